@@ -1,0 +1,37 @@
+# Two commands on a fresh machine: `make demo` and `make test`. Each sets up .venv by itself.
+VENV   ?= .venv
+PYTHON ?= python3
+BIN     = $(VENV)/bin
+DEMO   ?= demo
+
+.PHONY: demo test lint bench clean
+.DELETE_ON_ERROR:
+
+$(VENV)/.installed: pyproject.toml
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[dev]'
+	touch $@
+
+demo: $(VENV)/.installed
+	mkdir -p $(DEMO)
+	$(BIN)/netsp solve problems/wharf.json -o $(DEMO)/wharf-solution.json --plot $(DEMO)/wharf.png
+	$(BIN)/netsp verify problems/wharf.json $(DEMO)/wharf-solution.json
+	@echo
+	@echo "The picture is $(DEMO)/wharf.png, the tour $(DEMO)/wharf-solution.json."
+
+test: $(VENV)/.installed
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/python -m pytest -n auto --dist worksteal
+
+lint: $(VENV)/.installed
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+	$(BIN)/mypy
+
+bench: $(VENV)/.installed
+	$(BIN)/python benchmarks/spine.py
+
+clean:
+	rm -rf $(VENV) $(DEMO) .pytest_cache .mypy_cache .ruff_cache

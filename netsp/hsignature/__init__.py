@@ -1,0 +1,15 @@
+"""Homotopy signatures: words of a free group, and how a path writes one."""
+
+from netsp.hsignature.rays import crossings, signature
+from netsp.hsignature.words import EMPTY, Word, concatenate, invert, is_looping, reduce
+
+__all__ = [
+    "EMPTY",
+    "Word",
+    "concatenate",
+    "crossings",
+    "invert",
+    "is_looping",
+    "reduce",
+    "signature",
+]

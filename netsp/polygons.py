@@ -1,0 +1,95 @@
+"""Simple polygons: validity, an interior point, signed distance. Plain geometry for the door."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+Vertices = Sequence[tuple[float, float]]
+
+
+def check_polygon(vertices: Vertices) -> None:
+    """Raise ValueError unless the vertices bound a simple polygon of positive area."""
+    import shapely
+
+    if len(set(vertices)) < 3:
+        raise ValueError(f"expected at least 3 distinct vertices, got {len(set(vertices))}")
+    shape = shapely.Polygon(vertices)
+    size = float(np.ptp(np.asarray(vertices), axis=0).max())
+    if abs(shape.area) <= 1e-12 * size**2:
+        raise ValueError("polygon has zero area; expected one that encloses something")
+    if not shape.is_valid:
+        reason = shapely.is_valid_reason(shape)
+        raise ValueError(f"polygon is not simple ({reason}); expected edges that do not cross")
+
+
+def counterclockwise(vertices: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    """(k, 2) vertices in counter-clockwise order, without repeated or collinear ones."""
+    v = np.asarray(vertices, dtype=float)
+    keep = np.any(v != np.roll(v, 1, axis=0), axis=1)
+    v = v[keep]
+    while len(v) > 3:
+        a, b = v - np.roll(v, 1, axis=0), np.roll(v, -1, axis=0) - v
+        cross = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+        flat = np.abs(cross) <= 1e-12 * np.hypot(*a.T) * np.hypot(*b.T)
+        if not flat.any():
+            break
+        v = np.delete(v, int(np.argmax(flat)), axis=0)
+    x, y = v.T
+    if np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y) < 0:
+        v = v[::-1].copy()
+    return v
+
+
+def polygon_signed_distance(vertices: Vertices, xy: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    """Distance of points (..., 2) to the outline, negative inside."""
+    p = np.asarray(xy, dtype=float)
+    a = np.asarray(vertices, dtype=float)
+    b = np.roll(a, -1, axis=0)
+    edge = b - a
+    rel = p[..., None, :] - a
+    length2 = np.maximum((edge**2).sum(axis=-1), np.finfo(float).tiny)
+    t = np.clip((rel * edge).sum(axis=-1) / length2, 0.0, 1.0)
+    gap = rel - t[..., None] * edge
+    distance = np.sqrt((gap**2).sum(axis=-1)).min(axis=-1)
+    up = (a[:, 1] > p[..., None, 1]) != (b[:, 1] > p[..., None, 1])
+    dy = np.where(edge[:, 1] == 0.0, 1.0, edge[:, 1])
+    x = a[:, 0] + (p[..., None, 1] - a[:, 1]) / dy * edge[:, 0]
+    inside = (up & (p[..., None, 0] < x)).sum(axis=-1) % 2 == 1
+    return np.asarray(np.where(inside, -distance, distance))
+
+
+def polygon_interior_point(vertices: Vertices) -> tuple[float, float]:
+    """A point well inside, the same on every machine: the centroid when it keeps a tenth of the
+    best depth found, else the middle of the deepest horizontal chord at 15 fixed heights."""
+    v = np.asarray(vertices, dtype=float)
+    origin = v[0]
+    x, y = (v - origin).T
+    cross = x * np.roll(y, -1) - np.roll(x, -1) * y
+    centroid = origin + np.array(
+        [
+            np.sum((x + np.roll(x, -1)) * cross),
+            np.sum((y + np.roll(y, -1)) * cross),
+        ]
+    ) / (3.0 * np.sum(cross))
+    candidates = [centroid]
+    low, high = v[:, 1].min(), v[:, 1].max()
+    for k in range(1, 16):
+        height = low + (high - low) * k / 16
+        candidates += [
+            np.array([(x0 + x1) / 2, height]) for x0, x1 in _chords(v, float(height)) if x1 > x0
+        ]
+    depth = -polygon_signed_distance(vertices, np.array(candidates))
+    best = int(np.argmax(depth))
+    chosen = candidates[0] if depth[0] >= 0.1 * depth[best] else candidates[best]
+    return float(chosen[0]), float(chosen[1])
+
+
+def _chords(v: npt.NDArray[np.float64], height: float) -> list[tuple[float, float]]:
+    w = np.roll(v, -1, axis=0)
+    hit = (v[:, 1] > height) != (w[:, 1] > height)
+    a, b = v[hit], w[hit]
+    xs = np.sort(a[:, 0] + (height - a[:, 1]) / (b[:, 1] - a[:, 1]) * (b[:, 0] - a[:, 0]))
+    return [(float(p), float(q)) for p, q in zip(xs[::2], xs[1::2], strict=False)]

@@ -1,0 +1,423 @@
+"""The problem: what the robot must visit, what stands in the way, how long its tether is.
+
+Frozen and validated at the door, so that nothing further down has to doubt its input. The JSON
+format is version 1; `netsp schema problem` prints its JSON Schema, problems/README.md explains it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Iterable, Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    Tag,
+    ValidationError,
+    WithJsonSchema,
+    field_validator,
+    model_validator,
+)
+
+from netsp.errors import InputError
+from netsp.polygons import check_polygon, polygon_interior_point, polygon_signed_distance
+
+SCHEMA_VERSION = 1
+
+RELATIVE_TOLERANCE = 1e-9
+"""Lengths below this fraction of the largest coordinate count as zero (touching, on a boundary)."""
+
+
+def _number(value: Any) -> Any:
+    """Numbers only: no strings, no booleans; numpy scalars are welcome."""
+    if isinstance(value, bool | np.bool_) or not isinstance(value, int | float | np.number):
+        raise ValueError(f"expected a number, got {value!r}")
+    number = float(value)
+    if not math.isfinite(number):
+        raise ValueError(f"expected a finite number, got {value!r}")
+    return number
+
+
+def _coordinates(value: Any, sizes: tuple[int, ...]) -> tuple[float, ...]:
+    text = " or ".join(("[x, y]" if k == 2 else "[x, y, z]") for k in sizes)
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
+    if not isinstance(value, Sequence) or isinstance(value, str) or len(value) not in sizes:
+        raise ValueError(f"expected {text}, got {value!r}")
+    return tuple(_number(v) for v in value)
+
+
+def _point3(value: Any) -> tuple[float, ...]:
+    xyz = _coordinates(value, (2, 3))
+    return xyz if len(xyz) == 3 else (*xyz, 0.0)
+
+
+Number = Annotated[float, BeforeValidator(_number)]
+Point2 = Annotated[
+    tuple[float, float],
+    BeforeValidator(lambda v: _coordinates(v, (2,))),
+    WithJsonSchema(
+        {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2}
+    ),
+]
+_POINT3_SCHEMA = {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 3}
+Point3 = Annotated[
+    tuple[float, float, float], BeforeValidator(_point3), WithJsonSchema(_POINT3_SCHEMA)
+]
+
+_STRICT = ConfigDict(frozen=True, extra="forbid")
+
+
+class Circle(BaseModel):
+    """A vertical cylinder of unlimited height, given by its plan: centre and radius."""
+
+    model_config = _STRICT
+    center: Point2
+    radius: Annotated[Number, Field(gt=0)]
+    name: str | None = None
+
+    @property
+    def representative_point(self) -> tuple[float, float]:
+        """The point that the obstacle's ray starts from: the centre."""
+        return self.center
+
+    def signed_distance(self, xy: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        """Distance of points (..., 2) to the outline, negative inside."""
+        d = np.asarray(xy, dtype=float) - self.center
+        return np.asarray(np.hypot(d[..., 0], d[..., 1]) - self.radius)
+
+
+class Polygon(BaseModel):
+    """A vertical prism of unlimited height over a simple polygon, convex or not."""
+
+    model_config = _STRICT
+    polygon: Annotated[tuple[Point2, ...], Field(min_length=3)]
+    name: str | None = None
+
+    @model_validator(mode="after")
+    def _simple(self) -> Self:
+        check_polygon(self.polygon)
+        return self
+
+    @cached_property
+    def representative_point(self) -> tuple[float, float]:
+        """The point that the obstacle's ray starts from: the centroid if it lies inside, else the
+        middle of the widest horizontal chord at a fixed set of heights."""
+        return polygon_interior_point(self.polygon)
+
+    def signed_distance(self, xy: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        """Distance of points (..., 2) to the outline, negative inside."""
+        return polygon_signed_distance(self.polygon, xy)
+
+
+def _obstacle_kind(value: Any) -> str | None:
+    if isinstance(value, Circle):
+        return "circle"
+    if isinstance(value, Polygon):
+        return "polygon"
+    if isinstance(value, dict):
+        return "polygon" if "polygon" in value else "circle"
+    return None
+
+
+Obstacle = Annotated[
+    Annotated[Circle, Tag("circle")] | Annotated[Polygon, Tag("polygon")],
+    Discriminator(
+        _obstacle_kind,
+        custom_error_type="obstacle",
+        custom_error_message='expected {"center": [x, y], "radius": r} or {"polygon": [[x, y], …]}',
+    ),
+]
+
+
+class Goal(BaseModel):
+    """A point to inspect."""
+
+    model_config = _STRICT
+    position: Point3
+    name: str | None = None
+
+
+def _goal(value: Any) -> Any:
+    return value if isinstance(value, dict | Goal) else {"position": value}
+
+
+GoalLike = Annotated[
+    Goal,
+    BeforeValidator(_goal),
+    WithJsonSchema(
+        {
+            "anyOf": [
+                _POINT3_SCHEMA,
+                {
+                    "type": "object",
+                    "properties": {"name": {"type": "string"}, "position": _POINT3_SCHEMA},
+                    "required": ["position"],
+                    "additionalProperties": False,
+                },
+            ]
+        }
+    ),
+]
+
+
+class Problem(BaseModel):
+    """An instance of the Non-Entangling Travelling Salesperson Problem (McCammon & Hollinger 2017,
+    section III).
+
+    Attributes
+    ----------
+    base : where the tether is anchored and the tour starts and ends; (x, y, z), z up.
+    goals : points to visit; a bare ``[x, y]`` or ``[x, y, z]`` is accepted.
+    obstacles : vertical projections of circles or simple polygons.
+    tether_length : longest taut tether, measured in 3D from the base.
+    clearance : every obstacle is inflated by this (the vehicle's radius).
+    bounds : ``(xmin, ymin, xmax, ymax)`` box that robot and tether stay in, or None.
+
+    Raises
+    ------
+    pydantic.ValidationError : when constructed from values that break the format.
+    InputError : the same, in one line, from `load` and `from_json`.
+
+    >>> problem = Problem(base=(0, 0), goals=[(4, 0)], tether_length=5,
+    ...                   obstacles=[Circle(center=(2, 0), radius=1)])
+    >>> problem.goals[0].position
+    (4.0, 0.0, 0.0)
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", title="netsp problem")
+
+    schema_version: Literal[1] = SCHEMA_VERSION
+    name: str = "problem"
+    base: Point3
+    goals: Annotated[tuple[GoalLike, ...], Field(min_length=1)]
+    obstacles: tuple[Obstacle, ...] = ()
+    tether_length: Annotated[Number, Field(gt=0)]
+    clearance: Annotated[Number, Field(ge=0)] = 0.0
+    bounds: Annotated[
+        tuple[float, float, float, float] | None,
+        WithJsonSchema(
+            {
+                "anyOf": [
+                    {
+                        "type": "array",
+                        "items": {"type": "number"},
+                        "minItems": 4,
+                        "maxItems": 4,
+                    },
+                    {"type": "null"},
+                ]
+            }
+        ),
+    ] = None
+    units: str = "m"
+
+    @field_validator("bounds", mode="before")
+    @classmethod
+    def _box(cls, value: Any) -> Any:
+        if value is None:
+            return None
+        if isinstance(value, np.ndarray):
+            value = value.tolist()
+        if not isinstance(value, Sequence) or isinstance(value, str) or len(value) != 4:
+            raise ValueError(f"expected [xmin, ymin, xmax, ymax], got {value!r}")
+        box = tuple(_number(v) for v in value)
+        if not (box[0] < box[2] and box[1] < box[3]):
+            raise ValueError(f"expected xmin < xmax and ymin < ymax, got {list(box)}")
+        return box
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        self._check_distinct_goals()
+        self._check_free("base", self.base)
+        for k, goal in enumerate(self.goals):
+            self._check_free(self.goal_label(k), goal.position)
+        return self
+
+    def _check_distinct_goals(self) -> None:
+        seen: dict[tuple[float, float, float], int] = {}
+        for k, goal in enumerate(self.goals):
+            first = seen.setdefault(goal.position, k)
+            if first != k:
+                raise ValueError(
+                    f"{self.goal_label(k)}: same position {_show(goal.position)} as "
+                    f"{self.goal_label(first)}; expected distinct goals"
+                )
+
+    def _check_free(self, label: str, position: tuple[float, float, float]) -> None:
+        xy = position[:2]
+        tolerance = self.tolerance
+        if self.bounds is not None:
+            xmin, ymin, xmax, ymax = self.bounds
+            if not (
+                xmin - tolerance <= xy[0] <= xmax + tolerance
+                and ymin - tolerance <= xy[1] <= ymax + tolerance
+            ):
+                raise ValueError(
+                    f"{label}: {_show(position)} is outside bounds {list(self.bounds)}"
+                )
+        for i, obstacle in enumerate(self.obstacles):
+            distance = float(obstacle.signed_distance(xy))
+            if distance < self.clearance - tolerance:
+                grown = f" grown by the clearance {self.clearance:g}" if self.clearance else ""
+                raise ValueError(
+                    f"{label}: {_show(position)} lies inside {self.obstacle_label(i)}{grown} "
+                    f"(by {self.clearance - distance:.6g}); expected a point in free space"
+                )
+
+    @cached_property
+    def scale(self) -> float:
+        """Largest coordinate in absolute value, obstacles included: the scale of rounding errors,
+        so the unit of every tolerance."""
+        xy = [self.base[:2], *(g.position[:2] for g in self.goals)]
+        for o in self.obstacles:
+            if isinstance(o, Circle):
+                (x, y), r = o.center, o.radius
+                xy += [(x - r, y - r), (x + r, y + r)]
+            else:
+                xy += list(o.polygon)
+        return float(max(np.abs(np.array(xy)).max(), 1e-9 * self.tether_length))
+
+    @property
+    def tolerance(self) -> float:
+        """Length below which a depth, gap or penetration counts as zero."""
+        return RELATIVE_TOLERANCE * self.scale
+
+    @property
+    def representative_points(self) -> npt.NDArray[np.float64]:
+        """(n, 2) starts of the obstacles' rays."""
+        return np.array([o.representative_point for o in self.obstacles]).reshape(-1, 2)
+
+    @property
+    def points(self) -> npt.NDArray[np.float64]:
+        """(1 + m, 3) base, then goals."""
+        return np.array([self.base, *(g.position for g in self.goals)], dtype=float)
+
+    def goal_label(self, k: int) -> str:
+        """How messages name goal k (0-based)."""
+        name = self.goals[k].name
+        return f"goals[{k}]" + (f" ({name})" if name else "")
+
+    def obstacle_label(self, i: int) -> str:
+        """How messages name obstacle i (0-based)."""
+        name = self.obstacles[i].name
+        return f"obstacles[{i}]" + (f" ({name})" if name else "")
+
+    # JSON in and out
+
+    @classmethod
+    def from_json(cls, text: str | bytes, *, source: str = "problem") -> Self:
+        """Parse and validate; `InputError` with one line for anything wrong."""
+        data = parse_json_object(text, source)
+        version = data.get("schema_version", None)
+        if version != SCHEMA_VERSION or isinstance(version, bool):
+            raise InputError(f"{source}: schema_version: expected {SCHEMA_VERSION}, got {version!r}")
+        try:
+            return cls.model_validate(data)
+        except ValidationError as error:
+            raise InputError(f"{source}: {explain(error)}") from None
+
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """Read a problem file; `InputError` if it cannot be read or is not valid."""
+        return cls.from_json(read_text(path), source=str(path))
+
+    def to_json(self) -> str:
+        """The problem as version-1 JSON, in a form that reads back equal."""
+        data = self.model_dump(mode="json", exclude_none=True)
+        return json.dumps(data, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
+
+    @cached_property
+    def sha256(self) -> str:
+        """Hash of what the answer depends on: all values, but no names."""
+        data = self.model_dump(mode="json", exclude={"name": True, "units": True})
+        for item in (*data["goals"], *data["obstacles"]):
+            item.pop("name", None)
+        text = json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)
+        return hashlib.sha256(text.encode()).hexdigest()
+
+
+def read_text(path: str | Path) -> str:
+    """Contents of a UTF-8 text file, or `InputError` in one line."""
+    try:
+        return Path(path).read_text(encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: not a text file in UTF-8") from None
+
+
+def parse_json_object(text: str | bytes, source: str) -> dict[str, Any]:
+    """A JSON object without repeated keys, or `InputError` in one line."""
+
+    def unique(pairs: Iterable[tuple[str, Any]]) -> dict[str, Any]:
+        out: dict[str, Any] = {}
+        for key, value in pairs:
+            if key in out:
+                raise InputError(f"{source}: field {key!r} is given twice")
+            out[key] = value
+        return out
+
+    try:
+        data = json.loads(text, object_pairs_hook=unique)
+    except json.JSONDecodeError as error:
+        raise InputError(
+            f"{source}: not JSON: {error.msg} at line {error.lineno}, column {error.colno}"
+        ) from None
+    except RecursionError:
+        raise InputError(f"{source}: not JSON that netsp reads: nested too deeply") from None
+    if not isinstance(data, dict):
+        raise InputError(f"{source}: expected a JSON object, got {type(data).__name__}")
+    return data
+
+
+def explain(error: ValidationError) -> str:
+    """The first complaint of a validation error in one line: field, complaint, value."""
+    errors = error.errors(include_url=False)
+    first = errors[0]
+    where = ""
+    for part in first["loc"]:
+        if isinstance(part, int):
+            where += f"[{part}]"
+        elif part not in ("circle", "polygon") or not where.endswith("]"):
+            where += f".{part}" if where else str(part)
+        elif part == "polygon" and first["loc"].count("polygon") == 1 and _in_polygon(first):
+            where += ".polygon"
+    kind = first["type"]
+    if kind == "extra_forbidden":
+        message = "unknown field"
+    elif kind == "missing":
+        message = "missing"
+    elif kind in ("value_error", "obstacle"):
+        message = first["msg"].removeprefix("Value error, ")
+    else:
+        message = f"{_decapitalise(first['msg'])}, got {_brief(first['input'])}"
+    more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
+    return f"{where}: {message}{more}" if where else f"{message}{more}"
+
+
+def _in_polygon(first: Any) -> bool:
+    return bool(first["loc"][-1] != "polygon")
+
+
+def _decapitalise(text: str) -> str:
+    return text[:1].lower() + text[1:]
+
+
+def _brief(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "…"
+
+
+def _show(position: Sequence[float]) -> str:
+    return "(" + ", ".join(f"{v:g}" for v in position) + ")"

@@ -1,0 +1,74 @@
+"""Ray crossings of segments and arcs, compiled; the same rules as `netsp.hsignature.rays`.
+
+Sides are decided by comparing the stored x of a piece's two ends with the x of the ray, so the
+letters of consecutive pieces that share an end fit together exactly.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+
+@njit(cache=True)
+def ray_order(rays):
+    """Indices of the rays by x, ties by number: the order in which a rightward path meets them."""
+    return np.argsort(rays[:, 0], kind="mergesort")
+
+
+@njit(cache=True)
+def segment_letters(ax, ay, bx, by, rays, order, out, n):
+    """Append the letters of a straight segment to `out`; returns the new count."""
+    k = len(order)
+    rightward = bx > ax
+    for step in range(k):
+        i = order[step] if rightward else order[k - 1 - step]
+        x = rays[i, 0]
+        if (ax >= x) == (bx >= x):
+            continue
+        height = ay + (x - ax) / (bx - ax) * (by - ay)
+        if height > rays[i, 1]:
+            out[n] = i + 1 if rightward else -(i + 1)
+            n += 1
+    return n
+
+
+@njit(cache=True)
+def arc_letters(cx, cy, r, ax, bx, start, turn, rays, order, out, n):
+    """Append the letters of an arc from angle `start` through the signed angle `turn`.
+
+    ax, bx : stored x of the two ends. The arc is split at the quadrants into pieces monotone in x.
+    """
+    k = len(order)
+    quarter = 0.5 * math.pi
+    sign = 1.0 if turn >= 0.0 else -1.0
+    end = start + turn
+    angle, x0 = start, ax
+    boundary = math.floor(sign * start / quarter) + 1.0
+    while True:
+        nxt = sign * boundary * quarter
+        last = sign * (end - nxt) <= 0.0
+        if last:
+            x1, stop = bx, end
+        else:
+            which = int(sign * boundary) % 4
+            stop = nxt
+            x1 = cx + r if which == 0 else (cx - r if which == 2 else cx)
+        upper = math.sin(0.5 * (angle + stop)) > 0.0
+        rightward = x1 > x0
+        for step in range(k):
+            i = order[step] if rightward else order[k - 1 - step]
+            x = rays[i, 0]
+            if (x0 >= x) == (x1 >= x):
+                continue
+            root = math.sqrt(max(r * r - (x - cx) ** 2, 0.0))
+            height = cy + root if upper else cy - root
+            if height > rays[i, 1]:
+                out[n] = i + 1 if rightward else -(i + 1)
+                n += 1
+        if last:
+            return n
+        angle, x0 = stop, x1
+        boundary += 1.0

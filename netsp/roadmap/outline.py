@@ -1,0 +1,304 @@
+"""The outline of free space: what blocks a segment and which arcs a taut path can bend around.
+
+A circle of radius r, grown by the clearance, is a disk; a polygon grown by the clearance has a disk
+at each convex vertex, of which only the part between the normals of the two edges shows. So a
+circle is the one-vertex polygon, and every bend of a taut path is an arc of some disk. Where
+grown obstacles overlap, the covered part of an arc is cut away.
+
+Every obstacle is grown by a further `margin` (a fraction 1e-10 of the largest coordinate): what
+touches, overlaps, so no path slips through a gap of no width, and a polygon without clearance still
+has arcs. Lengths change by at most the margin times the turning.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from netsp.geometry import (
+    TWO_PI,
+    circle_circle_angles,
+    circle_line_angles,
+    depth_in_obstacle,
+    segment_blocked,
+)
+from netsp.polygons import counterclockwise
+from netsp.problem import Circle, Problem
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+MARGIN = 1e-10
+EPSILON = 1e-12
+
+
+@dataclass(frozen=True)
+class Blockers:
+    """Grown obstacles as arrays for the kernels of `netsp.geometry`."""
+
+    circles: Floats
+    edges: Floats
+    edge_start: Ints
+    grow: Floats
+    box: Floats
+    eps: float
+
+    def segment_blocked(self, a: npt.ArrayLike, b: npt.ArrayLike) -> bool:
+        """Whether the open segment enters a grown obstacle."""
+        (ax, ay), (bx, by) = np.asarray(a, dtype=float)[:2], np.asarray(b, dtype=float)[:2]
+        return bool(
+            segment_blocked(
+                ax,
+                ay,
+                bx,
+                by,
+                self.circles,
+                self.edges,
+                self.edge_start,
+                self.grow,
+                self.box,
+                self.eps,
+            )
+        )
+
+    def depth(self, point: npt.ArrayLike) -> Floats:
+        """(n,) depth of a point in each grown obstacle, negative outside."""
+        x, y = np.asarray(point, dtype=float)[:2]
+        return np.array(
+            [
+                depth_in_obstacle(x, y, o, self.circles, self.edges, self.edge_start, self.grow)
+                for o in range(len(self.circles))
+            ]
+        )
+
+
+@dataclass(frozen=True)
+class Outline:
+    """Free space for the taut roadmap.
+
+    Attributes
+    ----------
+    blockers : what a segment must not enter.
+    arcs : (a, 5) centre x, y, radius, start angle, end angle (counter-clockwise, end > start).
+    full : (a,) whether the arc is a whole circle.
+    points : (1 + m, 2) base and goals; one lying on a grown boundary is moved onto it exactly.
+    rays : (n, 2) representative points.
+    margin : the extra growth of all obstacles.
+    """
+
+    blockers: Blockers
+    arcs: Floats
+    full: npt.NDArray[np.bool_]
+    points: Floats
+    rays: Floats
+    margin: float
+
+
+def build_outline(problem: Problem) -> Outline:
+    """The outline of a problem's free space in the plane."""
+    scale = problem.scale
+    margin, eps = MARGIN * scale, EPSILON * scale
+    blockers, disks = _grow(problem, problem.clearance + margin, eps)
+    bounds = np.array(problem.bounds if problem.bounds else (-np.inf, -np.inf, np.inf, np.inf))
+    arcs, full = _visible_arcs(
+        disks,
+        blockers.circles,
+        blockers.edges,
+        blockers.edge_start,
+        blockers.grow,
+        blockers.box,
+        bounds,
+        eps,
+    )
+    points = np.array([_push_out(p[:2], blockers) for p in problem.points])
+    return Outline(blockers, arcs, full, points, problem.representative_points, margin)
+
+
+def _grow(problem: Problem, growth: float, eps: float) -> tuple[Blockers, Floats]:
+    """Blockers and disks (x, y, r, cone start, cone end); a whole circle's cone is 0 to 2 pi."""
+    circles, edges, edge_start, box = [], [], [0], []
+    disks: list[tuple[float, float, float, float, float]] = []
+    for obstacle in problem.obstacles:
+        if isinstance(obstacle, Circle):
+            (x, y), r = obstacle.center, obstacle.radius + growth
+            circles.append((x, y, r))
+            box.append((x - r, y - r, x + r, y + r))
+            disks.append((x, y, r, 0.0, TWO_PI))
+        else:
+            v = counterclockwise(obstacle.polygon)
+            following = np.roll(v, -1, axis=0)
+            edges.extend(np.hstack([v, following]).tolist())
+            circles.append((0.0, 0.0, -1.0))
+            box.append((*(v.min(axis=0) - growth), *(v.max(axis=0) + growth)))
+            disks.extend(_vertex_disks(v, growth))
+        edge_start.append(len(edges))
+    unique = list(dict.fromkeys(disks))
+    blockers = Blockers(
+        np.array(circles, dtype=float).reshape(-1, 3),
+        np.array(edges, dtype=float).reshape(-1, 4),
+        np.array(edge_start, dtype=np.int64),
+        np.full(len(circles), growth),
+        np.array(box, dtype=float).reshape(-1, 4),
+        eps,
+    )
+    return blockers, np.array(unique, dtype=float).reshape(-1, 5)
+
+
+def _vertex_disks(v: Floats, growth: float) -> list[tuple[float, float, float, float, float]]:
+    """Disks at the convex vertices of a counter-clockwise polygon with their normal cones."""
+    incoming = v - np.roll(v, 1, axis=0)
+    outgoing = np.roll(v, -1, axis=0) - v
+    disks = []
+    for (x, y), (ax, ay), (bx, by) in zip(v, incoming, outgoing, strict=True):
+        if ax * by - ay * bx > 0.0:
+            start = math.atan2(-ax, ay) % TWO_PI
+            turn = math.atan2(ax * by - ay * bx, ax * bx + ay * by)
+            disks.append((float(x), float(y), growth, start, start + turn))
+    return disks
+
+
+def _push_out(point: Floats, blockers: Blockers) -> Floats:
+    """Move a point that lies on a grown boundary, or a tolerance inside, just out of it."""
+    p = np.array(point, dtype=float)
+    for _ in range(32):
+        depth = blockers.depth(p)
+        if len(depth) == 0 or depth.max() <= 0.0:
+            break
+        o = int(np.argmax(depth))
+        if blockers.circles[o, 2] >= 0.0:
+            away = p - blockers.circles[o, :2]
+            p = blockers.circles[o, :2] + away / np.hypot(*away) * blockers.circles[o, 2] * (
+                1.0 + 4e-16
+            )
+        else:
+            p = _push_out_of_polygon(p, o, blockers)
+    return p
+
+
+def _push_out_of_polygon(p: Floats, o: int, blockers: Blockers) -> Floats:
+    """Out along the normal of the nearest edge, or away from the nearest vertex."""
+    e = blockers.edges[blockers.edge_start[o] : blockers.edge_start[o + 1]]
+    a, d = e[:, :2], e[:, 2:] - e[:, :2]
+    t = np.clip(((p - a) * d).sum(axis=1) / (d**2).sum(axis=1), 0.0, 1.0)
+    foot = a + t[:, None] * d
+    away = p - foot
+    k = int(np.argmin(np.hypot(away[:, 0], away[:, 1])))
+    normal = np.array([d[k, 1], -d[k, 0]]) / np.hypot(*d[k])
+    if 0.0 < t[k] < 1.0 or np.hypot(*away[k]) <= 1e-3 * blockers.grow[o]:
+        unit = normal
+    else:
+        unit = away[k] / np.hypot(*away[k])
+        if unit @ normal < 0.0:
+            unit = -unit
+    return np.asarray(foot[k] + unit * blockers.grow[o] * (1.0 + 1e-12))
+
+
+@njit(cache=True)
+def _covered(x, y, circles, edges, edge_start, grow, box, bounds, eps):
+    if x < bounds[0] - eps or x > bounds[2] + eps or y < bounds[1] - eps or y > bounds[3] + eps:
+        return True
+    for o in range(len(circles)):
+        if (
+            box[o, 0] <= x <= box[o, 2]
+            and box[o, 1] <= y <= box[o, 3]
+            and depth_in_obstacle(x, y, o, circles, edges, edge_start, grow) > eps
+        ):
+            return True
+    return False
+
+
+@njit(cache=True)
+def _visible_arcs(disks, circles, edges, edge_start, grow, box, bounds, eps):
+    """The parts of each disk's cone that no other obstacle covers and that lie within bounds."""
+    arcs = []
+    full = []
+    cuts = np.empty(2 * len(circles) + 6 * len(edges) + 16)
+    for k in range(len(disks)):
+        cx, cy, r = disks[k, 0], disks[k, 1], disks[k, 2]
+        start, end = disks[k, 3], disks[k, 4]
+        n = 0
+        for o in range(len(circles)):
+            if (
+                box[o, 0] > cx + r
+                or box[o, 2] < cx - r
+                or box[o, 1] > cy + r
+                or box[o, 3] < cy - r
+            ):
+                continue
+            if circles[o, 2] >= 0.0:
+                n = circle_circle_angles(
+                    cx, cy, r, circles[o, 0], circles[o, 1], circles[o, 2] - eps, cuts, n
+                )
+            for e in range(edge_start[o], edge_start[o + 1]):
+                ax, ay, bx, by = edges[e, 0], edges[e, 1], edges[e, 2], edges[e, 3]
+                n = circle_circle_angles(cx, cy, r, ax, ay, grow[o] - eps, cuts, n)
+                length = math.hypot(bx - ax, by - ay)
+                ux = (by - ay) / length * (grow[o] - eps)
+                uy = -(bx - ax) / length * (grow[o] - eps)
+                n = circle_line_angles(cx, cy, r, ax + ux, ay + uy, bx + ux, by + uy, cuts, n)
+                n = circle_line_angles(cx, cy, r, ax, ay, bx, by, cuts, n)
+        for side in range(4):
+            b = bounds[side]
+            if math.isinf(b):
+                continue
+            if side % 2 == 0:
+                n = circle_line_angles(cx, cy, r, b, cy - 1.0, b, cy + 1.0, cuts, n)
+            else:
+                n = circle_line_angles(cx, cy, r, cx - 1.0, b, cx + 1.0, b, cuts, n)
+        whole = end - start >= TWO_PI
+        inside = np.empty(n + 2)
+        m = 1
+        inside[0] = start
+        for i in range(n):
+            a = start + (cuts[i] - start) % TWO_PI
+            if start < a < end:
+                inside[m] = a
+                m += 1
+        inside[m] = end
+        m += 1
+        inside = np.sort(inside[:m])
+        first = len(arcs)
+        open_start = np.nan
+        for i in range(m - 1):
+            mid = 0.5 * (inside[i] + inside[i + 1])
+            hidden = inside[i + 1] <= inside[i] or _covered(
+                cx + r * math.cos(mid),
+                cy + r * math.sin(mid),
+                circles,
+                edges,
+                edge_start,
+                grow,
+                box,
+                bounds,
+                eps,
+            )
+            if inside[i + 1] <= inside[i]:
+                continue
+            if not hidden and math.isnan(open_start):
+                open_start = inside[i]
+            if hidden and not math.isnan(open_start):
+                arcs.append((cx, cy, r, open_start, inside[i]))
+                full.append(False)
+                open_start = np.nan
+        if not math.isnan(open_start):
+            if whole and open_start == start:
+                arcs.append((cx, cy, r, 0.0, TWO_PI))
+                full.append(True)
+            elif whole and len(arcs) > first and arcs[first][3] == start:
+                # the arc runs on through the angle where the cone was cut open
+                head = arcs[first]
+                arcs[first] = (cx, cy, r, open_start, head[4] + TWO_PI)
+            else:
+                arcs.append((cx, cy, r, open_start, end))
+                full.append(False)
+    out = np.empty((len(arcs), 5))
+    whole_out = np.empty(len(arcs), dtype=np.bool_)
+    for i in range(len(arcs)):
+        for j in range(5):
+            out[i, j] = arcs[i][j]
+        whole_out[i] = full[i]
+    return out, whole_out

@@ -1,0 +1,345 @@
+"""The tangent graph: all free segments that a taut path may use, with the letters they write.
+
+Nodes are directed arcs (arc, sense) and points (base, goals). A directed arc carries its departures
+in the order in which a robot sliding along it meets them, so that a taut path is: arrive, slide on
+in the same sense, depart. A taut path never uses anything else (docs/theory.md).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from netsp.geometry import TWO_PI, segment_blocked
+from netsp.roadmap.letters import arc_letters, ray_order, segment_letters
+from netsp.roadmap.outline import Outline
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+ANGLE_TOLERANCE = 1e-7
+"""A departure this little before the arrival counts as straight on (radians)."""
+
+
+@dataclass(frozen=True)
+class TangentGraph:
+    """Departures of all nodes in compressed rows.
+
+    Node ``2 a`` is arc a run counter-clockwise, ``2 a + 1`` clockwise, ``2 A + p`` is point p.
+
+    Attributes
+    ----------
+    start : (nodes + 1,) row starts into the departures below.
+    target : (e,) node arrived at.
+    length : (e,) length of the segment.
+    ends : (e, 4) x, y of departure and arrival.
+    angle : (e, 2) contact angle at departure and arrival (0 at points).
+    first : (e,) first departure of the target at or after the arrival; -1 if there is none.
+    turn : (e,) angle from the arrival to that departure.
+    gap : (e,) angle from this departure to the next of its node; negative at the end of an arc.
+    letters, segment_row, arrival_row, gap_row : words of the segment, of the arc from arrival to
+        `first`, and of the arc to the next departure, as rows into `letters`.
+    radius : (nodes,) radius of the arc (0 at points).
+    rays : (n, 2); cancelable : (2, n) whether letter +i / -i can be undone by a taut path.
+    """
+
+    arcs: Floats
+    full: npt.NDArray[np.bool_]
+    points: Floats
+    start: Ints
+    target: Ints
+    length: Floats
+    ends: Floats
+    angle: Floats
+    first: Ints
+    turn: Floats
+    gap: Floats
+    letters: npt.NDArray[np.int32]
+    segment_row: Ints
+    arrival_row: Ints
+    gap_row: Ints
+    radius: Floats
+    rays: Floats
+    cancelable: npt.NDArray[np.bool_]
+
+    def point_node(self, p: int) -> int:
+        """Node of point p."""
+        return 2 * len(self.arcs) + p
+
+
+def build_tangents(outline: Outline, reach: float) -> TangentGraph:
+    """All free tangents whose ends lie within `reach` of the base (inf for all).
+
+    Nothing farther from the base than the tether is ever touched: a leg between two admissible
+    goals stays in the ball of that radius, which is convex in the covering space.
+    """
+    b = outline.blockers
+    base = outline.points[0]
+    if np.isfinite(reach):
+        near = np.hypot(*(outline.arcs[:, :2] - base).T) - outline.arcs[:, 2] <= reach
+        arcs, full = outline.arcs[near], outline.full[near]
+    else:
+        arcs, full = outline.arcs, outline.full
+    rows = _tangents(
+        arcs,
+        full,
+        outline.points,
+        base,
+        reach,
+        b.circles,
+        b.edges,
+        b.edge_start,
+        b.grow,
+        b.box,
+        b.eps,
+    )
+    source, target, key, arrival_key, length, ends, angle = rows
+    order = np.lexsort((key, source))
+    node_count = 2 * len(arcs) + len(outline.points)
+    start = np.searchsorted(source[order], np.arange(node_count + 1)).astype(np.int64)
+    target, key, arrival_key = target[order], key[order], arrival_key[order]
+    length, ends, angle = length[order], ends[order], angle[order]
+    order_of_rays = ray_order(outline.rays) if len(outline.rays) else np.zeros(0, np.int64)
+    first, turn, gap, letters, segment_row, arrival_row, gap_row = _write_letters(
+        arcs,
+        full,
+        start,
+        target,
+        key,
+        arrival_key,
+        ends,
+        angle,
+        outline.rays,
+        order_of_rays,
+    )
+    radius = np.zeros(node_count)
+    radius[: 2 * len(arcs)] = np.repeat(arcs[:, 2], 2)
+    return TangentGraph(
+        arcs,
+        full,
+        outline.points,
+        start,
+        target,
+        length,
+        ends,
+        angle,
+        first,
+        turn,
+        gap,
+        letters,
+        segment_row,
+        arrival_row,
+        gap_row,
+        radius,
+        outline.rays,
+        _cancelable(outline),
+    )
+
+
+def _cancelable(outline: Outline) -> npt.NDArray[np.bool_]:
+    """Whether a taut path that crosses ray i can later cross it back without going round obstacle
+    i: only if, further up, the ray is interrupted by an obstacle whose representative point lies
+    on the side the path came from (lemma on pending letters in docs/theory.md)."""
+    rays = outline.rays
+    n = len(rays)
+    out = np.zeros((2, n), dtype=np.bool_)
+    box = outline.blockers.box
+    for i in range(n):
+        x, y = rays[i]
+        over = (box[:, 0] <= x) & (box[:, 2] >= x) & (box[:, 3] >= y)
+        over[i] = bool(outline.blockers.circles[i, 2] < 0.0)
+        out[0, i] = bool(np.any(over & (rays[:, 0] <= x)))
+        out[1, i] = bool(np.any(over & (rays[:, 0] >= x)))
+    return out
+
+
+@njit(cache=True)
+def _key(theta, sense, start, end, full):
+    """How far along the directed arc a contact angle lies; NaN if not on the arc."""
+    span = end - start
+    if sense > 0:
+        key = (theta - start) % TWO_PI
+    else:
+        key = (end - theta) % TWO_PI
+    if full:
+        return key
+    if key > span + ANGLE_TOLERANCE:
+        key -= TWO_PI
+    if key < -ANGLE_TOLERANCE:
+        return np.nan
+    return key
+
+
+@njit(cache=True)
+def _tangents(arcs, full, points, base, reach, circles, edges, edge_start, grow, box, eps):
+    """All free directed segments between arcs and points, unsorted."""
+    source = []
+    target = []
+    key = []
+    arrival_key = []
+    data = []
+    a_count, p_count = len(arcs), len(points)
+    total = a_count + p_count
+    place = np.zeros((total, 5))
+    place[:a_count] = arcs
+    place[a_count:, :2] = points
+    for i in range(total):
+        for j in range(i + 1, total):
+            xi, yi, ri, si, ei = place[i, 0], place[i, 1], place[i, 2], place[i, 3], place[i, 4]
+            xj, yj, rj, sj, ej = place[j, 0], place[j, 1], place[j, 2], place[j, 3], place[j, 4]
+            dx, dy = xj - xi, yj - yi
+            distance = math.hypot(dx, dy)
+            heading = math.atan2(dy, dx)
+            for ti in range(1 if i >= a_count else 2):
+                for tj in range(1 if j >= a_count else 2):
+                    sense_i = 1 - 2 * ti
+                    sense_j = 1 - 2 * tj
+                    k = sense_j * rj - sense_i * ri
+                    slack = distance * distance - k * k
+                    if slack < 0.0:
+                        # a point on a disk: within rounding it lies on it, not in it
+                        if (i >= a_count or j >= a_count) and abs(k) - distance <= eps:
+                            slack = 0.0
+                        else:
+                            continue
+                    if distance == 0.0 and i < a_count:
+                        continue
+                    length = math.sqrt(slack)
+                    direction = heading - math.atan2(k, length)
+                    ux, uy = math.cos(direction), math.sin(direction)
+                    theta_i = direction - sense_i * 0.5 * math.pi
+                    theta_j = direction - sense_j * 0.5 * math.pi
+                    key_i, key_j = 0.0, 0.0
+                    back_i, back_j = 0.0, 0.0
+                    if i < a_count:
+                        key_i = _key(theta_i, sense_i, si, ei, full[i])
+                        back_i = _key(theta_i, -sense_i, si, ei, full[i])
+                        if math.isnan(key_i):
+                            continue
+                    if j < a_count:
+                        key_j = _key(theta_j, sense_j, sj, ej, full[j])
+                        back_j = _key(theta_j, -sense_j, sj, ej, full[j])
+                        if math.isnan(key_j):
+                            continue
+                    ax, ay = xi + sense_i * ri * uy, yi - sense_i * ri * ux
+                    bx, by = xj + sense_j * rj * uy, yj - sense_j * rj * ux
+                    if (
+                        math.hypot(ax - base[0], ay - base[1]) > reach
+                        or math.hypot(bx - base[0], by - base[1]) > reach
+                    ):
+                        continue
+                    if segment_blocked(ax, ay, bx, by, circles, edges, edge_start, grow, box, eps):
+                        continue
+                    node_i = 2 * i + ti if i < a_count else a_count + i
+                    node_j = 2 * j + tj if j < a_count else a_count + j
+                    rev_i = node_i ^ 1 if i < a_count else node_i
+                    rev_j = node_j ^ 1 if j < a_count else node_j
+                    source.append(node_i)
+                    target.append(node_j)
+                    key.append(key_i)
+                    arrival_key.append(key_j)
+                    data.append((length, ax, ay, bx, by, theta_i, theta_j))
+                    source.append(rev_j)
+                    target.append(rev_i)
+                    key.append(back_j)
+                    arrival_key.append(back_i)
+                    data.append((length, bx, by, ax, ay, theta_j, theta_i))
+    n = len(source)
+    lengths = np.empty(n)
+    ends = np.empty((n, 4))
+    angle = np.empty((n, 2))
+    src = np.empty(n, dtype=np.int64)
+    dst = np.empty(n, dtype=np.int64)
+    k_out = np.empty(n)
+    k_in = np.empty(n)
+    for e in range(n):
+        src[e], dst[e], k_out[e], k_in[e] = source[e], target[e], key[e], arrival_key[e]
+        lengths[e] = data[e][0]
+        ends[e, 0], ends[e, 1] = data[e][1], data[e][2]
+        ends[e, 2], ends[e, 3] = data[e][3], data[e][4]
+        angle[e, 0], angle[e, 1] = data[e][5], data[e][6]
+    return src, dst, k_out, k_in, lengths, ends, angle
+
+
+@njit(cache=True)
+def _write_letters(arcs, full, start, target, key, arrival_key, ends, angle, rays, order):
+    """Words of segments and of the arc pieces between arrivals and departures."""
+    e_count = len(target)
+    arc_nodes = 2 * len(arcs)
+    first = np.full(e_count, -1, dtype=np.int64)
+    turn = np.zeros(e_count)
+    gap = np.full(e_count, -1.0)
+    segment_row = np.zeros((e_count, 2), dtype=np.int64)
+    arrival_row = np.zeros((e_count, 2), dtype=np.int64)
+    gap_row = np.zeros((e_count, 2), dtype=np.int64)
+    pool = np.empty(1024 + 8 * e_count, dtype=np.int32)
+    n = 0
+    room = 16 * (len(rays) + 1)
+    for node in range(len(start) - 1):
+        for e in range(start[node], start[node + 1]):
+            if n + 3 * room > len(pool):
+                bigger = np.empty(2 * len(pool) + 3 * room, dtype=np.int32)
+                bigger[:n] = pool[:n]
+                pool = bigger
+            segment_row[e, 0] = n
+            n = segment_letters(
+                ends[e, 0], ends[e, 1], ends[e, 2], ends[e, 3], rays, order, pool, n
+            )
+            segment_row[e, 1] = n
+            if node < arc_nodes:
+                a = node // 2
+                cx, cy, r = arcs[a, 0], arcs[a, 1], arcs[a, 2]
+                sense = 1.0 if node % 2 == 0 else -1.0
+                nxt = e + 1
+                step = -1.0
+                if nxt < start[node + 1]:
+                    step = key[nxt] - key[e]
+                elif full[node // 2]:
+                    nxt = start[node]
+                    step = key[nxt] + TWO_PI - key[e]
+                gap[e] = step
+                if step >= 0.0:
+                    gap_row[e, 0] = n
+                    n = arc_letters(
+                        cx, cy, r, ends[e, 0], ends[nxt, 0], angle[e, 0], sense * step,
+                        rays, order, pool, n,
+                    )
+                    gap_row[e, 1] = n
+            else:
+                gap[e] = 0.0 if e + 1 < start[node + 1] else -1.0
+            goal = target[e]
+            if goal < arc_nodes:
+                a = goal // 2
+                cx, cy, r = arcs[a, 0], arcs[a, 1], arcs[a, 2]
+                sense = 1.0 if goal % 2 == 0 else -1.0
+                lo, hi = start[goal], start[goal + 1]
+                f = lo
+                while f < hi and key[f] < arrival_key[e] - ANGLE_TOLERANCE:
+                    f += 1
+                wrap = 0.0
+                if f == hi and full[goal // 2] and hi > lo:
+                    f = lo
+                    wrap = TWO_PI
+                if f < hi:
+                    # departures just before the cut of a whole circle, arrival just after it
+                    if full[goal // 2] and wrap == 0.0 and f == lo:
+                        back = hi - 1
+                        while (
+                            back > lo
+                            and key[back] - TWO_PI >= arrival_key[e] - ANGLE_TOLERANCE
+                        ):
+                            f, wrap = back, -TWO_PI
+                            back -= 1
+                    first[e] = f
+                    turn[e] = key[f] + wrap - arrival_key[e]
+                    arrival_row[e, 0] = n
+                    n = arc_letters(
+                        cx, cy, r, ends[e, 2], ends[f, 0], angle[e, 1], sense * turn[e],
+                        rays, order, pool, n,
+                    )
+                    arrival_row[e, 1] = n
+    return first, turn, gap, pool[:n].copy(), segment_row, arrival_row, gap_row

@@ -1,0 +1,364 @@
+"""The exact roadmap: every taut class of every goal, and the exact length of every leg.
+
+Facts used (docs/theory.md): a homotopy class holds exactly one taut path; a taut path alternates
+common tangents and arcs; a leg between two admissible classes never needs more tether than its ends
+do, so its cost is the length of the taut path of the word ``h_i^-1 h_j`` and depends on nothing
+else; obstacles are vertical, so a 3D length is ``hypot(planar taut length, dz)``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from netsp.errors import InfeasibleError, InputError, NetspError
+from netsp.hsignature import Word, concatenate, invert
+from netsp.problem import Problem
+from netsp.roadmap.explore import Trie, run_explore, trie_child, trie_grown
+from netsp.roadmap.outline import Outline, build_outline
+from netsp.roadmap.reach import explain_unreached
+from netsp.roadmap.tangents import TangentGraph, build_tangents
+from netsp.travel import TravelGraph
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+MAX_CLASSES = 20_000
+"""Default for the most augmented goals a travel graph may have."""
+
+STATES_PER_CLASS = 2_000
+
+ARC_STEP = math.radians(3.0)
+"""Arcs are drawn as circumscribed chords of at most this turn: 0.023 % longer than the arc."""
+
+
+class TautRoadmap:
+    """Classes and legs of one problem. Satisfies `netsp.travel.Legs`.
+
+    Raises
+    ------
+    InfeasibleError : a goal that no taut tether reaches; names it and the tether that would do.
+    InputError : more classes than `max_classes`.
+    """
+
+    def __init__(self, problem: Problem, *, max_classes: int = MAX_CLASSES) -> None:
+        self.problem = problem
+        self.outline: Outline = build_outline(problem)
+        self.tangents: TangentGraph = build_tangents(self.outline, problem.tether_length)
+        # what rounding and the extra growth of obstacles can add to a length
+        self._margin = 100.0 * self.outline.margin
+        self._z = problem.points[:, 2]
+        self.cluster, self.signatures, self.planar = self._classes(max_classes)
+        self.tethers: Floats = np.hypot(self.planar, self._z[self.cluster] - self._z[0])
+
+    def travel_graph(self) -> TravelGraph:
+        """The travel graph over this roadmap; legs are computed when first asked for."""
+        return TravelGraph(self.cluster, self.signatures, self.tethers, self, roadmap="taut")
+
+    # classes
+
+    def _classes(self, max_classes: int) -> tuple[Ints, list[Word], Floats]:
+        """Clusters, words and planar lengths of all admissible augmented goals, base first."""
+        limit = self.problem.tether_length + self._margin
+        trie = Trie.root(limit)
+        hits, _, capped = run_explore(
+            self.tangents,
+            0,
+            trie,
+            grow=True,
+            keep=False,
+            margin=self.outline.margin,
+            cap=STATES_PER_CLASS * max_classes,
+        )
+        goal, word, length = hits[:3]
+        reach = np.hypot(length, self._z[goal] - self._z[0])
+        admissible = (goal > 0) & (reach <= limit)
+        best: dict[tuple[int, int], float] = {}
+        for g, w, d in zip(goal[admissible], word[admissible], length[admissible], strict=True):
+            key = (int(g), int(w))
+            best[key] = min(best.get(key, math.inf), float(d))
+        if capped or len(best) > max_classes:
+            found = f"{len(best)} classes so far" if capped else f"{len(best)} classes"
+            raise InputError(
+                f"tether_length: {self.problem.tether_length:g} admits too many homotopy classes "
+                f"({found}, limit {max_classes}); lower tether_length or raise max_classes"
+            )
+        missing = sorted(set(range(1, len(self._z))) - {g for g, _ in best})
+        if missing:
+            raise InfeasibleError(explain_unreached(self.problem, self.outline, missing))
+        order = sorted(best, key=lambda k: (k[0], best[k], trie.word(k[1])))
+        cluster = np.array([0, *(g for g, _ in order)], dtype=np.int64)
+        words: list[Word] = [(), *(trie.word(w) for _, w in order)]
+        planar = np.array([0.0, *(best[k] for k in order)])
+        return cluster, words, planar
+
+    # legs
+
+    def lengths(self, vertices: Ints) -> Floats:
+        """(k, k) 3D leg lengths among the given vertices; inf within a cluster.
+
+        Lengths are translation-invariant on the cover: all pairs with the same goals and the same
+        relative word share one taut path, so each goal is searched once, for all relative words.
+        """
+        vertices = np.asarray(vertices, dtype=np.int64)
+        cluster = self.cluster[vertices]
+        out = np.full((len(vertices), len(vertices)), np.inf)
+        flat = [np.array(self.signatures[v], dtype=np.int64) for v in vertices]
+        row = np.concatenate([[0], np.cumsum([len(w) for w in flat])]).astype(np.int64)
+        letters = np.concatenate(flat).astype(np.int64) if row[-1] else np.zeros(0, np.int64)
+        planar = self.planar[vertices]
+        for g in np.unique(cluster):
+            here = np.flatnonzero(cluster == g)
+            there = np.flatnonzero(cluster > g)
+            if len(there) == 0:
+                continue
+            if g == 0:
+                block = np.broadcast_to(planar[there], (len(here), len(there)))
+            else:
+                block = self._legs_from(int(g), here, there, letters, row, planar, cluster)
+            dz = self._z[g] - self._z[cluster[there]]
+            block = np.hypot(block, dz[None, :])
+            out[np.ix_(here, there)] = block
+            out[np.ix_(there, here)] = block.T
+        return out
+
+    def _legs_from(
+        self,
+        g: int,
+        here: Ints,
+        there: Ints,
+        letters: Ints,
+        row: Ints,
+        planar: Floats,
+        cluster: Ints,
+    ) -> Floats:
+        """(len(here), len(there)) planar lengths of all legs from the classes of goal g."""
+        trie = Trie.root(0.0)
+        arrays, head, entry_goal, entry_next, pair = _wanted(
+            here, there, letters, row, planar, cluster, self._margin,
+            trie.parent, trie.letter, trie.child, trie.sibling, trie.core, trie.limit,
+            self.tangents.cancelable,
+        )  # fmt: skip
+        (trie.parent, trie.letter, trie.child, trie.sibling, trie.core, trie.limit, trie.size) = (
+            arrays
+        )
+        core_size = trie.size
+        hits, _, capped = run_explore(
+            self.tangents,
+            g,
+            trie,
+            grow=False,
+            keep=False,
+            margin=self.outline.margin,
+            cap=np.iinfo(np.int64).max,
+        )
+        found = _match(
+            hits[0], hits[1], hits[2], head[:core_size], entry_goal, entry_next, len(entry_goal)
+        )
+        if np.isinf(found).any():
+            k = int(np.argmax(np.isinf(found)))
+            u, w = np.argwhere(pair == k)[0]
+            raise NetspError(
+                f"internal: no taut leg found between goal {g - 1} and goal "
+                f"{cluster[there[w]] - 1} for word "
+                f"{self.relative_word(int(here[u]), int(there[w]))}; please report the problem file"
+            )
+        return np.asarray(found[pair])
+
+    def relative_word(self, u: int, v: int) -> Word:
+        """The word of the leg from vertex u to vertex v."""
+        return concatenate(invert(self.signatures[u]), self.signatures[v])
+
+    # paths
+
+    def path(self, u: int, v: int) -> Floats:
+        """(n, 3) polyline of the taut leg from vertex u to vertex v, arcs circumscribed; height
+        changes in proportion to planar length."""
+        word = self.relative_word(u, v)
+        return self.taut_path(int(self.cluster[u]), int(self.cluster[v]), word)
+
+    def taut_path(self, a: int, b: int, word: Word) -> Floats:
+        """(n, 3) polyline of the taut path of a word from point a to point b (0 is the base)."""
+        length, pieces = self._taut_pieces(a, b, word)
+        xy = self._polyline(a, b, pieces)
+        steps = np.hypot(*np.diff(xy, axis=0).T)
+        total = float(steps.sum())
+        fraction = np.concatenate([[0.0], np.cumsum(steps)]) / total if total else steps
+        if not total:
+            fraction = np.linspace(0.0, 1.0, len(xy))
+        z = self._z[a] + fraction * (self._z[b] - self._z[a])
+        out = np.column_stack([xy, z])
+        out[0], out[-1] = self.problem.points[a], self.problem.points[b]
+        return out
+
+    def _taut_pieces(
+        self, a: int, b: int, word: Word
+    ) -> tuple[float, list[tuple[int, float]]]:
+        """Length, and (departure, angle slid before it) along the taut path of a word."""
+        limit = 2.0 * self.problem.tether_length + self._margin
+        trie = Trie.root(limit, capacity=max(256, 2 * len(word) + 2))
+        for k, letter in enumerate(word):
+            trie.parent[k + 1], trie.letter[k + 1] = k, letter
+            trie.child[k] = k + 1
+            trie.core[k + 1], trie.limit[k + 1] = True, limit
+        trie.size = len(word) + 1
+        hits, tree, _ = run_explore(
+            self.tangents,
+            a,
+            trie,
+            grow=False,
+            keep=True,
+            margin=self.outline.margin,
+            cap=np.iinfo(np.int64).max,
+        )
+        goal, node, length, state, edge, slid = hits
+        wanted = np.flatnonzero((goal == b) & (node == len(word)))
+        if len(wanted) == 0:
+            raise NetspError(f"internal: no taut path of word {word} from point {a} to point {b}")
+        best = int(wanted[np.argmin(length[wanted])])
+        pieces = [(int(edge[best]), float(slid[best]))]
+        parent, via, turned = tree
+        s = int(state[best])
+        while parent[s] >= 0:
+            pieces.append((int(via[s]), float(turned[s])))
+            s = int(parent[s])
+        return float(length[best]), pieces[::-1]
+
+    def _polyline(self, a: int, b: int, pieces: Sequence[tuple[int, float]]) -> Floats:
+        """Tangents and circumscribed arcs as one polyline, finer where a gap is narrow."""
+        step = ARC_STEP
+        for _ in range(12):
+            xy = self._draw(a, b, pieces, step)
+            if not any(
+                self.outline.blockers.segment_blocked(p, q)
+                for p, q in zip(xy[:-1], xy[1:], strict=True)
+            ):
+                break
+            step /= 2.0
+        return xy
+
+    def _draw(self, a: int, b: int, pieces: Sequence[tuple[int, float]], step: float) -> Floats:
+        t = self.tangents
+        out = [tuple(self.outline.points[a])]
+        for k, (e, slid) in enumerate(pieces):
+            if k > 0:
+                before = pieces[k - 1][0]
+                node = int(t.target[before])
+                cx, cy, r = t.arcs[node // 2, :3]
+                sense = 1.0 if node % 2 == 0 else -1.0
+                # the first departure may lie a rounding before the arrival: then nothing is slid
+                count = max(1, math.ceil(slid / step - 1e-9))
+                if slid > 1e-7:
+                    out.append(tuple(t.ends[before, 2:]))
+                    half = slid / count / 2.0
+                    radius = r / math.cos(half)
+                    for i in range(count):
+                        theta = t.angle[before, 1] + sense * half * (2 * i + 1)
+                        out.append((cx + radius * math.cos(theta), cy + radius * math.sin(theta)))
+                out.append(tuple(t.ends[e, :2]))
+        out.append(tuple(self.outline.points[b]))
+        xy = np.array(out)
+        keep = np.concatenate([[True], np.any(np.diff(xy, axis=0) != 0.0, axis=1)])
+        keep[-1] = True
+        return np.asarray(xy[keep] if keep.sum() > 1 else xy[[0, -1]])
+
+
+@njit(cache=True)
+def _wanted(
+    here, there, letters, row, planar, cluster, margin,
+    parent, letter, child, sibling, core, limit, cancelable,
+):  # fmt: skip
+    """The trie of all relative words between two lists of vertices.
+
+    Returns the trie, per node the head of a list of (goal, entry), and the entry of each pair.
+    """
+    size = 1
+    head = np.full(len(parent), -1, dtype=np.int64)
+    e_goal = np.empty(1024, dtype=np.int64)
+    e_next = np.empty(1024, dtype=np.int64)
+    entries = 0
+    pair = np.empty((len(here), len(there)), dtype=np.int64)
+    for a in range(len(here)):
+        u = here[a]
+        for b in range(len(there)):
+            v = there[b]
+            nu, nv = row[u + 1] - row[u], row[v + 1] - row[v]
+            shared = 0
+            while (
+                shared < nu and shared < nv and letters[row[u] + shared] == letters[row[v] + shared]
+            ):
+                shared += 1
+            bound = planar[u] + planar[v] + margin
+            node = 0
+            limit[0] = max(limit[0], bound)
+            for k in range(nu + nv - 2 * shared):
+                if k < nu - shared:
+                    x = -letters[row[u + 1] - 1 - k]
+                else:
+                    x = letters[row[v] + shared + k - (nu - shared)]
+                c = trie_child(node, x, letter, child, sibling)
+                if c < 0:
+                    if size == len(parent):
+                        parent, letter, child, sibling, core, limit = trie_grown(
+                            parent, letter, child, sibling, core, limit
+                        )
+                        head2 = np.full(len(parent), -1, dtype=np.int64)
+                        head2[: len(head)] = head
+                        head = head2
+                    c = size
+                    size += 1
+                    parent[c], letter[c], core[c], limit[c] = node, x, True, bound
+                    sibling[c] = child[node]
+                    child[node] = c
+                elif limit[c] < bound:
+                    limit[c] = bound
+                node = c
+            goal = cluster[v]
+            e = head[node]
+            while e >= 0 and e_goal[e] != goal:
+                e = e_next[e]
+            if e < 0:
+                if entries == len(e_goal):
+                    g2 = np.empty(2 * entries, dtype=np.int64)
+                    n2 = np.empty(2 * entries, dtype=np.int64)
+                    g2[:entries] = e_goal
+                    n2[:entries] = e_next
+                    e_goal, e_next = g2, n2
+                e = entries
+                entries += 1
+                e_goal[e], e_next[e] = goal, head[node]
+                head[node] = e
+            pair[a, b] = e
+    if size == len(parent):
+        parent, letter, child, sibling, core, limit = trie_grown(
+            parent, letter, child, sibling, core, limit
+        )
+        head2 = np.full(len(parent), -1, dtype=np.int64)
+        head2[: len(head)] = head
+        head = head2
+    # a path may stand on a longer word whose last letters it will still cancel
+    for c in range(1, size):
+        x = letter[c]
+        if cancelable[0, x - 1] if x > 0 else cancelable[1, -x - 1]:
+            limit[c] = max(limit[c], limit[parent[c]])
+    arrays = (parent, letter, child, sibling, core, limit, size)
+    return arrays, head, e_goal[:entries], e_next[:entries], pair
+
+
+@njit(cache=True)
+def _match(goal, node, length, head, entry_goal, entry_next, entries):
+    """Shortest hit of every entry; inf where there is none."""
+    out = np.full(entries, np.inf)
+    for i in range(len(goal)):
+        if node[i] < len(head):
+            e = head[node[i]]
+            while e >= 0:
+                if entry_goal[e] == goal[i]:
+                    out[e] = min(out[e], length[i])
+                    break
+                e = entry_next[e]
+    return out

@@ -1,0 +1,133 @@
+"""The solution of a problem, and what is honestly known of it. JSON format version 1."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from netsp.errors import InputError
+from netsp.problem import SCHEMA_VERSION, Number, Point3, explain, parse_json_object, read_text
+
+
+class Status(StrEnum):
+    """What is proven. `OPTIMAL` speaks of the travel graph; with the exact roadmap the travel graph
+    holds every admissible tour of the continuous world."""
+
+    OPTIMAL = "optimal"
+    FEASIBLE = "feasible"
+    INFEASIBLE = "infeasible"
+    NO_SOLUTION_FOUND = "no_solution_found"
+
+
+_STRICT = ConfigDict(frozen=True, extra="forbid")
+
+
+class ProblemReference(BaseModel):
+    """Which problem a solution belongs to."""
+
+    model_config = _STRICT
+    name: str
+    sha256: str
+
+
+class Visit(BaseModel):
+    """One stop of the tour: the goal (0-based), the word of the tether there, its taut length."""
+
+    model_config = _STRICT
+    goal: Annotated[int, Field(ge=0)]
+    signature: tuple[int, ...]
+    tether_length: Annotated[Number, Field(ge=0)]
+
+
+class Timings(BaseModel):
+    """Wall-clock seconds by stage."""
+
+    model_config = _STRICT
+    roadmap_s: float = 0.0
+    matrix_s: float = 0.0
+    solve_s: float = 0.0
+    total_s: float = 0.0
+
+
+class Solution(BaseModel):
+    """A tour with its proof status; `path` is a closed polyline from the base to the base.
+
+    Lengths are in the problem's units. `lower_bound` is a proven bound on every admissible tour,
+    `gap` is (length - lower_bound) / length. Without a tour, `length` and `gap` are None.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", title="netsp solution")
+
+    schema_version: Literal[1] = SCHEMA_VERSION
+    problem: ProblemReference
+    solver: str
+    roadmap: str
+    seed: int | None = None
+    status: Status
+    length: Number | None
+    lower_bound: Number | None
+    gap: Number | None
+    tour: tuple[Visit, ...] = ()
+    path: tuple[Point3, ...] = ()
+    timings: Timings = Timings()
+    versions: dict[str, str] = {}
+
+    @classmethod
+    def from_json(cls, text: str | bytes, *, source: str = "solution") -> Self:
+        """Parse and validate; `InputError` with one line for anything wrong."""
+        data = parse_json_object(text, source)
+        version = data.get("schema_version", None)
+        if version != SCHEMA_VERSION or isinstance(version, bool):
+            raise InputError(f"{source}: schema_version: expected {SCHEMA_VERSION}, got {version!r}")
+        try:
+            return cls.model_validate(data)
+        except ValidationError as error:
+            raise InputError(f"{source}: {explain(error)}") from None
+
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """Read a solution file; `InputError` if it cannot be read or is not valid."""
+        return cls.from_json(read_text(path), source=str(path))
+
+    def to_json(self) -> str:
+        """The solution as version-1 JSON."""
+        data = self.model_dump(mode="json")
+        path = data.pop("path")
+        text = json.dumps(data, indent=1, allow_nan=False, ensure_ascii=False)
+        rows = ",\n".join("  " + json.dumps(p, allow_nan=False) for p in path)
+        return f'{text[:-2]},\n "path": [\n{rows}\n ]\n}}\n'
+
+    def save(self, path: str | Path) -> None:
+        """Write the solution file whole or not at all; `InputError` if it cannot be written."""
+        write_text(path, self.to_json())
+
+
+def write_text(path: str | Path, text: str) -> None:
+    """Write a file by renaming a finished one into place, so that it is never half there."""
+    target = Path(path)
+    if target.exists() and not target.is_file():  # /dev/stdout and the like
+        try:
+            target.write_text(text, encoding="utf-8")
+        except OSError as error:
+            raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
+        return
+    try:
+        handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8") as stream:
+            stream.write(text)
+        umask = os.umask(0)
+        os.umask(umask)
+        os.chmod(name, 0o666 & ~umask)
+        os.replace(name, target)
+    except OSError as error:
+        Path(name).unlink(missing_ok=True)
+        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
