@@ -1,0 +1,118 @@
+"""For a fixed order of goals the best classes are a shortest path through layers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from netsp.travel import TravelGraph
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Instance:
+    """A travel graph with vertices grouped by cluster: members of cluster c are
+    order[start[c]:start[c + 1]]."""
+
+    graph: TravelGraph
+
+    @cached_property
+    def order(self) -> Ints:
+        """Vertices by cluster."""
+        return np.argsort(self.graph.cluster, kind="stable").astype(np.int64)
+
+    @cached_property
+    def start(self) -> Ints:
+        """Row starts into `order`."""
+        c = self.graph.cluster[self.order]
+        return np.searchsorted(c, np.arange(self.graph.goal_count + 2)).astype(np.int64)
+
+    @cached_property
+    def costs(self) -> Floats:
+        """(V, V) leg costs in the order of `order`."""
+        return np.ascontiguousarray(self.graph.costs[np.ix_(self.order, self.order)])
+
+    @cached_property
+    def cluster_costs(self) -> Floats:
+        """(m + 1, m + 1) least leg cost between clusters."""
+        k = len(self.start) - 1
+        out = np.full((k, k), np.inf)
+        for a in range(k):
+            for b in range(k):
+                block = self.costs[self.start[a] : self.start[a + 1], self.start[b] : self.start[b + 1]]
+                if a != b:
+                    out[a, b] = block.min()
+        return out
+
+    def original(self, tour: npt.ArrayLike) -> tuple[int, ...]:
+        """Vertices of the travel graph from positions in `order`."""
+        return tuple(int(v) for v in self.order[np.asarray(tour, dtype=np.int64)])
+
+
+@njit(cache=True)
+def layered_length(clusters, start, costs, work):
+    """Length of the best closed tour base, clusters…, base. work : (2, largest cluster)."""
+    n = len(clusters)
+    c = clusters[0]
+    width = start[c + 1] - start[c]
+    for j in range(width):
+        work[0, j] = costs[0, start[c] + j]
+    row = 0
+    for k in range(1, n):
+        p, c = c, clusters[k]
+        p_width, width = width, start[c + 1] - start[c]
+        for j in range(width):
+            v = start[c] + j
+            best = np.inf
+            for i in range(p_width):
+                d = work[row, i] + costs[start[p] + i, v]
+                if d < best:
+                    best = d
+            work[1 - row, j] = best
+        row = 1 - row
+    best = np.inf
+    for j in range(width):
+        d = work[row, j] + costs[start[c] + j, 0]
+        if d < best:
+            best = d
+    return best
+
+
+@njit(cache=True)
+def best_classes(clusters, start, costs):
+    """Length and vertices (base first) of the best tour that visits clusters in the given order."""
+    n = len(clusters)
+    largest = 0
+    for k in range(n):
+        largest = max(largest, start[clusters[k] + 1] - start[clusters[k]])
+    reach = np.full((n, largest), np.inf)
+    back = np.zeros((n, largest), dtype=np.int64)
+    for k in range(n):
+        c = clusters[k]
+        for j in range(start[c + 1] - start[c]):
+            v = start[c] + j
+            if k == 0:
+                reach[k, j] = costs[0, v]
+                continue
+            p = clusters[k - 1]
+            for i in range(start[p + 1] - start[p]):
+                d = reach[k - 1, i] + costs[start[p] + i, v]
+                if d < reach[k, j]:
+                    reach[k, j], back[k, j] = d, i
+    best, at = np.inf, 0
+    c = clusters[n - 1]
+    for j in range(start[c + 1] - start[c]):
+        d = reach[n - 1, j] + costs[start[c] + j, 0]
+        if d < best:
+            best, at = d, j
+    tour = np.zeros(n + 1, dtype=np.int64)
+    for k in range(n - 1, -1, -1):
+        tour[k + 1] = start[clusters[k]] + at
+        at = back[k, at]
+    return best, tour

@@ -1,0 +1,5 @@
+"""The paper's mixed-integer program, solved by cutting planes and lazy rounds."""
+
+from netsp.mip.solve import solve
+
+__all__ = ["solve"]
