@@ -102,9 +102,7 @@ def segment_depth_in_obstacle(ax, ay, bx, by, o, circles, edges, edge_start, gro
 @njit(cache=True)
 def segment_blocked(ax, ay, bx, by, circles, edges, edge_start, grow, box, eps):
     for o in range(len(circles)):
-        if segment_depth_in_obstacle(
-            ax, ay, bx, by, o, circles, edges, edge_start, grow, box, eps
-        ):
+        if segment_depth_in_obstacle(ax, ay, bx, by, o, circles, edges, edge_start, grow, box, eps):
             return True
     return False
 

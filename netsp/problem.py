@@ -66,9 +66,7 @@ Number = Annotated[float, BeforeValidator(_number)]
 Point2 = Annotated[
     tuple[float, float],
     BeforeValidator(lambda v: _coordinates(v, (2,))),
-    WithJsonSchema(
-        {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2}
-    ),
+    WithJsonSchema({"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2}),
 ]
 _POINT3_SCHEMA = {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 3}
 Point3 = Annotated[
@@ -197,7 +195,7 @@ class Problem(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", title="netsp problem")
 
-    schema_version: Literal[1] = SCHEMA_VERSION
+    schema_version: Literal[1] = 1
     name: str = "problem"
     base: Point3
     goals: Annotated[tuple[GoalLike, ...], Field(min_length=1)]
@@ -321,7 +319,9 @@ class Problem(BaseModel):
         data = parse_json_object(text, source)
         version = data.get("schema_version", None)
         if version != SCHEMA_VERSION or isinstance(version, bool):
-            raise InputError(f"{source}: schema_version: expected {SCHEMA_VERSION}, got {version!r}")
+            raise InputError(
+                f"{source}: schema_version: expected {SCHEMA_VERSION}, got {version!r}"
+            )
         try:
             return cls.model_validate(data)
         except ValidationError as error:

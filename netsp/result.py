@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 from netsp.solution import Status
 
 OPTIMALITY_TOLERANCE = 1e-6
-"""A tour is called optimal when (length - bound) <= this fraction of its length. Bounds are computed
-in floating point from dual values; their rounding is orders of magnitude smaller."""
+"""A tour is called optimal when (length - bound) <= this fraction of its length. Bounds are
+computed in floating point from dual values; their rounding is orders of magnitude smaller."""
 
 
 @dataclass(frozen=True)

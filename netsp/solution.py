@@ -64,7 +64,7 @@ class Solution(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", title="netsp solution")
 
-    schema_version: Literal[1] = SCHEMA_VERSION
+    schema_version: Literal[1] = 1
     problem: ProblemReference
     solver: str
     roadmap: str
@@ -84,7 +84,9 @@ class Solution(BaseModel):
         data = parse_json_object(text, source)
         version = data.get("schema_version", None)
         if version != SCHEMA_VERSION or isinstance(version, bool):
-            raise InputError(f"{source}: schema_version: expected {SCHEMA_VERSION}, got {version!r}")
+            raise InputError(
+                f"{source}: schema_version: expected {SCHEMA_VERSION}, got {version!r}"
+            )
         try:
             return cls.model_validate(data)
         except ValidationError as error:

@@ -45,7 +45,9 @@ class Instance:
         out = np.full((k, k), np.inf)
         for a in range(k):
             for b in range(k):
-                block = self.costs[self.start[a] : self.start[a + 1], self.start[b] : self.start[b + 1]]
+                block = self.costs[
+                    self.start[a] : self.start[a + 1], self.start[b] : self.start[b + 1]
+                ]
                 if a != b:
                     out[a, b] = block.min()
         return out

@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from netsp.mip.model import Cut, Duals
+from netsp.mip.program import Cut, Duals
 
 Floats = npt.NDArray[np.float64]
 

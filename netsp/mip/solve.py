@@ -8,6 +8,7 @@ cost, and the small integer program that remains is solved, cut at its subtours,
 
 from __future__ import annotations
 
+import importlib
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -15,15 +16,25 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from netsp.errors import InputError
 from netsp.lns import Instance, local_search
 from netsp.mip.bound import dual_bound, reduced_costs
-from netsp.mip.model import Model, Point
+from netsp.mip.program import Point, Program
 from netsp.mip.subtours import component_cuts, fractional_cuts, tour_from
 from netsp.result import Clock, OnProgress, Progress, Result, proven
 from netsp.solution import Status
 from netsp.travel import TravelGraph
 
 Ints = npt.NDArray[np.int64]
+
+BACKENDS = {
+    "highs": "netsp.mip.highs_program:HighsProgram",
+    "cbc": "netsp.mip.cbc_program:CbcProgram",
+}
+"""Who solves the program. `highs` re-solves the LP in process and is the faster; `cbc` is the
+paper's shape."""
+
+DEFAULT_BACKEND = "highs"
 
 NEAREST = 6
 """Legs per vertex in the first LP."""
@@ -47,7 +58,8 @@ def solve(
 ) -> Result:
     """Solve the generalised TSP of a travel graph to proven optimality, or as far as time allows.
 
-    params : ``search_rounds`` (perturbations of the first heuristic, default 30).
+    params : ``backend`` (`BACKENDS`), ``search_rounds`` (perturbations of the first heuristic,
+        default 30).
     warm_start : a tour to start from. Ctrl-C counts as the end of time.
     """
     run = _Run(graph, time_limit, rng or np.random.default_rng(0), params or {}, on_progress)
@@ -79,7 +91,7 @@ class _Run:
         self.tour: tuple[int, ...] | None = None
         self.length = math.inf
         self.bound = 0.0
-        self.model: Model | None = None
+        self.model: Program | None = None
         self.leg_costs: npt.NDArray[np.float64] | None = None
 
     # incumbents and bounds
@@ -147,7 +159,7 @@ class _Run:
     def root(self) -> None:
         """The LP relaxation with all violated subtour cuts and all legs priced."""
         graph = self.graph
-        self.model = Model(graph.cluster, graph.costs, self._first_legs(), np.arange(len(graph)))
+        self.model = self._program(self._first_legs(), np.arange(len(graph)))
         while not self.done:
             self.check()
             point = self.model.solve_relaxation(self.clock.left)
@@ -174,26 +186,26 @@ class _Run:
         tour_legs = _tour_legs(self.tour or ())
         legs = np.unique(np.vstack([legs, tour_legs]), axis=0)
         vertices = np.unique(np.concatenate([[0], legs.ravel()]))
-        model = Model(graph.cluster, graph.costs, legs, vertices)
+        model = self._program(legs, vertices)
         model.add_cuts(root.cuts)
         self.model = model
         self.report("fixed")
         while not self.done:
             self.check()
-            point, outcome = model.solve_integer(self.clock.left)
-            if outcome.status == "infeasible":
+            outcome = model.solve_integer(self.clock.left)
+            point = outcome.point
+            if outcome.infeasible:
                 # nothing that survived the fixing beats the incumbent
                 self.raise_bound(self.length)
                 break
-            claim = outcome.objective if outcome.status == "optimal" else outcome.bound
-            if claim is not None:
-                self.raise_bound(claim)
+            if outcome.bound is not None:
+                self.raise_bound(outcome.bound)
             if point is not None:
                 self._round(point)
             self.report("integer")
             if self.done:
                 break
-            if point is None or outcome.status != "optimal":
+            if point is None or not outcome.finished:
                 raise _Stop
             cuts = component_cuts(np.rint(point.x), point.legs, np.rint(point.y), graph.cluster)
             if not cuts:
@@ -203,6 +215,16 @@ class _Run:
         self.report("proven" if self.done else "integer")
 
     # parts
+
+    def _program(self, legs: Ints, vertices: Ints) -> Program:
+        name = self.params.get("backend", DEFAULT_BACKEND)
+        if name not in BACKENDS:
+            raise InputError(f"backend: unknown {name!r}; expected one of {', '.join(BACKENDS)}")
+        module, attribute = BACKENDS[name].split(":")
+        program: Program = getattr(importlib.import_module(module), attribute)(
+            self.graph.cluster, self.graph.costs, legs, vertices
+        )
+        return program
 
     def _first_legs(self) -> Ints:
         """The nearest legs of every vertex, all legs to the base, and the incumbent's."""
@@ -266,7 +288,9 @@ class _Run:
 
     def result(self) -> Result:
         if self.tour is None:
-            return Result(None, None, self.bound or None, Status.NO_SOLUTION_FOUND, tuple(self.trace))
+            return Result(
+                None, None, self.bound or None, Status.NO_SOLUTION_FOUND, tuple(self.trace)
+            )
         if self.done:
             status = Status.OPTIMAL
         else:

@@ -7,7 +7,7 @@ import numpy.typing as npt
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import breadth_first_order, connected_components, maximum_flow
 
-from netsp.mip.model import Cut
+from netsp.mip.program import Cut
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -31,7 +31,9 @@ def components(x: Floats, legs: Ints, y: Floats) -> tuple[int, Ints]:
     return len(used), np.array([renumber.get(int(k), -1) for k in label], dtype=np.int64)
 
 
-def whole_clusters(inside: npt.NDArray[np.bool_], x: Floats, cluster: Ints) -> npt.NDArray[np.bool_]:
+def whole_clusters(
+    inside: npt.NDArray[np.bool_], x: Floats, cluster: Ints
+) -> npt.NDArray[np.bool_]:
     """S with each cluster completed whose support lies inside: no weaker, and often stronger."""
     m = int(cluster.max()) + 1
     weight = np.bincount(cluster[inside], weights=x[inside], minlength=m)

@@ -15,6 +15,7 @@ letters).
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -94,15 +95,20 @@ def trie_child(node, a, letter, child, sibling):
 
 
 @njit(cache=True)
-def _pending(node, x, parent, letter, core, rays, margin):
-    """Whether the letters that lead out of the core can all still be cancelled from abscissa x."""
+def _may_wait(node, x, y, parent, letter, core, pending, margin):
+    """Whether the letters that lead out of the core can all still be cancelled from a bend at
+    (x, y)."""
     v = node
     while not core[v]:
         a = letter[v]
-        if a > 0:
-            if x < rays[a - 1, 0] - margin:
-                return False
-        elif x > rays[-a - 1, 0] + margin:
+        side = 0 if a > 0 else 1
+        i = abs(a) - 1
+        if (
+            x < pending[side, i, 0] - margin
+            or y < pending[side, i, 1] - margin
+            or x > pending[side, i, 2] + margin
+            or y > pending[side, i, 3] + margin
+        ):
             return False
         u = parent[v]
         while not core[u]:
@@ -116,7 +122,7 @@ def _pending(node, x, parent, letter, core, rays, margin):
 @njit(cache=True)
 def explore(
     source, start, target, length, ends, first, turn, gap, letters, segment_row, arrival_row,
-    gap_row, radius, arc_nodes, rays, cancelable, margin,
+    gap_row, radius, arc_nodes, pending, margin,
     parent, letter, child, sibling, core, limit, size, grow, keep, cap,
 ):  # fmt: skip
     """All taut paths from node `source` whose words stay in (or pend from) the core.
@@ -183,7 +189,7 @@ def explore(
             for k in range(segment_row[e, 0], segment_row[e, 1]):
                 a = letters[k]
                 w, size = _step(
-                    w, a, parent, letter, child, sibling, core, limit, size, grow, cancelable
+                    w, a, parent, letter, child, sibling, core, limit, size, grow, pending
                 )
                 if w < 0:
                     break
@@ -207,7 +213,8 @@ def explore(
                         h_state[hits], h_edge[hits], h_slid[hits] = sid, e, slid
                         hits += 1
                 elif first[e] >= 0 and (
-                    core[w] or _pending(w, ends[e, 2], parent, letter, core, rays, margin)
+                    core[w]
+                    or _may_wait(w, ends[e, 2], ends[e, 3], parent, letter, core, pending, margin)
                 ):
                     # one arrival per (word, directed arc) and place along it
                     f = first[e]
@@ -228,7 +235,7 @@ def explore(
                             a = letters[k]
                             w2, size = _step(
                                 w2, a, parent, letter, child, sibling, core, limit, size, grow,
-                                cancelable,
+                                pending,
                             )  # fmt: skip
                             if w2 < 0:
                                 break
@@ -267,7 +274,7 @@ def explore(
             for k in range(gap_row[e, 0], gap_row[e, 1]):
                 a = letters[k]
                 t, size = _step(
-                    t, a, parent, letter, child, sibling, core, limit, size, grow, cancelable
+                    t, a, parent, letter, child, sibling, core, limit, size, grow, pending
                 )
                 if t < 0:
                     dead = True
@@ -282,7 +289,9 @@ def explore(
             e += 1
             if e == start[node + 1]:
                 e = row_start
-            if not core[t] and not _pending(t, ends[e, 0], parent, letter, core, rays, margin):
+            if not core[t] and not _may_wait(
+                t, ends[e, 0], ends[e, 1], parent, letter, core, pending, margin
+            ):
                 break
     return (
         (parent, letter, child, sibling, core, limit, size),
@@ -294,7 +303,7 @@ def explore(
 
 
 @njit(cache=True)
-def _step(node, a, parent, letter, child, sibling, core, limit, size, grow, cancelable):
+def _step(node, a, parent, letter, child, sibling, core, limit, size, grow, pending):
     """The trie node after one more letter, made if it may exist; -1 if no wanted word follows."""
     if node > 0 and letter[node] == -a:
         return parent[node], size
@@ -311,8 +320,8 @@ def _step(node, a, parent, letter, child, sibling, core, limit, size, grow, canc
                 break
             v = parent[v]
     if not joins:
-        can = cancelable[0, a - 1] if a > 0 else cancelable[1, -a - 1]
-        if not can:
+        side = 0 if a > 0 else 1
+        if pending[side, abs(a) - 1, 0] > pending[side, abs(a) - 1, 2]:
             return -1, size
     c = size
     parent[c], letter[c], core[c], limit[c] = node, a, joins, limit[node]
@@ -362,12 +371,12 @@ def run_explore(
     keep: bool,
     margin: float,
     cap: int,
-) -> tuple[tuple[npt.NDArray, ...], tuple[npt.NDArray, ...], bool]:
+) -> tuple[tuple[npt.NDArray[Any], ...], tuple[npt.NDArray[Any], ...], bool]:
     """Run the kernel from point `source`; updates the trie. Returns hits, tree, capped."""
     arrays, hits, tree, capped = explore(
         graph.point_node(source), graph.start, graph.target, graph.length, graph.ends,
         graph.first, graph.turn, graph.gap, graph.letters, graph.segment_row, graph.arrival_row,
-        graph.gap_row, graph.radius, 2 * len(graph.arcs), graph.rays, graph.cancelable, margin,
+        graph.gap_row, graph.radius, 2 * len(graph.arcs), graph.pending, margin,
         trie.parent, trie.letter, trie.child, trie.sibling, trie.core, trie.limit, trie.size,
         grow, keep, cap,
     )  # fmt: skip

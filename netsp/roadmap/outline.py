@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -214,20 +215,15 @@ def _covered(x, y, circles, edges, edge_start, grow, box, bounds, eps):
 @njit(cache=True)
 def _visible_arcs(disks, circles, edges, edge_start, grow, box, bounds, eps):
     """The parts of each disk's cone that no other obstacle covers and that lie within bounds."""
-    arcs = []
-    full = []
+    arcs: Any = []
+    full: Any = []
     cuts = np.empty(2 * len(circles) + 6 * len(edges) + 16)
     for k in range(len(disks)):
         cx, cy, r = disks[k, 0], disks[k, 1], disks[k, 2]
         start, end = disks[k, 3], disks[k, 4]
         n = 0
         for o in range(len(circles)):
-            if (
-                box[o, 0] > cx + r
-                or box[o, 2] < cx - r
-                or box[o, 1] > cy + r
-                or box[o, 3] < cy - r
-            ):
+            if box[o, 0] > cx + r or box[o, 2] < cx - r or box[o, 1] > cy + r or box[o, 3] < cy - r:
                 continue
             if circles[o, 2] >= 0.0:
                 n = circle_circle_angles(

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from netsp.problem import Problem
+from netsp.problem import Circle, Problem
 from netsp.roadmap.outline import Outline
 from netsp.roadmap.tangents import build_tangents
 
@@ -79,7 +79,7 @@ def _enclosure(problem: Problem, g: int) -> str:
     grown = [
         (
             shapely.Point(o.center).buffer(o.radius + problem.clearance, quad_segs=64)
-            if hasattr(o, "center")
+            if isinstance(o, Circle)
             else shapely.Polygon(o.polygon).buffer(problem.clearance + problem.tolerance)
         )
         for o in problem.obstacles
@@ -93,7 +93,7 @@ def _enclosure(problem: Problem, g: int) -> str:
     return "the obstacles between close every way"
 
 
-def _ring_around(point, shapes, box, problem):  # type: ignore[no-untyped-def]
+def _ring_around(point, shapes, box, problem):
     import shapely
 
     tolerance = 1e-6 * problem.scale

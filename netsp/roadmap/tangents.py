@@ -44,7 +44,8 @@ class TangentGraph:
     letters, segment_row, arrival_row, gap_row : words of the segment, of the arc from arrival to
         `first`, and of the arc to the next departure, as rows into `letters`.
     radius : (nodes,) radius of the arc (0 at points).
-    rays : (n, 2); cancelable : (2, n) whether letter +i / -i can be undone by a taut path.
+    rays : (n, 2) representative points.
+    pending : (2, n, 4) boxes of `_pending_boxes`.
     """
 
     arcs: Floats
@@ -64,7 +65,7 @@ class TangentGraph:
     gap_row: Ints
     radius: Floats
     rays: Floats
-    cancelable: npt.NDArray[np.bool_]
+    pending: Floats
 
     def point_node(self, p: int) -> int:
         """Node of point p."""
@@ -136,24 +137,34 @@ def build_tangents(outline: Outline, reach: float) -> TangentGraph:
         gap_row,
         radius,
         outline.rays,
-        _cancelable(outline),
+        _pending_boxes(outline),
     )
 
 
-def _cancelable(outline: Outline) -> npt.NDArray[np.bool_]:
-    """Whether a taut path that crosses ray i can later cross it back without going round obstacle
-    i: only if, further up, the ray is interrupted by an obstacle whose representative point lies
-    on the side the path came from (lemma on pending letters in docs/theory.md)."""
-    rays = outline.rays
+def _pending_boxes(outline: Outline) -> Floats:
+    """(2, n, 4) box in which a taut path must bend while letter +i / -i waits to be cancelled.
+
+    A taut path that crosses ray i and later crosses it back without going round obstacle i does so
+    around an obstacle that interrupts the ray further up and whose representative point lies on the
+    side the path came from; all its bends in between lie in the hull of what protrudes on the other
+    side (lemma on pending letters in docs/theory.md). The box is empty (xmin > xmax) when nothing
+    does, so the letter is final. Rays of equal x count as ordered by their numbers.
+    """
+    rays, box = outline.rays, outline.blockers.box
     n = len(rays)
-    out = np.zeros((2, n), dtype=np.bool_)
-    box = outline.blockers.box
+    out = np.tile([np.inf, np.inf, -np.inf, -np.inf], (2, n, 1))
+    number = np.arange(n)
     for i in range(n):
         x, y = rays[i]
         over = (box[:, 0] <= x) & (box[:, 2] >= x) & (box[:, 3] >= y)
-        over[i] = bool(outline.blockers.circles[i, 2] < 0.0)
-        out[0, i] = bool(np.any(over & (rays[:, 0] <= x)))
-        out[1, i] = bool(np.any(over & (rays[:, 0] >= x)))
+        before = (rays[:, 0] < x) | ((rays[:, 0] == x) & (number < i))
+        own = (number == i) & (outline.blockers.circles[:, 2] < 0.0)
+        for side, which in ((0, over & (before | own)), (1, over & (~before | own))):
+            which[i] = own[i]
+            if which.any():
+                b = box[which]
+                low, high = (x, b[:, 2].max()) if side == 0 else (b[:, 0].min(), x)
+                out[side, i] = (low, max(y, b[:, 1].min()), high, b[:, 3].max())
     return out
 
 
@@ -305,8 +316,17 @@ def _write_letters(arcs, full, start, target, key, arrival_key, ends, angle, ray
                 if step >= 0.0:
                     gap_row[e, 0] = n
                     n = arc_letters(
-                        cx, cy, r, ends[e, 0], ends[nxt, 0], angle[e, 0], sense * step,
-                        rays, order, pool, n,
+                        cx,
+                        cy,
+                        r,
+                        ends[e, 0],
+                        ends[nxt, 0],
+                        angle[e, 0],
+                        sense * step,
+                        rays,
+                        order,
+                        pool,
+                        n,
                     )
                     gap_row[e, 1] = n
             else:
@@ -328,18 +348,24 @@ def _write_letters(arcs, full, start, target, key, arrival_key, ends, angle, ray
                     # departures just before the cut of a whole circle, arrival just after it
                     if full[goal // 2] and wrap == 0.0 and f == lo:
                         back = hi - 1
-                        while (
-                            back > lo
-                            and key[back] - TWO_PI >= arrival_key[e] - ANGLE_TOLERANCE
-                        ):
+                        while back > lo and key[back] - TWO_PI >= arrival_key[e] - ANGLE_TOLERANCE:
                             f, wrap = back, -TWO_PI
                             back -= 1
                     first[e] = f
                     turn[e] = key[f] + wrap - arrival_key[e]
                     arrival_row[e, 0] = n
                     n = arc_letters(
-                        cx, cy, r, ends[e, 2], ends[f, 0], angle[e, 1], sense * turn[e],
-                        rays, order, pool, n,
+                        cx,
+                        cy,
+                        r,
+                        ends[e, 2],
+                        ends[f, 0],
+                        angle[e, 1],
+                        sense * turn[e],
+                        rays,
+                        order,
+                        pool,
+                        n,
                     )
                     arrival_row[e, 1] = n
     return first, turn, gap, pool[:n].copy(), segment_row, arrival_row, gap_row

@@ -9,7 +9,6 @@ else; obstacles are vertical, so a 3D length is ``hypot(planar taut length, dz)`
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -19,9 +18,8 @@ from netsp.errors import InfeasibleError, InputError, NetspError
 from netsp.hsignature import Word, concatenate, invert
 from netsp.problem import Problem
 from netsp.roadmap.explore import Trie, run_explore, trie_child, trie_grown
-from netsp.roadmap.outline import Outline, build_outline
+from netsp.roadmap.paths import TautPaths
 from netsp.roadmap.reach import explain_unreached
-from netsp.roadmap.tangents import TangentGraph, build_tangents
 from netsp.travel import TravelGraph
 
 Floats = npt.NDArray[np.float64]
@@ -31,9 +29,6 @@ MAX_CLASSES = 20_000
 """Default for the most augmented goals a travel graph may have."""
 
 STATES_PER_CLASS = 2_000
-
-ARC_STEP = math.radians(3.0)
-"""Arcs are drawn as circumscribed chords of at most this turn: 0.023 % longer than the arc."""
 
 
 class TautRoadmap:
@@ -47,10 +42,9 @@ class TautRoadmap:
 
     def __init__(self, problem: Problem, *, max_classes: int = MAX_CLASSES) -> None:
         self.problem = problem
-        self.outline: Outline = build_outline(problem)
-        self.tangents: TangentGraph = build_tangents(self.outline, problem.tether_length)
-        # what rounding and the extra growth of obstacles can add to a length
-        self._margin = 100.0 * self.outline.margin
+        self.paths = TautPaths(problem)
+        self.outline, self.tangents = self.paths.outline, self.paths.tangents
+        self._margin = self.paths.margin
         self._z = problem.points[:, 2]
         self.cluster, self.signatures, self.planar = self._classes(max_classes)
         self.tethers: Floats = np.hypot(self.planar, self._z[self.cluster] - self._z[0])
@@ -141,13 +135,13 @@ class TautRoadmap:
         arrays, head, entry_goal, entry_next, pair = _wanted(
             here, there, letters, row, planar, cluster, self._margin,
             trie.parent, trie.letter, trie.child, trie.sibling, trie.core, trie.limit,
-            self.tangents.cancelable,
+            self.tangents.pending,
         )  # fmt: skip
         (trie.parent, trie.letter, trie.child, trie.sibling, trie.core, trie.limit, trie.size) = (
             arrays
         )
         core_size = trie.size
-        hits, _, capped = run_explore(
+        hits, _, _ = run_explore(
             self.tangents,
             g,
             trie,
@@ -179,98 +173,13 @@ class TautRoadmap:
         """(n, 3) polyline of the taut leg from vertex u to vertex v, arcs circumscribed; height
         changes in proportion to planar length."""
         word = self.relative_word(u, v)
-        return self.taut_path(int(self.cluster[u]), int(self.cluster[v]), word)
-
-    def taut_path(self, a: int, b: int, word: Word) -> Floats:
-        """(n, 3) polyline of the taut path of a word from point a to point b (0 is the base)."""
-        length, pieces = self._taut_pieces(a, b, word)
-        xy = self._polyline(a, b, pieces)
-        steps = np.hypot(*np.diff(xy, axis=0).T)
-        total = float(steps.sum())
-        fraction = np.concatenate([[0.0], np.cumsum(steps)]) / total if total else steps
-        if not total:
-            fraction = np.linspace(0.0, 1.0, len(xy))
-        z = self._z[a] + fraction * (self._z[b] - self._z[a])
-        out = np.column_stack([xy, z])
-        out[0], out[-1] = self.problem.points[a], self.problem.points[b]
-        return out
-
-    def _taut_pieces(
-        self, a: int, b: int, word: Word
-    ) -> tuple[float, list[tuple[int, float]]]:
-        """Length, and (departure, angle slid before it) along the taut path of a word."""
-        limit = 2.0 * self.problem.tether_length + self._margin
-        trie = Trie.root(limit, capacity=max(256, 2 * len(word) + 2))
-        for k, letter in enumerate(word):
-            trie.parent[k + 1], trie.letter[k + 1] = k, letter
-            trie.child[k] = k + 1
-            trie.core[k + 1], trie.limit[k + 1] = True, limit
-        trie.size = len(word) + 1
-        hits, tree, _ = run_explore(
-            self.tangents,
-            a,
-            trie,
-            grow=False,
-            keep=True,
-            margin=self.outline.margin,
-            cap=np.iinfo(np.int64).max,
-        )
-        goal, node, length, state, edge, slid = hits
-        wanted = np.flatnonzero((goal == b) & (node == len(word)))
-        if len(wanted) == 0:
-            raise NetspError(f"internal: no taut path of word {word} from point {a} to point {b}")
-        best = int(wanted[np.argmin(length[wanted])])
-        pieces = [(int(edge[best]), float(slid[best]))]
-        parent, via, turned = tree
-        s = int(state[best])
-        while parent[s] >= 0:
-            pieces.append((int(via[s]), float(turned[s])))
-            s = int(parent[s])
-        return float(length[best]), pieces[::-1]
-
-    def _polyline(self, a: int, b: int, pieces: Sequence[tuple[int, float]]) -> Floats:
-        """Tangents and circumscribed arcs as one polyline, finer where a gap is narrow."""
-        step = ARC_STEP
-        for _ in range(12):
-            xy = self._draw(a, b, pieces, step)
-            if not any(
-                self.outline.blockers.segment_blocked(p, q)
-                for p, q in zip(xy[:-1], xy[1:], strict=True)
-            ):
-                break
-            step /= 2.0
-        return xy
-
-    def _draw(self, a: int, b: int, pieces: Sequence[tuple[int, float]], step: float) -> Floats:
-        t = self.tangents
-        out = [tuple(self.outline.points[a])]
-        for k, (e, slid) in enumerate(pieces):
-            if k > 0:
-                before = pieces[k - 1][0]
-                node = int(t.target[before])
-                cx, cy, r = t.arcs[node // 2, :3]
-                sense = 1.0 if node % 2 == 0 else -1.0
-                # the first departure may lie a rounding before the arrival: then nothing is slid
-                count = max(1, math.ceil(slid / step - 1e-9))
-                if slid > 1e-7:
-                    out.append(tuple(t.ends[before, 2:]))
-                    half = slid / count / 2.0
-                    radius = r / math.cos(half)
-                    for i in range(count):
-                        theta = t.angle[before, 1] + sense * half * (2 * i + 1)
-                        out.append((cx + radius * math.cos(theta), cy + radius * math.sin(theta)))
-                out.append(tuple(t.ends[e, :2]))
-        out.append(tuple(self.outline.points[b]))
-        xy = np.array(out)
-        keep = np.concatenate([[True], np.any(np.diff(xy, axis=0) != 0.0, axis=1)])
-        keep[-1] = True
-        return np.asarray(xy[keep] if keep.sum() > 1 else xy[[0, -1]])
+        return self.paths.path(int(self.cluster[u]), int(self.cluster[v]), word)
 
 
 @njit(cache=True)
 def _wanted(
     here, there, letters, row, planar, cluster, margin,
-    parent, letter, child, sibling, core, limit, cancelable,
+    parent, letter, child, sibling, core, limit, pending,
 ):  # fmt: skip
     """The trie of all relative words between two lists of vertices.
 
@@ -343,7 +252,8 @@ def _wanted(
     # a path may stand on a longer word whose last letters it will still cancel
     for c in range(1, size):
         x = letter[c]
-        if cancelable[0, x - 1] if x > 0 else cancelable[1, -x - 1]:
+        side, i = (0, x - 1) if x > 0 else (1, -x - 1)
+        if pending[side, i, 0] <= pending[side, i, 2]:
             limit[c] = max(limit[c], limit[parent[c]])
     arrays = (parent, letter, child, sibling, core, limit, size)
     return arrays, head, e_goal[:entries], e_next[:entries], pair

@@ -1,67 +1,16 @@
-"""The paper's model in PuLP, grown by rows and columns as it is solved.
-
-For a travel graph with clusters C_0 = {base}, C_1 … C_m, binaries x_v (vertex v is visited) and
-y_uv (leg u-v is travelled; legs are undirected, so one variable serves both directions):
-
-    (2)  sum of x_v over a cluster            = 1          for every cluster
-    (3)  sum of y over the legs at v - 2 x_v  = 0          for every vertex
-    (4)  y(E(S)) - x(S \\ C)                  <= 0         for cuts (S, C), base not in S
-
-McCammon & Hollinger 2017 write (3) as a product y·x summed over a goal; the linear form per vertex
-says the same and also ties the class of the incoming leg to that of the outgoing one. Their (4) is
-a printer's subtour cut (its left side lacks the restriction to S); ours is the generalised subtour
-elimination constraint y(δ(S)) >= 2 x(S ∩ C), rewritten with (3): if the vertex that serves C lies
-in S, the tour must enter and leave S. (Fischetti, Salazar & Toth 1995, here aggregated over S ∩ C.)
-"""
+"""The program as a PuLP model solved by CBC: the paper's shape, complete on its own."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
-import numpy.typing as npt
 import pulp
 
 from netsp.mip.cbc import CbcOutcome, run_cbc
-
-Floats = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
-Bools = npt.NDArray[np.bool_]
+from netsp.mip.program import Cut, Duals, Floats, IntegerOutcome, Ints, Point
 
 
-@dataclass(frozen=True)
-class Cut:
-    """The cut y(E(S)) <= x(S \\ C): `inside` marks S, `cluster` is C."""
-
-    inside: Bools
-    cluster: int
-
-
-@dataclass(frozen=True)
-class Duals:
-    """Dual values: λ of (2) by cluster, π of (3) by vertex, μ <= 0 of (4) by cut."""
-
-    cluster: Floats
-    degree: Floats
-    cut: Floats
-
-
-@dataclass(frozen=True)
-class Point:
-    """An LP or integer solution: x by vertex, y by leg (k, 2); duals of an LP."""
-
-    x: Floats
-    legs: Ints
-    y: Floats
-    objective: float
-    duals: Duals | None
-
-
-class Model:
-    """The program over a growing set of legs and cuts.
-
-    legs : (k, 2) active legs u < v. cuts : active cuts.
-    """
+class CbcProgram:
+    """`netsp.mip.program.Program` by PuLP and CBC, one process a solve."""
 
     def __init__(self, cluster: Ints, costs: Floats, legs: Ints, vertices: Ints) -> None:
         self.cluster, self.costs = cluster, costs
@@ -130,10 +79,17 @@ class Model:
             return None
         return self._point(outcome, duals=True)
 
-    def solve_integer(self, time_left: float) -> tuple[Point | None, CbcOutcome]:
-        """CBC's best integer solution, if any, and what it says of bound and status."""
+    def solve_integer(self, time_left: float) -> IntegerOutcome:
+        """The best integer solution, as far as the time goes."""
         outcome = run_cbc(self.problem, integer=True, time_left=time_left)
-        return (self._point(outcome, duals=False) if outcome.values else None), outcome
+        point = self._point(outcome, duals=False) if outcome.values else None
+        finished = outcome.status == "optimal"
+        return IntegerOutcome(
+            point,
+            outcome.objective if finished else outcome.bound,
+            finished,
+            infeasible=outcome.status == "infeasible",
+        )
 
     def _point(self, outcome: CbcOutcome, *, duals: bool) -> Point:
         x = np.zeros(len(self.cluster))

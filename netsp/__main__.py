@@ -1,0 +1,7 @@
+"""`python -m netsp`."""
+
+import sys
+
+from netsp.cli import main
+
+sys.exit(main())

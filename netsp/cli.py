@@ -1,0 +1,220 @@
+"""The command line. Data goes to stdout or `-o`, progress and messages to stderr.
+
+Exit codes: 0 done, 1 internal error, 2 bad input, 3 proven infeasible, 4 limit reached without a
+solution, 5 verification failed, 130 interrupted with nothing to show. Heavy modules are imported by
+the commands that need them, so that `--help` is instant.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from netsp.errors import InputError, NetspError
+
+if TYPE_CHECKING:
+    from netsp.problem import Problem
+    from netsp.solution import Solution
+
+EXIT_NO_SOLUTION = 4
+EXIT_NOT_VERIFIED = 5
+EXIT_INTERRUPTED = 130
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line; returns the exit code."""
+    try:
+        args = _parser().parse_args(argv)
+        return int(args.run(args))
+    except NetspError as error:
+        print(f"netsp: {error}", file=sys.stderr)
+        return error.exit_code
+    except KeyboardInterrupt:
+        print("netsp: interrupted", file=sys.stderr)
+        return EXIT_INTERRUPTED
+    except BrokenPipeError:
+        # the reader has gone (| head); keep Python from complaining while it closes stdout
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="netsp",
+        description="Shortest non-entangling tours for tethered underwater robots, with proof.",
+        epilog="Exit codes: 0 done, 1 internal error, 2 bad input, 3 proven infeasible, "
+        "4 limit reached without a solution, 5 verification failed.",
+    )
+    parser.add_argument("--version", action=_Version)
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+
+    p = commands.add_parser("solve", help="find the shortest non-entangling tour of a problem")
+    p.add_argument("problem", metavar="PROBLEM", help="problem file (JSON)")
+    p.add_argument("--solver", default="mip", metavar="NAME", help="mip (default)")
+    p.add_argument("--roadmap", default="taut", metavar="NAME", help="taut (default)")
+    p.add_argument(
+        "--mip-backend", metavar="NAME", help="highs (default) or cbc, for the solvers built on mip"
+    )
+    p.add_argument("--time-limit", type=_seconds, metavar="S", help="seconds; default none")
+    p.add_argument("--seed", type=_natural, default=0, metavar="N", help="random seed; default 0")
+    p.add_argument("--warm-start", metavar="SOLUTION", help="start from this solution's tour")
+    p.add_argument("-o", "--output", metavar="FILE", help="write the solution here (else stdout)")
+    p.add_argument("--plot", metavar="FILE", help="draw the solution (png, svg or pdf)")
+    p.add_argument("--quiet", action="store_true", help="no progress, no summary")
+    p.set_defaults(run=_solve)
+
+    p = commands.add_parser("verify", help="judge a solution independently of what found it")
+    p.add_argument("problem", metavar="PROBLEM")
+    p.add_argument("solution", metavar="SOLUTION")
+    p.add_argument("--quiet", action="store_true", help="exit code only")
+    p.set_defaults(run=_verify)
+
+    p = commands.add_parser("plot", help="draw a problem, or a solution on it")
+    p.add_argument("problem", metavar="PROBLEM")
+    p.add_argument("solution", metavar="SOLUTION", nargs="?")
+    p.add_argument("-o", "--output", required=True, metavar="FILE", help="png, svg or pdf")
+    p.set_defaults(run=_plot)
+
+    p = commands.add_parser("schema", help="print the JSON Schema of a file format")
+    p.add_argument("format", choices=("problem", "solution"))
+    p.set_defaults(run=_schema)
+    return parser
+
+
+class _Version(argparse.Action):
+    def __init__(self, option_strings: Sequence[str], dest: str) -> None:
+        super().__init__(option_strings, dest, nargs=0, help="print the version and exit")
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        from netsp import __version__
+
+        print(f"netsp {__version__}")
+        parser.exit()
+
+
+def _seconds(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = -1.0
+    if not 0.0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"expected a positive number of seconds, got {text!r}")
+    return value
+
+
+def _natural(text: str) -> int:
+    try:
+        value = int(text)
+    except ValueError:
+        value = -1
+    if value < 0:
+        raise argparse.ArgumentTypeError(f"expected a whole number from 0 on, got {text!r}")
+    return value
+
+
+def _check_writable(*paths: str | None) -> None:
+    """InputError before the work starts rather than after it."""
+    for path in paths:
+        if path is None:
+            continue
+        folder = os.path.dirname(os.path.abspath(path))
+        if os.path.isdir(path):
+            raise InputError(f"{path}: cannot be written: it is a directory")
+        if not os.path.isdir(folder):
+            raise InputError(f"{path}: cannot be written: no directory {folder}")
+        if not os.access(path if os.path.exists(path) else folder, os.W_OK):
+            raise InputError(f"{path}: cannot be written: permission denied")
+
+
+def _solve(args: argparse.Namespace) -> int:
+    from netsp.problem import Problem
+    from netsp.progress import ProgressTable, summary
+    from netsp.solution import Solution, write_text
+
+    problem = Problem.load(args.problem)
+    warm = Solution.load(args.warm_start) if args.warm_start else None
+    _check_writable(args.output, args.plot)
+    if args.plot:
+        from netsp import plotting
+
+        plotting.check_format(args.plot)
+    from netsp.solvers import solve
+
+    table = None if args.quiet else ProgressTable(sys.stderr)
+    if table:
+        table.begin(problem)
+    solution = solve(
+        problem,
+        args.solver,
+        roadmap=args.roadmap,
+        time_limit=args.time_limit,
+        seed=args.seed,
+        params={"backend": args.mip_backend} if args.mip_backend else None,
+        warm_start=warm,
+        on_progress=table,
+    )
+    if args.output:
+        write_text(args.output, solution.to_json())
+    else:
+        sys.stdout.write(solution.to_json())
+        sys.stdout.flush()
+    if args.plot:
+        plotting.save(problem, solution, args.plot)
+    if table:
+        table.end()
+        print(summary(problem, solution, args.output, args.plot), file=sys.stderr)
+    return 0 if solution.length is not None else EXIT_NO_SOLUTION
+
+
+def _verify(args: argparse.Namespace) -> int:
+    problem, solution = _load_pair(args.problem, args.solution)
+    from netsp.verify import verify
+
+    verdict = verify(problem, solution)
+    if not args.quiet:
+        print(verdict)
+        print("verified" if verdict else "NOT VERIFIED")
+    return 0 if verdict else EXIT_NOT_VERIFIED
+
+
+def _plot(args: argparse.Namespace) -> int:
+    from netsp import plotting
+    from netsp.problem import Problem
+
+    plotting.check_format(args.output)
+    _check_writable(args.output)
+    if args.solution:
+        problem, solution = _load_pair(args.problem, args.solution)
+        if solution.problem.sha256 != problem.sha256:
+            raise InputError(
+                f"{args.solution}: is the solution of another problem (sha256 differs)"
+            )
+        plotting.save(problem, solution, args.output)
+    else:
+        plotting.save(Problem.load(args.problem), None, args.output)
+    return 0
+
+
+def _load_pair(problem: str, solution: str) -> tuple[Problem, Solution]:
+    from netsp.problem import Problem
+    from netsp.solution import Solution
+
+    return Problem.load(problem), Solution.load(solution)
+
+
+def _schema(args: argparse.Namespace) -> int:
+    import json
+
+    if args.format == "problem":
+        from netsp.problem import Problem as Model
+    else:
+        from netsp.solution import Solution as Model  # type: ignore[assignment]
+    print(json.dumps(Model.model_json_schema(), indent=1))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

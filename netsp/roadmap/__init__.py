@@ -1,0 +1,1 @@
+"""From a problem's geometry to its travel graph."""

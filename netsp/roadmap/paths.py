@@ -1,0 +1,118 @@
+"""Single taut paths, by their words: materialised as tangents and circumscribed arcs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from netsp.errors import NetspError
+from netsp.hsignature import Word
+from netsp.problem import Problem
+from netsp.roadmap.explore import Trie, run_explore
+from netsp.roadmap.outline import Outline, build_outline
+from netsp.roadmap.tangents import TangentGraph, build_tangents
+
+Floats = npt.NDArray[np.float64]
+
+ARC_STEP = math.radians(3.0)
+"""Arcs are drawn as circumscribed chords of at most this turn: 0.023 % longer than the arc."""
+
+
+class TautPaths:
+    """Taut paths between the base (point 0) and the goals (points 1 …) of a problem."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        self.outline: Outline = build_outline(problem)
+        self.tangents: TangentGraph = build_tangents(self.outline, problem.tether_length)
+        # what rounding and the extra growth of obstacles can add to a length
+        self.margin = 100.0 * self.outline.margin
+        self._z = problem.points[:, 2]
+
+    def length(self, a: int, b: int, word: Word) -> float:
+        """3D length of the taut path of a word from point a to point b."""
+        return math.hypot(self._pieces(a, b, word)[0], float(self._z[b] - self._z[a]))
+
+    def path(self, a: int, b: int, word: Word) -> Floats:
+        """(n, 3) polyline of the taut path of a word from point a to point b (0 is the base)."""
+        _, pieces = self._pieces(a, b, word)
+        xy = self._polyline(a, b, pieces)
+        steps = np.hypot(*np.diff(xy, axis=0).T)
+        total = float(steps.sum())
+        fraction = np.concatenate([[0.0], np.cumsum(steps)]) / total if total else steps
+        if not total:
+            fraction = np.linspace(0.0, 1.0, len(xy))
+        z = self._z[a] + fraction * (self._z[b] - self._z[a])
+        out = np.column_stack([xy, z])
+        out[0], out[-1] = self.problem.points[a], self.problem.points[b]
+        return out
+
+    def _pieces(self, a: int, b: int, word: Word) -> tuple[float, list[tuple[int, float]]]:
+        """Length, and (departure, angle slid before it) along the taut path of a word."""
+        limit = 2.0 * self.problem.tether_length + self.margin
+        trie = Trie.root(limit, capacity=max(256, 2 * len(word) + 2))
+        for k, letter in enumerate(word):
+            trie.parent[k + 1], trie.letter[k + 1] = k, letter
+            trie.child[k] = k + 1
+            trie.core[k + 1], trie.limit[k + 1] = True, limit
+        trie.size = len(word) + 1
+        hits, tree, _ = run_explore(
+            self.tangents,
+            a,
+            trie,
+            grow=False,
+            keep=True,
+            margin=self.outline.margin,
+            cap=np.iinfo(np.int64).max,
+        )
+        goal, node, length, state, edge, slid = hits
+        wanted = np.flatnonzero((goal == b) & (node == len(word)))
+        if len(wanted) == 0:
+            raise NetspError(f"internal: no taut path of word {word} from point {a} to point {b}")
+        best = int(wanted[np.argmin(length[wanted])])
+        pieces = [(int(edge[best]), float(slid[best]))]
+        parent, via, turned = tree
+        s = int(state[best])
+        while parent[s] >= 0:
+            pieces.append((int(via[s]), float(turned[s])))
+            s = int(parent[s])
+        return float(length[best]), pieces[::-1]
+
+    def _polyline(self, a: int, b: int, pieces: Sequence[tuple[int, float]]) -> Floats:
+        """Tangents and circumscribed arcs as one polyline, finer where a gap is narrow."""
+        step = ARC_STEP
+        for _ in range(12):
+            xy = self._draw(a, b, pieces, step)
+            if not any(self.outline.blockers.segment_blocked(p, q) for p, q in pairwise(xy)):
+                break
+            step /= 2.0
+        return xy
+
+    def _draw(self, a: int, b: int, pieces: Sequence[tuple[int, float]], step: float) -> Floats:
+        t = self.tangents
+        out = [tuple(self.outline.points[a])]
+        for k, (e, slid) in enumerate(pieces):
+            if k > 0:
+                before = pieces[k - 1][0]
+                node = int(t.target[before])
+                cx, cy, r = t.arcs[node // 2, :3]
+                sense = 1.0 if node % 2 == 0 else -1.0
+                # the first departure may lie a rounding before the arrival: then nothing is slid
+                count = max(1, math.ceil(slid / step - 1e-9))
+                if slid > 1e-7:
+                    out.append(tuple(t.ends[before, 2:]))
+                    half = slid / count / 2.0
+                    radius = r / math.cos(half)
+                    for i in range(count):
+                        theta = t.angle[before, 1] + sense * half * (2 * i + 1)
+                        out.append((cx + radius * math.cos(theta), cy + radius * math.sin(theta)))
+                out.append(tuple(t.ends[e, :2]))
+        out.append(tuple(self.outline.points[b]))
+        xy = np.array(out)
+        keep = np.concatenate([[True], np.any(np.diff(xy, axis=0) != 0.0, axis=1)])
+        keep[-1] = True
+        return np.asarray(xy[keep] if keep.sum() > 1 else xy[[0, -1]])

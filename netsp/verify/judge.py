@@ -1,0 +1,307 @@
+"""The independent judge of a solution. Imports no roadmap and no solver.
+
+Words come from the rays (`netsp.hsignature`); that the tour is contractible and each tether fits is
+found a second time over a triangulation (`netsp.verify.stringpull`); obstacles are kept clear of by
+plain distances (Shapely).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+import shapely
+
+from netsp.hsignature import Word, concatenate, crossings, reduce
+from netsp.problem import Circle, Problem
+from netsp.solution import Solution, Status
+from netsp.verify.stringpull import StringPuller, reduce_sleeve
+
+Floats = npt.NDArray[np.float64]
+
+PLACE_TOLERANCE = 1e-6
+"""How far, relative to the largest coordinate, a path may miss a point or enter an obstacle."""
+
+LENGTH_TOLERANCE = 1e-3
+"""How much longer than the stated length the drawn path may be (arcs are circumscribed)."""
+
+TAUT_TOLERANCE = 1e-4
+"""How far the stated tether length may lie from the recomputed one, which stands on polygons."""
+
+
+@dataclass(frozen=True)
+class Check:
+    """One question and its answer."""
+
+    name: str
+    passed: bool
+    detail: str
+
+
+@dataclass(frozen=True)
+class Verification:
+    """All checks, in order; truthy when every one passed."""
+
+    checks: tuple[Check, ...]
+
+    @property
+    def passed(self) -> bool:
+        """Whether every check passed."""
+        return all(c.passed for c in self.checks)
+
+    def __bool__(self) -> bool:
+        return self.passed
+
+    def __str__(self) -> str:
+        width = max(len(c.name) for c in self.checks)
+        return "\n".join(
+            f"{'ok  ' if c.passed else 'FAIL'}  {c.name:<{width}}  {c.detail}" for c in self.checks
+        )
+
+
+def verify(problem: Problem, solution: Solution) -> Verification:
+    """Judge a solution against its problem.
+
+    Checks that the files belong together; that the path is a closed polyline from the base through
+    every goal in the order of the tour, clear of obstacles and within bounds; that its word at
+    every goal is the stated one and its whole word is empty; that the tether, pulled taut again by
+    another method, fits the tether length and has the stated length; and that length, bound, gap
+    and status are consistent.
+    """
+    return Verification(tuple(_Judge(problem, solution).run()))
+
+
+class _Judge:
+    def __init__(self, problem: Problem, solution: Solution) -> None:
+        self.problem, self.solution = problem, solution
+        self.path: Floats = np.array(solution.path, dtype=float).reshape(-1, 3)
+        self.place = PLACE_TOLERANCE * problem.scale
+        self.stops: list[int] = []
+
+    def run(self) -> list[Check]:
+        checks = [self._belongs()]
+        if self.solution.length is None:
+            checks.append(Check("has a tour", False, f"status {self.solution.status.value}"))
+            return checks
+        checks += [self._closed(), self._every_goal()]
+        if not all(c.passed for c in checks[1:]):
+            return checks
+        checks += [self._visited(), self._clear(), *self._bounds()]
+        if not checks[3].passed:
+            return checks
+        checks += [self._words(), self._empty(), *self._tethers(), self._length(), self._status()]
+        return checks
+
+    def _belongs(self) -> Check:
+        same = self.problem.sha256 == self.solution.problem.sha256
+        return Check(
+            "belongs to the problem",
+            same,
+            f"sha256 {self.problem.sha256[:12]}…"
+            if same
+            else f"solution is for another problem or another version of it "
+            f"({self.solution.problem.sha256[:12]}…, this is {self.problem.sha256[:12]}…)",
+        )
+
+    def _closed(self) -> Check:
+        if len(self.path) < 2:
+            return Check("starts and ends at the base", False, "the path has fewer than 2 points")
+        base = self.problem.points[0]
+        miss = max(np.linalg.norm(self.path[0] - base), np.linalg.norm(self.path[-1] - base))
+        return Check(
+            "starts and ends at the base", bool(miss <= self.place), f"misses it by {miss:.3g}"
+        )
+
+    def _every_goal(self) -> Check:
+        order = [v.goal for v in self.solution.tour]
+        goals = range(len(self.problem.goals))
+        missing = sorted(set(goals) - set(order))
+        repeated = sorted({g for g in order if order.count(g) > 1})
+        unknown = sorted(set(order) - set(goals))
+        if missing or repeated or unknown:
+            parts = [
+                f"{what} {', '.join(map(str, which))}"
+                for what, which in (
+                    ("missing", missing),
+                    ("repeated", repeated),
+                    ("unknown", unknown),
+                )
+                if which
+            ]
+            return Check("names every goal once", False, "goals " + "; ".join(parts))
+        return Check("names every goal once", True, f"{len(order)} goals")
+
+    def _visited(self) -> Check:
+        """Find for each stop the path vertex at its goal, in order; several vertices may lie there,
+        so the first with the stated word is taken."""
+        rays = self.problem.representative_points
+        at = 0
+        word: Word = ()
+        for visit in self.solution.tour:
+            target = self.problem.points[visit.goal + 1]
+            gaps = np.linalg.norm(self.path[at:] - target, axis=1)
+            candidates = at + np.flatnonzero(gaps <= self.place)
+            if len(candidates) == 0:
+                label = self.problem.goal_label(visit.goal)
+                return Check(
+                    "visits every goal in order",
+                    False,
+                    f"no path point at {label} after point {at}; nearest misses by "
+                    f"{gaps.min():.3g}",
+                )
+            words = [concatenate(word, crossings(self.path[at : k + 1], rays)) for k in candidates]
+            pick = next((i for i, w in enumerate(words) if w == reduce(visit.signature)), 0)
+            at, word = int(candidates[pick]), words[pick]
+            self.stops.append(at)
+        return Check("visits every goal in order", True, f"{len(self.path)} path points")
+
+    def _clear(self) -> Check:
+        line = shapely.LineString(self.path[:, :2])
+        worst, where = -np.inf, ""
+        for i, o in enumerate(self.problem.obstacles):
+            if isinstance(o, Circle):
+                depth = o.radius + self.problem.clearance - line.distance(shapely.Point(o.center))
+            else:
+                shape = shapely.Polygon(o.polygon)
+                depth = self.problem.clearance - line.distance(shape)
+                if shape.buffer(-self.place, join_style="mitre").intersects(line):
+                    depth = np.inf
+            if depth > worst:
+                worst, where = float(depth), self.problem.obstacle_label(i)
+        if not self.problem.obstacles:
+            return Check("enters no obstacle", True, "there are none")
+        ok = worst <= self.place
+        detail = (
+            f"keeps {max(-worst, 0.0):.3g} from the nearest, {where}"
+            if ok
+            else f"enters {where} by {worst:.3g}"
+        )
+        return Check("enters no obstacle", ok, detail)
+
+    def _bounds(self) -> list[Check]:
+        if self.problem.bounds is None:
+            return []
+        xmin, ymin, xmax, ymax = self.problem.bounds
+        x, y = self.path[:, 0], self.path[:, 1]
+        out = max(xmin - x.min(), x.max() - xmax, ymin - y.min(), y.max() - ymax)
+        return [
+            Check("stays within bounds", bool(out <= self.place), f"outside by {max(out, 0):.3g}")
+        ]
+
+    def _words(self) -> Check:
+        rays = self.problem.representative_points
+        word: Word = ()
+        before = 0
+        for visit, stop in zip(self.solution.tour, self.stops, strict=True):
+            word = concatenate(word, crossings(self.path[before : stop + 1], rays))
+            before = stop
+            if word != tuple(visit.signature):
+                return Check(
+                    "tether word at every goal",
+                    False,
+                    f"at {self.problem.goal_label(visit.goal)} the path writes {list(word)}, "
+                    f"the solution says {list(visit.signature)}",
+                )
+        return Check("tether word at every goal", True, f"{len(self.stops)} words agree")
+
+    def _empty(self) -> Check:
+        word = reduce(crossings(self.path, self.problem.representative_points))
+        if word:
+            names = ", ".join(
+                self.problem.obstacle_label(i - 1) for i in sorted({abs(k) for k in word})
+            )
+            return Check("total word is empty", False, f"{list(word)}: entangles {names}")
+        return Check("total word is empty", True, "nothing is wrapped")
+
+    def _tethers(self) -> list[Check]:
+        """The second opinion: triangulate, pull each prefix and each leg taut."""
+        limit = self.problem.tether_length
+        puller = StringPuller(self.problem, reach=limit)
+        pieces = puller.crossings(self.path)
+        points = self.problem.points
+        sleeve: list[tuple[int, bool]] = []
+        before, place = 0, 0
+        pulled_total = 0.0
+        fits: tuple[float, str] = (-np.inf, "")
+        wrong: tuple[float, str] = (-np.inf, "")
+        stops = [*((v.goal + 1, s) for v, s in zip(self.solution.tour, self.stops, strict=True))]
+        stops.append((0, len(self.path) - 1))
+        for k, (point, stop) in enumerate(stops):
+            leg = [c for piece in pieces[before:stop] for c in piece]
+            sleeve = reduce_sleeve(sleeve + leg)
+            pulled = puller.pull(points[place], points[point], reduce_sleeve(leg))
+            dz = points[point, 2] - points[place, 2]
+            pulled_total += float(np.hypot(pulled.low, dz))
+            before, place = stop, point
+            if point == 0:
+                break
+            tether = puller.pull(points[0], points[point], sleeve)
+            dz = points[point, 2] - points[0, 2]
+            low, high = np.hypot(tether.low, dz), np.hypot(tether.high, dz)
+            label = self.problem.goal_label(point - 1)
+            fits = max(fits, (float(low), label))
+            stated = self.solution.tour[k].tether_length
+            slack = TAUT_TOLERANCE * limit
+            wrong = max(wrong, (float(max(low - stated, stated - high) - slack), label))
+        self.pulled_total = pulled_total
+        excess = fits[0] - limit
+        return [
+            Check(
+                "contractible over triangles",
+                not sleeve,
+                "the tour shrinks to the base" if not sleeve else f"{len(sleeve)} edges remain",
+            ),
+            Check(
+                "taut tether fits",
+                excess <= 1e-9 * limit + self.place,
+                f"longest {fits[0]:.6g} of {limit:g}, at {fits[1]}",
+            ),
+            Check(
+                "taut lengths as stated",
+                wrong[0] <= 0.0,
+                f"within {TAUT_TOLERANCE:g} of the tether length"
+                if wrong[0] <= 0.0
+                else f"off by {wrong[0] + TAUT_TOLERANCE * limit:.6g} at {wrong[1]}",
+            ),
+        ]
+
+    def _length(self) -> Check:
+        stated = float(self.solution.length or 0.0)
+        drawn = float(np.linalg.norm(np.diff(self.path, axis=0), axis=1).sum())
+        tiny = 1e-9 * self.problem.scale
+        ok = (
+            self.pulled_total <= stated * (1.0 + 1e-6) + tiny
+            and stated <= drawn * (1.0 + 1e-6) + tiny
+            and drawn <= stated * (1.0 + LENGTH_TOLERANCE) + tiny
+        )
+        return Check(
+            "length is right",
+            bool(ok),
+            f"stated {stated:.6f}, drawn {drawn:.6f}, legs pulled taut {self.pulled_total:.6f}",
+        )
+
+    def _status(self) -> Check:
+        s = self.solution
+        length, bound, gap = float(s.length or 0.0), s.lower_bound, s.gap
+        tiny = 1e-9 * max(length, self.problem.scale)
+        if (bound is None) != (gap is None):
+            return Check(
+                "bound, gap and status agree", False, "bound without gap or gap without bound"
+            )
+        if bound is not None and gap is not None:
+            expected = (length - bound) / length if length > 0 else 0.0
+            if bound > length + tiny:
+                return Check(
+                    "bound, gap and status agree", False, f"bound {bound:g} above length {length:g}"
+                )
+            if abs(gap - expected) > 1e-6:
+                return Check(
+                    "bound, gap and status agree", False, f"gap {gap:g}, should be {expected:g}"
+                )
+        if s.status is Status.OPTIMAL and (gap is None or gap > 1e-5):
+            return Check("bound, gap and status agree", False, f"optimal, but gap is {gap}")
+        if s.status in (Status.INFEASIBLE, Status.NO_SOLUTION_FOUND):
+            return Check("bound, gap and status agree", False, f"{s.status.value}, yet has a tour")
+        shown = "no bound" if gap is None else f"gap {gap:.2g}"
+        return Check("bound, gap and status agree", True, f"{s.status.value}, {shown}")
