@@ -63,6 +63,8 @@ def _point3(value: Any) -> tuple[float, ...]:
 
 
 Number = Annotated[float, BeforeValidator(_number)]
+Positive = Annotated[float, Field(gt=0), BeforeValidator(_number)]
+NonNegative = Annotated[float, Field(ge=0), BeforeValidator(_number)]
 Point2 = Annotated[
     tuple[float, float],
     BeforeValidator(lambda v: _coordinates(v, (2,))),
@@ -81,7 +83,7 @@ class Circle(BaseModel):
 
     model_config = _STRICT
     center: Point2
-    radius: Annotated[Number, Field(gt=0)]
+    radius: Positive
     name: str | None = None
 
     @property
@@ -200,8 +202,8 @@ class Problem(BaseModel):
     base: Point3
     goals: Annotated[tuple[GoalLike, ...], Field(min_length=1)]
     obstacles: tuple[Obstacle, ...] = ()
-    tether_length: Annotated[Number, Field(gt=0)]
-    clearance: Annotated[Number, Field(ge=0)] = 0.0
+    tether_length: Positive
+    clearance: NonNegative = 0.0
     bounds: Annotated[
         tuple[float, float, float, float] | None,
         WithJsonSchema(
@@ -386,28 +388,29 @@ def explain(error: ValidationError) -> str:
     errors = error.errors(include_url=False)
     first = errors[0]
     where = ""
-    for part in first["loc"]:
+    for k, part in enumerate(first["loc"]):
         if isinstance(part, int):
             where += f"[{part}]"
-        elif part not in ("circle", "polygon") or not where.endswith("]"):
-            where += f".{part}" if where else str(part)
-        elif part == "polygon" and first["loc"].count("polygon") == 1 and _in_polygon(first):
-            where += ".polygon"
-    kind = first["type"]
+        elif not (k == 2 and first["loc"][0] == "obstacles"):  # there pydantic tells the kind
+            where += f".{part}" if where else part
+    kind, context = first["type"], first.get("ctx", {})
+    got = f"got {_brief(first['input'])}"
     if kind == "extra_forbidden":
         message = "unknown field"
     elif kind == "missing":
         message = "missing"
     elif kind in ("value_error", "obstacle"):
         message = first["msg"].removeprefix("Value error, ")
+    elif kind == "too_short":
+        message = f"expected at least {context['min_length']}, got {context['actual_length']}"
+    elif kind == "greater_than":
+        message = f"expected a number > {context['gt']:g}, {got}"
+    elif kind == "greater_than_equal":
+        message = f"expected a number >= {context['ge']:g}, {got}"
     else:
-        message = f"{_decapitalise(first['msg'])}, got {_brief(first['input'])}"
+        message = f"{_decapitalise(first['msg'])}, {got}"
     more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
     return f"{where}: {message}{more}" if where else f"{message}{more}"
-
-
-def _in_polygon(first: Any) -> bool:
-    return bool(first["loc"][-1] != "polygon")
 
 
 def _decapitalise(text: str) -> str:

@@ -12,7 +12,7 @@ from typing import Annotated, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from netsp.errors import InputError
-from netsp.problem import SCHEMA_VERSION, Number, Point3, explain, parse_json_object, read_text
+from netsp.problem import SCHEMA_VERSION, NonNegative, Number, Point3, explain, parse_json_object, read_text
 
 
 class Status(StrEnum):
@@ -42,7 +42,7 @@ class Visit(BaseModel):
     model_config = _STRICT
     goal: Annotated[int, Field(ge=0)]
     signature: tuple[int, ...]
-    tether_length: Annotated[Number, Field(ge=0)]
+    tether_length: NonNegative
 
 
 class Timings(BaseModel):

@@ -2,11 +2,12 @@
 
 For any λ, π free and μ <= 0 the Lagrangian gives, for every tour,
 
-    length >= Σ_C (λ_C + min over v in C of r_v) + (m + 1) · min(0, min over legs of r_uv),
+    length >= Σ_C (λ_C + min over v in C of r_v) + max( Σ over legs of min(0, r_uv),
+                                                        (m + 1) · min(0, min over legs of r_uv) ),
 
 with reduced costs r_uv = c_uv - π_u - π_v - Σ_k μ_k [u, v ∈ S_k] and
 r_v = 2 π_v - λ_C(v) + Σ_k μ_k [v ∈ S_k \\ C_k], because a tour takes one vertex of each cluster and
-m + 1 legs. It holds whatever the solver's tolerances were; it is tight at an LP optimum.
+m + 1 legs, none of them twice (m >= 2). It holds whatever the solver's tolerances were; it is tight at an LP optimum.
 """
 
 from __future__ import annotations
@@ -42,7 +43,32 @@ def dual_bound(
 ) -> float:
     """The bound of the module's formula from reduced costs."""
     m = int(cluster.max())
-    least = np.full(m + 1, np.inf)
+    fixed = _vertex_part(vertex_costs, cluster, duals)
+    worst = (m + 1) * min(0.0, float(leg_costs.min()))
+    return fixed + max(worst, _negative_legs(leg_costs))
+
+
+def fixing_costs(
+    leg_costs: Floats, vertex_costs: Floats, cluster: npt.NDArray[np.int64], duals: Duals
+) -> tuple[float, Floats]:
+    """A bound, and per leg how much at least it rises when the leg is used: the leg's own reduced
+    cost and what its two vertices cost above the best of their clusters."""
+    bound = _vertex_part(vertex_costs, cluster, duals) + _negative_legs(leg_costs)
+    above = vertex_costs - _least(vertex_costs, cluster)[cluster]
+    return bound, np.maximum(leg_costs, 0.0) + above[:, None] + above[None, :]
+
+
+def _least(vertex_costs: Floats, cluster: npt.NDArray[np.int64]) -> Floats:
+    least = np.full(int(cluster.max()) + 1, np.inf)
     np.minimum.at(least, cluster, vertex_costs)
-    worst = min(0.0, float(leg_costs.min()))
-    return float((duals.cluster + least).sum() + (m + 1) * worst)
+    return least
+
+
+def _vertex_part(
+    vertex_costs: Floats, cluster: npt.NDArray[np.int64], duals: Duals
+) -> float:
+    return float((duals.cluster + _least(vertex_costs, cluster)).sum())
+
+
+def _negative_legs(leg_costs: Floats) -> float:
+    return float(np.minimum(leg_costs, 0.0).sum()) / 2.0

@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from netsp.errors import InputError
 from netsp.lns import Instance, local_search
-from netsp.mip.bound import dual_bound, reduced_costs
+from netsp.mip.bound import dual_bound, fixing_costs, reduced_costs
 from netsp.mip.program import Point, Program
 from netsp.mip.subtours import component_cuts, fractional_cuts, tour_from
 from netsp.result import Clock, OnProgress, Progress, Result, proven
@@ -92,7 +92,7 @@ class _Run:
         self.length = math.inf
         self.bound = 0.0
         self.model: Program | None = None
-        self.leg_costs: npt.NDArray[np.float64] | None = None
+        self.fixing: tuple[float, npt.NDArray[np.float64]] | None = None
 
     # incumbents and bounds
 
@@ -179,9 +179,9 @@ class _Run:
             return
         graph, root = self.graph, self.model
         assert root is not None
-        assert self.leg_costs is not None
-        slack = self.length - self.bound
-        upper = np.triu(self.leg_costs <= slack + 1e-9 * self.length, 1)
+        assert self.fixing is not None
+        bound, rise = self.fixing
+        upper = np.triu(bound + rise <= self.length * (1.0 + 1e-9), 1)
         legs = np.argwhere(upper)
         tour_legs = _tour_legs(self.tour or ())
         legs = np.unique(np.vstack([legs, tour_legs]), axis=0)
@@ -246,10 +246,10 @@ class _Run:
         assert model is not None
         assert point.duals is not None
         legs, vertices = reduced_costs(graph.costs, graph.cluster, model.cuts, point.duals)
-        bound = dual_bound(legs, vertices, graph.cluster, point.duals)
-        if bound >= self.bound or self.leg_costs is None:
-            self.leg_costs = _fixing_costs(legs, vertices, graph.cluster, point.duals.cluster)
-        self.raise_bound(bound)
+        self.raise_bound(dual_bound(legs, vertices, graph.cluster, point.duals))
+        fixing = fixing_costs(legs, vertices, graph.cluster, point.duals)
+        if self.fixing is None or fixing[0] >= self.fixing[0]:
+            self.fixing = fixing
         candidate = np.triu(legs, 1)
         candidate[model.legs[:, 0], model.legs[:, 1]] = 0.0
         tolerance = 1e-8 * self.length / (graph.goal_count + 1)
@@ -296,21 +296,6 @@ class _Run:
         else:
             status = Status.FEASIBLE
         return Result(self.tour, self.length, self.bound, status, tuple(self.trace))
-
-
-def _fixing_costs(
-    legs: npt.NDArray[np.float64],
-    vertices: npt.NDArray[np.float64],
-    cluster: Ints,
-    cluster_duals: npt.NDArray[np.float64],
-) -> npt.NDArray[np.float64]:
-    """How much at least the bound rises when a leg is used: its reduced cost and what its two
-    vertices cost above the best of their clusters."""
-    least = np.full(len(cluster_duals), np.inf)
-    np.minimum.at(least, cluster, vertices)
-    above = vertices - least[cluster]
-    worst = min(0.0, float(legs.min()))
-    return np.asarray(legs - worst + above[:, None] + above[None, :])
 
 
 def _tour_legs(tour: Sequence[int]) -> Ints:

@@ -1,0 +1,200 @@
+"""The mip solver proves what brute force finds, and is honest when it cannot."""
+
+import itertools
+import math
+import time
+
+import numpy as np
+import psutil
+import pytest
+
+from netsp.mip import solve
+from netsp.mip.bound import dual_bound, reduced_costs
+from netsp.mip.cbc_program import CbcProgram
+from netsp.mip.highs_program import HighsProgram
+from netsp.mip.program import Cut
+from netsp.mip.subtours import components, fractional_cuts
+from netsp.roadmap.taut import TautRoadmap
+from netsp.solution import Status
+from netsp.travel import TravelGraph
+from tests.worlds import random_world
+
+BACKENDS = ["highs", "cbc"]
+
+
+class Table:
+    """Legs from a cost matrix."""
+
+    def __init__(self, costs):
+        self.costs = costs
+
+    def lengths(self, vertices):
+        return self.costs[np.ix_(vertices, vertices)]
+
+    def path(self, u, v):
+        raise NotImplementedError
+
+
+def random_graph(seed, goals, most=4):
+    """A generalised TSP with costs of a metric, uncorrelated with any geometry of obstacles."""
+    rng = np.random.default_rng(seed)
+    sizes = [1, *rng.integers(1, most + 1, goals)]
+    cluster = np.repeat(np.arange(goals + 1), sizes)
+    at = rng.uniform(0, 1, (len(cluster), 3))
+    costs = np.linalg.norm(at[:, None] - at[None, :], axis=2)
+    costs[cluster[:, None] == cluster[None, :]] = np.inf
+    return TravelGraph(cluster, [()] * len(cluster), costs[0], Table(costs))
+
+
+def brute(graph):
+    """Optimum over every order, classes by dynamic programming."""
+    best = math.inf
+    members = [graph.members(c) for c in range(graph.goal_count + 1)]
+    for order in itertools.permutations(range(1, graph.goal_count + 1)):
+        if order[0] > order[-1]:
+            continue
+        reach = graph.costs[0, members[order[0]]]
+        for a, b in itertools.pairwise(order):
+            reach = (reach[:, None] + graph.costs[np.ix_(members[a], members[b])]).min(axis=0)
+        best = min(best, float((reach + graph.costs[members[order[-1]], 0]).min()))
+    return best
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+@pytest.mark.parametrize("seed", range(6))
+def test_the_optimum_of_small_graphs_is_proven(seed, backend):
+    graph = random_graph(seed, goals=3 + seed % 4)
+    result = solve(graph, params={"backend": backend})
+    best = brute(graph)
+    assert result.status is Status.OPTIMAL
+    assert graph.is_tour(result.tour)
+    assert result.length == pytest.approx(graph.tour_length(result.tour))
+    assert result.length == pytest.approx(best, rel=1e-6)
+    assert result.lower_bound <= best * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("goals", [1, 2])
+@pytest.mark.parametrize("seed", range(3))
+def test_one_and_two_goals(goals, seed):
+    graph = random_graph(seed, goals=goals)
+    result = solve(graph)
+    assert result.status is Status.OPTIMAL
+    assert result.length == pytest.approx(brute(graph))
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_every_bound_on_the_way_is_below_the_optimum(seed):
+    graph = random_graph(100 + seed, goals=6)
+    best = brute(graph)
+    rows = []
+    solve(graph, params={"search_rounds": 0}, on_progress=rows.append)
+    assert rows
+    for row in rows:
+        assert row.bound <= best * (1 + 1e-9)
+        assert row.incumbent >= best * (1 - 1e-9)
+    bounds = [r.bound for r in rows]
+    assert bounds == sorted(bounds)
+
+
+@pytest.mark.parametrize("backend", [HighsProgram, CbcProgram])
+def test_any_dual_values_give_a_valid_bound(backend):
+    """The bound stands on weak duality alone, so even perturbed duals must not lift it too far."""
+    graph = random_graph(7, goals=5)
+    best = brute(graph)
+    n = len(graph)
+    legs = np.argwhere(np.triu(np.isfinite(graph.costs), 1))
+    program = backend(graph.cluster, graph.costs, legs, np.arange(n))
+    program.add_cuts([Cut(np.isin(graph.cluster, [1, 2]), 1), Cut(np.isin(graph.cluster, [3]), 3)])
+    duals = program.solve_relaxation(60.0).duals
+    rng = np.random.default_rng(0)
+    for scale in (0.0, 0.01, 0.1, 1.0):
+        for _ in range(20):
+            shaken = type(duals)(
+                duals.cluster + scale * rng.normal(size=duals.cluster.shape),
+                duals.degree + scale * rng.normal(size=duals.degree.shape),
+                np.minimum(duals.cut + scale * rng.normal(size=duals.cut.shape), 0.0),
+            )
+            r = reduced_costs(graph.costs, graph.cluster, program.cuts, shaken)
+            assert dual_bound(*r, graph.cluster, shaken) <= best + 1e-9
+    r = reduced_costs(graph.costs, graph.cluster, program.cuts, duals)
+    assert dual_bound(*r, graph.cluster, duals) == pytest.approx(
+        program.solve_relaxation(60.0).objective, abs=1e-5
+    )
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_no_tour_violates_a_cut_and_the_cuts_found_are_violated(seed):
+    graph = random_graph(seed, goals=6)
+    rng = np.random.default_rng(seed)
+    legs = np.argwhere(np.triu(np.isfinite(graph.costs), 1))
+    program = HighsProgram(graph.cluster, graph.costs, legs, np.arange(len(graph)))
+    point = program.solve_relaxation(60.0)
+    cuts = fractional_cuts(point.x, point.legs, point.y, graph.cluster)
+    place = {tuple(leg): k for k, leg in enumerate(legs.tolist())}
+    for cut in cuts:
+        assert not cut.inside[0]
+        inside = cut.inside[point.legs].all(axis=1)
+        other = cut.inside & (graph.cluster != cut.cluster)
+        assert point.y[inside].sum() > point.x[other].sum() + 1e-6
+        for _ in range(50):
+            order = rng.permutation(np.arange(1, graph.goal_count + 1))
+            tour = [0, *(rng.choice(graph.members(c)) for c in order)]
+            pairs = zip(tour, [*tour[1:], 0], strict=True)
+            used = [place[tuple(sorted((int(a), int(b))))] for a, b in pairs]
+            assert inside[used].sum() <= other[tour].sum()
+
+
+def test_components_are_told_apart():
+    legs = np.array([[0, 1], [2, 3], [3, 4]])
+    count, label = components(np.array([1.0, 1, 1, 1, 1, 0]), legs, np.array([1.0, 0.5, 0.5]))
+    assert count == 2
+    assert label[5] == -1
+    assert label[0] == label[1] != label[2] == label[3] == label[4]
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_at_the_time_limit_there_is_a_tour_a_bound_and_no_process_left(backend):
+    graph = TautRoadmap(random_world(0, goals=20, tether=350.0)).travel_graph()
+    graph.costs  # noqa: B018 - not part of what is timed
+    begin = time.monotonic()
+    result = solve(graph, time_limit=0.6, params={"backend": backend, "search_rounds": 2})
+    assert time.monotonic() - begin < 0.6 + 2.0
+    assert graph.is_tour(result.tour)
+    assert 0.0 <= result.lower_bound <= result.length
+    if result.status is not Status.OPTIMAL:
+        assert result.status is Status.FEASIBLE
+    assert [p for p in psutil.Process().children(recursive=True) if "cbc" in p.name()] == []
+
+
+def test_ctrl_c_gives_the_best_tour_so_far():
+    graph = TautRoadmap(random_world(0, goals=15, tether=300.0)).travel_graph()
+
+    def interrupt(row):
+        if row.stage == "root":
+            raise KeyboardInterrupt
+
+    result = solve(graph, on_progress=interrupt, params={"search_rounds": 0})
+    assert graph.is_tour(result.tour)
+    assert result.status in (Status.FEASIBLE, Status.OPTIMAL)
+
+
+def test_a_warm_start_is_never_made_worse():
+    graph = random_graph(3, goals=6)
+    best = solve(graph)
+    again = solve(graph, warm_start=best.tour, time_limit=1e-3)
+    assert again.length <= best.length * (1 + 1e-12)
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_same_seed_same_answer(seed):
+    graph = random_graph(seed, goals=6)
+    a = solve(graph, rng=np.random.default_rng(5))
+    b = solve(graph, rng=np.random.default_rng(5))
+    assert (a.tour, a.length, a.lower_bound) == (b.tour, b.length, b.lower_bound)
+
+
+def test_the_backends_agree_on_a_real_graph():
+    graph = TautRoadmap(random_world(3, goals=8, tether=280.0)).travel_graph()
+    a, b = (solve(graph, params={"backend": k}) for k in BACKENDS)
+    assert a.status is b.status is Status.OPTIMAL
+    assert a.length == pytest.approx(b.length, rel=2e-6)

@@ -1,0 +1,325 @@
+"""The exact roadmap: every class once, every length right."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from netsp import Circle, InfeasibleError, InputError, Polygon, Problem
+from netsp.hsignature import crossings, is_looping, reduce, signature
+from netsp.roadmap.taut import TautRoadmap
+from tests.brute import BruteForce
+from tests.worlds import random_world, small_worlds
+
+relaxed = settings(
+    max_examples=400, deadline=None, suppress_health_check=[HealthCheck.filter_too_much]
+)
+
+
+def reachable(problem):
+    """The roadmap, or None where some goal is out of reach."""
+    try:
+        return TautRoadmap(problem)
+    except InfeasibleError:
+        return None
+
+
+def classes(roadmap):
+    return {
+        (int(c), w): float(d)
+        for c, w, d in zip(roadmap.cluster, roadmap.signatures, roadmap.planar, strict=True)
+        if c > 0
+    }
+
+
+def check_against_brute_force(problem, sides=32):
+    roadmap = reachable(problem)
+    brute = BruteForce(problem, sides)
+    limit = problem.tether_length
+    found = {
+        k: d for k, d in brute.lengths(0, limit).items() if k[0] > 0 and not is_looping(k[1])
+    }
+    # polygons are inscribed, so brute lengths are short by less than this
+    error = 2.0 * limit * (math.pi / sides) ** 2
+    if roadmap is None:
+        goals = {g for g, _ in found}
+        firm = {g for (g, _), d in found.items() if d < limit - error}
+        assert len(firm) < len(problem.goals), f"reachable by brute force: {sorted(goals)}"
+        return
+    exact = classes(roadmap)
+    for k, d in exact.items():
+        assert k in found, f"class {k} of length {d} unknown to brute force"
+        assert found[k] - 1e-6 <= d <= found[k] + error
+    for k, d in found.items():
+        if d < limit - error:
+            assert k in exact, f"class {k} of length {d} missed"
+
+
+@relaxed
+@given(small_worlds())
+def test_classes_agree_with_brute_force(problem):
+    check_against_brute_force(problem)
+
+
+@relaxed
+@given(small_worlds(grid=True))
+def test_classes_agree_with_brute_force_where_everything_is_aligned(problem):
+    check_against_brute_force(problem)
+
+
+@settings(relaxed, max_examples=300)
+@given(small_worlds(max_circles=3, goals=2), st.booleans())
+def test_legs_agree_with_brute_force(problem, _grid):
+    roadmap = reachable(problem)
+    if roadmap is None or len(roadmap.cluster) > 60:
+        return
+    brute = BruteForce(problem, 32)
+    found = brute.lengths(1, 2 * problem.tether_length, repeats=4)
+    costs = roadmap.travel_graph().costs
+    error = 4.0 * problem.tether_length * (math.pi / 32) ** 2
+    for u in np.flatnonzero(roadmap.cluster == 1):
+        for v in np.flatnonzero(roadmap.cluster == 2):
+            d = found[2, roadmap.relative_word(int(u), int(v))]
+            assert d - 1e-6 <= costs[u, v] <= d + error
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_laws_of_a_random_world(seed):
+    problem = random_world(seed, goals=8, tether=330.0)
+    roadmap = TautRoadmap(problem)
+    graph = roadmap.travel_graph()
+    costs = graph.costs
+    n = len(graph)
+    # each class once
+    keys = list(zip(graph.cluster.tolist(), graph.signatures, strict=True))
+    assert len(set(keys)) == n
+    assert all(w == reduce(w) and not is_looping(w) for w in graph.signatures)
+    # symmetric; no leg within a cluster
+    assert (costs == costs.T).all()
+    same = graph.cluster[:, None] == graph.cluster[None, :]
+    assert np.isinf(costs[same]).all()
+    assert np.isfinite(costs[~same]).all()
+    # triangle inequality on the cover
+    finite = np.where(same, np.inf, costs)
+    rng = np.random.default_rng(seed)
+    for _ in range(3000):
+        u, v, w = rng.integers(0, n, 3)
+        if len({int(graph.cluster[k]) for k in (u, v, w)}) == 3:
+            assert finite[u, w] <= finite[u, v] + finite[v, w] + 1e-9
+    # tethers are legs from the base
+    assert np.allclose(costs[0, 1:], graph.tethers[1:], rtol=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_materialised_leg_has_its_word_its_length_and_enough_tether(seed):
+    """Facts 2 and 3 of the design: tether along a leg is never longer than at its worse end."""
+    problem = random_world(seed, goals=8, tether=330.0)
+    roadmap = TautRoadmap(problem)
+    graph = roadmap.travel_graph()
+    rays = problem.representative_points
+    rng = np.random.default_rng(seed)
+    for _ in range(25):
+        u, v = (int(k) for k in rng.integers(0, len(graph), 2))
+        if graph.cluster[u] == graph.cluster[v]:
+            continue
+        path = graph.path(u, v)
+        assert signature(path, rays) == roadmap.relative_word(u, v)
+        drawn = np.linalg.norm(np.diff(path, axis=0), axis=1).sum()
+        assert graph.costs[u, v] - 1e-6 <= drawn <= graph.costs[u, v] * 1.001
+        # no piece of the path is inside an obstacle
+        for o in problem.obstacles:
+            a, d = path[:-1, :2], np.diff(path[:, :2], axis=0)
+            t = np.clip(((o.center - a) * d).sum(1) / np.maximum((d**2).sum(1), 1e-300), 0, 1)
+            assert np.hypot(*(a + t[:, None] * d - o.center).T).min() >= o.radius - 1e-9
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_tether_along_a_leg_stays_below_its_worse_end(seed):
+    """Sample points of a leg become goals; their class there must have a taut tether that short."""
+    problem = random_world(seed, goals=3, tether=300.0, circles=10)
+    roadmap = TautRoadmap(problem)
+    graph = roadmap.travel_graph()
+    rays = problem.representative_points
+    rng = np.random.default_rng(seed)
+    for _ in range(6):
+        u = int(rng.choice(np.flatnonzero(graph.cluster == 1)))
+        v = int(rng.choice(np.flatnonzero(graph.cluster == 2)))
+        tether, leg = graph.path(0, u), graph.path(u, v)
+        worse = max(graph.tethers[u], graph.tethers[v])
+        for k in rng.integers(1, len(leg) - 1, 3) if len(leg) > 2 else []:
+            drive = np.vstack([tether, leg[1 : k + 1]])
+            word = signature(drive, rays)
+            there = Problem(
+                base=problem.base,
+                goals=[leg[k, :2]],
+                obstacles=problem.obstacles,
+                tether_length=worse * 1.01,
+            )
+            taut = classes(TautRoadmap(there)) if not is_looping(word) else {(1, word): 0.0}
+            assert taut[1, word] <= worse * (1 + 1e-3)
+
+
+def test_a_word_twice_through_a_ray_that_another_obstacle_cuts_is_found():
+    """The tether passes right of the upper obstacle: letter 1 is written and taken back."""
+    problem = Problem(
+        base=(-6, 3.0),
+        goals=[(-6, 9.0)],
+        obstacles=[Circle(center=(0, 0), radius=1), Circle(center=(-1, 6), radius=2)],
+        tether_length=40,
+    )
+    roadmap = TautRoadmap(problem)
+    assert (1, (-2,)) in classes(roadmap)
+    path = roadmap.paths.path(0, 1, (-2,))
+    rays = problem.representative_points
+    assert crossings(path, rays) == (1, -1, -2)
+    assert path[:, 0].max() > 0.9
+    check_against_brute_force(problem.model_copy(update={"tether_length": 16.0}))
+
+
+def test_collinear_tangents_give_one_path_not_many():
+    """Twelve equal circles in a row: every tangent along the row grazes all of them."""
+    row = [Circle(center=(3.0 * k, 0), radius=1) for k in range(1, 13)]
+    problem = Problem(base=(0, 1), goals=[(39, 1)], obstacles=row, tether_length=41)
+    roadmap = TautRoadmap(problem)
+    keys = list(zip(roadmap.cluster.tolist(), roadmap.signatures, strict=True))
+    assert len(keys) == len(set(keys))
+    assert roadmap.planar.min() == 0.0
+    assert roadmap.planar[1] == pytest.approx(39.0, abs=1e-6)
+
+
+def test_three_dimensional_lengths_are_the_hypotenuse_of_the_plan_and_the_height():
+    flat = Problem(
+        base=(0, 0), goals=[(10, 0), (0, 6)], obstacles=[Circle(center=(5, 0), radius=3)],
+        tether_length=30,
+    )  # fmt: skip
+    deep = flat.model_copy(
+        update={"goals": Problem(base=(0, 0), goals=[(10, 0, -4), (0, 6, -9)], tether_length=30).goals}
+    )
+    a, b = TautRoadmap(flat), TautRoadmap(deep)
+    for (k, d), (key, e) in zip(classes(a).items(), classes(b).items(), strict=True):
+        assert k == key
+        assert d == pytest.approx(e, rel=1e-12)
+    ca, cb = a.travel_graph().costs, b.travel_graph().costs
+    z = deep.points[:, 2][b.cluster]
+    finite = np.isfinite(ca)
+    assert np.allclose(np.hypot(ca, z[:, None] - z[None, :])[finite], cb[finite], rtol=1e-12)
+
+
+def test_legs_may_be_asked_for_in_part():
+    roadmap = TautRoadmap(random_world(5, goals=6, tether=300.0))
+    whole = roadmap.lengths(np.arange(len(roadmap.cluster)))
+    some = np.array([0, 3, 5, 9, len(whole) - 1])
+    assert np.array_equal(roadmap.lengths(some), whole[np.ix_(some, some)])
+
+
+def test_a_goal_out_of_reach_is_named_with_the_tether_that_would_do():
+    problem = Problem(
+        base=(0, 0),
+        goals=[(1, 0), {"name": "far", "position": [10, 0]}],
+        obstacles=[Circle(center=(5, 0), radius=3)],
+        tether_length=11,
+    )
+    with pytest.raises(InfeasibleError, match=r"goals\[1\] \(far\) is out of reach") as caught:
+        TautRoadmap(problem)
+    needed = 8 + 6 * math.asin(0.6)
+    shown = float(str(caught.value).rsplit(" ", 1)[1])
+    assert shown == pytest.approx(needed, abs=2e-6)
+    assert shown >= needed - 1e-9
+    TautRoadmap(problem.model_copy(update={"tether_length": shown}))
+
+
+def test_a_goal_sealed_in_names_the_obstacles_round_it():
+    ring = [
+        Circle(center=(10 + 3 * math.cos(a), 3 * math.sin(a)), radius=1.7)
+        for a in np.arange(6) * math.pi / 3
+    ]
+    problem = Problem(
+        base=(0, 0), goals=[(10, 0)], obstacles=[*ring, Circle(center=(0, 9), radius=1)],
+        tether_length=100,
+    )  # fmt: skip
+    with pytest.raises(InfeasibleError, match=r"cannot be reached with any tether.*obstacles\[0\]"):
+        TautRoadmap(problem)
+    with pytest.raises(InfeasibleError) as caught:
+        TautRoadmap(problem)
+    assert "obstacles[6]" not in str(caught.value)
+
+
+def test_touching_circles_leave_no_gap():
+    """Between two circles that touch there is no way; a hair apart there is."""
+    shut = Problem(
+        base=(0, -3), goals=[(0, 3)], tether_length=12,
+        obstacles=[Circle(center=(-1, 0), radius=1), Circle(center=(1, 0), radius=1)],
+    )  # fmt: skip
+    ajar = Problem(
+        base=(0, -3), goals=[(0, 3)], tether_length=12,
+        obstacles=[Circle(center=(-1, 0), radius=1), Circle(center=(1.001, 0), radius=1)],
+    )  # fmt: skip
+    assert min(classes(TautRoadmap(shut)).values()) > 7.0
+    assert min(classes(TautRoadmap(ajar)).values()) == pytest.approx(6.0, abs=1e-5)
+
+
+def test_too_many_classes_is_a_clear_error():
+    problem = random_world(0, goals=5, tether=400.0)
+    with pytest.raises(InputError, match="too many homotopy classes.*limit 50"):
+        TautRoadmap(problem, max_classes=50)
+
+
+def test_polygons_bend_at_their_convex_vertices_only():
+    u = [(4, -2), (9, -2), (9, -1), (5, -1), (5, 1), (9, 1), (9, 2), (4, 2)]
+    problem = Problem(base=(0, 0), goals=[(7, 0)], obstacles=[Polygon(polygon=u)], tether_length=15)
+    expected = math.hypot(4, 2) + 5 + 1 + math.hypot(2, 1)
+    lengths = sorted(classes(TautRoadmap(problem)).values())
+    assert lengths[:2] == pytest.approx([expected, expected], abs=1e-6)
+
+
+shapes = st.sampled_from(
+    [
+        [(0, 0), (2, 0), (2, 2), (0, 2)],
+        [(0, 0), (3, 0), (0, 3)],
+        [(0, 0), (4, 0), (4, 1), (1, 1), (1, 4), (0, 4)],
+        [(0, 0), (4, 0), (4, 3), (3, 3), (3, 1), (1, 1), (1, 3), (0, 3)],
+        [(0, 0), (2, 1), (4, 0), (2, 4)],
+    ]
+)
+
+
+@settings(relaxed, max_examples=300)
+@given(
+    st.lists(st.tuples(shapes, st.integers(-5, 4), st.integers(-5, 4)), min_size=1, max_size=3),
+    st.sampled_from([0.0, 0.0, 0.25]),
+    st.data(),
+)
+def test_polygons_agree_with_brute_force(parts, clearance, data):
+    obstacles = [Polygon(polygon=[(x + dx, y + dy) for x, y in s]) for s, dx, dy in parts]
+    half = st.integers(-13, 13).map(lambda k: k / 2 + 0.13)
+    point = st.tuples(half, half).filter(
+        lambda p: all(o.signed_distance(p) > clearance + 1e-3 for o in obstacles)
+    )
+    base, *goals = data.draw(st.lists(point, min_size=3, max_size=3, unique=True))
+    problem = Problem(
+        base=base, goals=goals, obstacles=obstacles, tether_length=12.0, clearance=clearance
+    )
+    check_against_brute_force(problem)
+
+
+@settings(relaxed, max_examples=300)
+@given(small_worlds(max_circles=3, goals=2), st.sampled_from([-3.0, 0.0, 2.5]))
+def test_bounds_cut_off_what_lies_outside(problem, top):
+    if any(p[1] > top for p in problem.points):
+        return
+    check_against_brute_force(problem.model_copy(update={"bounds": (-9.0, -9.0, 9.0, top)}))
+
+
+def test_every_pair_of_classes_has_a_leg_in_an_aligned_grid():
+    """Rays through other centres, tangents that graze three circles: nothing goes missing."""
+    grid = [Circle(center=(3.0 * i, 3.0 * j), radius=1) for i, j in itertools.product(range(3), repeat=2)]
+    problem = Problem(
+        base=(-2, -2), goals=[(1.5, 1.5), (4.5, 4.5), (3, 1.5), (0, 4.5)], obstacles=grid,
+        tether_length=12,
+    )  # fmt: skip
+    graph = TautRoadmap(problem).travel_graph()
+    same = graph.cluster[:, None] == graph.cluster[None, :]
+    assert np.isfinite(graph.costs[~same]).all()
