@@ -211,7 +211,9 @@ def _view(problem: Problem, solution: Solution | None) -> tuple[float, float, fl
     points = np.vstack(xy)
     low, high = points.min(axis=0), points.max(axis=0)
     size = max(float((high - low).max()), 1e-9)
-    low, high = low - 0.04 * size, high + 0.04 * size
+    low, high = low - 0.05 * size, high + 0.05 * size
+    if any(g.name for g in problem.goals):
+        high[0] += 0.06 * size  # their labels stand to the right of the goals
     for axis in range(2):
         lack = 0.25 * size - float((high - low)[axis])
         if lack > 0:

@@ -12,7 +12,15 @@ from typing import Annotated, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from netsp.errors import InputError
-from netsp.problem import SCHEMA_VERSION, NonNegative, Number, Point3, explain, parse_json_object, read_text
+from netsp.problem import (
+    SCHEMA_VERSION,
+    NonNegative,
+    Number,
+    Point3,
+    explain,
+    parse_json_object,
+    read_text,
+)
 
 
 class Status(StrEnum):

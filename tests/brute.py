@@ -35,8 +35,10 @@ class BruteForce:
                 ring = np.array(grown.exterior.coords)[:-1]
             shapes.append(shapely.Polygon(ring))
             corners.append(ring)
+        # what touches is closed (the rule of the roadmap), what is merely hugged is free
+        joined = shapely.union_all([s.buffer(1e-5, join_style="mitre") for s in shapes])
+        solid = joined.buffer(-1.02e-5, join_style="mitre")
         union = shapely.union_all(shapes)
-        solid = union.buffer(-1e-7, join_style="mitre")
         box = shapely.box(*problem.bounds).buffer(1e-7) if problem.bounds else None
         goals = problem.points[:, :2]
         verts = np.vstack([goals, *corners])

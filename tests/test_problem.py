@@ -52,7 +52,7 @@ BAD = {
     "nan": (variant(base=[0, math.nan]), "base: expected a finite number, got nan"),
     "infinite": (variant(tether_length=math.inf), "tether_length: expected a finite number"),
     "text for a number": (variant(tether_length="9"), "tether_length: expected a number, got '9'"),
-    "bool for a number": (variant(tether_length=True), "tether_length: expected a number, got True"),
+    "bool for a number": (variant(tether_length=True), "tether_length: expected a number, got True"),  # noqa: E501
     "negative radius": (
         variant(obstacles=[{"center": [2, 0], "radius": -1}]),
         "obstacles[0].radius: expected a number > 0, got -1",
@@ -66,15 +66,15 @@ BAD = {
         variant(goals=[[4, 0], [4, 0, 0]]),
         "goals[1]: same position (4, 0, 0) as goals[0]; expected distinct goals",
     ),
-    "base in a circle": (variant(base=[2, 0.5]), "base: (2, 0.5, 0) lies inside obstacles[0] (pile)"),
-    "goal in a polygon": (variant(goals=[[2, 2.5]]), "goals[0]: (2, 2.5, 0) lies inside obstacles[1]"),
+    "base in a circle": (variant(base=[2, 0.5]), "base: (2, 0.5, 0) lies inside obstacles[0] (pile)"),  # noqa: E501
+    "goal in a polygon": (variant(goals=[[2, 2.5]]), "goals[0]: (2, 2.5, 0) lies inside obstacles[1]"),  # noqa: E501
     "goal in the clearance": (
         variant(clearance=1.5),
         "base: (0, 0, 0) lies inside obstacles[0] (pile) grown by the clearance 1.5",
     ),
     "goal out of bounds": (variant(bounds=[-1, -1, 3, 5]), "goals[0]: (4, 0, 0) is outside bounds"),
     "empty bounds": (variant(bounds=[1, 0, 1, 5]), "bounds: expected xmin < xmax and ymin < ymax"),
-    "short bounds": (variant(bounds=[1, 0]), "bounds: expected [xmin, ymin, xmax, ymax], got [1, 0]"),
+    "short bounds": (variant(bounds=[1, 0]), "bounds: expected [xmin, ymin, xmax, ymax], got [1, 0]"),  # noqa: E501
     "polygon crossing itself": (
         variant(obstacles=[{"polygon": [[1, 2], [3, 3], [3, 2], [1, 3]]}]),
         "obstacles[0]: polygon",
@@ -158,7 +158,9 @@ def test_numpy_values_are_welcome():
 
 
 def test_a_goal_on_the_boundary_is_in_free_space():
-    Problem(base=(0, 0), goals=[(1, 0)], obstacles=[Circle(center=(2, 0), radius=1)], tether_length=2)
+    Problem(
+        base=(0, 0), goals=[(1, 0)], obstacles=[Circle(center=(2, 0), radius=1)], tether_length=2
+    )
 
 
 @pytest.mark.parametrize("data", [GOOD, variant(bounds=[-9, -9, 9, 9], clearance=0.5)])
@@ -181,9 +183,7 @@ def test_the_solution_schema_is_published():
     assert {"tour", "path", "status", "lower_bound"} <= set(schema["properties"])
 
 
-ring = st.lists(
-    st.tuples(st.floats(0.2, 5.0), st.floats(0.05, 0.95)), min_size=3, max_size=9
-)
+ring = st.lists(st.tuples(st.floats(0.2, 5.0), st.floats(0.05, 0.95)), min_size=3, max_size=9)
 
 
 @given(ring)

@@ -102,7 +102,9 @@ def test_a_wrong_word_fails(pair):
 def test_a_loop_round_an_obstacle_fails_twice_over(pair):
     """Both opinions see it: the rays and the triangles."""
     problem, solution = pair
-    loop = tuple((5 + 1.2 * math.cos(a), 1.2 * math.sin(a), 0.0) for a in np.linspace(math.pi, -math.pi, 60))
+    loop = tuple(
+        (5 + 1.2 * math.cos(a), 1.2 * math.sin(a), 0.0) for a in np.linspace(math.pi, -math.pi, 60)
+    )
     path = (solution.path[0], *loop, *solution.path)
     bad = failed(problem, edit(solution, path=path))
     assert {"total word is empty", "contractible over triangles", "length is right"} <= bad

@@ -52,6 +52,7 @@ def small_worlds(draw, max_circles: int = 4, goals: int = 3, grid: bool = False)
     obstacles = draw(
         st.lists(st.tuples(coordinate, coordinate, radius), min_size=1, max_size=max_circles)
     )
+
     def clear(p: tuple[float, float]) -> bool:
         return all(np.hypot(p[0] - x, p[1] - y) >= r + 1e-3 for x, y, r in obstacles)
 

@@ -2,12 +2,13 @@
 
 For any λ, π free and μ <= 0 the Lagrangian gives, for every tour,
 
-    length >= Σ_C (λ_C + min over v in C of r_v) + max( Σ over legs of min(0, r_uv),
-                                                        (m + 1) · min(0, min over legs of r_uv) ),
+    length >= Σ_C (λ_C + min over v in C of r_v)
+              + max( Σ over legs of min(0, r_uv), (m + 1) · min(0, min over legs of r_uv) ),
 
 with reduced costs r_uv = c_uv - π_u - π_v - Σ_k μ_k [u, v ∈ S_k] and
 r_v = 2 π_v - λ_C(v) + Σ_k μ_k [v ∈ S_k \\ C_k], because a tour takes one vertex of each cluster and
-m + 1 legs, none of them twice (m >= 2). It holds whatever the solver's tolerances were; it is tight at an LP optimum.
+m + 1 legs, none of them twice (m >= 2). It holds whatever the solver's tolerances were; it is tight
+at an LP optimum.
 """
 
 from __future__ import annotations
@@ -64,9 +65,7 @@ def _least(vertex_costs: Floats, cluster: npt.NDArray[np.int64]) -> Floats:
     return least
 
 
-def _vertex_part(
-    vertex_costs: Floats, cluster: npt.NDArray[np.int64], duals: Duals
-) -> float:
+def _vertex_part(vertex_costs: Floats, cluster: npt.NDArray[np.int64], duals: Duals) -> float:
     return float((duals.cluster + _least(vertex_costs, cluster)).sum())
 
 

@@ -146,8 +146,10 @@ def _pending_boxes(outline: Outline) -> Floats:
 
     A taut path that crosses ray i and later crosses it back without going round obstacle i does so
     around an obstacle that interrupts the ray further up and whose representative point lies on the
-    side the path came from; all its bends in between lie in the hull of what protrudes on the other
-    side (lemma on pending letters in docs/theory.md). The box is empty (xmin > xmax) when nothing
+    side the path came from. In between it is the shortest path homotopic to the piece of the ray,
+    pushed aside by what protrudes there, so it stays in the hull of the piece and the protrusions:
+    above point i, and no farther out than they are (lemma on pending letters in docs/theory.md). The
+    bends between may be at further obstacles that reach into the hull. The box is empty (xmin > xmax) when nothing
     does, so the letter is final. Rays of equal x count as ordered by their numbers.
     """
     rays, box = outline.rays, outline.blockers.box
@@ -164,7 +166,7 @@ def _pending_boxes(outline: Outline) -> Floats:
             if which.any():
                 b = box[which]
                 low, high = (x, b[:, 2].max()) if side == 0 else (b[:, 0].min(), x)
-                out[side, i] = (low, max(y, b[:, 1].min()), high, b[:, 3].max())
+                out[side, i] = (low, y, high, np.inf)
     return out
 
 
