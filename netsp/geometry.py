@@ -139,3 +139,26 @@ def circle_circle_angles(cx, cy, r, ox, oy, q, out, n):
         out[n + 1] = mid + half
         n += 2
     return n
+
+
+@njit(cache=True)
+def more_rows(a):
+    """The same rows with room for twice as many. Copied by hand: a slice assignment would compile
+    NumPy's broadcasting and its error messages, seconds of work."""
+    b = np.empty((2 * a.shape[0], a.shape[1]))
+    for i in range(a.shape[0]):
+        for j in range(a.shape[1]):
+            b[i, j] = a[i, j]
+    return b
+
+
+@njit(cache=True)
+def sort_in_place(a, n):
+    """Sort the first n entries, few as they are, by insertion."""
+    for i in range(1, n):
+        x = a[i]
+        j = i - 1
+        while j >= 0 and a[j] > x:
+            a[j + 1] = a[j]
+            j -= 1
+        a[j + 1] = x

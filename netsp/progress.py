@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from typing import TextIO
 
@@ -12,6 +13,9 @@ from netsp.solution import Solution, Status
 _HEADER = (
     f"{'time':>7}  {'stage':<10} {'tour':>12} {'bound':>12} {'gap':>8} {'cuts':>6} {'legs':>7}"
 )
+
+PATIENCE = 3.0
+"""Seconds of silence after which the table says what takes so long."""
 
 EVERY = 0.2
 """Least seconds between two rows that bring nothing but a better bound."""
@@ -26,6 +30,8 @@ class ProgressTable:
         self._last: Progress | None = None
         self._shown = 0.0
         self._held: Progress | None = None
+        self._patience = threading.Timer(PATIENCE, self._explain)
+        self._patience.daemon = True
 
     def begin(self, problem: Problem) -> None:
         """Announce the problem."""
@@ -33,6 +39,10 @@ class ProgressTable:
             f"{problem.name}: {len(problem.goals)} goals, {len(problem.obstacles)} obstacles, "
             f"tether {problem.tether_length:g} {problem.units}"
         )
+        self._patience.start()
+
+    def _explain(self) -> None:
+        self._print("building the roadmap … (the first run on a machine compiles for some 20 s)")
 
     def __call__(self, row: Progress) -> None:
         news = (
@@ -47,10 +57,12 @@ class ProgressTable:
 
     def end(self) -> None:
         """Print the last row if it was held back."""
+        self._patience.cancel()
         if self._held is not None:
             self._show(self._held)
 
     def _show(self, row: Progress) -> None:
+        self._patience.cancel()
         if not self._header:
             self._print(_HEADER)
             self._header = True

@@ -98,10 +98,10 @@ def _descend(order, start, costs, cluster_costs, work):
                         length = layered_length(trial, start, costs, work)
                         if length < best * (1.0 - 1e-12):
                             best = length
-                            order[:] = trial
+                            _copy(trial, order)
                             improved = True
             for j in range(i + 2, n + 1):
-                trial[:] = order
+                _copy(order, trial)
                 for k in range(j - i):
                     trial[i + k] = order[j - 1 - k]
                 if _cluster_length(trial, cluster_costs) >= best:
@@ -109,7 +109,7 @@ def _descend(order, start, costs, cluster_costs, work):
                 length = layered_length(trial, start, costs, work)
                 if length < best * (1.0 - 1e-12):
                     best = length
-                    order[:] = trial
+                    _copy(trial, order)
                     improved = True
     return best
 
@@ -131,3 +131,9 @@ def _move(order, trial, i, size, at, flip):
         trial[k] = order[rest]
         rest += 1
         k += 1
+
+
+@njit(cache=True)
+def _copy(a, b):
+    for k in range(len(a)):
+        b[k] = a[k]

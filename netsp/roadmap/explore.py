@@ -15,46 +15,51 @@ letters).
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+from netsp.geometry import more_rows
 from netsp.roadmap.tangents import TangentGraph
 
 Ints = npt.NDArray[np.int64]
+Floats = npt.NDArray[np.float64]
+
+
+PARENT, LETTER, CHILD, SIBLING, CORE = range(5)
+"""Columns of a trie's nodes. SIBLING chains the children of one parent."""
 
 
 @dataclass
 class Trie:
     """Words as a tree; node 0 is the empty word. Arrays are over-allocated, `size` is the count.
 
-    core : whether the node is in the core; limit : longest path allowed at or below the node.
+    nodes : (capacity, 5) columns PARENT … CORE. limit : longest path allowed at or below a node.
     """
 
-    parent: Ints
-    letter: Ints
-    child: Ints
-    sibling: Ints
-    core: npt.NDArray[np.bool_]
-    limit: npt.NDArray[np.float64]
+    nodes: Ints
+    limit: Floats
     size: int = 1
     words: dict[int, tuple[int, ...]] = field(default_factory=dict)
 
     @classmethod
     def root(cls, limit: float, capacity: int = 256) -> Trie:
         """The trie that holds the empty word only."""
-        trie = cls(
-            np.full(capacity, -1, dtype=np.int64),
-            np.zeros(capacity, dtype=np.int64),
-            np.full(capacity, -1, dtype=np.int64),
-            np.full(capacity, -1, dtype=np.int64),
-            np.zeros(capacity, dtype=np.bool_),
-            np.zeros(capacity),
-        )
-        trie.core[0] = True
+        trie = cls(np.full((capacity, 5), -1, dtype=np.int64), np.zeros(capacity))
+        trie.nodes[0] = (-1, 0, -1, -1, 1)
         trie.limit[0] = limit
+        return trie
+
+    @classmethod
+    def of_word(cls, word: tuple[int, ...], limit: float) -> Trie:
+        """The trie of one word and its prefixes; node k is the prefix of length k."""
+        trie = cls.root(limit, capacity=max(256, 2 * len(word) + 2))
+        for k, letter in enumerate(word):
+            trie.nodes[k, CHILD] = k + 1
+            trie.nodes[k + 1] = (k, letter, -1, -1, 1)
+            trie.limit[k + 1] = limit
+        trie.size = len(word) + 1
         return trie
 
     def word(self, node: int) -> tuple[int, ...]:
@@ -62,161 +67,181 @@ class Trie:
         if node == 0:
             return ()
         if node not in self.words:
-            self.words[node] = (*self.word(int(self.parent[node])), int(self.letter[node]))
+            parent, letter = self.nodes[node, :2]
+            self.words[node] = (*self.word(int(parent)), int(letter))
         return self.words[node]
 
 
 @njit(cache=True)
-def trie_grown(parent, letter, child, sibling, core, limit):
-    """The trie's arrays at twice their capacity."""
-    n = len(parent)
-    parent2 = np.full(2 * n, -1, dtype=np.int64)
-    letter2 = np.zeros(2 * n, dtype=np.int64)
-    child2 = np.full(2 * n, -1, dtype=np.int64)
-    sibling2 = np.full(2 * n, -1, dtype=np.int64)
-    core2 = np.zeros(2 * n, dtype=np.bool_)
-    limit2 = np.zeros(2 * n)
-    parent2[:n] = parent
-    letter2[:n] = letter
-    child2[:n] = child
-    sibling2[:n] = sibling
-    core2[:n] = core
-    limit2[:n] = limit
-    return parent2, letter2, child2, sibling2, core2, limit2
-
-
-@njit(cache=True)
-def trie_child(node, a, letter, child, sibling):
+def trie_child(node, a, trie):
     """The child of a node along letter a, or -1."""
-    c = child[node]
-    while c >= 0 and letter[c] != a:
-        c = sibling[c]
+    c = trie[node, CHILD]
+    while c >= 0 and trie[c, LETTER] != a:
+        c = trie[c, SIBLING]
     return c
 
 
 @njit(cache=True)
-def _may_wait(node, x, y, parent, letter, core, pending, margin):
+def add_child(node, a, core, size, trie):
+    """Make the child of a node along letter a at the row `size`."""
+    trie[size, PARENT], trie[size, LETTER], trie[size, CORE] = node, a, core
+    trie[size, CHILD] = -1
+    trie[size, SIBLING] = trie[node, CHILD]
+    trie[node, CHILD] = size
+
+
+@njit(cache=True)
+def more_int_rows(a):
+    """The same rows with room for twice as many (copied by hand, see `geometry.more_rows`)."""
+    b = np.empty((2 * a.shape[0], a.shape[1]), dtype=np.int64)
+    for i in range(a.shape[0]):
+        for j in range(a.shape[1]):
+            b[i, j] = a[i, j]
+    return b
+
+
+@njit(cache=True)
+def longer(a):
+    """A float array with room for twice as many."""
+    b = np.empty(2 * len(a))
+    for i in range(len(a)):
+        b[i] = a[i]
+    return b
+
+
+@njit(cache=True)
+def _may_wait(node, x, y, trie, pending, margin):
     """Whether the letters that lead out of the core can all still be cancelled from a bend at
     (x, y)."""
     v = node
-    while not core[v]:
-        a = letter[v]
-        side = 0 if a > 0 else 1
-        i = abs(a) - 1
-        if (
-            x < pending[side, i, 0] - margin
-            or y < pending[side, i, 1] - margin
-            or x > pending[side, i, 2] + margin
-            or y > pending[side, i, 3] + margin
-        ):
+    while trie[v, CORE] == 0:
+        a = trie[v, LETTER]
+        if not _in_box(a, x, y, pending, margin):
             return False
-        u = parent[v]
-        while not core[u]:
-            if letter[u] == a:
+        u = trie[v, PARENT]
+        while trie[u, CORE] == 0:
+            if trie[u, LETTER] == a:
                 return False
-            u = parent[u]
-        v = parent[v]
+            u = trie[u, PARENT]
+        v = trie[v, PARENT]
     return True
+
+
+@njit(cache=True)
+def _in_box(a, x, y, pending, margin):
+    side = 0 if a > 0 else 1
+    i = abs(a) - 1
+    return (
+        x >= pending[side, i, 0] - margin
+        and y >= pending[side, i, 1] - margin
+        and x <= pending[side, i, 2] + margin
+        and y <= pending[side, i, 3] + margin
+    )
+
+
+@njit(cache=True)
+def _walk(node, lo, hi, x, y, letters, trie, limit, size, grow, pending, margin):
+    """The trie node after the letters lo … hi on the way to a bend at (x, y), made where it may
+    exist; -1 if no wanted word can follow. Returns node, size."""
+    for k in range(lo, hi):
+        a = letters[k]
+        if node > 0 and trie[node, LETTER] == -a:
+            node = trie[node, PARENT]
+            continue
+        c = trie_child(node, a, trie)
+        if c < 0:
+            joins = grow and trie[node, CORE] == 1
+            if joins:
+                v = node
+                while v > 0:
+                    if trie[v, LETTER] == a:
+                        joins = False
+                        break
+                    v = trie[v, PARENT]
+            if not joins and pending[0 if a > 0 else 1, abs(a) - 1, 0] == np.inf:
+                return -1, size
+            c = size
+            add_child(node, a, 1 if joins else 0, c, trie)
+            limit[c] = limit[node]
+            size += 1
+        node = c
+    if trie[node, CORE] == 0 and not _may_wait(node, x, y, trie, pending, margin):
+        return -1, size
+    return node, size
 
 
 @njit(cache=True)
 def explore(
     source, start, target, length, ends, first, turn, gap, letters, segment_row, arrival_row,
-    gap_row, radius, arc_nodes, pending, margin,
-    parent, letter, child, sibling, core, limit, size, grow, keep, cap,
+    gap_row, radius, arc_nodes, pending, margin, longest, trie, limit, size, grow, keep, cap,
 ):  # fmt: skip
     """All taut paths from node `source` whose words stay in (or pend from) the core.
 
-    grow : whether new non-looping words join the core. keep : whether to keep the search tree, so
-    that paths can be written out. cap : most states to visit.
+    longest : most letters that one step can write. grow : whether new non-looping words join the
+    core. keep : whether to keep the search tree, so that paths can be written out. cap : most
+    states to visit.
 
-    Returns the trie's arrays, and per hit: goal point, trie node, length, state, departure, angle
-    slid before the departure; then the tree (parent state, departure, angle slid); then whether
-    the cap stopped the search.
+    Returns trie, limit, size; per hit (goal point, trie node, state, departure) and (length, angle
+    slid before the departure); the tree as (parent state, departure) and angle slid; whether the
+    cap stopped the search.
     """
-    room = 1024
-    s_node = np.empty(room, dtype=np.int64)
-    s_first = np.empty(room, dtype=np.int64)
-    s_turn = np.empty(room)
-    s_word = np.empty(room, dtype=np.int64)
-    s_length = np.empty(room)
-    s_parent = np.empty(room, dtype=np.int64)
-    s_edge = np.empty(room, dtype=np.int64)
-    s_slid = np.empty(room)
-    stack = np.empty(room, dtype=np.int64)
+    # a state is an arrival: node, first departure, word there, parent state, departure taken;
+    # angle to the first departure, length at arrival, angle slid before the departure taken
+    s_i = np.empty((1024, 5), dtype=np.int64)
+    s_f = np.empty((1024, 3))
+    stack = np.empty((1024, 1), dtype=np.int64)
+    h_i = np.empty((256, 4), dtype=np.int64)
+    h_f = np.empty((256, 2))
     hits = 0
-    h_room = 256
-    h_goal = np.empty(h_room, dtype=np.int64)
-    h_word = np.empty(h_room, dtype=np.int64)
-    h_length = np.empty(h_room)
-    h_state = np.empty(h_room, dtype=np.int64)
-    h_edge = np.empty(h_room, dtype=np.int64)
-    h_slid = np.empty(h_room)
     # arrivals seen, by (word, directed arc): collinear tangents give one path several spellings
     slots = 4096
     seen_key = np.full(slots, -1, dtype=np.int64)
     seen_length = np.empty(slots)
     seen_used = 0
     nodes = len(radius)
-    capped = False
 
-    s_node[0], s_first[0], s_turn[0], s_word[0] = source, start[source], 0.0, 0
-    s_length[0], s_parent[0], s_edge[0], s_slid[0] = 0.0, -1, -1, 0.0
-    stack[0] = 0
+    s_i[0, 0], s_i[0, 1], s_i[0, 2], s_i[0, 3], s_i[0, 4] = source, start[source], 0, -1, -1
+    s_f[0, 0], s_f[0, 1], s_f[0, 2] = 0.0, 0.0, 0.0
+    stack[0, 0] = 0
     top, count, visited = 1, 1, 0
     while top > 0:
         top -= 1
-        sid = stack[top]
-        node, e, slid, t, base_length = (
-            s_node[sid], s_first[sid], s_turn[sid], s_word[sid], s_length[sid],
-        )  # fmt: skip
+        sid = stack[top, 0]
+        node, e, t = s_i[sid, 0], s_i[sid, 1], s_i[sid, 2]
+        slid, so_far = s_f[sid, 0], s_f[sid, 1]
         if not keep:
             count = top
         visited += 1
         if visited > cap:
-            capped = True
-            break
-        row_start = start[node]
-        if row_start == start[node + 1]:
+            return (trie, limit, size), (h_i[:hits], h_f[:hits]), (s_i[:count], s_f[:count]), True
+        if start[node] == start[node + 1]:
             continue
         r = radius[node]
         while True:
-            here = base_length + r * slid
+            here = so_far + r * slid
             if here > limit[t]:
                 break
+            if size + longest >= len(trie):
+                trie = more_int_rows(trie)
+                limit = longer(limit)
             reached = here + length[e]
-            w = t
-            for k in range(segment_row[e, 0], segment_row[e, 1]):
-                a = letters[k]
-                w, size = _step(
-                    w, a, parent, letter, child, sibling, core, limit, size, grow, pending
-                )
-                if w < 0:
-                    break
-                if size == len(parent):
-                    parent, letter, child, sibling, core, limit = trie_grown(
-                        parent, letter, child, sibling, core, limit
-                    )
+            x, y = ends[e, 2], ends[e, 3]
+            w, size = _walk(
+                t, segment_row[e, 0], segment_row[e, 1], x, y, letters, trie, limit, size, grow,
+                pending, margin,
+            )  # fmt: skip
             goal = target[e]
             if w >= 0 and reached <= limit[w]:
                 if goal >= arc_nodes:
-                    if core[w]:
-                        if hits == h_room:
-                            h_room *= 2
-                            h_goal = _grown_int(h_goal, h_room)
-                            h_word = _grown_int(h_word, h_room)
-                            h_length = _grown_float(h_length, h_room)
-                            h_state = _grown_int(h_state, h_room)
-                            h_edge = _grown_int(h_edge, h_room)
-                            h_slid = _grown_float(h_slid, h_room)
-                        h_goal[hits], h_word[hits], h_length[hits] = goal - arc_nodes, w, reached
-                        h_state[hits], h_edge[hits], h_slid[hits] = sid, e, slid
+                    if trie[w, CORE] == 1:
+                        if hits == len(h_i):
+                            h_i = more_int_rows(h_i)
+                            h_f = more_rows(h_f)
+                        h_i[hits, 0], h_i[hits, 1] = goal - arc_nodes, w
+                        h_i[hits, 2], h_i[hits, 3] = sid, e
+                        h_f[hits, 0], h_f[hits, 1] = reached, slid
                         hits += 1
-                elif first[e] >= 0 and (
-                    core[w]
-                    or _may_wait(w, ends[e, 2], ends[e, 3], parent, letter, core, pending, margin)
-                ):
-                    # one arrival per (word, directed arc) and place along it
+                elif first[e] >= 0:
                     f = first[e]
                     mark = reached + radius[goal] * turn[e]
                     code = w * nodes + goal
@@ -229,120 +254,41 @@ def explore(
                         slot += 1
                         if slot == slots:
                             slot = 0
-                    w2 = w
                     if fresh:
-                        for k in range(arrival_row[e, 0], arrival_row[e, 1]):
-                            a = letters[k]
-                            w2, size = _step(
-                                w2, a, parent, letter, child, sibling, core, limit, size, grow,
-                                pending,
-                            )  # fmt: skip
-                            if w2 < 0:
-                                break
-                            if size == len(parent):
-                                parent, letter, child, sibling, core, limit = trie_grown(
-                                    parent, letter, child, sibling, core, limit
-                                )
-                    if fresh and w2 >= 0:
                         seen_key[slot] = code
                         seen_length[slot] = mark
                         seen_used += 1
                         if 2 * seen_used > slots:
                             seen_key, seen_length = _rehashed(seen_key, seen_length)
                             slots = len(seen_key)
-                        if count == room or top == room:
-                            room *= 2
-                            s_node = _grown_int(s_node, room)
-                            s_first = _grown_int(s_first, room)
-                            s_turn = _grown_float(s_turn, room)
-                            s_word = _grown_int(s_word, room)
-                            s_length = _grown_float(s_length, room)
-                            s_parent = _grown_int(s_parent, room)
-                            s_edge = _grown_int(s_edge, room)
-                            s_slid = _grown_float(s_slid, room)
-                            stack = _grown_int(stack, room)
-                        s_node[count], s_first[count] = goal, f
-                        s_turn[count], s_word[count] = max(turn[e], 0.0), w2
-                        s_length[count] = reached
-                        s_parent[count], s_edge[count], s_slid[count] = sid, e, slid
-                        stack[top] = count
-                        top += 1
-                        count += 1
+                        w, size = _walk(
+                            w, arrival_row[e, 0], arrival_row[e, 1], ends[f, 0], ends[f, 1],
+                            letters, trie, limit, size, grow, pending, margin,
+                        )  # fmt: skip
+                        if w >= 0:
+                            if count == len(s_i) or top == len(stack):
+                                s_i = more_int_rows(s_i)
+                                s_f = more_rows(s_f)
+                                stack = more_int_rows(stack)
+                            s_i[count, 0], s_i[count, 1], s_i[count, 2] = goal, f, w
+                            s_i[count, 3], s_i[count, 4] = sid, e
+                            s_f[count, 0], s_f[count, 1] = max(turn[e], 0.0), reached
+                            s_f[count, 2] = slid
+                            stack[top, 0] = count
+                            top += 1
+                            count += 1
             if gap[e] < 0.0:
                 break
-            dead = False
-            for k in range(gap_row[e, 0], gap_row[e, 1]):
-                a = letters[k]
-                t, size = _step(
-                    t, a, parent, letter, child, sibling, core, limit, size, grow, pending
-                )
-                if t < 0:
-                    dead = True
-                    break
-                if size == len(parent):
-                    parent, letter, child, sibling, core, limit = trie_grown(
-                        parent, letter, child, sibling, core, limit
-                    )
-            if dead:
+            following = e + 1 if e + 1 < start[node + 1] else start[node]
+            t, size = _walk(
+                t, gap_row[e, 0], gap_row[e, 1], ends[following, 0], ends[following, 1], letters,
+                trie, limit, size, grow, pending, margin,
+            )  # fmt: skip
+            if t < 0:
                 break
             slid += gap[e]
-            e += 1
-            if e == start[node + 1]:
-                e = row_start
-            if not core[t] and not _may_wait(
-                t, ends[e, 0], ends[e, 1], parent, letter, core, pending, margin
-            ):
-                break
-    return (
-        (parent, letter, child, sibling, core, limit, size),
-        (h_goal[:hits], h_word[:hits], h_length[:hits], h_state[:hits], h_edge[:hits],
-         h_slid[:hits]),
-        (s_parent[:count].copy(), s_edge[:count].copy(), s_slid[:count].copy()),
-        capped,
-    )  # fmt: skip
-
-
-@njit(cache=True)
-def _step(node, a, parent, letter, child, sibling, core, limit, size, grow, pending):
-    """The trie node after one more letter, made if it may exist; -1 if no wanted word follows."""
-    if node > 0 and letter[node] == -a:
-        return parent[node], size
-    c = trie_child(node, a, letter, child, sibling)
-    if c >= 0:
-        return c, size
-    joins = False
-    if grow and core[node]:
-        joins = True
-        v = node
-        while v > 0:
-            if letter[v] == a:
-                joins = False
-                break
-            v = parent[v]
-    if not joins:
-        side = 0 if a > 0 else 1
-        if pending[side, abs(a) - 1, 0] > pending[side, abs(a) - 1, 2]:
-            return -1, size
-    c = size
-    parent[c], letter[c], core[c], limit[c] = node, a, joins, limit[node]
-    child[c] = -1
-    sibling[c] = child[node]
-    child[node] = c
-    return c, size + 1
-
-
-@njit(cache=True)
-def _grown_int(a, n):
-    b = np.empty(n, dtype=np.int64)
-    b[: len(a)] = a
-    return b
-
-
-@njit(cache=True)
-def _grown_float(a, n):
-    b = np.empty(n)
-    b[: len(a)] = a
-    return b
+            e = following
+    return (trie, limit, size), (h_i[:hits], h_f[:hits]), (s_i[:count], s_f[:count]), False
 
 
 @njit(cache=True)
@@ -362,23 +308,49 @@ def _rehashed(key, value):
     return key2, value2
 
 
+@dataclass(frozen=True)
+class Found:
+    """What a search hit: goal points, trie nodes of their words, lengths; with the search tree when
+    it was kept."""
+
+    goal: Ints
+    word: Ints
+    length: Floats
+    state: Ints
+    departure: Ints
+    slid: Floats
+    tree: Ints
+    tree_slid: Floats
+    capped: bool
+
+    def pieces(self, hit: int) -> list[tuple[int, float]]:
+        """(departure, angle slid before it) along the path of a hit, from the source on."""
+        out = [(int(self.departure[hit]), float(self.slid[hit]))]
+        s = int(self.state[hit])
+        while self.tree[s, 3] >= 0:
+            out.append((int(self.tree[s, 4]), float(self.tree_slid[s])))
+            s = int(self.tree[s, 3])
+        return out[::-1]
+
+
 def run_explore(
     graph: TangentGraph,
     source: int,
     trie: Trie,
     *,
-    grow: bool,
-    keep: bool,
     margin: float,
-    cap: int,
-) -> tuple[tuple[npt.NDArray[Any], ...], tuple[npt.NDArray[Any], ...], bool]:
-    """Run the kernel from point `source`; updates the trie. Returns hits, tree, capped."""
-    arrays, hits, tree, capped = explore(
+    grow: bool = False,
+    keep: bool = False,
+    cap: int | None = None,
+) -> Found:
+    """Run the kernel from point `source`; updates the trie."""
+    (trie.nodes, trie.limit, trie.size), (h_i, h_f), (s_i, s_f), capped = explore(
         graph.point_node(source), graph.start, graph.target, graph.length, graph.ends,
         graph.first, graph.turn, graph.gap, graph.letters, graph.segment_row, graph.arrival_row,
         graph.gap_row, graph.radius, 2 * len(graph.arcs), graph.pending, margin,
-        trie.parent, trie.letter, trie.child, trie.sibling, trie.core, trie.limit, trie.size,
-        grow, keep, cap,
+        graph.longest_step, trie.nodes, trie.limit, trie.size, grow, keep,
+        np.iinfo(np.int64).max if cap is None else cap,
     )  # fmt: skip
-    (trie.parent, trie.letter, trie.child, trie.sibling, trie.core, trie.limit, trie.size) = arrays
-    return hits, tree, capped
+    return Found(
+        h_i[:, 0], h_i[:, 1], h_f[:, 0], h_i[:, 2], h_i[:, 3], h_f[:, 1], s_i, s_f[:, 2], capped
+    )

@@ -8,14 +8,7 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 from numba import njit
-
-
-@njit(cache=True)
-def ray_order(rays):
-    """Indices of the rays by x, ties by number: the order in which a rightward path meets them."""
-    return np.argsort(rays[:, 0], kind="mergesort")
 
 
 @njit(cache=True)

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -25,7 +24,9 @@ from netsp.geometry import (
     circle_circle_angles,
     circle_line_angles,
     depth_in_obstacle,
+    more_rows,
     segment_blocked,
+    sort_in_place,
 )
 from netsp.polygons import counterclockwise
 from netsp.problem import Circle, Problem
@@ -105,7 +106,7 @@ def build_outline(problem: Problem) -> Outline:
     margin, eps = MARGIN * scale, EPSILON * scale
     blockers, disks = _grow(problem, problem.clearance + margin, eps)
     bounds = np.array(problem.bounds if problem.bounds else (-np.inf, -np.inf, np.inf, np.inf))
-    arcs, full = _visible_arcs(
+    rows = _visible_arcs(
         disks,
         blockers.circles,
         blockers.edges,
@@ -116,6 +117,7 @@ def build_outline(problem: Problem) -> Outline:
         eps,
     )
     points = np.array([_push_out(p[:2], blockers) for p in problem.points])
+    arcs, full = np.ascontiguousarray(rows[:, :5]), rows[:, 5] > 0.0
     return Outline(blockers, arcs, full, points, problem.representative_points, margin)
 
 
@@ -215,9 +217,11 @@ def _covered(x, y, circles, edges, edge_start, grow, box, bounds, eps):
 @njit(cache=True)
 def _visible_arcs(disks, circles, edges, edge_start, grow, box, bounds, eps):
     """The parts of each disk's cone that no other obstacle covers and that lie within bounds."""
-    arcs: Any = []
-    full: Any = []
-    cuts = np.empty(2 * len(circles) + 6 * len(edges) + 16)
+    arcs = np.empty((16, 6))  # the sixth column tells a whole circle
+    count = 0
+    room = 2 * len(circles) + 6 * len(edges) + 16
+    cuts = np.empty(room)
+    inside = np.empty(room + 2)
     for k in range(len(disks)):
         cx, cy, r = disks[k, 0], disks[k, 1], disks[k, 2]
         start, end = disks[k, 3], disks[k, 4]
@@ -246,7 +250,6 @@ def _visible_arcs(disks, circles, edges, edge_start, grow, box, bounds, eps):
             else:
                 n = circle_line_angles(cx, cy, r, cx - 1.0, b, cx + 1.0, b, cuts, n)
         whole = end - start >= TWO_PI
-        inside = np.empty(n + 2)
         m = 1
         inside[0] = start
         for i in range(n):
@@ -256,8 +259,8 @@ def _visible_arcs(disks, circles, edges, edge_start, grow, box, bounds, eps):
                 m += 1
         inside[m] = end
         m += 1
-        inside = np.sort(inside[:m])
-        first = len(arcs)
+        sort_in_place(inside, m)
+        first = count
         open_start = np.nan
         for i in range(m - 1):
             mid = 0.5 * (inside[i] + inside[i + 1])
@@ -277,24 +280,24 @@ def _visible_arcs(disks, circles, edges, edge_start, grow, box, bounds, eps):
             if not hidden and math.isnan(open_start):
                 open_start = inside[i]
             if hidden and not math.isnan(open_start):
-                arcs.append((cx, cy, r, open_start, inside[i]))
-                full.append(False)
+                arcs, count = _append(arcs, count, cx, cy, r, open_start, inside[i], 0.0)
                 open_start = np.nan
         if not math.isnan(open_start):
             if whole and open_start == start:
-                arcs.append((cx, cy, r, 0.0, TWO_PI))
-                full.append(True)
-            elif whole and len(arcs) > first and arcs[first][3] == start:
+                arcs, count = _append(arcs, count, cx, cy, r, 0.0, TWO_PI, 1.0)
+            elif whole and count > first and arcs[first, 3] == start:
                 # the arc runs on through the angle where the cone was cut open
-                head = arcs[first]
-                arcs[first] = (cx, cy, r, open_start, head[4] + TWO_PI)
+                arcs[first, 3] = open_start
+                arcs[first, 4] += TWO_PI
             else:
-                arcs.append((cx, cy, r, open_start, end))
-                full.append(False)
-    out = np.empty((len(arcs), 5))
-    whole_out = np.empty(len(arcs), dtype=np.bool_)
-    for i in range(len(arcs)):
-        for j in range(5):
-            out[i, j] = arcs[i][j]
-        whole_out[i] = full[i]
-    return out, whole_out
+                arcs, count = _append(arcs, count, cx, cy, r, open_start, end, 0.0)
+    return arcs[:count]
+
+
+@njit(cache=True)
+def _append(arcs, count, cx, cy, r, start, end, whole):
+    if count == len(arcs):
+        arcs = more_rows(arcs)
+    arcs[count, 0], arcs[count, 1], arcs[count, 2] = cx, cy, r
+    arcs[count, 3], arcs[count, 4], arcs[count, 5] = start, end, whole
+    return arcs, count + 1

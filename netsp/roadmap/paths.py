@@ -54,33 +54,13 @@ class TautPaths:
     def _pieces(self, a: int, b: int, word: Word) -> tuple[float, list[tuple[int, float]]]:
         """Length, and (departure, angle slid before it) along the taut path of a word."""
         limit = 2.0 * self.problem.tether_length + self.margin
-        trie = Trie.root(limit, capacity=max(256, 2 * len(word) + 2))
-        for k, letter in enumerate(word):
-            trie.parent[k + 1], trie.letter[k + 1] = k, letter
-            trie.child[k] = k + 1
-            trie.core[k + 1], trie.limit[k + 1] = True, limit
-        trie.size = len(word) + 1
-        hits, tree, _ = run_explore(
-            self.tangents,
-            a,
-            trie,
-            grow=False,
-            keep=True,
-            margin=self.outline.margin,
-            cap=np.iinfo(np.int64).max,
-        )
-        goal, node, length, state, edge, slid = hits
-        wanted = np.flatnonzero((goal == b) & (node == len(word)))
+        trie = Trie.of_word(word, limit)
+        found = run_explore(self.tangents, a, trie, keep=True, margin=self.outline.margin)
+        wanted = np.flatnonzero((found.goal == b) & (found.word == len(word)))
         if len(wanted) == 0:
             raise NetspError(f"internal: no taut path of word {word} from point {a} to point {b}")
-        best = int(wanted[np.argmin(length[wanted])])
-        pieces = [(int(edge[best]), float(slid[best]))]
-        parent, via, turned = tree
-        s = int(state[best])
-        while parent[s] >= 0:
-            pieces.append((int(via[s]), float(turned[s])))
-            s = int(parent[s])
-        return float(length[best]), pieces[::-1]
+        best = int(wanted[np.argmin(found.length[wanted])])
+        return float(found.length[best]), found.pieces(best)
 
     def _polyline(self, a: int, b: int, pieces: Sequence[tuple[int, float]]) -> Floats:
         """Tangents and circumscribed arcs as one polyline, finer where a gap is narrow."""

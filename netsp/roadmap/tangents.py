@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from netsp.geometry import TWO_PI, segment_blocked
-from netsp.roadmap.letters import arc_letters, ray_order, segment_letters
+from netsp.geometry import TWO_PI, more_rows, segment_blocked
+from netsp.roadmap.letters import arc_letters, segment_letters
 from netsp.roadmap.outline import Outline
 
 Floats = npt.NDArray[np.float64]
@@ -67,6 +68,12 @@ class TangentGraph:
     rays: Floats
     pending: Floats
 
+    @cached_property
+    def longest_step(self) -> int:
+        """Most letters that sliding to a departure, leaving and sliding on can write together."""
+        rows = (self.segment_row, self.arrival_row, self.gap_row)
+        return 1 + sum(int(np.max(row[:, 1] - row[:, 0], initial=0)) for row in rows)
+
     def point_node(self, p: int) -> int:
         """Node of point p."""
         return 2 * len(self.arcs) + p
@@ -85,10 +92,13 @@ def build_tangents(outline: Outline, reach: float) -> TangentGraph:
         arcs, full = outline.arcs[near], outline.full[near]
     else:
         arcs, full = outline.arcs, outline.full
+    place = np.zeros((len(arcs) + len(outline.points), 5))
+    place[: len(arcs)] = arcs
+    place[len(arcs) :, :2] = outline.points
     rows = _tangents(
-        arcs,
+        place,
+        len(arcs),
         full,
-        outline.points,
         base,
         reach,
         b.circles,
@@ -98,13 +108,16 @@ def build_tangents(outline: Outline, reach: float) -> TangentGraph:
         b.box,
         b.eps,
     )
-    source, target, key, arrival_key, length, ends, angle = rows
+    source, target = rows[:, 0].astype(np.int64), rows[:, 1].astype(np.int64)
+    key, arrival_key, length = rows[:, 2], rows[:, 3], rows[:, 4]
+    ends, angle = np.ascontiguousarray(rows[:, 5:9]), np.ascontiguousarray(rows[:, 9:])
     order = np.lexsort((key, source))
     node_count = 2 * len(arcs) + len(outline.points)
     start = np.searchsorted(source[order], np.arange(node_count + 1)).astype(np.int64)
     target, key, arrival_key = target[order], key[order], arrival_key[order]
     length, ends, angle = length[order], ends[order], angle[order]
-    order_of_rays = ray_order(outline.rays) if len(outline.rays) else np.zeros(0, np.int64)
+    # as `netsp.hsignature.rays`: by x, ties by number
+    order_of_rays = np.argsort(outline.rays[:, 0], kind="stable")
     first, turn, gap, letters, segment_row, arrival_row, gap_row = _write_letters(
         arcs,
         full,
@@ -148,9 +161,9 @@ def _pending_boxes(outline: Outline) -> Floats:
     around an obstacle that interrupts the ray further up and whose representative point lies on the
     side the path came from. In between it is the shortest path homotopic to the piece of the ray,
     pushed aside by what protrudes there, so it stays in the hull of the piece and the protrusions:
-    above point i, and no farther out than they are (lemma on pending letters in docs/theory.md). The
-    bends between may be at further obstacles that reach into the hull. The box is empty (xmin > xmax) when nothing
-    does, so the letter is final. Rays of equal x count as ordered by their numbers.
+    above point i, and no farther out than they are (lemma on pending letters in docs/theory.md).
+    The box is empty (xmin > xmax) when nothing protrudes, so that the letter is final. Rays of
+    equal x count as ordered by their numbers.
     """
     rays, box = outline.rays, outline.blockers.box
     n = len(rays)
@@ -188,18 +201,12 @@ def _key(theta, sense, start, end, full):
 
 
 @njit(cache=True)
-def _tangents(arcs, full, points, base, reach, circles, edges, edge_start, grow, box, eps):
-    """All free directed segments between arcs and points, unsorted."""
-    source = []
-    target = []
-    key = []
-    arrival_key = []
-    data = []
-    a_count, p_count = len(arcs), len(points)
-    total = a_count + p_count
-    place = np.zeros((total, 5))
-    place[:a_count] = arcs
-    place[a_count:, :2] = points
+def _tangents(place, a_count, full, base, reach, circles, edges, edge_start, grow, box, eps):
+    """All free directed segments between arcs and points, unsorted: rows of source, target, key,
+    arrival key, length, ends (4), angles (2). place : arcs, then points as arcs of radius 0."""
+    out = np.empty((256, 11))
+    n = 0
+    total = len(place)
     for i in range(total):
         for j in range(i + 1, total):
             xi, yi, ri, si, ei = place[i, 0], place[i, 1], place[i, 2], place[i, 3], place[i, 4]
@@ -251,31 +258,17 @@ def _tangents(arcs, full, points, base, reach, circles, edges, edge_start, grow,
                     node_j = 2 * j + tj if j < a_count else a_count + j
                     rev_i = node_i ^ 1 if i < a_count else node_i
                     rev_j = node_j ^ 1 if j < a_count else node_j
-                    source.append(node_i)
-                    target.append(node_j)
-                    key.append(key_i)
-                    arrival_key.append(key_j)
-                    data.append((length, ax, ay, bx, by, theta_i, theta_j))
-                    source.append(rev_j)
-                    target.append(rev_i)
-                    key.append(back_j)
-                    arrival_key.append(back_i)
-                    data.append((length, bx, by, ax, ay, theta_j, theta_i))
-    n = len(source)
-    lengths = np.empty(n)
-    ends = np.empty((n, 4))
-    angle = np.empty((n, 2))
-    src = np.empty(n, dtype=np.int64)
-    dst = np.empty(n, dtype=np.int64)
-    k_out = np.empty(n)
-    k_in = np.empty(n)
-    for e in range(n):
-        src[e], dst[e], k_out[e], k_in[e] = source[e], target[e], key[e], arrival_key[e]
-        lengths[e] = data[e][0]
-        ends[e, 0], ends[e, 1] = data[e][1], data[e][2]
-        ends[e, 2], ends[e, 3] = data[e][3], data[e][4]
-        angle[e, 0], angle[e, 1] = data[e][5], data[e][6]
-    return src, dst, k_out, k_in, lengths, ends, angle
+                    if n + 2 > len(out):
+                        out = more_rows(out)
+                    out[n, 0], out[n, 1], out[n, 2], out[n, 3] = node_i, node_j, key_i, key_j
+                    out[n, 4], out[n, 5], out[n, 6] = length, ax, ay
+                    out[n, 7], out[n, 8], out[n, 9], out[n, 10] = bx, by, theta_i, theta_j
+                    n += 1
+                    out[n, 0], out[n, 1], out[n, 2], out[n, 3] = rev_j, rev_i, back_j, back_i
+                    out[n, 4], out[n, 5], out[n, 6] = length, bx, by
+                    out[n, 7], out[n, 8], out[n, 9], out[n, 10] = ax, ay, theta_j, theta_i
+                    n += 1
+    return out[:n]
 
 
 @njit(cache=True)
@@ -296,7 +289,8 @@ def _write_letters(arcs, full, start, target, key, arrival_key, ends, angle, ray
         for e in range(start[node], start[node + 1]):
             if n + 3 * room > len(pool):
                 bigger = np.empty(2 * len(pool) + 3 * room, dtype=np.int32)
-                bigger[:n] = pool[:n]
+                for k in range(n):
+                    bigger[k] = pool[k]
                 pool = bigger
             segment_row[e, 0] = n
             n = segment_letters(

@@ -17,7 +17,17 @@ from numba import njit
 from netsp.errors import InfeasibleError, InputError, NetspError
 from netsp.hsignature import Word, concatenate, invert
 from netsp.problem import Problem
-from netsp.roadmap.explore import Trie, run_explore, trie_child, trie_grown
+from netsp.roadmap.explore import (
+    CORE,
+    LETTER,
+    PARENT,
+    Trie,
+    add_child,
+    longer,
+    more_int_rows,
+    run_explore,
+    trie_child,
+)
 from netsp.roadmap.paths import TautPaths
 from netsp.roadmap.reach import explain_unreached
 from netsp.travel import TravelGraph
@@ -59,16 +69,15 @@ class TautRoadmap:
         """Clusters, words and planar lengths of all admissible augmented goals, base first."""
         limit = self.problem.tether_length + self._margin
         trie = Trie.root(limit)
-        hits, _, capped = run_explore(
+        found = run_explore(
             self.tangents,
             0,
             trie,
             grow=True,
-            keep=False,
             margin=self.outline.margin,
             cap=STATES_PER_CLASS * max_classes,
         )
-        goal, word, length = hits[:3]
+        goal, word, length, capped = found.goal, found.word, found.length, found.capped
         reach = np.hypot(length, self._z[goal] - self._z[0])
         admissible = (goal > 0) & (reach <= limit)
         best: dict[tuple[int, int], float] = {}
@@ -76,10 +85,10 @@ class TautRoadmap:
             key = (int(g), int(w))
             best[key] = min(best.get(key, math.inf), float(d))
         if capped or len(best) > max_classes:
-            found = f"{len(best)} classes so far" if capped else f"{len(best)} classes"
+            count = f"{len(best)} classes so far" if capped else f"{len(best)} classes"
             raise InputError(
                 f"tether_length: {self.problem.tether_length:g} admits too many homotopy classes "
-                f"({found}, limit {max_classes}); lower tether_length or raise max_classes"
+                f"({count}, limit {max_classes}); lower tether_length or raise max_classes"
             )
         missing = sorted(set(range(1, len(self._z))) - {g for g, _ in best})
         if missing:
@@ -131,27 +140,12 @@ class TautRoadmap:
         cluster: Ints,
     ) -> Floats:
         """(len(here), len(there)) planar lengths of all legs from the classes of goal g."""
-        trie = Trie.root(0.0)
-        arrays, head, entry_goal, entry_next, pair = _wanted(
-            here, there, letters, row, planar, cluster, self._margin,
-            trie.parent, trie.letter, trie.child, trie.sibling, trie.core, trie.limit,
-            self.tangents.pending,
-        )  # fmt: skip
-        (trie.parent, trie.letter, trie.child, trie.sibling, trie.core, trie.limit, trie.size) = (
-            arrays
+        nodes, limit, size, head, entry_goal, entry_next, pair = _wanted(
+            here, there, letters, row, planar, cluster, self._margin, self.tangents.pending
         )
-        core_size = trie.size
-        hits, _, _ = run_explore(
-            self.tangents,
-            g,
-            trie,
-            grow=False,
-            keep=False,
-            margin=self.outline.margin,
-            cap=np.iinfo(np.int64).max,
-        )
+        hits = run_explore(self.tangents, g, Trie(nodes, limit, size), margin=self.outline.margin)
         found = _match(
-            hits[0], hits[1], hits[2], head[:core_size], entry_goal, entry_next, len(entry_goal)
+            hits.goal, hits.word, hits.length, head[:size], entry_goal, entry_next, len(entry_goal)
         )
         if np.isinf(found).any():
             k = int(np.argmax(np.isinf(found)))
@@ -177,18 +171,17 @@ class TautRoadmap:
 
 
 @njit(cache=True)
-def _wanted(
-    here, there, letters, row, planar, cluster, margin,
-    parent, letter, child, sibling, core, limit, pending,
-):  # fmt: skip
+def _wanted(here, there, letters, row, planar, cluster, margin, pending):
     """The trie of all relative words between two lists of vertices.
 
     Returns the trie, per node the head of a list of (goal, entry), and the entry of each pair.
     """
+    trie = np.full((256, 5), -1, dtype=np.int64)
+    limit = np.zeros(256)
+    trie[0, LETTER], trie[0, CORE] = 0, 1
     size = 1
-    head = np.full(len(parent), -1, dtype=np.int64)
-    e_goal = np.empty(1024, dtype=np.int64)
-    e_next = np.empty(1024, dtype=np.int64)
+    head = np.full((256, 1), -1, dtype=np.int64)
+    entry = np.empty((1024, 2), dtype=np.int64)
     entries = 0
     pair = np.empty((len(here), len(there)), dtype=np.int64)
     for a in range(len(here)):
@@ -204,59 +197,44 @@ def _wanted(
             bound = planar[u] + planar[v] + margin
             node = 0
             limit[0] = max(limit[0], bound)
+            while size + nu + nv >= len(trie):
+                trie = more_int_rows(trie)
+                limit = longer(limit)
+                head = more_int_rows(head)
             for k in range(nu + nv - 2 * shared):
                 if k < nu - shared:
                     x = -letters[row[u + 1] - 1 - k]
                 else:
                     x = letters[row[v] + shared + k - (nu - shared)]
-                c = trie_child(node, x, letter, child, sibling)
+                c = trie_child(node, x, trie)
                 if c < 0:
-                    if size == len(parent):
-                        parent, letter, child, sibling, core, limit = trie_grown(
-                            parent, letter, child, sibling, core, limit
-                        )
-                        head2 = np.full(len(parent), -1, dtype=np.int64)
-                        head2[: len(head)] = head
-                        head = head2
                     c = size
+                    add_child(node, x, 1, c, trie)
+                    limit[c] = bound
+                    head[c, 0] = -1
                     size += 1
-                    parent[c], letter[c], core[c], limit[c] = node, x, True, bound
-                    sibling[c] = child[node]
-                    child[node] = c
                 elif limit[c] < bound:
                     limit[c] = bound
                 node = c
             goal = cluster[v]
-            e = head[node]
-            while e >= 0 and e_goal[e] != goal:
-                e = e_next[e]
+            e = head[node, 0]
+            while e >= 0 and entry[e, 0] != goal:
+                e = entry[e, 1]
             if e < 0:
-                if entries == len(e_goal):
-                    g2 = np.empty(2 * entries, dtype=np.int64)
-                    n2 = np.empty(2 * entries, dtype=np.int64)
-                    g2[:entries] = e_goal
-                    n2[:entries] = e_next
-                    e_goal, e_next = g2, n2
+                if entries == len(entry):
+                    entry = more_int_rows(entry)
                 e = entries
                 entries += 1
-                e_goal[e], e_next[e] = goal, head[node]
-                head[node] = e
+                entry[e, 0], entry[e, 1] = goal, head[node, 0]
+                head[node, 0] = e
             pair[a, b] = e
-    if size == len(parent):
-        parent, letter, child, sibling, core, limit = trie_grown(
-            parent, letter, child, sibling, core, limit
-        )
-        head2 = np.full(len(parent), -1, dtype=np.int64)
-        head2[: len(head)] = head
-        head = head2
     # a path may stand on a longer word whose last letters it will still cancel
     for c in range(1, size):
-        x = letter[c]
+        x = trie[c, LETTER]
         side, i = (0, x - 1) if x > 0 else (1, -x - 1)
         if pending[side, i, 0] <= pending[side, i, 2]:
-            limit[c] = max(limit[c], limit[parent[c]])
-    arrays = (parent, letter, child, sibling, core, limit, size)
-    return arrays, head, e_goal[:entries], e_next[:entries], pair
+            limit[c] = max(limit[c], limit[trie[c, PARENT]])
+    return trie, limit, size, head[:, 0], entry[:entries, 0], entry[:entries, 1], pair
 
 
 @njit(cache=True)
