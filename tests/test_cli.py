@@ -1,7 +1,6 @@
 """The command line as a user meets it: exit codes, one-line errors, nothing overwritten."""
 
 import json
-import os
 import signal
 import subprocess
 import sys
@@ -146,18 +145,16 @@ def test_ctrl_c_leaves_a_verified_solution(tmp_path):
     problem = tmp_path / "p.json"
     problem.write_text(random_world(2, goals=40, tether=380.0).to_json())
     out = tmp_path / "s.json"
-    process = subprocess.Popen(
-        [sys.executable, "-m", "netsp", "solve", str(problem), "-o", str(out),
-         "--mip-backend", "cbc"],
-        stderr=subprocess.PIPE, text=True, cwd=ROOT, env={**os.environ, "PYTHONUNBUFFERED": "1"},
-    )  # fmt: skip
-    assert process.stderr is not None
-    for line in process.stderr:
-        if " root " in line:
-            break
-    time.sleep(0.5)
-    process.send_signal(signal.SIGINT)
-    process.communicate(timeout=60)
+    command = [sys.executable, "-m", "netsp", "solve", str(problem), "-o", str(out)]
+    with subprocess.Popen(
+        [*command, "--mip-backend", "cbc"], stderr=subprocess.PIPE, text=True, cwd=ROOT
+    ) as process:
+        for line in process.stderr:
+            if " root " in line:
+                break
+        time.sleep(0.5)
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=60)
     assert process.returncode == 0
     solution = json.loads(out.read_text())
     assert solution["status"] == "feasible"

@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+import shapely
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -36,12 +37,17 @@ def classes(roadmap):
 
 
 def nearly_touching(problem):
-    """Whether two circles touch so closely that inscribed polygons cannot tell if they do."""
-    circles = [o for o in problem.obstacles if isinstance(o, Circle)]
-    return any(
-        abs(math.dist(a.center, b.center) - a.radius - b.radius) < 0.05
-        for a, b in itertools.combinations(circles, 2)
-    )
+    """Whether two obstacles touch in a point, so that inscribed polygons cannot tell if they do."""
+    for a, b in itertools.combinations(problem.obstacles, 2):
+        if isinstance(a, Circle):
+            if abs(math.dist(a.center, b.center) - a.radius - b.radius) < 0.05:
+                return True
+            continue
+        p, q = shapely.Polygon(a.polygon), shapely.Polygon(b.polygon)
+        gap = p.distance(q) - 2 * problem.clearance
+        if abs(gap) < 0.02 and (problem.clearance or "Point" in p.intersection(q).geom_type):
+            return True
+    return False
 
 
 def check_against_brute_force(problem, sides=32):
@@ -270,6 +276,17 @@ def test_touching_circles_leave_no_gap():
     )  # fmt: skip
     assert min(classes(TautRoadmap(shut)).values()) > 7.0
     assert min(classes(TautRoadmap(ajar)).values()) == pytest.approx(6.0, abs=1e-5)
+
+
+def test_polygons_that_touch_in_a_corner_leave_no_gap():
+    """Two squares corner to corner: the way between them is shut, the way round is not."""
+    squares = [[(-2, -2), (0, -2), (0, 0), (-2, 0)], [(0, 0), (2, 0), (2, 2), (0, 2)]]
+    problem = Problem(
+        base=(1, -1), goals=[(-1, 1)], obstacles=[Polygon(polygon=s) for s in squares],
+        tether_length=9,
+    )  # fmt: skip
+    lengths = classes(TautRoadmap(problem)).values()
+    assert list(lengths) == pytest.approx([4 + 2 * math.sqrt(2)] * 2, abs=1e-6)
 
 
 def test_too_many_classes_is_a_clear_error():
