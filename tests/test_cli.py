@@ -154,7 +154,8 @@ def test_ctrl_c_leaves_a_verified_solution(tmp_path):
                 break
         time.sleep(0.5)
         process.send_signal(signal.SIGINT)
-        process.communicate(timeout=60)
+        process.stderr.read()
+        process.wait(timeout=60)
     assert process.returncode == 0
     solution = json.loads(out.read_text())
     assert solution["status"] == "feasible"
