@@ -8,6 +8,7 @@ the commands that need them, so that `--help` is instant.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import os
 import sys
 from collections.abc import Sequence
@@ -144,18 +145,19 @@ def _solve(args: argparse.Namespace) -> int:
     from netsp.solvers import solve
 
     table = None if args.quiet else ProgressTable(sys.stderr)
-    if table:
-        table.begin(problem)
-    solution = solve(
-        problem,
-        args.solver,
-        roadmap=args.roadmap,
-        time_limit=args.time_limit,
-        seed=args.seed,
-        params={"backend": args.mip_backend} if args.mip_backend else None,
-        warm_start=warm,
-        on_progress=table,
-    )
+    with table or contextlib.nullcontext():
+        if table:
+            table.begin(problem)
+        solution = solve(
+            problem,
+            args.solver,
+            roadmap=args.roadmap,
+            time_limit=args.time_limit,
+            seed=args.seed,
+            params={"backend": args.mip_backend} if args.mip_backend else None,
+            warm_start=warm,
+            on_progress=table,
+        )
     if args.output:
         write_text(args.output, solution.to_json())
     else:

@@ -55,9 +55,14 @@ class ProgressTable:
         else:
             self._held = row
 
+    def __enter__(self) -> ProgressTable:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._patience.cancel()
+
     def end(self) -> None:
         """Print the last row if it was held back."""
-        self._patience.cancel()
         if self._held is not None:
             self._show(self._held)
 
