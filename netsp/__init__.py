@@ -15,12 +15,12 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from netsp.errors import InfeasibleError, InputError, NetspError, VerificationError
+    from netsp.judge import Verification, verify
     from netsp.problem import Circle, Goal, Polygon, Problem
     from netsp.result import Progress, Result
     from netsp.solution import Solution, Status
     from netsp.solvers import solve, solve_graph, travel_graph
     from netsp.travel import TravelGraph
-    from netsp.verify import Verification, verify
 
 __version__ = "0.1.0"
 
@@ -37,12 +37,12 @@ _PUBLIC = {
     "Solution": "solution",
     "Status": "solution",
     "TravelGraph": "travel",
-    "Verification": "verify",
+    "Verification": "judge",
     "VerificationError": "errors",
     "solve": "solvers",
     "solve_graph": "solvers",
     "travel_graph": "solvers",
-    "verify": "verify",
+    "verify": "judge",
 }
 
 __all__ = [

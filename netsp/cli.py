@@ -173,7 +173,7 @@ def _solve(args: argparse.Namespace) -> int:
 
 def _verify(args: argparse.Namespace) -> int:
     problem, solution = _load_pair(args.problem, args.solution)
-    from netsp.verify import verify
+    from netsp.judge import verify
 
     verdict = verify(problem, solution)
     if not args.quiet:

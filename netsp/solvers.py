@@ -20,7 +20,10 @@ from netsp.travel import TravelGraph
 SOLVERS: dict[str, str] = {"mip": "netsp.mip:solve"}
 """Solver name → where its `solve(graph, …) -> Result` lives."""
 
-ROADMAPS: dict[str, str] = {"taut": "netsp.roadmap.taut:TautRoadmap"}
+ROADMAPS: dict[str, str] = {
+    "taut": "netsp.roadmap.taut:TautRoadmap",
+    "prm": "netsp.roadmap.prm:PrmRoadmap",
+}
 """Roadmap name → class with `travel_graph()`."""
 
 DEFAULT_SOLVER = "mip"

@@ -97,7 +97,7 @@ def test_legs_agree_with_brute_force(problem):
     error = 4.0 * problem.tether_length * (math.pi / 32) ** 2
     for u in np.flatnonzero(roadmap.cluster == 1):
         for v in np.flatnonzero(roadmap.cluster == 2):
-            d = found[2, roadmap.relative_word(int(u), int(v))]
+            d = found[2, roadmap.legs.relative_word(int(u), int(v))]
             assert d - 1e-6 <= costs[u, v] <= d + error
 
 
@@ -141,7 +141,7 @@ def test_a_materialised_leg_has_its_word_its_length_and_enough_tether(seed):
         if graph.cluster[u] == graph.cluster[v]:
             continue
         path = graph.path(u, v)
-        assert signature(path, rays) == roadmap.relative_word(u, v)
+        assert signature(path, rays) == roadmap.legs.relative_word(u, v)
         drawn = np.linalg.norm(np.diff(path, axis=0), axis=1).sum()
         assert graph.costs[u, v] - 1e-6 <= drawn <= graph.costs[u, v] * 1.001
         # no piece of the path is inside an obstacle
@@ -227,9 +227,9 @@ def test_three_dimensional_lengths_are_the_hypotenuse_of_the_plan_and_the_height
 
 def test_legs_may_be_asked_for_in_part():
     roadmap = TautRoadmap(random_world(5, goals=6, tether=300.0))
-    whole = roadmap.lengths(np.arange(len(roadmap.cluster)))
+    whole = roadmap.legs.lengths(np.arange(len(roadmap.cluster)))
     some = np.array([0, 3, 5, 9, len(whole) - 1])
-    assert np.array_equal(roadmap.lengths(some), whole[np.ix_(some, some)])
+    assert np.array_equal(roadmap.legs.lengths(some), whole[np.ix_(some, some)])
 
 
 def test_a_goal_out_of_reach_is_named_with_the_tether_that_would_do():

@@ -8,9 +8,9 @@ from hypothesis import given, settings
 
 from netsp import Circle, InfeasibleError, Problem, solve, travel_graph, verify
 from netsp.hsignature import is_looping, signature
+from netsp.judge.stringpull import StringPuller, reduce_sleeve
 from netsp.roadmap.taut import TautRoadmap
 from netsp.solution import ProblemReference, Status
-from netsp.verify.stringpull import StringPuller, reduce_sleeve
 from tests.worlds import random_world, small_worlds
 
 

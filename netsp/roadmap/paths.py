@@ -35,7 +35,11 @@ class TautPaths:
 
     def length(self, a: int, b: int, word: Word) -> float:
         """3D length of the taut path of a word from point a to point b."""
-        return math.hypot(self._pieces(a, b, word)[0], float(self._z[b] - self._z[a]))
+        return math.hypot(self.planar_length(a, b, word), float(self._z[b] - self._z[a]))
+
+    def planar_length(self, a: int, b: int, word: Word) -> float:
+        """Length in the plan of the taut path of a word from point a to point b."""
+        return self._pieces(a, b, word)[0]
 
     def path(self, a: int, b: int, word: Word) -> Floats:
         """(n, 3) polyline of the taut path of a word from point a to point b (0 is the base)."""

@@ -9,6 +9,7 @@ else; obstacles are vertical, so a 3D length is ``hypot(planar taut length, dz)`
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -42,7 +43,7 @@ STATES_PER_CLASS = 2_000
 
 
 class TautRoadmap:
-    """Classes and legs of one problem. Satisfies `netsp.travel.Legs`.
+    """Classes and legs of one problem.
 
     Raises
     ------
@@ -58,10 +59,11 @@ class TautRoadmap:
         self._z = problem.points[:, 2]
         self.cluster, self.signatures, self.planar = self._classes(max_classes)
         self.tethers: Floats = np.hypot(self.planar, self._z[self.cluster] - self._z[0])
+        self.legs = TautLegs(self.paths, self.cluster, self.signatures, self.planar)
 
     def travel_graph(self) -> TravelGraph:
         """The travel graph over this roadmap; legs are computed when first asked for."""
-        return TravelGraph(self.cluster, self.signatures, self.tethers, self, roadmap="taut")
+        return TravelGraph(self.cluster, self.signatures, self.tethers, self.legs, roadmap="taut")
 
     # classes
 
@@ -99,7 +101,20 @@ class TautRoadmap:
         planar = np.array([0.0, *(best[k] for k in order)])
         return cluster, words, planar
 
-    # legs
+
+class TautLegs:
+    """Exact legs between given augmented goals. Satisfies `netsp.travel.Legs`.
+
+    cluster, signatures, planar : goal (0 is the base), word and planar taut tether length of each
+    vertex.
+    """
+
+    def __init__(
+        self, paths: TautPaths, cluster: Ints, signatures: Sequence[Word], planar: Floats
+    ) -> None:
+        self.paths, self.cluster, self.planar = paths, cluster, planar
+        self.signatures = list(signatures)
+        self._z = paths.problem.points[:, 2]
 
     def lengths(self, vertices: Ints) -> Floats:
         """(k, k) 3D leg lengths among the given vertices; inf within a cluster.
@@ -141,9 +156,21 @@ class TautRoadmap:
     ) -> Floats:
         """(len(here), len(there)) planar lengths of all legs from the classes of goal g."""
         nodes, limit, size, head, entry_goal, entry_next, pair = _wanted(
-            here, there, letters, row, planar, cluster, self._margin, self.tangents.pending
+            here,
+            there,
+            letters,
+            row,
+            planar,
+            cluster,
+            self.paths.margin,
+            self.paths.tangents.pending,
         )
-        hits = run_explore(self.tangents, g, Trie(nodes, limit, size), margin=self.outline.margin)
+        hits = run_explore(
+            self.paths.tangents,
+            g,
+            Trie(nodes, limit, size),
+            margin=self.paths.outline.margin,
+        )
         found = _match(
             hits.goal, hits.word, hits.length, head[:size], entry_goal, entry_next, len(entry_goal)
         )
@@ -160,8 +187,6 @@ class TautRoadmap:
     def relative_word(self, u: int, v: int) -> Word:
         """The word of the leg from vertex u to vertex v."""
         return concatenate(invert(self.signatures[u]), self.signatures[v])
-
-    # paths
 
     def path(self, u: int, v: int) -> Floats:
         """(n, 3) polyline of the taut leg from vertex u to vertex v, arcs circumscribed; height

@@ -1,7 +1,7 @@
 """The independent judge of a solution. Imports no roadmap and no solver.
 
 Words come from the rays (`netsp.hsignature`); that the tour is contractible and each tether fits is
-found a second time over a triangulation (`netsp.verify.stringpull`); obstacles are kept clear of by
+found a second time over a triangulation (`netsp.judge.stringpull`); obstacles are kept clear of by
 plain distances (Shapely).
 """
 
@@ -14,9 +14,9 @@ import numpy.typing as npt
 import shapely
 
 from netsp.hsignature import Word, concatenate, crossings, reduce
+from netsp.judge.stringpull import StringPuller, reduce_sleeve
 from netsp.problem import Circle, Problem
 from netsp.solution import Solution, Status
-from netsp.verify.stringpull import StringPuller, reduce_sleeve
 
 Floats = npt.NDArray[np.float64]
 

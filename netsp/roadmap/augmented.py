@@ -1,0 +1,351 @@
+"""The homotopy-augmented graph of Bhattacharya, Likhachev & Kumar 2012 over any roadmap.
+
+Its vertices are (milestone, word): the milestone together with the class of the way from the base.
+As in McCammon & Hollinger 2017, section IV-A, a vertex exists only if the tether reaches it along
+the roadmap and if its word does not loop. An edge of the roadmap becomes one edge for every word at
+its tail, leading to the word with the edge's crossings appended and reduced.
+"""
+
+from __future__ import annotations
+
+import heapq
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from netsp.errors import InputError, NetspError
+from netsp.hsignature import Word
+from netsp.roadmap.explore import LETTER, PARENT, Trie, add_child, longer, more_int_rows, trie_child
+
+if TYPE_CHECKING:
+    import networkx
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class AugmentedGraph:
+    """Vertices (milestone, word) with the edges between them; vertex 0 is (base, empty word).
+
+    milestone, node, length : (n,) milestone, word (as a trie node), shortest length from the base.
+    start, target, cost : compressed rows of the edges, both ways.
+    points : (milestones, 3).
+    """
+
+    points: Floats
+    milestone: Ints
+    node: Ints
+    length: Floats
+    start: Ints
+    target: Ints
+    cost: Floats
+    trie: Trie
+
+    def __len__(self) -> int:
+        return len(self.milestone)
+
+    def word(self, v: int) -> Word:
+        """The word of a vertex."""
+        return self.trie.word(int(self.node[v]))
+
+    @cached_property
+    def _matrix(self) -> Any:
+        from scipy.sparse import csr_array
+
+        n = len(self)
+        return csr_array((self.cost, self.target, self.start), shape=(n, n))
+
+    def distances(self, sources: Ints, targets: Ints) -> Floats:
+        """(sources, targets) shortest lengths within the graph, by Dijkstra; inf if not joined."""
+        from scipy.sparse.csgraph import dijkstra
+
+        out = np.empty((len(sources), len(targets)))
+        step = max(1, 20_000_000 // max(len(self), 1))
+        for k in range(0, len(sources), step):
+            rows = dijkstra(self._matrix, directed=True, indices=sources[k : k + step])
+            out[k : k + step] = rows[:, targets]
+        return out
+
+    def path(self, u: int, v: int, method: Literal["astar", "dijkstra"] = "astar") -> list[int]:
+        """Vertices of a shortest path from u to v. A* is guided by the straight-line distance,
+        which never exceeds the way along edges, so both methods find the same length."""
+        goal = self.points[self.milestone[v]]
+        guide = np.zeros(len(self.points))
+        if method == "astar":
+            guide = np.linalg.norm(self.points - goal, axis=1)
+        best = {u: 0.0}
+        before = {u: -1}
+        done: set[int] = set()
+        queue = [(float(guide[self.milestone[u]]), u)]
+        while queue:
+            _, a = heapq.heappop(queue)
+            if a == v:
+                out = [v]
+                while before[out[-1]] >= 0:
+                    out.append(before[out[-1]])
+                return out[::-1]
+            if a in done:
+                continue
+            done.add(a)
+            for e in range(self.start[a], self.start[a + 1]):
+                b = int(self.target[e])
+                d = best[a] + float(self.cost[e])
+                if d < best.get(b, np.inf):
+                    best[b], before[b] = d, a
+                    heapq.heappush(queue, (d + float(guide[self.milestone[b]]), b))
+        raise NetspError(f"internal: vertices {u} and {v} of the augmented graph are not joined")
+
+    def to_networkx(self) -> networkx.Graph:
+        """A networkx Graph for study: nodes are (milestone, word), with ``pos`` and ``length``;
+        edges have ``weight``."""
+        try:
+            import networkx
+        except ImportError:
+            raise InputError("to_networkx needs networkx: pip install 'netsp[prm]'") from None
+        graph = networkx.Graph()
+        keys = [(int(m), self.word(v)) for v, m in enumerate(self.milestone)]
+        for v, key in enumerate(keys):
+            graph.add_node(key, pos=tuple(self.points[key[0]]), length=float(self.length[v]))
+        for v in range(len(self)):
+            for e in range(self.start[v], self.start[v + 1]):
+                graph.add_edge(keys[v], keys[self.target[e]], weight=float(self.cost[e]))
+        return graph
+
+
+def augment(
+    points: Floats,
+    edges: Ints,
+    rays: Floats,
+    letters: tuple[Ints, Ints],
+    tether_length: float,
+    cap: int,
+) -> AugmentedGraph:
+    """Augment a roadmap from milestone 0, the base.
+
+    points : (n, 3); edges : (k, 2); letters : the edges' ray crossings, and row starts into them.
+    cap : most vertices; more is an InputError.
+    """
+    n = len(points)
+    cost = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
+    tail = np.concatenate([edges[:, 0], edges[:, 1]])
+    order = np.argsort(tail, kind="stable")
+    start = np.searchsorted(tail[order], np.arange(n + 1)).astype(np.int64)
+    # a directed edge is its undirected number, with the sign of its sense
+    number = np.concatenate([np.arange(len(edges)), -1 - np.arange(len(edges))])[order]
+    head = np.concatenate([edges[:, 1], edges[:, 0]])[order]
+    milestone, node, length, trie, size, ok = _reach(
+        start, number, head, cost, letters[0], letters[1], float(tether_length), cap
+    )
+    if not ok:
+        raise InputError(
+            f"tether_length: {tether_length:g} gives more than {cap} vertices (milestone, word); "
+            "lower tether_length or samples, or raise max_augmented"
+        )
+    row, target, edge = _expand(
+        start, number, head, letters[0], letters[1], milestone, node, trie, n
+    )
+    return AugmentedGraph(
+        points, milestone, node, length, row, target, cost[edge], Trie(trie, np.zeros(0), size)
+    )
+
+
+@njit(cache=True)
+def _onward(node, k, letters, row, trie, size):
+    """The trie node after edge k (negative: backwards); -1 where the word loops. Makes nodes up to
+    the capacity of the trie when size >= 0, else only finds them. Returns node, size."""
+    backward = k < 0
+    if backward:
+        k = -1 - k
+    for j in range(row[k], row[k + 1]):
+        a = -letters[row[k + 1] - 1 - (j - row[k])] if backward else letters[j]
+        if node > 0 and trie[node, LETTER] == -a:
+            node = trie[node, PARENT]
+            continue
+        c = trie_child(node, a, trie)
+        if c < 0:
+            if size < 0:
+                return -1, size
+            add_child(node, a, 1, size, trie)
+            c = size
+            size += 1
+        node = c
+    return node, size
+
+
+@njit(cache=True)
+def _loops(node, trie):
+    v = node
+    while v > 0:
+        u = trie[v, PARENT]
+        while u > 0:
+            if trie[u, LETTER] == trie[v, LETTER]:
+                return True
+            u = trie[u, PARENT]
+        v = trie[v, PARENT]
+    return False
+
+
+@njit(cache=True)
+def _reach(start, number, head, cost, letters, row, limit, cap):
+    """Dijkstra over (milestone, word) from (0, empty word), up to the tether length."""
+    trie = np.full((256, 5), -1, dtype=np.int64)
+    trie[0, LETTER] = 0
+    size = 1
+    longest = 0
+    for k in range(len(row) - 1):
+        longest = max(longest, row[k + 1] - row[k])
+    n = len(start) - 1
+    # index of (milestone, word): open addressing
+    slots = 4096
+    slot_key = np.full(slots, -1, dtype=np.int64)
+    slot_id = np.empty(slots, dtype=np.int64)
+    ids = np.empty((1024, 2), dtype=np.int64)
+    length = np.full(1024, np.inf)
+    closed = np.zeros((1024, 1), dtype=np.int64)
+    count = 1
+    ids[0, 0], ids[0, 1], length[0] = 0, 0, 0.0
+    slot_key[0], slot_id[0] = 0, 0
+    heap_d = np.empty(4096)
+    heap_v = np.empty((4096, 1), dtype=np.int64)
+    heap_d[0], heap_v[0, 0] = 0.0, 0
+    heap = 1
+    while heap > 0:
+        d, v = heap_d[0], heap_v[0, 0]
+        heap -= 1
+        _sift_down(heap_d, heap_v, heap)
+        if closed[v, 0] == 1:
+            continue
+        closed[v, 0] = 1
+        m, w = ids[v, 0], ids[v, 1]
+        for e in range(start[m], start[m + 1]):
+            k = number[e]
+            reached = d + cost[k if k >= 0 else -1 - k]
+            if reached > limit:
+                continue
+            if size + longest >= len(trie):
+                trie = more_int_rows(trie)
+            w2, size = _onward(w, k, letters, row, trie, size)
+            key = w2 * n + head[e]
+            slot = (key * 0x9E3779B1) % slots
+            while slot_key[slot] >= 0 and slot_key[slot] != key:
+                slot += 1
+                if slot == slots:
+                    slot = 0
+            if slot_key[slot] < 0:
+                if w2 != w and _loops(w2, trie):
+                    continue
+                if count == cap:
+                    return ids[:, 0], ids[:, 1], length, trie, size, False
+                if count == len(ids):
+                    ids = more_int_rows(ids)
+                    longer_length = longer(length)
+                    for i in range(count, len(longer_length)):
+                        longer_length[i] = np.inf
+                    length = longer_length
+                    closed2 = np.zeros((2 * count, 1), dtype=np.int64)
+                    for i in range(count):
+                        closed2[i, 0] = closed[i, 0]
+                    closed = closed2
+                u = count
+                count += 1
+                ids[u, 0], ids[u, 1] = head[e], w2
+                slot_key[slot], slot_id[slot] = key, u
+                if 2 * count > slots:
+                    slots *= 2
+                    slot_key = np.full(slots, -1, dtype=np.int64)
+                    slot_id = np.empty(slots, dtype=np.int64)
+                    for i in range(count):
+                        code = ids[i, 1] * n + ids[i, 0]
+                        s = (code * 0x9E3779B1) % slots
+                        while slot_key[s] >= 0:
+                            s += 1
+                            if s == slots:
+                                s = 0
+                        slot_key[s], slot_id[s] = code, i
+            else:
+                u = slot_id[slot]
+            if reached < length[u]:
+                length[u] = reached
+                if heap == len(heap_d):
+                    heap_d = longer(heap_d)
+                    heap_v = more_int_rows(heap_v)
+                _sift_up(heap_d, heap_v, heap, reached, u)
+                heap += 1
+    return ids[:count, 0].copy(), ids[:count, 1].copy(), length[:count].copy(), trie, size, True
+
+
+@njit(cache=True)
+def _sift_up(heap_d, heap_v, at, d, v):
+    while at > 0:
+        up = (at - 1) // 2
+        if heap_d[up] <= d:
+            break
+        heap_d[at], heap_v[at, 0] = heap_d[up], heap_v[up, 0]
+        at = up
+    heap_d[at], heap_v[at, 0] = d, v
+
+
+@njit(cache=True)
+def _sift_down(heap_d, heap_v, heap):
+    """Put the last entry in the place of the first."""
+    d, v = heap_d[heap], heap_v[heap, 0]
+    at = 0
+    while True:
+        c = 2 * at + 1
+        if c >= heap:
+            break
+        if c + 1 < heap and heap_d[c + 1] < heap_d[c]:
+            c += 1
+        if heap_d[c] >= d:
+            break
+        heap_d[at], heap_v[at, 0] = heap_d[c], heap_v[c, 0]
+        at = c
+    heap_d[at], heap_v[at, 0] = d, v
+
+
+@njit(cache=True)
+def _expand(start, number, head, letters, row, milestone, node, trie, n):
+    """Edges among the augmented vertices, as compressed rows; `edge` is the undirected number."""
+    count = len(milestone)
+    slots = 4
+    while slots < 2 * count + 2:
+        slots *= 2
+    slot_key = np.full(slots, -1, dtype=np.int64)
+    slot_id = np.empty(slots, dtype=np.int64)
+    total = 0
+    for i in range(count):
+        code = node[i] * n + milestone[i]
+        s = (code * 0x9E3779B1) % slots
+        while slot_key[s] >= 0:
+            s += 1
+            if s == slots:
+                s = 0
+        slot_key[s], slot_id[s] = code, i
+        total += start[milestone[i] + 1] - start[milestone[i]]
+    out_row = np.zeros(count + 1, dtype=np.int64)
+    target = np.empty(total, dtype=np.int64)
+    edge = np.empty(total, dtype=np.int64)
+    m = 0
+    for v in range(count):
+        for e in range(start[milestone[v]], start[milestone[v] + 1]):
+            k = number[e]
+            w, _ = _onward(node[v], k, letters, row, trie, -1)
+            if w < 0:
+                continue
+            code = w * n + head[e]
+            s = (code * 0x9E3779B1) % slots
+            while slot_key[s] >= 0 and slot_key[s] != code:
+                s += 1
+                if s == slots:
+                    s = 0
+            if slot_key[s] == code:
+                target[m] = slot_id[s]
+                edge[m] = k if k >= 0 else -1 - k
+                m += 1
+        out_row[v + 1] = m
+    return out_row, target[:m].copy(), edge[:m].copy()

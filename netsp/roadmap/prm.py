@@ -1,0 +1,301 @@
+"""The sampled roadmap of the 2017 paper: PRM* (OMPL) with homotopy augmentation.
+
+McCammon & Hollinger 2017, section IV-A: milestones are sampled uniformly in free space, joined by
+the PRM* rule (Karaman & Frazzoli 2011), and augmented with the homotopy class of the way from the
+base (Bhattacharya et al. 2012). Words come from the projection on the plane, lengths are 3D.
+
+OMPL samples motions at a resolution, so it is asked to check the ends only and every edge is
+checked exactly here. Base and goals join the milestones by the same k-nearest rule.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from netsp.errors import InfeasibleError, InputError, NetspError
+from netsp.geometry import depth_in_obstacle, segment_blocked
+from netsp.hsignature import Word
+from netsp.problem import Circle, Problem
+from netsp.roadmap.augmented import AugmentedGraph, augment
+from netsp.roadmap.letters import segment_letters
+from netsp.roadmap.outline import Outline
+from netsp.roadmap.paths import TautPaths
+from netsp.roadmap.reach import explain_unreached
+from netsp.roadmap.taut import TautLegs
+from netsp.travel import TravelGraph
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+SAMPLES = 1000
+"""Milestones, as in the paper."""
+
+MAX_AUGMENTED = 2_000_000
+"""Most vertices of the augmented graph (milestone, word)."""
+
+
+class PrmRoadmap:
+    """PRM* and its homotopy-augmented graph. Satisfies `netsp.travel.Legs`.
+
+    Parameters
+    ----------
+    samples : milestones to sample. seed : of the sampling; same seed, same roadmap.
+    shortcut : pull every leg taut within its class, so that only the set of classes is sampled.
+
+    Attributes
+    ----------
+    milestones : (n, 3) base, goals, then samples. edges : (k, 2) pairs of milestones.
+    augmented : the graph over (milestone, word).
+
+    Raises
+    ------
+    InputError : bad options, OMPL not installed, or too many augmented vertices.
+    InfeasibleError : a goal that no path over the roadmap reaches within the tether.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        *,
+        samples: int = SAMPLES,
+        seed: int = 0,
+        shortcut: bool = False,
+        max_augmented: int = MAX_AUGMENTED,
+    ) -> None:
+        if samples < 1:
+            raise InputError(f"samples: expected a positive whole number, got {samples!r}")
+        self.problem = problem
+        self.paths = TautPaths(problem)
+        outline = self.paths.outline
+        fixed = problem.points.copy()
+        fixed[:, :2] = outline.points
+        sampled = _sample(problem, outline, samples, seed)
+        self.milestones: Floats = np.vstack([fixed, sampled[0]])
+        own = np.asarray(sampled[1], dtype=np.int64).reshape(-1, 2) + len(fixed)
+        self.edges: Ints = _exactly_free(
+            np.unique(np.vstack([own, _join(self.milestones, len(fixed))]), axis=0),
+            self.milestones,
+            outline,
+        )
+        self.augmented: AugmentedGraph = augment(
+            self.milestones,
+            self.edges,
+            outline.rays,
+            _edge_letters(self.edges, self.milestones, outline.rays),
+            problem.tether_length,
+            max_augmented,
+        )
+        self.cluster, self.signatures, self._vertex = self._classes()
+        planar = np.array(
+            [
+                self.paths.planar_length(0, int(c), w) if c else 0.0
+                for c, w in zip(self.cluster, self.signatures, strict=True)
+            ]
+        )
+        z = problem.points[:, 2]
+        self.tethers: Floats = np.hypot(planar, z[self.cluster] - z[0])
+        self._taut = (
+            TautLegs(self.paths, self.cluster, self.signatures, planar) if shortcut else None
+        )
+
+    def travel_graph(self) -> TravelGraph:
+        """The travel graph over this roadmap. Tethers are the taut ones of their classes; that
+        they fit was decided by the length along the roadmap, which is no shorter."""
+        return TravelGraph(self.cluster, self.signatures, self.tethers, self, roadmap="prm")
+
+    def _classes(self) -> tuple[Ints, list[Word], Ints]:
+        """Augmented goals: those augmented vertices that stand on a goal, base first."""
+        g = self.augmented
+        goals = len(self.problem.goals)
+        rows = np.flatnonzero((g.milestone >= 1) & (g.milestone <= goals))
+        missing = sorted(set(range(1, goals + 1)) - set(g.milestone[rows].tolist()))
+        if missing:
+            try:
+                reason = explain_unreached(self.problem, self.paths.outline, missing)
+            except NetspError as error:  # pragma: no cover - the reason is a courtesy
+                reason = str(error)
+            raise InfeasibleError(f"no path over the prm roadmap (try more samples): {reason}")
+        rows = rows[np.lexsort((g.length[rows], g.milestone[rows]))]
+        cluster = np.concatenate([[0], g.milestone[rows]]).astype(np.int64)
+        words: list[Word] = [(), *(g.word(int(v)) for v in rows)]
+        return cluster, words, np.concatenate([[0], rows]).astype(np.int64)
+
+    def lengths(self, vertices: Ints) -> Floats:
+        """(k, k) leg lengths among the given vertices, along the augmented graph; inf within a
+        cluster."""
+        vertices = np.asarray(vertices, dtype=np.int64)
+        if self._taut is not None:
+            return self._taut.lengths(vertices)
+        rows = self._vertex[vertices]
+        out = self.augmented.distances(rows, rows)
+        out = np.minimum(out, out.T)  # equal but for the order of summation
+        cluster = self.cluster[vertices]
+        out[cluster[:, None] == cluster[None, :]] = np.inf
+        return np.asarray(out)
+
+    def path(self, u: int, v: int) -> Floats:
+        """(n, 3) polyline of the leg from vertex u to vertex v."""
+        if self._taut is not None:
+            return self._taut.path(u, v)
+        rows = self.augmented.path(int(self._vertex[u]), int(self._vertex[v]))
+        out = self.milestones[self.augmented.milestone[rows]].copy()
+        out[0] = self.problem.points[self.cluster[u]]
+        out[-1] = self.problem.points[self.cluster[v]]
+        return out
+
+
+def _ompl() -> Any:
+    try:
+        from ompl import base, geometric, util
+    except ImportError:
+        raise InputError(
+            "roadmap: 'prm' needs OMPL; install it with: pip install 'netsp[prm]'"
+        ) from None
+    return base, geometric, util
+
+
+def sampling_box(problem: Problem) -> tuple[Floats, Floats]:
+    """Lower and upper corner (3,) of where milestones are drawn: the bounds, or what holds base,
+    goals and obstacles with a tenth to spare, within reach of the tether."""
+    points = problem.points
+    if problem.bounds is not None:
+        low2, high2 = np.array(problem.bounds[:2]), np.array(problem.bounds[2:])
+    else:
+        xy = [points[:, :2]]
+        for o in problem.obstacles:
+            if isinstance(o, Circle):
+                xy.append(np.array(o.center) + np.array([[-1.0], [1.0]]) * o.radius)
+            else:
+                xy.append(np.array(o.polygon))
+        every = np.vstack(xy)
+        low2, high2 = every.min(axis=0), every.max(axis=0)
+        spare = 0.1 * float((high2 - low2).max()) + 2.0 * problem.clearance
+        low2, high2 = low2 - spare, high2 + spare
+    reach = problem.tether_length
+    low2 = np.maximum(low2, points[0, :2] - reach)
+    high2 = np.minimum(high2, points[0, :2] + reach)
+    return np.append(low2, points[:, 2].min()), np.append(high2, points[:, 2].max())
+
+
+def _sample(
+    problem: Problem, outline: Outline, samples: int, seed: int
+) -> tuple[Floats, list[tuple[int, int]]]:
+    """Milestones (n, 3) and edges of OMPL's PRM*."""
+    ob, og, ou = _ompl()
+    ou.noOutputHandler()
+    # the generator is the process's own, but each planner's is seeded from it when made
+    ou.RNG.setSeed(seed + 1)
+    low, high = sampling_box(problem)
+    flat = bool(low[2] == high[2])
+    size = 2 if flat else 3
+    space = ob.RealVectorStateSpace(size)
+    bounds = ob.RealVectorBounds(size)
+    for k in range(size):
+        bounds.setLow(k, float(low[k]))
+        bounds.setHigh(k, float(high[k]))
+    space.setBounds(bounds)
+    info = ob.SpaceInformation(space)
+    b = outline.blockers
+    arrays = (b.circles, b.edges, b.edge_start, b.grow, b.box)
+
+    def is_valid(state: Any) -> bool:
+        return bool(_point_free(state[0], state[1], *arrays))
+
+    info.setStateValidityChecker(is_valid)
+    info.setStateValidityCheckingResolution(0.99)  # ends only: `_exactly_free` checks the rest
+    info.setup()
+    planner = og.PRMstar(info)
+    query = ob.ProblemDefinition(info)
+    planner.setProblemDefinition(query)
+    planner.setup()
+    if hasattr(planner, "growRoadmapPtc"):
+        grow = planner.growRoadmapPtc
+    else:  # pragma: no cover - other releases of OMPL overload one name
+        grow = planner.growRoadmap
+    grow(ob.PlannerTerminationCondition(lambda: planner.milestoneCount() >= samples))
+    data = ob.PlannerData(info)
+    planner.getPlannerData(data)
+    count = data.numVertices()
+    points = np.full((count, 3), low[2])
+    edges = []
+    for i in range(count):
+        state = data.getVertex(i).getState()
+        for k in range(size):
+            points[i, k] = state[k]
+        edges += [(min(i, int(j)), max(i, int(j))) for j in data.getEdges(i)]
+    return points, edges
+
+
+def _join(milestones: Floats, fixed: int) -> Ints:
+    """Edges from base and goals to their k nearest milestones, k by the PRM* rule in d dimensions,
+    k = e (1 + 1/d) ln n (Karaman & Frazzoli 2011, section 3.3)."""
+    from scipy.spatial import KDTree
+
+    n = len(milestones)
+    d = 2 if np.ptp(milestones[:, 2]) == 0.0 else 3
+    k = min(n, 1 + math.ceil(math.e * (1.0 + 1.0 / d) * math.log(max(n, 2))))
+    _, near = KDTree(milestones).query(milestones[:fixed], k=k)
+    near = np.asarray(near).reshape(fixed, -1)
+    pairs = np.column_stack([np.repeat(np.arange(fixed), near.shape[1]), near.ravel()])
+    return np.sort(pairs[pairs[:, 0] != pairs[:, 1]], axis=1)
+
+
+def _exactly_free(edges: Ints, milestones: Floats, outline: Outline) -> Ints:
+    """The edges whose segment enters no grown obstacle."""
+    b = outline.blockers
+    free = _free_edges(edges, milestones, b.circles, b.edges, b.edge_start, b.grow, b.box, b.eps)
+    return np.asarray(edges[free])
+
+
+@njit(cache=True)
+def _point_free(x, y, circles, edges, edge_start, grow, box):
+    for o in range(len(circles)):
+        if (
+            box[o, 0] <= x <= box[o, 2]
+            and box[o, 1] <= y <= box[o, 3]
+            and depth_in_obstacle(x, y, o, circles, edges, edge_start, grow) > 0.0
+        ):
+            return False
+    return True
+
+
+@njit(cache=True)
+def _free_edges(pairs, points, circles, edges, edge_start, grow, box, eps):
+    out = np.empty(len(pairs), dtype=np.bool_)
+    for k in range(len(pairs)):
+        a, b = pairs[k, 0], pairs[k, 1]
+        out[k] = not segment_blocked(
+            points[a, 0], points[a, 1], points[b, 0], points[b, 1],
+            circles, edges, edge_start, grow, box, eps,
+        )  # fmt: skip
+    return out
+
+
+def _edge_letters(edges: Ints, milestones: Floats, rays: Floats) -> tuple[Ints, Ints]:
+    """Letters of all edges in one array, and the row starts into it."""
+    order = np.argsort(rays[:, 0], kind="stable")
+    out, start = _all_letters(edges, milestones, rays, order)
+    return out, start
+
+
+@njit(cache=True)
+def _all_letters(edges, points, rays, order):
+    start = np.zeros(len(edges) + 1, dtype=np.int64)
+    scratch = np.empty(len(rays) + 1, dtype=np.int64)
+    for k in range(len(edges)):
+        a, b = edges[k, 0], edges[k, 1]
+        start[k + 1] = start[k] + segment_letters(
+            points[a, 0], points[a, 1], points[b, 0], points[b, 1], rays, order, scratch, 0
+        )
+    out = np.empty(start[-1], dtype=np.int64)
+    for k in range(len(edges)):
+        a, b = edges[k, 0], edges[k, 1]
+        segment_letters(
+            points[a, 0], points[a, 1], points[b, 0], points[b, 1], rays, order, out, start[k]
+        )
+    return out, start
