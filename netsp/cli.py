@@ -55,7 +55,15 @@ def _parser() -> argparse.ArgumentParser:
     p = commands.add_parser("solve", help="find the shortest non-entangling tour of a problem")
     p.add_argument("problem", metavar="PROBLEM", help="problem file (JSON)")
     p.add_argument("--solver", default="mip", metavar="NAME", help="mip (default)")
-    p.add_argument("--roadmap", default="taut", metavar="NAME", help="taut (default)")
+    p.add_argument("--roadmap", default="taut", metavar="NAME", help="taut (default) or prm")
+    p.add_argument("--samples", type=_positive, metavar="N", help="prm: milestones; default 1000")
+    p.add_argument("--shortcut", action="store_true", help="prm: pull every leg taut in its class")
+    p.add_argument(
+        "--max-classes",
+        type=_positive,
+        metavar="N",
+        help="taut: most classes of all goals together",
+    )
     p.add_argument(
         "--mip-backend", metavar="NAME", help="highs (default) or cbc, for the solvers built on mip"
     )
@@ -77,7 +85,13 @@ def _parser() -> argparse.ArgumentParser:
     p.add_argument("problem", metavar="PROBLEM")
     p.add_argument("solution", metavar="SOLUTION", nargs="?")
     p.add_argument("-o", "--output", required=True, metavar="FILE", help="png, svg or pdf")
-    p.set_defaults(run=_plot)
+    p.add_argument("--roadmap", metavar="NAME", help="draw this roadmap: taut or prm")
+    p.add_argument("--samples", type=_positive, metavar="N", help="prm: milestones; default 1000")
+    p.add_argument("--seed", type=_natural, default=0, metavar="N", help="prm: random seed")
+    p.add_argument(
+        "--classes", metavar="GOAL", help="draw all taut tethers to this goal (number or name)"
+    )
+    p.set_defaults(run=_plot, shortcut=False)
 
     p = commands.add_parser("schema", help="print the JSON Schema of a file format")
     p.add_argument("format", choices=("problem", "solution"))
@@ -113,6 +127,13 @@ def _natural(text: str) -> int:
         value = -1
     if value < 0:
         raise argparse.ArgumentTypeError(f"expected a whole number from 0 on, got {text!r}")
+    return value
+
+
+def _positive(text: str) -> int:
+    value = _natural(text)
+    if value == 0:
+        raise argparse.ArgumentTypeError("expected a whole number from 1 on, got '0'")
     return value
 
 
@@ -152,6 +173,7 @@ def _solve(args: argparse.Namespace) -> int:
             problem,
             args.solver,
             roadmap=args.roadmap,
+            roadmap_options=_roadmap_options(args),
             time_limit=args.time_limit,
             seed=args.seed,
             params={"backend": args.mip_backend} if args.mip_backend else None,
@@ -171,6 +193,15 @@ def _solve(args: argparse.Namespace) -> int:
     return 0 if solution.length is not None else EXIT_NO_SOLUTION
 
 
+def _roadmap_options(args: argparse.Namespace) -> dict[str, object]:
+    options = {
+        "samples": args.samples,
+        "shortcut": args.shortcut or None,
+        "max_classes": getattr(args, "max_classes", None),
+    }
+    return {name: value for name, value in options.items() if value is not None}
+
+
 def _verify(args: argparse.Namespace) -> int:
     problem, solution = _load_pair(args.problem, args.solution)
     from netsp.judge import verify
@@ -188,7 +219,21 @@ def _plot(args: argparse.Namespace) -> int:
 
     plotting.check_format(args.output)
     _check_writable(args.output)
-    if args.solution:
+    if args.classes is not None:
+        if args.solution or args.roadmap:
+            raise InputError(
+                "--classes: draws a problem alone; leave out the solution and --roadmap"
+            )
+        problem = Problem.load(args.problem)
+        plotting.save_classes(problem, _goal_number(problem, args.classes), args.output)
+    elif args.roadmap:
+        if args.solution:
+            raise InputError("--roadmap: draws a problem alone; leave out the solution")
+        options = _roadmap_options(args)
+        if args.roadmap == "prm":
+            options["seed"] = args.seed
+        plotting.save_roadmap(Problem.load(args.problem), args.roadmap, options, args.output)
+    elif args.solution:
         problem, solution = _load_pair(args.problem, args.solution)
         if solution.problem.sha256 != problem.sha256:
             raise InputError(
@@ -198,6 +243,18 @@ def _plot(args: argparse.Namespace) -> int:
     else:
         plotting.save(Problem.load(args.problem), None, args.output)
     return 0
+
+
+def _goal_number(problem: Problem, text: str) -> int:
+    names = [g.name for g in problem.goals]
+    if text in names:
+        return names.index(text)
+    if text.isdigit() and int(text) < len(names):
+        return int(text)
+    raise InputError(
+        f"--classes: no goal {text!r}; expected a number from 0 to {len(names) - 1}"
+        + (f" or a name such as {next(n for n in names if n)!r}" if any(names) else "")
+    )
 
 
 def _load_pair(problem: str, solution: str) -> tuple[Problem, Solution]:

@@ -21,6 +21,12 @@ class InfeasibleError(NetspError):
     exit_code = 3
 
 
+class LimitReachedError(NetspError):
+    """The time was up before there was any solution; the message says where the work stood."""
+
+    exit_code = 4
+
+
 class VerificationError(NetspError):
     """A solution failed its independent check."""
 

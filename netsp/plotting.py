@@ -37,8 +37,11 @@ def check_format(path: str | Path) -> None:
 
 def save(problem: Problem, solution: Solution | None, path: str | Path) -> None:
     """Draw a problem, with a solution if given, to a file; InputError if it cannot be written."""
+    _write(draw(problem, solution), path)
+
+
+def _write(figure: Any, path: str | Path) -> None:
     check_format(path)
-    figure = draw(problem, solution)
     try:
         metadata = {"Date": None} if Path(path).suffix.lower() == ".svg" else None
         figure.savefig(path, dpi=150, metadata=metadata)
@@ -56,10 +59,8 @@ def draw(problem: Problem, solution: Solution | None = None) -> Any:
     xmin, ymin, xmax, ymax = _view(problem, solution)
     aspect = (ymax - ymin) / (xmax - xmin)
     if panels == 0:
-        figure = Figure(
-            figsize=(8.0, float(np.clip(8.0 * aspect + 0.8, 3.5, 11.0))), layout="constrained"
-        )
-        _map(figure.subplots(), problem, solution)
+        figure, ax = _single(problem)
+        _map(ax, problem, solution)
         return figure
     small = panels if panels <= 20 else 0
     columns = int(np.clip(round(np.sqrt(max(small, 1) * aspect * 0.9)), 1, 5)) if small else 0
@@ -90,6 +91,85 @@ def draw(problem: Problem, solution: Solution | None = None) -> Any:
         ax.set_title(f"{k + 1}: {stop.tether_length:.4g} {problem.units}", fontsize=7, pad=2)
         _frame(ax, problem, solution)
     return figure
+
+
+def save_roadmap(problem: Problem, roadmap: str, options: dict[str, Any], path: str | Path) -> None:
+    """Draw a roadmap by name: tangents and arcs of ``taut``, milestones and edges of ``prm``."""
+    from matplotlib.collections import LineCollection
+
+    from netsp.solvers import build_roadmap
+
+    built = build_roadmap(problem, roadmap, **options)
+    figure, ax = _single(problem)
+    _map(ax, problem, None)
+    if roadmap == "prm":
+        m = built.milestones
+        lines = m[built.edges][:, :, :2]
+        ax.plot(m[:, 0], m[:, 1], ".", ms=2, color=_EDGE, zorder=2)
+        counted = f"{len(m)} milestones, {len(built.edges)} edges, {len(built.augmented)} augmented"
+    else:
+        t = built.paths.tangents
+        lines = t.ends.reshape(-1, 2, 2)
+        for cx, cy, r, a, b in t.arcs:
+            theta = np.linspace(a, b, 60)
+            ax.plot(cx + r * np.cos(theta), cy + r * np.sin(theta), color=_TOUR, lw=0.8, zorder=3)
+        counted = (
+            f"{len(t.arcs)} arcs, {len(lines) // 2} tangents, {len(built.cluster) - 1} classes"
+        )
+    ax.add_collection(LineCollection(list(lines), colors=_TOUR, lw=0.35, alpha=0.35, zorder=2))
+    ax.set_title(f"{problem.name}: {roadmap} roadmap, {counted}", fontsize=10, loc="left")
+    _write(figure, path)
+
+
+def save_classes(problem: Problem, goal: int, path: str | Path) -> None:
+    """Draw all taut tethers to one goal (0-based), shortest first, each with its word."""
+    from netsp.roadmap.taut import TautRoadmap
+
+    roadmap = TautRoadmap(problem)
+    rows = np.flatnonzero(roadmap.cluster == goal + 1)
+    shown = rows[:30]
+    xmin, ymin, xmax, ymax = _view(problem, None)
+    aspect = (ymax - ymin) / (xmax - xmin)
+    columns = int(np.clip(round(np.sqrt(len(shown) * aspect * 1.4)), 1, 6))
+    lines = -(-len(shown) // columns)
+    from matplotlib.figure import Figure
+
+    width = 2.6 if columns > 2 else 4.0
+    figure = Figure(
+        figsize=(width * columns, max(width * aspect, 0.8) * lines + 0.35 * lines + 0.6),
+        layout="constrained",
+    )
+    axes = np.atleast_1d(figure.subplots(lines, columns)).ravel()
+    for k, ax in enumerate(axes):
+        ax.set_axis_off()
+        if k >= len(shown):
+            continue
+        v = int(shown[k])
+        _obstacles(ax, problem, labels=len(problem.obstacles) <= 20)
+        tether = roadmap.paths.path(0, goal + 1, roadmap.signatures[v])
+        ax.plot(tether[:, 0], tether[:, 1], color=_TETHER, lw=1.4, zorder=3)
+        ax.plot(*problem.base[:2], marker="*", ms=9, color=_BASE, mec="none", zorder=4)
+        ax.plot(*problem.points[goal + 1, :2], "o", ms=5, color=_TOUR, zorder=4)
+        word = " ".join(f"{a:+d}" for a in roadmap.signatures[v]) or "empty word"
+        ax.set_title(f"{roadmap.tethers[v]:.5g} {problem.units}: {word}", fontsize=7, pad=2)
+        _frame(ax, problem, None)
+    more = f", the {len(shown)} shortest shown" if len(shown) < len(rows) else ""
+    figure.suptitle(
+        f"{problem.name}: {len(rows)} classes reach {problem.goal_label(goal)} within "
+        f"{problem.tether_length:g} {problem.units}{more}",
+        fontsize=10,
+    )
+    _write(figure, path)
+
+
+def _single(problem: Problem) -> tuple[Any, Any]:
+    from matplotlib.figure import Figure
+
+    xmin, ymin, xmax, ymax = _view(problem, None)
+    aspect = (ymax - ymin) / (xmax - xmin)
+    height = float(np.clip(8.0 * aspect + 0.8, 3.5, 11.0))
+    figure = Figure(figsize=(8.0, height), layout="constrained")
+    return figure, figure.subplots()
 
 
 def _map(ax: Axes, problem: Problem, solution: Solution | None, *, tethers: bool = False) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import importlib.metadata
+import inspect
 import platform
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -26,6 +27,8 @@ ROADMAPS: dict[str, str] = {
 }
 """Roadmap name → class with `travel_graph()`."""
 
+SEEDED_ROADMAPS = frozenset({"prm"})
+
 DEFAULT_SOLVER = "mip"
 DEFAULT_ROADMAP = "taut"
 
@@ -37,12 +40,26 @@ def _load(table: Mapping[str, str], kind: str, name: str) -> Any:
     return getattr(importlib.import_module(module), attribute)
 
 
-def travel_graph(problem: Problem, roadmap: str = DEFAULT_ROADMAP, **options: Any) -> TravelGraph:
-    """The travel graph of a problem by the named roadmap.
+def build_roadmap(problem: Problem, roadmap: str = DEFAULT_ROADMAP, **options: Any) -> Any:
+    """The named roadmap over a problem.
 
-    Raises InputError for an unknown roadmap, InfeasibleError if a goal cannot be reached.
+    Raises InputError for an unknown roadmap or option, InfeasibleError if a goal cannot be reached.
     """
-    return _load(ROADMAPS, "roadmap", roadmap)(problem, **options).travel_graph()  # type: ignore[no-any-return]
+    build = _load(ROADMAPS, "roadmap", roadmap)
+    known = {k for k, p in inspect.signature(build).parameters.items() if p.kind == p.KEYWORD_ONLY}
+    unknown = sorted(set(options) - known)
+    if unknown:
+        raise InputError(
+            f"roadmap {roadmap!r}: unknown option {unknown[0]!r}; expected one of "
+            f"{', '.join(sorted(known))}"
+        )
+    return build(problem, **options)
+
+
+def travel_graph(problem: Problem, roadmap: str = DEFAULT_ROADMAP, **options: Any) -> TravelGraph:
+    """The travel graph of a problem by the named roadmap; errors as `build_roadmap`."""
+    graph: TravelGraph = build_roadmap(problem, roadmap, **options).travel_graph()
+    return graph
 
 
 def solve_graph(
@@ -72,6 +89,7 @@ def solve(
     solver: str = DEFAULT_SOLVER,
     *,
     roadmap: str = DEFAULT_ROADMAP,
+    roadmap_options: Mapping[str, Any] | None = None,
     time_limit: float | None = None,
     seed: int = 0,
     params: Mapping[str, Any] | None = None,
@@ -82,8 +100,9 @@ def solve(
 
     Parameters
     ----------
+    roadmap_options : for ``taut``: ``max_classes``; for ``prm``: ``samples``, ``shortcut``.
     time_limit : seconds for the whole call; the best tour so far is returned when it is up.
-    seed : feeds the solver's random generator.
+    seed : feeds the solver's random generator, and the sampling of a roadmap that samples.
     warm_start : a solution of the same problem to start from.
     on_progress : called with a `netsp.result.Progress` now and then.
 
@@ -91,6 +110,7 @@ def solve(
     ------
     InputError : unknown names, bad limits, a warm start for another problem.
     InfeasibleError : some goal is out of the tether's reach; says which and by how much.
+    LimitReachedError : the time was up before the travel graph was complete.
 
     >>> from netsp import Problem, solve
     >>> problem = Problem(base=(0, 0), goals=[(3, 4)], obstacles=[], tether_length=6)
@@ -103,7 +123,10 @@ def solve(
         raise InputError("warm_start: it is the solution of another problem (sha256 differs)")
     _load(SOLVERS, "solver", solver)
     begin = time.monotonic()
-    graph = travel_graph(problem, roadmap)
+    options: dict[str, Any] = {"time_limit": time_limit, **(roadmap_options or {})}
+    if roadmap in SEEDED_ROADMAPS:
+        options.setdefault("seed", seed)
+    graph = travel_graph(problem, roadmap, **options)
     built = time.monotonic()
     graph.costs  # noqa: B018 - computed here so that its time is told apart
     measured = time.monotonic()
@@ -174,7 +197,7 @@ def _tour_of(solution: Solution, graph: TravelGraph) -> list[int] | None:
 
 def versions() -> dict[str, str]:
     """Versions of what computed a solution."""
-    names = ("netsp", "numpy", "numba", "pulp")
+    names = ("netsp", "numpy", "numba", "highspy", "pulp", "ompl")
     out = {"python": platform.python_version()}
     for name in names:
         try:

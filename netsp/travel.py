@@ -28,6 +28,9 @@ class Legs(Protocol):
     def lengths(self, vertices: Ints) -> Floats:
         """(k, k) symmetric leg lengths among the given vertices; inf within a cluster."""
 
+    def lower_bounds(self, vertices: Ints) -> Floats:
+        """(k, k) lower bounds on the leg lengths, much cheaper than the lengths."""
+
     def path(self, u: int, v: int) -> Floats:
         """(n, 3) polyline of the leg from vertex u to vertex v."""
 
@@ -75,6 +78,23 @@ class TravelGraph:
             costs.setflags(write=False)
             self._costs = costs
         return self._costs
+
+    def costs_among(self, vertices: npt.ArrayLike) -> Floats:
+        """(k, k) leg costs among some vertices only, for solvers that eliminate the others first;
+        inf within a cluster."""
+        chosen = np.asarray(vertices, dtype=np.int64)
+        if self._costs is not None:
+            return np.asarray(self._costs[np.ix_(chosen, chosen)])
+        return self._legs.lengths(chosen)
+
+    def lower_bounds(self, vertices: npt.ArrayLike | None = None) -> Floats:
+        """(k, k) lower bounds on the leg costs among some vertices (default all), without computing
+        the legs; inf within a cluster."""
+        chosen = np.arange(len(self)) if vertices is None else np.asarray(vertices, dtype=np.int64)
+        bounds = self._legs.lower_bounds(chosen)
+        cluster = self.cluster[chosen]
+        bounds[cluster[:, None] == cluster[None, :]] = np.inf
+        return bounds
 
     def members(self, cluster: int) -> Ints:
         """Vertices of a cluster."""

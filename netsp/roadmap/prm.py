@@ -66,6 +66,7 @@ class PrmRoadmap:
         seed: int = 0,
         shortcut: bool = False,
         max_augmented: int = MAX_AUGMENTED,
+        time_limit: float | None = None,
     ) -> None:
         if samples < 1:
             raise InputError(f"samples: expected a positive whole number, got {samples!r}")
@@ -99,9 +100,8 @@ class PrmRoadmap:
         )
         z = problem.points[:, 2]
         self.tethers: Floats = np.hypot(planar, z[self.cluster] - z[0])
-        self._taut = (
-            TautLegs(self.paths, self.cluster, self.signatures, planar) if shortcut else None
-        )
+        self.shortcut = shortcut
+        self._taut = TautLegs(self.paths, self.cluster, self.signatures, planar, time_limit)
 
     def travel_graph(self) -> TravelGraph:
         """The travel graph over this roadmap. Tethers are the taut ones of their classes; that
@@ -129,7 +129,7 @@ class PrmRoadmap:
         """(k, k) leg lengths among the given vertices, along the augmented graph; inf within a
         cluster."""
         vertices = np.asarray(vertices, dtype=np.int64)
-        if self._taut is not None:
+        if self.shortcut:
             return self._taut.lengths(vertices)
         rows = self._vertex[vertices]
         out = self.augmented.distances(rows, rows)
@@ -138,9 +138,14 @@ class PrmRoadmap:
         out[cluster[:, None] == cluster[None, :]] = np.inf
         return np.asarray(out)
 
+    def lower_bounds(self, vertices: Ints) -> Floats:
+        """(k, k) lower bounds on leg lengths: a leg along the roadmap is no shorter than the taut
+        leg, for which see `TautLegs.lower_bounds`."""
+        return self._taut.lower_bounds(vertices)
+
     def path(self, u: int, v: int) -> Floats:
         """(n, 3) polyline of the leg from vertex u to vertex v."""
-        if self._taut is not None:
+        if self.shortcut:
             return self._taut.path(u, v)
         rows = self.augmented.path(int(self._vertex[u]), int(self._vertex[v]))
         out = self.milestones[self.augmented.milestone[rows]].copy()

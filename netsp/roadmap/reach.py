@@ -33,8 +33,9 @@ def explain_unreached(problem: Problem, outline: Outline, missing: list[int]) ->
     return "; ".join(parts)
 
 
-def shortest_lengths(outline: Outline) -> npt.NDArray[np.float64]:
-    """Shortest planar path length from the base to every point, any class; inf if there is none.
+def shortest_lengths(outline: Outline, source: int = 0) -> npt.NDArray[np.float64]:
+    """Shortest planar path length from a point (the base) to every point in any class; inf if there
+    is none.
 
     Dijkstra over contact points: tangents join them across free space, arcs along the outline.
     """
@@ -44,13 +45,13 @@ def shortest_lengths(outline: Outline) -> npt.NDArray[np.float64]:
     t = build_tangents(outline, np.inf)
     arcs, points = len(t.arcs), len(t.points)
     edges = len(t.target)
-    source = np.repeat(np.arange(len(t.start) - 1), np.diff(t.start))
+    tail = np.repeat(np.arange(len(t.start) - 1), np.diff(t.start))
     # contact 0 … points-1 are the points; contact points + 2 e (+ 1) the departure (arrival) of e
-    leave = np.where(source >= 2 * arcs, source - 2 * arcs, points + 2 * np.arange(edges))
+    leave = np.where(tail >= 2 * arcs, tail - 2 * arcs, points + 2 * np.arange(edges))
     arrive = np.where(t.target >= 2 * arcs, t.target - 2 * arcs, points + 2 * np.arange(edges) + 1)
     rows, cols, cost = [leave], [arrive], [t.length]
     for a in range(arcs):
-        out_e = np.flatnonzero(source // 2 == a)
+        out_e = np.flatnonzero(tail // 2 == a)
         in_e = np.flatnonzero(t.target // 2 == a)
         contact = np.concatenate([leave[out_e], arrive[in_e]])
         theta = np.concatenate([t.angle[out_e, 0], t.angle[in_e, 1]])
@@ -69,7 +70,7 @@ def shortest_lengths(outline: Outline) -> npt.NDArray[np.float64]:
     size = points + 2 * edges
     # scipy takes a stored zero for no edge
     graph = csr_array((np.maximum(d, 1e-300), (r, c)), shape=(size, size))
-    return np.asarray(dijkstra(graph, directed=False, indices=0)[:points])
+    return np.asarray(dijkstra(graph, directed=False, indices=source)[:points])
 
 
 def _enclosure(problem: Problem, g: int) -> str:

@@ -9,13 +9,14 @@ else; obstacles are vertical, so a 3D length is ``hypot(planar taut length, dz)`
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from netsp.errors import InfeasibleError, InputError, NetspError
+from netsp.errors import InfeasibleError, InputError, LimitReachedError, NetspError
 from netsp.hsignature import Word, concatenate, invert
 from netsp.problem import Problem
 from netsp.roadmap.explore import (
@@ -30,14 +31,14 @@ from netsp.roadmap.explore import (
     trie_child,
 )
 from netsp.roadmap.paths import TautPaths
-from netsp.roadmap.reach import explain_unreached
+from netsp.roadmap.reach import explain_unreached, shortest_lengths
 from netsp.travel import TravelGraph
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
-MAX_CLASSES = 20_000
-"""Default for the most augmented goals a travel graph may have."""
+MAX_CLASSES = 6_000
+"""Default for the most augmented goals a travel graph may have: 36 million legs, 0.3 GiB."""
 
 STATES_PER_CLASS = 2_000
 
@@ -49,9 +50,18 @@ class TautRoadmap:
     ------
     InfeasibleError : a goal that no taut tether reaches; names it and the tether that would do.
     InputError : more classes than `max_classes`.
+    LimitReachedError : `time_limit` seconds were up while legs were measured.
     """
 
-    def __init__(self, problem: Problem, *, max_classes: int = MAX_CLASSES) -> None:
+    def __init__(
+        self,
+        problem: Problem,
+        *,
+        max_classes: int = MAX_CLASSES,
+        time_limit: float | None = None,
+    ) -> None:
+        if max_classes < 1:
+            raise InputError(f"max_classes: expected a positive whole number, got {max_classes!r}")
         self.problem = problem
         self.paths = TautPaths(problem)
         self.outline, self.tangents = self.paths.outline, self.paths.tangents
@@ -59,7 +69,7 @@ class TautRoadmap:
         self._z = problem.points[:, 2]
         self.cluster, self.signatures, self.planar = self._classes(max_classes)
         self.tethers: Floats = np.hypot(self.planar, self._z[self.cluster] - self._z[0])
-        self.legs = TautLegs(self.paths, self.cluster, self.signatures, self.planar)
+        self.legs = TautLegs(self.paths, self.cluster, self.signatures, self.planar, time_limit)
 
     def travel_graph(self) -> TravelGraph:
         """The travel graph over this roadmap; legs are computed when first asked for."""
@@ -106,15 +116,22 @@ class TautLegs:
     """Exact legs between given augmented goals. Satisfies `netsp.travel.Legs`.
 
     cluster, signatures, planar : goal (0 is the base), word and planar taut tether length of each
-    vertex.
+    vertex. time_limit : seconds from now after which `lengths` raises LimitReachedError.
     """
 
     def __init__(
-        self, paths: TautPaths, cluster: Ints, signatures: Sequence[Word], planar: Floats
+        self,
+        paths: TautPaths,
+        cluster: Ints,
+        signatures: Sequence[Word],
+        planar: Floats,
+        time_limit: float | None = None,
     ) -> None:
         self.paths, self.cluster, self.planar = paths, cluster, planar
         self.signatures = list(signatures)
         self._z = paths.problem.points[:, 2]
+        self._shortest: Floats | None = None
+        self._deadline = math.inf if time_limit is None else time.monotonic() + time_limit
 
     def lengths(self, vertices: Ints) -> Floats:
         """(k, k) 3D leg lengths among the given vertices; inf within a cluster.
@@ -129,7 +146,13 @@ class TautLegs:
         row = np.concatenate([[0], np.cumsum([len(w) for w in flat])]).astype(np.int64)
         letters = np.concatenate(flat).astype(np.int64) if row[-1] else np.zeros(0, np.int64)
         planar = self.planar[vertices]
-        for g in np.unique(cluster):
+        goals = np.unique(cluster)
+        for k, g in enumerate(goals):
+            if time.monotonic() > self._deadline:
+                raise LimitReachedError(
+                    f"time limit reached while measuring legs: {k} of {len(goals)} goals done, "
+                    f"{len(vertices)} homotopy classes; lower tether_length or raise the limit"
+                )
             here = np.flatnonzero(cluster == g)
             there = np.flatnonzero(cluster > g)
             if len(there) == 0:
@@ -183,6 +206,23 @@ class TautLegs:
                 f"{self.relative_word(int(here[u]), int(there[w]))}; please report the problem file"
             )
         return np.asarray(found[pair])
+
+    def lower_bounds(self, vertices: Ints) -> Floats:
+        """(k, k) lower bounds on leg lengths: a leg is no shorter than the difference of its two
+        tethers (triangle inequality on the cover), nor than the shortest way between its goals in
+        any class."""
+        vertices = np.asarray(vertices, dtype=np.int64)
+        if self._shortest is None:
+            outline = self.paths.outline
+            self._shortest = np.array(
+                [shortest_lengths(outline, k) for k in range(len(outline.points))]
+            )
+        cluster, planar = self.cluster[vertices], self.planar[vertices]
+        apart = np.abs(planar[:, None] - planar[None, :])
+        # rounding in either summand must not lift a bound above the length
+        low = np.maximum(apart, self._shortest[np.ix_(cluster, cluster)]) - self.paths.margin
+        dz = self._z[cluster][:, None] - self._z[cluster][None, :]
+        return np.asarray(np.hypot(np.maximum(low, 0.0), dz))
 
     def relative_word(self, u: int, v: int) -> Word:
         """The word of the leg from vertex u to vertex v."""
