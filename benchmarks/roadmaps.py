@@ -1,0 +1,185 @@
+"""Times both roadmaps and draws the convergence of PRM* towards the exact optimum.
+
+python benchmarks/roadmaps.py                 the tables
+python benchmarks/roadmaps.py --convergence   also docs/prm-convergence.png and its table
+"""
+
+from __future__ import annotations
+
+import argparse
+import datetime
+import os
+import platform
+import resource
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT))
+
+
+def row(name: str, values: list[float], note: str = "") -> None:
+    """One line of a table."""
+    print(
+        f"| {name} | {statistics.median(values):.3f} | {min(values):.3f} | {max(values):.3f} "
+        f"| {len(values)} | {note} |",
+        flush=True,
+    )
+
+
+def taut(tether: float, worlds: int = 10) -> None:
+    """Classes and the full matrix, 20 circles and 20 goals."""
+    from netsp.roadmap.taut import TautRoadmap
+    from tests.worlds import random_world
+
+    TautRoadmap(random_world(0, goals=3, tether=200.0)).travel_graph().costs  # noqa: B018
+    times, sizes = [], []
+    for seed in range(worlds):
+        problem = random_world(seed, goals=20, tether=tether)
+        begin = time.perf_counter()
+        graph = TautRoadmap(problem).travel_graph()
+        graph.costs  # noqa: B018
+        times.append(time.perf_counter() - begin)
+        sizes.append(len(graph))
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
+    row(
+        f"taut, classes and matrix, 20 goals, tether {tether:g}",
+        times,
+        f"{min(sizes)} to {max(sizes)} vertices, peak {peak:.2f} GiB",
+    )
+
+
+def many(worlds: int = 5) -> None:
+    """Classes alone among 100 obstacles; the world grows with their number."""
+    from netsp.roadmap.taut import TautRoadmap
+    from tests.worlds import random_world
+
+    times, sizes = [], []
+    for seed in range(worlds):
+        problem = random_world(seed, circles=100, goals=100, tether=300.0, side=1100.0)
+        begin = time.perf_counter()
+        sizes.append(len(TautRoadmap(problem).cluster))
+        times.append(time.perf_counter() - begin)
+    row("taut, classes, 100 circles, 100 goals, tether 300", times, f"{min(sizes)} to {max(sizes)}")
+
+
+def prm(worlds: int = 5) -> None:
+    """Build and matrix of PRM*, 1000 samples, tether 300."""
+    from netsp.roadmap.prm import PrmRoadmap
+    from tests.worlds import random_world
+
+    PrmRoadmap(random_world(0, goals=3, tether=200.0), samples=50)
+    builds, matrices, sizes = [], [], []
+    for seed in range(worlds):
+        problem = random_world(seed, goals=20, tether=300.0)
+        begin = time.perf_counter()
+        graph = PrmRoadmap(problem, seed=seed).travel_graph()
+        built = time.perf_counter()
+        graph.costs  # noqa: B018
+        builds.append(built - begin)
+        matrices.append(time.perf_counter() - built)
+        sizes.append(len(graph))
+    row("prm, build, 1000 samples, 20 circles, tether 300", builds)
+    row("prm, matrix, 20 goals", matrices, f"{min(sizes)} to {max(sizes)} vertices")
+
+
+def first_run() -> None:
+    """The whole of a first run in a process with nothing compiled: 20 goals, tether 350."""
+    code = (
+        "import sys; sys.path.insert(0, sys.argv[1])\n"
+        "from tests.worlds import random_world\n"
+        "from netsp import travel_graph\n"
+        "travel_graph(random_world(0, goals=20, tether=350.0)).costs\n"
+    )
+    with tempfile.TemporaryDirectory() as cache:
+        begin = time.perf_counter()
+        subprocess.run(
+            [sys.executable, "-c", code, str(ROOT)],
+            check=True,
+            env={**os.environ, "NUMBA_CACHE_DIR": cache},
+        )
+        row("taut, first run ever, compilation included", [time.perf_counter() - begin])
+
+
+def convergence(worlds: int = 4, seeds: int = 3) -> None:
+    """PRM* optimum over exact optimum against the number of samples."""
+    from matplotlib.figure import Figure
+
+    from netsp import InfeasibleError, solve
+    from tests.worlds import random_world
+
+    counts = [250, 500, 1000, 2000, 4000, 8000, 16000]
+    ratios: dict[int, list[float]] = {n: [] for n in counts}
+    shortcut: dict[int, list[float]] = {n: [] for n in counts}
+    lost = dict.fromkeys(counts, 0)
+    for w in range(worlds):
+        problem = random_world(w, goals=10, tether=300.0)
+        exact = solve(problem).length or 0.0
+        for n in counts:
+            for seed in range(seeds):
+                for pulled, into in ((False, ratios), (True, shortcut)):
+                    options = {"samples": n, "shortcut": pulled}
+                    try:
+                        found = solve(problem, roadmap="prm", roadmap_options=options, seed=seed)
+                    except InfeasibleError:
+                        lost[n] += 1
+                        continue
+                    into[n].append((found.length or 0.0) / exact)
+    print("\n| samples | median ratio | min | max | pulled taut: median | max | no tour |")
+    print("|---|---|---|---|---|---|---|")
+    for n in counts:
+        r, s = ratios[n], shortcut[n]
+        print(
+            f"| {n} | {np.median(r):.5f} | {min(r):.5f} | {max(r):.5f} | {np.median(s):.6f} "
+            f"| {max(s):.5f} | {lost[n]} |"
+        )
+    figure = Figure(figsize=(6.5, 4.0), layout="constrained")
+    ax = figure.subplots()
+    for n in counts:
+        ax.plot([n] * len(ratios[n]), 100 * (np.array(ratios[n]) - 1), ".", color="#0b69a3", ms=5)
+    medians = [100 * (np.median(ratios[n]) - 1) for n in counts]
+    pulled_medians = [100 * (np.median(shortcut[n]) - 1) for n in counts]
+    ax.plot(counts, medians, color="#0b69a3", label="along the roadmap (median)")
+    ax.plot(counts, pulled_medians, "--", color="#e8590c", label="legs pulled taut (median)")
+    ax.axhline(0.0, color="#52606d", lw=0.8)
+    ax.set_xscale("log")
+    ax.set_xticks(counts, [str(n) for n in counts])
+    ax.minorticks_off()
+    ax.set_xlabel("samples")
+    ax.set_ylabel("per cent above the exact optimum")
+    ax.set_title(f"{worlds} worlds, {seeds} seeds, 20 circles, 10 goals, tether 300", fontsize=10)
+    ax.legend()
+    figure.savefig(ROOT / "docs" / "prm-convergence.png", dpi=130)
+
+
+def main() -> None:
+    """Run what was asked for."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--convergence", action="store_true")
+    args = parser.parse_args()
+    commit = subprocess.run(
+        ["git", "-C", str(ROOT), "rev-parse", "--short", "HEAD"],
+        capture_output=True, text=True, check=False,
+    ).stdout.strip()  # fmt: skip
+    print(
+        f"{datetime.date.today()}, commit {commit}, {os.cpu_count()} cores {platform.machine()}, "
+        f"Python {platform.python_version()}\n"
+    )
+    print("| what | median s | min | max | runs | note |\n|---|---|---|---|---|---|")
+    taut(350.0)
+    taut(500.0)
+    many()
+    prm()
+    first_run()
+    if args.convergence:
+        convergence()
+
+
+if __name__ == "__main__":
+    main()
