@@ -107,7 +107,7 @@ def first_run() -> None:
         row("taut, first run ever, compilation included", [time.perf_counter() - begin])
 
 
-def convergence(worlds: int = 4, seeds: int = 3) -> None:
+def convergence(worlds: int = 3, seeds: int = 3) -> None:
     """PRM* optimum over exact optimum against the number of samples."""
     from matplotlib.figure import Figure
 

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from netsp.errors import InputError
+from netsp.errors import InputError, NetspError
 from netsp.problem import Circle, Problem
 from netsp.roadmap.paths import TautPaths
-from netsp.solution import Solution, Status
+from netsp.solution import Solution, Status, Visit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -84,13 +84,26 @@ def draw(problem: Problem, solution: Solution | None = None) -> Any:
             continue
         stop = stops[k]
         _obstacles(ax, problem, labels=False)
-        tether = paths.path(0, stop.goal + 1, stop.signature)
+        tether = _tether(paths, stop)
         ax.plot(tether[:, 0], tether[:, 1], color=_TETHER, lw=1.3)
         ax.plot(*problem.base[:2], marker="*", ms=8, color=_BASE, mec="none")
         ax.plot(*problem.points[stop.goal + 1, :2], "o", ms=4, color=_TOUR)
         ax.set_title(f"{k + 1}: {stop.tether_length:.4g} {problem.units}", fontsize=7, pad=2)
         _frame(ax, problem, solution)
     return figure
+
+
+def _tether(paths: TautPaths, stop: Visit) -> Any:
+    """The taut tether of a stop, or InputError if the solution names a class that is none."""
+    known = len(paths.problem.obstacles)
+    if stop.goal < len(paths.problem.goals) and all(1 <= abs(a) <= known for a in stop.signature):
+        try:
+            return paths.path(0, stop.goal + 1, stop.signature)
+        except NetspError:
+            pass
+    raise InputError(
+        f"solution: tour: no taut tether to goal {stop.goal} has the word {list(stop.signature)}"
+    )
 
 
 def save_roadmap(problem: Problem, roadmap: str, options: dict[str, Any], path: str | Path) -> None:
@@ -110,7 +123,8 @@ def save_roadmap(problem: Problem, roadmap: str, options: dict[str, Any], path: 
     else:
         t = built.paths.tangents
         lines = t.ends.reshape(-1, 2, 2)
-        for cx, cy, r, a, b in t.arcs:
+        lines = lines + built.outline.origin
+        for cx, cy, r, a, b in t.arcs + np.append(built.outline.origin, np.zeros(3)):
             theta = np.linspace(a, b, 60)
             ax.plot(cx + r * np.cos(theta), cy + r * np.sin(theta), color=_TOUR, lw=0.8, zorder=3)
         counted = (
@@ -182,7 +196,7 @@ def _map(ax: Axes, problem: Problem, solution: Solution | None, *, tethers: bool
         if tethers:
             paths = TautPaths(problem)
             for v in solution.tour:
-                line = paths.path(0, v.goal + 1, v.signature)
+                line = _tether(paths, v)
                 ax.plot(line[:, 0], line[:, 1], color=_TETHER, lw=0.7, alpha=0.6, zorder=2)
         path = np.array(solution.path)
         ax.plot(path[:, 0], path[:, 1], color=_TOUR, lw=1.8, zorder=3, solid_joinstyle="round")

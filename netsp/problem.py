@@ -35,17 +35,34 @@ from netsp.polygons import check_polygon, polygon_interior_point, polygon_signed
 SCHEMA_VERSION = 1
 
 RELATIVE_TOLERANCE = 1e-9
-"""Lengths below this fraction of the largest coordinate count as zero (touching, on a boundary)."""
+"""Lengths below this fraction of the problem's size count as zero (touching, on a boundary)."""
+
+LARGEST = 1e12
+"""Largest coordinate, radius or length in absolute value."""
 
 
 def _number(value: Any) -> Any:
     """Numbers only: no strings, no booleans; numpy scalars are welcome."""
     if isinstance(value, bool | np.bool_) or not isinstance(value, int | float | np.number):
         raise ValueError(f"expected a number, got {value!r}")
-    number = float(value)
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
     if not math.isfinite(number):
-        raise ValueError(f"expected a finite number, got {value!r}")
+        raise ValueError(f"expected a finite number, got {_brief(value)}")
+    if abs(number) > LARGEST:
+        raise ValueError(f"expected a magnitude of at most {LARGEST:g}, got {value!r}")
     return number
+
+
+def _name(value: Any) -> Any:
+    """Names are shown in one line."""
+    if isinstance(value, str) and (len(value) > 200 or not value.isprintable()):
+        raise ValueError(
+            f"expected a name of at most 200 printable characters, got {_brief(value)}"
+        )
+    return value
 
 
 def _coordinates(value: Any, sizes: tuple[int, ...]) -> tuple[float, ...]:
@@ -62,6 +79,7 @@ def _point3(value: Any) -> tuple[float, ...]:
     return xyz if len(xyz) == 3 else (*xyz, 0.0)
 
 
+Name = Annotated[str, BeforeValidator(_name)]
 Number = Annotated[float, BeforeValidator(_number)]
 Positive = Annotated[float, Field(gt=0), BeforeValidator(_number)]
 NonNegative = Annotated[float, Field(ge=0), BeforeValidator(_number)]
@@ -84,7 +102,7 @@ class Circle(BaseModel):
     model_config = _STRICT
     center: Point2
     radius: Positive
-    name: str | None = None
+    name: Name | None = None
 
     @property
     def representative_point(self) -> tuple[float, float]:
@@ -102,7 +120,7 @@ class Polygon(BaseModel):
 
     model_config = _STRICT
     polygon: Annotated[tuple[Point2, ...], Field(min_length=3)]
-    name: str | None = None
+    name: Name | None = None
 
     @model_validator(mode="after")
     def _simple(self) -> Self:
@@ -145,7 +163,7 @@ class Goal(BaseModel):
 
     model_config = _STRICT
     position: Point3
-    name: str | None = None
+    name: Name | None = None
 
 
 def _goal(value: Any) -> Any:
@@ -198,7 +216,7 @@ class Problem(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", title="netsp problem")
 
     schema_version: Literal[1] = 1
-    name: str = "problem"
+    name: Name = "problem"
     base: Point3
     goals: Annotated[tuple[GoalLike, ...], Field(min_length=1)]
     obstacles: tuple[Obstacle, ...] = ()
@@ -220,7 +238,7 @@ class Problem(BaseModel):
             }
         ),
     ] = None
-    units: str = "m"
+    units: Name = "m"
 
     @field_validator("bounds", mode="before")
     @classmethod
@@ -275,10 +293,11 @@ class Problem(BaseModel):
                     f"(by {self.clearance - distance:.6g}); expected a point in free space"
                 )
 
-    @cached_property
+    @property
     def scale(self) -> float:
-        """Largest coordinate in absolute value, obstacles included: the scale of rounding errors,
-        so the unit of every tolerance."""
+        """Size of the problem, the unit of every tolerance: the largest coordinate difference from
+        the base to anything. Geometry is computed relative to the base, so far-off origins (UTM)
+        cost no precision."""
         xy = [self.base[:2], *(g.position[:2] for g in self.goals)]
         for o in self.obstacles:
             if isinstance(o, Circle):
@@ -286,12 +305,14 @@ class Problem(BaseModel):
                 xy += [(x - r, y - r), (x + r, y + r)]
             else:
                 xy += list(o.polygon)
-        return float(max(np.abs(np.array(xy)).max(), 1e-9 * self.tether_length))
+        away = np.abs(np.array(xy) - np.array(self.base[:2])).max()
+        return float(max(away, 1e-9 * self.tether_length))
 
     @property
     def tolerance(self) -> float:
         """Length below which a depth, gap or penetration counts as zero."""
-        return RELATIVE_TOLERANCE * self.scale
+        resolution = 4.0 * float(np.spacing(np.abs(self.points[:, :2]).max()))
+        return max(RELATIVE_TOLERANCE * self.scale, resolution)
 
     @property
     def representative_points(self) -> npt.NDArray[np.float64]:
@@ -339,7 +360,7 @@ class Problem(BaseModel):
         data = self.model_dump(mode="json", exclude_none=True)
         return json.dumps(data, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
 
-    @cached_property
+    @property
     def sha256(self) -> str:
         """Hash of what the answer depends on: all values, but no names."""
         data = self.model_dump(mode="json", exclude={"name": True, "units": True})
@@ -375,6 +396,10 @@ def parse_json_object(text: str | bytes, source: str) -> dict[str, Any]:
     except json.JSONDecodeError as error:
         raise InputError(
             f"{source}: not JSON: {error.msg} at line {error.lineno}, column {error.colno}"
+        ) from None
+    except ValueError:
+        raise InputError(
+            f"{source}: not JSON that netsp reads: a number has too many digits"
         ) from None
     except RecursionError:
         raise InputError(f"{source}: not JSON that netsp reads: nested too deeply") from None

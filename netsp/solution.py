@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from netsp.errors import InputError
 from netsp.problem import (
     SCHEMA_VERSION,
+    Name,
     NonNegative,
     Number,
     Point3,
@@ -40,7 +41,7 @@ class ProblemReference(BaseModel):
     """Which problem a solution belongs to."""
 
     model_config = _STRICT
-    name: str
+    name: Name
     sha256: str
 
 

@@ -40,6 +40,7 @@ class StringPuller:
         self.problem = problem
         self.sides = sides
         shrink = 1e-7 * problem.scale
+        self.origin = np.array(problem.base[:2])
         shapes = []
         proud = 0.0
         for o in problem.obstacles:
@@ -47,21 +48,23 @@ class StringPuller:
                 r = o.radius + problem.clearance - shrink
                 # a phase no drawing has, so that symmetric worlds give no degenerate triangles
                 angle = 2.0 * np.pi * (np.arange(sides) + 0.2371) / sides
-                ring = np.column_stack([np.cos(angle), np.sin(angle)]) * r + o.center
+                ring = np.column_stack([np.cos(angle), np.sin(angle)]) * r + (
+                    np.array(o.center) - self.origin
+                )
                 shapes.append(shapely.Polygon(ring))
                 proud = max(proud, r * (1.0 - math.cos(math.pi / sides)) + shrink)
             else:
-                grown = shapely.Polygon(o.polygon)
+                grown = shapely.Polygon(np.array(o.polygon) - self.origin)
                 if problem.clearance > 0.0:
                     grown = grown.buffer(problem.clearance, quad_segs=sides // 4)
                     proud = max(proud, problem.clearance * (1.0 - math.cos(math.pi / sides)))
                 shapes.append(grown.buffer(-shrink, join_style="mitre"))
         self.proud = proud
         if problem.bounds is not None:
-            box = shapely.box(*problem.bounds).buffer(shrink, join_style="mitre")
+            bounds = np.array(problem.bounds) - np.tile(self.origin, 2)
+            box = shapely.box(*bounds).buffer(shrink, join_style="mitre")
         else:
-            x, y = problem.base[:2]
-            box = shapely.box(x, y, x, y).union(shapely.MultiPoint(problem.points[:, :2]))
+            box = shapely.MultiPoint(problem.points[:, :2] - self.origin)
             box = shapely.union_all([box, *shapes]).envelope.buffer(2.0 * reach, join_style="mitre")
         free = box.difference(shapely.union_all(shapes)) if shapes else box
         triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(free))
@@ -74,7 +77,7 @@ class StringPuller:
         Sides of vertices are half-open, as for rays, so that the sequence of a whole path is the
         sequences of its parts put together.
         """
-        xy = np.asarray(path, dtype=float)[:, :2]
+        xy = np.asarray(path, dtype=float)[:, :2] - self.origin
         out: list[list[tuple[int, bool]]] = [[] for _ in range(len(xy) - 1)]
         segments = shapely.linestrings(np.stack([xy[:-1], xy[1:]], axis=1))
         seg, edge = self._tree.query(segments, predicate=None)
@@ -94,7 +97,7 @@ class StringPuller:
         self, start: npt.ArrayLike, end: npt.ArrayLike, sleeve: list[tuple[int, bool]]
     ) -> Pulled:
         """Taut length from start to end through a reduced sequence of edges."""
-        a, b = np.asarray(start, dtype=float)[:2], np.asarray(end, dtype=float)[:2]
+        a, b = (np.asarray(p, dtype=float)[:2] - self.origin for p in (start, end))
         portals = []
         for edge, from_left in sleeve:
             u, v = self._edges[edge, :2], self._edges[edge, 2:]

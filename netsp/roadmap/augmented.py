@@ -120,7 +120,6 @@ class AugmentedGraph:
 def augment(
     points: Floats,
     edges: Ints,
-    rays: Floats,
     letters: tuple[Ints, Ints],
     tether_length: float,
     cap: int,

@@ -310,8 +310,8 @@ def _rehashed(key, value):
 
 @dataclass(frozen=True)
 class Found:
-    """What a search hit: goal points, trie nodes of their words, lengths; with the search tree when
-    it was kept."""
+    """What a search hit: goal points, trie nodes of their words, lengths; and the search tree if it
+    was kept: per state (arrival) the rows of the kernel, length at arrival, angle slid before."""
 
     goal: Ints
     word: Ints
@@ -320,6 +320,7 @@ class Found:
     departure: Ints
     slid: Floats
     tree: Ints
+    tree_length: Floats
     tree_slid: Floats
     capped: bool
 
@@ -352,5 +353,14 @@ def run_explore(
         np.iinfo(np.int64).max if cap is None else cap,
     )  # fmt: skip
     return Found(
-        h_i[:, 0], h_i[:, 1], h_f[:, 0], h_i[:, 2], h_i[:, 3], h_f[:, 1], s_i, s_f[:, 2], capped
+        h_i[:, 0],
+        h_i[:, 1],
+        h_f[:, 0],
+        h_i[:, 2],
+        h_i[:, 3],
+        h_f[:, 1],
+        s_i,
+        s_f[:, 1],
+        s_f[:, 2],
+        capped,
     )

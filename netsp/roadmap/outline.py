@@ -5,7 +5,8 @@ at each convex vertex, of which only the part between the normals of the two edg
 circle is the one-vertex polygon, and every bend of a taut path is an arc of some disk. Where
 grown obstacles overlap, the covered part of an arc is cut away.
 
-Every obstacle is grown by a further `margin` (a fraction 1e-10 of the largest coordinate): what
+Coordinates are relative to the base. Every obstacle is grown by a further `margin` (a fraction
+1e-10 of the problem's size): what
 touches, overlaps, so no path slips through a gap of no width, and a polygon without clearance still
 has arcs. Lengths change by at most the margin times the turning.
 """
@@ -25,6 +26,7 @@ from netsp.geometry import (
     circle_line_angles,
     depth_in_obstacle,
     more_rows,
+    point_in_polygon,
     segment_blocked,
     sort_in_place,
 )
@@ -87,7 +89,9 @@ class Outline:
     blockers : what a segment must not enter.
     arcs : (a, 5) centre x, y, radius, start angle, end angle (counter-clockwise, end > start).
     full : (a,) whether the arc is a whole circle.
-    points : (1 + m, 2) base and goals; one lying on a grown boundary is moved onto it exactly.
+    origin : (2,) the base, which all coordinates here are relative to.
+    places : (1 + m, 2) base and goals. points : the same, but those on or hardly inside a grown
+        boundary moved just outside it.
     rays : (n, 2) representative points.
     margin : the extra growth of all obstacles.
     """
@@ -95,6 +99,8 @@ class Outline:
     blockers: Blockers
     arcs: Floats
     full: npt.NDArray[np.bool_]
+    origin: Floats
+    places: Floats
     points: Floats
     rays: Floats
     margin: float
@@ -104,8 +110,10 @@ def build_outline(problem: Problem) -> Outline:
     """The outline of a problem's free space in the plane."""
     scale = problem.scale
     margin, eps = MARGIN * scale, EPSILON * scale
-    blockers, disks = _grow(problem, problem.clearance + margin, eps)
+    origin = np.array(problem.base[:2])
+    blockers, disks = _grow(problem, origin, problem.clearance + margin, eps)
     bounds = np.array(problem.bounds if problem.bounds else (-np.inf, -np.inf, np.inf, np.inf))
+    bounds = bounds - np.tile(origin, 2)
     rows = _visible_arcs(
         disks,
         blockers.circles,
@@ -116,23 +124,26 @@ def build_outline(problem: Problem) -> Outline:
         bounds,
         eps,
     )
-    points = np.array([_push_out(p[:2], blockers) for p in problem.points])
+    places = problem.points[:, :2] - origin
+    points = np.array([_push_out(p, blockers) for p in places])
+    rays = problem.representative_points - origin
     arcs, full = np.ascontiguousarray(rows[:, :5]), rows[:, 5] > 0.0
-    return Outline(blockers, arcs, full, points, problem.representative_points, margin)
+    return Outline(blockers, arcs, full, origin, places, points, rays, margin)
 
 
-def _grow(problem: Problem, growth: float, eps: float) -> tuple[Blockers, Floats]:
+def _grow(problem: Problem, origin: Floats, growth: float, eps: float) -> tuple[Blockers, Floats]:
     """Blockers and disks (x, y, r, cone start, cone end); a whole circle's cone is 0 to 2 pi."""
     circles, edges, edge_start, box = [], [], [0], []
     disks: list[tuple[float, float, float, float, float]] = []
     for obstacle in problem.obstacles:
         if isinstance(obstacle, Circle):
-            (x, y), r = obstacle.center, obstacle.radius + growth
+            x, y = (float(c) for c in np.array(obstacle.center) - origin)
+            r = obstacle.radius + growth
             circles.append((x, y, r))
             box.append((x - r, y - r, x + r, y + r))
             disks.append((x, y, r, 0.0, TWO_PI))
         else:
-            v = counterclockwise(obstacle.polygon)
+            v = counterclockwise(np.array(obstacle.polygon) - origin)
             following = np.roll(v, -1, axis=0)
             edges.extend(np.hstack([v, following]).tolist())
             circles.append((0.0, 0.0, -1.0))
@@ -183,20 +194,21 @@ def _push_out(point: Floats, blockers: Blockers) -> Floats:
 
 
 def _push_out_of_polygon(p: Floats, o: int, blockers: Blockers) -> Floats:
-    """Out along the normal of the nearest edge, or away from the nearest vertex."""
+    """Away from the nearest point of the outline; along the normal when it lies on it."""
     e = blockers.edges[blockers.edge_start[o] : blockers.edge_start[o + 1]]
     a, d = e[:, :2], e[:, 2:] - e[:, :2]
     t = np.clip(((p - a) * d).sum(axis=1) / (d**2).sum(axis=1), 0.0, 1.0)
     foot = a + t[:, None] * d
     away = p - foot
     k = int(np.argmin(np.hypot(away[:, 0], away[:, 1])))
-    normal = np.array([d[k, 1], -d[k, 0]]) / np.hypot(*d[k])
-    if 0.0 < t[k] < 1.0 or np.hypot(*away[k]) <= 1e-3 * blockers.grow[o]:
-        unit = normal
+    distance = np.hypot(*away[k])
+    if distance <= 1e-3 * blockers.grow[o]:
+        unit = np.array([d[k, 1], -d[k, 0]]) / np.hypot(*d[k])
     else:
-        unit = away[k] / np.hypot(*away[k])
-        if unit @ normal < 0.0:
-            unit = -unit
+        inside = point_in_polygon(
+            p[0], p[1], blockers.edges, blockers.edge_start[o], blockers.edge_start[o + 1]
+        )
+        unit = away[k] / distance * (-1.0 if inside else 1.0)
     return np.asarray(foot[k] + unit * blockers.grow[o] * (1.0 + 1e-12))
 
 

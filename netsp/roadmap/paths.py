@@ -51,7 +51,7 @@ class TautPaths:
         if not total:
             fraction = np.linspace(0.0, 1.0, len(xy))
         z = self._z[a] + fraction * (self._z[b] - self._z[a])
-        out = np.column_stack([xy, z])
+        out = np.column_stack([xy + self.outline.origin, z])
         out[0], out[-1] = self.problem.points[a], self.problem.points[b]
         return out
 

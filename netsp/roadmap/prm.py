@@ -76,18 +76,19 @@ class PrmRoadmap:
         fixed = problem.points.copy()
         fixed[:, :2] = outline.points
         sampled = _sample(problem, outline, samples, seed)
-        self.milestones: Floats = np.vstack([fixed, sampled[0]])
+        local = np.vstack([fixed, sampled[0]])
+        self.milestones: Floats = local + np.append(outline.origin, 0.0)
         own = np.asarray(sampled[1], dtype=np.int64).reshape(-1, 2) + len(fixed)
         self.edges: Ints = _exactly_free(
-            np.unique(np.vstack([own, _join(self.milestones, len(fixed))]), axis=0),
-            self.milestones,
+            np.unique(np.vstack([own, _join(local, len(fixed))]), axis=0),
+            local,
             outline,
         )
+        exact = np.vstack([np.column_stack([outline.places, fixed[:, 2]]), sampled[0]])
         self.augmented: AugmentedGraph = augment(
             self.milestones,
             self.edges,
-            outline.rays,
-            _edge_letters(self.edges, self.milestones, outline.rays),
+            _edge_letters(self.edges, exact, outline.rays),
             problem.tether_length,
             max_augmented,
         )
@@ -101,7 +102,9 @@ class PrmRoadmap:
         z = problem.points[:, 2]
         self.tethers: Floats = np.hypot(planar, z[self.cluster] - z[0])
         self.shortcut = shortcut
-        self._taut = TautLegs(self.paths, self.cluster, self.signatures, planar, time_limit)
+        self._taut = TautLegs(
+            self.paths, self.cluster, self.signatures, planar, time_limit=time_limit
+        )
 
     def travel_graph(self) -> TravelGraph:
         """The travel graph over this roadmap. Tethers are the taut ones of their classes; that
@@ -196,6 +199,7 @@ def _sample(
     # the generator is the process's own, but each planner's is seeded from it when made
     ou.RNG.setSeed(seed + 1)
     low, high = sampling_box(problem)
+    low, high = low - np.append(outline.origin, 0.0), high - np.append(outline.origin, 0.0)
     flat = bool(low[2] == high[2])
     size = 2 if flat else 3
     space = ob.RealVectorStateSpace(size)

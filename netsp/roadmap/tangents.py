@@ -118,6 +118,11 @@ def build_tangents(outline: Outline, reach: float) -> TangentGraph:
     length, ends, angle = length[order], ends[order], angle[order]
     # as `netsp.hsignature.rays`: by x, ties by number
     order_of_rays = np.argsort(outline.rays[:, 0], kind="stable")
+    # points as given: a vertex on a ray must not be moved across it
+    source = source[order]
+    for column, node in ((0, source), (2, target)):
+        at_point = node >= 2 * len(arcs)
+        ends[at_point, column : column + 2] = outline.places[node[at_point] - 2 * len(arcs)]
     first, turn, gap, letters, segment_row, arrival_row, gap_row = _write_letters(
         arcs,
         full,
@@ -219,16 +224,12 @@ def _tangents(place, a_count, full, base, reach, circles, edges, edge_start, gro
                     sense_i = 1 - 2 * ti
                     sense_j = 1 - 2 * tj
                     k = sense_j * rj - sense_i * ri
-                    slack = distance * distance - k * k
-                    if slack < 0.0:
-                        # a point on a disk: within rounding it lies on it, not in it
-                        if (i >= a_count or j >= a_count) and abs(k) - distance <= eps:
-                            slack = 0.0
-                        else:
-                            continue
-                    if distance == 0.0 and i < a_count:
+                    gap = distance - abs(k)
+                    if gap < -eps or (distance == 0.0 and i < a_count):
                         continue
-                    length = math.sqrt(slack)
+                    # a point on a disk, or disks that touch from inside: the tangent has no length.
+                    # Its true length, a root of rounding, would blur angles and lengths to 1e-8
+                    length = 0.0 if gap <= eps else math.sqrt(gap * (distance + abs(k)))
                     direction = heading - math.atan2(k, length)
                     ux, uy = math.cos(direction), math.sin(direction)
                     theta_i = direction - sense_i * 0.5 * math.pi

@@ -11,6 +11,8 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -43,6 +45,27 @@ MAX_CLASSES = 6_000
 STATES_PER_CLASS = 2_000
 
 
+@dataclass(frozen=True)
+class TetherTree:
+    """Tethers as paths in a tree of bends, rooted at the base.
+
+    last : (V,) last bend of each vertex's tether. parent, length : (bends,) the bend before (-1 at
+    the root), and the length of tether up to the bend.
+    """
+
+    last: Ints
+    parent: Ints
+    length: Floats
+
+    @cached_property
+    def depth(self) -> Ints:
+        """(bends,) bends before each; a bend comes after its parent in the arrays."""
+        depth = np.zeros(len(self.parent), dtype=np.int64)
+        for k in range(1, len(depth)):
+            depth[k] = depth[self.parent[k]] + 1
+        return depth
+
+
 class TautRoadmap:
     """Classes and legs of one problem.
 
@@ -67,9 +90,11 @@ class TautRoadmap:
         self.outline, self.tangents = self.paths.outline, self.paths.tangents
         self._margin = self.paths.margin
         self._z = problem.points[:, 2]
-        self.cluster, self.signatures, self.planar = self._classes(max_classes)
+        self.cluster, self.signatures, self.planar, tree = self._classes(max_classes)
         self.tethers: Floats = np.hypot(self.planar, self._z[self.cluster] - self._z[0])
-        self.legs = TautLegs(self.paths, self.cluster, self.signatures, self.planar, time_limit)
+        self.legs = TautLegs(
+            self.paths, self.cluster, self.signatures, self.planar, tree, time_limit
+        )
 
     def travel_graph(self) -> TravelGraph:
         """The travel graph over this roadmap; legs are computed when first asked for."""
@@ -77,8 +102,9 @@ class TautRoadmap:
 
     # classes
 
-    def _classes(self, max_classes: int) -> tuple[Ints, list[Word], Floats]:
-        """Clusters, words and planar lengths of all admissible augmented goals, base first."""
+    def _classes(self, max_classes: int) -> tuple[Ints, list[Word], Floats, TetherTree]:
+        """Clusters, words, planar lengths and tether tree of all admissible augmented goals, base
+        first."""
         limit = self.problem.tether_length + self._margin
         trie = Trie.root(limit)
         found = run_explore(
@@ -86,16 +112,18 @@ class TautRoadmap:
             0,
             trie,
             grow=True,
+            keep=True,
             margin=self.outline.margin,
             cap=STATES_PER_CLASS * max_classes,
         )
         goal, word, length, capped = found.goal, found.word, found.length, found.capped
         reach = np.hypot(length, self._z[goal] - self._z[0])
         admissible = (goal > 0) & (reach <= limit)
-        best: dict[tuple[int, int], float] = {}
-        for g, w, d in zip(goal[admissible], word[admissible], length[admissible], strict=True):
-            key = (int(g), int(w))
-            best[key] = min(best.get(key, math.inf), float(d))
+        best: dict[tuple[int, int], tuple[float, int]] = {}
+        for k in np.flatnonzero(admissible):
+            key = (int(goal[k]), int(word[k]))
+            found_here = (float(length[k]), int(found.state[k]))
+            best[key] = min(best.get(key, (math.inf, 0)), found_here)
         if capped or len(best) > max_classes:
             count = f"{len(best)} classes so far" if capped else f"{len(best)} classes"
             raise InputError(
@@ -105,18 +133,20 @@ class TautRoadmap:
         missing = sorted(set(range(1, len(self._z))) - {g for g, _ in best})
         if missing:
             raise InfeasibleError(explain_unreached(self.problem, self.outline, missing))
-        order = sorted(best, key=lambda k: (k[0], best[k], trie.word(k[1])))
+        order = sorted(best, key=lambda k: (k[0], best[k][0], trie.word(k[1])))
         cluster = np.array([0, *(g for g, _ in order)], dtype=np.int64)
         words: list[Word] = [(), *(trie.word(w) for _, w in order)]
-        planar = np.array([0.0, *(best[k] for k in order)])
-        return cluster, words, planar
+        planar = np.array([0.0, *(best[k][0] for k in order)])
+        last = np.array([0, *(best[k][1] for k in order)], dtype=np.int64)
+        return cluster, words, planar, TetherTree(last, found.tree[:, 3], found.tree_length)
 
 
 class TautLegs:
     """Exact legs between given augmented goals. Satisfies `netsp.travel.Legs`.
 
     cluster, signatures, planar : goal (0 is the base), word and planar taut tether length of each
-    vertex. time_limit : seconds from now after which `lengths` raises LimitReachedError.
+    vertex. tree : where their tethers part, if known. time_limit : seconds from now after which
+    `lengths` raises LimitReachedError.
     """
 
     def __init__(
@@ -125,12 +155,15 @@ class TautLegs:
         cluster: Ints,
         signatures: Sequence[Word],
         planar: Floats,
+        tree: TetherTree | None = None,
         time_limit: float | None = None,
     ) -> None:
         self.paths, self.cluster, self.planar = paths, cluster, planar
         self.signatures = list(signatures)
         self._z = paths.problem.points[:, 2]
         self._shortest: Floats | None = None
+        nothing = np.zeros(1, dtype=np.int64)
+        self._tree = tree or TetherTree(np.zeros_like(cluster), nothing - 1, np.zeros(1))
         self._deadline = math.inf if time_limit is None else time.monotonic() + time_limit
 
     def lengths(self, vertices: Ints) -> Floats:
@@ -145,7 +178,7 @@ class TautLegs:
         flat = [np.array(self.signatures[v], dtype=np.int64) for v in vertices]
         row = np.concatenate([[0], np.cumsum([len(w) for w in flat])]).astype(np.int64)
         letters = np.concatenate(flat).astype(np.int64) if row[-1] else np.zeros(0, np.int64)
-        planar = self.planar[vertices]
+        planar, last = self.planar[vertices], self._tree.last[vertices]
         goals = np.unique(cluster)
         for k, g in enumerate(goals):
             if time.monotonic() > self._deadline:
@@ -160,7 +193,7 @@ class TautLegs:
             if g == 0:
                 block = np.broadcast_to(planar[there], (len(here), len(there)))
             else:
-                block = self._legs_from(int(g), here, there, letters, row, planar, cluster)
+                block = self._legs_from(int(g), here, there, letters, row, planar, cluster, last)
             dz = self._z[g] - self._z[cluster[there]]
             block = np.hypot(block, dz[None, :])
             out[np.ix_(here, there)] = block
@@ -176,6 +209,7 @@ class TautLegs:
         row: Ints,
         planar: Floats,
         cluster: Ints,
+        last: Ints,
     ) -> Floats:
         """(len(here), len(there)) planar lengths of all legs from the classes of goal g."""
         nodes, limit, size, head, entry_goal, entry_next, pair = _wanted(
@@ -185,6 +219,10 @@ class TautLegs:
             row,
             planar,
             cluster,
+            last,
+            self._tree.parent,
+            self._tree.depth,
+            self._tree.length,
             self.paths.margin,
             self.paths.tangents.pending,
         )
@@ -236,7 +274,9 @@ class TautLegs:
 
 
 @njit(cache=True)
-def _wanted(here, there, letters, row, planar, cluster, margin, pending):
+def _wanted(
+    here, there, letters, row, planar, cluster, last, parent, depth, length, margin, pending
+):  # fmt: skip
     """The trie of all relative words between two lists of vertices.
 
     Returns the trie, per node the head of a list of (goal, entry), and the entry of each pair.
@@ -259,7 +299,14 @@ def _wanted(here, there, letters, row, planar, cluster, margin, pending):
                 shared < nu and shared < nv and letters[row[u] + shared] == letters[row[v] + shared]
             ):
                 shared += 1
-            bound = planar[u] + planar[v] + margin
+            # the two tethers run together up to where they part, and a leg need not go back so far
+            s, t = last[u], last[v]
+            while s != t:
+                if depth[s] >= depth[t]:
+                    s = parent[s]
+                else:
+                    t = parent[t]
+            bound = planar[u] + planar[v] - 2.0 * length[s] + margin
             node = 0
             limit[0] = max(limit[0], bound)
             while size + nu + nv >= len(trie):
