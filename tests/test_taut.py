@@ -10,6 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from netsp import Circle, InfeasibleError, InputError, Polygon, Problem
+from netsp.errors import LimitReachedError
 from netsp.hsignature import crossings, is_looping, reduce, signature
 from netsp.roadmap.taut import TautRoadmap
 from tests.brute import BruteForce
@@ -362,3 +363,108 @@ def test_every_pair_of_classes_has_a_leg_in_random_worlds(seed):
     graph = TautRoadmap(random_world(seed, goals=20, tether=350.0)).travel_graph()
     same = graph.cluster[:, None] == graph.cluster[None, :]
     assert np.isfinite(graph.costs[~same]).all()
+
+
+boundary_angles = st.one_of(st.sampled_from([0.0, 90.0, 180.0, 270.0]), st.floats(0.0, 360.0))
+
+
+@relaxed
+@given(
+    boundary_angles,
+    st.tuples(st.integers(-3, 3), st.integers(-3, 3)),
+    st.sampled_from([0.5, 1.0, 1.7]),
+    st.sampled_from([0.0, 0.5]),
+    st.sampled_from([(0.0, 0.0), (6e6, -5e6)]),
+)
+def test_goals_exactly_on_a_grown_boundary(angle, center, radius, clearance, offset):
+    """Both ways round one circle to a goal on it: a tangent and an arc, in closed form."""
+    base = np.array([-7.0, 0.3]) + offset
+    middle = np.array(center) + offset
+    grown = radius + clearance
+    a = math.radians(angle)
+    goal = middle + grown * np.array([math.cos(a), math.sin(a)])
+    circle = Circle(center=middle, radius=radius)
+    problem = Problem(
+        base=base, goals=[goal, base - np.array([0.0, 4.0])], obstacles=[circle], tether_length=40,
+        clearance=clearance,
+    )  # fmt: skip
+    roadmap = TautRoadmap(problem)
+    costs = roadmap.travel_graph().costs
+    same = roadmap.cluster[:, None] == roadmap.cluster[None, :]
+    assert np.isfinite(costs[~same]).all()
+    d = np.hypot(*(base - middle))
+    seen = abs((a - math.atan2(*(base - middle)[::-1]) + math.pi) % (2 * math.pi) - math.pi)
+    lit = math.acos(grown / d)  # how far round the boundary the base sees
+    if seen <= lit:
+        expected = float(np.hypot(*(goal - base)))
+    else:
+        expected = math.sqrt(d * d - grown * grown) + grown * (seen - lit)
+    assert roadmap.planar[roadmap.cluster == 1].min() == pytest.approx(expected, abs=2e-7)
+    for v in np.flatnonzero(roadmap.cluster == 1):
+        path = roadmap.legs.path(0, int(v))
+        assert signature(path, problem.representative_points) == roadmap.signatures[v]
+
+
+@pytest.mark.parametrize("offset", [(0.0, 0.0), (6e6, 5e6)])
+def test_capsules_of_a_rectangle_and_circles_of_its_width(offset):
+    """Outlines that touch from inside: the smooth joint is passed, nothing runs in circles."""
+    dx, dy = offset
+    capsule = [
+        Polygon(polygon=[(dx - 2, dy - 1), (dx + 2, dy - 1), (dx + 2, dy + 1), (dx - 2, dy + 1)]),
+        Circle(center=(dx - 2, dy), radius=1),
+        Circle(center=(dx + 2, dy), radius=1),
+        Circle(center=(dx + 1.5, dy), radius=0.5),
+    ]
+    problem = Problem(
+        base=(dx - 6, dy), goals=[(dx + 6, dy), (dx, dy + 1)], obstacles=capsule, tether_length=20
+    )
+    roadmap = TautRoadmap(problem)
+    tangent, arc = math.sqrt(16 - 1), math.asin(1 / 4)
+    assert roadmap.planar[roadmap.cluster == 1].min() == pytest.approx(
+        2 * (tangent + arc) + 4, abs=1e-6
+    )
+    assert roadmap.planar[roadmap.cluster == 2].min() == pytest.approx(tangent + arc + 2, abs=1e-6)
+
+
+def test_circles_inside_circles_that_touch_from_inside():
+    outer = Circle(center=(0, 0), radius=2)
+    inner = [
+        Circle(center=(1, 0), radius=1),
+        Circle(center=(0, 0), radius=2),
+        Circle(center=(0.3, 0), radius=0.5),
+    ]  # noqa: E501
+    for obstacles in ([outer], [outer, *inner], [*inner, outer]):
+        problem = Problem(base=(-5, 0), goals=[(5, 0)], obstacles=obstacles, tether_length=14)
+        d = 2 * (math.sqrt(21) + 2 * math.asin(2 / 5))
+        assert sorted(TautRoadmap(problem).planar)[1:3] == pytest.approx([d, d], abs=1e-6)
+
+
+def test_a_goal_at_the_end_of_a_vertex_arc():
+    """Found by attack: the point was pushed through the corner instead of away from it."""
+    problem = Problem(
+        base=(-1.862, 1.621), goals=[(-4.25, -2.0)], tether_length=4.5, clearance=0.25,
+        obstacles=[Polygon(polygon=[(-4, -4), (-2, -4), (-4, -2)])],
+    )  # fmt: skip
+    assert TautRoadmap(problem).planar[1] > math.dist((-1.862, 1.621), (-4.25, -2.0))
+
+
+def test_a_far_origin_changes_nothing():
+    near = random_world(4, goals=6, tether=280.0)
+    shift = np.array([6.1e6, -4.2e6])
+    far = Problem(
+        base=np.array(near.base[:2]) + shift,
+        goals=[np.array(g.position[:2]) + shift for g in near.goals],
+        obstacles=[
+            Circle(center=np.array(o.center) + shift, radius=o.radius) for o in near.obstacles
+        ],
+        tether_length=near.tether_length,
+    )
+    a, b = TautRoadmap(near), TautRoadmap(far)
+    assert a.signatures == b.signatures
+    assert np.allclose(a.planar, b.planar, atol=1e-7)
+
+
+def test_time_up_while_measuring_legs_says_where_it_stood():
+    graph = TautRoadmap(random_world(0, goals=10, tether=300.0), time_limit=1e-9).travel_graph()
+    with pytest.raises(LimitReachedError, match="time limit reached while measuring legs: 0 of 11"):
+        graph.costs  # noqa: B018
