@@ -432,7 +432,7 @@ def test_circles_inside_circles_that_touch_from_inside():
         Circle(center=(1, 0), radius=1),
         Circle(center=(0, 0), radius=2),
         Circle(center=(0.3, 0), radius=0.5),
-    ]  # noqa: E501
+    ]
     for obstacles in ([outer], [outer, *inner], [*inner, outer]):
         problem = Problem(base=(-5, 0), goals=[(5, 0)], obstacles=obstacles, tether_length=14)
         d = 2 * (math.sqrt(21) + 2 * math.asin(2 / 5))

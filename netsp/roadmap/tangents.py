@@ -123,6 +123,7 @@ def build_tangents(outline: Outline, reach: float) -> TangentGraph:
     for column, node in ((0, source), (2, target)):
         at_point = node >= 2 * len(arcs)
         ends[at_point, column : column + 2] = outline.places[node[at_point] - 2 * len(arcs)]
+    _merge_contacts(source, target, length, ends, angle, len(arcs))
     first, turn, gap, letters, segment_row, arrival_row, gap_row = _write_letters(
         arcs,
         full,
@@ -157,6 +158,45 @@ def build_tangents(outline: Outline, reach: float) -> TangentGraph:
         outline.rays,
         _pending_boxes(outline),
     )
+
+
+def _merge_contacts(
+    source: Ints, target: Ints, length: Floats, ends: Floats, angle: Floats, arc_count: int
+) -> None:
+    """Give contacts of one arc that agree within the angle tolerance the same coordinates.
+
+    Their sides of rays would else differ by rounding, and sliding from one to the other would write
+    letters that are not there. A point that lies on the arc lends its own coordinates.
+    """
+    node = np.concatenate([source, target])
+    on_arc = np.flatnonzero(node < 2 * arc_count)
+    if len(on_arc) == 0:
+        return
+    edges = len(source)
+    theta = np.concatenate([angle[:, 0], angle[:, 1]])[on_arc] % TWO_PI
+    arc = node[on_arc] // 2
+    other = np.concatenate([target, source])[on_arc]
+    given = (other >= 2 * arc_count) & (np.concatenate([length, length])[on_arc] == 0.0)
+    order = np.lexsort((theta, arc))
+    fresh = np.ones(len(order), dtype=bool)
+    fresh[1:] = (np.diff(arc[order]) != 0) | (np.diff(theta[order]) > ANGLE_TOLERANCE)
+    group = np.empty(len(order), dtype=np.int64)
+    group[order] = np.cumsum(fresh) - 1
+    # an angle just below a full turn is one just above nothing
+    first, last = np.flatnonzero(fresh), np.append(np.flatnonzero(fresh)[1:], len(order)) - 1
+    start_of_arc = np.append(True, np.diff(arc[order][first]) != 0)
+    for g in np.flatnonzero(np.append(start_of_arc[1:], True)):
+        h = int(np.flatnonzero(start_of_arc[: g + 1])[-1])
+        if h != g and theta[order[first[h]]] + TWO_PI - theta[order[last[g]]] <= ANGLE_TOLERANCE:
+            group[group == g] = h
+    xy = np.vstack([ends[:, :2], ends[:, 2:]])
+    # where a point lies on the arc, the far end of its edge of no length is the point itself
+    far = np.vstack([ends[:, 2:], ends[:, :2]])[on_arc]
+    chosen = np.empty((int(group.max()) + 1, 2))
+    chosen[group[::-1]] = xy[on_arc][::-1]
+    chosen[group[given]] = far[given]
+    xy[on_arc] = chosen[group]
+    ends[:, :2], ends[:, 2:] = xy[:edges], xy[edges:]
 
 
 def _pending_boxes(outline: Outline) -> Floats:
