@@ -27,6 +27,11 @@ Ints = npt.NDArray[np.int64]
 Floats = npt.NDArray[np.float64]
 
 
+SAME = 1e4
+"""Two arrivals at a directed arc with one word are one path when their lengths agree to this many
+margins (1e-6 of the size). Where outlines touch from inside, hopping between them and back takes no
+length but rounding; less tolerance would let that go on for ever."""
+
 PARENT, LETTER, CHILD, SIBLING, CORE = range(5)
 """Columns of a trie's nodes. SIBLING chains the children of one parent."""
 
@@ -248,7 +253,10 @@ def explore(
                     slot = (code * 0x9E3779B1) % slots
                     fresh = True
                     while seen_key[slot] >= 0:
-                        if seen_key[slot] == code and abs(seen_length[slot] - mark) <= margin:
+                        if (
+                            seen_key[slot] == code
+                            and abs(seen_length[slot] - mark) <= SAME * margin
+                        ):
                             fresh = False
                             break
                         slot += 1

@@ -38,6 +38,10 @@ Ints = npt.NDArray[np.int64]
 
 MARGIN = 1e-10
 EPSILON = 1e-12
+STAND_OFF = 1e-8
+"""How far from a grown boundary a point is kept, as a fraction of the size: far enough that its
+tangents are well conditioned even at the tiny arcs of a polygon without clearance, near enough that
+no length changes by more."""
 
 
 @dataclass(frozen=True)
@@ -90,8 +94,8 @@ class Outline:
     arcs : (a, 5) centre x, y, radius, start angle, end angle (counter-clockwise, end > start).
     full : (a,) whether the arc is a whole circle.
     origin : (2,) the base, which all coordinates here are relative to.
-    places : (1 + m, 2) base and goals. points : the same, but those on or hardly inside a grown
-        boundary moved just outside it.
+    places : (1 + m, 2) base and goals. points : the same, but those nearer to a grown boundary than
+        `STAND_OFF` moved to that distance.
     rays : (n, 2) representative points.
     margin : the extra growth of all obstacles.
     """
@@ -125,7 +129,7 @@ def build_outline(problem: Problem) -> Outline:
         eps,
     )
     places = problem.points[:, :2] - origin
-    points = np.array([_push_out(p, blockers) for p in places])
+    points = np.array([_push_out(p, blockers, STAND_OFF * scale) for p in places])
     rays = problem.representative_points - origin
     arcs, full = np.ascontiguousarray(rows[:, :5]), rows[:, 5] > 0.0
     return Outline(blockers, arcs, full, origin, places, points, rays, margin)
@@ -175,25 +179,24 @@ def _vertex_disks(v: Floats, growth: float) -> list[tuple[float, float, float, f
     return disks
 
 
-def _push_out(point: Floats, blockers: Blockers) -> Floats:
-    """Move a point that lies on a grown boundary, or a tolerance inside, just out of it."""
+def _push_out(point: Floats, blockers: Blockers, distance: float) -> Floats:
+    """Move a point that lies on a grown boundary, or nearly, to a distance from it."""
     p = np.array(point, dtype=float)
     for _ in range(32):
         depth = blockers.depth(p)
-        if len(depth) == 0 or depth.max() <= 0.0:
+        if len(depth) == 0 or depth.max() <= -0.5 * distance:
             break
         o = int(np.argmax(depth))
         if blockers.circles[o, 2] >= 0.0:
             away = p - blockers.circles[o, :2]
-            p = blockers.circles[o, :2] + away / np.hypot(*away) * blockers.circles[o, 2] * (
-                1.0 + 4e-16
-            )
+            clear = blockers.circles[o, 2] + distance
+            p = blockers.circles[o, :2] + away / np.hypot(*away) * clear
         else:
-            p = _push_out_of_polygon(p, o, blockers)
+            p = _push_out_of_polygon(p, o, blockers, distance)
     return p
 
 
-def _push_out_of_polygon(p: Floats, o: int, blockers: Blockers) -> Floats:
+def _push_out_of_polygon(p: Floats, o: int, blockers: Blockers, stand_off: float) -> Floats:
     """Away from the nearest point of the outline; along the normal when it lies on it."""
     e = blockers.edges[blockers.edge_start[o] : blockers.edge_start[o + 1]]
     a, d = e[:, :2], e[:, 2:] - e[:, :2]
@@ -202,14 +205,14 @@ def _push_out_of_polygon(p: Floats, o: int, blockers: Blockers) -> Floats:
     away = p - foot
     k = int(np.argmin(np.hypot(away[:, 0], away[:, 1])))
     distance = np.hypot(*away[k])
-    if distance <= 1e-3 * blockers.grow[o]:
+    if distance <= 1e-6 * stand_off:
         unit = np.array([d[k, 1], -d[k, 0]]) / np.hypot(*d[k])
     else:
         inside = point_in_polygon(
             p[0], p[1], blockers.edges, blockers.edge_start[o], blockers.edge_start[o + 1]
         )
         unit = away[k] / distance * (-1.0 if inside else 1.0)
-    return np.asarray(foot[k] + unit * blockers.grow[o] * (1.0 + 1e-12))
+    return np.asarray(foot[k] + unit * (blockers.grow[o] + stand_off))
 
 
 @njit(cache=True)
