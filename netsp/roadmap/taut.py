@@ -42,7 +42,7 @@ Ints = npt.NDArray[np.int64]
 MAX_CLASSES = 6_000
 """Default for the most augmented goals a travel graph may have: 36 million legs, 0.3 GiB."""
 
-STATES_PER_CLASS = 2_000
+STATES_PER_CLASS = 200
 
 
 @dataclass(frozen=True)
@@ -114,7 +114,7 @@ class TautRoadmap:
             grow=True,
             keep=True,
             margin=self.outline.margin,
-            cap=STATES_PER_CLASS * max_classes,
+            cap=max(1_000_000, STATES_PER_CLASS * max_classes),
         )
         goal, word, length, capped = found.goal, found.word, found.length, found.capped
         reach = np.hypot(length, self._z[goal] - self._z[0])
