@@ -50,6 +50,9 @@ BAD = {
     "no radius": (variant(obstacles=[{"center": [2, 0]}]), "obstacles[0].radius: missing"),
     "obstacle of no kind": (variant(obstacles=[7]), "obstacles[0]: expected {"),
     "nan": (variant(base=[0, math.nan]), "base: expected a finite number, got nan"),
+    "beyond every number": (variant(base=[0, 10**400]), "base: expected a finite number, got 1000"),
+    "beyond reason": (variant(base=[0, 1e300]), "base: expected a magnitude of at most 1e+12"),
+    "name of two lines": (variant(name="a\nb"), "name: expected a name of at most 200 printable"),
     "infinite": (variant(tether_length=math.inf), "tether_length: expected a finite number"),
     "text for a number": (variant(tether_length="9"), "tether_length: expected a number, got '9'"),
     "bool for a number": (variant(tether_length=True), "tether_length: expected a number, got True"),  # noqa: E501
@@ -108,6 +111,7 @@ def test_bad_input_is_named_in_one_line(case):
         ("", "f: not JSON: Expecting value at line 1, column 1"),
         ('{"base": [0, 0], "base": [1, 1]}', "f: field 'base' is given twice"),
         ("[" * 100_000, "f: not JSON"),
+        ('{"base": [' + "9" * 5000 + "]}", "f: not JSON that netsp reads: a number has too many"),
     ],
 )
 def test_broken_json_is_named_in_one_line(text, expected):
