@@ -12,7 +12,7 @@ import math
 from collections.abc import Iterable, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -31,6 +31,9 @@ from pydantic import (
 
 from netsp.errors import InputError
 from netsp.polygons import check_polygon, polygon_interior_point, polygon_signed_distance
+
+if TYPE_CHECKING:
+    import shapely
 
 SCHEMA_VERSION = 1
 
@@ -114,6 +117,12 @@ class Circle(BaseModel):
         d = np.asarray(xy, dtype=float) - self.center
         return np.asarray(np.hypot(d[..., 0], d[..., 1]) - self.radius)
 
+    def shape(self, grow: float = 0.0) -> shapely.Polygon:
+        """The plan grown by a clearance, as an inscribed Shapely polygon of 256 sides."""
+        import shapely
+
+        return shapely.Point(self.center).buffer(self.radius + grow, quad_segs=64)
+
 
 class Polygon(BaseModel):
     """A vertical prism of unlimited height over a simple polygon, convex or not."""
@@ -136,6 +145,13 @@ class Polygon(BaseModel):
     def signed_distance(self, xy: npt.ArrayLike) -> npt.NDArray[np.float64]:
         """Distance of points (..., 2) to the outline, negative inside."""
         return polygon_signed_distance(self.polygon, xy)
+
+    def shape(self, grow: float = 0.0) -> shapely.Polygon:
+        """The plan grown by a clearance, as a Shapely polygon."""
+        import shapely
+
+        shape = shapely.Polygon(self.polygon)
+        return shape.buffer(grow, quad_segs=64) if grow > 0.0 else shape
 
 
 def _obstacle_kind(value: Any) -> str | None:

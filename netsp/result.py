@@ -4,9 +4,15 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
+import numpy as np
+import numpy.typing as npt
+
+from netsp.hsignature import Word
 from netsp.solution import Status
+
+Floats = npt.NDArray[np.float64]
 
 OPTIMALITY_TOLERANCE = 1e-6
 """A tour is called optimal when (length - bound) <= this fraction of its length. Bounds are
@@ -16,7 +22,11 @@ computed in floating point from dual values; their rounding is orders of magnitu
 @dataclass(frozen=True)
 class Progress:
     """One row of the progress table. Lengths in problem units, time in seconds since the start of
-    the solver; None where nothing is known yet."""
+    the solver; None where nothing is known yet.
+
+    iteration : of the solver; each says what one is. current, entangled : of solvers that walk from
+    state to state, the length of the present one and how many obstacles it entangles.
+    """
 
     time: float
     stage: str
@@ -24,6 +34,9 @@ class Progress:
     bound: float | None = None
     cuts: int = 0
     legs: int = 0
+    iteration: int = 0
+    current: float | None = None
+    entangled: int | None = None
 
     @property
     def gap(self) -> float | None:
@@ -35,12 +48,29 @@ OnProgress = Callable[[Progress], None]
 
 
 @dataclass(frozen=True)
+class Trajectory:
+    """What a baseline blind to the tether walked: a closed path, whatever it entangles.
+
+    order : goals (clusters) in the order visited. words : at each of them, the word of the way
+    from the base. word : of the whole. path : (n, 3) closed polyline.
+    """
+
+    order: tuple[int, ...]
+    words: tuple[Word, ...]
+    word: Word
+    path: Floats
+
+
+@dataclass(frozen=True)
 class Result:
     """Outcome of a solver on a travel graph.
 
     tour : vertices from the base on (the base is not repeated at the end), or None.
     length, lower_bound : of the closed tour; a proven bound on every tour, or None.
     trace : the progress rows, in order.
+    walk : vertices as they are walked, base to base, where that is longer than the tour because
+        the solver retraces its steps; `length` is then that of the walk.
+    trajectory : of a blind baseline with status `invalid`; `tour` is then None.
     """
 
     tour: tuple[int, ...] | None
@@ -48,7 +78,8 @@ class Result:
     lower_bound: float | None
     status: Status
     trace: tuple[Progress, ...] = ()
-    timings: dict[str, float] = field(default_factory=dict)
+    walk: tuple[int, ...] | None = None
+    trajectory: Trajectory | None = None
 
 
 def relative_gap(length: float | None, bound: float | None) -> float | None:

@@ -26,12 +26,14 @@ from netsp.problem import (
 
 class Status(StrEnum):
     """What is proven. `OPTIMAL` speaks of the travel graph; with the exact roadmap the travel graph
-    holds every admissible tour of the continuous world."""
+    holds every admissible tour of the continuous world. `INVALID` marks the tour of a baseline that
+    is blind to the tether: it entangles obstacles or overstretches the tether."""
 
     OPTIMAL = "optimal"
     FEASIBLE = "feasible"
     INFEASIBLE = "infeasible"
     NO_SOLUTION_FOUND = "no_solution_found"
+    INVALID = "invalid"
 
 
 _STRICT = ConfigDict(frozen=True, extra="forbid")
@@ -69,6 +71,8 @@ class Solution(BaseModel):
 
     Lengths are in the problem's units. `lower_bound` is a proven bound on every admissible tour,
     `gap` is (length - lower_bound) / length. Without a tour, `length` and `gap` are None.
+    `entangled` lists the obstacles (0-based) that the path is wrapped around; only an `invalid`
+    tour has any.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", title="netsp solution")
@@ -82,6 +86,7 @@ class Solution(BaseModel):
     length: Number | None
     lower_bound: Number | None
     gap: Number | None
+    entangled: tuple[int, ...] = ()
     tour: tuple[Visit, ...] = ()
     path: tuple[Point3, ...] = ()
     timings: Timings = Timings()

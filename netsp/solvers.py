@@ -8,18 +8,34 @@ import inspect
 import platform
 import time
 from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from netsp.errors import InputError
+from netsp.hsignature import entangled
 from netsp.problem import Problem
-from netsp.result import OnProgress, Result, relative_gap
+from netsp.result import OnProgress, Result, Trajectory, relative_gap
 from netsp.solution import ProblemReference, Solution, Timings, Visit
 from netsp.travel import TravelGraph
 
-SOLVERS: dict[str, str] = {"mip": "netsp.mip:solve"}
+SOLVERS: dict[str, str] = {
+    "mip": "netsp.mip.solve:solve",
+    "reduced-mip": "netsp.mip.reduced:solve",
+    "anneal": "netsp.anneal.icra2017:solve",
+    "anneal-2016": "netsp.anneal.rss2016:solve",
+    "greedy": "netsp.greedy.backtracking:solve",
+    "greedy-2016": "netsp.greedy.backtracking:solve_2016",
+    "greedy-tsp": "netsp.greedy.blind:solve",
+}
 """Solver name → where its `solve(graph, …) -> Result` lives."""
+
+BLIND = frozenset({"greedy-tsp"})
+"""Baselines blind to the tether: their tours may be `invalid`."""
+
+GEOMETRIC = frozenset({"anneal-2016", "greedy-tsp"})
+"""Solvers that need the ways beneath a travel graph, so no graph made from costs will do."""
 
 ROADMAPS: dict[str, str] = {
     "taut": "netsp.roadmap.taut:TautRoadmap",
@@ -35,7 +51,7 @@ DEFAULT_ROADMAP = "taut"
 
 def _load(table: Mapping[str, str], kind: str, name: str) -> Any:
     if name not in table:
-        raise InputError(f"{kind}: unknown {name!r}; expected one of {', '.join(sorted(table))}")
+        raise InputError(f"{kind}: unknown {name!r}; expected one of {', '.join(table)}")
     module, attribute = table[name].split(":")
     return getattr(importlib.import_module(module), attribute)
 
@@ -67,16 +83,42 @@ def solve_graph(
     solver: str = DEFAULT_SOLVER,
     *,
     time_limit: float | None = None,
+    iteration_limit: int | None = None,
     seed: int = 0,
     params: Mapping[str, Any] | None = None,
     warm_start: Sequence[int] | None = None,
     on_progress: OnProgress | None = None,
 ) -> Result:
-    """Run a solver on a travel graph."""
+    """Run a solver on a travel graph, from a roadmap or from `TravelGraph.from_costs`.
+
+    Parameters
+    ----------
+    time_limit : seconds; the best tour so far is returned when they are up.
+    iteration_limit : of the solver; each says what one is. Under an iteration limit alone, the same
+        seed gives the same answer.
+    seed : of the solver's random generator.
+    params : the solver's options by name.
+    warm_start : a tour to start from, as vertices from 0 on.
+
+    Raises InputError for unknown names, bad limits, a warm start that is no tour of the graph, and
+    for solvers that need geometry (`GEOMETRIC`) on a graph that has none.
+
+    >>> from netsp import TravelGraph, solve_graph
+    >>> costs = [[0, 1, 5, 4], [1, 0, 2, 9], [5, 2, 0, 2], [4, 9, 2, 0]]
+    >>> solve_graph(TravelGraph.from_costs(costs, clusters=[0, 1, 2, 2])).length
+    8.0
+    """
     run: Callable[..., Result] = _load(SOLVERS, "solver", solver)
+    _check_limits(time_limit, iteration_limit)
+    if warm_start is not None and not graph.is_tour(warm_start):
+        raise InputError(
+            "warm_start: expected vertices from 0 on, one of every cluster, got "
+            f"{[int(v) for v in warm_start]}"
+        )
     return run(
         graph,
         time_limit=time_limit,
+        iteration_limit=iteration_limit,
         rng=np.random.default_rng(seed),
         params=params,
         warm_start=warm_start,
@@ -91,6 +133,7 @@ def solve(
     roadmap: str = DEFAULT_ROADMAP,
     roadmap_options: Mapping[str, Any] | None = None,
     time_limit: float | None = None,
+    iteration_limit: int | None = None,
     seed: int = 0,
     params: Mapping[str, Any] | None = None,
     warm_start: Solution | None = None,
@@ -102,8 +145,11 @@ def solve(
     ----------
     roadmap_options : for ``taut``: ``max_classes``; for ``prm``: ``samples``, ``shortcut``.
     time_limit : seconds for the whole call; the best tour so far is returned when it is up.
+    iteration_limit : of the solver; each says what one is.
     seed : feeds the solver's random generator, and the sampling of a roadmap that samples.
-    warm_start : a solution of the same problem to start from.
+    params : the solver's options by name.
+    warm_start : a solution of the same problem to start from, by whatever solver; where a class of
+        it is not in this roadmap, the best of its order is taken.
     on_progress : called with a `netsp.result.Progress` now and then.
 
     Raises
@@ -117,8 +163,7 @@ def solve(
     >>> solve(problem).length
     10.0
     """
-    if time_limit is not None and not time_limit > 0:
-        raise InputError(f"time_limit: expected a positive number of seconds, got {time_limit!r}")
+    _check_limits(time_limit, iteration_limit)
     if warm_start is not None and warm_start.problem.sha256 != problem.sha256:
         raise InputError("warm_start: it is the solution of another problem (sha256 differs)")
     _load(SOLVERS, "solver", solver)
@@ -128,23 +173,22 @@ def solve(
         options.setdefault("seed", seed)
     graph = travel_graph(problem, roadmap, **options)
     built = time.monotonic()
-    graph.costs  # noqa: B018 - computed here so that its time is told apart
-    measured = time.monotonic()
     result = solve_graph(
         graph,
         solver,
-        time_limit=None if time_limit is None else max(time_limit - (measured - begin), 1e-3),
+        time_limit=None if time_limit is None else max(time_limit - (built - begin), 1e-3),
+        iteration_limit=iteration_limit,
         seed=seed,
         params=params,
         warm_start=_tour_of(warm_start, graph) if warm_start is not None else None,
         on_progress=on_progress,
     )
-    solved = time.monotonic()
+    total = time.monotonic() - begin
     timings = Timings(
         roadmap_s=round(built - begin, 6),
-        matrix_s=round(measured - built, 6),
-        solve_s=round(solved - measured, 6),
-        total_s=round(solved - begin, 6),
+        matrix_s=round(graph.legs_s, 6),
+        solve_s=round(max(total - (built - begin) - graph.legs_s, 0.0), 6),
+        total_s=round(total, 6),
     )
     return to_solution(problem, graph, result, solver, seed, timings)
 
@@ -158,11 +202,14 @@ def to_solution(
     timings: Timings | None = None,
 ) -> Solution:
     """Write a solver's result as a solution of the problem, its path drawn."""
-    tour = result.tour or ()
-    path: list[tuple[float, float, float]] = []
-    for u, v in zip(tour, (*tour[1:], 0), strict=False):
-        leg = [(float(x), float(y), float(z)) for x, y, z in graph.path(u, v)]
-        path.extend(leg if not path else leg[1:])
+    if result.trajectory is not None:
+        visits, path = _blind_visits(problem, result.trajectory), result.trajectory.path
+        wrapped = tuple(k - 1 for k in entangled(result.trajectory.word))
+    else:
+        visits, wrapped = _visits(graph, result.tour or ()), ()
+        walk = result.walk or (*(result.tour or ()), 0)
+        legs = [graph.path(u, v) for u, v in pairwise(walk)]
+        path = np.vstack([legs[0], *(leg[1:] for leg in legs[1:])]) if legs else np.zeros((0, 3))
     return Solution(
         problem=ProblemReference(name=problem.name, sha256=problem.sha256),
         solver=solver,
@@ -172,27 +219,61 @@ def to_solution(
         length=result.length,
         lower_bound=result.lower_bound,
         gap=relative_gap(result.length, result.lower_bound),
-        tour=tuple(
-            Visit(
-                goal=int(graph.cluster[v]) - 1,
-                signature=graph.signatures[v],
-                tether_length=float(graph.tethers[v]),
-            )
-            for v in tour[1:]
-        ),
-        path=tuple(path),
+        entangled=wrapped,
+        tour=visits,
+        path=tuple((float(x), float(y), float(z)) for x, y, z in path),
         timings=timings or Timings(),
         versions=versions(),
     )
 
 
+def _visits(graph: TravelGraph, tour: Sequence[int]) -> tuple[Visit, ...]:
+    return tuple(
+        Visit(
+            goal=int(graph.cluster[v]) - 1,
+            signature=graph.signatures[v],
+            tether_length=float(graph.tethers[v]),
+        )
+        for v in tour[1:]
+    )
+
+
+def _blind_visits(problem: Problem, walked: Trajectory) -> tuple[Visit, ...]:
+    """Stops of a blind baseline, with the taut tether that its way would need."""
+    from netsp.roadmap.paths import TautPaths
+
+    longest = float(np.hypot(*np.diff(walked.path[:, :2], axis=0).T).sum())
+    paths = TautPaths(problem, longest * (1.0 + 1e-6))
+    return tuple(
+        Visit(goal=goal - 1, signature=word, tether_length=paths.length(0, goal, word))
+        for goal, word in zip(walked.order, walked.words, strict=True)
+    )
+
+
+def _check_limits(time_limit: float | None, iteration_limit: int | None) -> None:
+    if time_limit is not None and not time_limit > 0:
+        raise InputError(f"time_limit: expected a positive number of seconds, got {time_limit!r}")
+    if iteration_limit is not None and not iteration_limit >= 1:
+        raise InputError(
+            f"iteration_limit: expected a whole number from 1 on, got {iteration_limit!r}"
+        )
+
+
 def _tour_of(solution: Solution, graph: TravelGraph) -> list[int] | None:
-    """The vertices of a solution's tour, or None if a class of it is not in the graph."""
-    place = {
-        (int(c), w): v for v, (c, w) in enumerate(zip(graph.cluster, graph.signatures, strict=True))
-    }
-    tour = [place.get((visit.goal + 1, tuple(visit.signature)), -1) for visit in solution.tour]
-    return None if -1 in tour or not tour else [0, *tour]
+    """The vertices of a solution's tour; if a class of it is not in the graph, the best classes for
+    its order; None if it has no tour of all goals."""
+    order = [visit.goal + 1 for visit in solution.tour]
+    if sorted(order) != list(range(1, graph.goal_count + 1)):
+        return None
+    words = [tuple(visit.signature) for visit in solution.tour]
+    there = graph.vertices_of(order, words)
+    if there is None and order:
+        from netsp.lns import Instance, best_classes
+
+        instance = Instance(graph)
+        _, tour = best_classes(np.array(order), instance.start, instance.costs)
+        return list(instance.original(tour))
+    return [0, *(there or [])]
 
 
 def versions() -> dict[str, str]:

@@ -10,13 +10,18 @@ Solvers see this class and nothing beneath it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Sequence
 from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
 
+from netsp.errors import InputError
 from netsp.hsignature import Word
+from netsp.ways import Ways
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -27,6 +32,9 @@ class Legs(Protocol):
 
     def lengths(self, vertices: Ints) -> Floats:
         """(k, k) symmetric leg lengths among the given vertices; inf within a cluster."""
+
+    def to_base(self) -> Floats:
+        """(V,) lengths of the legs from the base."""
 
     def lower_bounds(self, vertices: Ints) -> Floats:
         """(k, k) lower bounds on the leg lengths, much cheaper than the lengths."""
@@ -44,6 +52,7 @@ class TravelGraph:
     signatures : V words, that of the tether at each vertex.
     tethers : (V,) taut tether lengths in 3D.
     roadmap : name of the roadmap it came from.
+    legs_s : seconds spent measuring legs so far.
     """
 
     def __init__(
@@ -53,13 +62,42 @@ class TravelGraph:
         tethers: npt.ArrayLike,
         legs: Legs,
         roadmap: str = "custom",
+        ways: Callable[[], Ways] | None = None,
     ) -> None:
         self.cluster: Ints = np.asarray(cluster, dtype=np.int64)
         self.signatures = tuple(signatures)
         self.tethers: Floats = np.asarray(tethers, dtype=float)
         self.roadmap = roadmap
+        self.legs_s = 0.0
         self._legs = legs
         self._costs: Floats | None = None
+        self._make_ways = ways
+        self._ways: Ways | None = None
+        self._place: dict[tuple[int, Word], int] | None = None
+
+    @classmethod
+    def from_costs(cls, costs: npt.ArrayLike, clusters: npt.ArrayLike) -> TravelGraph:
+        """Any symmetric generalised TSP as a travel graph, for the solvers that need no geometry.
+
+        Parameters
+        ----------
+        costs : (V, V) symmetric, not negative; inf where there is no leg. Costs within a cluster
+            are never used.
+        clusters : (V,) cluster of each vertex, numbered 0, 1, … without gaps. Vertex 0 is alone in
+            cluster 0: it is where the tour starts and ends.
+
+        Raises
+        ------
+        InputError : wrong shapes, asymmetric, negative or NaN costs, a missing cluster, or
+            infinities that leave no vertex of some cluster joined to vertex 0.
+
+        >>> costs = [[0, 3, 4], [3, 0, 5], [4, 5, 0]]
+        >>> TravelGraph.from_costs(costs, clusters=[0, 1, 2]).tour_length([0, 1, 2])
+        12.0
+        """
+        table = _CostTable(*_checked(costs, clusters))
+        cluster = table.cluster
+        return cls(cluster, [()] * len(cluster), np.zeros(len(cluster)), table)
 
     def __len__(self) -> int:
         return len(self.cluster)
@@ -74,7 +112,7 @@ class TravelGraph:
         """(V, V) leg costs, symmetric; inf on the diagonal and within a cluster. Computed once,
         when first asked for; read-only."""
         if self._costs is None:
-            costs = self._legs.lengths(np.arange(len(self)))
+            costs = self._measured(np.arange(len(self)))
             costs.setflags(write=False)
             self._costs = costs
         return self._costs
@@ -85,7 +123,56 @@ class TravelGraph:
         chosen = np.asarray(vertices, dtype=np.int64)
         if self._costs is not None:
             return np.asarray(self._costs[np.ix_(chosen, chosen)])
-        return self._legs.lengths(chosen)
+        return self._measured(chosen)
+
+    def _measured(self, vertices: Ints) -> Floats:
+        begin = time.monotonic()
+        try:
+            return self._legs.lengths(vertices)
+        finally:
+            self.legs_s += time.monotonic() - begin
+
+    @property
+    def ways(self) -> Ways:
+        """Ways in any class, for solvers blind to the tether; InputError if there is no geometry
+        beneath this graph."""
+        if self._make_ways is None:
+            raise InputError(
+                "solver: needs the geometry of a problem, and this travel graph has none"
+            )
+        if self._ways is None:
+            self._ways = self._make_ways()
+        return self._ways
+
+    def subgraph(self, vertices: npt.ArrayLike) -> TravelGraph:
+        """The travel graph on some of the vertices, the base first; vertex k of it is vertex
+        ``vertices[k]`` of this one."""
+        chosen = np.asarray(vertices, dtype=np.int64)
+        part = TravelGraph(
+            self.cluster[chosen],
+            [self.signatures[v] for v in chosen],
+            self.tethers[chosen],
+            _PartOfLegs(self, chosen),
+            self.roadmap,
+        )
+        return part
+
+    @property
+    def costs_to_base(self) -> Floats:
+        """(V,) costs of the legs from the base, without measuring any other; inf at the base."""
+        out = self._legs.to_base().copy()
+        out[0] = np.inf
+        return out
+
+    def vertices_of(self, order: Sequence[int], words: Sequence[Word]) -> list[int] | None:
+        """The vertices of clusters with given words; None if one of them is not in the graph."""
+        if self._place is None:
+            self._place = {
+                (int(c), w): v
+                for v, (c, w) in enumerate(zip(self.cluster, self.signatures, strict=True))
+            }
+        found = [self._place.get((c, tuple(w)), -1) for c, w in zip(order, words, strict=True)]
+        return None if -1 in found else found
 
     def lower_bounds(self, vertices: npt.ArrayLike | None = None) -> Floats:
         """(k, k) lower bounds on the leg costs among some vertices (default all), without computing
@@ -102,8 +189,14 @@ class TravelGraph:
 
     def tour_length(self, tour: Sequence[int]) -> float:
         """Length of the closed tour through the given vertices."""
-        t = np.asarray(tour)
-        return float(self.costs[t, np.roll(t, -1)].sum()) if len(t) > 1 else 0.0
+        return self.walk_length([*tour, tour[0]]) if len(tour) > 1 else 0.0
+
+    def walk_length(self, walk: Sequence[int]) -> float:
+        """Length of the legs from each vertex to the next."""
+        w = np.asarray(walk, dtype=np.int64)
+        used, at = np.unique(w, return_inverse=True)
+        among = self.costs_among(used)
+        return float(among[at[:-1], at[1:]].sum())
 
     def is_tour(self, tour: Sequence[int]) -> bool:
         """Whether it starts at the base and takes exactly one vertex of every cluster."""
@@ -118,3 +211,93 @@ class TravelGraph:
     def path(self, u: int, v: int) -> Floats:
         """(n, 3) polyline of the leg from vertex u to vertex v."""
         return self._legs.path(u, v)
+
+
+class _PartOfLegs:
+    """The legs of another travel graph, among some of its vertices."""
+
+    def __init__(self, graph: TravelGraph, chosen: Ints) -> None:
+        self.graph, self.chosen = graph, chosen
+
+    def lengths(self, vertices: Ints) -> Floats:
+        return self.graph.costs_among(self.chosen[vertices])
+
+    def to_base(self) -> Floats:
+        return np.asarray(self.graph.costs_to_base[self.chosen])
+
+    def lower_bounds(self, vertices: Ints) -> Floats:
+        return self.graph.lower_bounds(self.chosen[vertices])
+
+    def path(self, u: int, v: int) -> Floats:
+        return self.graph.path(int(self.chosen[u]), int(self.chosen[v]))
+
+
+class _CostTable:
+    """Legs given as a matrix."""
+
+    def __init__(self, costs: Floats, cluster: Ints) -> None:
+        self.costs, self.cluster = costs, cluster
+
+    def lengths(self, vertices: Ints) -> Floats:
+        return self.costs[np.ix_(vertices, vertices)].copy()
+
+    def to_base(self) -> Floats:
+        return np.asarray(self.costs[0])
+
+    lower_bounds = lengths
+
+    def path(self, u: int, v: int) -> Floats:
+        raise InputError(f"no path from vertex {u} to {v}: this travel graph was made from costs")
+
+
+def _checked(costs: npt.ArrayLike, clusters: npt.ArrayLike) -> tuple[Floats, Ints]:
+    """The matrix with inf within clusters, and the clusters, or InputError with what is wrong."""
+    try:
+        c = np.array(costs, dtype=float)
+        labels = np.asarray(clusters, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"costs, clusters: expected numbers: {error}") from None
+    n = len(c)
+    if c.ndim != 2 or c.shape != (n, n) or n == 0:
+        raise InputError(f"costs: expected a square matrix, got shape {c.shape}")
+    if labels.shape != (n,):
+        raise InputError(f"clusters: expected {n} labels, one per row of costs, got {labels.shape}")
+    if not np.array_equal(labels, np.floor(labels)) or labels.min() < 0:
+        bad = next(x for x in labels if not (x >= 0 and x == np.floor(x)))
+        raise InputError(f"clusters: expected whole numbers from 0 on, got {bad:g}")
+    cluster = labels.astype(np.int64)
+    if cluster[0] != 0 or (cluster == 0).sum() != 1:
+        raise InputError(
+            "clusters: vertex 0, where the tour starts, must be alone in cluster 0; cluster 0 is "
+            f"{np.flatnonzero(cluster == 0).tolist()}"
+        )
+    missing = sorted(set(range(int(cluster.max()) + 1)) - set(cluster.tolist()))
+    if missing:
+        raise InputError(
+            f"clusters: cluster {missing[0]} has no vertex; expected 0 to {cluster.max()} all used"
+        )
+    c[cluster[:, None] == cluster[None, :]] = np.inf
+    if np.isnan(c).any():
+        u, v = np.argwhere(np.isnan(c))[0]
+        raise InputError(f"costs: costs[{u}][{v}] is not a number")
+    if (c < 0).any():
+        u, v = np.argwhere(c < 0)[0]
+        raise InputError(f"costs: costs[{u}][{v}] is {c[u, v]:g}; expected no negative cost")
+    scale = np.max(c[np.isfinite(c)], initial=0.0)
+    with np.errstate(invalid="ignore"):
+        uneven = (c != c.T) & ~(np.abs(c - c.T) <= 1e-9 * scale)
+    if uneven.any():
+        u, v = np.argwhere(uneven)[0]
+        raise InputError(
+            f"costs: expected a symmetric matrix, but costs[{u}][{v}] is {c[u, v]:g} and "
+            f"costs[{v}][{u}] is {c[v, u]:g}"
+        )
+    c = np.minimum(c, c.T)
+    _, part = connected_components(csr_array(np.isfinite(c)), directed=False)
+    joined = set(cluster[part == part[0]].tolist())
+    cut_off = sorted(set(cluster.tolist()) - joined)
+    if cut_off:
+        raise InputError(
+            f"costs: infinite costs cut cluster {cut_off[0]} off from vertex 0, so there is no tour"
+        )
+    return c, cluster

@@ -1,13 +1,24 @@
 """Homotopy signatures: words of a free group, and how a path writes one."""
 
 from netsp.hsignature.rays import crossings, signature
-from netsp.hsignature.words import EMPTY, Word, concatenate, invert, is_looping, reduce
+from netsp.hsignature.words import (
+    EMPTY,
+    Word,
+    concatenate,
+    cyclically_reduced,
+    entangled,
+    invert,
+    is_looping,
+    reduce,
+)
 
 __all__ = [
     "EMPTY",
     "Word",
     "concatenate",
     "crossings",
+    "cyclically_reduced",
+    "entangled",
     "invert",
     "is_looping",
     "reduce",

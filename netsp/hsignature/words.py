@@ -56,3 +56,28 @@ def is_looping(word: Word) -> bool:
     of the authors' later code.
     """
     return len(set(word)) < len(word)
+
+
+def cyclically_reduced(word: Iterable[int]) -> Word:
+    """The reduced word without the letters that cancel between its end and its beginning: the class
+    of a loop that may slide off its base.
+
+    >>> cyclically_reduced((1, 2, -1))
+    (2,)
+    """
+    w = reduce(word)
+    k = 0
+    while k < len(w) - 1 - k and w[k] == -w[-1 - k]:
+        k += 1
+    return w[k : len(w) - k]
+
+
+def entangled(word: Iterable[int]) -> tuple[int, ...]:
+    """Numbers (from 1) of the obstacles that a closed path of this word is wrapped around: those of
+    its cyclically reduced word. In ``(1, 2, -1)`` the tether runs out past obstacle 1, round
+    obstacle 2 and back past 1, so only 2 holds it. Empty exactly when the word is.
+
+    McCammon & Hollinger 2016, section II-A, speak of the obstacles in the interior of the loop;
+    a loop such as ``(1, 2, -1, -2)`` encloses none and is entangled with both.
+    """
+    return tuple(sorted({abs(x) for x in cyclically_reduced(word)}))

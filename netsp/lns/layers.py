@@ -35,8 +35,13 @@ class Instance:
 
     @cached_property
     def costs(self) -> Floats:
-        """(V, V) leg costs in the order of `order`."""
-        return np.ascontiguousarray(self.graph.costs[np.ix_(self.order, self.order)])
+        """(V, V) leg costs in the order of `order`; where there is no leg, a cost that no tour of
+        legs alone can reach."""
+        costs = self.graph.costs[np.ix_(self.order, self.order)]
+        finite = np.isfinite(costs)
+        most = float(np.max(costs[finite], initial=0.0))
+        costs[~finite] = 2.0 * (self.graph.goal_count + 1) * most + 1.0
+        return np.ascontiguousarray(costs)
 
     @cached_property
     def cluster_costs(self) -> Floats:

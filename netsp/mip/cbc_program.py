@@ -6,7 +6,7 @@ import numpy as np
 import pulp
 
 from netsp.mip.cbc import CbcOutcome, run_cbc
-from netsp.mip.program import Cut, Duals, Floats, IntegerOutcome, Ints, Point
+from netsp.mip.program import Bools, Cut, Duals, Floats, IntegerOutcome, Ints, Point
 
 
 class CbcProgram:
@@ -18,6 +18,8 @@ class CbcProgram:
         self.vertices = vertices
         self.legs: Ints = np.zeros((0, 2), dtype=np.int64)
         self.cuts: list[Cut] = []
+        self.infeasible = False
+        self._cuts_made = 0
         self.problem = pulp.LpProblem("netsp", pulp.LpMinimize)
         self.problem.setObjective(pulp.LpAffineExpression())
         self._x = {int(v): pulp.LpVariable(f"x_{v}", 0, 1, pulp.LpInteger) for v in vertices}
@@ -68,13 +70,23 @@ class CbcProgram:
             ]
             within = cut.inside[self.legs[:, 0]] & cut.inside[self.legs[:, 1]]
             terms += [(self._y[k], 1.0) for k in np.flatnonzero(within)]
-            name = f"cut_{len(self.cuts)}"
+            name = f"cut_{self._cuts_made}"
+            self._cuts_made += 1
             self._cut_rows.append(self._row(terms, pulp.LpConstraintLE, 0.0, name))
             self.cuts.append(cut)
+
+    def keep_cuts(self, keep: Bools) -> None:
+        """Take all cuts out of the program but those marked."""
+        for row, kept in zip(self._cut_rows, keep, strict=True):
+            if not kept:
+                del self.problem.constraints[row.name]
+        self._cut_rows = [r for r, k in zip(self._cut_rows, keep, strict=True) if k]
+        self.cuts = [c for c, k in zip(self.cuts, keep, strict=True) if k]
 
     def solve_relaxation(self, time_left: float) -> Point | None:
         """The LP relaxation's optimum with duals; None if the time ran out."""
         outcome = run_cbc(self.problem, integer=False, time_left=time_left)
+        self.infeasible = outcome.status == "infeasible"
         if outcome.status != "optimal":
             return None
         return self._point(outcome, duals=True)
@@ -105,6 +117,6 @@ class CbcProgram:
             prices = Duals(
                 np.array([get(f"serve_{c}", 0.0) for c in range(self.clusters)]),
                 degree,
-                np.minimum([get(f"cut_{k}", 0.0) for k in range(len(self.cuts))], 0.0),
+                np.minimum([get(row.name, 0.0) for row in self._cut_rows], 0.0),
             )
         return Point(x, self.legs, y, float(outcome.objective or 0.0), prices)

@@ -7,7 +7,7 @@ import math
 import highspy
 import numpy as np
 
-from netsp.mip.program import Cut, Duals, Floats, IntegerOutcome, Ints, Point
+from netsp.mip.program import Bools, Cut, Duals, Floats, IntegerOutcome, Ints, Point
 
 
 class HighsProgram:
@@ -22,6 +22,7 @@ class HighsProgram:
         self.clusters = int(cluster.max()) + 1
         self.legs: Ints = np.zeros((0, 2), dtype=np.int64)
         self.cuts: list[Cut] = []
+        self.infeasible = False
         self._position = np.full(len(cluster), -1, dtype=np.int64)
         self._position[vertices] = np.arange(len(vertices))
         self._inside = np.zeros((0, len(cluster)), dtype=bool)
@@ -85,10 +86,19 @@ class HighsProgram:
         self.cuts = [*self.cuts, *cuts]
         self._inside = np.vstack([self._inside, [c.inside for c in cuts]])
 
+    def keep_cuts(self, keep: Bools) -> None:
+        """Take all cuts out of the program but those marked."""
+        gone = self.clusters + len(self.vertices) + np.flatnonzero(~keep)
+        self._highs.deleteRows(len(gone), gone.astype(np.int32))
+        self.cuts = [c for c, k in zip(self.cuts, keep, strict=True) if k]
+        self._inside = self._inside[keep]
+
     def solve_relaxation(self, time_left: float) -> Point | None:
         """The LP relaxation's optimum with duals; None if the time ran out."""
         self._run(time_left)
-        if self._highs.getModelStatus() != highspy.HighsModelStatus.kOptimal:
+        status = self._highs.getModelStatus()
+        self.infeasible = status == highspy.HighsModelStatus.kInfeasible
+        if status != highspy.HighsModelStatus.kOptimal:
             return None
         solution = self._highs.getSolution()
         duals = np.array(solution.row_dual)

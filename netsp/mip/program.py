@@ -73,17 +73,22 @@ class IntegerOutcome:
 class Program(Protocol):
     """A backend: the program over a growing set of legs and cuts.
 
-    legs : (k, 2) legs u < v in the program. cuts : cuts in the program.
+    legs : (k, 2) legs u < v in the program. cuts : cuts in the program. infeasible : whether the
+    last relaxation was found to have no solution.
     """
 
     legs: Ints
     cuts: list[Cut]
+    infeasible: bool
 
     def add_legs(self, legs: Ints) -> None:
         """Bring legs (k, 2) into the program, with their coefficients in every row."""
 
     def add_cuts(self, cuts: list[Cut]) -> None:
         """Bring cuts into the program."""
+
+    def keep_cuts(self, keep: Bools) -> None:
+        """Take all cuts out of the program but those marked."""
 
     def solve_relaxation(self, time_left: float) -> Point | None:
         """The LP relaxation's optimum with duals; None if the time ran out."""

@@ -9,20 +9,19 @@ cost, and the small integer program that remains is solved, cut at its subtours,
 from __future__ import annotations
 
 import importlib
-import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from netsp.errors import InputError
 from netsp.lns import Instance, local_search
 from netsp.mip.bound import dual_bound, fixing_costs, reduced_costs
 from netsp.mip.program import Point, Program
 from netsp.mip.subtours import component_cuts, fractional_cuts, tour_from
-from netsp.result import Clock, OnProgress, Progress, Result, proven
-from netsp.solution import Status
+from netsp.result import OnProgress, Result
+from netsp.run import Run, Stop, read_params
 from netsp.travel import TravelGraph
 
 Ints = npt.NDArray[np.int64]
@@ -43,14 +42,33 @@ PRICED_PER_VERTEX = 4
 """Most legs per vertex that one pricing round brings in."""
 
 
-class _Stop(Exception):
-    """Time is up."""
+PURGE_AFTER = 6
+"""A cut that was slack for so many rounds in a row leaves the LP; separation finds it again."""
+
+
+@dataclass(frozen=True)
+class Params:
+    """backend : one of `BACKENDS`. search_rounds : perturbations of the heuristic at the start."""
+
+    backend: str = DEFAULT_BACKEND
+    search_rounds: int = 30
+
+    def __post_init__(self) -> None:
+        if self.backend not in BACKENDS:
+            raise ValueError(
+                f"option 'backend': unknown {self.backend!r}; expected one of {', '.join(BACKENDS)}"
+            )
+        if self.search_rounds < 0:
+            raise ValueError(
+                f"option 'search_rounds': expected 0 or more, got {self.search_rounds}"
+            )
 
 
 def solve(
     graph: TravelGraph,
     *,
     time_limit: float | None = None,
+    iteration_limit: int | None = None,
     rng: np.random.Generator | None = None,
     params: Mapping[str, Any] | None = None,
     warm_start: Sequence[int] | None = None,
@@ -58,100 +76,57 @@ def solve(
 ) -> Result:
     """Solve the generalised TSP of a travel graph to proven optimality, or as far as time allows.
 
-    params : ``backend`` (`BACKENDS`), ``search_rounds`` (perturbations of the first heuristic,
-        default 30).
-    warm_start : a tour to start from. Ctrl-C counts as the end of time.
+    An iteration is one linear or integer program solved. params : see `Params`.
     """
-    run = _Run(graph, time_limit, rng or np.random.default_rng(0), params or {}, on_progress)
-    try:
-        run.start(warm_start)
-        if graph.goal_count > 1:
-            run.root()
-            run.integer()
-    except (_Stop, KeyboardInterrupt):
-        run.report("stopped")
-    return run.result()
+    chosen = read_params(Params, "mip", params)
+    run = MipRun(graph, time_limit, iteration_limit, on_progress)
+    return run.solve(rng or np.random.default_rng(0), chosen, warm_start)
 
 
-class _Run:
+class MipRun(Run):
     """State of one solve: incumbent, bound, model."""
 
-    def __init__(
-        self,
-        graph: TravelGraph,
-        time_limit: float | None,
-        rng: np.random.Generator,
-        params: Mapping[str, Any],
-        on_progress: OnProgress | None,
-    ) -> None:
-        self.graph, self.rng, self.params = graph, rng, params
-        self.clock = Clock(time_limit)
-        self.on_progress = on_progress
-        self.trace: list[Progress] = []
-        self.tour: tuple[int, ...] | None = None
-        self.length = math.inf
-        self.bound = 0.0
+    def solve(
+        self, rng: np.random.Generator, params: Params, warm_start: Sequence[int] | None
+    ) -> Result:
+        """Heuristic, root, integer rounds."""
+        self.rng, self.params = rng, params
         self.model: Program | None = None
         self.fixing: tuple[float, npt.NDArray[np.float64]] | None = None
+        self.slack_rounds: dict[int, int] = {}
+        self.bound = 0.0
+        try:
+            self.offer(warm_start)
+            if not self.trivial():
+                self.start()
+                self.root()
+                self.integer()
+        except (Stop, KeyboardInterrupt):
+            self.report("stopped")
+        return self.result()
 
-    # incumbents and bounds
-
-    def report(self, stage: str) -> None:
-        row = Progress(
-            self.clock.elapsed,
-            stage,
-            None if self.tour is None else self.length,
-            self.bound,
-            len(self.model.cuts) if self.model else 0,
-            len(self.model.legs) if self.model else 0,
-        )
-        self.trace.append(row)
-        if self.on_progress:
-            self.on_progress(row)
-
-    def offer(self, tour: Sequence[int]) -> None:
-        """Take a tour as incumbent if it is one and is shorter."""
-        if self.graph.is_tour(tour):
-            length = self.graph.tour_length(tour)
-            if length < self.length:
-                self.tour, self.length = tuple(int(v) for v in tour), length
-
-    def raise_bound(self, bound: float) -> None:
-        self.bound = min(max(self.bound, bound), self.length)
-
-    def check(self) -> None:
-        if self.clock.up:
-            raise _Stop
-
-    @property
-    def done(self) -> bool:
-        return self.tour is not None and proven(self.length, self.bound)
+    def report(self, stage: str, **more: Any) -> None:
+        """As `Run.report`, with the size of the model."""
+        size = {"cuts": len(self.model.cuts), "legs": len(self.model.legs)} if self.model else {}
+        super().report(stage, **size, **more)
 
     # stages
 
-    def start(self, warm_start: Sequence[int] | None) -> None:
+    def start(self) -> None:
+        """A first incumbent by local search, if the graph lets one be found."""
         graph = self.graph
-        if warm_start is not None:
-            self.offer(warm_start)
-        if graph.goal_count == 0:
-            self.offer([0])
-            self.bound = self.length
-            return
-        if graph.goal_count == 1:
-            v = int(np.argmin(graph.costs[0]))
-            self.offer([0, v])
-            self.bound = self.length
-            self.report("one goal")
-            return
         self.instance = Instance(graph)
         start_tour = None
         if self.tour is not None:
             position = np.empty(len(graph), dtype=np.int64)
             position[self.instance.order] = np.arange(len(graph))
             start_tour = position[np.array(self.tour)]
-        rounds = int(self.params.get("search_rounds", 30))
         _, tour = local_search(
-            self.instance, self.rng, rounds=rounds, clock=self.clock, start_tour=start_tour
+            self.instance,
+            self.rng,
+            rounds=self.params.search_rounds,
+            clock=self.clock,
+            start_tour=start_tour,
         )
         self.offer(self.instance.original(tour))
         self.report("heuristic")
@@ -163,9 +138,15 @@ class _Run:
         while not self.done:
             self.check()
             point = self.model.solve_relaxation(self.clock.left)
+            self.iterations += 1
             if point is None:
-                raise _Stop
+                # without an incumbent all legs are in the program from the start
+                self.infeasible = self.model.infeasible and self.tour is None
+                raise Stop
+            before = self.bound
             priced = self._price(point)
+            if self.bound is not None and before is not None and self.bound > before:
+                self._purge(point)
             cuts = fractional_cuts(point.x, point.legs, point.y, graph.cluster)
             self._round(point)
             self.report("root")
@@ -182,6 +163,7 @@ class _Run:
         assert self.fixing is not None
         bound, rise = self.fixing
         upper = np.triu(bound + rise <= self.length * (1.0 + 1e-9), 1)
+        upper &= np.isfinite(graph.costs)
         legs = np.argwhere(upper)
         tour_legs = _tour_legs(self.tour or ())
         legs = np.unique(np.vstack([legs, tour_legs]), axis=0)
@@ -193,10 +175,13 @@ class _Run:
         while not self.done:
             self.check()
             outcome = model.solve_integer(self.clock.left)
+            self.iterations += 1
             point = outcome.point
             if outcome.infeasible:
-                # nothing that survived the fixing beats the incumbent
-                self.raise_bound(self.length)
+                # nothing that survived the fixing beats the incumbent, if there is one
+                self.infeasible = self.tour is None
+                if self.tour is not None:
+                    self.raise_bound(self.length)
                 break
             if outcome.bound is not None:
                 self.raise_bound(outcome.bound)
@@ -206,7 +191,7 @@ class _Run:
             if self.done:
                 break
             if point is None or not outcome.finished:
-                raise _Stop
+                raise Stop
             cuts = component_cuts(np.rint(point.x), point.legs, np.rint(point.y), graph.cluster)
             if not cuts:
                 # an optimal tour of the program: the bound stands at its own length
@@ -217,18 +202,18 @@ class _Run:
     # parts
 
     def _program(self, legs: Ints, vertices: Ints) -> Program:
-        name = self.params.get("backend", DEFAULT_BACKEND)
-        if name not in BACKENDS:
-            raise InputError(f"backend: unknown {name!r}; expected one of {', '.join(BACKENDS)}")
-        module, attribute = BACKENDS[name].split(":")
+        module, attribute = BACKENDS[self.params.backend].split(":")
         program: Program = getattr(importlib.import_module(module), attribute)(
             self.graph.cluster, self.graph.costs, legs, vertices
         )
         return program
 
     def _first_legs(self) -> Ints:
-        """The nearest legs of every vertex, all legs to the base, and the incumbent's."""
+        """The nearest legs of every vertex, all legs to the base, and the incumbent's; all legs if
+        there is no incumbent, so that an infeasible program means that there is no tour."""
         costs = self.graph.costs
+        if self.tour is None:
+            return np.argwhere(np.triu(np.isfinite(costs), 1))
         k = min(NEAREST, len(costs) - 1)
         near = np.argpartition(costs, k - 1, axis=1)[:, :k]
         u = np.repeat(np.arange(len(costs)), k)
@@ -252,7 +237,8 @@ class _Run:
             self.fixing = fixing
         candidate = np.triu(legs, 1)
         candidate[model.legs[:, 0], model.legs[:, 1]] = 0.0
-        tolerance = 1e-8 * self.length / (graph.goal_count + 1)
+        scale = self.length if self.tour is not None else float(graph.costs[0, 1:].max())
+        tolerance = 1e-8 * scale / (graph.goal_count + 1)
         rows, cols = np.nonzero(candidate < -tolerance)
         if len(rows) == 0:
             return 0
@@ -286,16 +272,19 @@ class _Run:
         )
         self.offer(self.instance.original(tour))
 
-    def result(self) -> Result:
-        if self.tour is None:
-            return Result(
-                None, None, self.bound or None, Status.NO_SOLUTION_FOUND, tuple(self.trace)
-            )
-        if self.done:
-            status = Status.OPTIMAL
-        else:
-            status = Status.FEASIBLE
-        return Result(self.tour, self.length, self.bound, status, tuple(self.trace))
+    def _purge(self, point: Point) -> None:
+        """Take cuts out of the LP that have been slack for some rounds."""
+        model = self.model
+        assert model is not None
+        assert point.duals is not None
+        rounds = self.slack_rounds
+        for cut, price in zip(model.cuts, point.duals.cut, strict=True):
+            rounds[id(cut)] = rounds.get(id(cut), 0) + 1 if price > -1e-9 else 0
+        keep = np.array([rounds[id(cut)] < PURGE_AFTER for cut in model.cuts], dtype=bool)
+        if not keep.all():
+            for k in np.flatnonzero(~keep):
+                del rounds[id(model.cuts[k])]
+            model.keep_cuts(keep)
 
 
 def _tour_legs(tour: Sequence[int]) -> Ints:

@@ -23,12 +23,18 @@ ARC_STEP = math.radians(3.0)
 
 
 class TautPaths:
-    """Taut paths between the base (point 0) and the goals (points 1 …) of a problem."""
+    """Taut paths between the base (point 0) and the goals (points 1 …) of a problem.
 
-    def __init__(self, problem: Problem) -> None:
+    longest : limit on their planar length; by default that of a leg between two admissible classes,
+    and then only what the tether can touch is looked at.
+    """
+
+    def __init__(self, problem: Problem, longest: float | None = None) -> None:
         self.problem = problem
         self.outline: Outline = build_outline(problem)
-        self.tangents: TangentGraph = build_tangents(self.outline, problem.tether_length)
+        reach = problem.tether_length if longest is None else longest
+        self.tangents: TangentGraph = build_tangents(self.outline, reach)
+        self._longest = 2.0 * problem.tether_length if longest is None else longest
         # what rounding and the extra growth of obstacles can add to a length
         self.margin = 100.0 * self.outline.margin
         self._z = problem.points[:, 2]
@@ -57,7 +63,7 @@ class TautPaths:
 
     def _pieces(self, a: int, b: int, word: Word) -> tuple[float, list[tuple[int, float]]]:
         """Length, and (departure, angle slid before it) along the taut path of a word."""
-        limit = 2.0 * self.problem.tether_length + self.margin
+        limit = self._longest + self.margin
         trie = Trie.of_word(word, limit)
         found = run_explore(self.tangents, a, trie, keep=True, margin=self.outline.margin)
         wanted = np.flatnonzero((found.goal == b) & (found.word == len(word)))

@@ -26,8 +26,11 @@ from netsp.roadmap.letters import segment_letters
 from netsp.roadmap.outline import Outline
 from netsp.roadmap.paths import TautPaths
 from netsp.roadmap.reach import explain_unreached
+from netsp.roadmap.shortest import MilestoneGraph
 from netsp.roadmap.taut import TautLegs
+from netsp.roadmap.ways import sub_goals, tabulate
 from netsp.travel import TravelGraph
+from netsp.ways import Ways
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -109,7 +112,23 @@ class PrmRoadmap:
     def travel_graph(self) -> TravelGraph:
         """The travel graph over this roadmap. Tethers are the taut ones of their classes; that
         they fit was decided by the length along the roadmap, which is no shorter."""
-        return TravelGraph(self.cluster, self.signatures, self.tethers, self, roadmap="prm")
+        return TravelGraph(
+            self.cluster, self.signatures, self.tethers, self, roadmap="prm", ways=self._ways
+        )
+
+    def _ways(self) -> Ways:
+        """Ways in any class along the milestones; sub-goals are joined as base and goals are."""
+        places, side = sub_goals(self.problem, self.paths.outline.origin)
+        outline = self.paths.outline
+        fixed = len(self.problem.points)
+        local = self.milestones - np.append(outline.origin, 0.0)
+        level = np.full((len(places), 1), local[0, 2])
+        every = np.vstack([np.hstack([places, level]), local])
+        new = _exactly_free(_join(every, len(places)), every, outline)
+        edges = np.vstack([new, self.edges + len(places)])
+        graph = MilestoneGraph(every[:, :2], edges)
+        terminals = np.concatenate([len(places) + np.arange(fixed), np.arange(len(places))])
+        return tabulate(self.problem, outline, graph, terminals, places, side)
 
     def _classes(self) -> tuple[Ints, list[Word], Ints]:
         """Augmented goals: those augmented vertices that stand on a goal, base first."""
@@ -140,6 +159,12 @@ class PrmRoadmap:
         cluster = self.cluster[vertices]
         out[cluster[:, None] == cluster[None, :]] = np.inf
         return np.asarray(out)
+
+    def to_base(self) -> Floats:
+        """(V,) lengths of the legs from the base."""
+        if self.shortcut:
+            return self._taut.to_base()
+        return np.asarray(self.augmented.length[self._vertex])
 
     def lower_bounds(self, vertices: Ints) -> Floats:
         """(k, k) lower bounds on leg lengths: a leg along the roadmap is no shorter than the taut

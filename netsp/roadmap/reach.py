@@ -5,16 +5,15 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 
 from netsp.problem import Circle, Problem
 from netsp.roadmap.outline import Outline
-from netsp.roadmap.tangents import build_tangents
+from netsp.roadmap.shortest import ContactGraph
 
 
 def explain_unreached(problem: Problem, outline: Outline, missing: list[int]) -> str:
     """One line on goals (as point numbers, base 0) that no admissible tether reaches."""
-    planar = shortest_lengths(outline)
+    planar = ContactGraph(outline).lengths([0])[0]
     dz = problem.points[:, 2] - problem.points[0, 2]
     needed = np.hypot(planar, dz)
     parts = []
@@ -33,56 +32,12 @@ def explain_unreached(problem: Problem, outline: Outline, missing: list[int]) ->
     return "; ".join(parts)
 
 
-def shortest_lengths(outline: Outline, source: int = 0) -> npt.NDArray[np.float64]:
-    """Shortest planar path length from a point (the base) to every point in any class; inf if there
-    is none.
-
-    Dijkstra over contact points: tangents join them across free space, arcs along the outline.
-    """
-    from scipy.sparse import csr_array
-    from scipy.sparse.csgraph import dijkstra
-
-    t = build_tangents(outline, np.inf)
-    arcs, points = len(t.arcs), len(t.points)
-    edges = len(t.target)
-    tail = np.repeat(np.arange(len(t.start) - 1), np.diff(t.start))
-    # contact 0 … points-1 are the points; contact points + 2 e (+ 1) the departure (arrival) of e
-    leave = np.where(tail >= 2 * arcs, tail - 2 * arcs, points + 2 * np.arange(edges))
-    arrive = np.where(t.target >= 2 * arcs, t.target - 2 * arcs, points + 2 * np.arange(edges) + 1)
-    rows, cols, cost = [leave], [arrive], [t.length]
-    for a in range(arcs):
-        out_e = np.flatnonzero(tail // 2 == a)
-        in_e = np.flatnonzero(t.target // 2 == a)
-        contact = np.concatenate([leave[out_e], arrive[in_e]])
-        theta = np.concatenate([t.angle[out_e, 0], t.angle[in_e, 1]])
-        key = np.mod(theta - t.arcs[a, 3] + 1e-6, 2.0 * np.pi)
-        order = np.argsort(key)
-        contact, key = contact[order], key[order]
-        step = np.diff(key) * t.arcs[a, 2]
-        rows.append(contact[:-1])
-        cols.append(contact[1:])
-        cost.append(step)
-        if t.full[a] and len(contact) > 1:
-            rows.append(contact[-1:])
-            cols.append(contact[:1])
-            cost.append(np.array([(key[0] + 2.0 * np.pi - key[-1]) * t.arcs[a, 2]]))
-    r, c, d = np.concatenate(rows), np.concatenate(cols), np.concatenate(cost)
-    size = points + 2 * edges
-    # scipy takes a stored zero for no edge
-    graph = csr_array((np.maximum(d, 1e-300), (r, c)), shape=(size, size))
-    return np.asarray(dijkstra(graph, directed=False, indices=source)[:points])
-
-
 def _enclosure(problem: Problem, g: int) -> str:
     """Which obstacles stand between the base and a goal that no path joins."""
     import shapely
 
     grown = [
-        (
-            shapely.Point(o.center).buffer(o.radius + problem.clearance, quad_segs=64)
-            if isinstance(o, Circle)
-            else shapely.Polygon(o.polygon).buffer(problem.clearance + problem.tolerance)
-        )
+        o.shape(problem.clearance + (0.0 if isinstance(o, Circle) else problem.tolerance))
         for o in problem.obstacles
     ]
     base, goal = (shapely.Point(problem.points[k, :2]) for k in (0, g))

@@ -33,7 +33,9 @@ from netsp.roadmap.explore import (
     trie_child,
 )
 from netsp.roadmap.paths import TautPaths
-from netsp.roadmap.reach import explain_unreached, shortest_lengths
+from netsp.roadmap.reach import explain_unreached
+from netsp.roadmap.shortest import ContactGraph
+from netsp.roadmap.ways import taut_ways
 from netsp.travel import TravelGraph
 
 Floats = npt.NDArray[np.float64]
@@ -98,7 +100,14 @@ class TautRoadmap:
 
     def travel_graph(self) -> TravelGraph:
         """The travel graph over this roadmap; legs are computed when first asked for."""
-        return TravelGraph(self.cluster, self.signatures, self.tethers, self.legs, roadmap="taut")
+        return TravelGraph(
+            self.cluster,
+            self.signatures,
+            self.tethers,
+            self.legs,
+            roadmap="taut",
+            ways=lambda: taut_ways(self.problem),
+        )
 
     # classes
 
@@ -245,16 +254,17 @@ class TautLegs:
             )
         return np.asarray(found[pair])
 
+    def to_base(self) -> Floats:
+        """(V,) 3D lengths of the legs from the base, which are the tethers."""
+        return np.asarray(np.hypot(self.planar, self._z[self.cluster] - self._z[0]))
+
     def lower_bounds(self, vertices: Ints) -> Floats:
         """(k, k) lower bounds on leg lengths: a leg is no shorter than the difference of its two
         tethers (triangle inequality on the cover), nor than the shortest way between its goals in
         any class."""
         vertices = np.asarray(vertices, dtype=np.int64)
         if self._shortest is None:
-            outline = self.paths.outline
-            self._shortest = np.array(
-                [shortest_lengths(outline, k) for k in range(len(outline.points))]
-            )
+            self._shortest = ContactGraph(self.paths.outline).lengths()
         cluster, planar = self.cluster[vertices], self.planar[vertices]
         apart = np.abs(planar[:, None] - planar[None, :])
         # rounding in either summand must not lift a bound above the length

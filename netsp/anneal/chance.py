@@ -1,0 +1,43 @@
+"""The random numbers of the compiled loops.
+
+xorshift64* (Vigna 2016, "An experimental exploration of Marsaglia's xorshift generators,
+scrambled"), its state an array of one word, seeded from the solver's generator: the same on every
+version of numpy and numba, and a tenth of the price of a method call.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+
+def seeded(rng: np.random.Generator) -> npt.NDArray[np.uint64]:
+    """State of a generator, drawn from another."""
+    return np.array([rng.integers(1, 2**63)], dtype=np.uint64)
+
+
+@njit(cache=True)
+def uniform(state):
+    """A double in [0, 1)."""
+    x = state[0]
+    x ^= x >> np.uint64(12)
+    x ^= x << np.uint64(25)
+    x ^= x >> np.uint64(27)
+    state[0] = x
+    return np.float64((x * np.uint64(2685821657736338717)) >> np.uint64(11)) / 9007199254740992.0
+
+
+@njit(cache=True)
+def below(n, state):
+    """A whole number in 0 … n - 1."""
+    return int(uniform(state) * n)
+
+
+@njit(cache=True)
+def metropolis(rise, theta, state):
+    """Whether a change of cost is accepted: always if it falls, else with probability
+    exp(-rise / θ); equation (5) of 2017, (2) of 2016."""
+    return rise <= 0.0 or uniform(state) < math.exp(-rise / theta)

@@ -1,0 +1,152 @@
+"""`anneal`: simulated annealing over orders and classes.
+
+McCammon & Hollinger 2017, section IV-D. A state is an augmented trajectory: an order of the goals
+and a homotopy class for each. Two mutations, chosen at random: goal-swapping exchanges two goals
+(each keeps its class), path-inversion gives one goal another of its classes. Both change at most
+four legs, so a proposal costs a few look-ups, whatever the number of goals.
+
+The paper says that a mutation may raise the entanglement of the path. With the state on the
+covering space it cannot: every state is a non-entangling tour, and only its length is annealed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from netsp.anneal.chance import below, metropolis, seeded
+from netsp.anneal.cooling import Cooling, Schedule
+from netsp.lns.layers import Instance
+from netsp.result import OnProgress, Result
+from netsp.run import Run, Stop, read_params
+from netsp.travel import TravelGraph
+
+PROPOSALS_PER_VERTEX = 100_000
+"""Default number of proposals, times the number of goals, when nothing is limited."""
+
+CHUNK = 50_000
+"""Proposals between two looks at the clock: some milliseconds."""
+
+
+@dataclass(frozen=True)
+class Params(Cooling):
+    """hot, cold : see `Cooling`. swaps : share of proposals that swap goals; the others change a
+    class."""
+
+    swaps: float = 0.5
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not 0.0 <= self.swaps <= 1.0:
+            raise ValueError(f"option 'swaps': expected a share from 0 to 1, got {self.swaps}")
+
+
+def solve(
+    graph: TravelGraph,
+    *,
+    time_limit: float | None = None,
+    iteration_limit: int | None = None,
+    rng: np.random.Generator | None = None,
+    params: Mapping[str, Any] | None = None,
+    warm_start: Sequence[int] | None = None,
+    on_progress: OnProgress | None = None,
+) -> Result:
+    """Anneal from a random tour, or from the warm start. An iteration is one proposal."""
+    chosen = read_params(Params, "anneal", params)
+    rng = rng or np.random.default_rng(0)
+    run = Run(graph, time_limit, iteration_limit, on_progress)
+    run.offer(warm_start)
+    if run.trivial():
+        return run.result()
+    try:
+        run.check()
+        instance = Instance(graph)
+        goals = graph.goal_count
+        state = np.zeros(goals + 1, dtype=np.int64)
+        if run.tour is not None:
+            place = np.empty(len(graph), dtype=np.int64)
+            place[instance.order] = np.arange(len(graph))
+            state[:] = place[np.array(run.tour)]
+        else:
+            for k, c in enumerate(rng.permutation(np.arange(1, goals + 1))):
+                state[k + 1] = rng.integers(instance.start[c], instance.start[c + 1])
+        of_vertex = np.repeat(np.arange(goals + 1), np.diff(instance.start))
+        length = float(instance.costs[state, np.roll(state, -1)].sum())
+        schedule = Schedule(chosen, run, length / (goals + 1), default=PROPOSALS_PER_VERTEX * goals)
+        best = state.copy()
+        best_length = length
+        chance = seeded(rng)
+        run.offer(instance.original(best))
+        run.report("anneal", current=length, entangled=0)
+        while run.iterations < run.iteration_limit:
+            run.check()
+            count = schedule.chunk(CHUNK)
+            length, best_length = anneal(
+                state, best, length, best_length, count, schedule.temperature, chosen.swaps,
+                instance.costs, instance.start, of_vertex, chance,
+            )  # fmt: skip
+            run.iterations += count
+            run.offer(instance.original(best))
+            run.report("anneal", current=length, entangled=0)
+    except (Stop, KeyboardInterrupt):
+        pass
+    run.report("done" if run.iterations >= run.iteration_limit else "stopped", entangled=0)
+    return run.result()
+
+
+@njit(cache=True)
+def anneal(
+    tour, best, length, best_length, count, theta, swaps, costs, start, cluster, chance
+):  # fmt: skip
+    """Make `count` proposals at temperature θ, in place; returns the length of the present tour
+    and of the best, kept in `best`."""
+    n = len(tour)
+    for _ in range(count):
+        if n > 2 and (below(1 << 30, chance) < swaps * (1 << 30)):
+            i = 1 + below(n - 1, chance)
+            j = 1 + below(n - 2, chance)
+            if j >= i:
+                j += 1
+            if i > j:
+                i, j = j, i
+            u, v = tour[i], tour[j]
+            before, after = tour[i - 1], tour[j + 1 if j + 1 < n else 0]
+            if j == i + 1:
+                rise = costs[before, v] + costs[u, after] - costs[before, u] - costs[v, after]
+            else:
+                p, q = tour[i + 1], tour[j - 1]
+                rise = (
+                    costs[before, v] + costs[v, p] + costs[q, u] + costs[u, after]
+                    - costs[before, u] - costs[u, p] - costs[q, v] - costs[v, after]
+                )  # fmt: skip
+            if metropolis(rise, theta, chance):
+                tour[i], tour[j] = v, u
+                length += rise
+        else:
+            i = 1 + below(n - 1, chance)
+            u = tour[i]
+            c = cluster[u]
+            size = start[c + 1] - start[c]
+            if size == 1:
+                continue
+            v = start[c] + below(size - 1, chance)
+            if v >= u:
+                v += 1
+            before, after = tour[i - 1], tour[i + 1 if i + 1 < n else 0]
+            rise = costs[before, v] + costs[v, after] - costs[before, u] - costs[u, after]
+            if metropolis(rise, theta, chance):
+                tour[i] = v
+                length += rise
+        if length < best_length - 1e-12 * best_length:
+            best_length = length
+            for k in range(n):
+                best[k] = tour[k]
+    # summed afresh, so that rounding does not pile up
+    length = 0.0
+    for k in range(n):
+        length += costs[tour[k], tour[k + 1 if k + 1 < n else 0]]
+    return length, best_length

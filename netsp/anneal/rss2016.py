@@ -1,0 +1,258 @@
+"""`anneal-2016`: simulated annealing over free paths, priced by what they entangle.
+
+McCammon & Hollinger 2016, section III. A state is an order of the goals and a way for each leg:
+the shortest path (the paper's A*) or one through a sub-goal. Goal-swapping exchanges two goals and
+plans the legs at them anew; path-inversion plans one leg through a sub-goal on the far side of an
+obstacle. Cost (3): ``C(T) = k (E + 1) L`` with E the number of obstacles that the trajectory
+entangles, read off its reduced word.
+
+Where the paper is silent or assumes too much:
+
+- E counts the obstacles in the *cyclically* reduced word: in ``1 2 -1`` the tether goes out past
+  obstacle 1, round obstacle 2 and back, and nothing is wrapped around 1.
+- the paper's tether has no end. Ours has: a goal reached in a class that the tether does not admit
+  counts like an entanglement, so that with a long tether the cost is the paper's.
+- the trajectory returned is the best *valid* one met, each leg pulled taut in its class (the leg
+  of the travel graph), not the last state.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from netsp.anneal.chance import below, metropolis, seeded
+from netsp.anneal.cooling import Cooling, Schedule
+from netsp.result import OnProgress, Result
+from netsp.run import Run, Stop, read_params
+from netsp.travel import TravelGraph
+
+Ints = npt.NDArray[np.int64]
+
+PROPOSALS_PER_GOAL = 20_000
+"""Default number of proposals, times the number of goals, when nothing is limited."""
+
+CHUNK = 2_000
+
+
+@dataclass(frozen=True)
+class Params(Cooling):
+    """hot, cold : see `Cooling`. k : the paper's factor; the larger, the sooner entanglements go.
+    swaps : share of proposals that swap goals; the others invert a path."""
+
+    k: float = 10.0
+    swaps: float = 0.5
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.k > 0.0:
+            raise ValueError(f"option 'k': expected a positive number, got {self.k}")
+        if not 0.0 <= self.swaps <= 1.0:
+            raise ValueError(f"option 'swaps': expected a share from 0 to 1, got {self.swaps}")
+
+
+def solve(
+    graph: TravelGraph,
+    *,
+    time_limit: float | None = None,
+    iteration_limit: int | None = None,
+    rng: np.random.Generator | None = None,
+    params: Mapping[str, Any] | None = None,
+    warm_start: Sequence[int] | None = None,
+    on_progress: OnProgress | None = None,
+) -> Result:
+    """Anneal from a random order, or that of the warm start, all legs direct. An iteration is one
+    proposal. The result is `no_solution_found` if no state met was free of entanglement with every
+    goal within the tether.
+
+    Raises InputError for a graph without geometry beneath it.
+    """
+    chosen = read_params(Params, "anneal-2016", params)
+    rng = rng or np.random.default_rng(0)
+    run = Run(graph, time_limit, iteration_limit, on_progress)
+    run.offer(warm_start)
+    if run.trivial():
+        return run.result()
+    try:
+        run.check()
+        ways = graph.ways
+        goals = graph.goal_count
+        order = np.zeros(goals + 2, dtype=np.int64)
+        if run.tour is not None:
+            order[1:-1] = graph.cluster[list(run.tour[1:])]
+        else:
+            order[1:-1] = rng.permutation(np.arange(1, goals + 1))
+        via = np.full(goals + 1, -1, dtype=np.int64)
+        trie, vertex = _admissible(graph)
+        tables = (ways.planar, ways.height, ways.letters, ways.row, ways.far, ways.near)
+        longest = (goals + 1) * 2 * int((ways.row[:, 1:] - ways.row[:, :-1]).max(initial=0)) + 1
+        scratch = np.zeros((2, longest), dtype=np.int64)
+        stops = np.zeros(goals + 1, dtype=np.int64)
+        best = np.zeros(goals + 1, dtype=np.int64)
+        obstacles = ways.far.shape[2]
+        length, entangled, _ = evaluate(
+            order, via, *tables[:4], trie, vertex, stops, scratch, obstacles
+        )
+        schedule = Schedule(chosen, run, length / (goals + 1), default=PROPOSALS_PER_GOAL * goals)
+        chance = seeded(rng)
+        best_length = math.inf
+        run.report("anneal", current=length, entangled=int(entangled))
+        while run.iterations < run.iteration_limit:
+            run.check()
+            count = schedule.chunk(CHUNK)
+            before = best_length
+            length, entangled, best_length = anneal(
+                order, via, best, best_length, count, schedule.temperature, chosen.k, chosen.swaps,
+                *tables, trie, vertex, stops, scratch, chance,
+            )  # fmt: skip
+            run.iterations += count
+            if best_length < before:
+                run.offer(best.tolist())
+            run.report("anneal", current=length, entangled=int(entangled))
+    except (Stop, KeyboardInterrupt):
+        pass
+    run.report("done" if run.iterations >= run.iteration_limit else "stopped")
+    return run.result()
+
+
+def _admissible(graph: TravelGraph) -> tuple[Ints, Ints]:
+    """A trie of all words in the graph: (nodes, 2 n + 1) child by letter + n, -1 if none; and
+    (nodes, clusters) the vertex with that word, -1 if none."""
+    n = max((abs(x) for w in graph.signatures for x in w), default=0)
+    children = [[-1] * (2 * n + 1)]
+    vertex = [[-1] * (graph.goal_count + 1)]
+    for v, word in enumerate(graph.signatures):
+        node = 0
+        for x in word:
+            if children[node][x + n] < 0:
+                children[node][x + n] = len(children)
+                children.append([-1] * (2 * n + 1))
+                vertex.append([-1] * (graph.goal_count + 1))
+            node = children[node][x + n]
+        vertex[node][graph.cluster[v]] = v
+    return np.array(children, dtype=np.int64), np.array(vertex, dtype=np.int64)
+
+
+@njit(cache=True)
+def _way_length(a, b, via, planar, height):
+    p = planar[a, b] if via < 0 else planar[a, via] + planar[b, via]
+    return math.hypot(p, height[b] - height[a])
+
+
+@njit(cache=True)
+def _push(letter, size, stack, trie):
+    """Append a letter to the reduced word on the stack, with the trie node it leads to."""
+    if size > 0 and stack[0, size - 1] == -letter:
+        return size - 1
+    node = 0 if size == 0 else stack[1, size - 1]
+    half = (trie.shape[1] - 1) // 2
+    stack[0, size] = letter
+    if node < 0 or letter > half or letter < -half:
+        stack[1, size] = -1
+    else:
+        stack[1, size] = trie[node, letter + half]
+    return size + 1
+
+
+@njit(cache=True)
+def evaluate(order, via, planar, height, letters, row, trie, vertex, stops, stack, obstacles):
+    """Length, entangled obstacles, and goals in a class the tether does not admit; `stops` takes
+    the vertices."""
+    length = 0.0
+    size = 0
+    missed = 0
+    legs = len(order) - 1
+    for k in range(legs):
+        a, b, s = order[k], order[k + 1], via[k]
+        length += _way_length(a, b, s, planar, height)
+        if s < 0:
+            for i in range(row[a, b], row[a, b + 1]):
+                size = _push(letters[i], size, stack, trie)
+        else:
+            for i in range(row[a, s], row[a, s + 1]):
+                size = _push(letters[i], size, stack, trie)
+            for i in range(row[b, s + 1] - 1, row[b, s] - 1, -1):
+                size = _push(-letters[i], size, stack, trie)
+        if k < legs - 1:
+            node = 0 if size == 0 else stack[1, size - 1]
+            v = -1 if node < 0 else vertex[node, b]
+            stops[k + 1] = v
+            if v < 0:
+                missed += 1
+    low, high = 0, size - 1
+    while low < high and stack[0, low] == -stack[0, high]:
+        low += 1
+        high -= 1
+    entangled = 0
+    for i in range(low, high + 1):
+        fresh = True
+        for j in range(low, i):
+            if abs(stack[0, j]) == abs(stack[0, i]):
+                fresh = False
+        if fresh:
+            entangled += 1
+    return length, entangled, missed
+
+
+@njit(cache=True)
+def anneal(
+    order, via, best, best_length, count, theta, k, swaps,
+    planar, height, letters, row, far, near, trie, vertex, stops, stack, chance,
+):  # fmt: skip
+    """Make `count` proposals at temperature θ, in place; returns length and entanglement of the
+    present state and the length of the best valid one, whose vertices are in `best`."""
+    legs = len(order) - 1
+    obstacles = far.shape[2]
+    length, entangled, missed = evaluate(
+        order, via, planar, height, letters, row, trie, vertex, stops, stack, obstacles
+    )
+    cost = k * (entangled + missed + 1) * length
+    kept = np.empty(4, dtype=np.int64)
+    for _ in range(count):
+        i = j = leg = -1
+        if legs > 2 and (obstacles == 0 or below(1 << 30, chance) < swaps * (1 << 30)):
+            i = 1 + below(legs - 1, chance)
+            j = 1 + below(legs - 2, chance)
+            if j >= i:
+                j += 1
+            kept[0], kept[1], kept[2], kept[3] = via[i - 1], via[i], via[j - 1], via[j]
+            order[i], order[j] = order[j], order[i]
+            via[i - 1] = via[i] = via[j - 1] = via[j] = -1
+        elif obstacles > 0:
+            leg = below(legs, chance)
+            a, b, s = order[leg], order[leg + 1], via[leg]
+            o = below(obstacles, chance)
+            if s < 0:
+                turned = far[a, b, o]
+            elif near[a, s, o] <= near[b, s, o]:
+                turned = far[a, s, o]
+            else:
+                turned = far[b, s, o]
+            if turned < 0 or not (planar[a, turned] + planar[b, turned] < np.inf):
+                continue
+            kept[0] = s
+            via[leg] = turned
+        else:
+            continue
+        new_length, new_entangled, new_missed = evaluate(
+            order, via, planar, height, letters, row, trie, vertex, stops, stack, obstacles
+        )
+        new_cost = k * (new_entangled + new_missed + 1) * new_length
+        if metropolis(new_cost - cost, theta, chance):
+            length, entangled, missed, cost = new_length, new_entangled, new_missed, new_cost
+            if entangled == 0 and missed == 0 and length < best_length:
+                best_length = length
+                for m in range(len(stops)):
+                    best[m] = stops[m]
+        elif leg >= 0:
+            via[leg] = kept[0]
+        else:
+            order[i], order[j] = order[j], order[i]
+            via[i - 1], via[i], via[j - 1], via[j] = kept[0], kept[1], kept[2], kept[3]
+    return length, entangled, best_length

@@ -1,0 +1,114 @@
+"""Greedy backtracking: nearest goal by tether, then back along the own path.
+
+McCammon & Hollinger 2017, section V-A: the robot goes to the closest goal that does not violate the
+tether length, again and again, and retraces its path after the last one. The 2016 workshop paper
+has it retrace its path to the base after every goal.
+
+On the covering space a leg between two admissible classes never needs more tether than its ends do
+(docs/theory.md), so "does not violate the tether length" is: is a vertex of the travel graph. With
+a roadmap every vertex is joined to every other, so greedy always succeeds; on a graph made from
+costs it can run into a dead end, and says that it found nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from netsp.result import OnProgress, Result
+from netsp.run import Run, Stop, read_params
+from netsp.travel import TravelGraph
+
+
+@dataclass(frozen=True)
+class Params:
+    """retrace : ``path``, home along the own path as in the paper, or ``tether``, home along the
+    taut tether from the last goal, which is never longer."""
+
+    retrace: str = "path"
+
+    def __post_init__(self) -> None:
+        if self.retrace not in ("path", "tether"):
+            raise ValueError(f"option 'retrace': expected path or tether, got {self.retrace!r}")
+
+
+@dataclass(frozen=True)
+class NoParams:
+    """This solver takes no options."""
+
+
+def solve(
+    graph: TravelGraph,
+    *,
+    time_limit: float | None = None,
+    iteration_limit: int | None = None,
+    rng: np.random.Generator | None = None,
+    params: Mapping[str, Any] | None = None,
+    warm_start: Sequence[int] | None = None,
+    on_progress: OnProgress | None = None,
+) -> Result:
+    """`greedy`: to the nearest goal not yet visited, in whatever class is nearest on the covering
+    space; home from the last. One iteration builds the whole tour. params : see `Params`."""
+    chosen = read_params(Params, "greedy", params)
+    run = Run(graph, time_limit, iteration_limit, on_progress)
+    run.offer(warm_start)
+    if run.trivial():
+        return run.result()
+    try:
+        costs = graph.costs
+        tour, here = [0], 0
+        left = graph.cluster != 0
+        while left.any():
+            run.check()
+            onward = np.where(left, costs[here], np.inf)
+            here = int(np.argmin(onward))
+            if not np.isfinite(onward[here]):
+                run.report("dead end")
+                return run.result()
+            tour.append(here)
+            left &= graph.cluster != graph.cluster[here]
+        run.iterations = 1
+        run.offer(tour, walk=[*tour, *tour[-2::-1]] if chosen.retrace == "path" else None)
+        run.report("greedy")
+    except (Stop, KeyboardInterrupt):
+        run.report("stopped")
+    return run.result()
+
+
+def solve_2016(
+    graph: TravelGraph,
+    *,
+    time_limit: float | None = None,
+    iteration_limit: int | None = None,
+    rng: np.random.Generator | None = None,
+    params: Mapping[str, Any] | None = None,
+    warm_start: Sequence[int] | None = None,
+    on_progress: OnProgress | None = None,
+) -> Result:
+    """`greedy-2016`: out to the goal nearest to the base and back, then the next. No leg between
+    goals is ever measured. One iteration builds the whole tour."""
+    read_params(NoParams, "greedy-2016", params)
+    run = Run(graph, time_limit, iteration_limit, on_progress)
+    run.offer(warm_start)
+    if run.trivial():
+        return run.result()
+    try:
+        run.check()
+        out = graph.costs_to_base
+        nearest = []
+        for c in range(1, graph.goal_count + 1):
+            members = graph.members(c)
+            nearest.append(int(members[np.argmin(out[members])]))
+        nearest.sort(key=lambda v: (out[v], v))
+        walk = [0]
+        for v in nearest:
+            walk += [v, 0]
+        run.iterations = 1
+        run.offer([0, *nearest], walk=walk, length=2.0 * float(out[nearest].sum()))
+        run.report("greedy")
+    except (Stop, KeyboardInterrupt):
+        run.report("stopped")
+    return run.result()

@@ -1,0 +1,71 @@
+"""The entangling baseline: nearest neighbour, blind to what the tether does.
+
+McCammon & Hollinger 2016, section IV-A: "Greedy-TSP" goes to the closest goal not yet visited, by
+the shortest path whatever its class. Its tours may entangle obstacles, loop, or need more tether
+than there is; then the status is `invalid` and the trajectory tells what was walked.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from netsp.greedy.backtracking import NoParams
+from netsp.hsignature import Word, concatenate, entangled
+from netsp.result import OnProgress, Result, Trajectory
+from netsp.run import Run, Stop, read_params
+from netsp.solution import Status
+from netsp.travel import TravelGraph
+
+
+def solve(
+    graph: TravelGraph,
+    *,
+    time_limit: float | None = None,
+    iteration_limit: int | None = None,
+    rng: np.random.Generator | None = None,
+    params: Mapping[str, Any] | None = None,
+    warm_start: Sequence[int] | None = None,
+    on_progress: OnProgress | None = None,
+) -> Result:
+    """`greedy-tsp`. A warm start is not used: a baseline shows what it does by itself. One
+    iteration builds the whole tour.
+
+    Raises InputError for a graph without geometry beneath it.
+    """
+    read_params(NoParams, "greedy-tsp", params)
+    run = Run(graph, time_limit, iteration_limit, on_progress)
+    if run.trivial():
+        return run.result()
+    try:
+        run.check()
+        ways = graph.ways
+        order, here = [], 0
+        left = set(range(1, graph.goal_count + 1))
+        while left:
+            here = min(left, key=lambda b: (ways.length(here, b), b))
+            left.remove(here)
+            order.append(here)
+        run.iterations = 1
+        stops = [0, *order, 0]
+        words: list[Word] = [()]
+        for a, b in pairwise(stops):
+            words.append(concatenate(words[-1], ways.word(a, b)))
+        tour = graph.vertices_of(order, words[1:-1])
+        if not words[-1] and tour is not None:
+            # it happens to keep all promises; the walk is the same, for its legs are taut
+            run.offer([0, *tour])
+            run.report("greedy")
+            return run.result()
+        legs = [ways.path(a, b) for a, b in pairwise(stops)]
+        path = np.vstack([legs[0], *(leg[1:] for leg in legs[1:])])
+        length = sum(ways.length(a, b) for a, b in pairwise(stops))
+        run.report("greedy", current=length, entangled=len(entangled(words[-1])))
+        trajectory = Trajectory(tuple(order), tuple(words[1:-1]), words[-1], path)
+        return Result(None, length, None, Status.INVALID, tuple(run.trace), trajectory=trajectory)
+    except (Stop, KeyboardInterrupt):
+        run.report("stopped")
+    return run.result()

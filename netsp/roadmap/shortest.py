@@ -1,0 +1,155 @@
+"""Shortest paths in any class: over the contacts of tangents and arcs, or over milestones."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import dijkstra
+
+from netsp.roadmap.outline import Outline
+from netsp.roadmap.paths import ARC_STEP
+from netsp.roadmap.tangents import build_tangents
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+
+class ShortestPaths(Protocol):
+    """Shortest planar paths between numbered nodes, coordinates relative to the base."""
+
+    def tree(self, source: int) -> tuple[Floats, Ints]:
+        """Length to every node (inf if there is no path) and the node before it."""
+
+    def draw(self, source: int, target: int, before: Ints) -> Floats:
+        """(k, 2) polyline of the path from the source to a target along a tree."""
+
+
+class ContactGraph:
+    """Exact shortest paths: tangents join contact points across free space, arcs along the outline.
+
+    Nodes 0 … points-1 are the outline's points (base, goals); then two for every tangent.
+    """
+
+    def __init__(self, outline: Outline) -> None:
+        self.outline = outline
+        t = self.tangents = build_tangents(outline, np.inf)
+        arcs, points = len(t.arcs), len(t.points)
+        self.points = points
+        edges = len(t.target)
+        tail = np.repeat(np.arange(len(t.start) - 1), np.diff(t.start))
+        # contact points + 2 e (+ 1) is the departure (arrival) of tangent e
+        leave = np.where(tail >= 2 * arcs, tail - 2 * arcs, points + 2 * np.arange(edges))
+        arrive = np.where(
+            t.target >= 2 * arcs, t.target - 2 * arcs, points + 2 * np.arange(edges) + 1
+        )
+        rows, cols, cost = [leave], [arrive], [t.length]
+        self.arc = np.full(points + 2 * edges, -1, dtype=np.int64)
+        self.angle = np.zeros(points + 2 * edges)
+        for a in range(arcs):
+            out_e = np.flatnonzero(tail // 2 == a)
+            in_e = np.flatnonzero(t.target // 2 == a)
+            contact = np.concatenate([leave[out_e], arrive[in_e]])
+            theta = np.concatenate([t.angle[out_e, 0], t.angle[in_e, 1]])
+            key = np.mod(theta - t.arcs[a, 3] + 1e-6, 2.0 * np.pi)
+            order = np.argsort(key)
+            contact, key = contact[order], key[order]
+            self.arc[contact], self.angle[contact] = a, theta[order]
+            step = np.diff(key) * t.arcs[a, 2]
+            rows.append(contact[:-1])
+            cols.append(contact[1:])
+            cost.append(step)
+            if t.full[a] and len(contact) > 1:
+                rows.append(contact[-1:])
+                cols.append(contact[:1])
+                cost.append(np.array([(key[0] + 2.0 * np.pi - key[-1]) * t.arcs[a, 2]]))
+        r, c, d = np.concatenate(rows), np.concatenate(cols), np.concatenate(cost)
+        size = points + 2 * edges
+        # scipy takes a stored zero for no edge
+        self._graph = csr_array((np.maximum(d, 1e-300), (r, c)), shape=(size, size))
+        self._edge_of = np.concatenate([np.full(points, -1), np.repeat(np.arange(edges), 2)])
+
+    def lengths(self, sources: Sequence[int] | None = None) -> Floats:
+        """(sources, points) shortest lengths between the outline's points (default from all)."""
+        rows = np.arange(self.points) if sources is None else np.asarray(sources)
+        found = dijkstra(self._graph, directed=False, indices=rows)
+        return np.asarray(found[:, : self.points])
+
+    def tree(self, source: int) -> tuple[Floats, Ints]:
+        """Length to every node and the node before it."""
+        d, before = dijkstra(self._graph, directed=False, indices=source, return_predecessors=True)
+        return d, before.astype(np.int64)
+
+    def draw(self, source: int, target: int, before: Ints) -> Floats:
+        """(k, 2) polyline; arcs as circumscribed chords, finer where a gap is narrow."""
+        nodes = _walk_back(source, target, before)
+        step = ARC_STEP
+        for _ in range(12):
+            xy = self._polyline(nodes, step)
+            blockers = self.outline.blockers
+            if not any(blockers.segment_blocked(p, q) for p, q in pairwise(xy)):
+                break
+            step /= 2.0
+        return xy
+
+    def _polyline(self, nodes: list[int], step: float) -> Floats:
+        t = self.tangents
+        out: list[tuple[float, float]] = []
+        for k, node in enumerate(nodes):
+            on_arc = k > 0 and self.arc[node] >= 0 and self.arc[node] == self.arc[nodes[k - 1]]
+            if on_arc and self._edge_of[node] != self._edge_of[nodes[k - 1]]:
+                cx, cy, r = t.arcs[self.arc[node], :3]
+                first = self.angle[nodes[k - 1]]
+                turn = math.remainder(self.angle[node] - first, 2.0 * math.pi)
+                if abs(turn) > 1e-7:
+                    count = max(1, math.ceil(abs(turn) / step - 1e-9))
+                    half = turn / count / 2.0
+                    radius = r / math.cos(half)
+                    for i in range(count):
+                        theta = first + half * (2 * i + 1)
+                        out.append((cx + radius * math.cos(theta), cy + radius * math.sin(theta)))
+            out.append(self._place(node))
+        xy = np.array(out)
+        keep = np.concatenate([[True], np.any(np.diff(xy, axis=0) != 0.0, axis=1)])
+        return np.asarray(xy[keep] if keep.sum() > 1 else xy[[0, -1]])
+
+    def _place(self, node: int) -> tuple[float, float]:
+        if node < self.points:
+            x, y = self.outline.places[node]
+        else:
+            e, end = divmod(node - self.points, 2)
+            x, y = self.tangents.ends[e, 2 * end : 2 * end + 2]
+        return float(x), float(y)
+
+
+class MilestoneGraph:
+    """Shortest paths over the straight edges of a roadmap."""
+
+    def __init__(self, places: Floats, edges: Ints) -> None:
+        self.places = places
+        cost = np.hypot(*(places[edges[:, 0]] - places[edges[:, 1]]).T)
+        self._graph = csr_array(
+            (np.maximum(cost, 1e-300), (edges[:, 0], edges[:, 1])),
+            shape=(len(places), len(places)),
+        )
+
+    def tree(self, source: int) -> tuple[Floats, Ints]:
+        """Length to every node and the node before it."""
+        d, before = dijkstra(self._graph, directed=False, indices=source, return_predecessors=True)
+        return d, before.astype(np.int64)
+
+    def draw(self, source: int, target: int, before: Ints) -> Floats:
+        """(k, 2) polyline of the path from the source to a target along a tree."""
+        return np.asarray(self.places[_walk_back(source, target, before)])
+
+
+def _walk_back(source: int, target: int, before: Ints) -> list[int]:
+    nodes = [target]
+    while nodes[-1] != source:
+        nodes.append(int(before[nodes[-1]]))
+    return nodes[::-1]

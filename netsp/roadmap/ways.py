@@ -1,0 +1,150 @@
+"""Tabulates the ways in any class between base, goals and sub-goals beside the obstacles.
+
+McCammon & Hollinger 2016, section III-B, change the class of a path by planning it again "through
+an additional sub-goal placed on the opposite side of an obstacle", and leave open where exactly.
+Here every obstacle offers the free ones of eight places around it, a little off its boundary; the
+far side of a path is the one most opposite to where the path comes nearest to the obstacle.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+import shapely
+
+from netsp.hsignature import signature
+from netsp.problem import Goal, Problem
+from netsp.roadmap.outline import Outline, build_outline
+from netsp.roadmap.shortest import ContactGraph, ShortestPaths
+from netsp.ways import Ways
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+AROUND = 8
+"""Places for sub-goals around an obstacle."""
+
+OFF = 0.05
+"""How far off the boundary they lie, as a share of the obstacle's size."""
+
+
+def taut_ways(problem: Problem) -> Ways:
+    """The ways over tangents and arcs: exact shortest paths."""
+    origin = problem.points[0, :2]
+    places, side = sub_goals(problem, origin)
+    more = [Goal(position=(float(x), float(y), problem.base[2])) for x, y in places + origin]
+    wider = Problem(
+        base=problem.base,
+        goals=(*problem.goals, *more),
+        obstacles=problem.obstacles,
+        tether_length=problem.tether_length,
+        clearance=problem.clearance,
+        bounds=problem.bounds,
+    )
+    outline = build_outline(wider)
+    graph = ContactGraph(outline)
+    return tabulate(problem, outline, graph, np.arange(graph.points), places, side)
+
+
+def sub_goals(problem: Problem, origin: Floats) -> tuple[Floats, Ints]:
+    """Places (k, 2) beside the obstacles, relative to the origin, and the obstacle of each."""
+    shapes = [o.shape(problem.clearance) for o in problem.obstacles]
+    solid = shapely.union_all([s.buffer(1e-6 * problem.scale) for s in shapes])
+    shapely.prepare(solid)
+    places, side = [], []
+    for i, (shape, middle) in enumerate(zip(shapes, problem.representative_points, strict=True)):
+        xmin, ymin, xmax, ymax = shape.bounds
+        size = max(xmax - xmin, ymax - ymin)
+        for k in range(AROUND):
+            angle = 2.0 * np.pi * k / AROUND
+            sense = np.array([np.cos(angle), np.sin(angle)])
+            ray = shapely.LineString([middle, middle + 2.0 * size * sense])
+            inside = shape.intersection(ray)
+            reach = max(
+                float(np.hypot(*(np.array(c) - middle))) for c in shapely.get_coordinates(inside)
+            )
+            p = middle + (reach + OFF * size) * sense
+            in_bounds = problem.bounds is None or (
+                problem.bounds[0] <= p[0] <= problem.bounds[2]
+                and problem.bounds[1] <= p[1] <= problem.bounds[3]
+            )
+            if in_bounds and not shapely.contains_xy(solid, *p):
+                places.append(p - origin)
+                side.append(i)
+    return np.array(places).reshape(-1, 2), np.array(side, dtype=np.int64)
+
+
+def tabulate(
+    problem: Problem,
+    outline: Outline,
+    graph: ShortestPaths,
+    terminals: Ints,
+    places: Floats,
+    side: Ints,
+) -> Ways:
+    """All ways from base and goals to base, goals and sub-goals over a graph of shortest paths.
+
+    terminals : (m + 1 + k,) node of the graph for base, goals and sub-goals. side : (k,) obstacle
+    of each sub-goal.
+    """
+    fixed = len(problem.points)
+    count = len(terminals)
+    middles = problem.representative_points - outline.origin
+    n = len(middles)
+    planar = np.full((fixed, count), np.inf)
+    far = np.full((fixed, count, n), -1, dtype=np.int64)
+    near = np.full((fixed, count, n), np.inf)
+    row = np.zeros((fixed, count + 1), dtype=np.int64)
+    letters: list[int] = []
+    trees = []
+    for a in range(fixed):
+        length, before = graph.tree(int(terminals[a]))
+        trees.append(before)
+        planar[a] = length[terminals]
+        row[a, 0] = len(letters)
+        for p in range(count):
+            if np.isfinite(planar[a, p]) and p != a:
+                xy = graph.draw(int(terminals[a]), int(terminals[p]), before)
+                letters += signature(xy, middles)
+                near[a, p], far[a, p] = _far_sides(xy, middles, places, side, fixed)
+            row[a, p + 1] = len(letters)
+
+    def draw(a: int, p: int) -> Floats:
+        xy = graph.draw(int(terminals[a]), int(terminals[p]), trees[a]) + outline.origin
+        xy[0] = problem.points[a, :2]
+        if p < fixed:
+            xy[-1] = problem.points[p, :2]
+        return xy
+
+    return Ways(
+        planar=planar,
+        height=problem.points[:, 2],
+        letters=np.array(letters, dtype=np.int64),
+        row=row,
+        far=far,
+        near=near,
+        draw=draw,
+    )
+
+
+def _far_sides(
+    xy: Floats, middles: Floats, places: Floats, side: Ints, first: int
+) -> tuple[Floats, Ints]:
+    """Distance of a path from every obstacle's middle, and the sub-goal most opposite to it."""
+    start, step = xy[:-1], np.diff(xy, axis=0)
+    square = np.maximum((step**2).sum(axis=1), 1e-300)
+    apart = middles[:, None, :] - start[None, :, :]
+    t = np.clip((apart * step[None]).sum(axis=2) / square, 0.0, 1.0)
+    foot = start[None] + t[..., None] * step[None]
+    gap = np.hypot(*np.moveaxis(middles[:, None, :] - foot, 2, 0))
+    nearest = np.argmin(gap, axis=1)
+    rows = np.arange(len(middles))
+    away = middles - foot[rows, nearest]
+    far = np.full(len(middles), -1, dtype=np.int64)
+    best = np.full(len(middles), -np.inf)
+    for k, i in enumerate(side):
+        arm = places[k] - middles[i]
+        score = float(arm @ away[i]) / max(float(np.hypot(*arm)), 1e-300)
+        if score > best[i]:
+            best[i], far[i] = score, first + k
+    return gap[rows, nearest], far

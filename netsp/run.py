@@ -1,0 +1,152 @@
+"""What every solver run shares: the incumbent, the bound, the limits and the report."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
+from typing import Any, TypeVar
+
+import numpy as np
+
+from netsp.errors import InputError
+from netsp.result import Clock, OnProgress, Progress, Result, proven
+from netsp.solution import Status
+from netsp.travel import TravelGraph
+
+P = TypeVar("P")
+
+
+class Stop(Exception):
+    """A limit is reached."""
+
+
+class Run:
+    """One run of a solver on a travel graph.
+
+    iterations : how many the solver has done; each solver says what one is. `Stop` and Ctrl-C both
+    end a run with the best tour so far.
+    """
+
+    def __init__(
+        self,
+        graph: TravelGraph,
+        time_limit: float | None = None,
+        iteration_limit: int | None = None,
+        on_progress: OnProgress | None = None,
+    ) -> None:
+        self.graph = graph
+        self.clock = Clock(time_limit)
+        self.iterations = 0
+        self.iteration_limit = math.inf if iteration_limit is None else iteration_limit
+        self.on_progress = on_progress
+        self.trace: list[Progress] = []
+        self.tour: tuple[int, ...] | None = None
+        self.walk: tuple[int, ...] | None = None
+        self.length = math.inf
+        self.bound: float | None = None
+        self.infeasible = False
+
+    def offer(
+        self,
+        tour: Sequence[int] | None,
+        walk: Sequence[int] | None = None,
+        length: float | None = None,
+    ) -> bool:
+        """Take a tour as incumbent if it is one and is shorter; whether it was taken.
+
+        walk : the vertices as they are walked, base to base, when that is not just the tour.
+        length : of the walk, if the caller knows it already.
+        """
+        if tour is None or not self.graph.is_tour(tour):
+            return False
+        if length is None:
+            length = self.graph.walk_length(walk) if walk else self.graph.tour_length(tour)
+        if not length < self.length:
+            return False
+        self.tour, self.length = tuple(int(v) for v in tour), length
+        self.walk = None if walk is None else tuple(int(v) for v in walk)
+        return True
+
+    def trivial(self) -> bool:
+        """Settle problems of no goal or one, where the answer is known."""
+        if self.graph.goal_count > 1:
+            return False
+        if self.graph.goal_count == 0:
+            self.offer([0])
+        else:
+            there = self.graph.members(1)
+            self.offer([0, int(there[np.argmin(self.graph.costs_among([0, *there])[0, 1:])])])
+        self.bound = self.length
+        self.report("trivial")
+        return True
+
+    def raise_bound(self, bound: float) -> None:
+        """Take a lower bound if it is better; never above the incumbent."""
+        self.bound = min(max(self.bound or 0.0, bound), self.length)
+
+    def check(self) -> None:
+        """Raise `Stop` when a limit is reached."""
+        if self.clock.up or self.iterations >= self.iteration_limit:
+            raise Stop
+
+    @property
+    def done(self) -> bool:
+        """Whether the incumbent is proven optimal."""
+        return self.tour is not None and self.bound is not None and proven(self.length, self.bound)
+
+    def report(self, stage: str, **more: Any) -> None:
+        """Add a row to the trace and hand it on; `more` are further fields of `Progress`."""
+        row = Progress(
+            self.clock.elapsed,
+            stage,
+            None if self.tour is None else self.length,
+            self.bound,
+            iteration=self.iterations,
+            **more,
+        )
+        self.trace.append(row)
+        if self.on_progress:
+            self.on_progress(row)
+
+    def result(self) -> Result:
+        """The outcome as it stands."""
+        if self.tour is None:
+            status = Status.INFEASIBLE if self.infeasible else Status.NO_SOLUTION_FOUND
+            return Result(None, None, self.bound or None, status, tuple(self.trace))
+        status = Status.OPTIMAL if self.done else Status.FEASIBLE
+        return Result(self.tour, self.length, self.bound, status, tuple(self.trace), walk=self.walk)
+
+
+def read_params(kind: type[P], solver: str, params: Mapping[str, Any] | None) -> P:
+    """A solver's options as its dataclass; InputError for an unknown name or a wrong type, naming
+    the choices."""
+    known = {f.name: f for f in fields(kind)}  # type: ignore[arg-type]
+    values: dict[str, Any] = {}
+    for name, value in (params or {}).items():
+        if name not in known:
+            choices = f"expected one of {', '.join(sorted(known))}" if known else "it takes none"
+            raise InputError(f"solver {solver!r}: unknown option {name!r}; {choices}")
+        values[name] = _typed(f"solver {solver!r}: option {name!r}", value, known[name].default)
+    try:
+        return kind(**values)
+    except ValueError as error:
+        raise InputError(f"solver {solver!r}: {error}") from None
+
+
+def _typed(what: str, value: Any, default: Any) -> Any:
+    """The value as the type of its default; text (from the command line) is read as that type."""
+    try:
+        if isinstance(default, str):
+            return str(value)
+        if isinstance(default, int):
+            if not float(value) == int(float(value)):
+                raise ValueError
+            return int(float(value))
+        number = float(value)
+    except (TypeError, ValueError, OverflowError):
+        expected = "a whole number" if isinstance(default, int) else "a number"
+        raise InputError(f"{what}: expected {expected}, got {value!r}") from None
+    if not math.isfinite(number):
+        raise InputError(f"{what}: expected a finite number, got {value!r}")
+    return number
