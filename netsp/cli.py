@@ -18,6 +18,7 @@ from netsp.errors import InputError, NetspError
 
 if TYPE_CHECKING:
     from netsp.problem import Problem
+    from netsp.result import Progress
     from netsp.solution import Solution
 
 EXIT_NO_SOLUTION = 4
@@ -54,7 +55,20 @@ def _parser() -> argparse.ArgumentParser:
 
     p = commands.add_parser("solve", help="find the shortest non-entangling tour of a problem")
     p.add_argument("problem", metavar="PROBLEM", help="problem file (JSON)")
-    p.add_argument("--solver", default="mip", metavar="NAME", help="mip (default)")
+    p.add_argument(
+        "--solver",
+        default="mip",
+        metavar="NAME",
+        help="mip (default), reduced-mip, anneal, anneal-2016, greedy, greedy-2016 or greedy-tsp",
+    )
+    p.add_argument(
+        "--option",
+        action="append",
+        default=[],
+        type=_option,
+        metavar="NAME=VALUE",
+        help="an option of the solver, as docs/solvers.md lists them; may be repeated",
+    )
     p.add_argument("--roadmap", default="taut", metavar="NAME", help="taut (default) or prm")
     p.add_argument("--samples", type=_positive, metavar="N", help="prm: milestones; default 1000")
     p.add_argument("--shortcut", action="store_true", help="prm: pull every leg taut in its class")
@@ -68,16 +82,30 @@ def _parser() -> argparse.ArgumentParser:
         "--mip-backend", metavar="NAME", help="highs (default) or cbc, for the solvers built on mip"
     )
     p.add_argument("--time-limit", type=_seconds, metavar="S", help="seconds; default none")
+    p.add_argument(
+        "--iteration-limit", type=_positive, metavar="N", help="of the solver; default none"
+    )
     p.add_argument("--seed", type=_natural, default=0, metavar="N", help="random seed; default 0")
     p.add_argument("--warm-start", metavar="SOLUTION", help="start from this solution's tour")
     p.add_argument("-o", "--output", metavar="FILE", help="write the solution here (else stdout)")
     p.add_argument("--plot", metavar="FILE", help="draw the solution (png, svg or pdf)")
+    p.add_argument(
+        "--plot-trace",
+        metavar="FILE",
+        help="draw length, bound and entanglement against iterations (png, svg or pdf)",
+    )
     p.add_argument("--quiet", action="store_true", help="no progress, no summary")
     p.set_defaults(run=_solve)
 
     p = commands.add_parser("verify", help="judge a solution independently of what found it")
     p.add_argument("problem", metavar="PROBLEM")
     p.add_argument("solution", metavar="SOLUTION")
+    p.add_argument(
+        "--measures",
+        action="store_true",
+        help="print measures of entanglement; instead of a solution, any path will do "
+        "(CSV x,y[,z] or a JSON list of points)",
+    )
     p.add_argument("--quiet", action="store_true", help="exit code only")
     p.set_defaults(run=_verify)
 
@@ -120,6 +148,13 @@ def _seconds(text: str) -> float:
     return value
 
 
+def _option(text: str) -> tuple[str, str]:
+    name, equals, value = text.partition("=")
+    if not (name and equals):
+        raise argparse.ArgumentTypeError(f"expected NAME=VALUE, got {text!r}")
+    return name, value
+
+
 def _natural(text: str) -> int:
     try:
         value = int(text)
@@ -158,14 +193,24 @@ def _solve(args: argparse.Namespace) -> int:
 
     problem = Problem.load(args.problem)
     warm = Solution.load(args.warm_start) if args.warm_start else None
-    _check_writable(args.output, args.plot)
-    if args.plot:
+    _check_writable(args.output, args.plot, args.plot_trace)
+    if args.plot or args.plot_trace:
         from netsp import plotting
 
-        plotting.check_format(args.plot)
+        for picture in filter(None, (args.plot, args.plot_trace)):
+            plotting.check_format(picture)
     from netsp.solvers import solve
 
+    rows: list[Progress] = []
+
     table = None if args.quiet else ProgressTable(sys.stderr)
+
+    def listen(row: Progress) -> None:
+        if table:
+            table(row)
+        if args.plot_trace:
+            rows.append(row)
+
     with table or contextlib.nullcontext():
         if table:
             table.begin(problem)
@@ -175,10 +220,11 @@ def _solve(args: argparse.Namespace) -> int:
             roadmap=args.roadmap,
             roadmap_options=_roadmap_options(args),
             time_limit=args.time_limit,
+            iteration_limit=args.iteration_limit,
             seed=args.seed,
-            params={"backend": args.mip_backend} if args.mip_backend else None,
+            params=_params(args),
             warm_start=warm,
-            on_progress=table,
+            on_progress=listen,
         )
     if args.output:
         write_text(args.output, solution.to_json())
@@ -187,10 +233,30 @@ def _solve(args: argparse.Namespace) -> int:
         sys.stdout.flush()
     if args.plot:
         plotting.save(problem, solution, args.plot)
+    if args.plot_trace:
+        plotting.save_trace(rows, f"{problem.name}: {args.solver}", problem.units, args.plot_trace)
     if table:
         table.end()
         print(summary(problem, solution, args.output, args.plot), file=sys.stderr)
-    return 0 if solution.length is not None else EXIT_NO_SOLUTION
+    return _EXIT.get(solution.status.value, 0)
+
+
+_EXIT = {
+    "infeasible": 3,
+    "no_solution_found": EXIT_NO_SOLUTION,
+    "invalid": EXIT_NOT_VERIFIED,
+}
+
+
+def _params(args: argparse.Namespace) -> dict[str, str]:
+    params = dict(args.option)
+    if len(params) < len(args.option):
+        raise InputError("--option: the same option is given twice")
+    if args.mip_backend:
+        if "backend" in params:
+            raise InputError("--mip-backend: the backend is given by --option too")
+        params["backend"] = args.mip_backend
+    return params
 
 
 def _roadmap_options(args: argparse.Namespace) -> dict[str, object]:
@@ -203,6 +269,14 @@ def _roadmap_options(args: argparse.Namespace) -> dict[str, object]:
 
 
 def _verify(args: argparse.Namespace) -> int:
+    if args.measures:
+        from netsp.measuring import describe_path, read_path
+        from netsp.problem import Problem
+
+        path = read_path(args.solution)
+        if path is not None:
+            print(describe_path(Problem.load(args.problem), path))
+            return 0
     problem, solution = _load_pair(args.problem, args.solution)
     from netsp.judge import verify
 
@@ -210,6 +284,10 @@ def _verify(args: argparse.Namespace) -> int:
     if not args.quiet:
         print(verdict)
         print("verified" if verdict else "NOT VERIFIED")
+    if args.measures and solution.path:
+        from netsp.measuring import describe_tethers
+
+        print(f"\n{describe_path(problem, solution.path)}\n\n{describe_tethers(problem, solution)}")
     return 0 if verdict else EXIT_NOT_VERIFIED
 
 

@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from netsp.errors import InputError, NetspError
+from netsp.errors import InputError
 from netsp.problem import Circle, Problem
+from netsp.result import Progress
 from netsp.roadmap.paths import TautPaths
-from netsp.solution import Solution, Status, Visit
+from netsp.solution import Solution, Status
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 FORMATS = (".png", ".svg", ".pdf")
 
-_OBSTACLE, _EDGE, _TOUR, _TETHER, _GOAL, _BASE = (
+_OBSTACLE, _WRAPPED, _EDGE, _TOUR, _TETHER, _GOAL, _BASE = (
     "#9aa5b1",
+    "#f3a6a6",
     "#52606d",
     "#0b69a3",
     "#e8590c",
@@ -77,33 +80,21 @@ def draw(problem: Problem, solution: Solution | None = None) -> Any:
     _map(left.subplots(), problem, solution)
     axes = np.atleast_1d(right.subplots(rows, columns)).ravel()
     right.suptitle("the taut tether at each stop", fontsize=9, color=_EDGE)
-    paths = TautPaths(problem)
+    longest = max(problem.tether_length, *(stop.tether_length for stop in stops))
+    paths = TautPaths(problem, 2.0 * longest)
     for k, ax in enumerate(axes):
         ax.set_axis_off()
         if k >= len(stops):
             continue
         stop = stops[k]
         _obstacles(ax, problem, labels=False)
-        tether = _tether(paths, stop)
+        tether = paths.tether(stop.goal, stop.signature)
         ax.plot(tether[:, 0], tether[:, 1], color=_TETHER, lw=1.3)
         ax.plot(*problem.base[:2], marker="*", ms=8, color=_BASE, mec="none")
         ax.plot(*problem.points[stop.goal + 1, :2], "o", ms=4, color=_TOUR)
         ax.set_title(f"{k + 1}: {stop.tether_length:.4g} {problem.units}", fontsize=7, pad=2)
         _frame(ax, problem, solution)
     return figure
-
-
-def _tether(paths: TautPaths, stop: Visit) -> Any:
-    """The taut tether of a stop, or InputError if the solution names a class that is none."""
-    known = len(paths.problem.obstacles)
-    if stop.goal < len(paths.problem.goals) and all(1 <= abs(a) <= known for a in stop.signature):
-        try:
-            return paths.path(0, stop.goal + 1, stop.signature)
-        except NetspError:
-            pass
-    raise InputError(
-        f"solution: tour: no taut tether to goal {stop.goal} has the word {list(stop.signature)}"
-    )
 
 
 def save_roadmap(problem: Problem, roadmap: str, options: dict[str, Any], path: str | Path) -> None:
@@ -132,6 +123,36 @@ def save_roadmap(problem: Problem, roadmap: str, options: dict[str, Any], path: 
         )
     ax.add_collection(LineCollection(list(lines), colors=_TOUR, lw=0.35, alpha=0.35, zorder=2))
     ax.set_title(f"{problem.name}: {roadmap} roadmap, {counted}", fontsize=10, loc="left")
+    _write(figure, path)
+
+
+def save_trace(rows: Sequence[Progress], title: str, units: str, path: str | Path) -> None:
+    """Draw a solver's way to its answer: lengths and bound against iterations, and below, for
+    solvers that walk through entangled states, the number of entangled obstacles (Fig. 3 of
+    McCammon & Hollinger 2016)."""
+    from matplotlib.figure import Figure
+
+    tangled = any(r.entangled for r in rows)
+    figure = Figure(figsize=(8.0, 6.0 if tangled else 4.2), layout="constrained")
+    axes = figure.subplots(2 if tangled else 1, 1, sharex=True, squeeze=False)[:, 0]
+    top = axes[0]
+    for field, label, style in (
+        ("current", "present state", {"color": _OBSTACLE, "lw": 0.7}),
+        ("incumbent", "best tour", {"color": _TOUR, "lw": 1.6, "drawstyle": "steps-post"}),
+        ("bound", "lower bound", {"color": _TETHER, "lw": 1.2, "drawstyle": "steps-post"}),
+    ):
+        seen = [(r.iteration, getattr(r, field)) for r in rows if getattr(r, field) is not None]
+        if seen:
+            top.plot(*zip(*seen, strict=True), label=label, **style)
+    top.set_ylabel(f"length ({units})")
+    top.legend(frameon=False, fontsize=8)
+    top.set_title(title, fontsize=10, loc="left")
+    if tangled:
+        seen = [(r.iteration, r.entangled) for r in rows if r.entangled is not None]
+        axes[1].plot(*zip(*seen, strict=True), color=_BASE, lw=0.9)
+        axes[1].set_ylabel("entangled obstacles")
+        axes[1].set_ylim(bottom=0.0)
+    axes[-1].set_xlabel("iteration")
     _write(figure, path)
 
 
@@ -187,16 +208,18 @@ def _single(problem: Problem) -> tuple[Any, Any]:
 
 
 def _map(ax: Axes, problem: Problem, solution: Solution | None, *, tethers: bool = False) -> None:
-    _obstacles(ax, problem, labels=len(problem.obstacles) <= 40)
+    wrapped = solution.entangled if solution else ()
+    _obstacles(ax, problem, labels=len(problem.obstacles) <= 40, wrapped=wrapped)
     if problem.bounds is not None:
         xmin, ymin, xmax, ymax = problem.bounds
         ax.plot([xmin, xmax, xmax, xmin, xmin], [ymin, ymin, ymax, ymax, ymin], color=_EDGE, lw=1)
     order = {v.goal: k + 1 for k, v in enumerate(solution.tour)} if solution else {}
     if solution is not None and solution.path:
         if tethers:
-            paths = TautPaths(problem)
+            longest = max(v.tether_length for v in solution.tour)
+            paths = TautPaths(problem, 2.0 * max(problem.tether_length, longest))
             for v in solution.tour:
-                line = _tether(paths, v)
+                line = paths.tether(v.goal, v.signature)
                 ax.plot(line[:, 0], line[:, 1], color=_TETHER, lw=0.7, alpha=0.6, zorder=2)
         path = np.array(solution.path)
         ax.plot(path[:, 0], path[:, 1], color=_TOUR, lw=1.8, zorder=3, solid_joinstyle="round")
@@ -235,19 +258,24 @@ def _title(problem: Problem, solution: Solution | None) -> str:
     else:
         proof = "no bound"
     longest = max((v.tether_length for v in solution.tour), default=0.0)
+    kind = "non-entangling tour"
+    if solution.status is Status.INVALID:
+        kind, proof = "tour", f"entangles {len(solution.entangled)} obstacles (red)"
     return (
-        f"{problem.name}: non-entangling tour of {solution.length:.6g} {problem.units}, {proof}\n"
+        f"{problem.name}: {kind} of {solution.length:.6g} {problem.units}, {proof}\n"
         f"longest tether {longest:.4g} of {problem.tether_length:g} {problem.units}; "
         f"numbers give the order of visits"
     )
 
 
-def _obstacles(ax: Axes, problem: Problem, *, labels: bool) -> None:
+def _obstacles(ax: Axes, problem: Problem, *, labels: bool, wrapped: tuple[int, ...] = ()) -> None:
     from matplotlib.patches import Circle as Disk
     from matplotlib.patches import Polygon as Patch
 
     for i, o in enumerate(problem.obstacles):
         style: dict[str, Any] = {"fc": _OBSTACLE, "ec": _EDGE, "lw": 0.6, "zorder": 1}
+        if i in wrapped:
+            style["fc"] = _WRAPPED
         if isinstance(o, Circle):
             if problem.clearance:
                 grown = Disk(o.center, o.radius + problem.clearance)

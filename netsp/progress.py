@@ -11,7 +11,8 @@ from netsp.result import Progress
 from netsp.solution import Solution, Status
 
 _HEADER = (
-    f"{'time':>7}  {'stage':<10} {'tour':>12} {'bound':>12} {'gap':>8} {'cuts':>6} {'legs':>7}"
+    f"{'time':>7}  {'stage':<10} {'tour':>12} {'bound':>12} {'gap':>8} {'cuts':>6} {'legs':>7} "
+    f"{'iteration':>11}"
 )
 
 PATIENCE = 3.0
@@ -76,7 +77,7 @@ class ProgressTable:
         gap = "-" if row.gap is None else f"{100 * row.gap:.3f}%"
         self._print(
             f"{row.time:>6.1f}s  {row.stage:<10} {tour:>12} {bound:>12} {gap:>8} "
-            f"{row.cuts:>6} {row.legs:>7}"
+            f"{row.cuts or '-':>6} {row.legs or '-':>7} {row.iteration:>11}"
         )
         self._last, self._held, self._shown = row, None, time.monotonic()
 
@@ -93,22 +94,29 @@ def summary(
         f"roadmap {t.roadmap_s:.2f} s, legs {t.matrix_s:.2f} s, solver {t.solve_s:.2f} s, "
         f"total {t.total_s:.2f} s"
     )
+    if solution.status is Status.INFEASIBLE:
+        return f"there is no tour ({times})"
     if solution.length is None:
-        return f"no tour found within the limit ({times})"
+        return f"no tour found by {solution.solver} ({times})"
     if solution.status is Status.OPTIMAL:
         verdict = "proven optimal"
+    elif solution.status is Status.INVALID:
+        verdict = "INVALID: the solver is blind to the tether"
+    elif solution.lower_bound is None:
+        verdict = "no bound"
     else:
         verdict = f"bound {solution.lower_bound:.6g}, gap {100 * (solution.gap or 0.0):.2f} %"
-        if solution.lower_bound is None:
-            verdict = "no bound"
     names = [problem.goals[v.goal].name or str(v.goal) for v in solution.tour]
-    longest = max(v.tether_length for v in solution.tour)
+    longest = max((v.tether_length for v in solution.tour), default=0.0)
+    wrapped = ", ".join(problem.obstacle_label(k) for k in solution.entangled)
     lines = [
         f"tour     {solution.length:.6f} {problem.units}, {verdict}",
         f"order    base → {' → '.join(names)} → base",
         f"tether   longest {longest:.6g} of {problem.tether_length:g} {problem.units}",
         f"time     {times}",
     ]
+    if solution.entangled:
+        lines.insert(1, f"wraps    {len(solution.entangled)} obstacles: {wrapped}")
     if output:
         lines.append(f"solution {output}")
     if picture:

@@ -17,6 +17,7 @@ from netsp.errors import InputError
 from netsp.hsignature import entangled
 from netsp.problem import Problem
 from netsp.result import OnProgress, Result, Trajectory, relative_gap
+from netsp.run import read_params
 from netsp.solution import ProblemReference, Solution, Timings, Visit
 from netsp.travel import TravelGraph
 
@@ -30,6 +31,17 @@ SOLVERS: dict[str, str] = {
     "greedy-tsp": "netsp.greedy.blind:solve",
 }
 """Solver name → where its `solve(graph, …) -> Result` lives."""
+
+PARAMS: dict[str, str] = {
+    "mip": "netsp.mip.solve:Params",
+    "reduced-mip": "netsp.mip.reduced:ReducedParams",
+    "anneal": "netsp.anneal.icra2017:Params",
+    "anneal-2016": "netsp.anneal.rss2016:Params",
+    "greedy": "netsp.greedy.backtracking:Params",
+    "greedy-2016": "netsp.greedy.backtracking:NoParams",
+    "greedy-tsp": "netsp.greedy.backtracking:NoParams",
+}
+"""Solver name → the dataclass of its options."""
 
 BLIND = frozenset({"greedy-tsp"})
 """Baselines blind to the tether: their tours may be `invalid`."""
@@ -167,6 +179,7 @@ def solve(
     if warm_start is not None and warm_start.problem.sha256 != problem.sha256:
         raise InputError("warm_start: it is the solution of another problem (sha256 differs)")
     _load(SOLVERS, "solver", solver)
+    read_params(_load(PARAMS, "solver", solver), solver, params)  # before the long work
     begin = time.monotonic()
     options: dict[str, Any] = {"time_limit": time_limit, **(roadmap_options or {})}
     if roadmap in SEEDED_ROADMAPS:

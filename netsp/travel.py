@@ -62,7 +62,7 @@ class TravelGraph:
         tethers: npt.ArrayLike,
         legs: Legs,
         roadmap: str = "custom",
-        ways: Callable[[], Ways] | None = None,
+        ways: Callable[[bool], Ways] | None = None,
     ) -> None:
         self.cluster: Ints = np.asarray(cluster, dtype=np.int64)
         self.signatures = tuple(signatures)
@@ -72,7 +72,7 @@ class TravelGraph:
         self._legs = legs
         self._costs: Floats | None = None
         self._make_ways = ways
-        self._ways: Ways | None = None
+        self._ways: dict[bool, Ways] = {}
         self._place: dict[tuple[int, Word], int] | None = None
 
     @classmethod
@@ -132,17 +132,16 @@ class TravelGraph:
         finally:
             self.legs_s += time.monotonic() - begin
 
-    @property
-    def ways(self) -> Ways:
-        """Ways in any class, for solvers blind to the tether; InputError if there is no geometry
-        beneath this graph."""
+    def ways(self, *, sub_goals: bool) -> Ways:
+        """Ways in any class, for solvers blind to the tether, with or without sub-goals beside the
+        obstacles; InputError if there is no geometry beneath this graph."""
         if self._make_ways is None:
             raise InputError(
                 "solver: needs the geometry of a problem, and this travel graph has none"
             )
-        if self._ways is None:
-            self._ways = self._make_ways()
-        return self._ways
+        if sub_goals not in self._ways:
+            self._ways[sub_goals] = self._make_ways(sub_goals)
+        return self._ways[sub_goals]
 
     def subgraph(self, vertices: npt.ArrayLike) -> TravelGraph:
         """The travel graph on some of the vertices, the base first; vertex k of it is vertex

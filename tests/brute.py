@@ -111,3 +111,17 @@ class BruteForce:
             for w, d in reach.items():
                 best = min(best, d + math.hypot(tethers[g, w], z[g] - z[0]))
         return best
+
+
+def brute_tour(graph) -> float:
+    """Optimum of a travel graph over every order, classes by dynamic programming."""
+    best = math.inf
+    members = [graph.members(c) for c in range(graph.goal_count + 1)]
+    for order in itertools.permutations(range(1, graph.goal_count + 1)):
+        if order[0] > order[-1]:
+            continue
+        reach = graph.costs[0, members[order[0]]]
+        for a, b in itertools.pairwise(order):
+            reach = (reach[:, None] + graph.costs[np.ix_(members[a], members[b])]).min(axis=0)
+        best = min(best, float((reach + graph.costs[members[order[-1]], 0]).min()))
+    return best

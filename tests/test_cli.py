@@ -61,7 +61,10 @@ BAD_CALLS = {
     "no such file": (["solve", "none.json"], "none.json: cannot be read"),
     "unknown solver": (["solve", SMALL, "--solver", "magic"], "solver: unknown 'magic'; expected"),
     "unknown roadmap": (["solve", SMALL, "--roadmap", "x"], "roadmap: unknown 'x'; expected"),
-    "unknown backend": (["solve", SMALL, "--mip-backend", "x"], "backend: unknown 'x'; expected"),
+    "unknown backend": (
+        ["solve", SMALL, "--mip-backend", "x"],
+        "option 'backend': unknown 'x'; expected",
+    ),
     "picture format": (["solve", SMALL, "--plot", "a.xyz"], "a.xyz: cannot draw this format"),
     "no folder": (["solve", SMALL, "-o", "/none/s.json"], "/none/s.json: cannot be written"),
     "a folder": (["solve", SMALL, "-o", "/tmp"], "/tmp: cannot be written: it is a directory"),

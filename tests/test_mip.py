@@ -1,7 +1,5 @@
 """The mip solver proves what brute force finds, and is honest when it cannot."""
 
-import itertools
-import math
 import time
 
 import numpy as np
@@ -16,48 +14,11 @@ from netsp.mip.program import Cut
 from netsp.mip.subtours import components, fractional_cuts
 from netsp.roadmap.taut import TautRoadmap
 from netsp.solution import Status
-from netsp.travel import TravelGraph
+from tests.brute import brute_tour as brute
+from tests.test_contract import random_graph
 from tests.worlds import random_world
 
 BACKENDS = ["highs", "cbc"]
-
-
-class Table:
-    """Legs from a cost matrix."""
-
-    def __init__(self, costs):
-        self.costs = costs
-
-    def lengths(self, vertices):
-        return self.costs[np.ix_(vertices, vertices)]
-
-    def path(self, u, v):
-        raise NotImplementedError
-
-
-def random_graph(seed, goals, most=4):
-    """A generalised TSP with costs of a metric, uncorrelated with any geometry of obstacles."""
-    rng = np.random.default_rng(seed)
-    sizes = [1, *rng.integers(1, most + 1, goals)]
-    cluster = np.repeat(np.arange(goals + 1), sizes)
-    at = rng.uniform(0, 1, (len(cluster), 3))
-    costs = np.linalg.norm(at[:, None] - at[None, :], axis=2)
-    costs[cluster[:, None] == cluster[None, :]] = np.inf
-    return TravelGraph(cluster, [()] * len(cluster), costs[0], Table(costs))
-
-
-def brute(graph):
-    """Optimum over every order, classes by dynamic programming."""
-    best = math.inf
-    members = [graph.members(c) for c in range(graph.goal_count + 1)]
-    for order in itertools.permutations(range(1, graph.goal_count + 1)):
-        if order[0] > order[-1]:
-            continue
-        reach = graph.costs[0, members[order[0]]]
-        for a, b in itertools.pairwise(order):
-            reach = (reach[:, None] + graph.costs[np.ix_(members[a], members[b])]).min(axis=0)
-        best = min(best, float((reach + graph.costs[members[order[-1]], 0]).min()))
-    return best
 
 
 @pytest.mark.parametrize("backend", BACKENDS)

@@ -25,10 +25,10 @@ from netsp.result import OnProgress, Result
 from netsp.run import Run, Stop, read_params
 from netsp.travel import TravelGraph
 
-PROPOSALS_PER_VERTEX = 100_000
+PROPOSALS_PER_GOAL = 1_000_000
 """Default number of proposals, times the number of goals, when nothing is limited."""
 
-CHUNK = 50_000
+CHUNK = 100_000
 """Proposals between two looks at the clock: some milliseconds."""
 
 
@@ -76,7 +76,7 @@ def solve(
                 state[k + 1] = rng.integers(instance.start[c], instance.start[c + 1])
         of_vertex = np.repeat(np.arange(goals + 1), np.diff(instance.start))
         length = float(instance.costs[state, np.roll(state, -1)].sum())
-        schedule = Schedule(chosen, run, length / (goals + 1), default=PROPOSALS_PER_VERTEX * goals)
+        schedule = Schedule(chosen, run, length / (goals + 1), default=PROPOSALS_PER_GOAL * goals)
         best = state.copy()
         best_length = length
         chance = seeded(rng)

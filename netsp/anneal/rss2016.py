@@ -8,8 +8,8 @@ entangles, read off its reduced word.
 
 Where the paper is silent or assumes too much:
 
-- E counts the obstacles in the *cyclically* reduced word: in ``1 2 -1`` the tether goes out past
-  obstacle 1, round obstacle 2 and back, and nothing is wrapped around 1.
+- E counts the obstacles that the path winds around, and those that keep the word from cancelling
+  without them (`netsp.hsignature.entangled`), not the letters of the word.
 - the paper's tether has no end. Ours has: a goal reached in a class that the tether does not admit
   counts like an entanglement, so that with a long tether the cost is the paper's.
 - the trajectory returned is the best *valid* one met, each leg pulled taut in its class (the leg
@@ -38,7 +38,11 @@ Ints = npt.NDArray[np.int64]
 PROPOSALS_PER_GOAL = 20_000
 """Default number of proposals, times the number of goals, when nothing is limited."""
 
+REPORTS = 1_000
+"""Rows of the trace of a whole run."""
+
 CHUNK = 2_000
+"""Most proposals between two looks at the clock."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +50,7 @@ class Params(Cooling):
     """hot, cold : see `Cooling`. k : the paper's factor; the larger, the sooner entanglements go.
     swaps : share of proposals that swap goals; the others invert a path."""
 
-    k: float = 10.0
+    k: float = 1.0
     swaps: float = 0.5
 
     def __post_init__(self) -> None:
@@ -81,7 +85,7 @@ def solve(
         return run.result()
     try:
         run.check()
-        ways = graph.ways
+        ways = graph.ways(sub_goals=True)
         goals = graph.goal_count
         order = np.zeros(goals + 2, dtype=np.int64)
         if run.tour is not None:
@@ -92,24 +96,25 @@ def solve(
         trie, vertex = _admissible(graph)
         tables = (ways.planar, ways.height, ways.letters, ways.row, ways.far, ways.near)
         longest = (goals + 1) * 2 * int((ways.row[:, 1:] - ways.row[:, :-1]).max(initial=0)) + 1
-        scratch = np.zeros((2, longest), dtype=np.int64)
+        scratch = np.zeros((3, longest), dtype=np.int64)
         stops = np.zeros(goals + 1, dtype=np.int64)
         best = np.zeros(goals + 1, dtype=np.int64)
-        obstacles = ways.far.shape[2]
+        turns = np.zeros(ways.far.shape[2] + 1, dtype=np.int64)
         length, entangled, _ = evaluate(
-            order, via, *tables[:4], trie, vertex, stops, scratch, obstacles
+            order, via, *tables[:4], trie, vertex, stops, scratch, turns
         )
         schedule = Schedule(chosen, run, length / (goals + 1), default=PROPOSALS_PER_GOAL * goals)
+        chunk = CHUNK if schedule.by_clock else max(1, int(run.iteration_limit) // REPORTS)
         chance = seeded(rng)
         best_length = math.inf
         run.report("anneal", current=length, entangled=int(entangled))
         while run.iterations < run.iteration_limit:
             run.check()
-            count = schedule.chunk(CHUNK)
+            count = schedule.chunk(chunk)
             before = best_length
             length, entangled, best_length = anneal(
                 order, via, best, best_length, count, schedule.temperature, chosen.k, chosen.swaps,
-                *tables, trie, vertex, stops, scratch, chance,
+                *tables, trie, vertex, stops, scratch, turns, chance,
             )  # fmt: skip
             run.iterations += count
             if best_length < before:
@@ -161,12 +166,13 @@ def _push(letter, size, stack, trie):
 
 
 @njit(cache=True)
-def evaluate(order, via, planar, height, letters, row, trie, vertex, stops, stack, obstacles):
+def evaluate(order, via, planar, height, letters, row, trie, vertex, stops, stack, turns):
     """Length, entangled obstacles, and goals in a class the tether does not admit; `stops` takes
     the vertices."""
     length = 0.0
     size = 0
     missed = 0
+    obstacles = len(turns) - 1
     legs = len(order) - 1
     for k in range(legs):
         a, b, s = order[k], order[k + 1], via[k]
@@ -185,17 +191,31 @@ def evaluate(order, via, planar, height, letters, row, trie, vertex, stops, stac
             stops[k + 1] = v
             if v < 0:
                 missed += 1
-    low, high = 0, size - 1
-    while low < high and stack[0, low] == -stack[0, high]:
+    # as `netsp.hsignature.entangled`, on the second half of the stack
+    for o in range(obstacles + 1):
+        turns[o] = 0
+    for i in range(size):
+        x = stack[0, i]
+        turns[abs(x)] += 1 if x > 0 else -1
+    rest = 0
+    for i in range(size):
+        x = stack[0, i]
+        if turns[abs(x)] != 0:
+            continue
+        if rest > 0 and stack[2, rest - 1] == -x:
+            rest -= 1
+        else:
+            stack[2, rest] = x
+            rest += 1
+    low, high = 0, rest - 1
+    while low < high and stack[2, low] == -stack[2, high]:
         low += 1
         high -= 1
-    entangled = 0
     for i in range(low, high + 1):
-        fresh = True
-        for j in range(low, i):
-            if abs(stack[0, j]) == abs(stack[0, i]):
-                fresh = False
-        if fresh:
+        turns[abs(stack[2, i])] = 1
+    entangled = 0
+    for o in range(1, obstacles + 1):
+        if turns[o] != 0:
             entangled += 1
     return length, entangled, missed
 
@@ -203,14 +223,14 @@ def evaluate(order, via, planar, height, letters, row, trie, vertex, stops, stac
 @njit(cache=True)
 def anneal(
     order, via, best, best_length, count, theta, k, swaps,
-    planar, height, letters, row, far, near, trie, vertex, stops, stack, chance,
+    planar, height, letters, row, far, near, trie, vertex, stops, stack, turns, chance,
 ):  # fmt: skip
     """Make `count` proposals at temperature θ, in place; returns length and entanglement of the
     present state and the length of the best valid one, whose vertices are in `best`."""
     legs = len(order) - 1
     obstacles = far.shape[2]
     length, entangled, missed = evaluate(
-        order, via, planar, height, letters, row, trie, vertex, stops, stack, obstacles
+        order, via, planar, height, letters, row, trie, vertex, stops, stack, turns
     )
     cost = k * (entangled + missed + 1) * length
     kept = np.empty(4, dtype=np.int64)
@@ -241,7 +261,7 @@ def anneal(
         else:
             continue
         new_length, new_entangled, new_missed = evaluate(
-            order, via, planar, height, letters, row, trie, vertex, stops, stack, obstacles
+            order, via, planar, height, letters, row, trie, vertex, stops, stack, turns
         )
         new_cost = k * (new_entangled + new_missed + 1) * new_length
         if metropolis(new_cost - cost, theta, chance):

@@ -42,7 +42,7 @@ def solve(
         return run.result()
     try:
         run.check()
-        ways = graph.ways
+        ways = graph.ways(sub_goals=False)
         order, here = [], 0
         left = set(range(1, graph.goal_count + 1))
         while left:

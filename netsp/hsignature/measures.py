@@ -101,40 +101,49 @@ def winding_numbers(path: Floats, points: Floats) -> Floats:
 def self_crossings(path: Floats, *, tolerance: float = 0.0) -> int:
     """How often a polyline crosses itself in plan.
 
-    A vertex within `tolerance` of a segment's line counts as lying to its left, so that a path
-    through a vertex of its own is counted once and a path that retraces its steps does not cross.
+    A later vertex within `tolerance` of a segment's line is on neither side of it: the path crosses
+    where it comes from one side and leaves on the other, so a path through a vertex of its own is
+    counted once, and one that touches itself or retraces its steps is not.
     """
-    p, d = path[:-1], np.diff(path, axis=0)
-    length = np.hypot(d[:, 0], d[:, 1])
-    keep = length > 0.0
-    p, d, length = p[keep], d[keep], length[keep]
-    q = p + d
+    step = np.hypot(*np.diff(path, axis=0).T)
+    p = path[np.concatenate([[True], step > max(tolerance, 1e-150)])]
     count = 0
-    for k in range(len(p) - 1):
-        rest = slice(k + 1, None)
-
-        def left(a: Floats, along: Floats, size: Floats, b: Floats) -> npt.NDArray[np.bool_]:
-            cross = along[..., 0] * (b - a)[..., 1] - along[..., 1] * (b - a)[..., 0]
-            return np.asarray(cross >= -tolerance * size)
-
-        apart = left(p[k], d[k], length[k], p[rest]) != left(p[k], d[k], length[k], q[rest])
-        apart &= left(p[rest], d[rest], length[rest], p[k]) != left(
-            p[rest], d[rest], length[rest], q[k]
-        )
-        count += int(apart.sum())
+    for k in range(len(p) - 2):
+        d = p[k + 1] - p[k]
+        size = float(np.hypot(*d))
+        arm = p[k + 1 :] - p[k]
+        height = (d[0] * arm[:, 1] - d[1] * arm[:, 0]) / size
+        along = (arm @ d) / (size * size)
+        off = np.flatnonzero(np.abs(height) > tolerance)
+        for i, j in pairwise(off.tolist()):
+            if (height[i] > 0.0) == (height[j] > 0.0):
+                continue
+            if j == i + 1:
+                t = along[i] + (along[j] - along[i]) * height[i] / (height[i] - height[j])
+            else:
+                t = along[j - 1]
+            near = max(tolerance / size, 1e-12)
+            if near < t < 1.0 - near:
+                count += 1
+            elif abs(t) <= near and k > 0:
+                # through the vertex between two segments: in on one side of them, out on the other
+                arms = p[[k - 1, k + 1, k + 1 + i, k + 1 + j]] - p[k]
+                turn = np.mod(np.arctan2(arms[:, 1], arms[:, 0]), 2.0 * np.pi)
+                turn = np.mod(turn - turn[0], 2.0 * np.pi)
+                count += bool((turn[2] < turn[1]) != (turn[3] < turn[1]))
     return count
 
 
 def in_convex_hull(path: Floats, shapes: Sequence[shapely.Geometry]) -> tuple[int, ...]:
     """Obstacles whose interior the convex hull of a path meets."""
-    return _met(shapely.MultiPoint(path).convex_hull, shapes)
+    return _met([shapely.MultiPoint(path).convex_hull], shapes)
 
 
 def in_linear_homotopy(path: Floats, shapes: Sequence[shapely.Geometry]) -> tuple[int, ...]:
     """Obstacles whose interior a path sweeps when it is drawn straight to its first point: those
     that meet a triangle of the first point and a segment."""
     triangles = [shapely.MultiPoint([path[0], a, b]).convex_hull for a, b in pairwise(path[1:])]
-    return _met(shapely.union_all([shapely.LineString(path), *triangles]), shapes)
+    return _met([shapely.LineString(path), *triangles], shapes)
 
 
 def against_local_visibility(
@@ -166,5 +175,8 @@ def against_local_visibility(
     return tuple(sorted(k - 1 for k in broken))
 
 
-def _met(region: shapely.Geometry, shapes: Sequence[shapely.Geometry]) -> tuple[int, ...]:
-    return tuple(k for k, s in enumerate(shapes) if region.intersects(s))
+def _met(
+    regions: Sequence[shapely.Geometry], shapes: Sequence[shapely.Geometry]
+) -> tuple[int, ...]:
+    every = np.array(regions, dtype=object)
+    return tuple(k for k, s in enumerate(shapes) if shapely.intersects(every, s).any())

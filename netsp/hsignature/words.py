@@ -73,11 +73,24 @@ def cyclically_reduced(word: Iterable[int]) -> Word:
 
 
 def entangled(word: Iterable[int]) -> tuple[int, ...]:
-    """Numbers (from 1) of the obstacles that a closed path of this word is wrapped around: those of
-    its cyclically reduced word. In ``(1, 2, -1)`` the tether runs out past obstacle 1, round
-    obstacle 2 and back past 1, so only 2 holds it. Empty exactly when the word is.
+    """Numbers (from 1) of the obstacles that a closed path of this word is wrapped around: those it
+    winds around and, if the word would not cancel without them, those of what is left of it. Empty
+    exactly when the word is.
 
-    McCammon & Hollinger 2016, section II-A, speak of the obstacles in the interior of the loop;
-    a loop such as ``(1, 2, -1, -2)`` encloses none and is entangled with both.
+    McCammon & Hollinger 2016, section II-A, speak of the obstacles in the interior of the loop.
+    Letters alone do not tell: in ``(1, 2, -1)`` the path only crosses the ray of obstacle 1 on its
+    way to obstacle 2 and back. Nor do windings: ``(1, 2, -1, -2)`` encloses nothing and is
+    entangled with both.
+
+    >>> entangled((1, 2, -1))
+    (2,)
+    >>> entangled((1, 2, -1, -2))
+    (1, 2)
     """
-    return tuple(sorted({abs(x) for x in cyclically_reduced(word)}))
+    w = reduce(word)
+    turns: dict[int, int] = {}
+    for x in w:
+        turns[abs(x)] = turns.get(abs(x), 0) + (1 if x > 0 else -1)
+    wound = {k for k, n in turns.items() if n}
+    left = cyclically_reduced(x for x in w if abs(x) not in wound)
+    return tuple(sorted(wound | {abs(x) for x in left}))

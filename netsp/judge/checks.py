@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 import shapely
 
-from netsp.hsignature import Word, concatenate, crossings, reduce
+from netsp.hsignature import Word, concatenate, crossings, entangled, reduce
 from netsp.judge.stringpull import StringPuller, reduce_sleeve
 from netsp.problem import Circle, Problem
 from netsp.solution import Solution, Status
@@ -208,9 +208,7 @@ class _Judge:
     def _empty(self) -> Check:
         word = reduce(crossings(self.path, self.problem.representative_points))
         if word:
-            names = ", ".join(
-                self.problem.obstacle_label(i - 1) for i in sorted({abs(k) for k in word})
-            )
+            names = ", ".join(self.problem.obstacle_label(i - 1) for i in entangled(word))
             return Check("total word is empty", False, f"{list(word)}: entangles {names}")
         return Check("total word is empty", True, "nothing is wrapped")
 

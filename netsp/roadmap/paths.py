@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from netsp.errors import NetspError
+from netsp.errors import InputError, NetspError
 from netsp.hsignature import Word
 from netsp.problem import Problem
 from netsp.roadmap.explore import Trie, run_explore
@@ -60,6 +60,17 @@ class TautPaths:
         out = np.column_stack([xy + self.outline.origin, z])
         out[0], out[-1] = self.problem.points[a], self.problem.points[b]
         return out
+
+    def tether(self, goal: int, word: Word) -> Floats:
+        """(n, 3) polyline of the taut tether to a goal (0-based), as a solution states it;
+        InputError if there is no such goal or class."""
+        known = len(self.problem.obstacles)
+        if goal < len(self.problem.goals) and all(1 <= abs(a) <= known for a in word):
+            try:
+                return self.path(0, goal + 1, tuple(word))
+            except NetspError:
+                pass
+        raise InputError(f"solution: tour: no taut tether to goal {goal} has the word {list(word)}")
 
     def _pieces(self, a: int, b: int, word: Word) -> tuple[float, list[tuple[int, float]]]:
         """Length, and (departure, angle slid before it) along the taut path of a word."""

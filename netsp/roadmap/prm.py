@@ -116,16 +116,17 @@ class PrmRoadmap:
             self.cluster, self.signatures, self.tethers, self, roadmap="prm", ways=self._ways
         )
 
-    def _ways(self) -> Ways:
+    def _ways(self, with_sub_goals: bool) -> Ways:
         """Ways in any class along the milestones; sub-goals are joined as base and goals are."""
-        places, side = sub_goals(self.problem, self.paths.outline.origin)
+        places, side = sub_goals(self.problem, with_sub_goals)
         outline = self.paths.outline
         fixed = len(self.problem.points)
         local = self.milestones - np.append(outline.origin, 0.0)
         level = np.full((len(places), 1), local[0, 2])
         every = np.vstack([np.hstack([places, level]), local])
-        new = _exactly_free(_join(every, len(places)), every, outline)
+        new = _exactly_free(np.unique(_join(every, len(places)), axis=0), every, outline)
         edges = np.vstack([new, self.edges + len(places)])
+        every[len(places) : len(places) + fixed, :2] = outline.places
         graph = MilestoneGraph(every[:, :2], edges)
         terminals = np.concatenate([len(places) + np.arange(fixed), np.arange(len(places))])
         return tabulate(self.problem, outline, graph, terminals, places, side)
@@ -274,7 +275,7 @@ def _join(milestones: Floats, fixed: int) -> Ints:
     d = 2 if np.ptp(milestones[:, 2]) == 0.0 else 3
     k = min(n, 1 + math.ceil(math.e * (1.0 + 1.0 / d) * math.log(max(n, 2))))
     _, near = KDTree(milestones).query(milestones[:fixed], k=k)
-    near = np.asarray(near).reshape(fixed, -1)
+    near = np.asarray(near).reshape(fixed, k)
     pairs = np.column_stack([np.repeat(np.arange(fixed), near.shape[1]), near.ravel()])
     return np.sort(pairs[pairs[:, 0] != pairs[:, 1]], axis=1)
 

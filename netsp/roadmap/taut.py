@@ -12,7 +12,7 @@ import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 import numpy.typing as npt
@@ -106,7 +106,7 @@ class TautRoadmap:
             self.tethers,
             self.legs,
             roadmap="taut",
-            ways=lambda: taut_ways(self.problem),
+            ways=partial(taut_ways, self.problem),
         )
 
     # classes

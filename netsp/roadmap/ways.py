@@ -8,12 +8,16 @@ far side of a path is the one most opposite to where the path comes nearest to t
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+
 import numpy as np
 import numpy.typing as npt
 import shapely
+from numba import njit
 
 from netsp.hsignature import signature
-from netsp.problem import Goal, Problem
+from netsp.problem import Problem
 from netsp.roadmap.outline import Outline, build_outline
 from netsp.roadmap.shortest import ContactGraph, ShortestPaths
 from netsp.ways import Ways
@@ -28,26 +32,25 @@ OFF = 0.05
 """How far off the boundary they lie, as a share of the obstacle's size."""
 
 
-def taut_ways(problem: Problem) -> Ways:
+def taut_ways(problem: Problem, with_sub_goals: bool) -> Ways:
     """The ways over tangents and arcs: exact shortest paths."""
-    origin = problem.points[0, :2]
-    places, side = sub_goals(problem, origin)
-    more = [Goal(position=(float(x), float(y), problem.base[2])) for x, y in places + origin]
-    wider = Problem(
-        base=problem.base,
-        goals=(*problem.goals, *more),
-        obstacles=problem.obstacles,
-        tether_length=problem.tether_length,
-        clearance=problem.clearance,
-        bounds=problem.bounds,
+    places, side = sub_goals(problem, with_sub_goals)
+    outline = build_outline(problem)
+    outline = replace(
+        outline,
+        points=np.vstack([outline.points, places]),
+        places=np.vstack([outline.places, places]),
     )
-    outline = build_outline(wider)
     graph = ContactGraph(outline)
     return tabulate(problem, outline, graph, np.arange(graph.points), places, side)
 
 
-def sub_goals(problem: Problem, origin: Floats) -> tuple[Floats, Ints]:
-    """Places (k, 2) beside the obstacles, relative to the origin, and the obstacle of each."""
+def sub_goals(problem: Problem, wanted: bool = True) -> tuple[Floats, Ints]:
+    """Places (k, 2) beside the obstacles, relative to the base, and the obstacle of each; none if
+    they are not wanted."""
+    if not wanted:
+        return np.zeros((0, 2)), np.zeros(0, dtype=np.int64)
+    origin = problem.points[0, :2]
     shapes = [o.shape(problem.clearance) for o in problem.obstacles]
     solid = shapely.union_all([s.buffer(1e-6 * problem.scale) for s in shapes])
     shapely.prepare(solid)
@@ -127,24 +130,29 @@ def tabulate(
     )
 
 
-def _far_sides(
-    xy: Floats, middles: Floats, places: Floats, side: Ints, first: int
-) -> tuple[Floats, Ints]:
+@njit(cache=True)
+def _far_sides(xy, middles, places, side, first):
     """Distance of a path from every obstacle's middle, and the sub-goal most opposite to it."""
-    start, step = xy[:-1], np.diff(xy, axis=0)
-    square = np.maximum((step**2).sum(axis=1), 1e-300)
-    apart = middles[:, None, :] - start[None, :, :]
-    t = np.clip((apart * step[None]).sum(axis=2) / square, 0.0, 1.0)
-    foot = start[None] + t[..., None] * step[None]
-    gap = np.hypot(*np.moveaxis(middles[:, None, :] - foot, 2, 0))
-    nearest = np.argmin(gap, axis=1)
-    rows = np.arange(len(middles))
-    away = middles - foot[rows, nearest]
-    far = np.full(len(middles), -1, dtype=np.int64)
-    best = np.full(len(middles), -np.inf)
-    for k, i in enumerate(side):
-        arm = places[k] - middles[i]
-        score = float(arm @ away[i]) / max(float(np.hypot(*arm)), 1e-300)
-        if score > best[i]:
-            best[i], far[i] = score, first + k
-    return gap[rows, nearest], far
+    n = len(middles)
+    near = np.full(n, np.inf)
+    far = np.full(n, -1, dtype=np.int64)
+    away = np.zeros((n, 2))
+    for o in range(n):
+        for k in range(len(xy) - 1):
+            px, py = xy[k, 0], xy[k, 1]
+            dx, dy = xy[k + 1, 0] - px, xy[k + 1, 1] - py
+            ax, ay = middles[o, 0] - px, middles[o, 1] - py
+            square = dx * dx + dy * dy
+            t = 0.0 if square == 0.0 else min(1.0, max(0.0, (ax * dx + ay * dy) / square))
+            fx, fy = ax - t * dx, ay - t * dy
+            gap = math.hypot(fx, fy)
+            if gap < near[o]:
+                near[o], away[o, 0], away[o, 1] = gap, fx, fy
+    best = np.full(n, -np.inf)
+    for k in range(len(side)):
+        o = side[k]
+        x, y = places[k, 0] - middles[o, 0], places[k, 1] - middles[o, 1]
+        score = (x * away[o, 0] + y * away[o, 1]) / max(math.hypot(x, y), 1e-300)
+        if score > best[o]:
+            best[o], far[o] = score, first + k
+    return near, far

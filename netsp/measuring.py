@@ -1,0 +1,119 @@
+"""What `netsp verify --measures` prints: how entangled a path is, and the tether at every stop."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from netsp.errors import InputError
+from netsp.hsignature.measures import Measures, measure
+from netsp.problem import Problem, read_text
+from netsp.roadmap.paths import TautPaths
+from netsp.solution import Solution
+
+Floats = npt.NDArray[np.float64]
+
+DEFINITIONS = (
+    ("obstacle-free convex hull", "convex_hull"),
+    ("obstacle-free linear homotopy", "linear_homotopy"),
+    ("local visibility homotopy", "local_visibility"),
+)
+
+
+def read_path(file: str | Path) -> Floats | None:
+    """The (k, 2) or (k, 3) polyline of a path file: CSV rows ``x,y[,z]`` with or without a head, or
+    a JSON list of points; None if the file holds a JSON object, which is taken for a solution.
+
+    Raises InputError with the row that cannot be read.
+    """
+    text = read_text(file)
+    text = text.decode("utf-8", "replace") if isinstance(text, bytes) else text
+    if text.lstrip().startswith("{"):
+        return None
+    if text.lstrip().startswith("["):
+        try:
+            rows = json.loads(text)
+        except json.JSONDecodeError as error:
+            raise InputError(f"{file}: not valid JSON: {error}") from None
+    else:
+        rows = [row for row in csv.reader(text.splitlines()) if row]
+        if rows and not _is_point(rows[0]):
+            rows = rows[1:]
+    for k, row in enumerate(rows):
+        if not _is_point(row) or len(row) != len(rows[0]):
+            raise InputError(f"{file}: point {k}: expected x, y or x, y, z, got {row!r}")
+    if len(rows) < 2:
+        raise InputError(f"{file}: expected a path of at least 2 points, got {len(rows)}")
+    return np.array(rows, dtype=float)
+
+
+def _is_point(row: object) -> bool:
+    if not isinstance(row, list) or len(row) not in (2, 3):
+        return False
+    try:
+        return bool(np.isfinite([float(x) for x in row]).all())
+    except (TypeError, ValueError):
+        return False
+
+
+def describe_path(problem: Problem, path: npt.ArrayLike) -> str:
+    """All measures of one path, a line each."""
+    m = measure(problem, path)
+    rows = [
+        ("signature", f"{list(m.signature)}" if m.signature else "empty"),
+        ("entangled obstacles", _entangled(problem, m)),
+        ("winding numbers", _winding(problem, m)),
+        ("self-crossings", str(m.self_crossings)),
+    ]
+    if not m.closed:
+        rows += [(name, _verdict(problem, getattr(m, field))) for name, field in DEFINITIONS]
+    width = max(len(name) for name, _ in rows)
+    return "\n".join(f"{name:<{width}}  {value}" for name, value in rows)
+
+
+def describe_tethers(problem: Problem, solution: Solution) -> str:
+    """The taut tether at every stop against the definitions of Battocletti et al. 2024."""
+    path = np.array(solution.path)[:, :2]
+    longest = float(np.hypot(*np.diff(path, axis=0).T).sum()) if len(path) > 1 else 0.0
+    paths = TautPaths(problem, max(longest, problem.tether_length))
+    head = f"{'stop':>4}  {'goal':<12} {'tether':>10}  {'hull':<5} {'linear':<6} {'sight':<5} word"
+    lines = [head]
+    for k, stop in enumerate(solution.tour):
+        m = measure(problem, paths.tether(stop.goal, stop.signature))
+        free = ["free" if not getattr(m, field) else "no" for _, field in DEFINITIONS]
+        name = problem.goals[stop.goal].name or str(stop.goal)
+        lines.append(
+            f"{k + 1:>4}  {name:<12.12} {stop.tether_length:>10.6g}  {free[0]:<5} {free[1]:<6} "
+            f"{free[2]:<5} {list(stop.signature)}"
+        )
+    lines.append(
+        "hull, linear, sight: obstacle-free convex hull, obstacle-free linear homotopy and local "
+        "visibility\nhomotopy of the taut tether from the base (Battocletti et al. 2024)"
+    )
+    return "\n".join(lines)
+
+
+def _entangled(problem: Problem, m: Measures) -> str:
+    if m.entangled is None:
+        return "the path is not closed"
+    if not m.entangled:
+        return "none"
+    names = ", ".join(problem.obstacle_label(k) for k in m.entangled)
+    return f"{len(m.entangled)}: {names}"
+
+
+def _winding(problem: Problem, m: Measures) -> str:
+    if m.winding is None:
+        return "the path is not closed"
+    turned = [(k, w) for k, w in enumerate(m.winding) if w]
+    return ", ".join(f"{problem.obstacle_label(k)} {w:+d}" for k, w in turned) or "all zero"
+
+
+def _verdict(problem: Problem, broken: tuple[int, ...]) -> str:
+    if not broken:
+        return "holds"
+    return f"fails at {', '.join(problem.obstacle_label(k) for k in broken)}"

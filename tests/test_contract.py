@@ -1,0 +1,295 @@
+"""What every registered solver promises, on both roadmaps and on graphs without geometry."""
+
+import functools
+import itertools
+import math
+import time
+
+import numpy as np
+import psutil
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from netsp import InputError, Problem, Status, TravelGraph, solve, solve_graph, verify
+from netsp.solvers import BLIND, GEOMETRIC, ROADMAPS, SOLVERS, travel_graph
+from tests.brute import brute_tour
+from tests.worlds import random_world
+
+SEEING = [s for s in SOLVERS if s not in BLIND]
+ANYWHERE = [s for s in SOLVERS if s not in GEOMETRIC]
+ITERATIONS = {"anneal": 20_000, "anneal-2016": 5_000}
+SEED = 3
+EXACT = 1.0 + 1e-6
+
+
+@functools.cache
+def world():
+    return random_world(5, circles=10, goals=6, tether=280.0)
+
+
+@functools.cache
+def graph(roadmap):
+    return travel_graph(world(), roadmap, **({"seed": SEED} if roadmap == "prm" else {}))
+
+
+@functools.cache
+def optimum(roadmap):
+    result = solve_graph(graph(roadmap), "mip")
+    assert result.status is Status.OPTIMAL
+    return result
+
+
+def random_graph(seed, goals, most=4):
+    """A generalised TSP of random points; costs inf nowhere but within clusters."""
+    rng = np.random.default_rng(seed)
+    sizes = [1, *rng.integers(1, most + 1, goals)]
+    cluster = np.repeat(np.arange(goals + 1), sizes)
+    at = rng.uniform(0, 1, (len(cluster), 3))
+    return TravelGraph.from_costs(np.linalg.norm(at[:, None] - at[None, :], axis=2), cluster)
+
+
+@pytest.mark.parametrize("roadmap", ROADMAPS)
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_a_solution_is_verified_or_honestly_none_and_never_beats_the_optimum(solver, roadmap):
+    solution = solve(
+        world(), solver, roadmap=roadmap, iteration_limit=ITERATIONS.get(solver), seed=SEED
+    )
+    if solution.status is Status.NO_SOLUTION_FOUND:
+        assert solution.length is None
+        return
+    assert solution.path[0] == solution.path[-1] == world().base
+    if solution.status is Status.INVALID:
+        assert solver in BLIND
+        verdict = verify(world(), solution)
+        failed = {c.name for c in verdict.checks if not c.passed}
+        assert failed
+        assert failed <= {"total word is empty", "contractible over triangles", "taut tether fits"}
+        return
+    assert verify(world(), solution)
+    best = optimum(roadmap).length
+    assert solution.length >= best / EXACT
+    assert solution.lower_bound is None or solution.lower_bound <= best * EXACT
+    if solution.status is Status.OPTIMAL:
+        assert solution.length <= best * EXACT
+
+
+@pytest.mark.parametrize("solver", ANYWHERE)
+@pytest.mark.parametrize("seed", range(5))
+def test_on_any_generalised_tsp_no_solver_beats_brute_force(solver, seed):
+    g = random_graph(seed, goals=3 + seed % 4)
+    best = brute_tour(g)
+    result = solve_graph(g, solver, iteration_limit=ITERATIONS.get(solver))
+    assert g.is_tour(result.tour)
+    walk = result.walk or (*result.tour, 0)
+    assert set(result.tour) <= set(walk)
+    assert walk[0] == walk[-1] == 0
+    assert result.length == pytest.approx(g.walk_length(walk))
+    assert result.length >= best * (1 - 1e-9)
+    assert result.lower_bound is None or result.lower_bound <= best * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_same_seed_same_answer(solver):
+    def run():
+        limit = ITERATIONS.get(solver, 3)
+        r = solve_graph(graph("taut"), solver, iteration_limit=limit, seed=7)
+        return r.tour, r.length, r.lower_bound, r.status, r.walk
+
+    assert run() == run()
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_the_time_limit_is_kept_and_leaves_no_process(solver):
+    params = {"backend": "cbc"} if solver in ("mip", "reduced-mip") else None
+    begin = time.monotonic()
+    result = solve_graph(graph("taut"), solver, time_limit=0.3, params=params)
+    assert time.monotonic() - begin < 0.3 + 2.0
+    assert result.tour is None or graph("taut").is_tour(result.tour)
+    assert [p for p in psutil.Process().children(recursive=True) if "cbc" in p.name()] == []
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_one_iteration_is_enough_to_end_honestly(solver):
+    result = solve_graph(graph("taut"), solver, iteration_limit=1)
+    assert all(row.iteration <= 1 for row in result.trace)
+    if result.tour is not None:
+        assert result.length >= optimum("taut").length / EXACT
+    if result.status is Status.OPTIMAL:
+        assert result.length <= optimum("taut").length * EXACT
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_ctrl_c_gives_what_there_is(solver):
+    interrupted = []
+
+    def interrupt(row):
+        if not interrupted:
+            interrupted.append(row)
+            raise KeyboardInterrupt
+
+    result = solve_graph(graph("taut"), solver, on_progress=interrupt)
+    assert interrupted
+    assert result.tour is None or graph("taut").is_tour(result.tour)
+    assert result.status is not Status.INFEASIBLE
+
+
+@pytest.mark.parametrize("solver", SEEING)
+@pytest.mark.parametrize("first", ["greedy", "anneal", "mip"])
+def test_a_warm_start_by_any_other_solver_is_never_made_worse(solver, first):
+    p = world()
+    warm = solve(p, first, iteration_limit=ITERATIONS.get(first))
+    limit = ITERATIONS.get(solver, 1)
+    again = solve(p, solver, warm_start=warm, iteration_limit=limit)
+    assert again.length <= warm.length * (1 + 1e-12)
+    assert verify(p, again)
+
+
+def test_a_warm_start_from_another_roadmap_keeps_its_order():
+    p = world()
+    warm = solve(p, "mip", roadmap="taut")
+    short = solve(p, "greedy", roadmap="prm", warm_start=warm)
+    order = [v.goal for v in warm.tour]
+    assert [v.goal for v in short.tour] in (order, order[::-1])
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("roadmap", ROADMAPS)
+@pytest.mark.parametrize("goals", [1, 2])
+def test_one_goal_and_two_goal_problems(solver, roadmap, goals):
+    full = world()
+    p = Problem(
+        base=full.base,
+        goals=full.goals[:goals],
+        obstacles=full.obstacles,
+        tether_length=full.tether_length,
+    )
+    solution = solve(p, solver, roadmap=roadmap, iteration_limit=ITERATIONS.get(solver))
+    assert verify(p, solution) or (solver in BLIND and solution.status is Status.INVALID)
+    if goals < 2:
+        assert solution.status is Status.OPTIMAL
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_without_goals_the_tour_stays_at_the_base(solver):
+    result = solve_graph(TravelGraph.from_costs([[0]], [0]), solver)
+    assert (result.tour, result.length, result.status) == ((0,), 0.0, Status.OPTIMAL)
+
+
+def dead_end():
+    """Nearest neighbour runs from 1 to 2 to 3, whence there is no leg to 4."""
+    far = math.inf
+    costs = [
+        [0, 1, 9, 9, 9],
+        [1, 0, 1, 9, 9],
+        [9, 1, 0, 1, 9],
+        [9, 9, 1, 0, far],
+        [9, 9, 9, far, 0],
+    ]
+    return TravelGraph.from_costs(costs, range(5))
+
+
+def test_where_greedy_runs_into_a_dead_end_the_others_find_the_tour():
+    g = dead_end()
+    assert solve_graph(g, "greedy").status is Status.NO_SOLUTION_FOUND
+    best = solve_graph(g, "mip")
+    assert best.status is Status.OPTIMAL
+    assert best.length == pytest.approx(brute_tour(g))
+    assert solve_graph(g, "anneal", iteration_limit=20_000).length == pytest.approx(best.length)
+
+
+@pytest.mark.parametrize("backend", ["highs", "cbc"])
+def test_that_there_is_no_tour_is_proven_by_mip_and_claimed_by_none_else(backend):
+    costs = np.full((5, 5), np.inf)
+    costs[0, 1:] = costs[1:, 0] = 1.0  # a star: connected, yet no tour
+    g = TravelGraph.from_costs(costs, range(5))
+    assert solve_graph(g, "mip", params={"backend": backend}).status is Status.INFEASIBLE
+    for solver in ("anneal", "greedy"):
+        result = solve_graph(g, solver, iteration_limit=1000)
+        assert result.status is Status.NO_SOLUTION_FOUND
+    assert solve_graph(g, "greedy-2016").length == 8.0  # it retraces, so it needs no other leg
+
+
+@pytest.mark.parametrize(
+    ("kwargs", "said"),
+    [
+        (
+            {"solver": "gurobi"},
+            "solver: unknown 'gurobi'; expected one of mip, reduced-mip, anneal",
+        ),
+        ({"params": {"hot": 1}}, "unknown option 'hot'; expected one of backend, search_rounds"),
+        ({"params": {"backend": "cplex"}}, "unknown 'cplex'; expected one of highs, cbc"),
+        ({"params": {"search_rounds": "many"}}, "expected a whole number, got 'many'"),
+        ({"solver": "greedy-2016", "params": {"k": 1}}, "unknown option 'k'; it takes none"),
+        ({"solver": "anneal", "params": {"hot": 1, "cold": 2}}, "expected 0 < cold <= hot"),
+        ({"solver": "anneal", "params": {"hot": math.nan}}, "expected a finite number"),
+        ({"time_limit": 0.0}, "time_limit: expected a positive"),
+        ({"time_limit": math.nan}, "time_limit: expected a positive"),
+        ({"iteration_limit": 0}, "iteration_limit: expected a whole number from 1 on"),
+        ({"warm_start": [0, 1]}, "warm_start: expected vertices from 0 on"),
+        ({"solver": "greedy-tsp"}, "needs the geometry"),
+        ({"solver": "anneal-2016"}, "needs the geometry"),
+    ],
+)
+def test_bad_calls_are_told_in_one_line(kwargs, said):
+    with pytest.raises(InputError) as error:
+        solve_graph(dead_end(), **kwargs)
+    assert said in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def good_costs():
+    c = np.abs(np.subtract.outer(np.arange(4.0), np.arange(4.0)))
+    return c, np.array([0, 1, 2, 2])
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (
+            lambda c, k: (c + np.triu(np.ones((4, 4)), 1), k),
+            "costs[0][1] is 2 and costs[1][0] is 1",
+        ),
+        (lambda c, k: (-c, k), "costs[0][1] is -1; expected no negative cost"),
+        (lambda c, k: (c * np.nan, k), "costs[0][1] is not a number"),
+        (lambda c, k: (c[:3], k), "expected a square matrix, got shape (3, 4)"),
+        (lambda c, k: (c, k[:3]), "expected 4 labels"),
+        (lambda c, k: (c, k * 2), "cluster 1 has no vertex"),
+        (lambda c, k: (c, k - 1), "expected whole numbers from 0 on, got -1"),
+        (lambda c, k: (c, [0, 1, 2, 0.5]), "expected whole numbers from 0 on, got 0.5"),
+        (lambda c, k: (c, [0, 0, 1, 1]), "vertex 0, where the tour starts, must be alone"),
+        (lambda c, k: (np.where(np.eye(4)[1] + np.eye(4)[:, [1]], np.inf, c), k), "cluster 1 off"),
+        (lambda c, k: ([["a"]], [0]), "expected numbers"),
+    ],
+)
+def test_costs_that_make_no_travel_graph_are_told_in_one_line(change, said):
+    with pytest.raises(InputError) as error:
+        TravelGraph.from_costs(*change(*good_costs()))
+    assert said in str(error.value)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 10_000), st.permutations(range(1, 5)))
+def test_renaming_clusters_does_not_change_the_optimum(seed, names):
+    g = random_graph(seed, goals=4, most=3)
+    costs = np.where(np.isfinite(g.costs), g.costs, 0.0)
+    renamed = TravelGraph.from_costs(costs, np.array([0, *names])[g.cluster])
+    assert solve_graph(renamed).length == pytest.approx(solve_graph(g).length, rel=2e-6)
+
+
+def test_the_library_example_of_a_subgraph_keeps_costs_and_paths():
+    g = graph("taut")
+    some = np.flatnonzero(np.arange(len(g)) % 3 != 1)
+    some = np.unique(np.concatenate([[0], some]))
+    part = g.subgraph(some)
+    assert np.array_equal(part.costs, g.costs[np.ix_(some, some)])
+    assert np.array_equal(part.costs_to_base[1:], g.costs_to_base[some][1:])
+    for u, v in itertools.pairwise(range(0, len(part), max(1, len(part) // 4))):
+        if part.cluster[u] != part.cluster[v]:
+            assert np.array_equal(part.path(u, v), g.path(int(some[u]), int(some[v])))
+
+
+@pytest.mark.parametrize("roadmap", ROADMAPS)
+def test_costs_to_the_base_are_those_of_the_matrix(roadmap):
+    g = graph(roadmap)
+    assert np.allclose(g.costs_to_base[1:], g.costs[0, 1:], rtol=1e-12)
