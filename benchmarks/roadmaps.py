@@ -7,30 +7,22 @@ python benchmarks/roadmaps.py --convergence   also docs/prm-convergence.png and 
 from __future__ import annotations
 
 import argparse
-import datetime
 import os
-import platform
 import resource
 import statistics
 import subprocess
 import sys
 import tempfile
 import time
-from pathlib import Path
 
 import numpy as np
-
-ROOT = Path(__file__).resolve().parent.parent
-sys.path.insert(0, str(ROOT))
+from table import ROOT, head, heading, row
 
 
-def row(name: str, values: list[float], note: str = "") -> None:
-    """One line of a table."""
-    print(
-        f"| {name} | {statistics.median(values):.3f} | {min(values):.3f} | {max(values):.3f} "
-        f"| {len(values)} | {note} |",
-        flush=True,
-    )
+def times_row(name: str, values: list[float], note: str = "") -> None:
+    """One line of the table."""
+    low, high = min(values), max(values)
+    row(name, f"{statistics.median(values):.3f}", f"{low:.3f}", f"{high:.3f}", len(values), note)
 
 
 def taut(tether: float, worlds: int = 10) -> None:
@@ -48,7 +40,7 @@ def taut(tether: float, worlds: int = 10) -> None:
         times.append(time.perf_counter() - begin)
         sizes.append(len(graph))
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
-    row(
+    times_row(
         f"taut, classes and matrix, 20 goals, tether {tether:g}",
         times,
         f"{min(sizes)} to {max(sizes)} vertices, peak {peak:.2f} GiB",
@@ -66,7 +58,9 @@ def many(worlds: int = 5) -> None:
         begin = time.perf_counter()
         sizes.append(len(TautRoadmap(problem).cluster))
         times.append(time.perf_counter() - begin)
-    row("taut, classes, 100 circles, 100 goals, tether 300", times, f"{min(sizes)} to {max(sizes)}")
+    times_row(
+        "taut, classes, 100 circles, 100 goals, tether 300", times, f"{min(sizes)} to {max(sizes)}"
+    )
 
 
 def prm(worlds: int = 5) -> None:
@@ -85,8 +79,8 @@ def prm(worlds: int = 5) -> None:
         builds.append(built - begin)
         matrices.append(time.perf_counter() - built)
         sizes.append(len(graph))
-    row("prm, build, 1000 samples, 20 circles, tether 300", builds)
-    row("prm, matrix, 20 goals", matrices, f"{min(sizes)} to {max(sizes)} vertices")
+    times_row("prm, build, 1000 samples, 20 circles, tether 300", builds)
+    times_row("prm, matrix, 20 goals", matrices, f"{min(sizes)} to {max(sizes)} vertices")
 
 
 def first_run() -> None:
@@ -104,7 +98,7 @@ def first_run() -> None:
             check=True,
             env={**os.environ, "NUMBA_CACHE_DIR": cache},
         )
-        row("taut, first run ever, compilation included", [time.perf_counter() - begin])
+        times_row("taut, first run ever, compilation included", [time.perf_counter() - begin])
 
 
 def convergence(worlds: int = 3, seeds: int = 3) -> None:
@@ -131,14 +125,14 @@ def convergence(worlds: int = 3, seeds: int = 3) -> None:
                         lost[n] += 1
                         continue
                     into[n].append((found.length or 0.0) / exact)
-    print("\n| samples | median ratio | min | max | pulled taut: median | max | no tour |")
-    print("|---|---|---|---|---|---|---|")
+    print()
+    head("samples", "median ratio", "min", "max", "pulled taut: median", "max", "no tour")
     for n in counts:
         r, s = ratios[n], shortcut[n]
-        print(
-            f"| {n} | {np.median(r):.5f} | {min(r):.5f} | {max(r):.5f} | {np.median(s):.6f} "
-            f"| {max(s):.5f} | {lost[n]} |"
-        )
+        row(
+            n, f"{np.median(r):.5f}", f"{min(r):.5f}", f"{max(r):.5f}", f"{np.median(s):.6f}",
+            f"{max(s):.5f}", lost[n],
+        )  # fmt: skip
     figure = Figure(figsize=(6.5, 4.0), layout="constrained")
     ax = figure.subplots()
     for n in counts:
@@ -163,15 +157,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--convergence", action="store_true")
     args = parser.parse_args()
-    commit = subprocess.run(
-        ["git", "-C", str(ROOT), "rev-parse", "--short", "HEAD"],
-        capture_output=True, text=True, check=False,
-    ).stdout.strip()  # fmt: skip
-    print(
-        f"{datetime.date.today()}, commit {commit}, {os.cpu_count()} cores {platform.machine()}, "
-        f"Python {platform.python_version()}\n"
-    )
-    print("| what | median s | min | max | runs | note |\n|---|---|---|---|---|---|")
+    heading("Roadmaps")
+    head("what", "median s", "min", "max", "runs", "note")
     taut(350.0)
     taut(500.0)
     many()

@@ -7,18 +7,13 @@ Prints one markdown table; medians over the stated runs, in one process each whe
 
 from __future__ import annotations
 
-import datetime
-import os
-import platform
 import statistics
 import subprocess
 import sys
 import tempfile
 import time
-from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
-sys.path.insert(0, str(ROOT))
+from table import ROOT, head, heading, row
 
 
 def command(*args: str, runs: int = 7) -> list[float]:
@@ -48,35 +43,27 @@ def roadmap(tether: float, goals: int = 20, worlds: int = 10) -> tuple[list[floa
     return [t for t, _ in rows], [n for _, n in rows]
 
 
-def row(name: str, values: list[float], note: str = "") -> None:
+def times_row(name: str, values: list[float], note: str = "") -> None:
     """One line of the table."""
-    print(
-        f"| {name} | {statistics.median(values):.3f} | {min(values):.3f} | {max(values):.3f} "
-        f"| {len(values)} | {note} |",
-        flush=True,
-    )
+    low, high = min(values), max(values)
+    row(name, f"{statistics.median(values):.3f}", f"{low:.3f}", f"{high:.3f}", len(values), note)
 
 
 def main() -> None:
     """Run everything."""
-    commit = subprocess.run(
-        ["git", "-C", str(ROOT), "rev-parse", "--short", "HEAD"],
-        capture_output=True, text=True, check=False,
-    ).stdout.strip()  # fmt: skip
-    print(
-        f"{datetime.date.today()}, commit {commit}, {os.cpu_count()} cores {platform.machine()}, "
-        f"Python {platform.python_version()}\n"
-    )
-    print("| what | median s | min | max | runs | note |\n|---|---|---|---|---|---|")
-    row("`netsp --help`", command("--help"))
+    heading("The spine")
+    head("what", "median s", "min", "max", "runs", "note")
+    times_row("`netsp --help`", command("--help"))
     with tempfile.TemporaryDirectory() as folder:
         wharf = str(ROOT / "problems" / "wharf.json")
-        row("`netsp solve problems/wharf.json`", command("solve", wharf, "-o", f"{folder}/s.json"))
-        row("`netsp verify` of it", command("verify", wharf, f"{folder}/s.json"))
+        times_row(
+            "`netsp solve problems/wharf.json`", command("solve", wharf, "-o", f"{folder}/s.json")
+        )
+        times_row("`netsp verify` of it", command("verify", wharf, f"{folder}/s.json"))
     for tether in (200.0, 250.0, 300.0, 350.0):
         times, sizes = roadmap(tether)
         note = f"{min(sizes)} to {max(sizes)} vertices"
-        row(f"classes and legs, 20 circles, 20 goals, tether {tether:g}", times, note)
+        times_row(f"classes and legs, 20 circles, 20 goals, tether {tether:g}", times, note)
 
 
 if __name__ == "__main__":

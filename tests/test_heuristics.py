@@ -58,7 +58,7 @@ def test_greedy_2016_is_twice_the_shortest_tethers(roadmap):
 def test_reduced_mip_is_optimal_over_the_classes_of_least_tether(seed):
     g = random_graph(seed, goals=5)
     least = [0, *(int(m[np.argmin(g.costs[0, m])]) for m in map(g.members, range(1, 6)))]
-    literal = solve_graph(g, "reduced-mip", params={"polish": 0})
+    literal = solve_graph(g, "reduced-mip", params={"classes": 1, "polish": 0})
     assert set(literal.tour) == set(least)
     assert literal.length == pytest.approx(brute_tour(g.subgraph(np.sort(least))), rel=1e-6)
     assert solve_graph(g, "reduced-mip").length <= literal.length * (1 + 1e-12)
