@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from netsp import Circle, Polygon, Problem, solve_graph
 from netsp.anneal import icra2017, rss2016
-from netsp.anneal.chance import seeded, uniform
+from netsp.chance import seeded, uniform
 from netsp.hsignature import concatenate, entangled, signature
 from netsp.lns import Instance
 from netsp.solvers import ROADMAPS, travel_graph

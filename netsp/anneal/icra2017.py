@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from netsp.anneal.chance import below, metropolis, seeded
 from netsp.anneal.cooling import Cooling, Schedule
+from netsp.chance import below, metropolis, seeded
 from netsp.lns.layers import Instance
 from netsp.result import OnProgress, Result
 from netsp.run import Run, Stop, read_params

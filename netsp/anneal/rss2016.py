@@ -27,8 +27,8 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from netsp.anneal.chance import below, metropolis, seeded
 from netsp.anneal.cooling import Cooling, Schedule
+from netsp.chance import below, metropolis, seeded
 from netsp.result import OnProgress, Result
 from netsp.run import Run, Stop, read_params
 from netsp.travel import TravelGraph

@@ -15,6 +15,13 @@ Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
 
+NEAR = 12
+"""A cluster is put back next to one of so many nearest clusters."""
+
+RANKED = 60
+"""Neighbours of a cluster that are taken out with it."""
+
+
 @dataclass(frozen=True)
 class Instance:
     """A travel graph with vertices grouped by cluster: members of cluster c are
@@ -57,38 +64,27 @@ class Instance:
                     out[a, b] = block.min()
         return out
 
+    @cached_property
+    def rank(self) -> Ints:
+        """(m + 1, k) clusters nearest to each, nearest first; the base is among them."""
+        d = self.cluster_costs.copy()
+        np.fill_diagonal(d, np.inf)
+        return np.argsort(d, axis=1, kind="stable")[:, : min(RANKED, len(d) - 1)]
+
+    @cached_property
+    def near(self) -> npt.NDArray[np.bool_]:
+        """(m + 1, m + 1) whether one of two clusters is among the `NEAR` nearest of the other."""
+        out = np.zeros_like(self.cluster_costs, dtype=bool)
+        out[np.arange(len(out))[:, None], self.rank[:, :NEAR]] = True
+        return np.asarray(out | out.T)
+
+    def order_of(self, tour: npt.ArrayLike) -> Ints:
+        """Clusters in the order of a tour of the travel graph, base first."""
+        return np.asarray(self.graph.cluster[np.asarray(tour, dtype=np.int64)])
+
     def original(self, tour: npt.ArrayLike) -> tuple[int, ...]:
         """Vertices of the travel graph from positions in `order`."""
         return tuple(int(v) for v in self.order[np.asarray(tour, dtype=np.int64)])
-
-
-@njit(cache=True)
-def layered_length(clusters, start, costs, work):
-    """Length of the best closed tour base, clusters…, base. work : (2, largest cluster)."""
-    n = len(clusters)
-    c = clusters[0]
-    width = start[c + 1] - start[c]
-    for j in range(width):
-        work[0, j] = costs[0, start[c] + j]
-    row = 0
-    for k in range(1, n):
-        p, c = c, clusters[k]
-        p_width, width = width, start[c + 1] - start[c]
-        for j in range(width):
-            v = start[c] + j
-            best = np.inf
-            for i in range(p_width):
-                d = work[row, i] + costs[start[p] + i, v]
-                if d < best:
-                    best = d
-            work[1 - row, j] = best
-        row = 1 - row
-    best = np.inf
-    for j in range(width):
-        d = work[row, j] + costs[start[c] + j, 0]
-        if d < best:
-            best = d
-    return best
 
 
 @njit(cache=True)

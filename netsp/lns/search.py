@@ -1,18 +1,24 @@
-"""Iterated local search: Or-opt and 2-opt on the order of goals, classes chosen exactly.
-
-Every candidate order is priced by the layered shortest path, after a bound from the least legs
-between clusters has failed to reject it. Perturbation is the double bridge of Martin, Otto and
-Felten (1991).
-"""
+"""Local search, then ruin and recreate, over orders of clusters."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
-from netsp.lns.layers import Instance, best_classes, layered_length
+from netsp.chance import seeded
+from netsp.lns.layers import Instance, best_classes
+from netsp.lns.ruin import descend, ruin_and_recreate, two_opt
 from netsp.result import Clock
+
+Ints = npt.NDArray[np.int64]
+
+HOT, COLD = 0.1, 1e-3
+"""First and last temperature of ruin and recreate, in mean legs of the tour."""
+
+CHUNK_SECONDS = 0.02
+"""About the time between two looks at the clock."""
 
 
 def local_search(
@@ -21,119 +27,103 @@ def local_search(
     *,
     rounds: int,
     clock: Clock,
-    start_tour: npt.ArrayLike | None = None,
-) -> tuple[float, npt.NDArray[np.int64]]:
-    """Best (length, tour in the instance's vertex order) after `rounds` perturbations or when the
+    start_order: npt.ArrayLike | None = None,
+) -> tuple[float, tuple[int, ...]]:
+    """Best (length, vertices of the travel graph) after `rounds` of ruin and recreate or when the
     clock runs out. Deterministic by `rng` as long as the clock does not."""
-    goals = len(instance.start) - 2
-    largest = int(np.diff(instance.start).max())
-    work = np.empty((2, largest))
-    args = (instance.start, instance.costs, instance.cluster_costs, work)
-    if start_tour is None:
-        order = _insertion(instance.cluster_costs)
-    else:
-        of_vertex = np.repeat(np.arange(goals + 1), np.diff(instance.start))
-        order = of_vertex[np.asarray(start_tour, dtype=np.int64)[1:]]
-    best = order.copy()
-    best_length = _descend(best, *args)
-    for _ in range(rounds):
-        if clock.up or goals < 5:
-            break
-        trial = best.copy()
-        cuts = np.sort(rng.choice(np.arange(1, goals), size=3, replace=False))
-        a, b, c = (int(k) for k in cuts)
-        trial = np.concatenate([trial[:a], trial[b:c], trial[a:b], trial[c:]])
-        length = _descend(trial, *args)
-        if length < best_length - 1e-12 * best_length:
-            best, best_length = trial, length
-    length, tour = best_classes(best, instance.start, instance.costs)
-    return float(length), tour
+    search = Search(instance, rng, start_order)
+    search.settle()
+    search.run(rounds, clock)
+    return search.best()
 
 
-def _insertion(d: npt.NDArray[np.float64]) -> npt.NDArray[np.int64]:
-    """Order of clusters by farthest insertion on the least legs between clusters."""
+class Search:
+    """A search in progress: the present order and the best."""
+
+    def __init__(
+        self,
+        instance: Instance,
+        rng: np.random.Generator,
+        start_order: npt.ArrayLike | None = None,
+    ) -> None:
+        self.instance = instance
+        order = _insertion(instance.cluster_costs) if start_order is None else start_order
+        self.order: Ints = np.array(order, dtype=np.int64)
+        n = len(self.order)
+        largest = int(np.diff(instance.start).max())
+        self._ahead, self._behind = np.zeros((n + 2, largest)), np.zeros((n + 3, largest))
+        self.chance = seeded(rng)
+        self.length = np.inf
+        self.best_order, self.best_length = self.order.copy(), np.inf
+
+    def settle(self) -> None:
+        """Descend to an order that no move of one cluster and no reversal improves."""
+        i = self.instance
+        n = len(self.order)
+        before = np.inf
+        while True:
+            self.length = descend(
+                self.order, i.start, i.costs, i.near, self._ahead, self._behind, self.chance
+            )
+            if n > 3:
+                self.length = two_opt(
+                    self.order, i.start, i.costs, i.cluster_costs, self._ahead, self._behind
+                )
+            if not self.length < before * (1.0 - 1e-12):
+                break
+            before = self.length
+        self._keep()
+
+    def run(
+        self,
+        rounds: float,
+        clock: Clock,
+        progress: Callable[[], float] | None = None,
+        tell: Callable[[int], None] | None = None,
+    ) -> None:
+        """Ruin and recreate, cooling from `HOT` to `COLD` over the rounds, or over what `progress`
+        says (0 to 1); `tell` hears after every chunk how many rounds it had."""
+        i = self.instance
+        n = len(self.order)
+        done, chunk = 0, 1
+        leg = self.length / n
+        while done < rounds and n > 3 and not clock.up:
+            share = progress() if progress else done / rounds
+            theta = leg * HOT * (COLD / HOT) ** min(share, 1.0)
+            count = int(min(chunk, rounds - done))
+            begin = clock.elapsed
+            self.length, self.best_length = ruin_and_recreate(
+                self.order, self.best_order, self.length, self.best_length, count, theta,
+                i.start, i.costs, i.cluster_costs, i.near, i.rank, self.chance,
+            )  # fmt: skip
+            done += count
+            if clock.elapsed - begin < CHUNK_SECONDS and chunk < max(1, rounds / 100):
+                chunk *= 2
+            if tell:
+                tell(count)
+
+    def best(self) -> tuple[float, tuple[int, ...]]:
+        """Length and vertices of the best tour."""
+        i = self.instance
+        length, tour = best_classes(self.best_order[1:], i.start, i.costs)
+        return float(length), i.original(tour)
+
+    def _keep(self) -> None:
+        if self.length < self.best_length:
+            self.best_length = self.length
+            self.best_order[:] = self.order
+
+
+def _insertion(d: npt.NDArray[np.float64]) -> Ints:
+    """Order of clusters, base first, by farthest insertion on the least legs between clusters."""
     left = list(range(1, len(d)))
     tour = [0]
     while left:
-        k = max(left, key=lambda c: min(d[c, t] for t in tour)) if len(tour) > 1 else left[0]
-        gains = [
-            d[tour[i], k] + d[k, tour[(i + 1) % len(tour)]]
-            - (d[tour[i], tour[(i + 1) % len(tour)]] if len(tour) > 1 else 0.0)
-            for i in range(len(tour))
-        ]  # fmt: skip
-        tour.insert(int(np.argmin(gains)) + 1, k)
+        inside = d[np.ix_(left, tour)].min(axis=1)
+        k = left[int(np.argmax(inside))]
+        t = np.array(tour)
+        after = np.roll(t, -1)
+        between = d[t, after] if len(t) > 1 else np.zeros(1)
+        tour.insert(int(np.argmin(d[t, k] + d[k, after] - between)) + 1, k)
         left.remove(k)
-    return np.array(tour[1:], dtype=np.int64)
-
-
-@njit(cache=True)
-def _cluster_length(order, d):
-    total = d[0, order[0]] + d[order[-1], 0]
-    for k in range(len(order) - 1):
-        total += d[order[k], order[k + 1]]
-    return total
-
-
-@njit(cache=True)
-def _descend(order, start, costs, cluster_costs, work):
-    """First-improvement descent by segment moves (length up to 3, either way round) and reversals,
-    in place; returns the length of the best tour in that order."""
-    n = len(order)
-    best = layered_length(order, start, costs, work)
-    if n < 2:
-        return best
-    trial = np.empty_like(order)
-    improved = True
-    while improved:
-        improved = False
-        for i in range(n):
-            for size in range(1, min(3, n - i) + 1):
-                for at in range(n - size + 1):
-                    if at == i:
-                        continue
-                    for flip in range(2 if size > 1 else 1):
-                        _move(order, trial, i, size, at, flip)
-                        if _cluster_length(trial, cluster_costs) >= best:
-                            continue
-                        length = layered_length(trial, start, costs, work)
-                        if length < best * (1.0 - 1e-12):
-                            best = length
-                            _copy(trial, order)
-                            improved = True
-            for j in range(i + 2, n + 1):
-                _copy(order, trial)
-                for k in range(j - i):
-                    trial[i + k] = order[j - 1 - k]
-                if _cluster_length(trial, cluster_costs) >= best:
-                    continue
-                length = layered_length(trial, start, costs, work)
-                if length < best * (1.0 - 1e-12):
-                    best = length
-                    _copy(trial, order)
-                    improved = True
-    return best
-
-
-@njit(cache=True)
-def _move(order, trial, i, size, at, flip):
-    """Write to `trial` the order with order[i:i+size] taken out and put back at position `at`."""
-    n = len(order)
-    k = 0
-    rest = 0
-    while k < n:
-        if k == at:
-            for s in range(size):
-                trial[k + s] = order[i + size - 1 - s] if flip else order[i + s]
-            k += size
-            continue
-        if rest == i:
-            rest += size
-        trial[k] = order[rest]
-        rest += 1
-        k += 1
-
-
-@njit(cache=True)
-def _copy(a, b):
-    for k in range(len(a)):
-        b[k] = a[k]
+    return np.array(tour, dtype=np.int64)

@@ -51,7 +51,7 @@ class Params:
     """backend : one of `BACKENDS`. search_rounds : perturbations of the heuristic at the start."""
 
     backend: str = DEFAULT_BACKEND
-    search_rounds: int = 30
+    search_rounds: int = 500
 
     def __post_init__(self) -> None:
         if self.backend not in BACKENDS:
@@ -116,19 +116,14 @@ class MipRun(Run):
         """A first incumbent by local search, if the graph lets one be found."""
         graph = self.graph
         self.instance = Instance(graph)
-        start_tour = None
-        if self.tour is not None:
-            position = np.empty(len(graph), dtype=np.int64)
-            position[self.instance.order] = np.arange(len(graph))
-            start_tour = position[np.array(self.tour)]
         _, tour = local_search(
             self.instance,
             self.rng,
             rounds=self.params.search_rounds,
             clock=self.clock,
-            start_tour=start_tour,
+            start_order=None if self.tour is None else self.instance.order_of(self.tour),
         )
-        self.offer(self.instance.original(tour))
+        self.offer(tour)
         self.report("heuristic")
 
     def root(self) -> None:
@@ -266,11 +261,10 @@ class MipRun(Run):
             order = _follow(point, graph.cluster)
         if sorted(order) != list(range(1, graph.goal_count + 1)):
             return
-        first = self.instance.start[np.array([0, *order])]
         _, tour = local_search(
-            self.instance, self.rng, rounds=0, clock=self.clock, start_tour=first
+            self.instance, self.rng, rounds=0, clock=self.clock, start_order=[0, *order]
         )
-        self.offer(self.instance.original(tour))
+        self.offer(tour)
 
     def _purge(self, point: Point) -> None:
         """Take cuts out of the LP that have been slack for some rounds."""

@@ -1,0 +1,287 @@
+"""Ruin and recreate on orders of clusters, with the classes of every order chosen exactly.
+
+Slack induction by string removals (Christiaens & Vanden Berghe 2020, "Slack induction by string
+removals for vehicle routing problems"), carried over to the generalised TSP: a stretch of the tour
+near a random goal is taken out, its clusters are put back one by one where they cost least, and the
+new tour is accepted by simulated annealing.
+
+What an insertion costs is exact in the sense of the whole tour: with ``ahead[k, i]`` the shortest
+way from the base to vertex i of the k-th cluster and ``behind[k, i]`` from there home, the best
+tour that has cluster c after position k is ``min over i, j, l of ahead[k, i] + c_ij + c_jl +
+behind[k + 1, l]``, every class of every other goal chosen anew.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from netsp.chance import below, uniform
+
+LONGEST_STRING = 10
+"""Most clusters in one removed stretch."""
+
+REMOVED = 10
+"""Average number of clusters removed together."""
+
+BLINK = 0.01
+"""Chance that a place is overlooked (same paper, section 3.3)."""
+
+
+@njit(cache=True, nogil=True)
+def forward(order, n, first, start, costs, ahead):
+    """Fill ``ahead`` from position `first` on; order[0] is the base, positions run to n - 1."""
+    for k in range(first, n):
+        c, p = order[k], order[k - 1]
+        for j in range(start[c], start[c + 1]):
+            best = np.inf
+            for i in range(start[p], start[p + 1]):
+                d = ahead[k - 1, i - start[p]] + costs[i, j]
+                if d < best:
+                    best = d
+            ahead[k, j - start[c]] = best
+
+
+@njit(cache=True, nogil=True)
+def backward(order, n, last, start, costs, behind):
+    """Fill ``behind`` from position `last` down to 1; behind[n] is the way from the base home."""
+    for k in range(last, 0, -1):
+        c = order[k]
+        q = order[k + 1] if k + 1 < n else 0
+        for j in range(start[c], start[c + 1]):
+            best = np.inf
+            for i in range(start[q], start[q + 1]):
+                d = behind[k + 1, i - start[q]] + costs[j, i]
+                if d < best:
+                    best = d
+            behind[k, j - start[c]] = best
+
+
+@njit(cache=True, nogil=True)
+def inserted(c, k, order, n, start, costs, ahead, behind, limit):
+    """Length of the best tour with cluster c after position k."""
+    p = order[k]
+    q = order[k + 1] if k + 1 < n else 0
+    best = limit
+    for j in range(start[c], start[c + 1]):
+        there = np.inf
+        for i in range(start[p], start[p + 1]):
+            d = ahead[k, i - start[p]] + costs[i, j]
+            if d < there:
+                there = d
+        if there >= best:
+            continue
+        for i in range(start[q], start[q + 1]):
+            d = there + costs[j, i] + behind[k + 1, i - start[q]]
+            if d < best:
+                best = d
+    return best
+
+
+@njit(cache=True, nogil=True)
+def insert_best(c, order, n, start, costs, near, ahead, behind, blink, chance):
+    """Put a cluster where it costs least, next to one of its near clusters or the base; returns the
+    new size and the length of the tour."""
+    best, at = np.inf, -1
+    tried = False
+    for k in range(n):
+        close = k == 0 or k == n - 1 or near[c, order[k]]
+        if not close:
+            q = order[k + 1] if k + 1 < n else 0
+            close = near[c, q]
+        if not close:
+            continue
+        if blink > 0.0 and tried and uniform(chance) < blink:
+            continue
+        tried = True
+        d = inserted(c, k, order, n, start, costs, ahead, behind, best)
+        if d < best:
+            best, at = d, k
+    for k in range(n, at + 1, -1):
+        order[k] = order[k - 1]
+        for i in range(behind.shape[1]):
+            behind[k + 1, i] = behind[k, i]
+    for i in range(behind.shape[1]):
+        behind[at + 2, i] = behind[at + 1, i]
+    order[at + 1] = c
+    n += 1
+    forward(order, n, at + 1, start, costs, ahead)
+    backward(order, n, at + 1, start, costs, behind)
+    return n, best
+
+
+@njit(cache=True, nogil=True)
+def descend(order, start, costs, near, ahead, behind, chance):
+    """Take every cluster out and put it back where it costs least, until nothing improves; returns
+    the length."""
+    n = len(order)
+    work = np.empty(n + 1, dtype=np.int64)
+    length = tour_length(order, start, costs, ahead, behind)
+    improved = True
+    while improved:
+        improved = False
+        for c in range(1, n):
+            size = 0
+            for k in range(n):
+                if order[k] != c:
+                    work[size] = order[k]
+                    size += 1
+            forward(work, size, 1, start, costs, ahead)
+            behind[size, 0] = 0.0
+            backward(work, size, size - 1, start, costs, behind)
+            size, d = insert_best(c, work, size, start, costs, near, ahead, behind, 0.0, chance)
+            if d < length * (1.0 - 1e-12):
+                length = d
+                improved = True
+                for k in range(n):
+                    order[k] = work[k]
+    return length
+
+
+@njit(cache=True, nogil=True)
+def tour_length(order, start, costs, ahead, behind):
+    """Length of the best tour in the given order."""
+    n = len(order)
+    if n == 1:
+        return 0.0
+    ahead[0, 0] = 0.0
+    forward(order, n, 1, start, costs, ahead)
+    c = order[n - 1]
+    best = np.inf
+    for j in range(start[c], start[c + 1]):
+        best = min(best, ahead[n - 1, j - start[c]] + costs[j, 0])
+    return best
+
+
+@njit(cache=True, nogil=True)
+def two_opt(order, start, costs, nearest, ahead, behind):
+    """Reverse stretches of the order as long as that shortens the tour; candidates are those whose
+    two new legs could be shorter than the two old ones; returns the length."""
+    n = len(order)
+    work = np.empty(n, dtype=np.int64)
+    tour = np.empty(n, dtype=np.int64)
+    length = tour_length(order, start, costs, ahead, behind)
+    trace(order, start, costs, ahead, tour)
+    improved = True
+    while improved:
+        improved = False
+        for i in range(1, n - 1):
+            for j in range(i + 1, n):
+                after = tour[j + 1] if j + 1 < n else 0
+                c_after = order[j + 1] if j + 1 < n else 0
+                old = costs[tour[i - 1], tour[i]] + costs[tour[j], after]
+                new = nearest[order[i - 1], order[j]] + nearest[order[i], c_after]
+                if new >= old:
+                    continue
+                for k in range(n):
+                    work[k] = order[k] if k < i or k > j else order[i + j - k]
+                d = tour_length(work, start, costs, ahead, behind)
+                if d < length * (1.0 - 1e-12):
+                    length = d
+                    improved = True
+                    for k in range(n):
+                        order[k] = work[k]
+                    trace(order, start, costs, ahead, tour)
+    return length
+
+
+@njit(cache=True, nogil=True)
+def trace(order, start, costs, ahead, tour):
+    """The vertices of the best tour, from ``ahead`` filled for the order."""
+    n = len(order)
+    tour[0] = 0
+    v = 0
+    for k in range(n - 1, 0, -1):
+        c = order[k]
+        best, pick = np.inf, start[c]
+        for j in range(start[c], start[c + 1]):
+            d = ahead[k, j - start[c]] + costs[j, v]
+            if d < best:
+                best, pick = d, j
+        tour[k] = pick
+        v = pick
+
+
+@njit(cache=True, nogil=True)
+def ruin_and_recreate(
+    order, best, length, best_length, count, theta, start, costs, nearest, near, rank, chance
+):  # fmt: skip
+    """Make `count` rounds at temperature θ, in place; returns the lengths of the present order and
+    of the best, which is kept in `best`.
+
+    nearest : (m + 1, m + 1) least legs between clusters. near : which clusters are near which.
+    rank : (m + 1, k) the nearest clusters of each, nearest first.
+    """
+    n = len(order)
+    largest = 0
+    for c in range(n):
+        largest = max(largest, start[c + 1] - start[c])
+    ahead = np.zeros((n + 2, largest))
+    behind = np.zeros((n + 3, largest))
+    work = np.empty(n + 1, dtype=np.int64)
+    out = np.zeros(n, dtype=np.bool_)
+    position = np.empty(n, dtype=np.int64)
+    gone = np.empty(n, dtype=np.int64)
+    key = np.empty(n)
+    for _ in range(count):
+        for k in range(n):
+            out[k] = False
+            position[order[k]] = k
+        # strings around clusters near a seed, as in the paper, section 3.1
+        longest = min(LONGEST_STRING, n - 1)
+        strings = int(uniform(chance) * (4.0 * REMOVED / (1.0 + longest))) + 1
+        seed = 1 + below(n - 1, chance)
+        removed = 0
+        for r in range(-1, rank.shape[1]):
+            if strings == 0:
+                break
+            c = seed if r < 0 else rank[seed, r]
+            if c == 0 or out[c]:
+                continue
+            strings -= 1
+            size = 1 + below(longest, chance)
+            low = position[c] - below(size, chance)
+            for k in range(low, low + size):
+                if 1 <= k < n and not out[order[k]]:
+                    out[order[k]] = True
+                    gone[removed] = order[k]
+                    removed += 1
+        size = 0
+        for k in range(n):
+            if not out[order[k]]:
+                work[size] = order[k]
+                size += 1
+        # put back in random order, the farthest from the base first, or the nearest first
+        mode = below(4, chance)
+        for r in range(removed):
+            if mode == 0:
+                key[r] = -nearest[0, gone[r]]
+            elif mode == 1:
+                key[r] = nearest[0, gone[r]]
+            else:
+                key[r] = uniform(chance)
+        for r in range(1, removed):
+            c, x = gone[r], key[r]
+            q = r - 1
+            while q >= 0 and key[q] > x:
+                gone[q + 1], key[q + 1] = gone[q], key[q]
+                q -= 1
+            gone[q + 1], key[q + 1] = c, x
+        ahead[0, 0] = 0.0
+        forward(work, size, 1, start, costs, ahead)
+        behind[size, 0] = 0.0
+        backward(work, size, size - 1, start, costs, behind)
+        d = 0.0
+        for r in range(removed):
+            size, d = insert_best(
+                gone[r], work, size, start, costs, near, ahead, behind, BLINK, chance
+            )
+        if d < length - theta * np.log(max(uniform(chance), 1e-300)):
+            length = d
+            for k in range(n):
+                order[k] = work[k]
+            if d < best_length * (1.0 - 1e-12):
+                best_length = d
+                for k in range(n):
+                    best[k] = work[k]
+    return length, best_length
