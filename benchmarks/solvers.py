@@ -125,7 +125,7 @@ def heuristics(goals: int = 20, tether: float = 350.0) -> None:
             note = f" (entangles {np.mean(held):.1f} obstacles on average)"
         row(
             name, limit, f"{np.mean(over):.2f}", f"{np.median(over):.2f}", f"{max(over):.2f}",
-            f"{sum(x < 1e-4 for x in over)}/10", f"{statistics.median(times):.3f}",
+            f"{sum(abs(x) < 1e-4 for x in over)}/10", f"{statistics.median(times):.3f}",
             f"{max(times):.3f}", f"{verified}/10{note}",
         )  # fmt: skip
 
