@@ -24,7 +24,8 @@ class Progress:
     """One row of the progress table. Lengths in problem units, time in seconds since the start of
     the solver; None where nothing is known yet.
 
-    iteration : of the solver; each says what one is. current, entangled : of solvers that walk from
+    cuts, legs, vertices : in the program, and left after elimination. iteration : of the solver;
+    each says what one is. current, entangled : of solvers that walk from
     state to state, the length of the present one and how many obstacles it entangles.
     """
 
@@ -34,6 +35,7 @@ class Progress:
     bound: float | None = None
     cuts: int = 0
     legs: int = 0
+    vertices: int = 0
     iteration: int = 0
     current: float | None = None
     entangled: int | None = None

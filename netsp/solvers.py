@@ -283,7 +283,7 @@ def _tour_of(solution: Solution, graph: TravelGraph) -> list[int] | None:
     if there is None and order:
         from netsp.lns import Instance, best_classes
 
-        instance = Instance(graph)
+        instance = Instance.of(graph)
         _, tour = best_classes(np.array(order), instance.start, instance.costs)
         return list(instance.original(tour))
     return [0, *(there or [])]

@@ -117,6 +117,11 @@ class TravelGraph:
             self._costs = costs
         return self._costs
 
+    @property
+    def measured(self) -> bool:
+        """Whether all legs have been measured."""
+        return self._costs is not None
+
     def costs_among(self, vertices: npt.ArrayLike) -> Floats:
         """(k, k) leg costs among some vertices only, for solvers that eliminate the others first;
         inf within a cluster."""

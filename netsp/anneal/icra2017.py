@@ -64,7 +64,7 @@ def solve(
         return run.result()
     try:
         run.check()
-        instance = Instance(graph)
+        instance = Instance.of(graph)
         goals = graph.goal_count
         state = np.zeros(goals + 1, dtype=np.int64)
         if run.tour is not None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -22,53 +21,43 @@ RANKED = 60
 """Neighbours of a cluster that are taken out with it."""
 
 
-@dataclass(frozen=True)
 class Instance:
-    """A travel graph with vertices grouped by cluster: members of cluster c are
-    order[start[c]:start[c + 1]]."""
+    """Vertices grouped by cluster: members of cluster c are order[start[c]:start[c + 1]].
 
-    graph: TravelGraph
+    cluster : (V,). costs : (V, V) leg costs; where there is no leg (inf), a cost that no tour of
+    legs alone can reach is put. labels : (V,) what the vertices are called outside.
+    """
 
-    @cached_property
-    def order(self) -> Ints:
-        """Vertices by cluster."""
-        return np.argsort(self.graph.cluster, kind="stable").astype(np.int64)
+    def __init__(self, cluster: Ints, costs: Floats, labels: Ints | None = None) -> None:
+        self.clusters = int(cluster.max()) + 1
+        self.order: Ints = np.argsort(cluster, kind="stable").astype(np.int64)
+        self.start: Ints = np.searchsorted(
+            cluster[self.order], np.arange(self.clusters + 1)
+        ).astype(np.int64)
+        self.labels = self.order if labels is None else labels[self.order]
+        grouped = costs[np.ix_(self.order, self.order)]
+        finite = np.isfinite(grouped)
+        most = float(np.max(grouped[finite], initial=0.0))
+        grouped[~finite] = 2.0 * self.clusters * most + 1.0
+        self.costs: Floats = np.ascontiguousarray(grouped)
 
-    @cached_property
-    def start(self) -> Ints:
-        """Row starts into `order`."""
-        c = self.graph.cluster[self.order]
-        return np.searchsorted(c, np.arange(self.graph.goal_count + 2)).astype(np.int64)
-
-    @cached_property
-    def costs(self) -> Floats:
-        """(V, V) leg costs in the order of `order`; where there is no leg, a cost that no tour of
-        legs alone can reach."""
-        costs = self.graph.costs[np.ix_(self.order, self.order)]
-        finite = np.isfinite(costs)
-        most = float(np.max(costs[finite], initial=0.0))
-        costs[~finite] = 2.0 * (self.graph.goal_count + 1) * most + 1.0
-        return np.ascontiguousarray(costs)
+    @classmethod
+    def of(cls, graph: TravelGraph) -> Instance:
+        """All of a travel graph."""
+        return cls(graph.cluster, graph.costs)
 
     @cached_property
     def cluster_costs(self) -> Floats:
-        """(m + 1, m + 1) least leg cost between clusters."""
-        k = len(self.start) - 1
-        out = np.full((k, k), np.inf)
-        for a in range(k):
-            for b in range(k):
-                block = self.costs[
-                    self.start[a] : self.start[a + 1], self.start[b] : self.start[b + 1]
-                ]
-                if a != b:
-                    out[a, b] = block.min()
-        return out
+        """(m + 1, m + 1) least leg cost between clusters; inf on the diagonal."""
+        rows = np.minimum.reduceat(self.costs, self.start[:-1], axis=0)
+        out = np.minimum.reduceat(rows, self.start[:-1], axis=1)
+        np.fill_diagonal(out, np.inf)
+        return np.asarray(out)
 
     @cached_property
     def rank(self) -> Ints:
         """(m + 1, k) clusters nearest to each, nearest first; the base is among them."""
-        d = self.cluster_costs.copy()
-        np.fill_diagonal(d, np.inf)
+        d = self.cluster_costs
         return np.argsort(d, axis=1, kind="stable")[:, : min(RANKED, len(d) - 1)]
 
     @cached_property
@@ -78,13 +67,9 @@ class Instance:
         out[np.arange(len(out))[:, None], self.rank[:, :NEAR]] = True
         return np.asarray(out | out.T)
 
-    def order_of(self, tour: npt.ArrayLike) -> Ints:
-        """Clusters in the order of a tour of the travel graph, base first."""
-        return np.asarray(self.graph.cluster[np.asarray(tour, dtype=np.int64)])
-
     def original(self, tour: npt.ArrayLike) -> tuple[int, ...]:
-        """Vertices of the travel graph from positions in `order`."""
-        return tuple(int(v) for v in self.order[np.asarray(tour, dtype=np.int64)])
+        """Labels of the vertices at positions in `order`."""
+        return tuple(int(v) for v in self.labels[np.asarray(tour, dtype=np.int64)])
 
 
 @njit(cache=True)

@@ -12,10 +12,15 @@ says the same and also ties the class of the incoming leg to that of the outgoin
 a printer's subtour cut (its left side lacks the restriction to S); ours is the generalised subtour
 elimination constraint y(δ(S)) >= 2 x(S ∩ C), rewritten with (3): if the vertex that serves C lies
 in S, the tour must enter and leave S. (Fischetti, Salazar & Toth 1995, here aggregated over S ∩ C.)
+
+The relaxation does without x: by (3) x_v is half the legs at v, so (2) reads y over the legs at a
+cluster = 2, and (4), times -2, y(δ(S)) - y(δ(S ∩ C)) >= 0 with legs counted at the vertices of
+S ∩ C. That leaves one row per cluster where there was one per vertex.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -35,6 +40,18 @@ class Cut:
     cluster: int
 
 
+def cut_coefficients(cuts: Sequence[Cut], cluster: Ints, legs: Ints) -> Floats:
+    """(cuts, legs) coefficients of y(δ(S)) - y at S ∩ C >= 0: 1 for a leg out of S \\ C, -1 for one
+    between S ∩ C and S \\ C, else 0."""
+    out = np.zeros((len(cuts), len(legs)))
+    for k, cut in enumerate(cuts):
+        u, v = cut.inside[legs[:, 0]], cut.inside[legs[:, 1]]
+        of_c = cluster == cut.cluster
+        at_c = (u & of_c[legs[:, 0]]).astype(np.int8) + (v & of_c[legs[:, 1]])
+        out[k] = (u ^ v).astype(np.int8) - at_c
+    return out
+
+
 @dataclass(frozen=True)
 class Duals:
     """Dual values: λ of (2) by cluster, π of (3) by vertex, μ <= 0 of (4) by cut."""
@@ -44,15 +61,38 @@ class Duals:
     cut: Floats
 
 
+def restricted(
+    cluster: Ints, legs: Ints, cuts: Sequence[Cut], keep: Bools
+) -> tuple[Ints, Ints, list[Cut]]:
+    """Cluster, legs and cuts renumbered for the vertices marked."""
+    number = np.cumsum(keep) - 1
+    return cluster[keep], number[legs], [Cut(c.inside[keep], c.cluster) for c in cuts]
+
+
+def duals_of_relaxation(
+    by_cluster: Floats, by_cut: Floats, cuts: Sequence[Cut], cluster: Ints
+) -> Duals:
+    """Duals of (2)-(4) from those of the relaxation without x, so that no vertex has a reduced
+    cost of its own: λ = 2 by_cluster, μ = -2 by_cut, π_v = by_cluster + by_cut where v is in
+    S \\ C."""
+    prices = np.maximum(by_cut, 0.0)
+    degree = by_cluster[cluster].copy()
+    for cut, price in zip(cuts, prices, strict=True):
+        if price > 0.0:
+            degree[cut.inside & (cluster != cut.cluster)] += price
+    return Duals(2.0 * by_cluster, degree, -2.0 * prices)
+
+
 @dataclass(frozen=True)
 class Point:
-    """An LP or integer solution: x by vertex, y by leg (k, 2); duals of an LP."""
+    """An LP or integer solution: x by vertex, y by leg (k, 2); duals and slacks by cut of an LP."""
 
     x: Floats
     legs: Ints
     y: Floats
     objective: float
     duals: Duals | None
+    slack: Floats | None = None
 
 
 @dataclass(frozen=True)
@@ -70,19 +110,28 @@ class IntegerOutcome:
     infeasible: bool = False
 
 
-class Program(Protocol):
-    """A backend: the program over a growing set of legs and cuts.
+class Relaxation(Protocol):
+    """The linear relaxation over a changing set of legs and cuts.
 
     legs : (k, 2) legs u < v in the program. cuts : cuts in the program. infeasible : whether the
-    last relaxation was found to have no solution.
+    last solve found that there is no solution.
     """
 
     legs: Ints
     cuts: list[Cut]
     infeasible: bool
 
-    def add_legs(self, legs: Ints) -> None:
-        """Bring legs (k, 2) into the program, with their coefficients in every row."""
+    def add_legs(self, legs: Ints, costs: Floats) -> None:
+        """Bring legs (k, 2) into the program."""
+
+    def keep_legs(self, keep: Bools) -> None:
+        """Take all legs out of the program but those marked."""
+
+    def restrict(self, keep: Bools) -> None:
+        """Renumber legs and cuts for the vertices marked; no other has a leg in the program."""
+
+    def set_costs(self, costs: Floats) -> None:
+        """Set the costs of all legs in the program."""
 
     def add_cuts(self, cuts: list[Cut]) -> None:
         """Bring cuts into the program."""
@@ -90,8 +139,18 @@ class Program(Protocol):
     def keep_cuts(self, keep: Bools) -> None:
         """Take all cuts out of the program but those marked."""
 
-    def solve_relaxation(self, time_left: float) -> Point | None:
-        """The LP relaxation's optimum with duals; None if the time ran out."""
+    def solve(self, time_left: float) -> Point | None:
+        """The optimum with duals; None if there is none or the time ran out."""
 
-    def solve_integer(self, time_left: float) -> IntegerOutcome:
+
+class IntegerProgram(Protocol):
+    """The integer program over fixed legs and a growing set of cuts."""
+
+    legs: Ints
+    cuts: list[Cut]
+
+    def add_cuts(self, cuts: list[Cut]) -> None:
+        """Bring cuts into the program."""
+
+    def solve(self, time_left: float) -> IntegerOutcome:
         """The best integer solution, as far as the time goes."""

@@ -76,7 +76,7 @@ def solve(
         if whole and part.bound is not None:
             outer.raise_bound(part.bound)
         outer.iterations = row.iteration
-        outer.report(row.stage, cuts=row.cuts, legs=row.legs)
+        outer.report(row.stage, cuts=row.cuts, legs=row.legs, vertices=row.vertices)
 
     part.on_progress = pass_on
     place = {int(v): k for k, v in enumerate(kept)}
@@ -87,7 +87,7 @@ def solve(
     if result.tour is not None:
         outer.offer(kept[np.array(result.tour)].tolist())
         if chosen.polish and not whole:
-            instance = Instance(graph)
+            instance = Instance.of(graph)
             order = graph.cluster[kept[np.array(result.tour[1:])]]
             _, tour = best_classes(order, instance.start, instance.costs)
             outer.offer(instance.original(tour))

@@ -1,9 +1,7 @@
-"""Cutting planes at fractional points, then lazy rounds at integer ones.
+"""`mip`: heuristic, cutting planes at fractional points, then lazy rounds at integer ones.
 
-The root loop alternates the LP over few legs with two questions to the whole graph: which legs
-price out negative, and which subtour cuts are violated. Every round yields a valid bound
-(`netsp.mip.bound`). What cannot be in a better tour than the incumbent is then fixed by reduced
-cost, and the small integer program that remains is solved, cut at its subtours, and solved again.
+The root (`netsp.mip.root`) bounds every tour and rules out most legs and vertices. The small
+integer program that is left is solved, cut at its subtours, and solved again.
 """
 
 from __future__ import annotations
@@ -14,41 +12,36 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from netsp.lns import Instance, local_search
-from netsp.mip.bound import dual_bound, fixing_costs, reduced_costs
-from netsp.mip.program import Point, Program
-from netsp.mip.subtours import component_cuts, fractional_cuts, tour_from
+from netsp.lns import Instance, Search
+from netsp.mip.costs import LegCosts
+from netsp.mip.program import IntegerProgram, Ints, Point, Relaxation
+from netsp.mip.root import Root, tour_legs
+from netsp.mip.subtours import component_cuts, follow, tour_from
 from netsp.result import OnProgress, Result
 from netsp.run import Run, Stop, read_params
 from netsp.travel import TravelGraph
 
-Ints = npt.NDArray[np.int64]
-
 BACKENDS = {
-    "highs": "netsp.mip.highs_program:HighsProgram",
-    "cbc": "netsp.mip.cbc_program:CbcProgram",
+    "highs": ("netsp.mip.highs:HighsRelaxation", "netsp.mip.highs:HighsInteger"),
+    "cbc": ("netsp.mip.cbc_program:CbcRelaxation", "netsp.mip.cbc_program:CbcInteger"),
 }
-"""Who solves the program. `highs` re-solves the LP in process and is the faster; `cbc` is the
+"""Who solves the programs. `highs` re-solves the LP in process and is the faster; `cbc` is the
 paper's shape."""
 
 DEFAULT_BACKEND = "highs"
 
-NEAREST = 6
-"""Legs per vertex in the first LP."""
+CORE = 8
+"""Classes per goal among which the heuristic looks, while not all legs are measured."""
 
-PRICED_PER_VERTEX = 4
-"""Most legs per vertex that one pricing round brings in."""
-
-
-PURGE_AFTER = 6
-"""A cut that was slack for so many rounds in a row leaves the LP; separation finds it again."""
+ROUND_EVERY = 4
+"""Rounds of the root between two attempts to turn its point into a tour."""
 
 
 @dataclass(frozen=True)
 class Params:
-    """backend : one of `BACKENDS`. search_rounds : perturbations of the heuristic at the start."""
+    """backend : one of `BACKENDS`. search_rounds : rounds of ruin and recreate at the start, and
+    again after the root."""
 
     backend: str = DEFAULT_BACKEND
     search_rounds: int = 500
@@ -84,221 +77,134 @@ def solve(
 
 
 class MipRun(Run):
-    """State of one solve: incumbent, bound, model."""
+    """State of one solve."""
 
     def solve(
         self, rng: np.random.Generator, params: Params, warm_start: Sequence[int] | None
     ) -> Result:
         """Heuristic, root, integer rounds."""
         self.rng, self.params = rng, params
-        self.model: Program | None = None
-        self.fixing: tuple[float, npt.NDArray[np.float64]] | None = None
-        self.slack_rounds: dict[int, int] = {}
         self.bound = 0.0
+        self._core: tuple[int, Instance] | None = None
         try:
             self.offer(warm_start)
             if not self.trivial():
-                self.start()
-                self.root()
-                self.integer()
+                self._solve()
         except (Stop, KeyboardInterrupt):
             self.report("stopped")
         return self.result()
 
-    def report(self, stage: str, **more: Any) -> None:
-        """As `Run.report`, with the size of the model."""
-        size = {"cuts": len(self.model.cuts), "legs": len(self.model.legs)} if self.model else {}
-        super().report(stage, **size, **more)
-
-    # stages
-
-    def start(self) -> None:
-        """A first incumbent by local search, if the graph lets one be found."""
-        graph = self.graph
-        self.instance = Instance(graph)
-        _, tour = local_search(
-            self.instance,
-            self.rng,
-            rounds=self.params.search_rounds,
-            clock=self.clock,
-            start_order=None if self.tour is None else self.instance.order_of(self.tour),
-        )
-        self.offer(tour)
-        self.report("heuristic")
-
-    def root(self) -> None:
-        """The LP relaxation with all violated subtour cuts and all legs priced."""
-        graph = self.graph
-        self.model = self._program(self._first_legs(), np.arange(len(graph)))
-        while not self.done:
+    def _solve(self) -> None:
+        relaxation, integer = (_load(path) for path in BACKENDS[self.params.backend])
+        costs = LegCosts(self.graph)
+        self.search(costs, np.zeros(0, dtype=np.int64))
+        self.report("heuristic", vertices=len(costs))
+        root = Root(self, costs, relaxation, self.round)
+        root.solve()
+        if not self.done and root.point is not None:
+            used = np.flatnonzero(root.point.x > 1e-6)
+            self.search(costs, used)
+            self.report("heuristic", **root.size())
+        if not self.done and costs.exact is not None:
             self.check()
-            point = self.model.solve_relaxation(self.clock.left)
-            self.iterations += 1
-            if point is None:
-                # without an incumbent all legs are in the program from the start
-                self.infeasible = self.model.infeasible and self.tour is None
-                raise Stop
-            before = self.bound
-            priced = self._price(point)
-            if self.bound is not None and before is not None and self.bound > before:
-                self._purge(point)
-            cuts = fractional_cuts(point.x, point.legs, point.y, graph.cluster)
-            self._round(point)
-            self.report("root")
-            if self.done or (priced == 0 and not cuts):
-                return
-            self.model.add_cuts(cuts)
+            costs.measure_all()
+            root.lp.set_costs(costs.values[root.lp.legs[:, 0], root.lp.legs[:, 1]])
+            root.solve()
+        if not self.done:
+            self.integer(root, integer)
 
-    def integer(self) -> None:
-        """The integer program on what reduced costs have not ruled out, with lazy cuts."""
-        if self.done:
+    # incumbents
+
+    def instance(self, costs: LegCosts, more: Ints) -> Instance:
+        """What the heuristic searches: everything if it is measured, else the classes of least
+        tether, the incumbent's, and more."""
+        if costs.exact is None:
+            if self._core is None or self._core[0] != len(costs):
+                self._core = len(costs), Instance(costs.cluster, costs.values, costs.vertices)
+            return self._core[1]
+        order = np.lexsort((costs.values[0], costs.cluster))
+        cluster = costs.cluster[order]
+        rank = np.arange(len(order)) - np.searchsorted(cluster, cluster)
+        own = np.searchsorted(costs.vertices, np.array(self.tour or (0,)))
+        core = np.unique(np.concatenate([order[rank < CORE], own, more]))
+        costs.measure(core)
+        return Instance(costs.cluster[core], costs.values[np.ix_(core, core)], costs.vertices[core])
+
+    def search(self, costs: LegCosts, more: Ints) -> None:
+        """Local search, then ruin and recreate, from the incumbent if there is one."""
+        instance = self.instance(costs, more)
+        start = None if self.tour is None else self.graph.cluster[list(self.tour)]
+        search = Search(instance, self.rng, start)
+        search.settle()
+        search.run(self.params.search_rounds, self.clock)
+        self.offer(search.best()[1])
+
+    def round(self, root: Root, point: Point) -> None:
+        """Now and then, turn a point of the root into a tour."""
+        whole = np.abs(point.y - np.rint(point.y)).max(initial=0.0) < 1e-6
+        if whole or self.iterations % ROUND_EVERY == 0:
+            self.tour_at(root.costs, point, whole=whole)
+
+    def tour_at(self, costs: LegCosts, point: Point, *, whole: bool) -> None:
+        """Join the cycles of a point, or follow its strongest legs, and improve that."""
+        cluster = costs.cluster
+        if whole:
+            cycles = tour_from(point.x, point.legs, point.y)
+            if len(cycles) == 1:
+                self.offer(costs.vertices[cycles[0]].tolist())
+            order = [int(cluster[v]) for cycle in cycles for v in cycle]
+        else:
+            order = follow(point.legs, point.y, cluster)
+        if sorted(order) != list(range(self.graph.goal_count + 1)):
             return
-        graph, root = self.graph, self.model
-        assert root is not None
-        assert self.fixing is not None
-        bound, rise = self.fixing
-        upper = np.triu(bound + rise <= self.length * (1.0 + 1e-9), 1)
-        upper &= np.isfinite(graph.costs)
-        legs = np.argwhere(upper)
-        tour_legs = _tour_legs(self.tour or ())
-        legs = np.unique(np.vstack([legs, tour_legs]), axis=0)
+        search = Search(self.instance(costs, np.flatnonzero(point.x > 1e-6)), self.rng, order)
+        search.settle()
+        self.offer(search.best()[1])
+
+    # the end
+
+    def integer(self, root: Root, program: Any) -> None:
+        """The integer program on what the root has not ruled out, with lazy cuts."""
+        costs = root.costs
+        legs = np.argwhere(np.triu(~root.dead, 1))
+        legs = np.unique(np.vstack([legs, tour_legs(root.tour())]), axis=0)
         vertices = np.unique(np.concatenate([[0], legs.ravel()]))
-        model = self._program(legs, vertices)
-        model.add_cuts(root.cuts)
-        self.model = model
-        self.report("fixed")
+        model: IntegerProgram = program(
+            costs.cluster, vertices, legs, costs.values[legs[:, 0], legs[:, 1]], root.lp.cuts
+        )
+        size = {"legs": len(legs), "vertices": len(vertices)}
+        self.report("fixed", cuts=len(model.cuts), **size)
         while not self.done:
             self.check()
-            outcome = model.solve_integer(self.clock.left)
+            outcome = model.solve(self.clock.left)
             self.iterations += 1
             point = outcome.point
             if outcome.infeasible:
-                # nothing that survived the fixing beats the incumbent, if there is one
+                # nothing that was not ruled out beats the incumbent, if there is one
                 self.infeasible = self.tour is None
                 if self.tour is not None:
-                    self.raise_bound(self.length)
+                    self.raise_bound(root.cutoff)
                 break
             if outcome.bound is not None:
-                self.raise_bound(outcome.bound)
+                self.raise_bound(min(outcome.bound, root.cutoff))
             if point is not None:
-                self._round(point)
-            self.report("integer")
+                self.tour_at(costs, point, whole=True)
+            self.report("integer", cuts=len(model.cuts), **size)
             if self.done:
                 break
             if point is None or not outcome.finished:
                 raise Stop
-            cuts = component_cuts(np.rint(point.x), point.legs, np.rint(point.y), graph.cluster)
+            cuts = component_cuts(np.rint(point.x), point.legs, np.rint(point.y), costs.cluster)
             if not cuts:
                 # an optimal tour of the program: the bound stands at its own length
                 break
             model.add_cuts(cuts)
-        self.report("proven" if self.done else "integer")
-
-    # parts
-
-    def _program(self, legs: Ints, vertices: Ints) -> Program:
-        module, attribute = BACKENDS[self.params.backend].split(":")
-        program: Program = getattr(importlib.import_module(module), attribute)(
-            self.graph.cluster, self.graph.costs, legs, vertices
-        )
-        return program
-
-    def _first_legs(self) -> Ints:
-        """The nearest legs of every vertex, all legs to the base, and the incumbent's; all legs if
-        there is no incumbent, so that an infeasible program means that there is no tour."""
-        costs = self.graph.costs
-        if self.tour is None:
-            return np.argwhere(np.triu(np.isfinite(costs), 1))
-        k = min(NEAREST, len(costs) - 1)
-        near = np.argpartition(costs, k - 1, axis=1)[:, :k]
-        u = np.repeat(np.arange(len(costs)), k)
-        pairs = [np.column_stack([u, near.ravel()])]
-        others = np.arange(1, len(costs))
-        pairs.append(np.column_stack([np.zeros_like(others), others]))
-        pairs.append(_tour_legs(self.tour or ()))
-        legs = np.sort(np.vstack(pairs), axis=1)
-        legs = legs[np.isfinite(costs[legs[:, 0], legs[:, 1]])]
-        return np.unique(legs, axis=0)
-
-    def _price(self, point: Point) -> int:
-        """Update bound and reduced costs; bring in legs of negative reduced cost."""
-        model, graph = self.model, self.graph
-        assert model is not None
-        assert point.duals is not None
-        legs, vertices = reduced_costs(graph.costs, graph.cluster, model.cuts, point.duals)
-        self.raise_bound(dual_bound(legs, vertices, graph.cluster, point.duals))
-        fixing = fixing_costs(legs, vertices, graph.cluster, point.duals)
-        if self.fixing is None or fixing[0] >= self.fixing[0]:
-            self.fixing = fixing
-        candidate = np.triu(legs, 1)
-        candidate[model.legs[:, 0], model.legs[:, 1]] = 0.0
-        scale = self.length if self.tour is not None else float(graph.costs[0, 1:].max())
-        tolerance = 1e-8 * scale / (graph.goal_count + 1)
-        rows, cols = np.nonzero(candidate < -tolerance)
-        if len(rows) == 0:
-            return 0
-        order = np.argsort(candidate[rows, cols], kind="stable")
-        taken = np.zeros(len(graph), dtype=np.int64)
-        chosen = []
-        for k in order:
-            u, v = int(rows[k]), int(cols[k])
-            if taken[u] < PRICED_PER_VERTEX or taken[v] < PRICED_PER_VERTEX:
-                chosen.append((u, v))
-                taken[u] += 1
-                taken[v] += 1
-        model.add_legs(np.array(chosen, dtype=np.int64))
-        return len(chosen)
-
-    def _round(self, point: Point) -> None:
-        """Turn a point into a tour: join its cycles or follow its strongest legs, then improve."""
-        graph = self.graph
-        if np.abs(point.y - np.rint(point.y)).max(initial=0.0) < 1e-6:
-            cycles = tour_from(point.x, point.legs, point.y)
-            if len(cycles) == 1:
-                self.offer(cycles[0])
-            order = [int(graph.cluster[v]) for cycle in cycles for v in cycle if v != 0]
-        else:
-            order = _follow(point, graph.cluster)
-        if sorted(order) != list(range(1, graph.goal_count + 1)):
-            return
-        _, tour = local_search(
-            self.instance, self.rng, rounds=0, clock=self.clock, start_order=[0, *order]
-        )
-        self.offer(tour)
-
-    def _purge(self, point: Point) -> None:
-        """Take cuts out of the LP that have been slack for some rounds."""
-        model = self.model
-        assert model is not None
-        assert point.duals is not None
-        rounds = self.slack_rounds
-        for cut, price in zip(model.cuts, point.duals.cut, strict=True):
-            rounds[id(cut)] = rounds.get(id(cut), 0) + 1 if price > -1e-9 else 0
-        keep = np.array([rounds[id(cut)] < PURGE_AFTER for cut in model.cuts], dtype=bool)
-        if not keep.all():
-            for k in np.flatnonzero(~keep):
-                del rounds[id(model.cuts[k])]
-            model.keep_cuts(keep)
+        self.report("proven" if self.done else "integer", cuts=len(model.cuts), **size)
 
 
-def _tour_legs(tour: Sequence[int]) -> Ints:
-    t = np.array(tour, dtype=np.int64)
-    if len(t) < 2:
-        return np.zeros((0, 2), dtype=np.int64)
-    return np.sort(np.column_stack([t, np.roll(t, -1)]), axis=1)
+def _load(path: str) -> Any:
+    module, attribute = path.split(":")
+    return getattr(importlib.import_module(module), attribute)
 
 
-def _follow(point: Point, cluster: Ints) -> list[int]:
-    """Order of goals by walking from the base along the heaviest leg to a goal not yet visited."""
-    m = int(cluster.max())
-    weight = np.zeros((m + 1, m + 1))
-    np.add.at(weight, (cluster[point.legs[:, 0]], cluster[point.legs[:, 1]]), point.y)
-    weight += weight.T
-    left = np.ones(m + 1, dtype=bool)
-    left[0] = False
-    order, here = [], 0
-    while left.any():
-        here = int(np.argmax(np.where(left, weight[here] + 1e-9, -1.0)))
-        left[here] = False
-        order.append(here)
-    return order
+__all__ = ["BACKENDS", "MipRun", "Params", "Relaxation", "solve"]

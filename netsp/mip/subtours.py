@@ -1,21 +1,28 @@
-"""Finding violated subtour cuts, at fractional points by minimum cuts, at integer ones by sight."""
+"""Finding violated subtour cuts.
+
+At integer points by sight: the components of the support. At fractional points first by components;
+if there is but one, by the branches of the cover (for every prefix of a word, the vertices whose
+word begins with it: sets that belong together in space and need no search) and by minimum cuts, one
+for every cluster, which find a violated cut if there is one.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
-import numpy.typing as npt
-from scipy.sparse import coo_array, csr_array
-from scipy.sparse.csgraph import breadth_first_order, connected_components, maximum_flow
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
-from netsp.mip.program import Cut
-
-Floats = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
+from netsp.hsignature import Word
+from netsp.mip.flows import min_cuts
+from netsp.mip.program import Bools, Cut, Floats, Ints
 
 VIOLATION = 1e-4
 """Least violation worth a cut."""
 
-_SCALE = 10_000_000
+MOST_CUTS = 60
+"""Most cuts from one point."""
 
 
 def components(x: Floats, legs: Ints, y: Floats) -> tuple[int, Ints]:
@@ -31,9 +38,7 @@ def components(x: Floats, legs: Ints, y: Floats) -> tuple[int, Ints]:
     return len(used), np.array([renumber.get(int(k), -1) for k in label], dtype=np.int64)
 
 
-def whole_clusters(
-    inside: npt.NDArray[np.bool_], x: Floats, cluster: Ints
-) -> npt.NDArray[np.bool_]:
+def whole_clusters(inside: Bools, x: Floats, cluster: Ints) -> Bools:
     """S with each cluster completed whose support lies inside: no weaker, and often stronger."""
     m = int(cluster.max()) + 1
     weight = np.bincount(cluster[inside], weights=x[inside], minlength=m)
@@ -54,49 +59,83 @@ def component_cuts(x: Floats, legs: Ints, y: Floats, cluster: Ints) -> list[Cut]
     return cuts
 
 
-def fractional_cuts(x: Floats, legs: Ints, y: Floats, cluster: Ints) -> list[Cut]:
-    """Cuts violated by a fractional point: for every cluster C the most violated S.
+def branches(signatures: Sequence[Word]) -> Bools:
+    """(k, V) vertices of every branch of the cover with more than one vertex and not all."""
+    rows: dict[Word, list[int]] = {}
+    for v, word in enumerate(signatures):
+        for k in range(1, len(word) + 1):
+            rows.setdefault(word[:k], []).append(v)
+    distinct = {tuple(r) for r in rows.values() if len(r) > 1}
+    out = np.zeros((len(distinct), len(signatures)), dtype=bool)
+    for k, row in enumerate(sorted(distinct)):
+        out[k, list(row)] = True
+    return out
 
-    Minimum cut between the base and a source joined to each v of C by capacity 2 x_v: its value is
-    the minimum over S of y(δ(S)) + 2 x(C \\ S), and (S, C) is violated when that is below 2.
-    """
+
+def fractional_cuts(
+    x: Floats, legs: Ints, y: Floats, cluster: Ints, branch: Bools | None = None
+) -> list[Cut]:
+    """Cuts violated by a fractional point, the most violated first."""
     cuts = component_cuts(x, legs, y, cluster)
     if cuts:
         return cuts
     support = np.flatnonzero(x > 1e-9)
-    local = np.full(len(x), -1)
-    local[support] = np.arange(len(support))
     on = y > 1e-9
-    u, v = local[legs[on, 0]], local[legs[on, 1]]
-    weight = np.rint(y[on] * _SCALE).astype(np.int64)
-    n = len(support)
-    seen: set[bytes] = set()
-    for c in range(1, int(cluster.max()) + 1):
-        members = local[support[cluster[support] == c]]
-        into = np.rint(2.0 * x[support[members]] * _SCALE).astype(np.int64)
-        rows = np.concatenate([u, v, np.full(len(members), n)])
-        cols = np.concatenate([v, u, members])
-        capacity = np.concatenate([weight, weight, into]).astype(np.int32)
-        graph = csr_array((capacity, (rows, cols)), shape=(n + 1, n + 1), dtype=np.int32)
-        flow = maximum_flow(graph, n, int(local[0]))
-        if flow.flow_value >= (2.0 - VIOLATION) * _SCALE:
-            continue
-        residual = graph - flow.flow
-        residual.data[residual.data < 0] = 0
-        residual.eliminate_zeros()
-        reached = breadth_first_order(residual, n, return_predecessors=False)
-        inside = np.zeros(len(x), dtype=bool)
-        inside[support[reached[reached < n]]] = True
-        if not inside.any() or inside[0]:
-            continue
-        full = whole_clusters(inside, x, cluster)
-        # the cluster best served inside S makes the cut as deep as S allows
-        served = np.bincount(cluster[full], weights=x[full])
-        key = full.tobytes()
-        if key not in seen:
-            seen.add(key)
-            cuts.append(Cut(full, int(np.argmax(served))))
-    return cuts
+    legs, y = legs[on], y[on]
+    found: dict[bytes, tuple[float, Bools, int]] = {}
+    if branch is not None and len(branch):
+        crossing = (branch[:, legs[:, 0]] ^ branch[:, legs[:, 1]]) @ y
+        served = np.zeros((len(branch), int(cluster.max()) + 1))
+        for v in support:
+            served[:, cluster[v]] += branch[:, v] * x[v]
+        worst = 2.0 * served.max(axis=1) - crossing
+        for k in np.argsort(-worst, kind="stable"):
+            if worst[k] <= VIOLATION or len(found) >= MOST_CUTS:
+                break
+            _add(found, branch[k], x, legs, y, cluster)
+    if len(found) < MOST_CUTS // 2:
+        local = np.full(len(x), -1, dtype=np.int64)
+        local[support] = np.arange(len(support))
+        sets, _, _ = min_cuts(
+            len(support),
+            local[legs[:, 0]],
+            local[legs[:, 1]],
+            y,
+            x[support],
+            cluster[support],
+            int(local[0]),
+            np.arange(1, int(cluster.max()) + 1),
+            2.0 - VIOLATION,
+        )
+        for row in sets:
+            inside = np.zeros(len(x), dtype=bool)
+            inside[support[row]] = True
+            _add(found, inside, x, legs, y, cluster)
+    best = sorted(found.values(), key=lambda f: -f[0])[:MOST_CUTS]
+    return [Cut(inside, c) for _, inside, c in best]
+
+
+def _add(
+    found: dict[bytes, tuple[float, Bools, int]],
+    inside: Bools,
+    x: Floats,
+    legs: Ints,
+    y: Floats,
+    cluster: Ints,
+) -> None:
+    """Keep the cut of a set, completed by whole clusters, for the cluster it serves best."""
+    if inside[0]:
+        return
+    full = whole_clusters(inside, x, cluster)
+    key = np.packbits(full).tobytes()
+    if key in found:
+        return
+    served = np.bincount(cluster[full], weights=x[full])
+    c = int(np.argmax(served))
+    crossing = y[full[legs[:, 0]] ^ full[legs[:, 1]]].sum()
+    violation = 2.0 * float(served[c]) - float(crossing)
+    if violation > VIOLATION / 2.0:
+        found[key] = (violation, full, c)
 
 
 def tour_from(x: Floats, legs: Ints, y: Floats) -> list[list[int]]:
@@ -120,3 +159,19 @@ def tour_from(x: Floats, legs: Ints, y: Floats) -> list[list[int]]:
             before, here = here, onward[0]
         cycles.append(cycle)
     return cycles
+
+
+def follow(legs: Ints, y: Floats, cluster: Ints) -> list[int]:
+    """Clusters by walking from the base along the heaviest leg to one not yet visited."""
+    m = int(cluster.max())
+    weight = np.zeros((m + 1, m + 1))
+    np.add.at(weight, (cluster[legs[:, 0]], cluster[legs[:, 1]]), y)
+    weight += weight.T
+    left = np.ones(m + 1, dtype=bool)
+    left[0] = False
+    order, here = [0], 0
+    while left.any():
+        here = int(np.argmax(np.where(left, weight[here] + 1e-9, -1.0)))
+        left[here] = False
+        order.append(here)
+    return order

@@ -34,7 +34,7 @@ from netsp.roadmap.explore import (
 )
 from netsp.roadmap.paths import TautPaths
 from netsp.roadmap.reach import explain_unreached
-from netsp.roadmap.shortest import ContactGraph
+from netsp.roadmap.slits import Slits, build_slits, slit_lengths
 from netsp.roadmap.ways import taut_ways
 from netsp.travel import TravelGraph
 
@@ -170,7 +170,7 @@ class TautLegs:
         self.paths, self.cluster, self.planar = paths, cluster, planar
         self.signatures = list(signatures)
         self._z = paths.problem.points[:, 2]
-        self._shortest: Floats | None = None
+        self._slits: Slits | None = None
         nothing = np.zeros(1, dtype=np.int64)
         self._tree = tree or TetherTree(np.zeros_like(cluster), nothing - 1, np.zeros(1))
         self._deadline = math.inf if time_limit is None else time.monotonic() + time_limit
@@ -259,18 +259,23 @@ class TautLegs:
         return np.asarray(np.hypot(self.planar, self._z[self.cluster] - self._z[0]))
 
     def lower_bounds(self, vertices: Ints) -> Floats:
-        """(k, k) lower bounds on leg lengths: a leg is no shorter than the difference of its two
-        tethers (triangle inequality on the cover), nor than the shortest way between its goals in
-        any class."""
+        """(k, k) lower bounds on leg lengths: a leg is no shorter than its class among slits
+        (`netsp.roadmap.slits`), nor than the difference of its two tethers (triangle inequality on
+        the cover)."""
         vertices = np.asarray(vertices, dtype=np.int64)
-        if self._shortest is None:
-            self._shortest = ContactGraph(self.paths.outline).lengths()
+        if self._slits is None:
+            self._slits = build_slits(self.paths.problem)
         cluster, planar = self.cluster[vertices], self.planar[vertices]
-        apart = np.abs(planar[:, None] - planar[None, :])
-        # rounding in either summand must not lift a bound above the length
-        low = np.maximum(apart, self._shortest[np.ix_(cluster, cluster)]) - self.paths.margin
-        dz = self._z[cluster][:, None] - self._z[cluster][None, :]
-        return np.asarray(np.hypot(np.maximum(low, 0.0), dz))
+        low = slit_lengths(
+            self._slits, self.paths.outline.places, cluster, [self.signatures[v] for v in vertices]
+        )
+        np.maximum(low, np.abs(planar[:, None] - planar[None, :]), out=low)
+        # rounding must not lift a bound above the length
+        low -= self.paths.margin
+        np.maximum(low, 0.0, out=low)
+        if np.ptp(self._z) > 0.0:
+            np.hypot(low, self._z[cluster][:, None] - self._z[cluster][None, :], out=low)
+        return low
 
     def relative_word(self, u: int, v: int) -> Word:
         """The word of the leg from vertex u to vertex v."""

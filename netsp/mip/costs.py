@@ -1,0 +1,68 @@
+"""Leg costs that are measured only when they matter.
+
+A leg of a long tether costs a search, and there are many. As long as a leg is only bounded from
+below, everything that is proven with the bound holds: the relaxation is one of a cheaper world. So
+the relaxation starts on bounds, and what it wants to use is measured.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from netsp.mip.program import Bools, Floats, Ints
+from netsp.travel import TravelGraph
+
+MEASURE_AT_ONCE = 400
+"""So many vertices or fewer are measured altogether: that takes a second at most."""
+
+
+class LegCosts:
+    """Costs among some vertices of a travel graph.
+
+    vertices : (k,) of the graph. cluster : (k,). values : (k, k) lengths or lower bounds, inf
+    within a cluster. exact : (k, k) which are lengths; None when all are.
+    """
+
+    def __init__(self, graph: TravelGraph) -> None:
+        self.graph = graph
+        self.vertices: Ints = np.arange(len(graph))
+        self.cluster: Ints = graph.cluster
+        self.values: Floats
+        self.exact: Bools | None = None
+        if graph.measured or len(graph) <= MEASURE_AT_ONCE:
+            self.values = np.array(graph.costs)
+            return
+        self.values = graph.lower_bounds()
+        self.exact = np.zeros(self.values.shape, dtype=bool)
+        self.values[0] = self.values[:, 0] = graph.costs_to_base
+        self.exact[0] = self.exact[:, 0] = True
+
+    def __len__(self) -> int:
+        return len(self.vertices)
+
+    def measure(self, chosen: Ints) -> bool:
+        """Measure all legs among chosen rows; whether any cost changed."""
+        if self.exact is None:
+            return False
+        grid = np.ix_(chosen, chosen)
+        known = self.exact[grid] | (self.cluster[chosen][:, None] == self.cluster[chosen][None, :])
+        if known.all():
+            return False
+        open_rows = chosen[~known.all(axis=1)]
+        grid = np.ix_(open_rows, open_rows)
+        self.values[grid] = self.graph.costs_among(self.vertices[open_rows])
+        self.exact[grid] = True
+        return True
+
+    def measure_all(self) -> None:
+        """Measure everything that is left."""
+        if self.exact is not None:
+            self.values = self.graph.costs_among(self.vertices)
+            self.exact = None
+
+    def restrict(self, keep: Bools) -> None:
+        """Forget all vertices but those marked."""
+        self.vertices, self.cluster = self.vertices[keep], self.cluster[keep]
+        self.values = np.ascontiguousarray(self.values[np.ix_(keep, keep)])
+        if self.exact is not None:
+            self.exact = self.exact[np.ix_(keep, keep)]

@@ -1,0 +1,122 @@
+"""Minimum cuts between the base and each cluster at a fractional point, by Dinic's algorithm."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+TINY = 1e-11
+"""Residual capacity that counts as none."""
+
+
+@njit(cache=True, nogil=True)
+def min_cuts(n, tail, head, capacity, x, cluster, sink, wanted, enough):
+    """For every wanted cluster C the vertex set S of least ``capacity(δ(S)) + 2 x(C \\ S)`` without
+    the sink, if that is below `enough`.
+
+    n : vertices. tail, head, capacity : undirected edges. x : (n,) visits. Returns (k, n) flags of
+    the sets found, the cluster and the value of each. A source joined to each v of C by capacity
+    2 x_v makes it one maximum flow; it ends as soon as the flow is enough.
+    """
+    edges = len(tail)
+    arcs = 2 * edges + 2 * n
+    # arc 2 e and 2 e + 1 are the two senses of edge e, then come source -> v and back
+    first = np.full(n + 1, -1, dtype=np.int64)
+    following = np.empty(arcs, dtype=np.int64)
+    to = np.empty(arcs, dtype=np.int64)
+    rest = np.empty(arcs)
+    for e in range(edges):
+        to[2 * e], to[2 * e + 1] = head[e], tail[e]
+        following[2 * e] = first[tail[e]]
+        first[tail[e]] = 2 * e
+        following[2 * e + 1] = first[head[e]]
+        first[head[e]] = 2 * e + 1
+    for v in range(n):
+        a = 2 * edges + 2 * v
+        to[a], to[a + 1] = v, n
+        following[a] = first[n]
+        first[n] = a
+        following[a + 1] = first[v]
+        first[v] = a + 1
+    level = np.empty(n + 1, dtype=np.int64)
+    queue = np.empty(n + 1, dtype=np.int64)
+    at = np.empty(n + 1, dtype=np.int64)
+    path = np.empty(n + 2, dtype=np.int64)
+    inside = np.zeros((len(wanted), n), dtype=np.bool_)
+    which = np.empty(len(wanted), dtype=np.int64)
+    value = np.empty(len(wanted))
+    found = 0
+    for c in wanted:
+        for e in range(edges):
+            rest[2 * e] = rest[2 * e + 1] = capacity[e]
+        for v in range(n):
+            a = 2 * edges + 2 * v
+            rest[a] = 2.0 * x[v] if cluster[v] == c else 0.0
+            rest[a + 1] = 0.0
+        flow = 0.0
+        while flow < enough:
+            for v in range(n + 1):
+                level[v] = -1
+            level[n] = 0
+            queue[0] = n
+            low, high = 0, 1
+            while low < high:
+                v = queue[low]
+                low += 1
+                a = first[v]
+                while a >= 0:
+                    w = to[a]
+                    if rest[a] > TINY and level[w] < 0:
+                        level[w] = level[v] + 1
+                        queue[high] = w
+                        high += 1
+                    a = following[a]
+            if level[sink] < 0:
+                break
+            for v in range(n + 1):
+                at[v] = first[v]
+            depth = 0
+            v = n
+            while True:
+                if v == sink:
+                    push = np.inf
+                    for k in range(depth):
+                        push = min(push, rest[path[k]])
+                    back = depth
+                    for k in range(depth - 1, -1, -1):
+                        a = path[k]
+                        rest[a] -= push
+                        rest[a ^ 1] += push
+                        if rest[a] <= TINY:
+                            back = k
+                    flow += push
+                    if flow >= enough:
+                        break
+                    depth = back
+                    v = to[path[depth] ^ 1]
+                    continue
+                a = at[v]
+                while a >= 0 and not (rest[a] > TINY and level[to[a]] == level[v] + 1):
+                    a = following[a]
+                at[v] = a
+                if a >= 0:
+                    path[depth] = a
+                    depth += 1
+                    v = to[a]
+                elif depth == 0:
+                    break
+                else:
+                    level[v] = -1
+                    depth -= 1
+                    v = to[path[depth] ^ 1]
+        if flow >= enough:
+            continue
+        # level marks what the source still reaches
+        some = False
+        for v in range(n):
+            inside[found, v] = level[v] >= 0
+            some = some or level[v] >= 0
+        if some:
+            which[found], value[found] = c, flow
+            found += 1
+    return inside[:found], which[:found], value[:found]

@@ -1,0 +1,202 @@
+"""The programs in HiGHS, in process: rows and columns are added to a warm basis."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import highspy
+import numpy as np
+
+from netsp.mip.program import (
+    Bools,
+    Cut,
+    Floats,
+    IntegerOutcome,
+    Ints,
+    Point,
+    cut_coefficients,
+    duals_of_relaxation,
+    restricted,
+)
+
+_NONE = (0, np.zeros(0, np.int32), np.zeros(0, np.int32), np.zeros(0))
+
+
+def _solver() -> highspy.Highs:
+    h = highspy.Highs()
+    h.setOptionValue("output_flag", False)
+    h.setOptionValue("threads", 1)
+    h.setOptionValue("primal_feasibility_tolerance", 1e-9)
+    h.setOptionValue("dual_feasibility_tolerance", 1e-9)
+    return h
+
+
+def _run(h: highspy.Highs, time_left: float) -> None:
+    # HiGHS counts its limit from the first run of the object
+    limit = h.getRunTime() + max(time_left, 0.05) if time_left < 1e9 else 1e30
+    h.setOptionValue("time_limit", limit)
+    h.run()
+
+
+def _compressed(dense: Floats) -> tuple[int, Ints, Ints, Floats]:
+    """Entries, row starts, columns and values of a dense block of rows."""
+    row, col = np.nonzero(dense)
+    start = np.searchsorted(row, np.arange(len(dense)))
+    return len(row), start.astype(np.int32), col.astype(np.int32), dense[row, col]
+
+
+class HighsRelaxation:
+    """`netsp.mip.program.Relaxation`. Columns: y in the order of `legs`. Rows: clusters, cuts."""
+
+    def __init__(self, cluster: Ints, legs: Ints, costs: Floats) -> None:
+        self.cluster = cluster
+        self.clusters = int(cluster.max()) + 1
+        self.legs: Ints = np.zeros((0, 2), dtype=np.int64)
+        self.cuts: list[Cut] = []
+        self.infeasible = False
+        self._highs = _solver()
+        twos = np.full(self.clusters, 2.0)
+        self._highs.addRows(self.clusters, twos, twos, *_NONE)
+        self.add_legs(legs, costs)
+
+    def add_legs(self, legs: Ints, costs: Floats) -> None:
+        """Bring legs (k, 2) into the program, with their coefficients in every row."""
+        n = len(legs)
+        if n == 0:
+            return
+        cut, leg = np.nonzero(block := cut_coefficients(self.cuts, self.cluster, legs))
+        rows = np.concatenate([self.cluster[legs].ravel(), self.clusters + cut])
+        cols = np.concatenate([np.repeat(np.arange(n), 2), leg])
+        values = np.concatenate([np.ones(2 * n), block[cut, leg]])
+        order = np.argsort(cols, kind="stable")
+        start = np.searchsorted(cols[order], np.arange(n))
+        self._highs.addCols(
+            n, costs, np.zeros(n), np.ones(n), len(rows), start.astype(np.int32),
+            rows[order].astype(np.int32), values[order],
+        )  # fmt: skip
+        self.legs = np.vstack([self.legs, legs])
+
+    def keep_legs(self, keep: Bools) -> None:
+        """Take all legs out of the program but those marked."""
+        gone = np.flatnonzero(~keep).astype(np.int32)
+        self._highs.deleteCols(len(gone), gone)
+        self.legs = self.legs[keep]
+
+    def restrict(self, keep: Bools) -> None:
+        """Renumber legs and cuts for the vertices marked; no other has a leg in the program."""
+        self.cluster, self.legs, self.cuts = restricted(self.cluster, self.legs, self.cuts, keep)
+
+    def set_costs(self, costs: Floats) -> None:
+        """Set the costs of all legs in the program."""
+        n = len(costs)
+        self._highs.changeColsCost(n, np.arange(n, dtype=np.int32), costs)
+
+    def add_cuts(self, cuts: list[Cut]) -> None:
+        """Bring cuts into the program."""
+        if not cuts:
+            return
+        n = len(cuts)
+        block = cut_coefficients(cuts, self.cluster, self.legs)
+        no_limit = np.full(n, highspy.kHighsInf)
+        self._highs.addRows(n, np.zeros(n), no_limit, *_compressed(block))
+        self.cuts = [*self.cuts, *cuts]
+
+    def keep_cuts(self, keep: Bools) -> None:
+        """Take all cuts out of the program but those marked."""
+        gone = self.clusters + np.flatnonzero(~keep)
+        self._highs.deleteRows(len(gone), gone.astype(np.int32))
+        self.cuts = [c for c, k in zip(self.cuts, keep, strict=True) if k]
+
+    def solve(self, time_left: float) -> Point | None:
+        """The optimum with duals; None if there is none or the time ran out."""
+        h = self._highs
+        _run(h, time_left)
+        status = h.getModelStatus()
+        self.infeasible = status == highspy.HighsModelStatus.kInfeasible
+        if status != highspy.HighsModelStatus.kOptimal:
+            return None
+        solution = h.getSolution()
+        y, price = np.array(solution.col_value), np.array(solution.row_dual)
+        x = np.zeros(len(self.cluster))
+        np.add.at(x, self.legs.ravel(), np.repeat(y / 2.0, 2))
+        duals = duals_of_relaxation(
+            price[: self.clusters], price[self.clusters :], self.cuts, self.cluster
+        )
+        slack = np.array(solution.row_value)[self.clusters :]
+        return Point(x, self.legs, y, float(h.getInfo().objective_function_value), duals, slack)
+
+
+class HighsInteger:
+    """`netsp.mip.program.IntegerProgram`. Columns: x by position in `vertices`, then y in the order
+    of `legs`. Rows: clusters, then vertices, then cuts."""
+
+    def __init__(
+        self, cluster: Ints, vertices: Ints, legs: Ints, costs: Floats, cuts: Sequence[Cut]
+    ) -> None:
+        self.cluster, self.vertices, self.legs = cluster, vertices, legs
+        self.clusters = int(cluster.max()) + 1
+        self.cuts: list[Cut] = []
+        self._position = np.full(len(cluster), -1, dtype=np.int64)
+        self._position[vertices] = np.arange(len(vertices))
+        h = self._highs = _solver()
+        k, n = len(vertices), len(legs)
+        ones = np.ones(self.clusters)
+        h.addRows(self.clusters, ones, ones, *_NONE)
+        h.addRows(k, np.zeros(k), np.zeros(k), *_NONE)
+        index = np.column_stack([cluster[vertices], self.clusters + np.arange(k)])
+        h.addCols(
+            k, np.zeros(k), np.zeros(k), np.ones(k), 2 * k,
+            (2 * np.arange(k)).astype(np.int32), index.ravel().astype(np.int32),
+            np.tile([1.0, -2.0], k),
+        )  # fmt: skip
+        h.addCols(
+            n, costs, np.zeros(n), np.ones(n), 2 * n, (2 * np.arange(n)).astype(np.int32),
+            (self.clusters + self._position[legs]).ravel().astype(np.int32), np.ones(2 * n),
+        )  # fmt: skip
+        self.add_cuts(list(cuts))
+        h.changeColsIntegrality(
+            k + n, np.arange(k + n, dtype=np.int32), np.full(k + n, highspy.HighsVarType.kInteger)
+        )
+        h.setOptionValue("mip_rel_gap", 1e-9)
+        h.setOptionValue("mip_abs_gap", 1e-9)
+
+    def add_cuts(self, cuts: list[Cut]) -> None:
+        """Bring cuts into the program."""
+        if not cuts:
+            return
+        starts, index, value = [], [], []
+        count = 0
+        for cut in cuts:
+            at = self.vertices
+            outside_c = at[cut.inside[at] & (self.cluster[at] != cut.cluster)]
+            within = np.flatnonzero(cut.inside[self.legs[:, 0]] & cut.inside[self.legs[:, 1]])
+            starts.append(count)
+            index += [self._position[outside_c], len(self.vertices) + within]
+            value += [np.full(len(outside_c), -1.0), np.ones(len(within))]
+            count += len(outside_c) + len(within)
+        n = len(cuts)
+        self._highs.addRows(
+            n, np.full(n, -highspy.kHighsInf), np.zeros(n), count,
+            np.array(starts, dtype=np.int32), np.concatenate(index).astype(np.int32),
+            np.concatenate(value),
+        )  # fmt: skip
+        self.cuts = [*self.cuts, *cuts]
+
+    def solve(self, time_left: float) -> IntegerOutcome:
+        """The best integer solution, as far as the time goes."""
+        h = self._highs
+        _run(h, time_left)
+        status = h.getModelStatus()
+        if status == highspy.HighsModelStatus.kInfeasible:
+            return IntegerOutcome(None, None, finished=True, infeasible=True)
+        info = h.getInfo()
+        point = None
+        if info.primal_solution_status == 2:  # feasible
+            columns = np.array(h.getSolution().col_value)
+            x = np.zeros(len(self.cluster))
+            x[self.vertices] = columns[: len(self.vertices)]
+            y = columns[len(self.vertices) :]
+            point = Point(x, self.legs, y, float(info.objective_function_value), None)
+        bound = info.mip_dual_bound if math.isfinite(info.mip_dual_bound) else None
+        return IntegerOutcome(point, bound, status == highspy.HighsModelStatus.kOptimal)

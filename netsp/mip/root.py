@@ -1,0 +1,268 @@
+"""The root: the relaxation, solved with cuts from a fractional point and legs from their prices.
+
+Every round yields a bound that holds whatever the solver's tolerances (`netsp.mip.bound`), and with
+an incumbent every bound rules out legs and vertices: those that cost more than what is missing.
+What is ruled out is forgotten, so the rounds get cheaper as the proof gets closer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from netsp.mip.bound import dual_bound, fixing_costs, reduced_costs
+from netsp.mip.costs import LegCosts
+from netsp.mip.program import Bools, Cut, Floats, Ints, Point, Relaxation
+from netsp.mip.subtours import branches, fractional_cuts
+from netsp.result import OPTIMALITY_TOLERANCE
+from netsp.run import Run, Stop
+
+NEAREST = 6
+"""Legs per vertex in the first LP."""
+
+PRICED_PER_VERTEX = 3
+"""Most legs per vertex that one pricing round brings in."""
+
+PURGE_AFTER = 5
+"""A cut that was slack for so many rounds in a row leaves the LP; separation finds it again."""
+
+MIX = 0.6
+"""Cuts are first sought between the LP's point and the incumbent: those found there go deeper
+(in-out separation, Ben-Ameur & Neto 2007)."""
+
+SHRINK = 0.85
+"""Vertices are forgotten when no more than this share of them is left."""
+
+PATIENCE, WORTH = 40, 0.02
+"""The root ends when so many rounds closed less than this share of the gap."""
+
+
+class Root:
+    """The relaxation over what is left of a travel graph.
+
+    costs : of the legs among the vertices left. lp : the relaxation. bound, rise : the best bound
+    with how much it rises at least when a leg is used. dead : legs in no better tour.
+    """
+
+    def __init__(
+        self,
+        run: Run,
+        costs: LegCosts,
+        relaxation: Callable[[Ints, Ints, Floats], Relaxation],
+        offer: Callable[[Root, Point], None],
+    ) -> None:
+        self.run, self.costs, self.offer = run, costs, offer
+        graph = costs.graph
+        self.branch = branches([graph.signatures[v] for v in costs.vertices])
+        self.dead: Bools = ~np.isfinite(costs.values)
+        legs = self._first_legs()
+        self.lp = relaxation(costs.cluster, legs, costs.values[legs[:, 0], legs[:, 1]])
+        self.point: Point | None = None
+        self._slack: dict[int, int] = {}
+
+    # the incumbent among the vertices left
+
+    @property
+    def cutoff(self) -> float:
+        """Tours no shorter than this are of no interest: half the tolerance below the incumbent."""
+        return self.run.length * (1.0 - 0.5 * OPTIMALITY_TOLERANCE)
+
+    def tour(self) -> Ints:
+        """Rows of the incumbent; empty if there is none."""
+        if self.run.tour is None:
+            return np.zeros(0, dtype=np.int64)
+        return np.searchsorted(self.costs.vertices, np.array(self.run.tour))
+
+    # the loop
+
+    def solve(self) -> None:
+        """Rounds of LP, measuring, pricing, elimination and separation, until there is nothing to
+        add or progress stalls."""
+        run = self.run
+        gaps: list[float] = []
+        while not run.done:
+            run.check()
+            point = self.lp.solve(run.clock.left)
+            run.iterations += 1
+            if point is None:
+                # without an incumbent all legs are in the program from the start
+                run.infeasible = self.lp.infeasible and run.tour is None
+                raise Stop
+            self.point = point
+            if self._measure(point):
+                run.report("measuring", **self.size())
+                continue
+            priced = self._price(point)
+            if self.point is None:  # vertices were forgotten; the LP must be solved anew
+                run.report("root", **self.size())
+                continue
+            self.offer(self, point)
+            run.report("root", **self.size())
+            if run.done:
+                return
+            if self._missing_tour_legs():
+                continue  # a new incumbent came with legs the LP has not seen
+            cuts = self._separate(point)
+            if not priced and not cuts:
+                return
+            gaps.append(run.length - (run.bound or 0.0))
+            if len(gaps) > PATIENCE and not priced:
+                before = gaps[-1 - PATIENCE]
+                if before - gaps[-1] < WORTH * before:
+                    return
+            self._purge(point)
+            self.lp.add_cuts(cuts)
+
+    def size(self) -> dict[str, int]:
+        """For the report."""
+        return {
+            "cuts": len(self.lp.cuts),
+            "legs": int((~self.dead).sum()) // 2,
+            "vertices": len(self.costs),
+        }
+
+    # parts
+
+    def _first_legs(self) -> Ints:
+        """The nearest legs of every vertex, all legs to the base, and the incumbent's; all legs if
+        there is no incumbent, so that an infeasible program means that there is no tour."""
+        values = self.costs.values
+        if self.run.tour is None:
+            return np.argwhere(np.triu(np.isfinite(values), 1))
+        k = min(NEAREST, len(values) - 1)
+        near = np.argpartition(values, k - 1, axis=1)[:, :k]
+        others = np.arange(1, len(values))
+        pairs = np.vstack(
+            [
+                np.column_stack([np.repeat(np.arange(len(values)), k), near.ravel()]),
+                np.column_stack([np.zeros_like(others), others]),
+                tour_legs(self.tour()),
+            ]
+        )
+        legs = np.unique(np.sort(pairs, axis=1), axis=0)
+        return np.asarray(legs[np.isfinite(values[legs[:, 0], legs[:, 1]])])
+
+    def _missing_tour_legs(self) -> bool:
+        """Bring the incumbent's legs into the LP; whether any was missing."""
+        known = set(map(tuple, self.lp.legs.tolist()))
+        new = [leg for leg in map(tuple, tour_legs(self.tour()).tolist()) if leg not in known]
+        if new:
+            legs = np.array(new, dtype=np.int64)
+            self.lp.add_legs(legs, self.costs.values[legs[:, 0], legs[:, 1]])
+        return bool(new)
+
+    def _measure(self, point: Point) -> bool:
+        """Measure the legs that the LP uses; whether its costs changed."""
+        if not self.costs.measure(np.flatnonzero(point.x > 1e-6)):
+            return False
+        legs = self.lp.legs
+        self.lp.set_costs(self.costs.values[legs[:, 0], legs[:, 1]])
+        return True
+
+    def _price(self, point: Point) -> bool:
+        """Raise the bound, eliminate, bring in legs of negative reduced cost; whether any came."""
+        run, cluster = self.run, self.costs.cluster
+        assert point.duals is not None
+        legs, vertices = reduced_costs(self.costs.values, cluster, self.lp.cuts, point.duals)
+        legs[self.dead] = np.inf
+        bound = dual_bound(legs, vertices, cluster, point.duals)
+        # a tour with a dead leg is no shorter than the cutoff
+        run.raise_bound(min(bound, self.cutoff))
+        self._eliminate(*fixing_costs(legs, vertices, cluster, point.duals))
+        tour = tour_legs(self.tour())
+        candidate = np.where(self.dead, np.inf, legs)
+        candidate[tour[:, 0], tour[:, 1]] = legs[tour[:, 0], tour[:, 1]]
+        candidate[np.tril_indices(len(candidate))] = np.inf
+        candidate[self.lp.legs[:, 0], self.lp.legs[:, 1]] = np.inf
+        scale = run.length if run.tour is not None else float(self.costs.values[0, 1:].max())
+        new = self._most_negative(candidate, 1e-9 * scale)
+        if len(new):
+            self.lp.add_legs(new, self.costs.values[new[:, 0], new[:, 1]])
+        self._forget()
+        return len(new) > 0
+
+    def _most_negative(self, candidate: Floats, tolerance: float) -> Ints:
+        rows, cols = np.nonzero(candidate < -tolerance)
+        order = np.argsort(candidate[rows, cols], kind="stable")
+        taken = np.zeros(len(candidate), dtype=np.int64)
+        chosen = []
+        for u, v in zip(rows[order].tolist(), cols[order].tolist(), strict=True):
+            if taken[u] < PRICED_PER_VERTEX or taken[v] < PRICED_PER_VERTEX:
+                chosen.append((u, v))
+                taken[u] += 1
+                taken[v] += 1
+        return np.array(chosen, dtype=np.int64).reshape(-1, 2)
+
+    def _eliminate(self, bound: float, rise: Floats) -> None:
+        """Legs and vertices that cost more than what is missing to the cutoff are dead: a tour
+        through a vertex uses two of its legs."""
+        missing = self.cutoff - bound
+        if not np.isfinite(missing):
+            return
+        self.dead |= rise > missing
+        left = np.where(self.dead, np.inf, rise)
+        two = np.partition(left, 1, axis=1)[:, :2].sum(axis=1) if len(left) > 2 else left.min(1)
+        gone = two > missing
+        gone[0] = False
+        self.dead[gone] = True
+        self.dead[:, gone] = True
+
+    def _forget(self) -> None:
+        """Drop dead legs from the LP, and dead vertices altogether once they are many."""
+        tour = self.tour()
+        in_tour = np.zeros(len(self.costs), dtype=bool)
+        in_tour[tour] = True
+        legs = self.lp.legs
+        own = set(map(tuple, tour_legs(tour).tolist()))
+        dead = self.dead[legs[:, 0], legs[:, 1]]
+        keep = np.array(
+            [not d or (u, v) in own for d, (u, v) in zip(dead.tolist(), legs.tolist(), strict=True)]
+        )
+        if (~keep).sum() > 0.3 * len(keep):
+            self.lp.keep_legs(keep)
+        alive = ~self.dead.all(axis=1) | in_tour
+        alive[0] = True
+        if alive.sum() > SHRINK * len(alive):
+            return
+        self.lp.keep_legs(np.asarray(alive[self.lp.legs].all(axis=1)))
+        self.costs.restrict(alive)
+        self.lp.restrict(alive)
+        self.dead = self.dead[np.ix_(alive, alive)]
+        self.branch = self.branch[:, alive]
+        self.branch = np.unique(self.branch[self.branch.sum(axis=1) > 1], axis=0)
+        self.point = None
+
+    def _separate(self, point: Point) -> list[Cut]:
+        cluster = self.costs.cluster
+        tour = tour_legs(self.tour())
+        if len(tour):
+            place = {leg: k for k, leg in enumerate(map(tuple, point.legs.tolist()))}
+            y = (1.0 - MIX) * point.y
+            y[[place[leg] for leg in map(tuple, tour.tolist())]] += MIX
+            x = (1.0 - MIX) * point.x
+            x[self.tour()] += MIX
+            cuts = fractional_cuts(x, point.legs, y, cluster, self.branch)
+            if cuts:
+                return cuts
+        return fractional_cuts(point.x, point.legs, point.y, cluster, self.branch)
+
+    def _purge(self, point: Point) -> None:
+        """Take cuts out of the LP that have been slack for some rounds."""
+        assert point.slack is not None
+        rounds = self._slack
+        for cut, slack in zip(self.lp.cuts, point.slack.tolist(), strict=True):
+            rounds[id(cut)] = rounds.get(id(cut), 0) + 1 if slack > 1e-6 else 0
+        keep = np.array([rounds[id(cut)] < PURGE_AFTER for cut in self.lp.cuts], dtype=bool)
+        if (~keep).sum() > 0.1 * len(keep):
+            for k in np.flatnonzero(~keep):
+                del rounds[id(self.lp.cuts[k])]
+            self.lp.keep_cuts(keep)
+
+
+def tour_legs(tour: Sequence[int] | Ints) -> Ints:
+    """(k, 2) legs u < v of a closed tour."""
+    t = np.asarray(tour, dtype=np.int64)
+    if len(t) < 2:
+        return np.zeros((0, 2), dtype=np.int64)
+    return np.sort(np.column_stack([t, np.roll(t, -1)]), axis=1)
