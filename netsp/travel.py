@@ -25,13 +25,15 @@ from netsp.ways import Ways
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
+Bools = npt.NDArray[np.bool_]
 
 
 class Legs(Protocol):
     """What a roadmap offers: lengths of legs between vertices, and their paths."""
 
-    def lengths(self, vertices: Ints) -> Floats:
-        """(k, k) symmetric leg lengths among the given vertices; inf within a cluster."""
+    def lengths(self, vertices: Ints, asked: Bools | None = None) -> Floats:
+        """(k, k) symmetric leg lengths among the given vertices; inf within a cluster. Where
+        `asked` (k, k, symmetric) is given and false, anything."""
 
     def to_base(self) -> Floats:
         """(V,) lengths of the legs from the base."""
@@ -122,18 +124,18 @@ class TravelGraph:
         """Whether all legs have been measured."""
         return self._costs is not None
 
-    def costs_among(self, vertices: npt.ArrayLike) -> Floats:
+    def costs_among(self, vertices: npt.ArrayLike, asked: Bools | None = None) -> Floats:
         """(k, k) leg costs among some vertices only, for solvers that eliminate the others first;
-        inf within a cluster."""
+        inf within a cluster. Where `asked` (k, k, symmetric) is given and false, anything."""
         chosen = np.asarray(vertices, dtype=np.int64)
         if self._costs is not None:
             return np.asarray(self._costs[np.ix_(chosen, chosen)])
-        return self._measured(chosen)
+        return self._measured(chosen, asked)
 
-    def _measured(self, vertices: Ints) -> Floats:
+    def _measured(self, vertices: Ints, asked: Bools | None = None) -> Floats:
         begin = time.monotonic()
         try:
-            return self._legs.lengths(vertices)
+            return self._legs.lengths(vertices, asked)
         finally:
             self.legs_s += time.monotonic() - begin
 
@@ -223,8 +225,8 @@ class _PartOfLegs:
     def __init__(self, graph: TravelGraph, chosen: Ints) -> None:
         self.graph, self.chosen = graph, chosen
 
-    def lengths(self, vertices: Ints) -> Floats:
-        return self.graph.costs_among(self.chosen[vertices])
+    def lengths(self, vertices: Ints, asked: Bools | None = None) -> Floats:
+        return self.graph.costs_among(self.chosen[vertices], asked)
 
     def to_base(self) -> Floats:
         return np.asarray(self.graph.costs_to_base[self.chosen])
@@ -242,13 +244,14 @@ class _CostTable:
     def __init__(self, costs: Floats, cluster: Ints) -> None:
         self.costs, self.cluster = costs, cluster
 
-    def lengths(self, vertices: Ints) -> Floats:
+    def lengths(self, vertices: Ints, asked: Bools | None = None) -> Floats:
         return self.costs[np.ix_(vertices, vertices)].copy()
 
     def to_base(self) -> Floats:
         return np.asarray(self.costs[0])
 
-    lower_bounds = lengths
+    def lower_bounds(self, vertices: Ints) -> Floats:
+        return self.lengths(vertices)
 
     def path(self, u: int, v: int) -> Floats:
         raise InputError(f"no path from vertex {u} to {v}: this travel graph was made from costs")

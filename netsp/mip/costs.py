@@ -54,10 +54,13 @@ class LegCosts:
         self.exact[grid] = True
         return True
 
-    def measure_all(self) -> None:
-        """Measure everything that is left."""
+    def measure_all(self, asked: Bools) -> None:
+        """Measure everything asked for (symmetric); what is neither measured nor asked for counts
+        as no leg from now on."""
         if self.exact is not None:
-            self.values = self.graph.costs_among(self.vertices)
+            asked = asked & ~self.exact
+            new = self.graph.costs_among(self.vertices, asked)
+            self.values = np.where(asked, new, np.where(self.exact, self.values, np.inf))
             self.exact = None
 
     def restrict(self, keep: Bools) -> None:

@@ -27,6 +27,9 @@ PRICED_PER_VERTEX = 3
 PURGE_AFTER = 5
 """A cut that was slack for so many rounds in a row leaves the LP; separation finds it again."""
 
+PRICE_EVERY = 4
+"""Rounds of cuts between two looks at the prices of all legs, unless no cut is found."""
+
 MIX = 0.6
 """Cuts are first sought between the LP's point and the incumbent: those found there go deeper
 (in-out separation, Ben-Ameur & Neto 2007)."""
@@ -34,8 +37,8 @@ MIX = 0.6
 SHRINK = 0.85
 """Vertices are forgotten when no more than this share of them is left."""
 
-PATIENCE, WORTH = 40, 0.02
-"""The root ends when so many rounds closed less than this share of the gap."""
+PATIENCE, WORTH = 15, 0.02
+"""The root ends when so many looks at the prices closed less than this share of the gap."""
 
 
 class Root:
@@ -77,10 +80,11 @@ class Root:
     # the loop
 
     def solve(self) -> None:
-        """Rounds of LP, measuring, pricing, elimination and separation, until there is nothing to
-        add or progress stalls."""
+        """Rounds of LP, pricing, elimination and separation, until there is nothing to add or
+        progress stalls."""
         run = self.run
         gaps: list[float] = []
+        since = 0
         while not run.done:
             run.check()
             point = self.lp.solve(run.clock.left)
@@ -90,9 +94,15 @@ class Root:
                 run.infeasible = self.lp.infeasible and run.tour is None
                 raise Stop
             self.point = point
-            if self._measure(point):
-                run.report("measuring", **self.size())
+            priced = False
+            cuts: list[Cut] = []
+            if since % PRICE_EVERY:
+                cuts = self._separate(point)
+            since += 1
+            if cuts:
+                self.lp.add_cuts(cuts)
                 continue
+            since = 1
             priced = self._price(point)
             if self.point is None:  # vertices were forgotten; the LP must be solved anew
                 run.report("root", **self.size())
@@ -113,6 +123,12 @@ class Root:
                     return
             self._purge(point)
             self.lp.add_cuts(cuts)
+
+    def measure(self) -> None:
+        """Measure all legs that are not ruled out."""
+        self.costs.measure_all(~self.dead)
+        legs = self.lp.legs
+        self.lp.set_costs(self.costs.values[legs[:, 0], legs[:, 1]])
 
     def size(self) -> dict[str, int]:
         """For the report."""
@@ -151,14 +167,6 @@ class Root:
             legs = np.array(new, dtype=np.int64)
             self.lp.add_legs(legs, self.costs.values[legs[:, 0], legs[:, 1]])
         return bool(new)
-
-    def _measure(self, point: Point) -> bool:
-        """Measure the legs that the LP uses; whether its costs changed."""
-        if not self.costs.measure(np.flatnonzero(point.x > 1e-6)):
-            return False
-        legs = self.lp.legs
-        self.lp.set_costs(self.costs.values[legs[:, 0], legs[:, 1]])
-        return True
 
     def _price(self, point: Point) -> bool:
         """Raise the bound, eliminate, bring in legs of negative reduced cost; whether any came."""

@@ -34,9 +34,6 @@ DEFAULT_BACKEND = "highs"
 CORE = 8
 """Classes per goal among which the heuristic looks, while not all legs are measured."""
 
-ROUND_EVERY = 4
-"""Rounds of the root between two attempts to turn its point into a tour."""
-
 
 @dataclass(frozen=True)
 class Params:
@@ -107,8 +104,9 @@ class MipRun(Run):
             self.report("heuristic", **root.size())
         if not self.done and costs.exact is not None:
             self.check()
-            costs.measure_all()
-            root.lp.set_costs(costs.values[root.lp.legs[:, 0], root.lp.legs[:, 1]])
+            root.measure()
+            self.search(costs, np.zeros(0, dtype=np.int64))
+            self.report("measured", **root.size())
             root.solve()
         if not self.done:
             self.integer(root, integer)
@@ -140,9 +138,9 @@ class MipRun(Run):
         self.offer(search.best()[1])
 
     def round(self, root: Root, point: Point) -> None:
-        """Now and then, turn a point of the root into a tour."""
-        whole = np.abs(point.y - np.rint(point.y)).max(initial=0.0) < 1e-6
-        if whole or self.iterations % ROUND_EVERY == 0:
+        """Turn a point of the root into a tour, if all legs are measured."""
+        if root.costs.exact is None:
+            whole = np.abs(point.y - np.rint(point.y)).max(initial=0.0) < 1e-6
             self.tour_at(root.costs, point, whole=whole)
 
     def tour_at(self, costs: LegCosts, point: Point, *, whole: bool) -> None:

@@ -77,7 +77,7 @@ class Trie:
         return self.words[node]
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def trie_child(node, a, trie):
     """The child of a node along letter a, or -1."""
     c = trie[node, CHILD]
@@ -86,7 +86,7 @@ def trie_child(node, a, trie):
     return c
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def add_child(node, a, core, size, trie):
     """Make the child of a node along letter a at the row `size`."""
     trie[size, PARENT], trie[size, LETTER], trie[size, CORE] = node, a, core
@@ -95,7 +95,7 @@ def add_child(node, a, core, size, trie):
     trie[node, CHILD] = size
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def more_int_rows(a):
     """The same rows with room for twice as many (copied by hand, see `geometry.more_rows`)."""
     b = np.empty((2 * a.shape[0], a.shape[1]), dtype=np.int64)
@@ -105,7 +105,7 @@ def more_int_rows(a):
     return b
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def longer(a):
     """A float array with room for twice as many."""
     b = np.empty(2 * len(a))
@@ -114,7 +114,7 @@ def longer(a):
     return b
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _may_wait(node, x, y, trie, pending, margin):
     """Whether the letters that lead out of the core can all still be cancelled from a bend at
     (x, y)."""
@@ -132,7 +132,7 @@ def _may_wait(node, x, y, trie, pending, margin):
     return True
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _in_box(a, x, y, pending, margin):
     side = 0 if a > 0 else 1
     i = abs(a) - 1
@@ -144,7 +144,7 @@ def _in_box(a, x, y, pending, margin):
     )
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _walk(node, lo, hi, x, y, letters, trie, limit, size, grow, pending, margin):
     """The trie node after the letters lo … hi on the way to a bend at (x, y), made where it may
     exist; -1 if no wanted word can follow. Returns node, size."""
@@ -175,7 +175,7 @@ def _walk(node, lo, hi, x, y, letters, trie, limit, size, grow, pending, margin)
     return node, size
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def explore(
     source, start, target, length, ends, first, turn, gap, letters, segment_row, arrival_row,
     gap_row, radius, arc_nodes, pending, margin, longest, trie, limit, size, grow, keep, cap,
@@ -299,7 +299,7 @@ def explore(
     return (trie, limit, size), (h_i[:hits], h_f[:hits]), (s_i[:count], s_f[:count]), False
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _rehashed(key, value):
     n = 2 * len(key)
     key2 = np.full(n, -1, dtype=np.int64)

@@ -34,6 +34,7 @@ from netsp.ways import Ways
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
+Bools = npt.NDArray[np.bool_]
 
 SAMPLES = 1000
 """Milestones, as in the paper."""
@@ -148,12 +149,12 @@ class PrmRoadmap:
         words: list[Word] = [(), *(g.word(int(v)) for v in rows)]
         return cluster, words, np.concatenate([[0], rows]).astype(np.int64)
 
-    def lengths(self, vertices: Ints) -> Floats:
+    def lengths(self, vertices: Ints, asked: Bools | None = None) -> Floats:
         """(k, k) leg lengths among the given vertices, along the augmented graph; inf within a
         cluster."""
         vertices = np.asarray(vertices, dtype=np.int64)
         if self.shortcut:
-            return self._taut.lengths(vertices)
+            return self._taut.lengths(vertices, asked)
         rows = self._vertex[vertices]
         out = self.augmented.distances(rows, rows)
         out = np.minimum(out, out.T)  # equal but for the order of summation

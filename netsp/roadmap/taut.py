@@ -9,8 +9,10 @@ else; obstacles are vertical, so a 3D length is ``hypot(planar taut length, dz)`
 from __future__ import annotations
 
 import math
+import os
 import time
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property, partial
 
@@ -40,6 +42,7 @@ from netsp.travel import TravelGraph
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
+Bools = npt.NDArray[np.bool_]
 
 MAX_CLASSES = 6_000
 """Default for the most augmented goals a travel graph may have: 36 million legs, 0.3 GiB."""
@@ -175,8 +178,9 @@ class TautLegs:
         self._tree = tree or TetherTree(np.zeros_like(cluster), nothing - 1, np.zeros(1))
         self._deadline = math.inf if time_limit is None else time.monotonic() + time_limit
 
-    def lengths(self, vertices: Ints) -> Floats:
-        """(k, k) 3D leg lengths among the given vertices; inf within a cluster.
+    def lengths(self, vertices: Ints, asked: Bools | None = None) -> Floats:
+        """(k, k) 3D leg lengths among the given vertices; inf within a cluster, and where `asked`
+        is given and false.
 
         Lengths are translation-invariant on the cover: all pairs with the same goals and the same
         relative word share one taut path, so each goal is searched once, for all relative words.
@@ -188,25 +192,31 @@ class TautLegs:
         row = np.concatenate([[0], np.cumsum([len(w) for w in flat])]).astype(np.int64)
         letters = np.concatenate(flat).astype(np.int64) if row[-1] else np.zeros(0, np.int64)
         planar, last = self.planar[vertices], self._tree.last[vertices]
+        if asked is None:
+            asked = np.ones((1, 1), dtype=bool)
+            asked = np.broadcast_to(asked, out.shape)
         goals = np.unique(cluster)
-        for k, g in enumerate(goals):
-            if time.monotonic() > self._deadline:
-                raise LimitReachedError(
-                    f"time limit reached while measuring legs: {k} of {len(goals)} goals done, "
-                    f"{len(vertices)} homotopy classes; lower tether_length or raise the limit"
-                )
+
+        def measure(g: int) -> None:
             here = np.flatnonzero(cluster == g)
             there = np.flatnonzero(cluster > g)
-            if len(there) == 0:
-                continue
+            if len(there) == 0 or time.monotonic() > self._deadline:
+                return
             if g == 0:
                 block = np.broadcast_to(planar[there], (len(here), len(there)))
             else:
-                block = self._legs_from(int(g), here, there, letters, row, planar, cluster, last)
-            dz = self._z[g] - self._z[cluster[there]]
-            block = np.hypot(block, dz[None, :])
+                block = self._legs_from(g, here, there, asked, letters, row, planar, cluster, last)
+            block = np.hypot(block, (self._z[g] - self._z[cluster[there]])[None, :])
             out[np.ix_(here, there)] = block
             out[np.ix_(there, here)] = block.T
+
+        with ThreadPoolExecutor(os.cpu_count()) as pool:
+            list(pool.map(measure, goals.tolist()))
+        if time.monotonic() > self._deadline:
+            raise LimitReachedError(
+                f"time limit reached while measuring the legs between {len(vertices)} homotopy "
+                "classes; lower tether_length or raise the limit"
+            )
         return out
 
     def _legs_from(
@@ -214,6 +224,7 @@ class TautLegs:
         g: int,
         here: Ints,
         there: Ints,
+        asked: Bools,
         letters: Ints,
         row: Ints,
         planar: Floats,
@@ -224,6 +235,7 @@ class TautLegs:
         nodes, limit, size, head, entry_goal, entry_next, pair = _wanted(
             here,
             there,
+            asked,
             letters,
             row,
             planar,
@@ -252,7 +264,7 @@ class TautLegs:
                 f"{cluster[there[w]] - 1} for word "
                 f"{self.relative_word(int(here[u]), int(there[w]))}; please report the problem file"
             )
-        return np.asarray(found[pair])
+        return np.where(pair >= 0, np.append(found, np.inf)[pair], np.inf)
 
     def to_base(self) -> Floats:
         """(V,) 3D lengths of the legs from the base, which are the tethers."""
@@ -288,9 +300,9 @@ class TautLegs:
         return self.paths.path(int(self.cluster[u]), int(self.cluster[v]), word)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _wanted(
-    here, there, letters, row, planar, cluster, last, parent, depth, length, margin, pending
+    here, there, asked, letters, row, planar, cluster, last, parent, depth, length, margin, pending
 ):  # fmt: skip
     """The trie of all relative words between two lists of vertices.
 
@@ -308,6 +320,9 @@ def _wanted(
         u = here[a]
         for b in range(len(there)):
             v = there[b]
+            if not asked[u, v]:
+                pair[a, b] = -1
+                continue
             nu, nv = row[u + 1] - row[u], row[v + 1] - row[v]
             shared = 0
             while (
@@ -364,7 +379,7 @@ def _wanted(
     return trie, limit, size, head[:, 0], entry[:entries, 0], entry[:entries, 1], pair
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _match(goal, node, length, head, entry_goal, entry_next, entries):
     """Shortest hit of every entry; inf where there is none."""
     out = np.full(entries, np.inf)
