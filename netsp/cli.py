@@ -57,9 +57,10 @@ def _parser() -> argparse.ArgumentParser:
     p.add_argument("problem", metavar="PROBLEM", help="problem file (JSON)")
     p.add_argument(
         "--solver",
-        default="mip",
+        default="auto",
         metavar="NAME",
-        help="mip (default), reduced-mip, anneal, anneal-2016, greedy, greedy-2016 or greedy-tsp",
+        help="auto (default), mip, reduced-mip, lns, anneal, anneal-2016, greedy, greedy-2016 or "
+        "greedy-tsp",
     )
     p.add_argument(
         "--option",

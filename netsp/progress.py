@@ -11,8 +11,8 @@ from netsp.result import Progress
 from netsp.solution import Solution, Status
 
 _HEADER = (
-    f"{'time':>7}  {'stage':<10} {'tour':>12} {'bound':>12} {'gap':>8} {'cuts':>6} {'legs':>7} "
-    f"{'iteration':>11}"
+    f"{'time':>7}  {'stage':<10} {'tour':>12} {'bound':>12} {'gap':>8} {'cuts':>6} {'classes':>8} "
+    f"{'legs':>9} {'iteration':>11}"
 )
 
 PATIENCE = 3.0
@@ -77,7 +77,8 @@ class ProgressTable:
         gap = "-" if row.gap is None else f"{100 * row.gap:.3f}%"
         self._print(
             f"{row.time:>6.1f}s  {row.stage:<10} {tour:>12} {bound:>12} {gap:>8} "
-            f"{row.cuts or '-':>6} {row.legs or '-':>7} {row.iteration:>11}"
+            f"{row.cuts or '-':>6} {row.vertices or '-':>8} {row.legs or '-':>9} "
+            f"{row.iteration:>11}"
         )
         self._last, self._held, self._shown = row, None, time.monotonic()
 

@@ -22,8 +22,10 @@ from netsp.solution import ProblemReference, Solution, Timings, Visit
 from netsp.travel import TravelGraph
 
 SOLVERS: dict[str, str] = {
+    "auto": "netsp.auto:solve",
     "mip": "netsp.mip.solve:solve",
     "reduced-mip": "netsp.mip.reduced:solve",
+    "lns": "netsp.lns.solve:solve",
     "anneal": "netsp.anneal.icra2017:solve",
     "anneal-2016": "netsp.anneal.rss2016:solve",
     "greedy": "netsp.greedy.backtracking:solve",
@@ -33,8 +35,10 @@ SOLVERS: dict[str, str] = {
 """Solver name → where its `solve(graph, …) -> Result` lives."""
 
 PARAMS: dict[str, str] = {
+    "auto": "netsp.auto:Params",
     "mip": "netsp.mip.solve:Params",
     "reduced-mip": "netsp.mip.reduced:ReducedParams",
+    "lns": "netsp.lns.solve:Params",
     "anneal": "netsp.anneal.icra2017:Params",
     "anneal-2016": "netsp.anneal.rss2016:Params",
     "greedy": "netsp.greedy.backtracking:Params",
@@ -57,7 +61,7 @@ ROADMAPS: dict[str, str] = {
 
 SEEDED_ROADMAPS = frozenset({"prm"})
 
-DEFAULT_SOLVER = "mip"
+DEFAULT_SOLVER = "auto"
 DEFAULT_ROADMAP = "taut"
 
 

@@ -18,7 +18,7 @@ from tests.worlds import random_world
 
 SEEING = [s for s in SOLVERS if s not in BLIND]
 ANYWHERE = [s for s in SOLVERS if s not in GEOMETRIC]
-ITERATIONS = {"anneal": 20_000, "anneal-2016": 5_000}
+ITERATIONS = {"anneal": 20_000, "anneal-2016": 5_000, "lns": 500}
 SEED = 3
 EXACT = 1.0 + 1e-6
 
@@ -101,7 +101,7 @@ def test_same_seed_same_answer(solver):
 
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_the_time_limit_is_kept_and_leaves_no_process(solver):
-    params = {"backend": "cbc"} if solver in ("mip", "reduced-mip") else None
+    params = {"backend": "cbc"} if solver in ("auto", "mip", "reduced-mip") else None
     begin = time.monotonic()
     result = solve_graph(graph("taut"), solver, time_limit=0.3, params=params)
     assert time.monotonic() - begin < 0.3 + 2.0

@@ -7,8 +7,9 @@ import psutil
 import pytest
 
 from netsp.mip import solve
-from netsp.mip.bound import dual_bound, reduced_costs
+from netsp.mip.bound import dual_bound, exact_bound, fixing_costs, reduced_costs
 from netsp.mip.cbc_program import CbcRelaxation
+from netsp.mip.costs import MEASURE_AT_ONCE
 from netsp.mip.highs import HighsRelaxation
 from netsp.mip.program import Cut
 from netsp.mip.subtours import components, fractional_cuts
@@ -158,3 +159,56 @@ def test_the_backends_agree_on_a_real_graph():
     a, b = (solve(graph, params={"backend": k}) for k in BACKENDS)
     assert a.status is b.status is Status.OPTIMAL
     assert a.length == pytest.approx(b.length, rel=2e-6)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_the_certificate_in_exact_rationals_is_no_lower_than_the_bound_claimed(seed):
+    """`ROUNDING` covers what floating point can lose, for the LP's duals and for wild ones."""
+    graph = random_graph(seed, goals=3 + seed % 4)
+    legs = np.argwhere(np.triu(np.isfinite(graph.costs), 1))
+    program = HighsRelaxation(graph.cluster, legs, graph.costs[legs[:, 0], legs[:, 1]])
+    for _ in range(6):
+        point = program.solve(60.0)
+        cuts = fractional_cuts(point.x, point.legs, point.y, graph.cluster)
+        if not cuts:
+            break
+        program.add_cuts(cuts)
+    duals = program.solve(60.0).duals
+    rng = np.random.default_rng(seed)
+    best = brute(graph)
+    for scale in (0.0, 1e-3, 1.0, 1e6):
+        shaken = type(duals)(
+            duals.cluster + scale * rng.normal(size=duals.cluster.shape),
+            duals.degree + scale * rng.normal(size=duals.degree.shape),
+            np.minimum(duals.cut + scale * rng.normal(size=duals.cut.shape), 0.0),
+        )
+        exact = exact_bound(graph.costs, graph.cluster, program.cuts, shaken)
+        r = reduced_costs(graph.costs, graph.cluster, program.cuts, shaken)
+        claimed = dual_bound(*r, graph.cluster, shaken)
+        assert claimed <= exact
+        assert float(exact) - claimed <= 1e-9 * max(1.0, scale)
+        assert exact <= best * (1 + 1e-12)
+        assert fixing_costs(*r, graph.cluster, shaken)[0] <= exact
+
+
+def test_a_long_tether_is_solved_without_measuring_most_legs():
+    from netsp import travel_graph
+
+    problem = random_world(6, circles=12, goals=8, tether=450.0)
+    lazy, whole = travel_graph(problem), travel_graph(problem)
+    whole.costs  # noqa: B018
+    if len(whole) <= MEASURE_AT_ONCE:
+        pytest.skip("the world has too few classes to say anything")
+    asked = []
+    lengths = lazy._legs.lengths
+
+    def count(vertices, asked_for=None):
+        out = lengths(vertices, asked_for)
+        asked.append(out.size // 2 if asked_for is None else int(asked_for.sum()) // 2)
+        return out
+
+    lazy._legs.lengths = count
+    a, b = solve(lazy), solve(whole)
+    assert a.status is b.status is Status.OPTIMAL
+    assert a.length == pytest.approx(b.length, rel=2e-6)
+    assert sum(asked) < 0.5 * len(whole) ** 2 / 2

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Sequence
+from typing import Any
 
 import highspy
 import numpy as np
@@ -160,6 +162,10 @@ class HighsInteger:
         )
         h.setOptionValue("mip_rel_gap", 1e-9)
         h.setOptionValue("mip_abs_gap", 1e-9)
+        # HiGHS can overrun its own limit in presolve and at the root of its tree
+        self._deadline = math.inf
+        h.cbMipInterrupt.subscribe(self._interrupt)
+        h.cbSimplexInterrupt.subscribe(self._interrupt)
 
     def add_cuts(self, cuts: list[Cut]) -> None:
         """Bring cuts into the program."""
@@ -183,9 +189,14 @@ class HighsInteger:
         )  # fmt: skip
         self.cuts = [*self.cuts, *cuts]
 
+    def _interrupt(self, event: Any) -> None:
+        if time.monotonic() > self._deadline:
+            event.interrupt()
+
     def solve(self, time_left: float) -> IntegerOutcome:
         """The best integer solution, as far as the time goes."""
         h = self._highs
+        self._deadline = time.monotonic() + time_left
         _run(h, time_left)
         status = h.getModelStatus()
         if status == highspy.HighsModelStatus.kInfeasible:

@@ -23,10 +23,11 @@ from typing import Any
 import numpy as np
 
 from netsp.lns import Instance, best_classes
+from netsp.lns.solve import least_tethers
 from netsp.mip.solve import MipRun, Params
 from netsp.result import OnProgress, Progress, Result
 from netsp.run import Run, read_params
-from netsp.travel import Ints, TravelGraph
+from netsp.travel import TravelGraph
 
 
 @dataclass(frozen=True)
@@ -97,14 +98,3 @@ def solve(
         if part.bound is not None:
             outer.raise_bound(part.bound)
     return outer.result()
-
-
-def least_tethers(graph: TravelGraph, classes: int = 1) -> Ints:
-    """The vertices of the shortest tethers of every cluster, at most `classes` of each, base first.
-    The leg from the base is the tether, in a graph made from costs too."""
-    tethers = graph.costs_to_base
-    tethers[0] = 0.0
-    order = np.lexsort((tethers, graph.cluster))
-    cluster = graph.cluster[order]
-    rank = np.arange(len(order)) - np.searchsorted(cluster, cluster)
-    return np.asarray(order[rank < classes], dtype=np.int64)

@@ -161,12 +161,15 @@ class Root:
 
     def _missing_tour_legs(self) -> bool:
         """Bring the incumbent's legs into the LP; whether any was missing."""
-        known = set(map(tuple, self.lp.legs.tolist()))
-        new = [leg for leg in map(tuple, tour_legs(self.tour()).tolist()) if leg not in known]
-        if new:
-            legs = np.array(new, dtype=np.int64)
-            self.lp.add_legs(legs, self.costs.values[legs[:, 0], legs[:, 1]])
-        return bool(new)
+        tour = tour_legs(self.tour())
+        new = tour[~np.isin(self._keys(tour), self._keys(self.lp.legs))]
+        if len(new):
+            self.lp.add_legs(new, self.costs.values[new[:, 0], new[:, 1]])
+        return len(new) > 0
+
+    def _keys(self, legs: Ints) -> Ints:
+        """One number for each leg."""
+        return np.asarray(legs[:, 0] * len(self.costs) + legs[:, 1])
 
     def _price(self, point: Point) -> bool:
         """Raise the bound, eliminate, bring in legs of negative reduced cost; whether any came."""
@@ -222,11 +225,8 @@ class Root:
         in_tour = np.zeros(len(self.costs), dtype=bool)
         in_tour[tour] = True
         legs = self.lp.legs
-        own = set(map(tuple, tour_legs(tour).tolist()))
-        dead = self.dead[legs[:, 0], legs[:, 1]]
-        keep = np.array(
-            [not d or (u, v) in own for d, (u, v) in zip(dead.tolist(), legs.tolist(), strict=True)]
-        )
+        keep = ~self.dead[legs[:, 0], legs[:, 1]]
+        keep |= np.isin(self._keys(legs), self._keys(tour_legs(tour)))
         if (~keep).sum() > 0.3 * len(keep):
             self.lp.keep_legs(keep)
         alive = ~self.dead.all(axis=1) | in_tour
@@ -245,9 +245,8 @@ class Root:
         cluster = self.costs.cluster
         tour = tour_legs(self.tour())
         if len(tour):
-            place = {leg: k for k, leg in enumerate(map(tuple, point.legs.tolist()))}
             y = (1.0 - MIX) * point.y
-            y[[place[leg] for leg in map(tuple, tour.tolist())]] += MIX
+            y[np.isin(self._keys(point.legs), self._keys(tour))] += MIX
             x = (1.0 - MIX) * point.x
             x[self.tour()] += MIX
             cuts = fractional_cuts(x, point.legs, y, cluster, self.branch)

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from netsp.errors import LimitReachedError
 from netsp.lns import Instance, Search
 from netsp.mip.costs import LegCosts
 from netsp.mip.program import IntegerProgram, Ints, Point, Relaxation
@@ -33,6 +34,10 @@ DEFAULT_BACKEND = "highs"
 
 CORE = 8
 """Classes per goal among which the heuristic looks, while not all legs are measured."""
+
+
+MOST_LEGS = 20_000
+"""With more legs left the integer program is not begun: it would end nowhere."""
 
 
 @dataclass(frozen=True)
@@ -89,6 +94,11 @@ class MipRun(Run):
                 self._solve()
         except (Stop, KeyboardInterrupt):
             self.report("stopped")
+        except LimitReachedError:
+            # while legs were measured; without a tour there is nothing to show for it
+            if self.tour is None:
+                raise
+            self.report("stopped")
         return self.result()
 
     def _solve(self) -> None:
@@ -108,7 +118,7 @@ class MipRun(Run):
             self.search(costs, np.zeros(0, dtype=np.int64))
             self.report("measured", **root.size())
             root.solve()
-        if not self.done:
+        if not self.done and not (~root.dead).sum() // 2 > MOST_LEGS:
             self.integer(root, integer)
 
     # incumbents

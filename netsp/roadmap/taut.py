@@ -44,8 +44,9 @@ Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
 
-MAX_CLASSES = 6_000
-"""Default for the most augmented goals a travel graph may have: 36 million legs, 0.3 GiB."""
+MAX_CLASSES = 20_000
+"""Default for the most augmented goals a travel graph may have. All legs of so many would take
+3 GiB; solvers that bound and eliminate first measure a small part of them."""
 
 STATES_PER_CLASS = 200
 

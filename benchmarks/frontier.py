@@ -1,0 +1,197 @@
+"""How far proofs reach: from problem file to proof, random worlds with up to 200 goals.
+
+    python benchmarks/frontier.py                     every cell, 10 worlds, 300 s each: many hours
+    python benchmarks/frontier.py --worlds 3 --limit 60
+    python benchmarks/frontier.py --cells 60:300,60:350
+    python benchmarks/frontier.py --heuristic         `lns` against the best known
+    python benchmarks/frontier.py --peers             CP-SAT and HiGHS on the raw model beside it
+
+Worlds: 500 x 500, 20 circles of radius 10 to 30 (`--many`: 50 of radius 10 to 20), seeds from 0
+(`netsp.worlds`). A time is that of `netsp.solve` with `auto`: roadmap, legs and proof.
+"""
+
+from __future__ import annotations
+
+import argparse
+import resource
+import statistics
+import time
+
+import numpy as np
+from table import head, heading, row
+
+from netsp import Problem, Status, solve, solve_graph, travel_graph, verify
+from netsp.errors import NetspError
+from netsp.worlds import random_world
+
+CELLS = [
+    *[(n, t) for n in (5, 10, 15, 20) for t in (200, 250, 300, 350, 500)],
+    *[(40, t) for t in (250, 300, 350, 500)],
+    *[(60, t) for t in (300, 350, 500)],
+    *[(100, t) for t in (300, 350, 500)],
+    *[(200, t) for t in (300, 350, 500)],
+]
+
+
+def world(seed: int, goals: int, tether: float, many: bool) -> Problem:
+    """A problem of a cell."""
+    if many:
+        return random_world(
+            seed, goals=goals, tether_length=tether, obstacles=50, radii=(10.0, 20.0)
+        )
+    return random_world(seed, goals=goals, tether_length=tether)
+
+
+def proofs(cells: list[tuple[int, float]], worlds: int, limit: float, many: bool) -> None:
+    """One row a cell."""
+    head("goals", "tether", "classes", "proven", "median s", "worst s", "mean gap %", "worst gap %",
+         "verified", "peak GiB")  # fmt: skip
+    for goals, tether in cells:
+        times, gaps, sizes, proven, verified, failed = [], [], [], 0, 0, ""
+        for seed in range(worlds):
+            problem = world(seed, goals, tether, many)
+            begin = time.perf_counter()
+            try:
+                solution = solve(problem, time_limit=limit)
+            except NetspError as error:
+                failed = f" ({str(error)[:40]}…)"
+                times.append(time.perf_counter() - begin)
+                continue
+            times.append(time.perf_counter() - begin)
+            sizes.append(len(travel_graph(problem)))
+            proven += solution.status is Status.OPTIMAL
+            verified += bool(verify(problem, solution))
+            gaps.append(100.0 * (solution.gap if solution.gap is not None else 1.0))
+        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
+        row(
+            goals, f"{tether:g}", f"{min(sizes, default=0)} to {max(sizes, default=0)}",
+            f"{proven}/{worlds}{failed}", f"{statistics.median(times):.2f}", f"{max(times):.2f}",
+            f"{np.mean(gaps or [100.0]):.3f}", f"{max(gaps, default=100.0):.3f}",
+            f"{verified}/{worlds}", f"{peak:.2f}",
+        )  # fmt: skip
+
+
+def heuristic(worlds: int) -> None:
+    """`lns` after a stated time over the best known: the proven optimum, or the best of `auto` in
+    two minutes and of `lns` itself."""
+    head("goals", "tether", "lns s", "mean % over best known", "worst %", "best known is proven")
+    for goals, tether, limit in ((20, 350, 1.0), (60, 300, 10.0), (200, 300, 60.0)):
+        over, proven = [], 0
+        for seed in range(worlds):
+            graph = travel_graph(world(seed, goals, tether, many=False))
+            graph.costs  # noqa: B018
+            found = solve_graph(graph, "lns", time_limit=limit, seed=seed)
+            best = solve_graph(graph, "auto", time_limit=120.0)
+            proven += best.status is Status.OPTIMAL
+            known = min(best.length or np.inf, found.length or np.inf)
+            over.append(100.0 * ((found.length or np.inf) / known - 1.0))
+        row(goals, tether, limit, f"{np.mean(over):.3f}", f"{max(over):.3f}", f"{proven}/{worlds}")
+
+
+def peers(worlds: int, limit: float) -> None:
+    """The same travel graphs handed to others; seconds beside ours."""
+    head("goals", "tether", "solver", "proven", "median s", "mean gap %")
+    for goals, tether in ((10, 300), (20, 350)):
+        graphs = [travel_graph(world(s, goals, tether, many=False)) for s in range(worlds)]
+        for graph in graphs:
+            graph.costs  # noqa: B018
+        for name, run in (("netsp mip", _ours), ("CP-SAT", _cp_sat), ("HiGHS, raw model", _raw)):
+            times, gaps, proven = [], [], 0
+            for graph in graphs:
+                begin = time.perf_counter()
+                try:
+                    length, bound = run(graph, limit)
+                except ImportError as error:
+                    row(goals, tether, name, f"not installed: {error.name}", "", "")
+                    break
+                times.append(time.perf_counter() - begin)
+                gap = 100.0 * (length - bound) / length if np.isfinite(length) else 100.0
+                proven += gap < 1e-3
+                gaps.append(max(gap, 0.0))
+            else:
+                row(goals, tether, name, f"{proven}/{worlds}", f"{statistics.median(times):.2f}",
+                    f"{np.mean(gaps):.2f}")  # fmt: skip
+
+
+def _ours(graph, limit):
+    result = solve_graph(graph, "mip", time_limit=limit)
+    return result.length, result.lower_bound
+
+
+def _cp_sat(graph, limit):
+    from ortools.sat.python import cp_model
+
+    model = cp_model.CpModel()
+    n = len(graph)
+    scale = 1e6 / float(np.max(graph.costs[np.isfinite(graph.costs)]))
+    visited = [model.NewBoolVar(f"x{v}") for v in range(n)]
+    arcs = [(v, v, visited[v].Not()) for v in range(1, n)]
+    terms = []
+    for u in range(n):
+        for v in range(n):
+            if np.isfinite(graph.costs[u, v]):
+                used = model.NewBoolVar(f"y{u}_{v}")
+                arcs.append((u, v, used))
+                terms.append((round(float(graph.costs[u, v]) * scale), used))
+    model.AddCircuit(arcs)
+    model.Add(visited[0] == 1)
+    for c in range(1, graph.goal_count + 1):
+        model.AddExactlyOne(visited[int(v)] for v in graph.members(c))
+    model.Minimize(sum(w * y for w, y in terms))
+    solver = cp_model.CpSolver()
+    solver.parameters.max_time_in_seconds = limit
+    solver.parameters.num_workers = 2
+    status = solver.Solve(model)
+    found = status in (cp_model.OPTIMAL, cp_model.FEASIBLE)
+    length = solver.ObjectiveValue() / scale if found else np.inf
+    return length, solver.BestObjectiveBound() / scale
+
+
+def _raw(graph, limit):
+    """The paper's program over all legs, cut at integer solutions only."""
+    from netsp.mip.highs import HighsInteger
+    from netsp.mip.subtours import component_cuts
+
+    legs = np.argwhere(np.triu(np.isfinite(graph.costs), 1))
+    costs = graph.costs[legs[:, 0], legs[:, 1]]
+    model = HighsInteger(graph.cluster, np.arange(len(graph)), legs, costs, [])
+    begin, bound = time.perf_counter(), 0.0
+    while (left := limit - (time.perf_counter() - begin)) > 0:
+        outcome = model.solve(left)
+        bound = max(bound, outcome.bound or 0.0)
+        if outcome.point is None or not outcome.finished:
+            break
+        x, y = np.rint(outcome.point.x), np.rint(outcome.point.y)
+        cuts = component_cuts(x, legs, y, graph.cluster)
+        if not cuts:
+            return outcome.point.objective, bound
+        model.add_cuts(cuts)
+    return np.inf, bound
+
+
+def main() -> None:
+    """Run what was asked for."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--cells", help="goals:tether,… instead of all")
+    parser.add_argument("--worlds", type=int, default=10)
+    parser.add_argument("--limit", type=float, default=300.0, help="seconds a world")
+    parser.add_argument("--many", action="store_true", help="50 circles of radius 10 to 20")
+    parser.add_argument("--heuristic", action="store_true")
+    parser.add_argument("--peers", action="store_true")
+    args = parser.parse_args()
+    heading(f"Frontier ({args.worlds} worlds a cell, limit {args.limit:g} s)")
+    solve(world(0, 5, 200.0, many=False))  # compiled before it counts
+    solve_graph(travel_graph(world(0, 5, 200.0, many=False)), "lns", iteration_limit=10)
+    if args.heuristic:
+        heuristic(args.worlds)
+    elif args.peers:
+        peers(args.worlds, args.limit)
+    else:
+        cells = CELLS
+        if args.cells:
+            cells = [(int(c.split(":")[0]), float(c.split(":")[1])) for c in args.cells.split(",")]
+        proofs([(n, float(t)) for n, t in cells], args.worlds, args.limit, args.many)
+
+
+if __name__ == "__main__":
+    main()

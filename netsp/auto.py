@@ -1,0 +1,97 @@
+"""`auto`: the solver by the size of the problem; always a tour, a bound and a gap.
+
+Up to `PROVABLE` vertices `mip` does it all: its heuristic finds the tour, its root the bound, its
+branching the rest. Beyond that its matrices would not fit into a few gigabytes: then `lns` searches
+among the classes of least tether, and the bound comes from the goals alone, as the travelling
+salesperson's tour over the shortest ways between them in any class. That bound is weak, and true.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from netsp.lns.solve import solve as search
+from netsp.mip.solve import solve as prove
+from netsp.result import OnProgress, Progress, Result
+from netsp.run import read_params
+from netsp.travel import TravelGraph
+
+PROVABLE = 7_000
+"""Most vertices of a travel graph that `mip` is asked to bound: about 2 GiB of matrices."""
+
+ROUNDS_PER_GOAL = 40
+"""Rounds of ruin and recreate before and after the root, times the number of goals."""
+
+SHARE = 0.6
+"""Part of the time that the search has where it shares it with the bound from the goals."""
+
+
+@dataclass(frozen=True)
+class Params:
+    """backend : of `mip`."""
+
+    backend: str = "highs"
+
+    def __post_init__(self) -> None:
+        from netsp.mip.solve import Params as MipParams
+
+        MipParams(backend=self.backend)
+
+
+def solve(
+    graph: TravelGraph,
+    *,
+    time_limit: float | None = None,
+    iteration_limit: int | None = None,
+    rng: np.random.Generator | None = None,
+    params: Mapping[str, Any] | None = None,
+    warm_start: Sequence[int] | None = None,
+    on_progress: OnProgress | None = None,
+) -> Result:
+    """Solve by size. Iterations are those of the solver chosen."""
+    chosen = read_params(Params, "auto", params)
+    if len(graph) <= PROVABLE:
+        rounds = max(500, ROUNDS_PER_GOAL * graph.goal_count)
+        return prove(
+            graph,
+            time_limit=time_limit,
+            iteration_limit=iteration_limit,
+            rng=rng,
+            params={"backend": chosen.backend, "search_rounds": rounds},
+            warm_start=warm_start,
+            on_progress=on_progress,
+        )
+    found = search(
+        graph,
+        time_limit=None if time_limit is None else SHARE * time_limit,
+        iteration_limit=iteration_limit,
+        rng=rng,
+        warm_start=warm_start,
+        on_progress=on_progress,
+    )
+    if found.length is None:
+        return found
+    length = found.length
+    rows: list[Progress] = list(found.trace)
+
+    def tell(row: Progress) -> None:
+        rows.append(replace(row, stage="goals", incumbent=length))
+        if on_progress:
+            on_progress(rows[-1])
+
+    ways = graph.ways(sub_goals=False)
+    places = range(graph.goal_count + 1)
+    shortest = np.array([[ways.length(a, b) for b in places] for a in places])
+    over_goals = TravelGraph.from_costs(np.minimum(shortest, shortest.T), places)
+    left = None if time_limit is None else (1.0 - SHARE) * time_limit
+    bound = prove(over_goals, time_limit=left, rng=rng, on_progress=tell).lower_bound
+    return replace(
+        found,
+        # the ways are shortest up to rounding
+        lower_bound=min(length, (bound or 0.0) * (1.0 - 1e-9)),
+        trace=tuple(rows),
+    )

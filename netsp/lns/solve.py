@@ -1,0 +1,111 @@
+"""`lns`: ruin and recreate with exact choice of classes, as a solver of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from netsp.lns.layers import Instance
+from netsp.lns.search import Search
+from netsp.result import OnProgress, Result
+from netsp.run import Run, Stop, read_params
+from netsp.travel import TravelGraph
+
+ROUNDS_PER_GOAL = 300
+"""Default number of rounds, times the number of goals, when nothing is limited."""
+
+MOST_VERTICES = 1000
+"""By default so many classes of least tether are looked at, shared among the goals."""
+
+
+@dataclass(frozen=True)
+class Params:
+    """classes : most classes per goal, those of least tether; 0 for as many as make
+    `MOST_VERTICES` in all. restarts : searches that share the iterations or the time, each from the
+    best so far."""
+
+    classes: int = 0
+    restarts: int = 3
+
+    def __post_init__(self) -> None:
+        if self.classes < 0:
+            raise ValueError(f"option 'classes': expected 0 or more, got {self.classes}")
+        if self.restarts < 1:
+            raise ValueError(f"option 'restarts': expected 1 or more, got {self.restarts}")
+
+
+def solve(
+    graph: TravelGraph,
+    *,
+    time_limit: float | None = None,
+    iteration_limit: int | None = None,
+    rng: np.random.Generator | None = None,
+    params: Mapping[str, Any] | None = None,
+    warm_start: Sequence[int] | None = None,
+    on_progress: OnProgress | None = None,
+) -> Result:
+    """Search orders of goals. An iteration is one round of ruin and recreate; the search cools over
+    the iterations, or over the time if only that is limited. No bound is claimed."""
+    chosen = read_params(Params, "lns", params)
+    rng = rng or np.random.default_rng(0)
+    run = Run(graph, time_limit, iteration_limit, on_progress)
+    run.offer(warm_start)
+    try:
+        if run.trivial():
+            return run.result()
+        run.check()
+        core = least_tethers(graph, chosen.classes or most_classes(graph, MOST_VERTICES))
+        if run.tour is not None:
+            core = np.union1d(core, run.tour)
+        instance = Instance(graph.cluster[core], graph.costs_among(core), core)
+        by_clock = time_limit is not None and iteration_limit is None
+        total = iteration_limit or ROUNDS_PER_GOAL * graph.goal_count
+        begin = run.clock.elapsed
+        for k in range(chosen.restarts):
+            start = None if run.tour is None else graph.cluster[list(run.tour)]
+            search = Search(instance, rng, start)
+            search.settle()
+            run.offer(search.best()[1])
+            run.report("settled", current=search.length)
+
+            def progress(k: int = k) -> float:
+                share = (run.clock.elapsed - begin) / max((time_limit or 1.0) - begin, 1e-9)
+                return share * chosen.restarts - k
+
+            def tell(count: int, search: Search = search) -> None:
+                run.iterations += count
+                if search.best_length < run.length * (1.0 - 1e-12):
+                    run.offer(search.best()[1])
+                run.report("search", current=search.length)
+
+            rounds = total * (k + 1) // chosen.restarts - total * k // chosen.restarts
+            search.run(
+                np.inf if by_clock else rounds, run.clock, progress if by_clock else None, tell
+            )
+    except (Stop, KeyboardInterrupt):
+        pass
+    run.report("done")
+    return run.result()
+
+
+def most_classes(graph: TravelGraph, vertices: int) -> int:
+    """The most classes per goal that give no more than so many vertices, at least 3."""
+    sizes = np.bincount(graph.cluster)
+    k = 3
+    while k < sizes.max() and np.minimum(sizes, k + 1).sum() <= vertices:
+        k += 1
+    return k
+
+
+def least_tethers(graph: TravelGraph, classes: int = 1) -> np.ndarray[Any, np.dtype[np.int64]]:
+    """The vertices of the shortest tethers of every cluster, at most `classes` of each, base first.
+    The leg from the base is the tether, in a graph made from costs too."""
+    tethers = graph.costs_to_base
+    tethers[0] = 0.0
+    order = np.lexsort((tethers, graph.cluster))
+    cluster = graph.cluster[order]
+    rank = np.arange(len(order)) - np.searchsorted(cluster, cluster)
+    return np.asarray(np.sort(order[rank < classes]), dtype=np.int64)
