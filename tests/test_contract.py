@@ -215,11 +215,17 @@ def test_that_there_is_no_tour_is_proven_by_mip_and_claimed_by_none_else(backend
     [
         (
             {"solver": "gurobi"},
-            "solver: unknown 'gurobi'; expected one of mip, reduced-mip, anneal",
+            "solver: unknown 'gurobi'; expected one of auto, mip, reduced-mip",
         ),
-        ({"params": {"hot": 1}}, "unknown option 'hot'; expected one of backend, search_rounds"),
+        (
+            {"solver": "mip", "params": {"hot": 1}},
+            "unknown option 'hot'; expected one of backend, search_rounds",
+        ),
         ({"params": {"backend": "cplex"}}, "unknown 'cplex'; expected one of highs, cbc"),
-        ({"params": {"search_rounds": "many"}}, "expected a whole number, got 'many'"),
+        (
+            {"solver": "mip", "params": {"search_rounds": "many"}},
+            "expected a whole number, got 'many'",
+        ),
         ({"solver": "greedy-2016", "params": {"k": 1}}, "unknown option 'k'; it takes none"),
         ({"solver": "anneal", "params": {"hot": 1, "cold": 2}}, "expected 0 < cold <= hot"),
         ({"solver": "anneal", "params": {"hot": math.nan}}, "expected a finite number"),
