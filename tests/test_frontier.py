@@ -1,0 +1,219 @@
+"""What makes long proofs possible: bounds among slits, cuts, elimination, lns and auto."""
+
+import itertools
+import math
+
+import networkx as nx
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from netsp import Polygon, Problem, Status, solve, solve_graph, travel_graph, verify
+from netsp.lns import Instance, Search
+from netsp.mip.flows import min_cuts
+from netsp.mip.solve import MipRun, Params
+from netsp.mip.subtours import branches
+from netsp.result import Clock
+from netsp.roadmap.slits import _taut, build_slits, slit_lengths
+from netsp.roadmap.taut import TautRoadmap
+from tests.brute import brute_tour
+from tests.test_contract import random_graph
+from tests.worlds import random_world, small_worlds
+
+
+@settings(max_examples=40, deadline=None)
+@given(small_worlds(), st.booleans())
+def test_among_slits_no_leg_is_longer(problem, grid):
+    try:
+        graph = travel_graph(problem)
+    except Exception:
+        return
+    exact, low = graph.costs, graph.lower_bounds()
+    held = np.isfinite(exact)
+    assert (low[held] <= exact[held] * (1 + 1e-12)).all()
+    assert (low[0, 1:] >= exact[0, 1:] * 0.3).all()
+
+
+@settings(max_examples=20, deadline=None)
+@given(small_worlds(grid=True))
+def test_among_slits_no_leg_is_longer_on_a_grid_of_ties(problem):
+    try:
+        graph = travel_graph(problem)
+    except Exception:
+        return
+    exact, low = graph.costs, graph.lower_bounds()
+    held = np.isfinite(exact)
+    assert (low[held] <= exact[held] * (1 + 1e-12)).all()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_for_obstacles_that_are_slits_the_bound_is_the_length(seed):
+    rng = np.random.default_rng(seed)
+    x = np.sort(rng.uniform(1, 9, 5))
+    thin = 1e-6
+    slits = []
+    for k in x:
+        y, h = rng.uniform(-2, 2), rng.uniform(0.5, 2)
+        slits.append(
+            Polygon(polygon=[(k, y - h), (k + thin, y - h), (k + thin, y + h), (k, y + h)])
+        )
+    p = Problem(
+        base=(0, 0), goals=[(10, 0.3), (float(x[2] + x[3]) / 2, 0.1)], obstacles=slits,
+        tether_length=18,
+    )  # fmt: skip
+    roadmap = TautRoadmap(p)
+    graph = roadmap.travel_graph()
+    low = slit_lengths(build_slits(p), roadmap.outline.places, roadmap.cluster, roadmap.signatures)
+    held = np.isfinite(graph.costs)
+    assert len(graph) > 6
+    assert np.abs(low[held] - graph.costs[held]).max() < 1e-3
+
+
+@settings(max_examples=200, deadline=None)
+@given(
+    st.lists(
+        st.tuples(st.floats(0, 2), st.floats(-3, 3), st.booleans(), st.floats(0, 2)),
+        min_size=1, max_size=6,
+    ),
+    st.floats(-3, 3),
+)  # fmt: skip
+def test_the_taut_string_is_the_least_of_a_convex_program(gates, start):
+    """Against alternating minimisation from three starts: no string through the gates is shorter,
+    and some string is as short."""
+    s = np.cumsum([round(g[0], 2) for g in gates])
+    rows = np.array(
+        [(a, g[1], np.inf) if g[2] else (a, -np.inf, g[1]) for a, g in zip(s, gates, strict=True)]
+    )
+    rows[-1, 1:] = gates[-1][1]
+    length = _taut(start, rows, len(rows))
+    xs = np.concatenate([[0.0], rows[:, 0]])
+    best = math.inf
+    for first in (-3.0, 0.0, 3.0):
+        y = np.concatenate([[start], np.clip(first, rows[:, 1], rows[:, 2])])
+        for _ in range(400):
+            for k in range(1, len(y) - 1):
+                left, right = xs[k] - xs[k - 1], xs[k + 1] - xs[k]
+                t = left / (left + right) if left + right > 0 else 0.5
+                y[k] = np.clip(y[k - 1] + t * (y[k + 1] - y[k - 1]), *rows[k - 1, 1:])
+        best = min(best, float(np.hypot(np.diff(xs), np.diff(y)).sum()))
+    assert length <= best + 1e-9
+    assert length >= math.hypot(xs[-1], rows[-1, 1] - start) - 1e-9
+    if (np.diff(xs) > 0.01).all():
+        assert length >= best - 0.05 * (1 + best)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_minimum_cuts_are_those_of_networkx(seed):
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(3, 12))
+    pairs = [e for e in itertools.combinations(range(n), 2) if rng.random() < 0.5]
+    tail, head = (np.array([e[k] for e in pairs], dtype=np.int64) for k in range(2))
+    capacity = rng.uniform(0.1, 1.0, len(pairs))
+    x = rng.uniform(0.0, 1.0, n)
+    cluster = np.concatenate([[0], rng.integers(1, 3, n - 1)])
+    for c in np.unique(cluster[1:]):
+        sets, _, values = min_cuts(
+            n, tail, head, capacity, x, cluster, 0, np.array([c]), 1e9
+        )  # fmt: skip
+        g = nx.Graph()
+        g.add_nodes_from([*range(n), "s"])
+        for (u, v), w in zip(pairs, capacity, strict=True):
+            g.add_edge(u, v, capacity=w)
+        for v in np.flatnonzero(cluster == c):
+            g.add_edge("s", int(v), capacity=2.0 * x[v])
+        expected = nx.maximum_flow_value(g, "s", 0)
+        if len(values) == 0:
+            assert expected == pytest.approx(2.0 * x[cluster == c].sum())  # S is empty
+            continue
+        assert values[0] == pytest.approx(expected)
+        inside = sets[0]
+        assert not inside[0]
+        across = capacity[inside[tail] ^ inside[head]].sum()
+        outside = 2.0 * x[(cluster == c) & ~inside].sum()
+        assert across + outside == pytest.approx(expected)
+
+
+def test_branches_are_the_prefixes_of_words():
+    words = [(), (1,), (1, 2), (1, 2, 3), (-1,), (-1, 2)]
+    found = {tuple(np.flatnonzero(row).tolist()) for row in branches(words)}
+    assert found == {(1, 2, 3), (2, 3), (4, 5)}
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_nothing_that_is_ruled_out_is_in_the_optimum(seed):
+    """Elimination with a weak incumbent keeps an optimal tour."""
+    graph = random_graph(seed, goals=6)
+    best = brute_tour(graph)
+    run = MipRun(graph, None, None, None)
+    result = run.solve(np.random.default_rng(seed), Params(search_rounds=0), None)
+    assert result.status is Status.OPTIMAL
+    assert result.length == pytest.approx(best, rel=1e-6)
+    assert result.lower_bound <= best * (1 + 1e-12)
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(0, 10_000), st.integers(2, 7))
+def test_the_search_keeps_its_length_and_never_beats_brute_force(seed, goals):
+    graph = random_graph(seed, goals=goals)
+    search = Search(Instance.of(graph), np.random.default_rng(seed))
+    search.settle()
+    settled = search.best_length
+    search.run(50, Clock(None))
+    length, tour = search.best()
+    assert graph.is_tour(tour)
+    assert length == pytest.approx(graph.tour_length(tour))
+    assert length == pytest.approx(search.best_length)
+    assert brute_tour(graph) * (1 - 1e-9) <= length <= settled * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_lns_finds_the_proven_optimum_of_twenty_goals(seed):
+    problem = random_world(seed, goals=20, tether=300.0)
+    best = solve(problem, "mip")
+    found = solve(problem, "lns", iteration_limit=4_000)
+    assert verify(problem, found)
+    assert found.lower_bound is None
+    assert best.length * (1 - 1e-6) <= found.length <= best.length * 1.01
+
+
+def test_auto_proves_what_it_can():
+    problem = random_world(1, goals=12, tether=300.0)
+    solution = solve(problem)
+    assert solution.solver == "auto"
+    assert solution.status is Status.OPTIMAL
+    assert verify(problem, solution)
+
+
+def test_auto_gives_a_tour_and_a_true_bound_where_mip_would_not_fit(monkeypatch):
+    import netsp.auto
+
+    problem = random_world(1, goals=8, tether=300.0)
+    best = solve(problem, "mip")
+    monkeypatch.setattr(netsp.auto, "PROVABLE", 10)
+    solution = solve(problem, "auto", iteration_limit=2_000)
+    assert verify(problem, solution)
+    assert solution.lower_bound is not None
+    assert 0.3 * best.length < solution.lower_bound <= best.length * (1 + 1e-9)
+    assert solution.length >= best.length * (1 - 1e-6)
+
+
+def test_the_root_reports_what_is_left():
+    rows = []
+    graph = travel_graph(random_world(0, goals=15, tether=300.0))
+    result = solve_graph(graph, "mip", on_progress=rows.append)
+    assert result.status is Status.OPTIMAL
+    left = [r.legs for r in rows if r.stage == "root"]
+    assert left == sorted(left, reverse=True)
+    assert left[0] > 0
+    assert all(0 < r.vertices <= len(graph) for r in rows if r.stage == "root")
+
+
+@pytest.mark.parametrize("solver", ["auto", "mip"])
+def test_a_limit_that_ends_in_the_root_leaves_a_true_bound(solver):
+    graph = travel_graph(random_world(3, goals=25, tether=300.0))
+    best = solve_graph(graph, "mip").length
+    for limit in (3, 8, 20):
+        result = solve_graph(graph, solver, iteration_limit=limit)
+        assert result.lower_bound <= best * (1 + 1e-9)
+        assert result.length >= best * (1 - 1e-6)
