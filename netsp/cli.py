@@ -175,6 +175,10 @@ def _positive(text: str) -> int:
 
 def _check_writable(*paths: str | None) -> None:
     """InputError before the work starts rather than after it."""
+    given = [os.path.realpath(p) for p in paths if p is not None and not p.startswith("/dev/")]
+    twice = [name for name in given if given.count(name) > 1]
+    if twice:
+        raise InputError(f"{twice[0]}: is named for two different files")
     for path in paths:
         if path is None:
             continue
@@ -276,7 +280,9 @@ def _verify(args: argparse.Namespace) -> int:
 
         path = read_path(args.solution)
         if path is not None:
-            print(describe_path(Problem.load(args.problem), path))
+            text = describe_path(Problem.load(args.problem), path)
+            if not args.quiet:
+                print(text)
             return 0
     problem, solution = _load_pair(args.problem, args.solution)
     from netsp.judge import verify
@@ -285,7 +291,9 @@ def _verify(args: argparse.Namespace) -> int:
     if not args.quiet:
         print(verdict)
         print("verified" if verdict else "NOT VERIFIED")
-    if args.measures and solution.path:
+    if args.measures and solution.path and not args.quiet:
+        if solution.problem.sha256 != problem.sha256:
+            return EXIT_NOT_VERIFIED
         from netsp.measuring import describe_tethers
 
         print(f"\n{describe_path(problem, solution.path)}\n\n{describe_tethers(problem, solution)}")

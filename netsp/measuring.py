@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from netsp.errors import InputError
 from netsp.hsignature.measures import Measures, measure
-from netsp.problem import Problem, read_text
+from netsp.problem import LARGEST, Problem, read_text
 from netsp.roadmap.paths import TautPaths
 from netsp.solution import Solution
 
@@ -31,17 +31,18 @@ def read_path(file: str | Path) -> Floats | None:
     Raises InputError with the row that cannot be read.
     """
     text = read_text(file)
-    text = text.decode("utf-8", "replace") if isinstance(text, bytes) else text
+    text = text.decode("utf-8-sig", "replace") if isinstance(text, bytes) else text
+    text = text.removeprefix("\ufeff")
     if text.lstrip().startswith("{"):
         return None
     if text.lstrip().startswith("["):
         try:
             rows = json.loads(text)
-        except json.JSONDecodeError as error:
+        except (json.JSONDecodeError, RecursionError) as error:
             raise InputError(f"{file}: not valid JSON: {error}") from None
     else:
         rows = [row for row in csv.reader(text.splitlines()) if row]
-        if rows and not _is_point(rows[0]):
+        if rows and not any(_is_number(cell) for cell in rows[0]):
             rows = rows[1:]
     for k, row in enumerate(rows):
         if not _is_point(row) or len(row) != len(rows[0]):
@@ -51,11 +52,19 @@ def read_path(file: str | Path) -> Floats | None:
     return np.array(rows, dtype=float)
 
 
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True
+
+
 def _is_point(row: object) -> bool:
     if not isinstance(row, list) or len(row) not in (2, 3):
         return False
     try:
-        return bool(np.isfinite([float(x) for x in row]).all())
+        return all(abs(float(x)) <= LARGEST for x in row)
     except (TypeError, ValueError):
         return False
 

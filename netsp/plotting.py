@@ -143,17 +143,22 @@ def save_trace(rows: Sequence[Progress], title: str, units: str, path: str | Pat
     ):
         seen = [(r.iteration, getattr(r, field)) for r in rows if getattr(r, field) is not None]
         if seen:
-            top.plot(*zip(*seen, strict=True), label=label, **style)
+            top.plot(*zip(*seen, strict=True), label=label, marker=_mark(seen), **style)
     top.set_ylabel(f"length ({units})")
     top.legend(frameon=False, fontsize=8)
     top.set_title(title, fontsize=10, loc="left")
     if tangled:
         seen = [(r.iteration, r.entangled) for r in rows if r.entangled is not None]
-        axes[1].plot(*zip(*seen, strict=True), color=_BASE, lw=0.9)
+        axes[1].plot(*zip(*seen, strict=True), color=_BASE, lw=0.9, marker=_mark(seen))
         axes[1].set_ylabel("entangled obstacles")
         axes[1].set_ylim(bottom=0.0)
     axes[-1].set_xlabel("iteration")
     _write(figure, path)
+
+
+def _mark(points: Sequence[object]) -> str | None:
+    """A marker where there is but one point to see."""
+    return "o" if len(points) == 1 else None
 
 
 def save_classes(problem: Problem, goal: int, path: str | Path) -> None:

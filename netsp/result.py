@@ -54,13 +54,15 @@ class Trajectory:
     """What a baseline blind to the tether walked: a closed path, whatever it entangles.
 
     order : goals (clusters) in the order visited. words : at each of them, the word of the way
-    from the base. word : of the whole. path : (n, 3) closed polyline.
+    from the base. word : of the whole. path : (n, 3) closed polyline, circumscribed to arcs, and
+    length : of the arcs themselves.
     """
 
     order: tuple[int, ...]
     words: tuple[Word, ...]
     word: Word
     path: Floats
+    length: float
 
 
 @dataclass(frozen=True)

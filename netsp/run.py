@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import fields
 from typing import Any, TypeVar
 
 import numpy as np
 
-from netsp.errors import InputError
+from netsp.errors import InputError, LimitReachedError
 from netsp.result import Clock, OnProgress, Progress, Result, proven
 from netsp.solution import Status
 from netsp.travel import TravelGraph
@@ -46,6 +47,7 @@ class Run:
         self.length = math.inf
         self.bound: float | None = None
         self.infeasible = False
+        self.stopped = False
 
     def offer(
         self,
@@ -68,6 +70,25 @@ class Run:
         self.walk = None if walk is None else tuple(int(v) for v in walk)
         return True
 
+    @contextmanager
+    def until_stopped(self) -> Iterator[None]:
+        """Run the body until it is done, a limit is reached or Ctrl-C is pressed. A limit that is
+        reached while legs are measured counts the same, if there is a tour to show."""
+        try:
+            yield
+        except (Stop, KeyboardInterrupt):
+            self.stopped = True
+        except LimitReachedError:
+            if self.tour is None:
+                raise
+            self.stopped = True
+
+    def finish(self, stage: str, **more: Any) -> Result:
+        """The last report, which says so if the run was stopped, and the outcome."""
+        with suppress(KeyboardInterrupt):
+            self.report("stopped" if self.stopped else stage, **more)
+        return self.result()
+
     def trivial(self) -> bool:
         """Settle problems of no goal or one, where the answer is known."""
         if self.graph.goal_count > 1:
@@ -78,7 +99,6 @@ class Run:
             there = self.graph.members(1)
             self.offer([0, int(there[np.argmin(self.graph.costs_among([0, *there])[0, 1:])])])
         self.bound = self.length
-        self.report("trivial")
         return True
 
     def raise_bound(self, bound: float) -> None:
@@ -121,6 +141,8 @@ class Run:
 def read_params(kind: type[P], solver: str, params: Mapping[str, Any] | None) -> P:
     """A solver's options as its dataclass; InputError for an unknown name or a wrong type, naming
     the choices."""
+    if params is not None and not isinstance(params, Mapping):
+        raise InputError(f"solver {solver!r}: params: expected names with values, got {params!r}")
     known = {f.name: f for f in fields(kind)}  # type: ignore[arg-type]
     values: dict[str, Any] = {}
     for name, value in (params or {}).items():

@@ -66,7 +66,7 @@ DEFAULT_ROADMAP = "taut"
 
 
 def _load(table: Mapping[str, str], kind: str, name: str) -> Any:
-    if name not in table:
+    if not isinstance(name, str) or name not in table:
         raise InputError(f"{kind}: unknown {name!r}; expected one of {', '.join(table)}")
     module, attribute = table[name].split(":")
     return getattr(importlib.import_module(module), attribute)
@@ -126,18 +126,16 @@ def solve_graph(
     """
     run: Callable[..., Result] = _load(SOLVERS, "solver", solver)
     _check_limits(time_limit, iteration_limit)
-    if warm_start is not None and not graph.is_tour(warm_start):
-        raise InputError(
-            "warm_start: expected vertices from 0 on, one of every cluster, got "
-            f"{[int(v) for v in warm_start]}"
-        )
+    if not isinstance(graph, TravelGraph):
+        raise InputError(f"graph: expected a TravelGraph, got {graph!r}")
+    tour = None if warm_start is None else _as_tour(warm_start, graph)
     return run(
         graph,
         time_limit=time_limit,
         iteration_limit=iteration_limit,
-        rng=np.random.default_rng(seed),
+        rng=np.random.default_rng(_seed(seed)),
         params=params,
-        warm_start=warm_start,
+        warm_start=tour,
         on_progress=on_progress,
     )
 
@@ -268,12 +266,38 @@ def _blind_visits(problem: Problem, walked: Trajectory) -> tuple[Visit, ...]:
 
 
 def _check_limits(time_limit: float | None, iteration_limit: int | None) -> None:
-    if time_limit is not None and not time_limit > 0:
-        raise InputError(f"time_limit: expected a positive number of seconds, got {time_limit!r}")
-    if iteration_limit is not None and not iteration_limit >= 1:
+    if time_limit is not None:
+        number = isinstance(time_limit, (int, float, np.number)) and time_limit is not True
+        if not (number and time_limit > 0):
+            raise InputError(
+                f"time_limit: expected a positive number of seconds, got {time_limit!r}"
+            )
+    if iteration_limit is not None:
+        whole = isinstance(iteration_limit, (int, np.integer)) and iteration_limit is not True
+        if not (whole and 1 <= iteration_limit < 2**62):
+            raise InputError(
+                f"iteration_limit: expected a whole number from 1 on, got {iteration_limit!r}"
+            )
+
+
+def _seed(seed: int) -> int:
+    if not (isinstance(seed, (int, np.integer)) and seed >= 0):
+        raise InputError(f"seed: expected a whole number from 0 on, got {seed!r}")
+    return int(seed)
+
+
+def _as_tour(vertices: Sequence[int], graph: TravelGraph) -> tuple[int, ...]:
+    try:
+        given = np.asarray(list(vertices) if not isinstance(vertices, str) else None)
+        tour = tuple(int(v) for v in given) if given.dtype.kind in "iu" else ()
+    except (TypeError, ValueError):
+        tour = ()
+    if not tour or not graph.is_tour(tour):
         raise InputError(
-            f"iteration_limit: expected a whole number from 1 on, got {iteration_limit!r}"
+            "warm_start: expected vertices from 0 on, one of every cluster, got "
+            f"{str(vertices)[:80]}"
         )
+    return tour
 
 
 def _tour_of(solution: Solution, graph: TravelGraph) -> list[int] | None:

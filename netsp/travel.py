@@ -64,7 +64,7 @@ class TravelGraph:
         tethers: npt.ArrayLike,
         legs: Legs,
         roadmap: str = "custom",
-        ways: Callable[[bool], Ways] | None = None,
+        ways: Callable[[bool, Callable[[], None]], Ways] | None = None,
     ) -> None:
         self.cluster: Ints = np.asarray(cluster, dtype=np.int64)
         self.signatures = tuple(signatures)
@@ -139,15 +139,21 @@ class TravelGraph:
         finally:
             self.legs_s += time.monotonic() - begin
 
-    def ways(self, *, sub_goals: bool) -> Ways:
+    @property
+    def geometric(self) -> bool:
+        """Whether a problem's geometry lies beneath, so that legs can be walked and retraced."""
+        return self._make_ways is not None
+
+    def ways(self, *, sub_goals: bool, check: Callable[[], None] = lambda: None) -> Ways:
         """Ways in any class, for solvers blind to the tether, with or without sub-goals beside the
-        obstacles; InputError if there is no geometry beneath this graph."""
+        obstacles; `check` is called now and then and may raise. InputError if there is no geometry
+        beneath this graph."""
         if self._make_ways is None:
             raise InputError(
                 "solver: needs the geometry of a problem, and this travel graph has none"
             )
         if sub_goals not in self._ways:
-            self._ways[sub_goals] = self._make_ways(sub_goals)
+            self._ways[sub_goals] = self._make_ways(sub_goals, check)
         return self._ways[sub_goals]
 
     def subgraph(self, vertices: npt.ArrayLike) -> TravelGraph:
@@ -261,17 +267,22 @@ def _checked(costs: npt.ArrayLike, clusters: npt.ArrayLike) -> tuple[Floats, Int
     """The matrix with inf within clusters, and the clusters, or InputError with what is wrong."""
     try:
         c = np.array(costs, dtype=float)
-        labels = np.asarray(clusters, dtype=float)
-    except (TypeError, ValueError) as error:
+        labels = np.array(clusters, dtype=float)
+    except (TypeError, ValueError, OverflowError) as error:
         raise InputError(f"costs, clusters: expected numbers: {error}") from None
-    n = len(c)
-    if c.ndim != 2 or c.shape != (n, n) or n == 0:
+    if c.ndim != 2 or c.shape[0] != c.shape[1] or len(c) == 0:
         raise InputError(f"costs: expected a square matrix, got shape {c.shape}")
+    n = len(c)
     if labels.shape != (n,):
         raise InputError(f"clusters: expected {n} labels, one per row of costs, got {labels.shape}")
-    if not np.array_equal(labels, np.floor(labels)) or labels.min() < 0:
-        bad = next(x for x in labels if not (x >= 0 and x == np.floor(x)))
-        raise InputError(f"clusters: expected whole numbers from 0 on, got {bad:g}")
+    good = np.isfinite(labels) & (labels >= 0) & (labels == np.floor(labels))
+    if not good.all():
+        raise InputError(f"clusters: expected whole numbers from 0 on, got {labels[~good][0]:g}")
+    if labels.max() >= n:
+        raise InputError(
+            f"clusters: {n} vertices cannot fill clusters 0 to {labels.max():g}; expected numbers "
+            "without gaps"
+        )
     cluster = labels.astype(np.int64)
     if cluster[0] != 0 or (cluster == 0).sum() != 1:
         raise InputError(
@@ -290,7 +301,9 @@ def _checked(costs: npt.ArrayLike, clusters: npt.ArrayLike) -> tuple[Floats, Int
     if (c < 0).any():
         u, v = np.argwhere(c < 0)[0]
         raise InputError(f"costs: costs[{u}][{v}] is {c[u, v]:g}; expected no negative cost")
-    scale = np.max(c[np.isfinite(c)], initial=0.0)
+    scale = float(np.max(c[np.isfinite(c)], initial=0.0))
+    if scale > 1e100:
+        raise InputError(f"costs: {scale:g} is too large; expected at most 1e100")
     with np.errstate(invalid="ignore"):
         uneven = (c != c.T) & ~(np.abs(c - c.T) <= 1e-9 * scale)
     if uneven.any():

@@ -134,6 +134,51 @@ def test_ctrl_c_gives_what_there_is(solver):
     assert result.status is not Status.INFEASIBLE
 
 
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_ctrl_c_at_any_report_gives_what_there_is(solver):
+    limit = ITERATIONS.get(solver)
+    reports = len(solve_graph(graph("taut"), solver, iteration_limit=limit).trace)
+    for at in sorted({1, 2, reports // 2, reports - 1, reports}):
+        seen = []
+
+        def interrupt(row, seen=seen, at=at):
+            seen.append(row)
+            if len(seen) == at:
+                raise KeyboardInterrupt
+
+        result = solve_graph(graph("taut"), solver, iteration_limit=limit, on_progress=interrupt)
+        assert result.tour is None or graph("taut").is_tour(result.tour)
+
+
+@pytest.mark.parametrize("solver", ["anneal", "anneal-2016", "lns"])
+def test_of_two_limits_the_first_to_come_ends_the_run(solver):
+    begin = time.monotonic()
+    result = solve_graph(graph("taut"), solver, time_limit=1.0, iteration_limit=10**15)
+    assert time.monotonic() - begin < 3.0
+    assert result.length <= optimum("taut").length * 1.3
+
+
+@pytest.mark.parametrize("scale", [1e-12, 1e-3, 1e10, 1e20])
+@pytest.mark.parametrize("backend", ["highs", "cbc"])
+def test_proofs_do_not_depend_on_the_unit(scale, backend):
+    plain = random_graph(4, goals=6)
+    costs = np.where(np.isfinite(plain.costs), plain.costs, 0.0) * scale
+    g = TravelGraph.from_costs(costs, plain.cluster)
+    result = solve_graph(g, "mip", params={"backend": backend})
+    assert result.status is Status.OPTIMAL
+    assert result.length == pytest.approx(brute_tour(plain) * scale, rel=1e-6)
+
+
+def test_time_up_does_not_lose_a_tour():
+    problem = random_world(1, goals=15, tether=350.0)
+    for solver in ("reduced-mip", "mip", "auto"):
+        for limit in (0.15, 0.4):
+            warm = solve(problem, "greedy-2016")
+            solution = solve(problem, solver, time_limit=limit, warm_start=warm)
+            assert solution.length <= warm.length
+            assert verify(problem, solution)
+
+
 @pytest.mark.parametrize("solver", SEEING)
 @pytest.mark.parametrize("first", ["greedy", "anneal", "mip"])
 def test_a_warm_start_by_any_other_solver_is_never_made_worse(solver, first):
@@ -204,10 +249,9 @@ def test_that_there_is_no_tour_is_proven_by_mip_and_claimed_by_none_else(backend
     costs[0, 1:] = costs[1:, 0] = 1.0  # a star: connected, yet no tour
     g = TravelGraph.from_costs(costs, range(5))
     assert solve_graph(g, "mip", params={"backend": backend}).status is Status.INFEASIBLE
-    for solver in ("anneal", "greedy"):
+    for solver in ("anneal", "lns", "greedy", "greedy-2016"):
         result = solve_graph(g, solver, iteration_limit=1000)
         assert result.status is Status.NO_SOLUTION_FOUND
-    assert solve_graph(g, "greedy-2016").length == 8.0  # it retraces, so it needs no other leg
 
 
 @pytest.mark.parametrize(
@@ -233,6 +277,15 @@ def test_that_there_is_no_tour_is_proven_by_mip_and_claimed_by_none_else(backend
         ({"time_limit": math.nan}, "time_limit: expected a positive"),
         ({"iteration_limit": 0}, "iteration_limit: expected a whole number from 1 on"),
         ({"warm_start": [0, 1]}, "warm_start: expected vertices from 0 on"),
+        ({"warm_start": [0, 1.5, 2, 3, 4]}, "warm_start: expected vertices from 0 on"),
+        ({"warm_start": "01234"}, "warm_start: expected vertices from 0 on"),
+        ({"warm_start": 5}, "warm_start: expected vertices from 0 on"),
+        ({"time_limit": "5"}, "time_limit: expected a positive"),
+        ({"iteration_limit": 2.5}, "iteration_limit: expected a whole number"),
+        ({"iteration_limit": True}, "iteration_limit: expected a whole number"),
+        ({"seed": -1}, "seed: expected a whole number from 0 on"),
+        ({"params": [("backend", "highs")]}, "params: expected names with values"),
+        ({"solver": ["mip"]}, "solver: unknown ['mip']"),
         ({"solver": "greedy-tsp"}, "needs the geometry"),
         ({"solver": "anneal-2016"}, "needs the geometry"),
     ],
@@ -260,7 +313,12 @@ def good_costs():
         (lambda c, k: (c * np.nan, k), "costs[0][1] is not a number"),
         (lambda c, k: (c[:3], k), "expected a square matrix, got shape (3, 4)"),
         (lambda c, k: (c, k[:3]), "expected 4 labels"),
-        (lambda c, k: (c, k * 2), "cluster 1 has no vertex"),
+        (lambda c, k: (c, np.where(k > 0, k + 1, 0)), "cluster 1 has no vertex"),
+        (lambda c, k: (c, k * 1e9), "4 vertices cannot fill clusters 0 to 2e+09"),
+        (lambda c, k: (c, [0, 1, 2, np.inf]), "expected whole numbers from 0 on"),
+        (lambda c, k: (c * 1e300, k), "is too large"),
+        (lambda c, k: (None, k), "expected a square matrix"),
+        (lambda c, k: ([[10**400]], k), "expected numbers"),
         (lambda c, k: (c, k - 1), "expected whole numbers from 0 on, got -1"),
         (lambda c, k: (c, [0, 1, 2, 0.5]), "expected whole numbers from 0 on, got 0.5"),
         (lambda c, k: (c, [0, 0, 1, 1]), "vertex 0, where the tour starts, must be alone"),

@@ -199,3 +199,19 @@ def test_sub_goals_go_round_polygons_and_stay_within_bounds():
     assert np.sign(direct[:, 1].sum()) == -np.sign(around[:, 1].sum())
     assert ways.word(0, 1) != ways.word(0, 1, ways.far_side(0, 1, -1, 0))
     assert around[:, 1].max() <= 6.05
+
+
+def test_a_goal_on_a_boundary_does_not_make_a_path_of_thousands_of_points():
+    p = Problem(
+        base=(0, 0),
+        goals=[(5, 0), (4, 1), (4, -1), (9, 0)],
+        obstacles=[Circle(center=(4, 0), radius=1), Circle(center=(7, 0), radius=1)],
+        tether_length=14,
+    )
+    ways = travel_graph(p).ways(sub_goals=True)
+    for a in range(5):
+        for b in range(5):
+            if a != b:
+                path = ways.path(a, b)
+                assert len(path) < 500
+                assert signature(path, p.representative_points) == ways.word(a, b)

@@ -153,3 +153,22 @@ def test_the_command_prints_measures_of_any_path(tmp_path, capsys):
     (tmp_path / "bad.csv").write_text("x,y\n1,2\n3\n")
     assert main(["verify", str(problem), str(tmp_path / "bad.csv"), "--measures"]) == 2
     assert "point 1" in capsys.readouterr().err
+
+
+def test_a_tour_out_and_home_past_the_same_side_does_not_cross_itself():
+    from netsp import solve
+
+    p = Problem(
+        base=(0, 0),
+        goals=[(9, 0), (9, 0.7), (9, -0.4)],
+        obstacles=[Circle(center=(4, 0), radius=2)],
+        tether_length=14,
+    )
+    assert measure(p, solve(p, "greedy-2016").path).self_crossings <= 4
+
+
+def test_a_byte_order_mark_does_not_cost_a_point(tmp_path):
+    from netsp.measuring import read_path
+
+    (tmp_path / "a.csv").write_text("\ufeff0,0\n1,1\n", encoding="utf-8")
+    assert len(read_path(tmp_path / "a.csv")) == 2

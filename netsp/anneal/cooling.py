@@ -27,10 +27,9 @@ class Cooling:
 
 
 class Schedule:
-    """Temperature as a function of progress.
-
-    By iterations if there is an iteration limit or no limit at all (then `default` iterations are
-    made), so that the same seed gives the same answer; by the clock if only time is limited.
+    """Temperature as a function of progress: the larger share of the iterations or of the time that
+    is used up. Without any limit `default` iterations are made. Only under an iteration limit that
+    comes first does the same seed give the same answer.
     """
 
     def __init__(self, cooling: Cooling, run: Run, leg: float, default: int) -> None:
@@ -38,16 +37,17 @@ class Schedule:
         self.unit = max(leg, 1e-300)
         if run.clock.limit is None and run.iteration_limit == float("inf"):
             run.iteration_limit = default
-        self.by_clock = run.iteration_limit == float("inf")
-        self.end = run.clock.left if self.by_clock else float("inf")
+        self.begin = run.clock.elapsed
 
     @property
     def progress(self) -> float:
         """From 0 at the start to 1 at the end."""
         run = self.run
-        if self.by_clock:
-            return min(1.0, 1.0 - max(run.clock.left, 0.0) / max(self.end, 1e-9))
-        return min(1.0, run.iterations / run.iteration_limit)
+        by_clock = 0.0
+        if run.clock.limit is not None:
+            spent = run.clock.elapsed - self.begin
+            by_clock = spent / max(run.clock.limit - self.begin, 1e-9)
+        return min(1.0, max(by_clock, run.iterations / run.iteration_limit))
 
     @property
     def temperature(self) -> float:

@@ -22,7 +22,7 @@ from netsp.anneal.cooling import Cooling, Schedule
 from netsp.chance import below, metropolis, seeded
 from netsp.lns.layers import Instance
 from netsp.result import OnProgress, Result
-from netsp.run import Run, Stop, read_params
+from netsp.run import Run, read_params
 from netsp.travel import TravelGraph
 
 PROPOSALS_PER_GOAL = 1_000_000
@@ -59,43 +59,44 @@ def solve(
     chosen = read_params(Params, "anneal", params)
     rng = rng or np.random.default_rng(0)
     run = Run(graph, time_limit, iteration_limit, on_progress)
-    run.offer(warm_start)
-    if run.trivial():
-        return run.result()
-    try:
+    with run.until_stopped():
+        run.offer(warm_start)
+        if not run.trivial():
+            _anneal(run, rng, chosen)
+    return run.finish("done", entangled=0)
+
+
+def _anneal(run: Run, rng: np.random.Generator, chosen: Params) -> None:
+    run.check()
+    graph = run.graph
+    instance = Instance.of(graph)
+    goals = graph.goal_count
+    state = np.zeros(goals + 1, dtype=np.int64)
+    if run.tour is not None:
+        place = np.empty(len(graph), dtype=np.int64)
+        place[instance.order] = np.arange(len(graph))
+        state[:] = place[np.array(run.tour)]
+    else:
+        for k, c in enumerate(rng.permutation(np.arange(1, goals + 1))):
+            state[k + 1] = rng.integers(instance.start[c], instance.start[c + 1])
+    of_vertex = np.repeat(np.arange(goals + 1), np.diff(instance.start))
+    length = float(instance.costs[state, np.roll(state, -1)].sum())
+    schedule = Schedule(chosen, run, length / (goals + 1), default=PROPOSALS_PER_GOAL * goals)
+    best = state.copy()
+    best_length = length
+    chance = seeded(rng)
+    run.offer(instance.original(best))
+    run.report("anneal", current=length, entangled=0)
+    while run.iterations < run.iteration_limit:
         run.check()
-        instance = Instance.of(graph)
-        goals = graph.goal_count
-        state = np.zeros(goals + 1, dtype=np.int64)
-        if run.tour is not None:
-            place = np.empty(len(graph), dtype=np.int64)
-            place[instance.order] = np.arange(len(graph))
-            state[:] = place[np.array(run.tour)]
-        else:
-            for k, c in enumerate(rng.permutation(np.arange(1, goals + 1))):
-                state[k + 1] = rng.integers(instance.start[c], instance.start[c + 1])
-        of_vertex = np.repeat(np.arange(goals + 1), np.diff(instance.start))
-        length = float(instance.costs[state, np.roll(state, -1)].sum())
-        schedule = Schedule(chosen, run, length / (goals + 1), default=PROPOSALS_PER_GOAL * goals)
-        best = state.copy()
-        best_length = length
-        chance = seeded(rng)
+        count = schedule.chunk(CHUNK)
+        length, best_length = anneal(
+            state, best, length, best_length, count, schedule.temperature, chosen.swaps,
+            instance.costs, instance.start, of_vertex, chance,
+        )  # fmt: skip
+        run.iterations += count
         run.offer(instance.original(best))
         run.report("anneal", current=length, entangled=0)
-        while run.iterations < run.iteration_limit:
-            run.check()
-            count = schedule.chunk(CHUNK)
-            length, best_length = anneal(
-                state, best, length, best_length, count, schedule.temperature, chosen.swaps,
-                instance.costs, instance.start, of_vertex, chance,
-            )  # fmt: skip
-            run.iterations += count
-            run.offer(instance.original(best))
-            run.report("anneal", current=length, entangled=0)
-    except (Stop, KeyboardInterrupt):
-        pass
-    run.report("done" if run.iterations >= run.iteration_limit else "stopped", entangled=0)
-    return run.result()
 
 
 @njit(cache=True)

@@ -30,7 +30,7 @@ from numba import njit
 from netsp.anneal.cooling import Cooling, Schedule
 from netsp.chance import below, metropolis, seeded
 from netsp.result import OnProgress, Result
-from netsp.run import Run, Stop, read_params
+from netsp.run import Run, read_params
 from netsp.travel import TravelGraph
 
 Ints = npt.NDArray[np.int64]
@@ -80,50 +80,49 @@ def solve(
     chosen = read_params(Params, "anneal-2016", params)
     rng = rng or np.random.default_rng(0)
     run = Run(graph, time_limit, iteration_limit, on_progress)
-    run.offer(warm_start)
-    if run.trivial():
-        return run.result()
-    try:
+    with run.until_stopped():
+        run.offer(warm_start)
+        if not run.trivial():
+            _anneal(run, rng, chosen)
+    return run.finish("done")
+
+
+def _anneal(run: Run, rng: np.random.Generator, chosen: Params) -> None:
+    graph = run.graph
+    run.check()
+    ways = graph.ways(sub_goals=True, check=run.check)
+    goals = graph.goal_count
+    order = np.zeros(goals + 2, dtype=np.int64)
+    if run.tour is not None:
+        order[1:-1] = graph.cluster[list(run.tour[1:])]
+    else:
+        order[1:-1] = rng.permutation(np.arange(1, goals + 1))
+    via = np.full(goals + 1, -1, dtype=np.int64)
+    trie, vertex = _admissible(graph)
+    tables = (ways.planar, ways.height, ways.letters, ways.row, ways.far, ways.near)
+    longest = (goals + 1) * 2 * int((ways.row[:, 1:] - ways.row[:, :-1]).max(initial=0)) + 1
+    scratch = np.zeros((3, longest), dtype=np.int64)
+    stops = np.zeros(goals + 1, dtype=np.int64)
+    best = np.zeros(goals + 1, dtype=np.int64)
+    turns = np.zeros(ways.far.shape[2] + 1, dtype=np.int64)
+    length, entangled, _ = evaluate(order, via, *tables[:4], trie, vertex, stops, scratch, turns)
+    schedule = Schedule(chosen, run, length / (goals + 1), default=PROPOSALS_PER_GOAL * goals)
+    chunk = int(max(1, min(CHUNK, run.iteration_limit / REPORTS)))
+    chance = seeded(rng)
+    best_length = math.inf
+    run.report("anneal", current=length, entangled=int(entangled))
+    while run.iterations < run.iteration_limit:
         run.check()
-        ways = graph.ways(sub_goals=True)
-        goals = graph.goal_count
-        order = np.zeros(goals + 2, dtype=np.int64)
-        if run.tour is not None:
-            order[1:-1] = graph.cluster[list(run.tour[1:])]
-        else:
-            order[1:-1] = rng.permutation(np.arange(1, goals + 1))
-        via = np.full(goals + 1, -1, dtype=np.int64)
-        trie, vertex = _admissible(graph)
-        tables = (ways.planar, ways.height, ways.letters, ways.row, ways.far, ways.near)
-        longest = (goals + 1) * 2 * int((ways.row[:, 1:] - ways.row[:, :-1]).max(initial=0)) + 1
-        scratch = np.zeros((3, longest), dtype=np.int64)
-        stops = np.zeros(goals + 1, dtype=np.int64)
-        best = np.zeros(goals + 1, dtype=np.int64)
-        turns = np.zeros(ways.far.shape[2] + 1, dtype=np.int64)
-        length, entangled, _ = evaluate(
-            order, via, *tables[:4], trie, vertex, stops, scratch, turns
-        )
-        schedule = Schedule(chosen, run, length / (goals + 1), default=PROPOSALS_PER_GOAL * goals)
-        chunk = CHUNK if schedule.by_clock else max(1, int(run.iteration_limit) // REPORTS)
-        chance = seeded(rng)
-        best_length = math.inf
+        count = schedule.chunk(chunk)
+        before = best_length
+        length, entangled, best_length = anneal(
+            order, via, best, best_length, count, schedule.temperature, chosen.k, chosen.swaps,
+            *tables, trie, vertex, stops, scratch, turns, chance,
+        )  # fmt: skip
+        run.iterations += count
+        if best_length < before:
+            run.offer(best.tolist())
         run.report("anneal", current=length, entangled=int(entangled))
-        while run.iterations < run.iteration_limit:
-            run.check()
-            count = schedule.chunk(chunk)
-            before = best_length
-            length, entangled, best_length = anneal(
-                order, via, best, best_length, count, schedule.temperature, chosen.k, chosen.swaps,
-                *tables, trie, vertex, stops, scratch, turns, chance,
-            )  # fmt: skip
-            run.iterations += count
-            if best_length < before:
-                run.offer(best.tolist())
-            run.report("anneal", current=length, entangled=int(entangled))
-    except (Stop, KeyboardInterrupt):
-        pass
-    run.report("done" if run.iterations >= run.iteration_limit else "stopped")
-    return run.result()
 
 
 def _admissible(graph: TravelGraph) -> tuple[Ints, Ints]:

@@ -7,7 +7,8 @@ has it retrace its path to the base after every goal.
 On the covering space a leg between two admissible classes never needs more tether than its ends do
 (docs/theory.md), so "does not violate the tether length" is: is a vertex of the travel graph. With
 a roadmap every vertex is joined to every other, so greedy always succeeds; on a graph made from
-costs it can run into a dead end, and says that it found nothing.
+costs it can run into a dead end, and says that it found nothing. Such a graph has no way to retrace
+(its costs need not be those of a metric), so there the tour is closed by its own leg.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from netsp.result import OnProgress, Result
-from netsp.run import Run, Stop, read_params
+from netsp.run import Run, read_params
 from netsp.travel import TravelGraph
 
 
@@ -54,28 +55,30 @@ def solve(
     space; home from the last. One iteration builds the whole tour. params : see `Params`."""
     chosen = read_params(Params, "greedy", params)
     run = Run(graph, time_limit, iteration_limit, on_progress)
-    run.offer(warm_start)
-    if run.trivial():
-        return run.result()
-    try:
-        costs = graph.costs
-        tour, here = [0], 0
-        left = graph.cluster != 0
-        while left.any():
-            run.check()
-            onward = np.where(left, costs[here], np.inf)
-            here = int(np.argmin(onward))
-            if not np.isfinite(onward[here]):
-                run.report("dead end")
-                return run.result()
-            tour.append(here)
-            left &= graph.cluster != graph.cluster[here]
-        run.iterations = 1
-        run.offer(tour, walk=[*tour, *tour[-2::-1]] if chosen.retrace == "path" else None)
-        run.report("greedy")
-    except (Stop, KeyboardInterrupt):
-        run.report("stopped")
-    return run.result()
+    stage = "trivial"
+    with run.until_stopped():
+        run.offer(warm_start)
+        if not run.trivial():
+            stage = _nearest_by_tether(run, retrace=chosen.retrace == "path" and graph.geometric)
+    return run.finish(stage)
+
+
+def _nearest_by_tether(run: Run, *, retrace: bool) -> str:
+    graph = run.graph
+    costs = graph.costs
+    tour, here = [0], 0
+    left = graph.cluster != 0
+    while left.any():
+        run.check()
+        onward = np.where(left, costs[here], np.inf)
+        here = int(np.argmin(onward))
+        if not np.isfinite(onward[here]):
+            return "dead end"
+        tour.append(here)
+        left &= graph.cluster != graph.cluster[here]
+    run.iterations = 1
+    run.offer(tour, walk=[*tour, *tour[-2::-1]] if retrace else None)
+    return "greedy"
 
 
 def solve_2016(
@@ -92,23 +95,27 @@ def solve_2016(
     goals is ever measured. One iteration builds the whole tour."""
     read_params(NoParams, "greedy-2016", params)
     run = Run(graph, time_limit, iteration_limit, on_progress)
-    run.offer(warm_start)
-    if run.trivial():
-        return run.result()
-    try:
-        run.check()
-        out = graph.costs_to_base
-        nearest = []
-        for c in range(1, graph.goal_count + 1):
-            members = graph.members(c)
-            nearest.append(int(members[np.argmin(out[members])]))
-        nearest.sort(key=lambda v: (out[v], v))
+    with run.until_stopped():
+        run.offer(warm_start)
+        if not run.trivial():
+            run.check()
+            _out_and_back(run)
+    return run.finish("greedy")
+
+
+def _out_and_back(run: Run) -> None:
+    graph = run.graph
+    out = graph.costs_to_base
+    nearest = []
+    for c in range(1, graph.goal_count + 1):
+        members = graph.members(c)
+        nearest.append(int(members[np.argmin(out[members])]))
+    nearest.sort(key=lambda v: (out[v], v))
+    run.iterations = 1
+    if graph.geometric:
         walk = [0]
         for v in nearest:
             walk += [v, 0]
-        run.iterations = 1
         run.offer([0, *nearest], walk=walk, length=2.0 * float(out[nearest].sum()))
-        run.report("greedy")
-    except (Stop, KeyboardInterrupt):
-        run.report("stopped")
-    return run.result()
+    else:
+        run.offer([0, *nearest])

@@ -16,7 +16,7 @@ import numpy as np
 from netsp.greedy.backtracking import NoParams
 from netsp.hsignature import Word, concatenate, entangled
 from netsp.result import OnProgress, Result, Trajectory
-from netsp.run import Run, Stop, read_params
+from netsp.run import Run, read_params
 from netsp.solution import Status
 from netsp.travel import TravelGraph
 
@@ -38,34 +38,39 @@ def solve(
     """
     read_params(NoParams, "greedy-tsp", params)
     run = Run(graph, time_limit, iteration_limit, on_progress)
-    if run.trivial():
-        return run.result()
-    try:
-        run.check()
-        ways = graph.ways(sub_goals=False)
-        order, here = [], 0
-        left = set(range(1, graph.goal_count + 1))
-        while left:
-            here = min(left, key=lambda b: (ways.length(here, b), b))
-            left.remove(here)
-            order.append(here)
-        run.iterations = 1
-        stops = [0, *order, 0]
-        words: list[Word] = [()]
-        for a, b in pairwise(stops):
-            words.append(concatenate(words[-1], ways.word(a, b)))
-        tour = graph.vertices_of(order, words[1:-1])
-        if not words[-1] and tour is not None:
-            # it happens to keep all promises; the walk is the same, for its legs are taut
-            run.offer([0, *tour])
-            run.report("greedy")
-            return run.result()
-        legs = [ways.path(a, b) for a, b in pairwise(stops)]
-        path = np.vstack([legs[0], *(leg[1:] for leg in legs[1:])])
-        length = sum(ways.length(a, b) for a, b in pairwise(stops))
-        run.report("greedy", current=length, entangled=len(entangled(words[-1])))
-        trajectory = Trajectory(tuple(order), tuple(words[1:-1]), words[-1], path)
-        return Result(None, length, None, Status.INVALID, tuple(run.trace), trajectory=trajectory)
-    except (Stop, KeyboardInterrupt):
-        run.report("stopped")
-    return run.result()
+    walked: Trajectory | None = None
+    with run.until_stopped():
+        if not run.trivial():
+            run.check()
+            walked = _nearest_neighbour(run)
+    if walked is None:
+        return run.finish("greedy")
+    held = len(entangled(walked.word))
+    seen = run.finish("greedy", current=walked.length, entangled=held)
+    return Result(None, walked.length, None, Status.INVALID, seen.trace, trajectory=walked)
+
+
+def _nearest_neighbour(run: Run) -> Trajectory | None:
+    """The trajectory, or None if it happens to be a tour of the graph: then that is offered."""
+    graph = run.graph
+    ways = graph.ways(sub_goals=False, check=run.check)
+    order, here = [], 0
+    left = set(range(1, graph.goal_count + 1))
+    while left:
+        here = min(left, key=lambda b: (ways.length(here, b), b))
+        left.remove(here)
+        order.append(here)
+    run.iterations = 1
+    stops = [0, *order, 0]
+    words: list[Word] = [()]
+    for a, b in pairwise(stops):
+        words.append(concatenate(words[-1], ways.word(a, b)))
+    tour = graph.vertices_of(order, words[1:-1])
+    if not words[-1] and tour is not None:
+        # it happens to keep all promises; the walk is the same, for its legs are taut
+        run.offer([0, *tour])
+        return None
+    legs = [ways.path(a, b) for a, b in pairwise(stops)]
+    path = np.vstack([legs[0], *(leg[1:] for leg in legs[1:])])
+    length = sum(ways.length(a, b) for a, b in pairwise(stops))
+    return Trajectory(tuple(order), tuple(words[1:-1]), words[-1], path, length)

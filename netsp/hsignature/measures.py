@@ -42,6 +42,10 @@ Floats = npt.NDArray[np.float64]
 TOUCHING = 1e-6
 """How deep, relative to the size of the problem, a tether may reach into an obstacle it touches."""
 
+SAGITTA = 1e-3
+"""How far, as a share of the largest obstacle, two drawings of one arc may lie apart: drawn with
+chords, a path that retraces an arc would seem to cross itself."""
+
 VISIBILITY_POINTS = 120
 """Points of a tether between which lines of sight are tried, besides its vertices."""
 
@@ -71,6 +75,8 @@ def measure(problem: Problem, path: npt.ArrayLike) -> Measures:
     rays = problem.representative_points
     slack = TOUCHING * problem.scale
     shapes = [o.shape(problem.clearance).buffer(-slack, quad_segs=32) for o in problem.obstacles]
+    widths = [max(s.bounds[2] - s.bounds[0], s.bounds[3] - s.bounds[1]) for s in shapes if s]
+    largest = max(widths, default=0.0)
     word = reduce(crossings(xy, rays))
     closed = bool(np.hypot(*(xy[0] - xy[-1])) <= slack)
     turns = winding_numbers(xy, rays)
@@ -79,7 +85,7 @@ def measure(problem: Problem, path: npt.ArrayLike) -> Measures:
         closed=closed,
         entangled=tuple(k - 1 for k in entangled(word)) if closed else None,
         winding=tuple(round(t) for t in turns.tolist()) if closed else None,
-        self_crossings=self_crossings(xy, tolerance=slack),
+        self_crossings=self_crossings(xy, tolerance=max(slack, SAGITTA * largest)),
         convex_hull=in_convex_hull(xy, shapes),
         linear_homotopy=in_linear_homotopy(xy, shapes),
         local_visibility=against_local_visibility(xy, shapes, rays),

@@ -11,7 +11,7 @@ import numpy as np
 from netsp.lns.layers import Instance
 from netsp.lns.search import Search
 from netsp.result import OnProgress, Result
-from netsp.run import Run, Stop, read_params
+from netsp.run import Run, read_params
 from netsp.travel import TravelGraph
 
 ROUNDS_PER_GOAL = 300
@@ -52,43 +52,44 @@ def solve(
     chosen = read_params(Params, "lns", params)
     rng = rng or np.random.default_rng(0)
     run = Run(graph, time_limit, iteration_limit, on_progress)
-    run.offer(warm_start)
-    try:
-        if run.trivial():
-            return run.result()
-        run.check()
-        core = least_tethers(graph, chosen.classes or most_classes(graph, MOST_VERTICES))
-        if run.tour is not None:
-            core = np.union1d(core, run.tour)
-        instance = Instance(graph.cluster[core], graph.costs_among(core), core)
-        by_clock = time_limit is not None and iteration_limit is None
-        total = iteration_limit or ROUNDS_PER_GOAL * graph.goal_count
-        begin = run.clock.elapsed
-        for k in range(chosen.restarts):
-            start = None if run.tour is None else graph.cluster[list(run.tour)]
-            search = Search(instance, rng, start)
-            search.settle()
-            run.offer(search.best()[1])
-            run.report("settled", current=search.length)
+    with run.until_stopped():
+        run.offer(warm_start)
+        if not run.trivial():
+            _search(run, rng, chosen)
+    return run.finish("done")
 
-            def progress(k: int = k) -> float:
-                share = (run.clock.elapsed - begin) / max((time_limit or 1.0) - begin, 1e-9)
-                return share * chosen.restarts - k
 
-            def tell(count: int, search: Search = search) -> None:
-                run.iterations += count
-                if search.best_length < run.length * (1.0 - 1e-12):
-                    run.offer(search.best()[1])
-                run.report("search", current=search.length)
+def _search(run: Run, rng: np.random.Generator, chosen: Params) -> None:
+    graph = run.graph
+    run.check()
+    core = least_tethers(graph, chosen.classes or most_classes(graph, MOST_VERTICES))
+    if run.tour is not None:
+        core = np.union1d(core, run.tour)
+    instance = Instance(graph.cluster[core], graph.costs_among(core), core)
+    by_clock = run.clock.limit is not None and run.iteration_limit == np.inf
+    if not by_clock and run.iteration_limit == np.inf:
+        run.iteration_limit = ROUNDS_PER_GOAL * graph.goal_count
+    total = 0 if by_clock else int(run.iteration_limit)
+    begin = run.clock.elapsed
+    for k in range(chosen.restarts):
+        start = None if run.tour is None else graph.cluster[list(run.tour)]
+        search = Search(instance, rng, start)
+        search.settle()
+        run.offer(search.best()[1])
+        run.report("settled", current=search.length)
 
-            rounds = total * (k + 1) // chosen.restarts - total * k // chosen.restarts
-            search.run(
-                np.inf if by_clock else rounds, run.clock, progress if by_clock else None, tell
-            )
-    except (Stop, KeyboardInterrupt):
-        pass
-    run.report("done")
-    return run.result()
+        def progress(k: int = k) -> float:
+            share = (run.clock.elapsed - begin) / max((run.clock.limit or 1.0) - begin, 1e-9)
+            return share * chosen.restarts - k
+
+        def tell(count: int, search: Search = search) -> None:
+            run.iterations += count
+            if search.best_length < run.length * (1.0 - 1e-12):
+                run.offer(search.best()[1])
+            run.report("search", current=search.length)
+
+        rounds = total * (k + 1) // chosen.restarts - total * k // chosen.restarts
+        search.run(np.inf if by_clock else rounds, run.clock, progress if by_clock else None, tell)
 
 
 def most_classes(graph: TravelGraph, vertices: int) -> int:

@@ -18,6 +18,7 @@ from netsp.mip.program import (
     cut_coefficients,
     duals_of_relaxation,
     restricted,
+    scale_of,
 )
 
 
@@ -75,9 +76,9 @@ class CbcRelaxation:
         """The optimum with duals; None if there is none or the time ran out."""
         problem = pulp.LpProblem("netsp", pulp.LpMinimize)
         y = [pulp.LpVariable(f"y_{u}_{v}", 0, 1) for u, v in self.legs.tolist()]
-        problem.setObjective(
-            pulp.LpAffineExpression(list(zip(y, self.costs.tolist(), strict=True)))
-        )
+        scale = scale_of(self.costs)
+        scaled = (self.costs * scale).tolist()
+        problem.setObjective(pulp.LpAffineExpression(list(zip(y, scaled, strict=True))))
         at: list[list[tuple[pulp.LpVariable, float]]] = [[] for _ in range(self.clusters)]
         for var, (u, v) in zip(y, self.legs.tolist(), strict=True):
             at[self.cluster[u]].append((var, 1.0))
@@ -97,12 +98,12 @@ class CbcRelaxation:
         np.add.at(x, self.legs.ravel(), np.repeat(value / 2.0, 2))
         get = outcome.duals.get
         duals = duals_of_relaxation(
-            np.array([get(f"serve_{c}", 0.0) for c in range(self.clusters)]),
-            np.array([get(f"cut_{k}", 0.0) for k in range(len(self.cuts))]),
+            np.array([get(f"serve_{c}", 0.0) for c in range(self.clusters)]) / scale,
+            np.array([get(f"cut_{k}", 0.0) for k in range(len(self.cuts))]) / scale,
             self.cuts,
             self.cluster,
         )
-        return Point(x, self.legs, value, float(outcome.objective or 0.0), duals, block @ value)
+        return Point(x, self.legs, value, (outcome.objective or 0.0) / scale, duals, block @ value)
 
 
 class CbcInteger:
@@ -116,9 +117,9 @@ class CbcInteger:
         self.problem = pulp.LpProblem("netsp", pulp.LpMinimize)
         self._x = {int(v): pulp.LpVariable(f"x_{v}", 0, 1, pulp.LpInteger) for v in vertices}
         self._y = [pulp.LpVariable(f"y_{u}_{v}", 0, 1, pulp.LpInteger) for u, v in legs.tolist()]
-        self.problem.setObjective(
-            pulp.LpAffineExpression(list(zip(self._y, costs.tolist(), strict=True)))
-        )
+        self._scale = scale_of(costs)
+        scaled = (costs * self._scale).tolist()
+        self.problem.setObjective(pulp.LpAffineExpression(list(zip(self._y, scaled, strict=True))))
         for c in range(int(cluster.max()) + 1):
             members = [(self._x[int(v)], 1.0) for v in vertices[cluster[vertices] == c]]
             _row(self.problem, members, pulp.LpConstraintEQ, 1.0, f"serve_{c}")
@@ -156,11 +157,12 @@ class CbcInteger:
             for v in self._x:
                 x[v] = outcome.values.get(f"x_{v}", 0.0)
             y = np.array([outcome.values.get(var.name, 0.0) for var in self._y])
-            point = Point(x, self.legs, y, float(outcome.objective or 0.0), None)
+            point = Point(x, self.legs, y, (outcome.objective or 0.0) / self._scale, None)
         finished = outcome.status == "optimal"
+        bound = outcome.objective if finished else outcome.bound
         return IntegerOutcome(
             point,
-            outcome.objective if finished else outcome.bound,
+            None if bound is None else bound / self._scale,
             finished,
             infeasible=outcome.status == "infeasible",
         )

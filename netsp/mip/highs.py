@@ -20,6 +20,14 @@ from netsp.mip.program import (
     cut_coefficients,
     duals_of_relaxation,
     restricted,
+    scale_of,
+)
+
+_SETTLED = (
+    highspy.HighsModelStatus.kOptimal,
+    highspy.HighsModelStatus.kInfeasible,
+    highspy.HighsModelStatus.kTimeLimit,
+    highspy.HighsModelStatus.kInterrupt,
 )
 
 _NONE = (0, np.zeros(0, np.int32), np.zeros(0, np.int32), np.zeros(0))
@@ -57,6 +65,7 @@ class HighsRelaxation:
         self.legs: Ints = np.zeros((0, 2), dtype=np.int64)
         self.cuts: list[Cut] = []
         self.infeasible = False
+        self._scale = scale_of(costs)
         self._highs = _solver()
         twos = np.full(self.clusters, 2.0)
         self._highs.addRows(self.clusters, twos, twos, *_NONE)
@@ -74,7 +83,7 @@ class HighsRelaxation:
         order = np.argsort(cols, kind="stable")
         start = np.searchsorted(cols[order], np.arange(n))
         self._highs.addCols(
-            n, costs, np.zeros(n), np.ones(n), len(rows), start.astype(np.int32),
+            n, costs * self._scale, np.zeros(n), np.ones(n), len(rows), start.astype(np.int32),
             rows[order].astype(np.int32), values[order],
         )  # fmt: skip
         self.legs = np.vstack([self.legs, legs])
@@ -92,7 +101,7 @@ class HighsRelaxation:
     def set_costs(self, costs: Floats) -> None:
         """Set the costs of all legs in the program."""
         n = len(costs)
-        self._highs.changeColsCost(n, np.arange(n, dtype=np.int32), costs)
+        self._highs.changeColsCost(n, np.arange(n, dtype=np.int32), costs * self._scale)
 
     def add_cuts(self, cuts: list[Cut]) -> None:
         """Bring cuts into the program."""
@@ -113,20 +122,31 @@ class HighsRelaxation:
     def solve(self, time_left: float) -> Point | None:
         """The optimum with duals; None if there is none or the time ran out."""
         h = self._highs
-        _run(h, time_left)
-        status = h.getModelStatus()
+        begin = time.monotonic()
+        # a warm basis can end in numerical trouble: then afresh, then with looser tolerances (the
+        # bound does not rest on them)
+        for tolerance, fresh in ((1e-9, False), (1e-9, True), (1e-7, True)):
+            if fresh:
+                h.clearSolver()
+            h.setOptionValue("primal_feasibility_tolerance", tolerance)
+            h.setOptionValue("dual_feasibility_tolerance", tolerance)
+            _run(h, time_left - (time.monotonic() - begin))
+            status = h.getModelStatus()
+            if status in _SETTLED:
+                break
         self.infeasible = status == highspy.HighsModelStatus.kInfeasible
         if status != highspy.HighsModelStatus.kOptimal:
             return None
         solution = h.getSolution()
-        y, price = np.array(solution.col_value), np.array(solution.row_dual)
+        y, price = np.array(solution.col_value), np.array(solution.row_dual) / self._scale
         x = np.zeros(len(self.cluster))
         np.add.at(x, self.legs.ravel(), np.repeat(y / 2.0, 2))
         duals = duals_of_relaxation(
             price[: self.clusters], price[self.clusters :], self.cuts, self.cluster
         )
         slack = np.array(solution.row_value)[self.clusters :]
-        return Point(x, self.legs, y, float(h.getInfo().objective_function_value), duals, slack)
+        objective = float(h.getInfo().objective_function_value) / self._scale
+        return Point(x, self.legs, y, objective, duals, slack)
 
 
 class HighsInteger:
@@ -139,6 +159,7 @@ class HighsInteger:
         self.cluster, self.vertices, self.legs = cluster, vertices, legs
         self.clusters = int(cluster.max()) + 1
         self.cuts: list[Cut] = []
+        self._scale = scale_of(costs)
         self._position = np.full(len(cluster), -1, dtype=np.int64)
         self._position[vertices] = np.arange(len(vertices))
         h = self._highs = _solver()
@@ -153,7 +174,8 @@ class HighsInteger:
             np.tile([1.0, -2.0], k),
         )  # fmt: skip
         h.addCols(
-            n, costs, np.zeros(n), np.ones(n), 2 * n, (2 * np.arange(n)).astype(np.int32),
+            n, costs * self._scale, np.zeros(n), np.ones(n), 2 * n,
+            (2 * np.arange(n)).astype(np.int32),
             (self.clusters + self._position[legs]).ravel().astype(np.int32), np.ones(2 * n),
         )  # fmt: skip
         self.add_cuts(list(cuts))
@@ -208,6 +230,7 @@ class HighsInteger:
             x = np.zeros(len(self.cluster))
             x[self.vertices] = columns[: len(self.vertices)]
             y = columns[len(self.vertices) :]
-            point = Point(x, self.legs, y, float(info.objective_function_value), None)
-        bound = info.mip_dual_bound if math.isfinite(info.mip_dual_bound) else None
+            point = Point(x, self.legs, y, info.objective_function_value / self._scale, None)
+        dual = info.mip_dual_bound
+        bound = dual / self._scale if math.isfinite(dual) else None
         return IntegerOutcome(point, bound, status == highspy.HighsModelStatus.kOptimal)

@@ -20,6 +20,7 @@ S ∩ C. That leaves one row per cluster where there was one per vertex.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
@@ -50,6 +51,13 @@ def cut_coefficients(cuts: Sequence[Cut], cluster: Ints, legs: Ints) -> Floats:
         at_c = (u & of_c[legs[:, 0]]).astype(np.int8) + (v & of_c[legs[:, 1]])
         out[k] = (u ^ v).astype(np.int8) - at_c
     return out
+
+
+def scale_of(costs: Floats) -> float:
+    """A power of two that brings costs to some hundreds, where solvers' absolute tolerances mean
+    what they should; multiplying by it is exact."""
+    largest = float(np.max(np.abs(costs), initial=0.0))
+    return 2.0 ** (10 - math.frexp(largest)[1]) if largest > 0.0 else 1.0
 
 
 @dataclass(frozen=True)

@@ -67,9 +67,6 @@ def solve(
     whole = len(kept) == len(graph)
     part = MipRun(graph.subgraph(kept), time_limit, iteration_limit, None)
     outer = Run(graph, time_limit, iteration_limit, on_progress)
-    outer.offer(warm_start)
-    if outer.trivial():
-        return outer.result()
 
     def pass_on(row: Progress) -> None:
         if part.tour is not None:
@@ -80,21 +77,25 @@ def solve(
         outer.report(row.stage, cuts=row.cuts, legs=row.legs, vertices=row.vertices)
 
     part.on_progress = pass_on
-    place = {int(v): k for k, v in enumerate(kept)}
-    start = [place.get(int(v), -1) for v in warm_start or ()]
-    result = part.solve(
-        rng or np.random.default_rng(0), chosen, start if start and -1 not in start else None
-    )
-    if result.tour is not None:
-        outer.offer(kept[np.array(result.tour)].tolist())
-        if chosen.polish and not whole:
-            instance = Instance.of(graph)
-            order = graph.cluster[kept[np.array(result.tour[1:])]]
-            _, tour = best_classes(order, instance.start, instance.costs)
-            outer.offer(instance.original(tour))
-            outer.report("polished")
+    with outer.until_stopped():
+        outer.offer(warm_start)
+        if outer.trivial():
+            return outer.finish("trivial")
+        place = {int(v): k for k, v in enumerate(kept)}
+        start = [place.get(int(v), -1) for v in warm_start] if warm_start is not None else []
+        result = part.solve(
+            rng or np.random.default_rng(0), chosen, start if start and -1 not in start else None
+        )
+        outer.stopped = part.stopped
+        if result.tour is not None:
+            outer.offer(kept[np.array(result.tour)].tolist())
+            if chosen.polish and not whole:
+                instance = Instance.of(graph)
+                order = graph.cluster[kept[np.array(result.tour[1:])]]
+                _, tour = best_classes(order, instance.start, instance.costs)
+                outer.offer(instance.original(tour))
     if whole:
         outer.infeasible = part.infeasible
         if part.bound is not None:
             outer.raise_bound(part.bound)
-    return outer.result()
+    return outer.finish("proven" if outer.done else "polished" if chosen.polish else "reduced")

@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from netsp.errors import LimitReachedError
 from netsp.lns import Instance, Search
 from netsp.mip.costs import LegCosts
 from netsp.mip.program import IntegerProgram, Ints, Point, Relaxation
@@ -88,18 +87,11 @@ class MipRun(Run):
         self.rng, self.params = rng, params
         self.bound = 0.0
         self._core: tuple[int, Instance] | None = None
-        try:
+        with self.until_stopped():
             self.offer(warm_start)
             if not self.trivial():
                 self._solve()
-        except (Stop, KeyboardInterrupt):
-            self.report("stopped")
-        except LimitReachedError:
-            # while legs were measured; without a tour there is nothing to show for it
-            if self.tour is None:
-                raise
-            self.report("stopped")
-        return self.result()
+        return self.finish("proven" if self.done else "open")
 
     def _solve(self) -> None:
         relaxation, integer = (_load(path) for path in BACKENDS[self.params.backend])
@@ -207,7 +199,6 @@ class MipRun(Run):
                 # an optimal tour of the program: the bound stands at its own length
                 break
             model.add_cuts(cuts)
-        self.report("proven" if self.done else "integer", cuts=len(model.cuts), **size)
 
 
 def _load(path: str) -> Any:

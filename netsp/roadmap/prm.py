@@ -11,6 +11,7 @@ checked exactly here. Base and goals join the milestones by the same k-nearest r
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -117,7 +118,7 @@ class PrmRoadmap:
             self.cluster, self.signatures, self.tethers, self, roadmap="prm", ways=self._ways
         )
 
-    def _ways(self, with_sub_goals: bool) -> Ways:
+    def _ways(self, with_sub_goals: bool, check: Callable[[], None]) -> Ways:
         """Ways in any class along the milestones; sub-goals are joined as base and goals are."""
         places, side = sub_goals(self.problem, with_sub_goals)
         outline = self.paths.outline
@@ -130,7 +131,7 @@ class PrmRoadmap:
         every[len(places) : len(places) + fixed, :2] = outline.places
         graph = MilestoneGraph(every[:, :2], edges)
         terminals = np.concatenate([len(places) + np.arange(fixed), np.arange(len(places))])
-        return tabulate(self.problem, outline, graph, terminals, places, side)
+        return tabulate(self.problem, outline, graph, terminals, places, side, check)
 
     def _classes(self) -> tuple[Ints, list[Word], Ints]:
         """Augmented goals: those augmented vertices that stand on a goal, base first."""

@@ -95,6 +95,8 @@ class ContactGraph:
             if not any(blockers.segment_blocked(p, q) for p, q in pairwise(xy)):
                 break
             step /= 2.0
+        # drawn from where points on a boundary stand off; their places decide sides of rays
+        xy[0], xy[-1] = self.outline.places[source], self.outline.places[target]
         return xy
 
     def _polyline(self, nodes: list[int], step: float) -> Floats:
@@ -120,7 +122,7 @@ class ContactGraph:
 
     def _place(self, node: int) -> tuple[float, float]:
         if node < self.points:
-            x, y = self.outline.places[node]
+            x, y = self.outline.points[node]
         else:
             e, end = divmod(node - self.points, 2)
             x, y = self.tangents.ends[e, 2 * end : 2 * end + 2]

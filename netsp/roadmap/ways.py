@@ -9,6 +9,7 @@ far side of a path is the one most opposite to where the path comes nearest to t
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -32,7 +33,9 @@ OFF = 0.05
 """How far off the boundary they lie, as a share of the obstacle's size."""
 
 
-def taut_ways(problem: Problem, with_sub_goals: bool) -> Ways:
+def taut_ways(
+    problem: Problem, with_sub_goals: bool, check: Callable[[], None] = lambda: None
+) -> Ways:
     """The ways over tangents and arcs: exact shortest paths."""
     places, side = sub_goals(problem, with_sub_goals)
     outline = build_outline(problem)
@@ -42,7 +45,7 @@ def taut_ways(problem: Problem, with_sub_goals: bool) -> Ways:
         places=np.vstack([outline.places, places]),
     )
     graph = ContactGraph(outline)
-    return tabulate(problem, outline, graph, np.arange(graph.points), places, side)
+    return tabulate(problem, outline, graph, np.arange(graph.points), places, side, check)
 
 
 def sub_goals(problem: Problem, wanted: bool = True) -> tuple[Floats, Ints]:
@@ -84,11 +87,12 @@ def tabulate(
     terminals: Ints,
     places: Floats,
     side: Ints,
+    check: Callable[[], None] = lambda: None,
 ) -> Ways:
     """All ways from base and goals to base, goals and sub-goals over a graph of shortest paths.
 
     terminals : (m + 1 + k,) node of the graph for base, goals and sub-goals. side : (k,) obstacle
-    of each sub-goal.
+    of each sub-goal. check : called for every base or goal; may raise to stop.
     """
     fixed = len(problem.points)
     count = len(terminals)
@@ -101,6 +105,7 @@ def tabulate(
     letters: list[int] = []
     trees = []
     for a in range(fixed):
+        check()
         length, before = graph.tree(int(terminals[a]))
         trees.append(before)
         planar[a] = length[terminals]
