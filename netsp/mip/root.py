@@ -24,8 +24,10 @@ NEAREST = 6
 PRICED_PER_VERTEX = 3
 """Most legs per vertex that one pricing round brings in."""
 
-PURGE_AFTER = 5
-"""A cut that was slack for so many rounds in a row leaves the LP; separation finds it again."""
+IDLE, SLACK = 40, 4
+"""A cut leaves the LP after so many rounds in a row without a price, rounds in which it was slack
+counting four times (a cut between vertices that the LP leaves alone is tight and means nothing).
+Separation finds it again if need be."""
 
 PRICE_EVERY = 4
 """Rounds of cuts between two looks at the prices of all legs, unless no cut is found."""
@@ -38,7 +40,8 @@ SHRINK = 0.85
 """Vertices are forgotten when no more than this share of them is left."""
 
 PATIENCE, WORTH = 15, 0.02
-"""The root ends when so many looks at the prices closed less than this share of the gap."""
+"""On bounds of legs, the root ends when so many looks at the prices closed less than this share of
+the gap; on lengths it has four times the patience, for nothing but branching comes after it."""
 
 
 class Root:
@@ -62,7 +65,7 @@ class Root:
         legs = self._first_legs()
         self.lp = relaxation(costs.cluster, legs, costs.values[legs[:, 0], legs[:, 1]])
         self.point: Point | None = None
-        self._slack: dict[int, int] = {}
+        self._idle: dict[int, int] = {}
 
     # the incumbent among the vertices left
 
@@ -100,10 +103,13 @@ class Root:
                 cuts = self._separate(point)
             since += 1
             if cuts:
+                self._purge(point, False)
                 self.lp.add_cuts(cuts)
                 continue
             since = 1
+            before = run.bound or 0.0
             priced = self._price(point)
+            risen = (run.bound or 0.0) > before + 1e-6 * abs(before)
             if self.point is None:  # vertices were forgotten; the LP must be solved anew
                 run.report("root", **self.size())
                 continue
@@ -117,11 +123,13 @@ class Root:
             if not priced and not cuts:
                 return
             gaps.append(run.length - (run.bound or 0.0))
-            if len(gaps) > PATIENCE and not priced:
-                before = gaps[-1 - PATIENCE]
-                if before - gaps[-1] < WORTH * before:
-                    return
-            self._purge(point)
+            patience = 4 * PATIENCE if self.costs.exact is None else PATIENCE
+            slow = len(gaps) > patience and (
+                gaps[-1 - patience] - gaps[-1] < WORTH * gaps[-1 - patience]
+            )
+            if slow and not priced:
+                return
+            self._purge(point, risen)
             self.lp.add_cuts(cuts)
 
     def measure(self) -> None:
@@ -254,16 +262,23 @@ class Root:
                 return cuts
         return fractional_cuts(point.x, point.legs, point.y, cluster, self.branch)
 
-    def _purge(self, point: Point) -> None:
-        """Take cuts out of the LP that have been slack for some rounds."""
+    def _purge(self, point: Point, risen: bool) -> None:
+        """Count how long cuts have done nothing, and take the idle ones out of the LP, but only
+        when the bound has risen: on a plateau they would only come back."""
         assert point.slack is not None
-        rounds = self._slack
-        for cut, slack in zip(self.lp.cuts, point.slack.tolist(), strict=True):
-            rounds[id(cut)] = rounds.get(id(cut), 0) + 1 if slack > 1e-6 else 0
-        keep = np.array([rounds[id(cut)] < PURGE_AFTER for cut in self.lp.cuts], dtype=bool)
-        if (~keep).sum() > 0.1 * len(keep):
+        assert point.duals is not None
+        idle = self._idle
+        for cut, slack, price in zip(
+            self.lp.cuts, point.slack.tolist(), point.duals.cut.tolist(), strict=True
+        ):
+            if price < -1e-9:
+                idle[id(cut)] = 0
+            else:
+                idle[id(cut)] = idle.get(id(cut), 0) + (SLACK if slack > 1e-6 else 1)
+        keep = np.array([idle[id(cut)] < IDLE for cut in self.lp.cuts], dtype=bool)
+        if risen and (~keep).sum() > 0.1 * len(keep):
             for k in np.flatnonzero(~keep):
-                del rounds[id(self.lp.cuts[k])]
+                del idle[id(self.lp.cuts[k])]
             self.lp.keep_cuts(keep)
 
 
