@@ -6,6 +6,7 @@ import numpy as np
 import psutil
 import pytest
 
+from netsp import travel_graph
 from netsp.mip import solve
 from netsp.mip.bound import dual_bound, exact_bound, fixing_costs, reduced_costs
 from netsp.mip.cbc_program import CbcRelaxation
@@ -15,6 +16,7 @@ from netsp.mip.program import Cut
 from netsp.mip.subtours import components, fractional_cuts
 from netsp.roadmap.taut import TautRoadmap
 from netsp.solution import Status
+from netsp.worlds import random_world as far_world
 from tests.brute import brute_tour as brute
 from tests.test_contract import random_graph
 from tests.worlds import random_world
@@ -192,13 +194,10 @@ def test_the_certificate_in_exact_rationals_is_no_lower_than_the_bound_claimed(s
 
 
 def test_a_long_tether_is_solved_without_measuring_most_legs():
-    from netsp import travel_graph
-
-    problem = random_world(6, circles=12, goals=8, tether=450.0)
+    problem = far_world(0, goals=5, tether_length=500.0)
     lazy, whole = travel_graph(problem), travel_graph(problem)
     whole.costs  # noqa: B018
-    if len(whole) <= MEASURE_AT_ONCE:
-        pytest.skip("the world has too few classes to say anything")
+    assert len(whole) > MEASURE_AT_ONCE
     asked = []
     lengths = lazy._legs.lengths
 
@@ -211,4 +210,4 @@ def test_a_long_tether_is_solved_without_measuring_most_legs():
     a, b = solve(lazy), solve(whole)
     assert a.status is b.status is Status.OPTIMAL
     assert a.length == pytest.approx(b.length, rel=2e-6)
-    assert sum(asked) < 0.5 * len(whole) ** 2 / 2
+    assert sum(asked) < 0.2 * len(whole) ** 2 / 2
