@@ -16,7 +16,7 @@ import numpy as np
 
 from netsp.lns.solve import solve as search
 from netsp.mip.solve import solve as prove
-from netsp.result import OnProgress, Progress, Result
+from netsp.result import Clock, OnProgress, Progress, Result
 from netsp.run import read_params
 from netsp.travel import TravelGraph
 
@@ -65,6 +65,7 @@ def solve(
             warm_start=warm_start,
             on_progress=on_progress,
         )
+    clock = Clock(time_limit)
     found = search(
         graph,
         time_limit=None if time_limit is None else SHARE * time_limit,
@@ -87,7 +88,7 @@ def solve(
     places = range(graph.goal_count + 1)
     shortest = np.array([[ways.length(a, b) for b in places] for a in places])
     over_goals = TravelGraph.from_costs(np.minimum(shortest, shortest.T), places)
-    left = None if time_limit is None else (1.0 - SHARE) * time_limit
+    left = None if time_limit is None else max(clock.left, 0.1)
     bound = prove(over_goals, time_limit=left, rng=rng, on_progress=tell).lower_bound
     return replace(
         found,

@@ -465,6 +465,6 @@ def test_a_far_origin_changes_nothing():
 
 
 def test_time_up_while_measuring_legs_says_where_it_stood():
-    graph = TautRoadmap(random_world(0, goals=20, tether=350.0), time_limit=1e-9).travel_graph()
+    graph = TautRoadmap(random_world(0, goals=20, tether=400.0), time_limit=1e-9).travel_graph()
     with pytest.raises(LimitReachedError, match="time limit reached while measuring the legs"):
         graph.costs  # noqa: B018

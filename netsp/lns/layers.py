@@ -38,7 +38,8 @@ class Instance:
         grouped = costs[np.ix_(self.order, self.order)]
         finite = np.isfinite(grouped)
         most = float(np.max(grouped[finite], initial=0.0))
-        grouped[~finite] = 2.0 * self.clusters * most + 1.0
+        self.penalty = 2.0 * self.clusters * most + 1.0
+        grouped[~finite] = self.penalty
         self.costs: Floats = np.ascontiguousarray(grouped)
 
     @classmethod

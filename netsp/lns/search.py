@@ -103,10 +103,10 @@ class Search:
                 tell(count)
 
     def best(self) -> tuple[float, tuple[int, ...]]:
-        """Length and vertices of the best tour."""
+        """Length and vertices of the best tour; inf if it would need a leg that there is not."""
         i = self.instance
         length, tour = best_classes(self.best_order[1:], i.start, i.costs)
-        return float(length), i.original(tour)
+        return float(length) if length < i.penalty else float("inf"), i.original(tour)
 
     def _keep(self) -> None:
         if self.length < self.best_length:

@@ -75,7 +75,7 @@ def _search(run: Run, rng: np.random.Generator, chosen: Params) -> None:
         start = None if run.tour is None else graph.cluster[list(run.tour)]
         search = Search(instance, rng, start)
         search.settle()
-        run.offer(search.best()[1])
+        _take(run, search)
         run.report("settled", current=search.length)
 
         def progress(k: int = k) -> float:
@@ -85,11 +85,16 @@ def _search(run: Run, rng: np.random.Generator, chosen: Params) -> None:
         def tell(count: int, search: Search = search) -> None:
             run.iterations += count
             if search.best_length < run.length * (1.0 - 1e-12):
-                run.offer(search.best()[1])
+                _take(run, search)
             run.report("search", current=search.length)
 
         rounds = total * (k + 1) // chosen.restarts - total * k // chosen.restarts
         search.run(np.inf if by_clock else rounds, run.clock, progress if by_clock else None, tell)
+
+
+def _take(run: Run, search: Search) -> None:
+    length, tour = search.best()
+    run.offer(tour, length=length)
 
 
 def most_classes(graph: TravelGraph, vertices: int) -> int:

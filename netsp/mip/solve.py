@@ -31,8 +31,9 @@ paper's shape."""
 
 DEFAULT_BACKEND = "highs"
 
-CORE = 8
-"""Classes per goal among which the heuristic looks, while not all legs are measured."""
+CORE = 800
+"""About so many vertices, those of least tether, are measured for the heuristic while the other
+legs are only bounded."""
 
 
 MOST_LEGS = 20_000
@@ -126,7 +127,8 @@ class MipRun(Run):
         cluster = costs.cluster[order]
         rank = np.arange(len(order)) - np.searchsorted(cluster, cluster)
         own = np.searchsorted(costs.vertices, np.array(self.tour or (0,)))
-        core = np.unique(np.concatenate([order[rank < CORE], own, more]))
+        classes = max(3, CORE // len(np.unique(cluster)))
+        core = np.unique(np.concatenate([order[rank < classes], own, more]))
         costs.measure(core)
         return Instance(costs.cluster[core], costs.values[np.ix_(core, core)], costs.vertices[core])
 
@@ -137,7 +139,12 @@ class MipRun(Run):
         search = Search(instance, self.rng, start)
         search.settle()
         search.run(self.params.search_rounds, self.clock)
-        self.offer(search.best()[1])
+        self.take(search)
+
+    def take(self, search: Search) -> None:
+        """Offer what a search found; its legs are measured, so its length is known."""
+        length, tour = search.best()
+        self.offer(tour, length=length)
 
     def round(self, root: Root, point: Point) -> None:
         """Turn a point of the root into a tour, if all legs are measured."""
@@ -159,7 +166,7 @@ class MipRun(Run):
             return
         search = Search(self.instance(costs, np.flatnonzero(point.x > 1e-6)), self.rng, order)
         search.settle()
-        self.offer(search.best()[1])
+        self.take(search)
 
     # the end
 

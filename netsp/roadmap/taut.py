@@ -50,7 +50,7 @@ MAX_CLASSES = 20_000
 
 STATES_PER_CLASS = 200
 
-UNTIMED = 60
+UNTIMED = 250
 """Legs among so few vertices are measured whatever the time: the length of a tour, say."""
 
 
