@@ -35,6 +35,9 @@ CORE = 800
 """About so many vertices, those of least tether, are measured for the heuristic while the other
 legs are only bounded."""
 
+MOST_CLASSES = 12
+"""Most classes per goal among them."""
+
 
 MOST_LEGS = 20_000
 """With more legs left the integer program is not begun: it would end nowhere."""
@@ -127,7 +130,7 @@ class MipRun(Run):
         cluster = costs.cluster[order]
         rank = np.arange(len(order)) - np.searchsorted(cluster, cluster)
         own = np.searchsorted(costs.vertices, np.array(self.tour or (0,)))
-        classes = max(3, CORE // len(np.unique(cluster)))
+        classes = min(max(3, CORE // len(np.unique(cluster))), MOST_CLASSES)
         core = np.unique(np.concatenate([order[rank < classes], own, more]))
         costs.measure(core)
         return Instance(costs.cluster[core], costs.values[np.ix_(core, core)], costs.vertices[core])
