@@ -15,10 +15,13 @@ from __future__ import annotations
 import argparse
 import resource
 import statistics
+import subprocess
+import sys
+import tempfile
 import time
 
 import numpy as np
-from table import head, heading, row
+from table import ROOT, head, heading, row
 
 from netsp import Problem, Status, solve, solve_graph, travel_graph, verify
 from netsp.errors import NetspError
@@ -119,32 +122,17 @@ def _ours(graph, limit):
 
 
 def _cp_sat(graph, limit):
-    from ortools.sat.python import cp_model
-
-    model = cp_model.CpModel()
-    n = len(graph)
-    scale = 1e6 / float(np.max(graph.costs[np.isfinite(graph.costs)]))
-    visited = [model.NewBoolVar(f"x{v}") for v in range(n)]
-    arcs = [(v, v, visited[v].Not()) for v in range(1, n)]
-    terms = []
-    for u in range(n):
-        for v in range(n):
-            if np.isfinite(graph.costs[u, v]):
-                used = model.NewBoolVar(f"y{u}_{v}")
-                arcs.append((u, v, used))
-                terms.append((round(float(graph.costs[u, v]) * scale), used))
-    model.AddCircuit(arcs)
-    model.Add(visited[0] == 1)
-    for c in range(1, graph.goal_count + 1):
-        model.AddExactlyOne(visited[int(v)] for v in graph.members(c))
-    model.Minimize(sum(w * y for w, y in terms))
-    solver = cp_model.CpSolver()
-    solver.parameters.max_time_in_seconds = limit
-    solver.parameters.num_workers = 2
-    status = solver.Solve(model)
-    found = status in (cp_model.OPTIMAL, cp_model.FEASIBLE)
-    length = solver.ObjectiveValue() / scale if found else np.inf
-    return length, solver.BestObjectiveBound() / scale
+    with tempfile.NamedTemporaryFile(suffix=".npz") as file:
+        np.savez(file, costs=graph.costs, cluster=graph.cluster)
+        file.flush()
+        script = str(ROOT / "benchmarks" / "cp_sat.py")
+        run = subprocess.run(
+            [sys.executable, script, file.name, str(limit)], capture_output=True, text=True
+        )
+    if run.returncode:
+        raise ImportError(run.stderr.strip().splitlines()[-1], name="ortools")
+    length, bound = map(float, run.stdout.split())
+    return length, bound
 
 
 def _raw(graph, limit):
