@@ -242,7 +242,8 @@ def _solve(args: argparse.Namespace) -> int:
         plotting.save_trace(rows, f"{problem.name}: {args.solver}", problem.units, args.plot_trace)
     if table:
         table.end()
-        print(summary(problem, solution, args.output, args.plot), file=sys.stderr)
+        text = summary(problem, solution, args.output, args.plot, args.plot_trace)
+        print(text, file=sys.stderr)
     return _EXIT.get(solution.status.value, 0)
 
 

@@ -87,7 +87,11 @@ class ProgressTable:
 
 
 def summary(
-    problem: Problem, solution: Solution, output: str | None = None, picture: str | None = None
+    problem: Problem,
+    solution: Solution,
+    output: str | None = None,
+    picture: str | None = None,
+    trace: str | None = None,
 ) -> str:
     """What was found, in a few lines."""
     t = solution.timings
@@ -122,4 +126,6 @@ def summary(
         lines.append(f"solution {output}")
     if picture:
         lines.append(f"picture  {picture}")
+    if trace:
+        lines.append(f"trace    {trace}")
     return "\n".join(lines)
