@@ -102,7 +102,10 @@ def summary(
     if solution.status is Status.INFEASIBLE:
         return f"there is no tour ({times})"
     if solution.length is None:
-        return f"no tour found by {solution.solver} ({times})"
+        return (
+            f"no tour found by {solution.solver} ({times}); give it more time or more iterations, "
+            "or choose another --solver"
+        )
     if solution.status is Status.OPTIMAL:
         verdict = "proven optimal"
     elif solution.status is Status.INVALID:

@@ -160,14 +160,13 @@ class TravelGraph:
         """The travel graph on some of the vertices, the base first; vertex k of it is vertex
         ``vertices[k]`` of this one."""
         chosen = np.asarray(vertices, dtype=np.int64)
-        part = TravelGraph(
+        return TravelGraph(
             self.cluster[chosen],
             [self.signatures[v] for v in chosen],
             self.tethers[chosen],
             _PartOfLegs(self, chosen),
             self.roadmap,
         )
-        return part
 
     @property
     def costs_to_base(self) -> Floats:

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from netsp import Polygon, Problem, Status, solve, solve_graph, travel_graph, verify
+from netsp import NetspError, Polygon, Problem, Status, solve, solve_graph, travel_graph, verify
 from netsp.lns import Instance, Search
 from netsp.mip.flows import min_cuts
 from netsp.mip.solve import MipRun, Params
@@ -27,7 +27,7 @@ from tests.worlds import random_world, small_worlds
 def test_among_slits_no_leg_is_longer(problem, grid):
     try:
         graph = travel_graph(problem)
-    except Exception:
+    except NetspError:  # a goal out of reach
         return
     exact, low = graph.costs, graph.lower_bounds()
     held = np.isfinite(exact)
@@ -40,7 +40,7 @@ def test_among_slits_no_leg_is_longer(problem, grid):
 def test_among_slits_no_leg_is_longer_on_a_grid_of_ties(problem):
     try:
         graph = travel_graph(problem)
-    except Exception:
+    except NetspError:  # a goal out of reach
         return
     exact, low = graph.costs, graph.lower_bounds()
     held = np.isfinite(exact)

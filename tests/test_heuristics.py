@@ -9,7 +9,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from netsp import Circle, Polygon, Problem, solve_graph
+from netsp import Circle, NetspError, Polygon, Problem, solve_graph
 from netsp.anneal import icra2017, rss2016
 from netsp.chance import seeded, uniform
 from netsp.hsignature import concatenate, entangled, signature
@@ -152,7 +152,7 @@ def test_ways_are_free_and_write_the_words_they_say(roadmap):
 def test_entanglement_and_vertices_of_2016_are_those_of_the_words(problem, seed):
     try:
         g = travel_graph(problem)
-    except Exception:
+    except NetspError:  # a goal out of reach
         return
     ways = g.ways(sub_goals=True)
     rng = np.random.default_rng(seed)

@@ -73,6 +73,14 @@ class Instance:
         return tuple(int(v) for v in self.labels[np.asarray(tour, dtype=np.int64)])
 
 
+def least_tethers(tethers: Floats, cluster: Ints, classes: int) -> Ints:
+    """Vertices of the shortest tethers of every cluster, at most so many of each, in order."""
+    order = np.lexsort((tethers, cluster))
+    grouped = cluster[order]
+    rank = np.arange(len(order)) - np.searchsorted(grouped, grouped)
+    return np.asarray(np.sort(order[rank < classes]), dtype=np.int64)
+
+
 @njit(cache=True)
 def best_classes(clusters, start, costs):
     """Length and vertices (base first) of the best tour that visits clusters in the given order."""

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from netsp.lns.layers import Instance
+from netsp.lns.layers import Instance, least_tethers
 from netsp.lns.search import Search
 from netsp.result import OnProgress, Result
 from netsp.run import Run, read_params
@@ -62,7 +62,8 @@ def solve(
 def _search(run: Run, rng: np.random.Generator, chosen: Params) -> None:
     graph = run.graph
     run.check()
-    core = least_tethers(graph, chosen.classes or most_classes(graph, MOST_VERTICES))
+    classes = chosen.classes or most_classes(graph, MOST_VERTICES)
+    core = least_tethers(graph.costs_to_base, graph.cluster, classes)
     if run.tour is not None:
         core = np.union1d(core, run.tour)
     instance = Instance(graph.cluster[core], graph.costs_among(core), core)
@@ -104,14 +105,3 @@ def most_classes(graph: TravelGraph, vertices: int) -> int:
     while k < sizes.max() and np.minimum(sizes, k + 1).sum() <= vertices:
         k += 1
     return k
-
-
-def least_tethers(graph: TravelGraph, classes: int = 1) -> np.ndarray[Any, np.dtype[np.int64]]:
-    """The vertices of the shortest tethers of every cluster, at most `classes` of each, base first.
-    The leg from the base is the tether, in a graph made from costs too."""
-    tethers = graph.costs_to_base
-    tethers[0] = 0.0
-    order = np.lexsort((tethers, graph.cluster))
-    cluster = graph.cluster[order]
-    rank = np.arange(len(order)) - np.searchsorted(cluster, cluster)
-    return np.asarray(np.sort(order[rank < classes]), dtype=np.int64)

@@ -2,7 +2,7 @@
 
 A leg of a long tether costs a search, and there are many. As long as a leg is only bounded from
 below, everything that is proven with the bound holds: the relaxation is one of a cheaper world. So
-the relaxation starts on bounds, and what it wants to use is measured.
+the relaxation runs on bounds first, and what it cannot rule out is measured.
 """
 
 from __future__ import annotations
@@ -40,19 +40,18 @@ class LegCosts:
     def __len__(self) -> int:
         return len(self.vertices)
 
-    def measure(self, chosen: Ints) -> bool:
-        """Measure all legs among chosen rows; whether any cost changed."""
+    def measure(self, chosen: Ints) -> None:
+        """Measure all legs among chosen rows."""
         if self.exact is None:
-            return False
+            return
         grid = np.ix_(chosen, chosen)
         known = self.exact[grid] | (self.cluster[chosen][:, None] == self.cluster[chosen][None, :])
         if known.all():
-            return False
+            return
         open_rows = chosen[~known.all(axis=1)]
         grid = np.ix_(open_rows, open_rows)
         self.values[grid] = self.graph.costs_among(self.vertices[open_rows])
         self.exact[grid] = True
-        return True
 
     def measure_all(self, asked: Bools) -> None:
         """Measure everything asked for (symmetric); what is neither measured nor asked for counts

@@ -22,8 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from netsp.lns import Instance, best_classes
-from netsp.lns.solve import least_tethers
+from netsp.lns import Instance, best_classes, least_tethers
 from netsp.mip.solve import MipRun, Params
 from netsp.result import OnProgress, Progress, Result
 from netsp.run import Run, read_params
@@ -63,7 +62,7 @@ def solve(
     are all there are. Iterations as of `netsp.mip.solve`; params : see `ReducedParams`.
     """
     chosen = read_params(ReducedParams, "reduced-mip", params)
-    kept = least_tethers(graph, chosen.classes)
+    kept = least_tethers(graph.costs_to_base, graph.cluster, chosen.classes)
     whole = len(kept) == len(graph)
     part = MipRun(graph.subgraph(kept), time_limit, iteration_limit, None)
     outer = Run(graph, time_limit, iteration_limit, on_progress)

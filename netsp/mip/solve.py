@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from netsp.lns import Instance, Search
+from netsp.lns import Instance, Search, least_tethers
 from netsp.mip.costs import LegCosts
-from netsp.mip.program import IntegerProgram, Ints, Point, Relaxation
+from netsp.mip.program import IntegerProgram, Ints, Point
 from netsp.mip.root import Root, tour_legs
 from netsp.mip.subtours import component_cuts, follow, tour_from
 from netsp.result import OnProgress, Result
@@ -114,7 +114,7 @@ class MipRun(Run):
             self.search(costs, np.zeros(0, dtype=np.int64))
             self.report("measured", **root.size())
             root.solve()
-        if not self.done and not (~root.dead).sum() // 2 > MOST_LEGS:
+        if not self.done and root.size()["legs"] <= MOST_LEGS:
             self.integer(root, integer)
 
     # incumbents
@@ -126,12 +126,10 @@ class MipRun(Run):
             if self._core is None or self._core[0] != len(costs):
                 self._core = len(costs), Instance(costs.cluster, costs.values, costs.vertices)
             return self._core[1]
-        order = np.lexsort((costs.values[0], costs.cluster))
-        cluster = costs.cluster[order]
-        rank = np.arange(len(order)) - np.searchsorted(cluster, cluster)
+        classes = min(max(3, CORE // (self.graph.goal_count + 1)), MOST_CLASSES)
+        least = least_tethers(costs.values[0], costs.cluster, classes)
         own = np.searchsorted(costs.vertices, np.array(self.tour or (0,)))
-        classes = min(max(3, CORE // len(np.unique(cluster))), MOST_CLASSES)
-        core = np.unique(np.concatenate([order[rank < classes], own, more]))
+        core = np.unique(np.concatenate([least, own, more]))
         costs.measure(core)
         return Instance(costs.cluster[core], costs.values[np.ix_(core, core)], costs.vertices[core])
 
@@ -214,6 +212,3 @@ class MipRun(Run):
 def _load(path: str) -> Any:
     module, attribute = path.split(":")
     return getattr(importlib.import_module(module), attribute)
-
-
-__all__ = ["BACKENDS", "MipRun", "Params", "Relaxation", "solve"]
