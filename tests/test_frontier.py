@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from netsp import NetspError, Polygon, Problem, Status, solve, solve_graph, travel_graph, verify
 from netsp.lns import Instance, Search
 from netsp.mip.flows import min_cuts
-from netsp.mip.solve import MipRun, Params
+from netsp.mip.solve import MipRun
 from netsp.mip.subtours import branches
 from netsp.result import Clock
 from netsp.roadmap.slits import _taut, build_slits, slit_lengths
@@ -145,8 +145,8 @@ def test_nothing_that_is_ruled_out_is_in_the_optimum(seed):
     """Elimination with a weak incumbent keeps an optimal tour."""
     graph = random_graph(seed, goals=6)
     best = brute_tour(graph)
-    run = MipRun(graph, None, None, None)
-    result = run.solve(np.random.default_rng(seed), Params(search_rounds=0), None)
+    run = MipRun(graph, rng=np.random.default_rng(seed), search_rounds=0)
+    result = run.solve("highs", None)
     assert result.status is Status.OPTIMAL
     assert result.length == pytest.approx(best, rel=1e-6)
     assert result.lower_bound <= best * (1 + 1e-12)

@@ -7,10 +7,10 @@ import psutil
 import pytest
 
 from netsp import travel_graph
+from netsp.legcosts import MEASURE_AT_ONCE
 from netsp.mip import solve
 from netsp.mip.bound import dual_bound, exact_bound, fixing_costs, reduced_costs
 from netsp.mip.cbc_program import CbcRelaxation
-from netsp.mip.costs import MEASURE_AT_ONCE
 from netsp.mip.highs import HighsRelaxation
 from netsp.mip.program import Cut
 from netsp.mip.subtours import components, fractional_cuts

@@ -64,7 +64,10 @@ def solve(
     chosen = read_params(ReducedParams, "reduced-mip", params)
     kept = least_tethers(graph.costs_to_base, graph.cluster, chosen.classes)
     whole = len(kept) == len(graph)
-    part = MipRun(graph.subgraph(kept), time_limit, iteration_limit, None)
+    part = MipRun(
+        graph.subgraph(kept), time_limit, iteration_limit,
+        rng=rng, search_rounds=chosen.search_rounds,
+    )  # fmt: skip
     outer = Run(graph, time_limit, iteration_limit, on_progress)
 
     def pass_on(row: Progress) -> None:
@@ -82,9 +85,7 @@ def solve(
             return outer.finish("trivial")
         place = {int(v): k for k, v in enumerate(kept)}
         start = [place.get(int(v), -1) for v in warm_start] if warm_start is not None else []
-        result = part.solve(
-            rng or np.random.default_rng(0), chosen, start if start and -1 not in start else None
-        )
+        result = part.solve(chosen.backend, start if start and -1 not in start else None)
         outer.stopped = part.stopped
         if result.tour is not None:
             outer.offer(kept[np.array(result.tour)].tolist())

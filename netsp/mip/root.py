@@ -11,12 +11,12 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from netsp.legcosts import LegCosts
+from netsp.lns.incumbent import SearchingRun
 from netsp.mip.bound import dual_bound, fixing_costs, reduced_costs
-from netsp.mip.costs import LegCosts
 from netsp.mip.program import Bools, Cut, Floats, Ints, Point, Relaxation
 from netsp.mip.subtours import branches, fractional_cuts
-from netsp.result import OPTIMALITY_TOLERANCE
-from netsp.run import Run, Stop
+from netsp.run import Stop
 
 NEAREST = 6
 """Legs per vertex in the first LP."""
@@ -53,7 +53,7 @@ class Root:
 
     def __init__(
         self,
-        run: Run,
+        run: SearchingRun,
         costs: LegCosts,
         relaxation: Callable[[Ints, Ints, Floats], Relaxation],
         offer: Callable[[Root, Point], None],
@@ -68,11 +68,6 @@ class Root:
         self._idle: dict[int, int] = {}
 
     # the incumbent among the vertices left
-
-    @property
-    def cutoff(self) -> float:
-        """Tours no shorter than this are of no interest: half the tolerance below the incumbent."""
-        return self.run.length * (1.0 - 0.5 * OPTIMALITY_TOLERANCE)
 
     def tour(self) -> Ints:
         """Rows of the incumbent; empty if there is none."""
@@ -187,7 +182,7 @@ class Root:
         legs[self.dead] = np.inf
         bound = dual_bound(legs, vertices, cluster, point.duals)
         # a tour with a dead leg is no shorter than the cutoff
-        run.raise_bound(min(bound, self.cutoff))
+        run.raise_bound(min(bound, run.cutoff))
         self._eliminate(*fixing_costs(legs, vertices, cluster, point.duals))
         tour = tour_legs(self.tour())
         candidate = np.where(self.dead, np.inf, legs)
@@ -216,7 +211,7 @@ class Root:
     def _eliminate(self, bound: float, rise: Floats) -> None:
         """Legs and vertices that cost more than what is missing to the cutoff are dead: a tour
         through a vertex uses two of its legs."""
-        missing = self.cutoff - bound
+        missing = self.run.cutoff - bound
         if not np.isfinite(missing):
             return
         self.dead |= rise > missing

@@ -13,13 +13,14 @@ from typing import Any
 
 import numpy as np
 
-from netsp.lns import Instance, Search, least_tethers
-from netsp.mip.costs import LegCosts
-from netsp.mip.program import IntegerProgram, Ints, Point
+from netsp.legcosts import LegCosts
+from netsp.lns import Search
+from netsp.lns.incumbent import SearchingRun
+from netsp.mip.program import IntegerProgram, Point
 from netsp.mip.root import Root, tour_legs
 from netsp.mip.subtours import component_cuts, follow, tour_from
 from netsp.result import OnProgress, Result
-from netsp.run import Run, Stop, read_params
+from netsp.run import Stop, read_params
 from netsp.travel import TravelGraph
 
 BACKENDS = {
@@ -30,14 +31,6 @@ BACKENDS = {
 paper's shape."""
 
 DEFAULT_BACKEND = "highs"
-
-CORE = 800
-"""About so many vertices, those of least tether, are measured for the heuristic while the other
-legs are only bounded."""
-
-MOST_CLASSES = 12
-"""Most classes per goal among them."""
-
 
 MOST_LEGS = 20_000
 """With more legs left the integer program is not begun: it would end nowhere."""
@@ -77,31 +70,30 @@ def solve(
     An iteration is one linear or integer program solved. params : see `Params`.
     """
     chosen = read_params(Params, "mip", params)
-    run = MipRun(graph, time_limit, iteration_limit, on_progress)
-    return run.solve(rng or np.random.default_rng(0), chosen, warm_start)
+    run = MipRun(
+        graph, time_limit, iteration_limit, on_progress,
+        rng=rng, search_rounds=chosen.search_rounds,
+    )  # fmt: skip
+    return run.solve(chosen.backend, warm_start)
 
 
-class MipRun(Run):
+class MipRun(SearchingRun):
     """State of one solve."""
 
-    def solve(
-        self, rng: np.random.Generator, params: Params, warm_start: Sequence[int] | None
-    ) -> Result:
+    def solve(self, backend: str, warm_start: Sequence[int] | None) -> Result:
         """Heuristic, root, integer rounds."""
-        self.rng, self.params = rng, params
-        self.bound = 0.0
-        self._core: tuple[int, Instance] | None = None
         with self.until_stopped():
             self.offer(warm_start)
             if not self.trivial():
-                self._solve()
+                costs = LegCosts(self.graph)
+                self.search(costs)
+                self.report("heuristic", vertices=len(costs))
+                self.cut(costs, backend)
         return self.finish("proven" if self.done else "open")
 
-    def _solve(self) -> None:
-        relaxation, integer = (_load(path) for path in BACKENDS[self.params.backend])
-        costs = LegCosts(self.graph)
-        self.search(costs, np.zeros(0, dtype=np.int64))
-        self.report("heuristic", vertices=len(costs))
+    def cut(self, costs: LegCosts, backend: str) -> None:
+        """Root and integer rounds over what is left of the vertices."""
+        relaxation, integer = (_load(path) for path in BACKENDS[backend])
         root = Root(self, costs, relaxation, self.round)
         root.solve()
         if not self.done and root.point is not None:
@@ -111,41 +103,13 @@ class MipRun(Run):
         if not self.done and costs.exact is not None:
             self.check()
             root.measure()
-            self.search(costs, np.zeros(0, dtype=np.int64))
+            self.search(costs)
             self.report("measured", **root.size())
             root.solve()
         if not self.done and root.size()["legs"] <= MOST_LEGS:
             self.integer(root, integer)
 
     # incumbents
-
-    def instance(self, costs: LegCosts, more: Ints) -> Instance:
-        """What the heuristic searches: everything if it is measured, else the classes of least
-        tether, the incumbent's, and more."""
-        if costs.exact is None:
-            if self._core is None or self._core[0] != len(costs):
-                self._core = len(costs), Instance(costs.cluster, costs.values, costs.vertices)
-            return self._core[1]
-        classes = min(max(3, CORE // (self.graph.goal_count + 1)), MOST_CLASSES)
-        least = least_tethers(costs.values[0], costs.cluster, classes)
-        own = np.searchsorted(costs.vertices, np.array(self.tour or (0,)))
-        core = np.unique(np.concatenate([least, own, more]))
-        costs.measure(core)
-        return Instance(costs.cluster[core], costs.values[np.ix_(core, core)], costs.vertices[core])
-
-    def search(self, costs: LegCosts, more: Ints) -> None:
-        """Local search, then ruin and recreate, from the incumbent if there is one."""
-        instance = self.instance(costs, more)
-        start = None if self.tour is None else self.graph.cluster[list(self.tour)]
-        search = Search(instance, self.rng, start)
-        search.settle()
-        search.run(self.params.search_rounds, self.clock)
-        self.take(search)
-
-    def take(self, search: Search) -> None:
-        """Offer what a search found; its legs are measured, so its length is known."""
-        length, tour = search.best()
-        self.offer(tour, length=length)
 
     def round(self, root: Root, point: Point) -> None:
         """Turn a point of the root into a tour, if all legs are measured."""
@@ -191,10 +155,10 @@ class MipRun(Run):
                 # nothing that was not ruled out beats the incumbent, if there is one
                 self.infeasible = self.tour is None
                 if self.tour is not None:
-                    self.raise_bound(root.cutoff)
+                    self.raise_bound(self.cutoff)
                 break
             if outcome.bound is not None:
-                self.raise_bound(min(outcome.bound, root.cutoff))
+                self.raise_bound(min(outcome.bound, self.cutoff))
             if point is not None:
                 self.tour_at(costs, point, whole=True)
             self.report("integer", cuts=len(model.cuts), **size)

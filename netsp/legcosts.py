@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from netsp.mip.program import Bools, Floats, Ints
-from netsp.travel import TravelGraph
+from netsp.travel import Bools, Floats, Ints, TravelGraph
 
 MEASURE_AT_ONCE = 400
 """So many vertices or fewer are measured altogether: that takes a second at most."""
