@@ -24,6 +24,7 @@ from netsp.travel import TravelGraph
 SOLVERS: dict[str, str] = {
     "auto": "netsp.auto:solve",
     "mip": "netsp.mip.solve:solve",
+    "dp": "netsp.dp.solve:solve",
     "reduced-mip": "netsp.mip.reduced:solve",
     "lns": "netsp.lns.solve:solve",
     "anneal": "netsp.anneal.icra2017:solve",
@@ -37,6 +38,7 @@ SOLVERS: dict[str, str] = {
 PARAMS: dict[str, str] = {
     "auto": "netsp.auto:Params",
     "mip": "netsp.mip.solve:Params",
+    "dp": "netsp.dp.solve:Params",
     "reduced-mip": "netsp.mip.reduced:ReducedParams",
     "lns": "netsp.lns.solve:Params",
     "anneal": "netsp.anneal.icra2017:Params",

@@ -1,0 +1,206 @@
+"""The kernels: states of walks, layer by layer.
+
+A walk leaves the base, makes n visits to goals and returns. Its cost is that of its legs less a
+price for every visit. A *label* at (k, v) is a walk that makes its k-th visit at vertex v: its cost
+and its memory. Vertices are grouped by goal: those of goal g are start[g] to start[g + 1] - 1.
+
+Costs are symmetric, so a walk read backwards is a walk: what is known about the first k visits is
+known about the last k.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from netsp.dp.memory import CHUNK
+
+LOW = (1 << CHUNK) - 1
+
+
+@njit(cache=True, nogil=True)
+def completions(costs, goal, start, prices, alive, least, onward):
+    """Walks without memory but that of the goal before last: bounds on how labels are completed.
+
+    least : (n + 1, V) cost of the best k visits ending at v. onward : (n + 1, n + 1, V) cost of the
+    best k visits of which the last is to goal h, and of the leg from there to vertex v, whose goal
+    is not that of the visit before.
+    """
+    count = len(goal)
+    n = len(start) - 2
+    second = np.full((n + 1, count), np.inf)
+    before = np.full((n + 1, count), -1, dtype=np.int64)
+    least[:] = np.inf
+    onward[:] = np.inf
+    for v in range(1, count):
+        if alive[1, v]:
+            least[1, v] = costs[0, v] - prices[goal[v]]
+    for k in range(1, n + 1):
+        for v in range(1, count):
+            best = least[k, v]
+            if best == np.inf:
+                continue
+            h = goal[v]
+            row = onward[k, h]
+            for g in range(n + 1):
+                if g == h:
+                    continue
+                cost = second[k, v] if g == before[k, v] else best
+                if cost == np.inf:
+                    continue
+                for u in range(start[g], start[g + 1]):
+                    d = cost + costs[v, u]
+                    row[u] = d if d < row[u] else row[u]
+        if k == n:
+            break
+        for u in range(1, count):
+            if not alive[k + 1, u]:
+                continue
+            a, b, last = np.inf, np.inf, -1
+            for h in range(1, n + 1):
+                d = onward[k, h, u]
+                if d < a:
+                    a, b, last = d, a, h
+                elif d < b:
+                    b = d
+            least[k + 1, u] = a - prices[goal[u]]
+            second[k + 1, u] = b - prices[goal[u]]
+            before[k + 1, u] = last
+
+
+@njit(cache=True, nogil=True)
+def translate(tables, g, h, memory):
+    """The memory at goal h of a walk that comes from goal g; negative if it must not."""
+    return (
+        tables[g, h, 0, memory & LOW]
+        | tables[g, h, 1, (memory >> CHUNK) & LOW]
+        | tables[g, h, 2, memory >> (2 * CHUNK)]
+    )
+
+
+@njit(cache=True, nogil=True)
+def extend(
+    costs, start, first, last, bits, tables, pointer, cost, memory, onward, limit, cut, prices
+):
+    """Labels of the next layer at goals first to last - 1, from those of this layer.
+
+    pointer, cost, memory : labels of vertex v are pointer[v] to pointer[v + 1] - 1, cheapest first.
+    onward : (n + 1, V) of the visits still to make. limit : (V,) most that a label may cost before
+    the price is taken off. A label is kept if none costs less and remembers no more.
+    """
+    n = len(start) - 2
+    room, used_up = 1024, 0
+    out_cost, out_memory = np.empty(room), np.empty(room, dtype=np.int32)
+    out_pointer = np.zeros(start[last] - start[first] + 1, dtype=np.int64)
+    widest = 0
+    for h in range(first, last):
+        widest = max(widest, bits[h])
+    slot = np.full(1 << widest, -1, dtype=np.int32)
+    seen = np.empty(1 << widest, dtype=np.int32)
+    found_cost, found_memory = np.empty(1 << widest), np.empty(1 << widest, dtype=np.int32)
+    table_room = 1 << 14
+    table = np.empty(table_room)
+    for h in range(first, last):
+        begin = start[h]
+        size = start[h + 1] - begin
+        if size == 0:
+            continue
+        slots = 0
+        for g in range(1, n + 1):
+            if g == h:
+                continue
+            for u in range(start[g], start[g + 1]):
+                most = cut - onward[h, u]
+                leg = costs[u, begin : begin + size]
+                for label in range(pointer[u], pointer[u + 1]):
+                    d = cost[label]
+                    if d > most:
+                        break
+                    m = translate(tables, g, h, memory[label])
+                    if m < 0:
+                        continue
+                    s = slot[m]
+                    if s < 0:
+                        s = slots
+                        slot[m], seen[s] = s, m
+                        slots += 1
+                        if slots * size > table_room:
+                            bigger = np.empty(2 * slots * size)
+                            bigger[:table_room] = table
+                            table, table_room = bigger, len(bigger)
+                        table[s * size : slots * size] = np.inf
+                    row = table[s * size : (s + 1) * size]
+                    for j in range(size):
+                        c = d + leg[j]
+                        row[j] = c if c < row[j] else row[j]
+        for j in range(size):
+            v = begin + j
+            out_pointer[v - start[first]] = used_up
+            found = 0
+            for s in range(slots):
+                c = table[s * size + j]
+                if c <= limit[v] and c < np.inf:
+                    found_cost[found], found_memory[found] = c, seen[s]
+                    found += 1
+            if found == 0:
+                continue
+            own = used_up
+            for i in np.argsort(found_cost[:found]):
+                m = found_memory[i]
+                dominated = False
+                for label in range(own, used_up):
+                    if out_memory[label] & m == out_memory[label]:
+                        dominated = True
+                        break
+                if dominated:
+                    continue
+                if used_up == room:
+                    more_cost, more_memory = np.empty(2 * room), np.empty(2 * room, dtype=np.int32)
+                    more_cost[:room], more_memory[:room] = out_cost, out_memory
+                    out_cost, out_memory, room = more_cost, more_memory, 2 * room
+                out_cost[used_up], out_memory[used_up] = found_cost[i] - prices[h], m
+                used_up += 1
+        for s in range(slots):
+            slot[seen[s]] = -1
+    out_pointer[-1] = used_up
+    return out_pointer, out_cost[:used_up], out_memory[:used_up]
+
+
+@njit(cache=True, nogil=True)
+def join(goal, prices, a_pointer, a_cost, a_memory, b_pointer, b_cost, b_memory):
+    """(V,) cost of the best walk through v, from walks that end there and such read backwards: they
+    may remember no goal in common but that of v."""
+    count = len(goal)
+    out = np.full(count, np.inf)
+    for v in range(1, count):
+        best = np.inf
+        low, high = b_pointer[v], b_pointer[v + 1]
+        for i in range(a_pointer[v], a_pointer[v + 1]):
+            if low == high or a_cost[i] + b_cost[low] >= best:
+                break
+            for j in range(low, high):
+                if a_cost[i] + b_cost[j] >= best:
+                    break
+                if a_memory[i] & b_memory[j] == 1:
+                    best = a_cost[i] + b_cost[j]
+                    break
+        out[v] = best + prices[goal[v]]
+    return out
+
+
+@njit(cache=True, nogil=True)
+def step_back(costs, goal, prices, tables, v, at_cost, at_memory, pointer, cost, memory):
+    """(vertex, label) of the layer before that a label at v came from."""
+    off, from_vertex, from_label = np.inf, -1, -1
+    h = goal[v]
+    for u in range(1, len(goal)):
+        g = goal[u]
+        if g == h:
+            continue
+        for label in range(pointer[u], pointer[u + 1]):
+            m = translate(tables, g, h, memory[label])
+            if m >= 0 and m & at_memory == m:
+                e = abs(cost[label] + costs[u, v] - prices[h] - at_cost)
+                if e < off:
+                    off, from_vertex, from_label = e, u, label
+    return from_vertex, from_label

@@ -1,0 +1,200 @@
+"""`dp`: dynamic programming over partly remembered walks, with prices and elimination.
+
+Where there are few goals and very many classes this is by far the fastest proof: the states are
+(visit, vertex, remembered goals), the legs of a class cost nothing to keep apart, and what a bound
+rules out shrinks the next pass. It starts on lower bounds of the legs; in most worlds nine classes
+in ten are dead before a leg is measured.
+
+Prices follow the walk (deflected subgradient): goals it misses become dearer to miss, goals it
+repeats cheaper. Memory follows it too: where it repeats a goal, that is remembered from now on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from netsp.dp.walks import Walks
+from netsp.errors import InputError
+from netsp.legcosts import MEASURE_AT_ONCE, LegCosts
+from netsp.lns.incumbent import SearchingRun
+from netsp.result import OnProgress, Result
+from netsp.run import read_params
+from netsp.travel import Floats, TravelGraph
+
+STEP, SHORTER = 0.5, 0.7
+"""First step of the prices as a share of the gap, and its factor after `STALL` passes in vain."""
+
+STALL = 5
+
+DEFLECTION = 0.5
+"""Weight of the present walk in the direction of the prices; the rest is that of the last step."""
+
+MOST_LABELS = 2_000_000
+"""With more labels in a pass the memory is not widened."""
+
+PATIENCE, WORTH = 12, 0.03
+"""Passes after which something must have come of them: this share of the gap closed, or of the
+states dead."""
+
+SHRINK = 0.95
+"""Vertices are forgotten when no more than this share of them is left."""
+
+MOST_CELLS = 100_000_000
+"""Most (goal, goal, vertex) cells: tables of 0.8 GiB."""
+
+
+@dataclass(frozen=True)
+class Params:
+    """search_rounds : rounds of ruin and recreate at the start, and again when all legs are
+    measured."""
+
+    search_rounds: int = 500
+
+    def __post_init__(self) -> None:
+        if self.search_rounds < 0:
+            raise ValueError(
+                f"option 'search_rounds': expected 0 or more, got {self.search_rounds}"
+            )
+
+
+def solve(
+    graph: TravelGraph,
+    *,
+    time_limit: float | None = None,
+    iteration_limit: int | None = None,
+    rng: np.random.Generator | None = None,
+    params: Mapping[str, Any] | None = None,
+    warm_start: Sequence[int] | None = None,
+    on_progress: OnProgress | None = None,
+) -> Result:
+    """Bound and prove by walks, for few goals with many classes; with many goals it stops with the
+    gap at which the walks make no more progress.
+
+    An iteration is one pass over all layers. params : see `Params`. Raises InputError if the tables
+    would not fit into memory.
+    """
+    chosen = read_params(Params, "dp", params)
+    if not fits(graph):
+        raise InputError(
+            f"solver 'dp': {graph.goal_count} goals with {len(graph)} classes need too much memory;"
+            " use 'auto' or 'lns'"
+        )
+    run = SearchingRun(
+        graph, time_limit, iteration_limit, on_progress,
+        rng=rng, search_rounds=chosen.search_rounds,
+    )  # fmt: skip
+    with run.until_stopped():
+        run.offer(warm_start)
+        if not run.trivial():
+            costs = LegCosts(graph)
+            run.search(costs)
+            run.report("heuristic", vertices=len(costs))
+            bound_by_walks(run, costs)
+    return run.finish("proven" if run.done else "open")
+
+
+def fits(graph: TravelGraph) -> bool:
+    """Whether the tables of the walks over a graph are of a reasonable size."""
+    return (graph.goal_count + 1) ** 2 * len(graph) <= MOST_CELLS
+
+
+def bound_by_walks(run: SearchingRun, costs: LegCosts) -> None:
+    """Raise the bound of a run and forget vertices, until the proof is done or progress stalls."""
+    walks = Walks(costs)
+    prices = first_prices(run, costs)
+    direction = np.zeros_like(prices)
+    best, kept, step, vain = -np.inf, prices, STEP, 0
+    history: list[tuple[float, int]] = []
+    while not run.done:
+        run.check()
+        cutoff = run.cutoff
+        walk = walks.solve(prices, cutoff, run.check)
+        run.iterations += 1
+        if walk is None:
+            run.infeasible = run.tour is None
+            if run.tour is not None:
+                run.raise_bound(cutoff - walks.rounding(prices))
+            return
+        run.raise_bound(min(walk.bound, cutoff))
+        goals = costs.cluster[walk.rows]
+        visits = np.bincount(goals, minlength=walks.n + 1)
+        whole = bool((visits[1:] == 1).all())
+        if whole:
+            costs.measure(np.concatenate([[0], walk.rows]))
+            run.offer([0, *costs.vertices[walk.rows].tolist()])
+            walks.refresh()
+        _forget(run, walks)
+        run.report("walks", vertices=len(costs), legs=len(costs) * (len(costs) - 1) // 2)
+        if whole:
+            best = -np.inf  # its legs have grown, or it is the optimum
+            continue
+        if walk.bound > best:
+            best, kept, vain = walk.bound, prices, 0
+        else:
+            vain += 1
+            if vain % STALL == 0:
+                step, prices = step * SHORTER, kept
+        history.append((best, int(walks.alive.sum())))
+        stalls = _stalls(history, run.length)
+        if costs.exact is not None and (stalls or len(costs) <= MEASURE_AT_ONCE):
+            _measure(run, walks)
+            best, step = -np.inf, STEP
+            history.clear()
+        elif stalls:
+            return
+        if walk.labels < MOST_LABELS:
+            walks.memory.widen(goals.tolist())
+        missed = 1.0 - visits
+        missed[0] = 0.0
+        direction = missed if not direction.any() else _mixed(missed, direction)
+        target = run.length if run.tour is not None else 1.1 * abs(walk.bound) + 1e-9
+        prices = prices + step * (target - walk.bound) / (direction @ direction) * direction
+
+
+def first_prices(run: SearchingRun, costs: LegCosts) -> Floats:
+    """(n + 1,) for every goal half of the incumbent's two legs there: then its own walk costs
+    nothing less than all prices."""
+    prices = np.zeros(run.graph.goal_count + 1)
+    if run.tour is not None:
+        rows = np.searchsorted(costs.vertices, np.array(run.tour))
+        legs = costs.values[rows, np.roll(rows, -1)]
+        prices[costs.cluster[rows]] = 0.5 * (legs + np.roll(legs, 1))
+    prices[0] = 0.0
+    return prices
+
+
+def _mixed(missed: Floats, direction: Floats) -> Floats:
+    mixed = DEFLECTION * missed + (1.0 - DEFLECTION) * direction
+    return mixed if mixed @ mixed > 1e-3 else missed
+
+
+def _forget(run: SearchingRun, walks: Walks) -> None:
+    """Drop vertices without a state, once they are many; the incumbent's stay."""
+    keep = walks.left
+    if run.tour is not None:
+        keep[np.searchsorted(walks.costs.vertices, np.array(run.tour))] = True
+    if keep.sum() <= SHRINK * len(keep):
+        walks.restrict(keep)
+
+
+def _measure(run: SearchingRun, walks: Walks) -> None:
+    """Measure all legs that are left, and search among them."""
+    costs = walks.costs
+    run.check()
+    costs.measure_all(np.isfinite(costs.values))
+    run.search(costs)
+    walks.refresh()
+    run.report("measured", vertices=len(costs), legs=len(costs) * (len(costs) - 1) // 2)
+
+
+def _stalls(history: list[tuple[float, int]], length: float) -> bool:
+    """Whether the last `PATIENCE` passes closed little of the gap and killed few states."""
+    if len(history) <= PATIENCE:
+        return False
+    (bound_then, states_then), (bound, states) = history[-1 - PATIENCE], history[-1]
+    closed = bound - bound_then > WORTH * (length - bound_then if length < np.inf else abs(bound))
+    return not closed and states > (1.0 - WORTH) * states_then

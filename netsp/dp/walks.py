@@ -1,0 +1,196 @@
+"""The relaxation: the cheapest closed walk that visits n goals, under prices and little memory.
+
+Every tour is such a walk, whatever the memory. With a price p_g for every visit to goal g,
+
+    length of a tour >= cost of the cheapest walk + Σ_g p_g,
+
+for a tour visits every goal once and pays every price once. And if the cheapest walk that has
+vertex v at its k-th visit is no cheaper than an incumbent, no better tour has it there: the state
+(k, v) is dead, for these prices and for good.
+
+Sums are of floating point: `ROUNDING` times the size of what is summed is taken off a bound.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from netsp.dp.labels import completions, extend, join, step_back
+from netsp.dp.memory import Memory
+from netsp.legcosts import LegCosts
+from netsp.travel import Bools, Floats, Ints
+
+ROUNDING = 1e-12
+"""Relative rounding allowed for: some hundred additions at 1.1e-16 each, with room to spare."""
+
+THREADS = 2
+"""The goals of a layer are shared among so many; the labels do not depend on it."""
+
+REMEMBERED = 6
+"""Goals that each goal remembers at first."""
+
+Labels = tuple[Ints, Floats, npt.NDArray[np.int32]]
+
+
+@dataclass(frozen=True)
+class Walk:
+    """The cheapest walk. bound : on every tour shorter than the cutoff. rows : of the vertices
+    visited, in order, without the base. labels : how many there were."""
+
+    bound: float
+    rows: Ints
+    labels: int
+
+
+class Walks:
+    """The relaxation over what is left of the vertices.
+
+    costs : their legs. alive : (n + 1, V) whether a better tour may make its k-th visit there; rows
+    of `costs` are vertices here too, if they are grouped by goal, else they are taken in `order`.
+    """
+
+    def __init__(self, costs: LegCosts) -> None:
+        self.costs = costs
+        self.n = int(costs.cluster.max())
+        self.alive: Bools = np.ones((self.n + 1, len(costs)), dtype=bool)
+        self.alive[0] = False
+        self.alive[:, 0] = False
+        self.refresh()
+        self.memory = Memory(self._near(), REMEMBERED)
+
+    def refresh(self) -> None:
+        """Take over what has changed in the legs."""
+        cluster = self.costs.cluster
+        self.order: Ints = np.argsort(cluster, kind="stable")
+        values = self.costs.values
+        if (np.diff(cluster) < 0).any():
+            values = values[np.ix_(self.order, self.order)]
+        self.values: Floats = np.ascontiguousarray(values)
+        self.goal: Ints = cluster[self.order]
+        self.start: Ints = np.searchsorted(self.goal, np.arange(self.n + 2))
+        self.longest = float(np.max(self.values, where=np.isfinite(self.values), initial=0.0))
+
+    def restrict(self, keep: Bools) -> None:
+        """Forget the rows that are not marked."""
+        self.alive = self.alive[:, keep[self.order]]
+        self.costs.restrict(keep)
+        self.refresh()
+
+    @property
+    def left(self) -> Bools:
+        """(V,) rows of `costs` that a better tour may visit; the base is one."""
+        out = np.zeros(len(self.goal), dtype=bool)
+        out[self.order] = self.alive.any(axis=0)
+        out[0] = True
+        return out
+
+    def solve(self, prices: Floats, cutoff: float, check: Callable[[], None]) -> Walk | None:
+        """The cheapest walk below the cutoff, and death to states that none goes through; None if
+        there is no walk. `check` is called after every layer and may raise.
+
+        prices : (n + 1,) of a visit to each goal.
+        """
+        n, goal, start = self.n, self.goal, self.start
+        cut = cutoff - float(prices[1:].sum()) + self.rounding(prices)
+        least = np.empty((n + 1, len(goal)))
+        onward = np.empty((n + 1, n + 1, len(goal)))
+        completions(self.values, goal, start, prices, self.alive, least, onward)
+        check()
+        layers = self._layers(prices, cut, least, onward, check)
+        pointer, cost, memory = layers[n]
+        has = pointer[1:] > pointer[:-1]
+        ends = np.full(len(goal), np.inf)
+        ends[has] = cost[pointer[:-1][has]] + self.values[0][has]
+        last = int(np.argmin(ends))
+        if not ends[last] <= cut:
+            self.alive[:] = False
+            return None
+        rows = self._trace(last, layers, prices)
+        for k in range(1, (n + 1) // 2 + 1):
+            through = join(goal, prices, *layers[k], *layers[n + 1 - k])
+            self.alive[k] &= through <= cut
+            self.alive[n + 1 - k] = self.alive[k]
+        bound = float(ends[last]) + float(prices[1:].sum()) - self.rounding(prices)
+        labels = sum(len(layer[1]) for layer in layers[1:])
+        return Walk(bound, self.order[rows], labels)
+
+    def rounding(self, prices: Floats) -> float:
+        """What the sums of a pass can be off by."""
+        return ROUNDING * (2.0 * float(np.abs(prices).sum()) + (self.n + 1) * self.longest)
+
+    def _layers(
+        self, prices: Floats, cut: float, least: Floats, onward: Floats, check: Callable[[], None]
+    ) -> list[Labels]:
+        n, goal, start = self.n, self.goal, self.start
+        bits, tables = self.memory.bits, self.memory.tables()
+        none = np.zeros(0, dtype=np.int32)
+        layers: list[Labels] = [(np.zeros(len(goal) + 1, dtype=np.int64), np.zeros(0), none)]
+        with np.errstate(invalid="ignore"):  # inf - inf: neither cut nor way to complete
+            limits = np.where(self.alive[1:], cut - least[:0:-1], -np.inf)
+        first = self.values[0]
+        kept = np.isfinite(first) & (first <= limits[0])
+        layers.append(
+            (
+                np.concatenate([[0], np.cumsum(kept)]),
+                (first - prices[goal])[kept],
+                np.ones(int(kept.sum()), dtype=np.int32),
+            )
+        )
+        parts = self._parts()
+        with ThreadPoolExecutor(THREADS) as pool:
+            for k in range(2, n + 1):
+                check()
+
+                def part(p: tuple[int, int], k: int = k) -> Labels:
+                    labels: Labels = extend(
+                        self.values, start, p[0], p[1], bits, tables, *layers[k - 1],
+                        onward[n + 1 - k], limits[k - 1], cut, prices,
+                    )  # fmt: skip
+                    return labels
+
+                layers.append(_together(list(pool.map(part, parts))))
+        return layers
+
+    def _parts(self) -> list[tuple[int, int]]:
+        """Ranges of goals with about as many vertices each."""
+        shares = np.linspace(1, len(self.goal), THREADS + 1)[1:-1].astype(int)
+        ends = [1, *self.goal[np.minimum(shares, len(self.goal) - 1)].tolist(), self.n + 1]
+        return [(a, b) for a, b in zip(ends[:-1], ends[1:], strict=True) if a < b]
+
+    def _trace(self, last: int, layers: list[Labels], prices: Floats) -> Ints:
+        out = np.zeros(self.n, dtype=np.int64)
+        out[-1] = last
+        tables = self.memory.tables()
+        label = int(layers[-1][0][last])
+        for k in range(self.n - 1, 0, -1):
+            _, cost, memory = layers[k + 1]
+            out[k - 1], label = step_back(
+                self.values, self.goal, prices, tables, out[k], cost[label], memory[label],
+                *layers[k],
+            )  # fmt: skip
+        return out
+
+    def _near(self) -> Ints:
+        """(n + 1, n + 1) goals by the least leg between any of their classes, nearest first."""
+        rows = np.minimum.reduceat(self.values, self.start[:-1], axis=0)
+        return np.argsort(np.minimum.reduceat(rows, self.start[:-1], axis=1), axis=1, kind="stable")
+
+
+def _together(parts: list[Labels]) -> Labels:
+    """Labels of consecutive ranges of vertices; vertex 0 has none."""
+    offset = 0
+    pointers = [np.zeros(1, dtype=np.int64)]
+    for pointer, cost, _ in parts:
+        pointers.append(pointer[:-1] + offset)
+        offset += len(cost)
+    pointers.append(np.array([offset]))
+    return (
+        np.concatenate(pointers),
+        np.concatenate([cost for _, cost, _ in parts]),
+        np.concatenate([memory for _, _, memory in parts]),
+    )
