@@ -104,9 +104,9 @@ def fits(graph: TravelGraph) -> bool:
 
 def bound_by_walks(run: SearchingRun, costs: LegCosts) -> None:
     """Raise the bound of a run and forget vertices, until the proof is done or progress stalls."""
-    walks = Walks(costs)
+    walks = Walks(costs.cluster, costs.values)
     prices = first_prices(run, costs)
-    direction = np.zeros_like(prices)
+    direction: Floats = np.zeros_like(prices)
     best, kept, step, vain = -np.inf, prices, STEP, 0
     history: list[tuple[float, int]] = []
     while not run.done:
@@ -126,8 +126,8 @@ def bound_by_walks(run: SearchingRun, costs: LegCosts) -> None:
         if whole:
             costs.measure(np.concatenate([[0], walk.rows]))
             run.offer([0, *costs.vertices[walk.rows].tolist()])
-            walks.refresh()
-        _forget(run, walks)
+            walks.set_values(costs.values)
+        _forget(run, walks, costs)
         run.report("walks", vertices=len(costs), legs=len(costs) * (len(costs) - 1) // 2)
         if whole:
             best = -np.inf  # its legs have grown, or it is the optimum
@@ -141,7 +141,7 @@ def bound_by_walks(run: SearchingRun, costs: LegCosts) -> None:
         history.append((best, int(walks.alive.sum())))
         stalls = _stalls(history, run.length)
         if costs.exact is not None and (stalls or len(costs) <= MEASURE_AT_ONCE):
-            _measure(run, walks)
+            _measure(run, walks, costs)
             best, step = -np.inf, STEP
             history.clear()
         elif stalls:
@@ -150,7 +150,8 @@ def bound_by_walks(run: SearchingRun, costs: LegCosts) -> None:
             walks.memory.widen(goals.tolist())
         missed = 1.0 - visits
         missed[0] = 0.0
-        direction = missed if not direction.any() else _mixed(missed, direction)
+        mixed = DEFLECTION * missed + (1.0 - DEFLECTION) * direction
+        direction = mixed if mixed @ mixed > 1e-3 else missed
         target = run.length if run.tour is not None else 1.1 * abs(walk.bound) + 1e-9
         prices = prices + step * (target - walk.bound) / (direction @ direction) * direction
 
@@ -167,27 +168,23 @@ def first_prices(run: SearchingRun, costs: LegCosts) -> Floats:
     return prices
 
 
-def _mixed(missed: Floats, direction: Floats) -> Floats:
-    mixed = DEFLECTION * missed + (1.0 - DEFLECTION) * direction
-    return mixed if mixed @ mixed > 1e-3 else missed
-
-
-def _forget(run: SearchingRun, walks: Walks) -> None:
+def _forget(run: SearchingRun, walks: Walks, costs: LegCosts) -> None:
     """Drop vertices without a state, once they are many; the incumbent's stay."""
     keep = walks.left
     if run.tour is not None:
-        keep[np.searchsorted(walks.costs.vertices, np.array(run.tour))] = True
+        keep[np.searchsorted(costs.vertices, np.array(run.tour))] = True
     if keep.sum() <= SHRINK * len(keep):
         walks.restrict(keep)
+        costs.restrict(keep)
+        walks.set_values(costs.values)
 
 
-def _measure(run: SearchingRun, walks: Walks) -> None:
+def _measure(run: SearchingRun, walks: Walks, costs: LegCosts) -> None:
     """Measure all legs that are left, and search among them."""
-    costs = walks.costs
     run.check()
     costs.measure_all(np.isfinite(costs.values))
     run.search(costs)
-    walks.refresh()
+    walks.set_values(costs.values)
     run.report("measured", vertices=len(costs), legs=len(costs) * (len(costs) - 1) // 2)
 
 

@@ -16,13 +16,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 
 from netsp.dp.labels import completions, extend, join, step_back
 from netsp.dp.memory import Memory
-from netsp.legcosts import LegCosts
 from netsp.travel import Bools, Floats, Ints
 
 ROUNDING = 1e-12
@@ -48,42 +48,43 @@ class Walk:
 
 
 class Walks:
-    """The relaxation over what is left of the vertices.
+    """The relaxation over some vertices.
 
-    costs : their legs. alive : (n + 1, V) whether a better tour may make its k-th visit there; rows
-    of `costs` are vertices here too, if they are grouped by goal, else they are taken in `order`.
+    cluster : (V,). values : (V, V) symmetric costs of legs, inf where there is none. alive :
+    (n + 1, V) whether a better tour may make its k-th visit there, with vertices taken in `order`,
+    which groups them by goal.
     """
 
-    def __init__(self, costs: LegCosts) -> None:
-        self.costs = costs
-        self.n = int(costs.cluster.max())
-        self.alive: Bools = np.ones((self.n + 1, len(costs)), dtype=bool)
+    def __init__(self, cluster: Ints, values: Floats) -> None:
+        self.n = int(cluster.max())
+        self.alive: Bools = np.ones((self.n + 1, len(cluster)), dtype=bool)
         self.alive[0] = False
         self.alive[:, 0] = False
-        self.refresh()
+        self._group(cluster)
+        self.set_values(values)
         self.memory = Memory(self._near(), REMEMBERED)
 
-    def refresh(self) -> None:
-        """Take over what has changed in the legs."""
-        cluster = self.costs.cluster
+    def _group(self, cluster: Ints) -> None:
+        self.cluster = cluster
         self.order: Ints = np.argsort(cluster, kind="stable")
-        values = self.costs.values
-        if (np.diff(cluster) < 0).any():
-            values = values[np.ix_(self.order, self.order)]
-        self.values: Floats = np.ascontiguousarray(values)
         self.goal: Ints = cluster[self.order]
         self.start: Ints = np.searchsorted(self.goal, np.arange(self.n + 2))
-        self.longest = float(np.max(self.values, where=np.isfinite(self.values), initial=0.0))
+
+    def set_values(self, values: Floats) -> None:
+        """Change the costs of legs."""
+        if (np.diff(self.cluster) < 0).any():
+            values = values[np.ix_(self.order, self.order)]
+        self.values: Floats = np.ascontiguousarray(values)
+        self.longest = float(np.abs(values).max(where=np.isfinite(values), initial=0.0))
 
     def restrict(self, keep: Bools) -> None:
-        """Forget the rows that are not marked."""
+        """Forget the rows that are not marked; `set_values` must follow."""
         self.alive = self.alive[:, keep[self.order]]
-        self.costs.restrict(keep)
-        self.refresh()
+        self._group(self.cluster[keep])
 
     @property
     def left(self) -> Bools:
-        """(V,) rows of `costs` that a better tour may visit; the base is one."""
+        """(V,) rows that a better tour may visit; the base is one."""
         out = np.zeros(len(self.goal), dtype=bool)
         out[self.order] = self.alive.any(axis=0)
         out[0] = True
@@ -102,7 +103,7 @@ class Walks:
         completions(self.values, goal, start, prices, self.alive, least, onward)
         check()
         layers = self._layers(prices, cut, least, onward, check)
-        pointer, cost, memory = layers[n]
+        pointer, cost, _ = layers[n]
         has = pointer[1:] > pointer[:-1]
         ends = np.full(len(goal), np.inf)
         ends[has] = cost[pointer[:-1][has]] + self.values[0][has]
@@ -160,7 +161,7 @@ class Walks:
         """Ranges of goals with about as many vertices each."""
         shares = np.linspace(1, len(self.goal), THREADS + 1)[1:-1].astype(int)
         ends = [1, *self.goal[np.minimum(shares, len(self.goal) - 1)].tolist(), self.n + 1]
-        return [(a, b) for a, b in zip(ends[:-1], ends[1:], strict=True) if a < b]
+        return [(a, b) for a, b in pairwise(ends) if a < b]
 
     def _trace(self, last: int, layers: list[Labels], prices: Floats) -> Ints:
         out = np.zeros(self.n, dtype=np.int64)
