@@ -1,9 +1,11 @@
 """`auto`: the solver by the size of the problem; always a tour, a bound and a gap.
 
-Up to `PROVABLE` vertices `mip` does it all: its heuristic finds the tour, its root the bound, its
-branching the rest. Beyond that its matrices would not fit into a few gigabytes: then `lns` searches
-among the classes of least tether, and the bound comes from the goals alone, as the travelling
-salesperson's tour over the shortest ways between them in any class. That bound is weak, and true.
+Up to `PROVABLE` vertices it proves: the heuristic finds the tour; for up to `FEW_GOALS` goals walks
+(`netsp.dp`) bound it, which at that size ends with a proof more often than not; cutting planes
+(`netsp.mip`) do the rest, or all of it with more goals, on the vertices that are left. Beyond
+`PROVABLE` the matrices would not fit into a few gigabytes: then `lns` searches among the classes of
+least tether, and the bound comes from the goals alone, as the travelling salesperson's tour over
+the shortest ways between them in any class. That bound is weak, and true.
 """
 
 from __future__ import annotations
@@ -15,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from netsp.lns.solve import solve as search
+from netsp.mip.solve import MipRun
 from netsp.mip.solve import solve as prove
 from netsp.result import Clock, OnProgress, Progress, Result
 from netsp.run import read_params
@@ -22,6 +25,9 @@ from netsp.travel import TravelGraph
 
 PROVABLE = 7_000
 """Most vertices of a travel graph that `mip` is asked to bound: about 2 GiB of matrices."""
+
+FEW_GOALS = 24
+"""Most goals for which walks come first: with more, remembering them costs more than cuts do."""
 
 ROUNDS_PER_GOAL = 40
 """Rounds of ruin and recreate before and after the root, times the number of goals."""
@@ -56,15 +62,8 @@ def solve(
     chosen = read_params(Params, "auto", params)
     if len(graph) <= PROVABLE:
         rounds = max(500, ROUNDS_PER_GOAL * graph.goal_count)
-        return prove(
-            graph,
-            time_limit=time_limit,
-            iteration_limit=iteration_limit,
-            rng=rng,
-            params={"backend": chosen.backend, "search_rounds": rounds},
-            warm_start=warm_start,
-            on_progress=on_progress,
-        )
+        run = MipRun(graph, time_limit, iteration_limit, on_progress, rng=rng, search_rounds=rounds)
+        return run.solve(chosen.backend, warm_start, walks=graph.goal_count <= FEW_GOALS)
     clock = Clock(time_limit)
     found = search(
         graph,

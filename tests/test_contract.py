@@ -259,7 +259,7 @@ def test_that_there_is_no_tour_is_proven_by_mip_and_claimed_by_none_else(backend
     [
         (
             {"solver": "gurobi"},
-            "solver: unknown 'gurobi'; expected one of auto, mip, reduced-mip",
+            "solver: unknown 'gurobi'; expected one of auto, mip, dp, reduced-mip",
         ),
         (
             {"solver": "mip", "params": {"hot": 1}},

@@ -106,7 +106,7 @@ def bound_by_walks(run: SearchingRun, costs: LegCosts) -> None:
     """Raise the bound of a run and forget vertices, until the proof is done or progress stalls."""
     walks = Walks(costs.cluster, costs.values)
     prices = first_prices(run, costs)
-    direction: Floats = np.zeros_like(prices)
+    direction: Floats = np.zeros(walks.n + 1)
     best, kept, step, vain = -np.inf, prices, STEP, 0
     history: list[tuple[float, int]] = []
     while not run.done:
@@ -148,10 +148,11 @@ def bound_by_walks(run: SearchingRun, costs: LegCosts) -> None:
             return
         if walk.labels < MOST_LABELS:
             walks.memory.widen(goals.tolist())
-        missed = 1.0 - visits
+        missed: Floats = np.asarray(1.0 - visits, dtype=np.float64)
         missed[0] = 0.0
-        mixed = DEFLECTION * missed + (1.0 - DEFLECTION) * direction
-        direction = mixed if mixed @ mixed > 1e-3 else missed
+        direction = DEFLECTION * missed + (1.0 - DEFLECTION) * direction
+        if direction @ direction < 0.1:
+            direction = missed
         target = run.length if run.tour is not None else 1.1 * abs(walk.bound) + 1e-9
         prices = prices + step * (target - walk.bound) / (direction @ direction) * direction
 

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from netsp.dp.solve import bound_by_walks
 from netsp.legcosts import LegCosts
 from netsp.lns import Search
 from netsp.lns.incumbent import SearchingRun
@@ -80,15 +81,20 @@ def solve(
 class MipRun(SearchingRun):
     """State of one solve."""
 
-    def solve(self, backend: str, warm_start: Sequence[int] | None) -> Result:
-        """Heuristic, root, integer rounds."""
+    def solve(
+        self, backend: str, warm_start: Sequence[int] | None, *, walks: bool = False
+    ) -> Result:
+        """Heuristic, walks if wanted, root, integer rounds."""
         with self.until_stopped():
             self.offer(warm_start)
             if not self.trivial():
                 costs = LegCosts(self.graph)
                 self.search(costs)
                 self.report("heuristic", vertices=len(costs))
-                self.cut(costs, backend)
+                if walks:
+                    bound_by_walks(self, costs)
+                if not (self.done or self.infeasible):
+                    self.cut(costs, backend)
         return self.finish("proven" if self.done else "open")
 
     def cut(self, costs: LegCosts, backend: str) -> None:
