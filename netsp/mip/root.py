@@ -247,15 +247,19 @@ class Root:
     def _separate(self, point: Point) -> list[Cut]:
         cluster = self.costs.cluster
         tour = tour_legs(self.tour())
+        # visited by the point or by the incumbent
+        visited = np.union1d(np.flatnonzero(point.x > 1e-9), self.tour())
+        near = visited[np.argmin(self.costs.values[:, visited], axis=1)]
+        near[visited] = visited
         if len(tour):
             y = (1.0 - MIX) * point.y
             y[np.isin(self._keys(point.legs), self._keys(tour))] += MIX
             x = (1.0 - MIX) * point.x
             x[self.tour()] += MIX
-            cuts = fractional_cuts(x, point.legs, y, cluster, self.branch)
+            cuts = fractional_cuts(x, point.legs, y, cluster, self.branch, near)
             if cuts:
                 return cuts
-        return fractional_cuts(point.x, point.legs, point.y, cluster, self.branch)
+        return fractional_cuts(point.x, point.legs, point.y, cluster, self.branch, near)
 
     def _purge(self, point: Point, risen: bool) -> None:
         """Count how long cuts have done nothing, and take the idle ones out of the LP, but only

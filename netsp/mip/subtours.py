@@ -45,14 +45,23 @@ def whole_clusters(inside: Bools, x: Floats, cluster: Ints) -> Bools:
     return np.asarray(inside | (weight[cluster] > 1.0 - 1e-9))
 
 
-def component_cuts(x: Floats, legs: Ints, y: Floats, cluster: Ints) -> list[Cut]:
-    """One cut for each component of the support that the base is not in."""
+def component_cuts(
+    x: Floats, legs: Ints, y: Floats, cluster: Ints, near: Ints | None = None
+) -> list[Cut]:
+    """One cut for each component of the support that the base is not in.
+
+    near : (V,) the visited vertex nearest to each, itself if it is visited. Vertices that are not
+    visited then go with it: they carry no flow, so the cut is as violated, and the same subtour in
+    a neighbouring class, which the next LP would pay for instead, is cut with it.
+    """
     count, label = components(x, legs, y)
     cuts = []
     for k in range(count):
         inside = label == k
         if label[0] == k or not inside.any():
             continue
+        if near is not None:
+            inside = inside[near]
         weight = np.bincount(cluster[inside], weights=x[inside])
         best = int(np.argmax(weight))
         cuts.append(Cut(whole_clusters(inside, x, cluster), best))
@@ -73,10 +82,16 @@ def branches(signatures: Sequence[Word]) -> Bools:
 
 
 def fractional_cuts(
-    x: Floats, legs: Ints, y: Floats, cluster: Ints, branch: Bools | None = None
+    x: Floats,
+    legs: Ints,
+    y: Floats,
+    cluster: Ints,
+    branch: Bools | None = None,
+    near: Ints | None = None,
 ) -> list[Cut]:
-    """Cuts violated by a fractional point, the most violated first."""
-    cuts = component_cuts(x, legs, y, cluster)
+    """Cuts violated by a fractional point, the most violated first; `near` as of
+    `component_cuts`."""
+    cuts = component_cuts(x, legs, y, cluster, near)
     if cuts:
         return cuts
     support = np.flatnonzero(x > 1e-9)
@@ -110,6 +125,8 @@ def fractional_cuts(
         for row in sets:
             inside = np.zeros(len(x), dtype=bool)
             inside[support[row]] = True
+            if near is not None:
+                inside = inside[near]
             _add(found, inside, x, legs, y, cluster)
     best = sorted(found.values(), key=lambda f: -f[0])[:MOST_CUTS]
     return [Cut(inside, c) for _, inside, c in best]
