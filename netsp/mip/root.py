@@ -29,8 +29,9 @@ IDLE, SLACK = 40, 4
 counting four times (a cut between vertices that the LP leaves alone is tight and means nothing).
 Separation finds it again if need be."""
 
-PRICE_EVERY = 4
-"""Rounds of cuts between two looks at the prices of all legs, unless no cut is found."""
+PRICE_EVERY, PRICE_SELDOM = 4, 32
+"""Rounds of cuts between two looks at the prices of all legs, unless no cut is found; every look
+that brings hardly a leg and raises the bound by little doubles the first, up to the second."""
 
 MIX = 0.6
 """Cuts are first sought between the LP's point and the incumbent: those found there go deeper
@@ -82,7 +83,7 @@ class Root:
         progress stalls."""
         run = self.run
         gaps: list[float] = []
-        since = 0
+        since, every = 0, PRICE_EVERY
         while not run.done:
             run.check()
             point = self.lp.solve(run.clock.left)
@@ -94,7 +95,7 @@ class Root:
             self.point = point
             priced = False
             cuts: list[Cut] = []
-            if since % PRICE_EVERY:
+            if since % every:
                 cuts = self._separate(point)
             since += 1
             if cuts:
@@ -102,8 +103,13 @@ class Root:
                 self.lp.add_cuts(cuts)
                 continue
             since = 1
-            before = run.bound or 0.0
+            before, legs = run.bound or 0.0, len(self.lp.legs)
             priced = self._price(point)
+            brought = len(self.lp.legs) - legs if self.point is not None else legs
+            idle = brought < 0.002 * legs and (
+                (run.bound or 0.0) - before < WORTH * (run.length - before)
+            )
+            every = min(2 * every, PRICE_SELDOM) if idle else PRICE_EVERY
             risen = (run.bound or 0.0) > before + 1e-6 * abs(before)
             if self.point is None:  # vertices were forgotten; the LP must be solved anew
                 run.report("root", **self.size())
