@@ -4,7 +4,7 @@
     python benchmarks/frontier.py --worlds 3 --limit 60
     python benchmarks/frontier.py --cells 60:300,60:350
     python benchmarks/frontier.py --heuristic         `lns` against the best known
-    python benchmarks/frontier.py --peers             CP-SAT and HiGHS on the raw model beside it
+    python benchmarks/frontier.py --peers             other people's solvers on the same graphs
 
 Worlds: 500 x 500, 20 circles of radius 10 to 30 (`--many`: 50 of radius 10 to 20), seeds from 0
 (`netsp.worlds`). A time is that of `netsp.solve` with `auto`: roadmap, legs and proof.
@@ -15,13 +15,12 @@ from __future__ import annotations
 import argparse
 import resource
 import statistics
-import subprocess
 import sys
-import tempfile
 import time
 
 import numpy as np
-from table import ROOT, head, heading, row
+from peers import EXACT, HEURISTIC
+from table import head, heading, row
 
 from netsp import Problem, Status, solve, solve_graph, travel_graph, verify
 from netsp.errors import NetspError
@@ -76,85 +75,93 @@ def proofs(cells: list[tuple[int, float]], worlds: int, limit: float, many: bool
 
 def heuristic(worlds: int) -> None:
     """`lns` after a stated time over the best known: the proven optimum, or the best of `auto` in
-    two minutes and of `lns` itself."""
-    head("goals", "tether", "lns s", "mean % over best known", "worst %", "best known is proven")
+    150 s and of `lns` itself."""
+    head("goals", "tether", "worlds", "lns s", "mean % over best known", "worst %",
+         "best known is proven")  # fmt: skip
     for goals, tether, limit in ((20, 350, 1.0), (60, 300, 10.0), (200, 300, 60.0)):
         over, proven = [], 0
+        worlds = min(worlds, 5) if goals == 200 else worlds
         for seed in range(worlds):
             graph = travel_graph(world(seed, goals, tether, many=False))
             graph.costs  # noqa: B018
             found = solve_graph(graph, "lns", time_limit=limit, seed=seed)
-            best = solve_graph(graph, "auto", time_limit=120.0)
+            best = solve_graph(graph, "auto", time_limit=150.0)
             proven += best.status is Status.OPTIMAL
             known = min(best.length or np.inf, found.length or np.inf)
             over.append(100.0 * ((found.length or np.inf) / known - 1.0))
-        row(goals, tether, limit, f"{np.mean(over):.3f}", f"{max(over):.3f}", f"{proven}/{worlds}")
+        row(
+            goals,
+            tether,
+            worlds,
+            limit,
+            f"{np.mean(over):.3f}",
+            f"{max(over):.3f}",
+            f"{proven}/{worlds}",
+        )
 
 
-def peers(worlds: int, limit: float) -> None:
-    """The same travel graphs handed to others; seconds beside ours."""
-    head("goals", "tether", "solver", "proven", "median s", "mean gap %")
-    for goals, tether in ((10, 300), (20, 350)):
+def peers(worlds: int, limit: float, plot: str | None) -> None:
+    """The same travel graphs handed to others; seconds beside ours. Best known is the least of all
+    lengths found."""
+    head("goals", "tether", "solver", "proven", "median s", "mean gap %", "mean % over best known",
+         "no tour")  # fmt: skip
+    profile: dict[str, list[float]] = {name: [] for name in EXACT}
+    for goals, tether in ((10, 300), (20, 300), (20, 350), (40, 300)):
         graphs = [travel_graph(world(s, goals, tether, many=False)) for s in range(worlds)]
         for graph in graphs:
             graph.costs  # noqa: B018
-        for name, run in (("netsp mip", _ours), ("CP-SAT", _cp_sat), ("HiGHS, raw model", _raw)):
-            times, gaps, proven = [], [], 0
+        found: dict[str, list[tuple[float, float, float]]] = {}
+        for name, run in {**EXACT, **HEURISTIC}.items():
+            rows = found[name] = []
             for graph in graphs:
                 begin = time.perf_counter()
                 try:
                     length, bound = run(graph, limit)
                 except ImportError as error:
-                    row(goals, tether, name, f"not installed: {error.name}", "", "")
+                    print(f"{name}: not installed: {error.name}", file=sys.stderr)
                     break
-                times.append(time.perf_counter() - begin)
-                gap = 100.0 * (length - bound) / length if np.isfinite(length) else 100.0
-                proven += gap < 1e-3
-                gaps.append(max(gap, 0.0))
-            else:
-                row(goals, tether, name, f"{proven}/{worlds}", f"{statistics.median(times):.2f}",
-                    f"{np.mean(gaps):.2f}")  # fmt: skip
+                rows.append((length, bound, time.perf_counter() - begin))
+        best = [min(rows[k][0] for rows in found.values() if rows) for k in range(worlds)]
+        for name, rows in found.items():
+            if not rows:
+                continue
+            gaps = [100.0 * max(n - b, 0.0) / n if np.isfinite(n) else 100.0 for n, b, _ in rows]
+            over = [100.0 * (n / k - 1.0) for (n, _, _), k in zip(rows, best, strict=True)]
+            proofs = [g < 1e-3 for g in gaps]
+            if name in profile:
+                profile[name] += [r[2] if p else np.inf for r, p in zip(rows, proofs, strict=True)]
+            finite = [o for o in over if np.isfinite(o)]
+            row(goals, tether, name, f"{sum(proofs)}/{worlds}" if name in EXACT else "",
+                f"{statistics.median(r[2] for r in rows):.2f}",
+                f"{np.mean(gaps):.2f}" if name in EXACT else "",
+                f"{np.mean(finite):.2f}" if finite else "", len(over) - len(finite))  # fmt: skip
+    if plot:
+        draw_profile({n: t for n, t in profile.items() if t}, plot)
 
 
-def _ours(graph, limit):
-    result = solve_graph(graph, "mip", time_limit=limit)
-    return result.length, result.lower_bound
+def draw_profile(seconds: dict[str, list[float]], path: str) -> None:
+    """Performance profile (Dolan & More 2002): share of problems proven within a multiple of the
+    fastest solver's time."""
+    import matplotlib
 
+    matplotlib.use("Agg")
+    from matplotlib import pyplot as plt
 
-def _cp_sat(graph, limit):
-    with tempfile.NamedTemporaryFile(suffix=".npz") as file:
-        np.savez(file, costs=graph.costs, cluster=graph.cluster)
-        file.flush()
-        script = str(ROOT / "benchmarks" / "cp_sat.py")
-        run = subprocess.run(
-            [sys.executable, script, file.name, str(limit)], capture_output=True, text=True
-        )
-    if run.returncode:
-        raise ImportError(run.stderr.strip().splitlines()[-1], name="ortools")
-    length, bound = map(float, run.stdout.split())
-    return length, bound
-
-
-def _raw(graph, limit):
-    """The paper's program over all legs, cut at integer solutions only."""
-    from netsp.mip.highs import HighsInteger
-    from netsp.mip.subtours import component_cuts
-
-    legs = np.argwhere(np.triu(np.isfinite(graph.costs), 1))
-    costs = graph.costs[legs[:, 0], legs[:, 1]]
-    model = HighsInteger(graph.cluster, np.arange(len(graph)), legs, costs, [])
-    begin, bound = time.perf_counter(), 0.0
-    while (left := limit - (time.perf_counter() - begin)) > 0:
-        outcome = model.solve(left)
-        bound = max(bound, outcome.bound or 0.0)
-        if outcome.point is None or not outcome.finished:
-            break
-        x, y = np.rint(outcome.point.x), np.rint(outcome.point.y)
-        cuts = component_cuts(x, legs, y, graph.cluster)
-        if not cuts:
-            return outcome.point.objective, bound
-        model.add_cuts(cuts)
-    return np.inf, bound
+    fastest = np.min(list(seconds.values()), axis=0)
+    ratios = {n: np.sort(np.array(t) / fastest) for n, t in seconds.items()}
+    most = 2.0 * max(r[np.isfinite(r)].max(initial=1.0) for r in ratios.values())
+    figure, axes = plt.subplots(figsize=(7, 4.2), layout="constrained")
+    for name, r in ratios.items():
+        r = r[np.isfinite(r)]
+        x = np.concatenate([[1.0], np.repeat(r, 2), [most]])
+        share = np.arange(len(r) + 1) / len(fastest)
+        axes.plot(x, np.repeat(share, 2), label=name)
+    axes.set(xscale="log", xlim=(1.0, most), ylim=(-0.02, 1.02),
+             xlabel="time over that of the fastest", ylabel="share proven",
+             title=f"{len(fastest)} problems")  # fmt: skip
+    axes.grid(alpha=0.3)
+    axes.legend(loc="lower right", fontsize="small")
+    figure.savefig(path, dpi=130)
 
 
 def main() -> None:
@@ -166,6 +173,7 @@ def main() -> None:
     parser.add_argument("--many", action="store_true", help="50 circles of radius 10 to 20")
     parser.add_argument("--heuristic", action="store_true")
     parser.add_argument("--peers", action="store_true")
+    parser.add_argument("--plot", help="of --peers, a performance profile")
     args = parser.parse_args()
     heading(f"Frontier ({args.worlds} worlds a cell, limit {args.limit:g} s)")
     solve(world(0, 5, 200.0, many=False))  # compiled before it counts
@@ -173,7 +181,7 @@ def main() -> None:
     if args.heuristic:
         heuristic(args.worlds)
     elif args.peers:
-        peers(args.worlds, args.limit)
+        peers(args.worlds, args.limit, args.plot)
     else:
         cells = CELLS
         if args.cells:

@@ -146,7 +146,7 @@ def test_ctrl_c_leaves_a_verified_solution(tmp_path):
     from tests.worlds import random_world
 
     problem = tmp_path / "p.json"
-    problem.write_text(random_world(2, goals=40, tether=380.0).to_json())
+    problem.write_text(random_world(2, goals=70, tether=420.0).to_json())
     out = tmp_path / "s.json"
     command = [sys.executable, "-m", "netsp", "solve", str(problem), "-o", str(out)]
     with subprocess.Popen(

@@ -2,10 +2,10 @@
 
 For any λ, π free and μ <= 0 the Lagrangian gives, for every tour,
 
-    length >= Σ_C (λ_C + min over v in C of r_v)
+    length >= Σ_C (λ_C + min over v in C of r_v) + Σ_k μ_k room_k
               + max( Σ over legs of min(0, r_uv), (m + 1) · min(0, min over legs of r_uv) ),
 
-with reduced costs r_uv = c_uv - π_u - π_v - Σ_k μ_k [u, v ∈ S_k] and
+with reduced costs r_uv = c_uv - π_u - π_v - Σ_k μ_k [u, v ∈ S_k or uv in a tooth of k] and
 r_v = 2 π_v - λ_C(v) + Σ_k μ_k [v ∈ S_k \\ C_k], because a tour takes one vertex of each cluster and
 m + 1 legs, none of them twice (m >= 2). It holds whatever the solver's tolerances were; it is tight
 at an LP optimum.
@@ -46,6 +46,14 @@ def reduced_costs(
             np.array([cuts[k].cluster for k in active])[:, None] != cluster[None, :]
         )
         vertices += mu @ outside_c
+        m = int(cluster.max()) + 1
+        bitten = np.zeros((m, m))
+        for k in active:
+            for g, h in cuts[k].teeth:
+                bitten[g, h] += duals.cut[k]
+                bitten[h, g] += duals.cut[k]
+        if bitten.any():
+            legs -= bitten[np.ix_(cluster, cluster)]
     return legs, vertices
 
 
@@ -64,7 +72,7 @@ def rounding(leg_costs: Floats, duals: Duals) -> float:
     cost for every leg of a tour."""
     finite = leg_costs[np.isfinite(leg_costs)]
     longest = float(np.abs(finite).max(initial=0.0))
-    size = float(np.abs(duals.cluster).sum() + np.abs(duals.cut).sum())
+    size = float(np.abs(duals.cluster).sum() + np.abs(duals.cut).sum() - duals.constant)
     return ROUNDING * (size + len(duals.cluster) * (longest + float(np.abs(duals.degree).max())))
 
 
@@ -87,9 +95,11 @@ def exact_bound(
         for v in range(u + 1, n):
             if np.isfinite(costs[u, v]):
                 r = Fraction(float(costs[u, v])) - degree[u] - degree[v]
-                legs.append(r - sum(mu for c, mu in active if c.inside[u] and c.inside[v]))
+                pair = tuple(sorted((int(cluster[u]), int(cluster[v]))))
+                r -= sum(mu for c, mu in active if c.inside[u] and c.inside[v])
+                legs.append(r - sum(mu for c, mu in active if pair in c.teeth))
     least = [min(vertex[v] for v in range(n) if cluster[v] == c) for c in range(max(cluster) + 1)]
-    fixed = sum(cluster_dual) + sum(least)
+    fixed = sum(cluster_dual) + sum(least) + sum(mu * Fraction(c.room) for c, mu in active)
     negative = sum(min(r, Fraction(0)) for r in legs)
     worst = (int(max(cluster)) + 1) * min(min(legs, default=Fraction(0)), Fraction(0))
     return Fraction(fixed + max(negative, worst))
@@ -113,7 +123,7 @@ def _least(vertex_costs: Floats, cluster: npt.NDArray[np.int64]) -> Floats:
 
 
 def _vertex_part(vertex_costs: Floats, cluster: npt.NDArray[np.int64], duals: Duals) -> float:
-    return float((duals.cluster + _least(vertex_costs, cluster)).sum())
+    return float((duals.cluster + _least(vertex_costs, cluster)).sum()) + duals.constant
 
 
 def _negative_legs(leg_costs: Floats) -> float:

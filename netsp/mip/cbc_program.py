@@ -88,7 +88,7 @@ class CbcRelaxation:
         block = cut_coefficients(self.cuts, self.cluster, self.legs)
         for k, values in enumerate(block):
             terms = [(y[e], float(values[e])) for e in np.flatnonzero(values)]
-            _row(problem, terms, pulp.LpConstraintGE, 0.0, f"cut_{k}")
+            _row(problem, terms, pulp.LpConstraintGE, -2.0 * self.cuts[k].room, f"cut_{k}")
         outcome = run_cbc(problem, integer=False, time_left=time_left)
         self.infeasible = outcome.status == "infeasible"
         if outcome.status != "optimal":
@@ -103,7 +103,8 @@ class CbcRelaxation:
             self.cuts,
             self.cluster,
         )
-        return Point(x, self.legs, value, (outcome.objective or 0.0) / scale, duals, block @ value)
+        slack = block @ value + np.array([2.0 * c.room for c in self.cuts])
+        return Point(x, self.legs, value, (outcome.objective or 0.0) / scale, duals, slack)
 
 
 class CbcInteger:
@@ -141,11 +142,10 @@ class CbcInteger:
                 for v, x in self._x.items()
                 if cut.inside[v] and self.cluster[v] != cut.cluster
             ]
-            within = cut.inside[self.legs[:, 0]] & cut.inside[self.legs[:, 1]]
-            terms += [(self._y[k], 1.0) for k in np.flatnonzero(within)]
+            terms += [(self._y[k], 1.0) for k in cut.within(self.cluster, self.legs)]
             if terms:
                 name = f"cut_{len(self.cuts)}"
-                _row(self.problem, terms, pulp.LpConstraintLE, 0.0, name)
+                _row(self.problem, terms, pulp.LpConstraintLE, cut.room, name)
             self.cuts.append(cut)
 
     def solve(self, time_left: float) -> IntegerOutcome:

@@ -110,7 +110,8 @@ class HighsRelaxation:
         n = len(cuts)
         block = cut_coefficients(cuts, self.cluster, self.legs)
         no_limit = np.full(n, highspy.kHighsInf)
-        self._highs.addRows(n, np.zeros(n), no_limit, *_compressed(block))
+        least = np.array([-2.0 * c.room for c in cuts])
+        self._highs.addRows(n, least, no_limit, *_compressed(block))
         self.cuts = [*self.cuts, *cuts]
 
     def keep_cuts(self, keep: Bools) -> None:
@@ -145,6 +146,7 @@ class HighsRelaxation:
             price[: self.clusters], price[self.clusters :], self.cuts, self.cluster
         )
         slack = np.array(solution.row_value)[self.clusters :]
+        slack += np.array([2.0 * c.room for c in self.cuts])
         objective = float(h.getInfo().objective_function_value) / self._scale
         return Point(x, self.legs, y, objective, duals, slack)
 
@@ -198,14 +200,14 @@ class HighsInteger:
         for cut in cuts:
             at = self.vertices
             outside_c = at[cut.inside[at] & (self.cluster[at] != cut.cluster)]
-            within = np.flatnonzero(cut.inside[self.legs[:, 0]] & cut.inside[self.legs[:, 1]])
+            within = cut.within(self.cluster, self.legs)
             starts.append(count)
             index += [self._position[outside_c], len(self.vertices) + within]
             value += [np.full(len(outside_c), -1.0), np.ones(len(within))]
             count += len(outside_c) + len(within)
         n = len(cuts)
         self._highs.addRows(
-            n, np.full(n, -highspy.kHighsInf), np.zeros(n), count,
+            n, np.full(n, -highspy.kHighsInf), np.array([c.room for c in cuts]), count,
             np.array(starts, dtype=np.int32), np.concatenate(index).astype(np.int32),
             np.concatenate(value),
         )  # fmt: skip

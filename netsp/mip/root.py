@@ -13,20 +13,21 @@ import numpy as np
 
 from netsp.legcosts import LegCosts
 from netsp.lns.incumbent import SearchingRun
+from netsp.mip.blossoms import blossom_cuts
 from netsp.mip.bound import dual_bound, fixing_costs, reduced_costs
 from netsp.mip.program import Bools, Cut, Floats, Ints, Point, Relaxation
 from netsp.mip.subtours import branches, fractional_cuts
 from netsp.run import Stop
 
-NEAREST = 6
+NEAREST = 4
 """Legs per vertex in the first LP."""
 
 PRICED_PER_VERTEX = 3
 """Most legs per vertex that one pricing round brings in."""
 
-IDLE, SLACK = 40, 4
+IDLE, SLACK = 16, 2
 """A cut leaves the LP after so many rounds in a row without a price, rounds in which it was slack
-counting four times (a cut between vertices that the LP leaves alone is tight and means nothing).
+counting twice (a cut between vertices that the LP leaves alone is tight and means nothing).
 Separation finds it again if need be."""
 
 PRICE_EVERY, PRICE_SELDOM = 4, 32
@@ -265,7 +266,8 @@ class Root:
             cuts = fractional_cuts(x, point.legs, y, cluster, self.branch, near)
             if cuts:
                 return cuts
-        return fractional_cuts(point.x, point.legs, point.y, cluster, self.branch, near)
+        cuts = fractional_cuts(point.x, point.legs, point.y, cluster, self.branch, near)
+        return cuts or blossom_cuts(point.legs, point.y, cluster)
 
     def _purge(self, point: Point, risen: bool) -> None:
         """Count how long cuts have done nothing, and take the idle ones out of the LP, but only

@@ -33,8 +33,12 @@ paper's shape."""
 
 DEFAULT_BACKEND = "highs"
 
-MOST_LEGS = 20_000
-"""With more legs left the integer program is not begun: it would end nowhere."""
+SEARCH_AGAIN = 0.5
+"""Share of the last gap at which the classes that the LP visits are searched once more."""
+
+MOST_LEGS, TRIES = 30_000, 6
+"""With more legs left the integer program would end nowhere; so many more searches may find a tour
+that rules legs out, else the run ends."""
 
 
 @dataclass(frozen=True)
@@ -99,6 +103,7 @@ class MipRun(SearchingRun):
 
     def cut(self, costs: LegCosts, backend: str) -> None:
         """Root and integer rounds over what is left of the vertices."""
+        self._gap_searched = self.length
         relaxation, integer = (_load(path) for path in BACKENDS[backend])
         root = Root(self, costs, relaxation, self.round)
         root.solve()
@@ -112,16 +117,30 @@ class MipRun(SearchingRun):
             self.search(costs)
             self.report("measured", **root.size())
             root.solve()
+        for _ in range(TRIES):
+            if self.done or root.size()["legs"] <= MOST_LEGS:
+                break
+            before = self.length
+            self.search(costs)
+            self.report("heuristic", **root.size())
+            if self.length < before:
+                root.solve()
         if not self.done and root.size()["legs"] <= MOST_LEGS:
             self.integer(root, integer)
 
     # incumbents
 
     def round(self, root: Root, point: Point) -> None:
-        """Turn a point of the root into a tour, if all legs are measured."""
+        """Turn a point of the root into a tour, if all legs are measured; else search among the
+        classes it visits whenever the gap has shrunk to `SEARCH_AGAIN` of what it was."""
         if root.costs.exact is None:
             whole = np.abs(point.y - np.rint(point.y)).max(initial=0.0) < 1e-6
             self.tour_at(root.costs, point, whole=whole)
+            return
+        gap = self.length - (self.bound or 0.0)
+        if gap < SEARCH_AGAIN * self._gap_searched:
+            self._gap_searched = gap
+            self.search(root.costs, np.flatnonzero(point.x > 1e-6))
 
     def tour_at(self, costs: LegCosts, point: Point, *, whole: bool) -> None:
         """Join the cycles of a point, or follow its strongest legs, and improve that."""
