@@ -33,6 +33,10 @@ paper's shape."""
 
 DEFAULT_BACKEND = "highs"
 
+SECONDS_PER_LEG = 3e-4
+"""With less time than this left for every leg the integer program is not begun: its presolve alone
+would take that long, and cannot be stopped."""
+
 SEARCH_AGAIN = 0.5
 """Share of the last gap at which the classes that the LP visits are searched once more."""
 
@@ -125,7 +129,8 @@ class MipRun(SearchingRun):
             self.report("heuristic", **root.size())
             if self.length < before:
                 root.solve()
-        if not self.done and root.size()["legs"] <= MOST_LEGS:
+        legs = root.size()["legs"]
+        if not self.done and legs <= min(MOST_LEGS, self.clock.left / SECONDS_PER_LEG):
             self.integer(root, integer)
 
     # incumbents
