@@ -59,8 +59,8 @@ def _parser() -> argparse.ArgumentParser:
         "--solver",
         default="auto",
         metavar="NAME",
-        help="auto (default), mip, reduced-mip, lns, anneal, anneal-2016, greedy, greedy-2016 or "
-        "greedy-tsp",
+        help="auto (default), mip, dp, reduced-mip, lns, anneal, anneal-2016, greedy, "
+        "greedy-2016 or greedy-tsp",
     )
     p.add_argument(
         "--option",
@@ -122,6 +122,26 @@ def _parser() -> argparse.ArgumentParser:
     )
     p.set_defaults(run=_plot, shortcut=False)
 
+    p = commands.add_parser("world", help="draw a random problem, the same on every machine")
+    p.add_argument(
+        "--family",
+        default="icra2017",
+        metavar="NAME",
+        help="icra2017 (default), rss2016, clustered, array or harbour",
+    )
+    p.add_argument("--seed", type=_natural, default=0, metavar="N", help="of all draws; default 0")
+    p.add_argument("--goals", type=_positive, metavar="N", help="default 20; rss2016: 5 to 10")
+    p.add_argument("--obstacles", type=_natural, metavar="N", help="default 20; rss2016: 5 to 10")
+    p.add_argument("--tether", type=_length, default=300.0, metavar="L", help="default 300")
+    p.add_argument("--side", type=_length, default=500.0, metavar="L", help="default 500")
+    p.add_argument(
+        "--radii", type=_length, nargs=2, default=(10.0, 30.0), metavar="R",
+        help="least and most; default 10 30",
+    )  # fmt: skip
+    p.add_argument("-o", "--output", metavar="FILE", help="write the problem here (else stdout)")
+    p.add_argument("--plot", metavar="FILE", help="draw it (png, svg or pdf)")
+    p.set_defaults(run=_world)
+
     p = commands.add_parser("schema", help="print the JSON Schema of a file format")
     p.add_argument("format", choices=("problem", "solution"))
     p.set_defaults(run=_schema)
@@ -146,6 +166,16 @@ def _seconds(text: str) -> float:
         value = -1.0
     if not 0.0 < value < float("inf"):
         raise argparse.ArgumentTypeError(f"expected a positive number of seconds, got {text!r}")
+    return value
+
+
+def _length(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = -1.0
+    if not 0.0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"expected a positive number, got {text!r}")
     return value
 
 
@@ -350,6 +380,35 @@ def _load_pair(problem: str, solution: str) -> tuple[Problem, Solution]:
     from netsp.solution import Solution
 
     return Problem.load(problem), Solution.load(solution)
+
+
+def _world(args: argparse.Namespace) -> int:
+    from netsp.solution import write_text
+    from netsp.worlds import reachable_world
+
+    _check_writable(args.output, args.plot)
+    if args.plot:
+        from netsp import plotting
+
+        plotting.check_format(args.plot)
+    problem, in_vain = reachable_world(
+        args.seed,
+        family=args.family,
+        goals=args.goals,
+        obstacles=args.obstacles,
+        tether_length=args.tether,
+        side=args.side,
+        radii=tuple(args.radii),
+    )
+    if in_vain:
+        print(f"netsp: {in_vain} worlds of this seed did not fit and were redrawn", file=sys.stderr)
+    if args.output:
+        write_text(args.output, problem.to_json())
+    else:
+        sys.stdout.write(problem.to_json())
+    if args.plot:
+        plotting.save(problem, None, args.plot)
+    return 0
 
 
 def _schema(args: argparse.Namespace) -> int:

@@ -1,12 +1,17 @@
 """Random worlds are what they say, everywhere the same."""
 
 import hashlib
+import itertools
+import json
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from netsp import InputError, solve
-from netsp.worlds import random_world
+from netsp import InputError, Problem, solve
+from netsp.cli import main
+from netsp.worlds import FAMILIES, random_world, reachable_world
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -21,13 +26,78 @@ def test_circles_are_apart_and_every_goal_is_in_reach(seed):
     assert solve(p, "greedy-2016").length <= 2 * 12 * 250.0
 
 
-def test_a_world_is_the_same_on_every_machine():
-    # digest of the coordinates, computed once; Python promises the sequence of random.Random
-    p = random_world(7, goals=5, obstacles=6)
+DIGESTS = {
+    "icra2017": "dada8bcc9790a942",
+    "rss2016": "5c1007a010d09b55",
+    "clustered": "14126f2177be8fa2",
+    "array": "95a06d386c4099aa",
+    "harbour": "4b384b7485bae1bd",
+}
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_a_world_is_the_same_on_every_machine(family):
+    # digests of the coordinates, computed once; Python promises the sequence of random.Random
+    given = {} if family == "rss2016" else {"goals": 5, "obstacles": 6}
+    p = random_world(7, family=family, **given)
     numbers = [*p.base, *(x for g in p.goals for x in g.position)]
-    numbers += [x for o in p.obstacles for x in (*o.center, o.radius)]
+    for o in p.obstacles:
+        circle = hasattr(o, "radius")
+        numbers += (*o.center, o.radius) if circle else itertools.chain(*o.polygon)
     text = " ".join(f"{x:.9f}" for x in numbers)
-    assert hashlib.sha256(text.encode()).hexdigest()[:16] == "dada8bcc9790a942"
+    assert hashlib.sha256(text.encode()).hexdigest()[:16] == DIGESTS[family]
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.sampled_from(sorted(FAMILIES)), st.integers(0, 10**9), st.integers(0, 24))
+def test_in_every_family_obstacles_are_apart_and_goals_in_reach(family, seed, count):
+    p, _ = reachable_world(seed, family=family, obstacles=count, goals=6, tether_length=260.0)
+    assert len(p.obstacles) == count
+    shapes = [o.shape(0.0) for o in p.obstacles]
+    for a, b in itertools.combinations(shapes, 2):
+        assert a.distance(b) > 0.0
+    assert solve(p, "greedy-2016").length <= 2 * 6 * 260.0
+
+
+def test_a_seed_whose_world_does_not_fit_is_drawn_again_and_counted():
+    crowded = {"obstacles": 44, "goals": 4, "side": 300.0, "radii": (20.0, 20.0)}
+    in_vain = []
+    for seed in range(6):
+        problem, drawn = reachable_world(seed, **crowded)
+        in_vain.append(drawn)
+        if drawn == 0:
+            assert problem == random_world(seed, **crowded)
+        else:
+            with pytest.raises(InputError):
+                random_world(seed, **crowded)
+    assert sum(map(bool, in_vain)) > 0
+
+
+def test_netsp_world_writes_a_problem_that_solve_reads(tmp_path, capsys):
+    out, picture = tmp_path / "w.json", tmp_path / "w.svg"
+    command = ["world", "--family", "harbour", "--seed", "4", "--goals", "3", "-o", str(out)]
+    assert main([*command, "--plot", str(picture)]) == 0
+    assert Problem.load(out) == reachable_world(4, family="harbour", goals=3)[0]
+    assert "<svg" in picture.read_text()
+    assert main(["solve", str(out), "-o", str(tmp_path / "s.json"), "--quiet"]) == 0
+    assert main(["world", "--goals", "2", "--obstacles", "0"]) == 0
+    assert len(json.loads(capsys.readouterr().out)["goals"]) == 2
+
+
+@pytest.mark.parametrize(
+    ("args", "said"),
+    [
+        (["--family", "reef"], "family: unknown 'reef'; expected one of icra2017, rss2016"),
+        (["--radii", "30", "10"], "radii: expected 0 < least <= most, got 30 and 10"),
+        (["--obstacles", "900"], "900 circles do not fit"),
+        (["--tether", "0.001"], "places in reach of the tether found"),
+    ],
+)
+def test_bad_worlds_are_told_in_one_line(args, said, capsys):
+    assert main(["world", *args]) == 2
+    err = capsys.readouterr().err
+    assert said in err
+    assert err.count("\n") == 1
 
 
 @pytest.mark.parametrize(
