@@ -142,6 +142,34 @@ def _parser() -> argparse.ArgumentParser:
     p.add_argument("--plot", metavar="FILE", help="draw it (png, svg or pdf)")
     p.set_defaults(run=_world)
 
+    p = commands.add_parser("compare", help="solvers side by side over random worlds, resumable")
+    p.add_argument(
+        "study", metavar="STUDY", nargs="?", help="study file (TOML); or the flags below"
+    )
+    p.add_argument("-o", "--output", required=True, metavar="FILE", help="results (JSON lines)")
+    p.add_argument("--goals", type=_positive, nargs="+", metavar="N")
+    p.add_argument("--tethers", type=_length, nargs="+", metavar="L")
+    p.add_argument("--solvers", nargs="+", metavar="NAME")
+    p.add_argument("--roadmaps", nargs="+", metavar="NAME", help="default taut")
+    p.add_argument("--worlds", type=_positive, metavar="N", help="per cell; default 10")
+    p.add_argument("--family", metavar="NAME", help="of the worlds; default icra2017")
+    p.add_argument(
+        "--seeds", type=_natural, nargs="+", metavar="N", help="of the solvers; default 0"
+    )
+    p.add_argument("--time-limit", type=_seconds, metavar="S", help="of a trial; default 120")
+    p.add_argument("--memory-limit", type=_length, metavar="GIB", help="of a trial; default none")
+    p.add_argument("--jobs", type=_positive, default=1, metavar="N", help="processes; default 1")
+    p.add_argument(
+        "--shard", type=_shard, default=(1, 1), metavar="I/N", help="only the I-th of N parts"
+    )
+    p.add_argument("--quiet", action="store_true", help="no progress")
+    p.set_defaults(run=_compare)
+
+    p = commands.add_parser("combine", help="join the results of shards of one study")
+    p.add_argument("results", metavar="RESULTS", nargs="+")
+    p.add_argument("-o", "--output", required=True, metavar="FILE")
+    p.set_defaults(run=_combine)
+
     p = commands.add_parser("schema", help="print the JSON Schema of a file format")
     p.add_argument("format", choices=("problem", "solution"))
     p.set_defaults(run=_schema)
@@ -167,6 +195,13 @@ def _seconds(text: str) -> float:
     if not 0.0 < value < float("inf"):
         raise argparse.ArgumentTypeError(f"expected a positive number of seconds, got {text!r}")
     return value
+
+
+def _shard(text: str) -> tuple[int, int]:
+    part, _, of = text.partition("/")
+    if not (part.isdigit() and of.isdigit() and 1 <= int(part) <= int(of)):
+        raise argparse.ArgumentTypeError(f"expected I/N with 1 <= I <= N, got {text!r}")
+    return int(part), int(of)
 
 
 def _length(text: str) -> float:
@@ -409,6 +444,18 @@ def _world(args: argparse.Namespace) -> int:
     if args.plot:
         plotting.save(problem, None, args.plot)
     return 0
+
+
+def _compare(args: argparse.Namespace) -> int:
+    from netsp.compare import command
+
+    return command.run(args)
+
+
+def _combine(args: argparse.Namespace) -> int:
+    from netsp.compare import command
+
+    return command.run_combine(args)
 
 
 def _schema(args: argparse.Namespace) -> int:

@@ -182,8 +182,7 @@ def solve(
     _check_limits(time_limit, iteration_limit)
     if warm_start is not None and warm_start.problem.sha256 != problem.sha256:
         raise InputError("warm_start: it is the solution of another problem (sha256 differs)")
-    _load(SOLVERS, "solver", solver)
-    read_params(_load(PARAMS, "solver", solver), solver, params)  # before the long work
+    check_solver(solver, params)  # before the long work
     begin = time.monotonic()
     options: dict[str, Any] = {"time_limit": time_limit, **(roadmap_options or {})}
     if roadmap in SEEDED_ROADMAPS:
@@ -208,6 +207,12 @@ def solve(
         total_s=round(total, 6),
     )
     return to_solution(problem, graph, result, solver, seed, timings)
+
+
+def check_solver(solver: str, params: Mapping[str, Any] | None) -> None:
+    """InputError if there is no such solver, or an option of it is unknown or out of range."""
+    _load(SOLVERS, "solver", solver)
+    read_params(_load(PARAMS, "solver", solver), solver, params)
 
 
 def to_solution(

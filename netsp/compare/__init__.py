@@ -1,0 +1,1 @@
+"""Solvers side by side over random worlds: studies, trials, rows."""

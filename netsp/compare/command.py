@@ -1,0 +1,123 @@
+"""`netsp compare` and `netsp combine`: from flags or a study file to rows, with a progress line."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from typing import Any, TextIO
+
+from netsp.compare.rows import Row, combine
+from netsp.compare.run import FAILED, Tally, compare
+from netsp.compare.study import Study
+from netsp.errors import InputError
+
+
+def study_of(args: argparse.Namespace) -> Study:
+    """The study file, or a study made from the flags."""
+    flags = {
+        "goals": args.goals,
+        "tether_lengths": args.tethers,
+        "solvers": args.solvers and [{"name": name} for name in args.solvers],
+        "roadmaps": args.roadmaps and [{"name": name} for name in args.roadmaps],
+        "seeds": args.seeds,
+        "time_limit": args.time_limit,
+        "memory_limit": args.memory_limit,
+    }
+    given = {name: value for name, value in flags.items() if value is not None}
+    worlds = {"count": args.worlds, "family": args.family}
+    given_worlds = {name: value for name, value in worlds.items() if value is not None}
+    if args.study:
+        if given or given_worlds:
+            name = next(iter({**given, **given_worlds}))
+            raise InputError(f"compare: {name} is given by a flag and a study file too; choose one")
+        return Study.load(args.study)
+    missing = [name for name in ("goals", "tether_lengths", "solvers") if name not in given]
+    if missing:
+        flag = {"tether_lengths": "tethers"}.get(missing[0], missing[0])
+        raise InputError(f"compare: expected a study file or --{flag}")
+    data: dict[str, Any] = {"name": "compare", **given, "worlds": given_worlds}
+    return Study.checked(data, "compare")
+
+
+def run(args: argparse.Namespace) -> int:
+    """`netsp compare`."""
+    study = study_of(args)
+    bar = Bar(sys.stderr, args.quiet)
+    try:
+        tally = compare(study, args.output, jobs=args.jobs, part=args.shard, on_row=bar.show)
+    except KeyboardInterrupt:
+        bar.end()
+        print(
+            f"netsp: interrupted; {args.output} holds what is done, the same command goes on",
+            file=sys.stderr,
+        )
+        return 130
+    bar.end()
+    if not args.quiet:
+        print(
+            f"{tally.done} trials in {args.output}, {tally.done - tally.begun} of them new, "
+            f"{tally.failed} failed",
+            file=sys.stderr,
+        )
+    return 0
+
+
+def run_combine(args: argparse.Namespace) -> int:
+    """`netsp combine`."""
+    count = combine(args.results, args.output)
+    print(f"{count} trials in {args.output}", file=sys.stderr)
+    return 0
+
+
+class Bar:
+    """One line that is drawn over, on a terminal; a line now and then elsewhere."""
+
+    def __init__(self, stream: TextIO, quiet: bool) -> None:
+        self.stream, self.quiet = stream, quiet
+        self.begin = self.shown = time.monotonic()
+        self.live = stream.isatty()
+
+    def show(self, row: Row, tally: Tally) -> None:
+        """After a trial."""
+        if self.quiet:
+            return
+        if row["status"] in FAILED:
+            self._clear()
+            print(f"{describe(row)}: {row['status']}: {row['message']}", file=self.stream)
+        now = time.monotonic()
+        if now - self.shown < (0.1 if self.live else 10.0) and tally.done < tally.total:
+            return
+        self.shown = now
+        fresh = tally.done - tally.begun
+        left = (now - self.begin) / fresh * (tally.total - tally.done)
+        text = (
+            f"{tally.done}/{tally.total} trials, {tally.failed} failed, {_span(left)} left, "
+            f"last {describe(row)}"
+        )
+        self._clear()
+        print(text[:118], end="" if self.live else "\n", file=self.stream, flush=True)
+
+    def end(self) -> None:
+        """Leave the line."""
+        if self.live and not self.quiet:
+            print(file=self.stream)
+
+    def _clear(self) -> None:
+        if self.live:
+            print("\r\x1b[K", end="", file=self.stream)
+
+
+def describe(row: Row) -> str:
+    """A trial in a few words."""
+    world = row["world"]
+    return (
+        f"{row['solver']['label']} on {world['family']}-{world['seed']}, {world['goals']} goals, "
+        f"tether {world['tether_length']:g}"
+    )
+
+
+def _span(seconds: float) -> str:
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"

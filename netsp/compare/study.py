@@ -1,0 +1,212 @@
+"""A study: which worlds, roadmaps, solvers and seeds are tried with one another."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import tomllib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from netsp.errors import InputError
+from netsp.problem import Positive, explain, read_text
+from netsp.solvers import PARAMS, ROADMAPS, SOLVERS, check_solver
+from netsp.worlds import FAMILIES
+
+_STRICT = ConfigDict(frozen=True, extra="forbid")
+
+Whole = Annotated[int, Field(ge=1)]
+Natural = Annotated[int, Field(ge=0)]
+
+
+class Worlds(BaseModel):
+    """Random worlds `first` to `first + count - 1` of a family (`netsp.worlds`)."""
+
+    model_config = _STRICT
+    family: str = "icra2017"
+    count: Whole = 10
+    first: Natural = 0
+    obstacles: Natural | None = None
+    side: Positive = 500.0
+    radii: tuple[Positive, Positive] = (10.0, 30.0)
+
+    @model_validator(mode="after")
+    def _known(self) -> Self:
+        if self.family not in FAMILIES:
+            raise ValueError(f"family: unknown {self.family!r}; expected one of {_list(FAMILIES)}")
+        return self
+
+
+class Roadmap(BaseModel):
+    """A roadmap by name, with options; `label` tells it apart in the results."""
+
+    model_config = _STRICT
+    name: str = "taut"
+    label: str = ""
+    options: dict[str, Any] = {}
+
+    @model_validator(mode="after")
+    def _known(self) -> Self:
+        if self.name not in ROADMAPS:
+            raise ValueError(
+                f"name: unknown roadmap {self.name!r}; expected one of {_list(ROADMAPS)}"
+            )
+        return self
+
+
+class Solver(BaseModel):
+    """A solver by name, with options and limits of its own; `label` tells it apart."""
+
+    model_config = _STRICT
+    name: str
+    label: str = ""
+    time_limit: Positive | None = None
+    iteration_limit: Whole | None = None
+    options: dict[str, Any] = {}
+
+    @model_validator(mode="after")
+    def _known(self) -> Self:
+        if self.name not in SOLVERS:
+            raise ValueError(f"name: unknown solver {self.name!r}; expected one of {_list(PARAMS)}")
+        try:
+            check_solver(self.name, self.options)
+        except InputError as error:
+            raise ValueError(str(error)) from None
+        return self
+
+
+class Study(BaseModel):
+    """Everything tried with everything: goals x tether lengths x worlds x roadmaps x solvers x
+    seeds. time_limit : seconds for a solver that has none of its own. memory_limit : GiB for one
+    trial beyond what the worker needs to start."""
+
+    model_config = _STRICT
+    schema_version: Literal[1] = 1
+    name: Annotated[str, Field(min_length=1)]
+    goals: Annotated[tuple[Whole, ...], Field(min_length=1)]
+    tether_lengths: Annotated[tuple[Positive, ...], Field(min_length=1)]
+    worlds: Worlds = Worlds()
+    roadmaps: Annotated[tuple[Roadmap, ...], Field(min_length=1)] = (Roadmap(),)
+    solvers: Annotated[tuple[Solver, ...], Field(min_length=1)]
+    seeds: Annotated[tuple[Natural, ...], Field(min_length=1)] = (0,)
+    time_limit: Positive | None = 120.0
+    memory_limit: Positive | None = None
+
+    @model_validator(mode="after")
+    def _told_apart(self) -> Self:
+        for what, specs in (("roadmaps", self.roadmaps), ("solvers", self.solvers)):
+            labels = [s.label or s.name for s in specs]
+            twice = [name for name in labels if labels.count(name) > 1]
+            if twice:
+                raise ValueError(f"{what}: {twice[0]!r} is there twice; give each a label")
+        return self
+
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """Read a study file; InputError with key and line for anything wrong."""
+        text = read_text(path)
+        try:
+            data = tomllib.loads(text)
+        except tomllib.TOMLDecodeError as error:
+            raise InputError(f"{path}: {error}") from None
+        return cls.checked(data, str(path), text)
+
+    @classmethod
+    def checked(cls, data: dict[str, Any], source: str, text: str = "") -> Self:
+        """A study from plain data; `text` is where it came from, for the line of a complaint."""
+        try:
+            return cls.model_validate(data)
+        except ValidationError as error:
+            where = error.errors()[0]["loc"]
+            raise InputError(f"{source}: {_line(text, where)}{explain(error)}") from None
+
+    @property
+    def sha256(self) -> str:
+        """Hash of what the trials depend on, without the name."""
+        return _digest(self.model_dump(mode="json", exclude={"name"}))
+
+    def trials(self) -> Iterator[Trial]:
+        """All trials, those of one world next to one another."""
+        for world in range(self.worlds.first, self.worlds.first + self.worlds.count):
+            for goals in self.goals:
+                for tether in self.tether_lengths:
+                    for roadmap in self.roadmaps:
+                        for solver in self.solvers:
+                            for seed in self.seeds:
+                                yield self._trial(world, goals, tether, roadmap, solver, seed)
+
+    def _trial(
+        self, world: int, goals: int, tether: float, roadmap: Roadmap, solver: Solver, seed: int
+    ) -> Trial:
+        recipe = self.worlds.model_dump(mode="json", exclude={"count", "first"})
+        return Trial(
+            world={"seed": world, **recipe, "goals": goals, "tether_length": tether},
+            roadmap={**roadmap.model_dump(mode="json"), "label": roadmap.label or roadmap.name},
+            solver={
+                **solver.model_dump(mode="json"),
+                "label": solver.label or solver.name,
+                "time_limit": solver.time_limit or self.time_limit,
+            },
+            seed=seed,
+            memory_limit=self.memory_limit,
+        )
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One solver on one world, as plain data that a worker anywhere can run.
+
+    world : arguments of `netsp.worlds.reachable_world`. roadmap : name, label, options. solver :
+    name, label, options, limits. seed : of the solver, and of a roadmap that samples.
+    """
+
+    world: dict[str, Any]
+    roadmap: dict[str, Any]
+    solver: dict[str, Any]
+    seed: int
+    memory_limit: float | None = None
+
+    @property
+    def id(self) -> str:
+        """Hash of all of it: the same trial anywhere."""
+        return _digest(
+            {
+                "world": self.world, "roadmap": self.roadmap, "solver": self.solver,
+                "seed": self.seed,
+            }
+        )[:16]  # fmt: skip
+
+
+def shard(trials: list[Trial], part: int, of: int) -> list[Trial]:
+    """Part 1 to `of` of the trials, dealt out in turn; together the parts are all of them."""
+    return trials[part - 1 :: of]
+
+
+def _digest(data: Any) -> str:
+    return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()
+
+
+def _line(text: str, where: tuple[int | str, ...]) -> str:
+    """``line N: `` of the key in question, as far as it can be found by sight."""
+    lines = text.splitlines()
+    at, found = 0, None
+    for k, part in enumerate(where):
+        if isinstance(part, int):
+            heads = [n for n, s in enumerate(lines) if s.strip() == f"[[{where[k - 1]}]]"]
+            if part < len(heads):
+                at = found = heads[part]
+            continue
+        pattern = re.compile(rf"\s*(\[+\s*)?\"?{re.escape(part)}\"?\s*(=|\])")
+        hit = next((n for n in range(at, len(lines)) if pattern.match(lines[n])), None)
+        if hit is not None:
+            at = found = hit
+    return "" if found is None else f"line {found + 1}: "
+
+
+def _list(names: Any) -> str:
+    return ", ".join(names)

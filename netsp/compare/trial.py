@@ -1,0 +1,130 @@
+"""One trial, run where it is: a world, a roadmap, a solver; the outcome as a row."""
+
+from __future__ import annotations
+
+import datetime
+import functools
+import os
+import platform
+import time
+from typing import Any
+
+from netsp.compare.rows import SCHEMA, Row
+from netsp.compare.study import Trial
+from netsp.errors import InfeasibleError, InputError, NetspError
+from netsp.problem import Problem
+from netsp.result import Progress
+
+MOST_POINTS = 200
+"""Most points of a trial's history of bests that a row keeps."""
+
+
+@functools.lru_cache(maxsize=4)
+def _world(recipe: tuple[tuple[str, Any], ...]) -> tuple[Problem, int]:
+    from netsp.worlds import reachable_world
+
+    return reachable_world(**dict(recipe))
+
+
+def world_of(trial: Trial) -> tuple[Problem, int]:
+    """The problem of a trial, and how many worlds were drawn in vain before it."""
+    recipe = {k: tuple(v) if isinstance(v, list) else v for k, v in trial.world.items()}
+    return _world(tuple(sorted(recipe.items())))
+
+
+def run(trial: Trial) -> Row:
+    """Run a trial; whatever netsp complains of becomes the row's status `error` and its message.
+
+    Every trial builds its own roadmap and measures its own legs, so its times are what a user would
+    see. Other exceptions are the worker's business (`netsp.compare.pool`).
+    """
+    from netsp.solvers import solve
+
+    row: Row = {"status": "error", "message": ""}
+    history: list[tuple[float, float | None, float | None]] = []
+
+    def listen(p: Progress) -> None:
+        if not history or (p.incumbent, p.bound) != history[-1][1:]:
+            history.append((round(p.time, 4), p.incumbent, p.bound))
+
+    begin = time.perf_counter()
+    try:
+        problem, row["redrawn"] = world_of(trial)
+        row["problem_sha256"] = problem.sha256
+        begin = time.perf_counter()
+        solution = solve(
+            problem,
+            trial.solver["name"],
+            roadmap=trial.roadmap["name"],
+            roadmap_options=trial.roadmap["options"],
+            time_limit=trial.solver["time_limit"],
+            iteration_limit=trial.solver["iteration_limit"],
+            seed=trial.seed,
+            params=trial.solver["options"],
+            on_progress=listen,
+        )
+    except InfeasibleError as error:
+        row |= {"status": "infeasible", "message": str(error)}
+    except NetspError as error:
+        row["message"] = str(error)
+    else:
+        row |= {
+            "status": solution.status.value,
+            "length": solution.length,
+            "lower_bound": solution.lower_bound,
+            "gap": solution.gap,
+            "entangled": len(solution.entangled),
+            "longest_tether": max((v.tether_length for v in solution.tour), default=0.0),
+            **solution.timings.model_dump(),
+            "history": thinned(history),
+            "versions": solution.versions,
+        }
+    row.setdefault("total_s", round(time.perf_counter() - begin, 6))
+    return row
+
+
+def thinned(history: list[Any]) -> list[Any]:
+    """At most `MOST_POINTS`, evenly, the first and the last among them."""
+    n = len(history)
+    if n <= MOST_POINTS:
+        return history
+    return [history[k * (n - 1) // (MOST_POINTS - 1)] for k in range(MOST_POINTS)]
+
+
+def full_row(trial: Trial, outcome: Row, study: str, study_name: str) -> Row:
+    """The immutable row: what was tried, what came of it, where and when."""
+    return {
+        "schema": SCHEMA,
+        "study": study,
+        "study_name": study_name,
+        "trial": trial.id,
+        "world": trial.world,
+        "roadmap": trial.roadmap,
+        "solver": trial.solver,
+        "seed": trial.seed,
+        **outcome,
+        "finished": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
+        "machine": _machine(),
+    }
+
+
+@functools.cache
+def _machine() -> str:
+    return f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores"
+
+
+def check(trial: Trial) -> None:
+    """InputError now rather than in every trial: options of a roadmap that do not exist."""
+    import inspect
+
+    from netsp.solvers import ROADMAPS
+
+    module, name = ROADMAPS[trial.roadmap["name"]].split(":")
+    build = getattr(__import__(module, fromlist=[name]), name)
+    known = {k for k, p in inspect.signature(build).parameters.items() if p.kind == p.KEYWORD_ONLY}
+    unknown = sorted(set(trial.roadmap["options"]) - known)
+    if unknown:
+        raise InputError(
+            f"roadmap {trial.roadmap['name']!r}: unknown option {unknown[0]!r}; expected one of "
+            f"{', '.join(sorted(known))}"
+        )
