@@ -162,6 +162,9 @@ def _parser() -> argparse.ArgumentParser:
     p.add_argument(
         "--shard", type=_shard, default=(1, 1), metavar="I/N", help="only the I-th of N parts"
     )
+    p.add_argument(
+        "--scheduler", metavar="ADDRESS", help="run on a Dask cluster, tcp://host:port, not here"
+    )
     p.add_argument("--quiet", action="store_true", help="no progress")
     p.set_defaults(run=_compare)
 

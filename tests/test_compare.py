@@ -1,6 +1,7 @@
 """Comparisons survive kills, crashes and torn lines, and nothing is run twice or lost."""
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -281,3 +282,62 @@ def test_a_thinned_history_keeps_its_ends(n):
     assert len(out) == min(n, MOST_POINTS)
     assert (out[0], out[-1]) == (0, n - 1)
     assert out == sorted(set(out))
+
+
+@pytest.fixture
+def dask_cluster(tmp_path):
+    """A scheduler and two workers, real processes on loopback."""
+    dask = str(Path(sys.executable).parent / "dask")
+    where = tmp_path / "scheduler.json"
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "cwd": tmp_path}
+    common = ["--scheduler-file", str(where)]
+    scheduler = subprocess.Popen(
+        [dask, "scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard", *common],
+        **quiet,
+    )
+    deadline = time.monotonic() + 60
+    while not where.exists():
+        assert time.monotonic() < deadline
+        time.sleep(0.1)
+    options = ["--nthreads", "1", "--no-nanny", "--no-dashboard", "--host", "127.0.0.1"]
+    workers = [
+        subprocess.Popen([dask, "worker", *common, *options], env=_with_netsp(), **quiet)
+        for _ in range(2)
+    ]
+    yield json.loads(where.read_text())["address"], workers
+    for process in (*workers, scheduler):
+        process.kill()
+        process.wait()
+
+
+def _with_netsp():
+    return {**os.environ, "PYTHONPATH": str(ROOT)}
+
+
+def test_a_dask_cluster_gives_the_same_rows_though_a_worker_is_killed(dask_cluster, tmp_path):
+    from netsp.compare.cluster import dask_executor
+
+    address, workers = dask_cluster
+    (tmp_path / "study.toml").write_text(TOML.replace("count = 2", "count = 5"))
+    study = Study.load(tmp_path / "study.toml")
+    remote, local = tmp_path / "remote.jsonl", tmp_path / "local.jsonl"
+
+    def kill_one(row, tally):
+        if tally.done == 8:
+            workers[0].send_signal(signal.SIGKILL)
+
+    tally = compare(study, remote, executor=dask_executor(address), on_row=kill_one)
+    compare(study, local, jobs=2)
+    assert (tally.done, tally.failed) == (40, 0)
+    assert workers[0].wait(timeout=10) == -signal.SIGKILL
+    assert without_clock(read_rows(remote)) == without_clock(read_rows(local))
+
+
+def test_a_scheduler_that_is_not_there_is_told_in_one_line(tmp_path, capsys, monkeypatch):
+    from netsp.compare import cluster
+
+    monkeypatch.setattr(cluster, "CONNECT", 1.0)
+    (tmp_path / "s.toml").write_text(TOML)
+    command = ["compare", str(tmp_path / "s.toml"), "-o", str(tmp_path / "r.jsonl")]
+    assert main([*command, "--scheduler", "tcp://127.0.0.1:9"]) == 2
+    assert "no Dask scheduler at 'tcp://127.0.0.1:9'" in capsys.readouterr().err

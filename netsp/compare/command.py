@@ -43,9 +43,16 @@ def study_of(args: argparse.Namespace) -> Study:
 def run(args: argparse.Namespace) -> int:
     """`netsp compare`."""
     study = study_of(args)
+    executor = None
+    if args.scheduler:
+        from netsp.compare.cluster import dask_executor
+
+        executor = dask_executor(args.scheduler)
     bar = Bar(sys.stderr, args.quiet)
     try:
-        tally = compare(study, args.output, jobs=args.jobs, part=args.shard, on_row=bar.show)
+        tally = compare(
+            study, args.output, jobs=args.jobs, part=args.shard, executor=executor, on_row=bar.show
+        )
     except KeyboardInterrupt:
         bar.end()
         print(

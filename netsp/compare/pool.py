@@ -124,13 +124,15 @@ def _work(pipe: Connection) -> None:
         except MemoryError:
             outcome = {"status": "out_of_memory", "message": f"of {trial.memory_limit} GiB"}
         except Exception as error:
-            where = traceback.extract_tb(error.__traceback__)[-1]
-            outcome = {
-                "status": "crashed",
-                "message": f"{type(error).__name__}: {error} "
-                f"({os.path.basename(where.filename)}:{where.lineno})",
-            }
+            outcome = crashed(error)
         pipe.send(outcome)
+
+
+def crashed(error: Exception) -> Row:
+    """The outcome of a trial that raised what it should not."""
+    at = traceback.extract_tb(error.__traceback__)[-1]
+    where = f"{os.path.basename(at.filename)}:{at.lineno}"
+    return {"status": "crashed", "message": f"{type(error).__name__}: {error} ({where})"}
 
 
 def _limit_memory(gib: float) -> None:
