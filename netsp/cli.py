@@ -173,6 +173,14 @@ def _parser() -> argparse.ArgumentParser:
     p.add_argument("-o", "--output", required=True, metavar="FILE")
     p.set_defaults(run=_combine)
 
+    p = commands.add_parser("report", help="one page about the results of a comparison")
+    p.add_argument("results", metavar="RESULTS", help="rows of `netsp compare`")
+    p.add_argument("-o", "--output", required=True, metavar="FILE", help="the page (HTML)")
+    p.add_argument(
+        "--figures", choices=("svg", "png", "pdf"), help="save the figures beside the page, too"
+    )
+    p.set_defaults(run=_report)
+
     p = commands.add_parser("schema", help="print the JSON Schema of a file format")
     p.add_argument("format", choices=("problem", "solution"))
     p.set_defaults(run=_schema)
@@ -459,6 +467,14 @@ def _combine(args: argparse.Namespace) -> int:
     from netsp.compare import command
 
     return command.run_combine(args)
+
+
+def _report(args: argparse.Namespace) -> int:
+    from netsp.report.page import write_report
+
+    _check_writable(args.output)
+    write_report(args.results, args.output, args.figures)
+    return 0
 
 
 def _schema(args: argparse.Namespace) -> int:

@@ -1,0 +1,1 @@
+"""Results of comparisons as one page with figures and tables."""

@@ -1,0 +1,134 @@
+"""Figures of a report, as in Fig. 5 of McCammon & Hollinger 2017 and beyond."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from netsp.compare.rows import Row
+from netsp.report.stats import Cell, Summary, gap_over_time, over_best, profile, summary
+
+STYLES = ("-", "--", "-.", ":")
+
+
+def _figure(columns: int = 1) -> tuple[Any, Any]:
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot as plt
+
+    width = 4.2 * columns + 1.8
+    figure, axes = plt.subplots(
+        1, columns, figsize=(width, 3.6), sharey=True, squeeze=False, layout="constrained"
+    )
+    return figure, axes
+
+
+def _style(k: int) -> dict[str, Any]:
+    return {"color": f"C{k % 10}", "linestyle": STYLES[k // 10 % 4], "marker": "o", "ms": 3.5}
+
+
+def by_goals(
+    cells: dict[Cell, list[Row]], value: Callable[[Row], float | None], label: str, *, log: bool
+) -> Any:
+    """One panel for each tether length: the median of a number against goals, with intervals."""
+    tethers = sorted({c.tether for c in cells})
+    names = list(dict.fromkeys(c.method for c in cells))
+    figure, axes = _figure(len(tethers))
+    for panel, tether in zip(axes[0], tethers, strict=True):
+        for k, name in enumerate(names):
+            points: list[tuple[int, Summary]] = []
+            for cell in sorted((c for c in cells if c.method == name), key=lambda c: c.goals):
+                found = [v for r in cells[cell] if (v := value(r)) is not None]
+                if cell.tether == tether and (s := summary(found)) is not None:
+                    points.append((cell.goals, s))
+            if points:
+                at = [g + 0.06 * (k - len(names) / 2) for g, _ in points]
+                mid = np.array([s.median for _, s in points])
+                spread = [mid - [s.low for _, s in points], [s.high for _, s in points] - mid]
+                panel.errorbar(at, mid, spread, label=name, capsize=2, lw=1.2, **_style(k))
+        panel.set(
+            title=f"tether {tether:g}", xlabel="goals", xticks=sorted({c.goals for c in cells})
+        )
+        panel.grid(alpha=0.3)
+        if log:
+            panel.set_yscale("log")
+    axes[0][0].set_ylabel(label)
+    axes[0][-1].legend(fontsize="x-small", loc="upper left", bbox_to_anchor=(1.02, 1.0))
+    return figure
+
+
+def lengths(cells: dict[Cell, list[Row]], best: dict[str, float]) -> Any:
+    """Per cent over the best known, as Fig. 5a to c."""
+    return by_goals(cells, lambda r: over_best(r, best), "% over the best known", log=False)
+
+
+def times(cells: dict[Cell, list[Row]]) -> Any:
+    """Seconds, roadmap and legs included, as Fig. 5d to f."""
+    return by_goals(cells, lambda r: r["total_s"] if r.get("length") else None, "seconds", log=True)
+
+
+def entanglements(cells: dict[Cell, list[Row]]) -> Any | None:
+    """Obstacles entangled by baselines that are blind to the tether; None without any."""
+    blind = {c: rows for c, rows in cells.items() if any(r["status"] == "invalid" for r in rows)}
+    if not blind:
+        return None
+    return by_goals(blind, lambda r: r.get("entangled"), "obstacles entangled", log=False)
+
+
+def performance(by_method: dict[str, list[Row]]) -> Any | None:
+    """Share of problems proven within a multiple of the fastest time; None if nothing is proven."""
+    ratios = profile(by_method)
+    if not ratios:
+        return None
+    figure, axes = _figure()
+    panel = axes[0][0]
+    finite = [r[np.isfinite(r)] for r in ratios.values()]
+    most = 2.0 * max(float(r.max(initial=1.0)) for r in finite)
+    for k, (name, r) in enumerate(ratios.items()):
+        held = r[np.isfinite(r)]
+        x = np.concatenate([[1.0], np.repeat(held, 2), [most]])
+        share = np.repeat(np.arange(len(held) + 1) / len(r), 2)
+        style = {**_style(k), "marker": ""}
+        panel.plot(x, share, label=name, **style)
+    panel.set(xscale="log", xlim=(1.0, most), ylim=(-0.02, 1.02), ylabel="share proven",
+              xlabel="time over that of the fastest")  # fmt: skip
+    panel.grid(alpha=0.3)
+    panel.legend(fontsize="x-small", loc="lower right")
+    return figure
+
+
+def anytime(by_method: dict[str, list[Row]], best: dict[str, float]) -> Any | None:
+    """Median per cent over the best known against time; None without histories."""
+    last = max((r["total_s"] for rows in by_method.values() for r in rows), default=0.0)
+    at = np.geomspace(1e-3, max(last, 1e-2), 120)
+    figure, axes = _figure()
+    panel, drawn = axes[0][0], False
+    for k, (name, rows) in enumerate(by_method.items()):
+        curve = gap_over_time(rows, best, at)
+        if curve is not None and np.isfinite(curve).any():
+            style = {**_style(k), "marker": ""}
+            panel.plot(at, np.where(np.isfinite(curve), curve, np.nan), label=name, **style)
+            drawn = True
+    if not drawn:
+        return None
+    panel.set(xscale="log", xlabel="seconds", ylabel="median % over the best known")
+    panel.set_yscale("symlog", linthresh=0.1)
+    panel.set_ylim(bottom=-0.02)
+    panel.grid(alpha=0.3)
+    panel.legend(fontsize="x-small", loc="upper left", bbox_to_anchor=(1.02, 1.0))
+    return figure
+
+
+def svg(figure: Any) -> str:
+    """A figure as inline SVG."""
+    from matplotlib import pyplot as plt
+
+    out = io.StringIO()
+    figure.savefig(out, format="svg")
+    plt.close(figure)
+    text = out.getvalue()
+    return text[text.index("<svg") :]

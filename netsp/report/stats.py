@@ -1,0 +1,131 @@
+"""What the rows of a comparison say: groups, medians with intervals, profiles."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.stats import binom
+
+from netsp.compare.rows import Row
+from netsp.compare.run import FAILED
+
+Floats = npt.NDArray[np.float64]
+
+CONFIDENCE = 0.95
+"""Of the intervals about medians."""
+
+
+@dataclass(frozen=True)
+class Cell:
+    """Where a row belongs in a table."""
+
+    method: str
+    goals: int
+    tether: float
+
+
+@dataclass(frozen=True)
+class Summary:
+    """Of one number over the trials of a cell: median, its interval, mean, how many."""
+
+    median: float
+    low: float
+    high: float
+    mean: float
+    count: int
+
+
+def methods(rows: Iterable[Row]) -> dict[str, list[Row]]:
+    """Rows by method: the solver's label, and the roadmap's where there are several."""
+    rows = list(rows)
+    several = len({r["roadmap"]["label"] for r in rows}) > 1
+    out: dict[str, list[Row]] = defaultdict(list)
+    for row in rows:
+        name = row["solver"]["label"]
+        out[f"{name}, {row['roadmap']['label']}" if several else name].append(row)
+    return {name: out[name] for name in sorted(out)}
+
+
+def cells(by_method: dict[str, list[Row]]) -> dict[Cell, list[Row]]:
+    """Rows by method, goals and tether length."""
+    out: dict[Cell, list[Row]] = defaultdict(list)
+    for method, rows in by_method.items():
+        for row in rows:
+            world = row["world"]
+            out[Cell(method, world["goals"], world["tether_length"])].append(row)
+    return dict(out)
+
+
+def best_lengths(rows: Iterable[Row]) -> dict[str, float]:
+    """Shortest tour known of each problem, by its sha256; tours that entangle do not count."""
+    out: dict[str, float] = {}
+    for row in rows:
+        if row.get("length") is not None and row["status"] != "invalid":
+            key = row["problem_sha256"]
+            out[key] = min(out.get(key, np.inf), row["length"])
+    return out
+
+
+def over_best(row: Row, best: dict[str, float]) -> float | None:
+    """Per cent by which a row's tour is longer than the best of its problem."""
+    key = row.get("problem_sha256")
+    if row.get("length") is None or key not in best:
+        return None
+    return float(100.0 * (row["length"] / best[key] - 1.0))
+
+
+def summary(values: Sequence[float]) -> Summary | None:
+    """Median with its distribution-free interval: between the order statistics that hold it with
+    `CONFIDENCE` by the binomial distribution; with few trials that is from least to greatest."""
+    if not values:
+        return None
+    x = np.sort(np.asarray(values, dtype=float))
+    n = len(x)
+    k = int(binom.ppf(0.5 * (1.0 - CONFIDENCE), n, 0.5))
+    k = max(0, min(k - 1, (n - 1) // 2)) if k > 0 else 0
+    return Summary(float(np.median(x)), float(x[k]), float(x[n - 1 - k]), float(x.mean()), n)
+
+
+def failures(rows: Iterable[Row]) -> list[Row]:
+    """Rows that came to nothing."""
+    return [r for r in rows if r["status"] in FAILED or r["status"] == "no_solution_found"]
+
+
+def profile(by_method: dict[str, list[Row]]) -> dict[str, Floats]:
+    """For each method the sorted ratios of its time to proof to the fastest's, over the problems
+    that any of them proved (Dolan & Moré 2002); inf where it proved nothing. Methods that prove
+    nothing at all are left out."""
+    times: dict[str, dict[tuple[str, int], float]] = {}
+    for method, rows in by_method.items():
+        proven = {
+            (r["problem_sha256"], r["seed"]): r["total_s"] for r in rows if r["status"] == "optimal"
+        }
+        if proven:
+            times[method] = proven
+    problems = sorted(set().union(*times.values())) if times else []
+    fastest = {p: min(t[p] for t in times.values() if p in t) for p in problems}
+    return {
+        method: np.sort([t.get(p, np.inf) / max(fastest[p], 1e-9) for p in problems])
+        for method, t in times.items()
+    }
+
+
+def gap_over_time(rows: Iterable[Row], best: dict[str, float], times: Floats) -> Floats | None:
+    """Median per cent over the best known at given times, of anytime solvers; inf before the first
+    tour. None if no row has a history."""
+    curves = []
+    for row in rows:
+        history = row.get("history") or []
+        known = best.get(row.get("problem_sha256", ""))
+        if not history or known is None or row["status"] == "invalid":
+            continue
+        at = np.array([h[0] for h in history])
+        length = np.array([np.inf if h[1] is None else h[1] for h in history])
+        index = np.searchsorted(at, times, side="right") - 1
+        value = np.where(index >= 0, length[np.maximum(index, 0)], np.inf)
+        curves.append(100.0 * (np.maximum(value, known) / known - 1.0))
+    return np.asarray(np.median(curves, axis=0)) if curves else None
