@@ -341,3 +341,11 @@ def test_a_scheduler_that_is_not_there_is_told_in_one_line(tmp_path, capsys, mon
     command = ["compare", str(tmp_path / "s.toml"), "-o", str(tmp_path / "r.jsonl")]
     assert main([*command, "--scheduler", "tcp://127.0.0.1:9"]) == 2
     assert "no Dask scheduler at 'tcp://127.0.0.1:9'" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "studies").glob("*.toml")), ids=lambda p: p.stem)
+def test_shipped_studies_are_what_their_names_say(path):
+    study = Study.load(path)
+    assert study.name == path.stem
+    trials = list(study.trials())
+    assert len({t.id for t in trials}) == len(trials) > 100
