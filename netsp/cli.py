@@ -472,7 +472,7 @@ def _combine(args: argparse.Namespace) -> int:
 def _report(args: argparse.Namespace) -> int:
     from netsp.report.page import write_report
 
-    _check_writable(args.output)
+    _check_writable(args.results, args.output)
     write_report(args.results, args.output, args.figures)
     return 0
 

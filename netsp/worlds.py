@@ -27,6 +27,9 @@ GIVE_UP = 20_000
 APART = 1e-3
 """Least gap between obstacles, times the side."""
 
+MOST = 10_000
+"""Most goals, and most obstacles."""
+
 ATTEMPTS = 50
 """Worlds drawn for one seed before `reachable_world` gives up."""
 
@@ -222,14 +225,14 @@ def _check(
 ) -> None:
     if family not in FAMILIES:
         raise InputError(f"family: unknown {family!r}; expected one of {', '.join(FAMILIES)}")
-    if goals is not None and goals < 1:
-        raise InputError(f"world: goals: expected 1 or more, got {goals}")
-    if obstacles is not None and obstacles < 0:
-        raise InputError(f"world: obstacles: expected 0 or more, got {obstacles}")
-    for name, value in (("tether_length", tether_length), ("side", side)):
-        if not (math.isfinite(value) and value > 0.0):
-            raise InputError(f"world: {name}: expected a positive number, got {value:g}")
-    if not 0.0 < radii[0] <= radii[1] < math.inf:
+    if goals is not None and not 1 <= goals <= MOST:
+        raise InputError(f"world: goals: expected 1 to {MOST}, got {goals}")
+    if obstacles is not None and not 0 <= obstacles <= MOST:
+        raise InputError(f"world: obstacles: expected 0 to {MOST}, got {obstacles}")
+    for name, value in (("tether_length", tether_length), ("side", side), ("radii", radii[1])):
+        if not 0.0 < value <= 1e11:
+            raise InputError(f"world: {name}: expected more than 0 and at most 1e11, got {value:g}")
+    if not 0.0 < radii[0] <= radii[1]:
         raise InputError(
             f"world: radii: expected 0 < least <= most, got {radii[0]:g} and {radii[1]:g}"
         )

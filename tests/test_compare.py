@@ -226,6 +226,14 @@ def test_solvers_that_crash_hang_or_eat_cost_one_row_each(tmp_path, monkeypatch)
         (('label = "short"', 'label = "greedy"'), "'greedy' is there twice; give each a label"),
         (("[worlds]", "[worlds]\nfamily = 'reef'"), "family: unknown 'reef'"),
         (("seeds = [0, 1]", "seeds = [0, 1"), "line"),
+        (("obstacles = 6", "radii = [30, 10]"), "radii: expected least <= most, got 30 and 10"),
+        (("count = 2", "count = 100000"), "800000 trials; expected at most 500000"),
+        (("count = 2", "count = 10000000000"), "line 9: worlds.count"),
+        (
+            ("[worlds]", "[[roadmaps]]\nname = 'prm'\noptions = {samples = 'x'}\n[worlds]"),
+            "roadmap",
+        ),
+        (("[worlds]", "[[roadmaps]]\nname = 'prm'\noptions = {sample = 1}\n[worlds]"), "sample"),
     ],
 )
 def test_bad_studies_are_told_with_key_and_line(change, said, tmp_path, capsys):
@@ -349,3 +357,68 @@ def test_shipped_studies_are_what_their_names_say(path):
     assert study.name == path.stem
     trials = list(study.trials())
     assert len({t.id for t in trials}) == len(trials) > 100
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        '{"schema": "netsp-trial/1"}',
+        '{"schema": "netsp-trial/1", "study": 3, "trial": [1], "study_name": "x"}',
+        "[" * 100_000,
+        "\udcff".encode(errors="surrogateescape").decode(errors="replace"),
+    ],
+)
+def test_rows_that_are_none_are_refused_by_every_command(line, tmp_path, capsys):
+    bad, page = tmp_path / "b.jsonl", tmp_path / "b.html"
+    bad.write_text(line + "\n")
+    small = ["--goals", "2", "--tethers", "150", "--solvers", "greedy", "--worlds", "1"]
+    for command in (
+        ["report", str(bad), "-o", str(page)],
+        ["combine", str(bad), "-o", str(page)],
+        ["compare", "-o", str(bad), *small],
+    ):
+        assert main(command) == 2
+        err = capsys.readouterr().err
+        assert "line 1: expected a row of schema netsp-trial/1" in err
+        assert err.count("\n") == 1
+    assert bad.read_text() == line + "\n"
+    assert not page.exists()
+
+
+def test_combine_adds_to_results_of_its_study_and_touches_nothing_else(study, tmp_path, capsys):
+    rows, other, empty = tmp_path / "r.jsonl", tmp_path / "o.json", tmp_path / "e.jsonl"
+    compare(study, rows, part=(1, 8))
+    compare(study, tmp_path / "s.jsonl", part=(2, 8))
+    before = rows.read_text()
+    assert combine([str(tmp_path / "s.jsonl")], str(rows)) == 4
+    assert rows.read_text().startswith(before)
+    other.write_text('{"mine": 1}\n')
+    empty.write_text("")
+    for sources, target in (([rows], other), ([empty], rows)):
+        kept = target.read_text()
+        assert main(["combine", *map(str, sources), "-o", str(target)]) == 2
+        assert target.read_text() == kept
+    with RowsFile(rows, study.sha256):
+        assert main(["combine", str(rows), "-o", str(rows)]) == 2
+    assert "another comparison is writing" in capsys.readouterr().err
+
+
+def test_a_full_disk_is_told_and_leaves_whole_lines(tmp_path):
+    out = tmp_path / "r.jsonl"
+    small = "--goals 2 --tethers 150 --solvers greedy --worlds 3 --quiet"
+    done = subprocess.run(
+        ["bash", "-c", f"ulimit -f 2; {sys.executable} -m netsp compare -o {out} {small}"],
+        cwd=ROOT, capture_output=True, text=True,
+    )  # fmt: skip
+    assert done.returncode == 2
+    assert "cannot be written: File too large" in done.stderr
+    assert "Traceback" not in done.stderr
+    data = out.read_bytes()
+    assert data == b"" or data.endswith(b"\n")
+
+
+@pytest.mark.parametrize("device", ["/dev/full", "/dev/null", "/tmp"])
+def test_results_must_be_a_file(device, capsys):
+    small = ["--goals", "2", "--tethers", "150", "--solvers", "greedy", "--worlds", "1"]
+    assert main(["compare", "-o", device, *small]) == 2
+    assert "expected a file of results" in capsys.readouterr().err

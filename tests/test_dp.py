@@ -14,6 +14,8 @@ from netsp.dp import walks as walks_module
 from netsp.dp.labels import translate
 from netsp.dp.memory import MOST, Memory
 from netsp.dp.walks import Walks
+from netsp.mip.bound import fixing_costs
+from netsp.mip.program import Duals
 from tests.brute import brute_tour
 from tests.test_contract import random_graph
 from tests.worlds import random_world
@@ -164,3 +166,32 @@ def test_dp_refuses_what_would_not_fit_into_memory(monkeypatch):
     monkeypatch.setattr(SOLVE, "MOST_CELLS", 10)
     with pytest.raises(InputError, match="too much memory; use 'auto' or 'lns'"):
         solve_graph(random_graph(0, 4), "dp")
+
+
+@pytest.mark.parametrize("solver", ["dp", "auto", "mip"])
+def test_no_tour_is_proven_where_goals_are_joined_to_the_base_alone(solver):
+    costs = np.full((4, 4), np.inf)
+    costs[0, 1:] = costs[1:, 0] = 1.0
+    result = solve_graph(TravelGraph.from_costs(costs, [0, 1, 2, 3]), solver)
+    assert result.status is Status.INFEASIBLE
+
+
+@pytest.mark.parametrize("solver", ["dp", "auto"])
+def test_legs_a_million_times_the_tour_end_the_walks_all_the_same(solver):
+    costs = np.full((5, 5), 1e7)
+    for a, b in ((0, 1), (1, 2), (2, 3), (0, 3)):
+        costs[a, b] = costs[b, a] = 1.0 + 0.1 * a
+    result = solve_graph(TravelGraph.from_costs(costs, [0, 1, 2, 3, 3]), solver)
+    assert result.length == pytest.approx(4.3)
+    assert result.trace[-1].iteration < 50
+    assert solver == "dp" or result.status is Status.OPTIMAL
+
+
+def test_what_a_vertex_costs_is_paid_once():
+    cluster = np.array([0, 1, 1, 2])
+    duals = Duals(np.zeros(3), np.zeros(4), np.zeros(0))
+    vertices = np.array([0.0, 0.0, 5.0, 0.0])
+    legs = np.where(cluster[:, None] == cluster[None, :], np.inf, 0.0)
+    _, rise, above = fixing_costs(legs, vertices, cluster, duals)
+    two = np.sort(rise[2])[:2].sum() - above[2]
+    assert two == 5.0

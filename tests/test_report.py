@@ -123,6 +123,8 @@ def test_the_page_needs_nothing_else_and_holds_every_trial(results, tmp_path):
 
 def test_failures_are_listed(results, tmp_path):
     rows = [row("a", 0, length=2.0), row("b", 0, status="crashed"), row("b", 1, status="timeout")]
+    for lost in rows[1:]:
+        del lost["total_s"], lost["problem_sha256"]
     path = tmp_path / "f.jsonl"
     path.write_text("".join(json.dumps(r) + "\n" for r in rows))
     page = write_report(path, tmp_path / "f.html").read_text()
@@ -137,3 +139,10 @@ def test_a_report_on_nothing_is_refused(tmp_path, capsys):
     assert "holds no trial yet" in capsys.readouterr().err
     assert main(["report", str(tmp_path / "no.jsonl"), "-o", str(tmp_path / "e.html")]) == 2
     assert not (tmp_path / "e.html").exists()
+
+
+def test_a_report_does_not_overwrite_its_rows(results, capsys):
+    before = results.read_bytes()
+    assert main(["report", str(results), "-o", str(results)]) == 2
+    assert "is named for two different files" in capsys.readouterr().err
+    assert results.read_bytes() == before

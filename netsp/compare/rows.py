@@ -7,15 +7,15 @@ trial run again.
 
 from __future__ import annotations
 
+import contextlib
 import fcntl
 import json
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 from netsp.errors import InputError
-from netsp.solution import write_text
 
 SCHEMA = "netsp-trial/1"
 Row = dict[str, Any]
@@ -23,21 +23,23 @@ Row = dict[str, Any]
 _BEGIN = f'{{"schema": "{SCHEMA}"'.encode()
 
 
+_TEXTS = ("study", "study_name", "trial", "status", "message", "finished", "machine")
+_TABLES = ("world", "roadmap", "solver")
+
+
 def read_rows(path: str | Path) -> list[Row]:
     """All rows of a results file; a torn last line is left out. InputError if it is not one."""
     try:
+        if not Path(path).is_file():
+            raise InputError(f"{path}: expected a file of results")
         data = Path(path).read_bytes()
     except OSError as error:
         raise InputError(f"{path}: {error.strerror or error}") from None
     rows = []
     *lines, torn = data.split(b"\n")
     for number, line in enumerate(lines, start=1):
-        try:
-            row = json.loads(line)
-            good = isinstance(row, dict) and row["schema"] == SCHEMA
-        except (ValueError, KeyError):
-            good = False
-        if not good:
+        row = _parsed(line)
+        if row is None:
             raise InputError(
                 f"{path}: line {number}: expected a row of schema {SCHEMA}, got "
                 f"{line[:40].decode(errors='replace')!r}"
@@ -47,6 +49,29 @@ def read_rows(path: str | Path) -> list[Row]:
     if not rows and not torn.startswith(begin):
         raise InputError(f"{path}: expected rows of schema {SCHEMA}; it is another kind of file")
     return rows
+
+
+def _parsed(line: bytes) -> Row | None:
+    """A line as a row; None if it is none."""
+    try:
+        row = json.loads(line, parse_constant=_no_constant)
+    except (ValueError, RecursionError):
+        return None
+    good = (
+        isinstance(row, dict)
+        and row.get("schema") == SCHEMA
+        and all(isinstance(row.get(name), str) for name in _TEXTS)
+        and all(isinstance(row.get(name), dict) for name in _TABLES)
+        and isinstance(row["solver"].get("label"), str)
+        and isinstance(row["roadmap"].get("label"), str)
+        and {"seed", "goals", "tether_length", "family"} <= row["world"].keys()
+        and isinstance(row.get("length", 0.0), int | float | None)
+    )
+    return row if good else None
+
+
+def _no_constant(name: str) -> None:
+    raise ValueError(name)
 
 
 class RowsFile:
@@ -59,6 +84,8 @@ class RowsFile:
     def __init__(self, path: str | Path, study: str) -> None:
         self.path = Path(path)
         try:
+            if self.path.exists() and not self.path.is_file():
+                raise InputError(f"{path}: expected a file of results, not a folder or a device")
             self._fd = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
         except OSError as error:
             raise InputError(f"{path}: cannot be written: {error.strerror}") from None
@@ -78,9 +105,17 @@ class RowsFile:
         os.ftruncate(self._fd, whole.rfind(b"\n") + 1)
 
     def append(self, row: Row) -> None:
-        """Write a row, to the disk."""
-        os.write(self._fd, (json.dumps(row, allow_nan=False) + "\n").encode())
-        os.fsync(self._fd)
+        """Write a row, to the disk; InputError if it cannot be, and then nothing of it is there."""
+        data = (json.dumps(row, allow_nan=False) + "\n").encode()
+        end = os.fstat(self._fd).st_size
+        try:
+            while data:
+                data = data[os.write(self._fd, data) :]
+            os.fsync(self._fd)
+        except OSError as error:
+            with contextlib.suppress(OSError):
+                os.ftruncate(self._fd, end)
+            raise InputError(f"{self.path}: cannot be written: {error.strerror}") from None
         self.done.add(row["trial"])
 
     def close(self) -> None:
@@ -105,19 +140,20 @@ def check_study(rows: Iterable[Row], study: str, source: str) -> None:
 
 
 def combine(sources: list[str], target: str) -> int:
-    """Join the results of shards of one study, each trial once; how many rows that makes."""
-    seen: dict[str, Row] = {}
-    study = ""
+    """Add the rows of shards of one study to a results file, each trial once; how many that makes.
+
+    Raises InputError if the sources hold no trial or rows of several studies, and if the target
+    exists and is anything but results of the same study.
+    """
+    found: list[Row] = []
     for source in sources:
         rows = read_rows(source)
-        study = study or (rows[0]["study"] if rows else "")
-        check_study(rows, study, source)
-        for row in rows:
-            seen.setdefault(row["trial"], row)
-    write_text(target, "".join(_lines(seen.values())))
-    return len(seen)
-
-
-def _lines(rows: Iterable[Row]) -> Iterator[str]:
-    for row in rows:
-        yield json.dumps(row, allow_nan=False) + "\n"
+        check_study(rows, (found or rows)[0]["study"] if found or rows else "", source)
+        found += rows
+    if not found:
+        raise InputError(f"{sources[0]}: holds no trial yet")
+    with RowsFile(target, found[0]["study"]) as out:
+        for row in found:
+            if row["trial"] not in out.done:
+                out.append(row)
+        return len(out.done)

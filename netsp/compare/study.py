@@ -20,8 +20,12 @@ from netsp.worlds import FAMILIES
 
 _STRICT = ConfigDict(frozen=True, extra="forbid")
 
-Whole = Annotated[int, Field(ge=1)]
+Whole = Annotated[int, Field(ge=1, le=100_000)]
 Natural = Annotated[int, Field(ge=0)]
+
+
+MOST_TRIALS = 500_000
+"""Of one study."""
 
 
 class Worlds(BaseModel):
@@ -39,6 +43,10 @@ class Worlds(BaseModel):
     def _known(self) -> Self:
         if self.family not in FAMILIES:
             raise ValueError(f"family: unknown {self.family!r}; expected one of {_list(FAMILIES)}")
+        if self.radii[0] > self.radii[1]:
+            raise ValueError(
+                f"radii: expected least <= most, got {self.radii[0]:g} and {self.radii[1]:g}"
+            )
         return self
 
 
@@ -66,7 +74,7 @@ class Solver(BaseModel):
     name: str
     label: str = ""
     time_limit: Positive | None = None
-    iteration_limit: Whole | None = None
+    iteration_limit: Annotated[int, Field(ge=1, lt=2**62)] | None = None
     options: dict[str, Any] = {}
 
     @model_validator(mode="after")
@@ -95,7 +103,7 @@ class Study(BaseModel):
     solvers: Annotated[tuple[Solver, ...], Field(min_length=1)]
     seeds: Annotated[tuple[Natural, ...], Field(min_length=1)] = (0,)
     time_limit: Positive | None = 120.0
-    memory_limit: Positive | None = None
+    memory_limit: Annotated[float, Field(gt=0, le=1e6)] | None = None
 
     @model_validator(mode="after")
     def _told_apart(self) -> Self:
@@ -104,6 +112,10 @@ class Study(BaseModel):
             twice = [name for name in labels if labels.count(name) > 1]
             if twice:
                 raise ValueError(f"{what}: {twice[0]!r} is there twice; give each a label")
+        count = self.worlds.count * len(self.goals) * len(self.tether_lengths)
+        count *= len(self.roadmaps) * len(self.solvers) * len(self.seeds)
+        if count > MOST_TRIALS:
+            raise ValueError(f"{count} trials; expected at most {MOST_TRIALS}")
         return self
 
     @classmethod

@@ -124,13 +124,16 @@ def bound_by_walks(run: SearchingRun, costs: LegCosts) -> None:
         visits = np.bincount(goals, minlength=walks.n + 1)
         whole = bool((visits[1:] == 1).all())
         if whole:
+            measured = costs.exact is None
             costs.measure(np.concatenate([[0], walk.rows]))
             run.offer([0, *costs.vertices[walk.rows].tolist()])
             walks.set_values(costs.values)
         _forget(run, walks, costs)
         run.report("walks", vertices=len(costs), legs=len(costs) * (len(costs) - 1) // 2)
         if whole:
-            best = -np.inf  # its legs have grown, or it is the optimum
+            if measured and not run.done:
+                return  # rounding is all that is missing, and no price can mend that
+            best = -np.inf  # its legs have grown
             continue
         if walk.bound > best:
             best, kept, vain = walk.bound, prices, 0

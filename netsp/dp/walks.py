@@ -108,7 +108,7 @@ class Walks:
         ends = np.full(len(goal), np.inf)
         ends[has] = cost[pointer[:-1][has]] + self.values[0][has]
         last = int(np.argmin(ends))
-        if not ends[last] <= cut:
+        if not (np.isfinite(ends[last]) and ends[last] <= cut):
             self.alive[:] = False
             return None
         rows = self._trace(last, layers, prices)

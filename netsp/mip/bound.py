@@ -107,13 +107,13 @@ def exact_bound(
 
 def fixing_costs(
     leg_costs: Floats, vertex_costs: Floats, cluster: npt.NDArray[np.int64], duals: Duals
-) -> tuple[float, Floats]:
-    """A bound, and per leg how much at least it rises when the leg is used: the leg's own reduced
-    cost and what its two vertices cost above the best of their clusters."""
+) -> tuple[float, Floats, Floats]:
+    """A bound; per leg how much at least it rises when the leg is used: the leg's own reduced cost
+    and what its two vertices cost above the best of their clusters; per vertex the latter alone."""
     bound = _vertex_part(vertex_costs, cluster, duals) + _negative_legs(leg_costs)
     bound -= rounding(leg_costs, duals)
     above = vertex_costs - _least(vertex_costs, cluster)[cluster]
-    return bound, np.maximum(leg_costs, 0.0) + above[:, None] + above[None, :]
+    return bound, np.maximum(leg_costs, 0.0) + above[:, None] + above[None, :], above
 
 
 def _least(vertex_costs: Floats, cluster: npt.NDArray[np.int64]) -> Floats:

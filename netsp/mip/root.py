@@ -215,16 +215,16 @@ class Root:
                 taken[v] += 1
         return np.array(chosen, dtype=np.int64).reshape(-1, 2)
 
-    def _eliminate(self, bound: float, rise: Floats) -> None:
+    def _eliminate(self, bound: float, rise: Floats, above: Floats) -> None:
         """Legs and vertices that cost more than what is missing to the cutoff are dead: a tour
-        through a vertex uses two of its legs."""
+        through a vertex uses two of its legs, and pays once for the vertex itself."""
         missing = self.run.cutoff - bound
         if not np.isfinite(missing):
             return
         self.dead |= rise > missing
         left = np.where(self.dead, np.inf, rise)
         two = np.partition(left, 1, axis=1)[:, :2].sum(axis=1) if len(left) > 2 else left.min(1)
-        gone = two > missing
+        gone = two - above > missing
         gone[0] = False
         self.dead[gone] = True
         self.dead[:, gone] = True

@@ -103,7 +103,7 @@ def performance(by_method: dict[str, list[Row]]) -> Any | None:
 
 def anytime(by_method: dict[str, list[Row]], best: dict[str, float]) -> Any | None:
     """Median per cent over the best known against time; None without histories."""
-    last = max((r["total_s"] for rows in by_method.values() for r in rows), default=0.0)
+    last = max((r.get("total_s", 0.0) for rows in by_method.values() for r in rows), default=0.0)
     at = np.geomspace(1e-3, max(last, 1e-2), 120)
     figure, axes = _figure()
     panel, drawn = axes[0][0], False

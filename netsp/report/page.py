@@ -70,7 +70,7 @@ def write_report(results: str | Path, output: str | Path, pictures: str | None =
         if figure is None:
             continue
         if pictures:
-            figure.savefig(output.with_name(f"{output.stem}-{name}.{pictures}"), dpi=150)
+            _save(figure, output.with_name(f"{output.stem}-{name}.{pictures}"))
         caption = html.escape(CAPTIONS[name])
         parts.append(f"<figure>{figures.svg(figure)}<figcaption>{caption}</figcaption></figure>")
     parts += [
@@ -86,6 +86,13 @@ def write_report(results: str | Path, output: str | Path, pictures: str | None =
         f"<style>{STYLE}</style></head><body>{''.join(parts)}</body></html>\n",
     )
     return output
+
+
+def _save(figure: Any, path: Path) -> None:
+    try:
+        figure.savefig(path, dpi=150)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror}") from None
 
 
 def _head(rows: list[Row], source: str) -> str:
