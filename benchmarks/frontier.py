@@ -160,7 +160,7 @@ def draw_profile(seconds: dict[str, list[float]], path: str) -> None:
              xlabel="time over that of the fastest", ylabel="share proven",
              title=f"{len(fastest)} problems")  # fmt: skip
     axes.grid(alpha=0.3)
-    axes.legend(loc="lower right", fontsize="small")
+    axes.legend(loc="center right", fontsize="small")
     figure.savefig(path, dpi=130)
 
 
