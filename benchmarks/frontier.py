@@ -24,6 +24,7 @@ from table import head, heading, row
 
 from netsp import Problem, Status, solve, solve_graph, travel_graph, verify
 from netsp.errors import NetspError
+from netsp.report.figures import performance
 from netsp.worlds import random_world
 
 CELLS = [
@@ -105,7 +106,7 @@ def peers(worlds: int, limit: float, plot: str | None) -> None:
     lengths found."""
     head("goals", "tether", "solver", "proven", "median s", "mean gap %", "mean % over best known",
          "no tour")  # fmt: skip
-    profile: dict[str, list[float]] = {name: [] for name in EXACT}
+    trials: dict[str, list[dict]] = {name: [] for name in EXACT}
     for goals, tether in ((10, 300), (20, 300), (20, 350), (40, 300)):
         graphs = [travel_graph(world(s, goals, tether, many=False)) for s in range(worlds)]
         for graph in graphs:
@@ -128,40 +129,20 @@ def peers(worlds: int, limit: float, plot: str | None) -> None:
             gaps = [100.0 * max(n - b, 0.0) / n if np.isfinite(n) else 100.0 for n, b, _ in rows]
             over = [100.0 * (n / k - 1.0) for (n, _, _), k in zip(rows, best, strict=True)]
             proofs = [g < 1e-3 for g in gaps]
-            if name in profile:
-                profile[name] += [r[2] if p else np.inf for r, p in zip(rows, proofs, strict=True)]
+            if name in EXACT:
+                trials[name] += [
+                    {"problem_sha256": f"{goals} {tether} {k}", "seed": 0, "total_s": seconds,
+                     "status": "optimal" if proof else "feasible"}
+                    for k, ((_, _, seconds), proof) in enumerate(zip(rows, proofs, strict=True))
+                ]  # fmt: skip
             finite = [o for o in over if np.isfinite(o)]
             row(goals, tether, name, f"{sum(proofs)}/{worlds}" if name in EXACT else "",
                 f"{statistics.median(r[2] for r in rows):.2f}",
                 f"{np.mean(gaps):.2f}" if name in EXACT else "",
                 f"{np.mean(finite):.2f}" if finite else "", len(over) - len(finite))  # fmt: skip
-    if plot:
-        draw_profile({n: t for n, t in profile.items() if t}, plot)
-
-
-def draw_profile(seconds: dict[str, list[float]], path: str) -> None:
-    """Performance profile (Dolan & More 2002): share of problems proven within a multiple of the
-    fastest solver's time."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot as plt
-
-    fastest = np.min(list(seconds.values()), axis=0)
-    ratios = {n: np.sort(np.array(t) / fastest) for n, t in seconds.items()}
-    most = 2.0 * max(r[np.isfinite(r)].max(initial=1.0) for r in ratios.values())
-    figure, axes = plt.subplots(figsize=(7, 4.2), layout="constrained")
-    for name, r in ratios.items():
-        r = r[np.isfinite(r)]
-        x = np.concatenate([[1.0], np.repeat(r, 2), [most]])
-        share = np.arange(len(r) + 1) / len(fastest)
-        axes.plot(x, np.repeat(share, 2), label=name)
-    axes.set(xscale="log", xlim=(1.0, most), ylim=(-0.02, 1.02),
-             xlabel="time over that of the fastest", ylabel="share proven",
-             title=f"{len(fastest)} problems")  # fmt: skip
-    axes.grid(alpha=0.3)
-    axes.legend(loc="center right", fontsize="small")
-    figure.savefig(path, dpi=130)
+    figure = performance(trials) if plot else None
+    if figure is not None:
+        figure.savefig(plot, dpi=130)
 
 
 def main() -> None:

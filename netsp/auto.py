@@ -16,12 +16,13 @@ from typing import Any
 
 import numpy as np
 
+from netsp.lns import Instance
 from netsp.lns.solve import solve as search
 from netsp.mip.solve import MipRun
 from netsp.mip.solve import solve as prove
 from netsp.result import Clock, OnProgress, Progress, Result
 from netsp.run import read_params
-from netsp.travel import TravelGraph
+from netsp.travel import Floats, TravelGraph
 
 PROVABLE = 7_000
 """Most vertices of a travel graph that `mip` is asked to bound: about 2 GiB of matrices."""
@@ -83,10 +84,7 @@ def solve(
         if on_progress:
             on_progress(rows[-1])
 
-    ways = graph.ways(sub_goals=False)
-    places = range(graph.goal_count + 1)
-    shortest = np.array([[ways.length(a, b) for b in places] for a in places])
-    over_goals = TravelGraph.from_costs(np.minimum(shortest, shortest.T), places)
+    over_goals = TravelGraph.from_costs(_between_goals(graph), range(graph.goal_count + 1))
     left = None if time_limit is None else max(clock.left, 0.1)
     bound = prove(over_goals, time_limit=left, rng=rng, on_progress=tell).lower_bound
     return replace(
@@ -95,3 +93,13 @@ def solve(
         lower_bound=min(length, (bound or 0.0) * (1.0 - 1e-9)),
         trace=tuple(rows),
     )
+
+
+def _between_goals(graph: TravelGraph) -> Floats:
+    """(n + 1, n + 1) no more than any leg between two goals, in any class."""
+    if not graph.geometric:
+        return Instance.of(graph).cluster_costs
+    ways = graph.ways(sub_goals=False)
+    places = range(graph.goal_count + 1)
+    shortest = np.array([[ways.length(a, b) for b in places] for a in places])
+    return np.asarray(np.minimum(shortest, shortest.T))

@@ -11,7 +11,7 @@ import argparse
 import contextlib
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from netsp.errors import InputError, NetspError
@@ -35,7 +35,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"netsp: {error}", file=sys.stderr)
         return error.exit_code
     except KeyboardInterrupt:
-        print("netsp: interrupted", file=sys.stderr)
+        print("netsp: interrupted before there was anything to write", file=sys.stderr)
         return EXIT_INTERRUPTED
     except BrokenPipeError:
         # the reader has gone (| head); keep Python from complaining while it closes stdout
@@ -198,14 +198,20 @@ class _Version(argparse.Action):
         parser.exit()
 
 
-def _seconds(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = -1.0
-    if not 0.0 < value < float("inf"):
-        raise argparse.ArgumentTypeError(f"expected a positive number of seconds, got {text!r}")
-    return value
+def _above_zero(what: str) -> Callable[[str], float]:
+    def read(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            value = -1.0
+        if not 0.0 < value < float("inf"):
+            raise argparse.ArgumentTypeError(f"expected a positive number{what}, got {text!r}")
+        return value
+
+    return read
+
+
+_seconds, _length = _above_zero(" of seconds"), _above_zero("")
 
 
 def _shard(text: str) -> tuple[int, int]:
@@ -213,16 +219,6 @@ def _shard(text: str) -> tuple[int, int]:
     if not (part.isdigit() and of.isdigit() and 1 <= int(part) <= int(of)):
         raise argparse.ArgumentTypeError(f"expected I/N with 1 <= I <= N, got {text!r}")
     return int(part), int(of)
-
-
-def _length(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = -1.0
-    if not 0.0 < value < float("inf"):
-        raise argparse.ArgumentTypeError(f"expected a positive number, got {text!r}")
-    return value
 
 
 def _option(text: str) -> tuple[str, str]:

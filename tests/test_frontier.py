@@ -217,3 +217,14 @@ def test_a_limit_that_ends_in_the_root_leaves_a_true_bound(solver):
         result = solve_graph(graph, solver, iteration_limit=limit)
         assert result.lower_bound <= best * (1 + 1e-9)
         assert result.length >= best * (1 - 1e-6)
+
+
+def test_auto_bounds_large_graphs_without_geometry_too(monkeypatch):
+    import netsp.auto
+
+    graph = random_graph(4, goals=6)
+    best = brute_tour(graph)
+    monkeypatch.setattr(netsp.auto, "PROVABLE", 5)
+    result = solve_graph(graph, "auto", iteration_limit=500)
+    assert 0.0 < result.lower_bound <= best * (1 + 1e-9)
+    assert result.length >= best * (1 - 1e-9)

@@ -7,8 +7,8 @@ import sys
 import time
 from typing import Any, TextIO
 
-from netsp.compare.rows import Row, combine
-from netsp.compare.run import FAILED, Tally, compare
+from netsp.compare.rows import FAILED, Row, combine
+from netsp.compare.run import Tally, compare
 from netsp.compare.study import Study
 from netsp.errors import InputError
 

@@ -6,6 +6,7 @@ is replaced, and its trial gets a row that says so.
 
 from __future__ import annotations
 
+import contextlib
 import multiprocessing
 import os
 import signal
@@ -16,7 +17,7 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from typing import Any
 
-from netsp.compare.rows import Row
+from netsp.compare.rows import LOST, Row
 from netsp.compare.study import Trial
 
 PATIENCE = 60.0
@@ -64,7 +65,7 @@ def run_all(trials: list[Trial], jobs: int) -> Iterator[tuple[Trial, Row]]:
                 if outcome is None:
                     continue
                 trial = worker.trial
-                if outcome["status"] in ("timeout", "crashed", "killed", "out_of_memory"):
+                if outcome["status"] in LOST:
                     _stop(worker)
                     workers[k] = worker = _start(context)
                 _feed(worker, queue)
@@ -89,7 +90,8 @@ def _feed(worker: _Worker, queue: list[Trial]) -> None:
         limit = worker.trial.solver["time_limit"]
         if limit is not None:
             worker.deadline = time.monotonic() + 2.0 * limit + PATIENCE
-        worker.pipe.send(worker.trial)
+        with contextlib.suppress(OSError):  # a worker that is dead already is found by its pipe
+            worker.pipe.send(worker.trial)
 
 
 def _stop(worker: _Worker) -> None:

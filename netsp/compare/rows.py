@@ -20,6 +20,12 @@ from netsp.errors import InputError
 SCHEMA = "netsp-trial/1"
 Row = dict[str, Any]
 
+LOST = frozenset({"crashed", "killed", "timeout", "out_of_memory"})
+"""Statuses of trials that took their worker with them, or may have."""
+
+FAILED = LOST | {"error"}
+"""Statuses of trials that came to nothing."""
+
 _BEGIN = f'{{"schema": "{SCHEMA}"'.encode()
 
 
@@ -30,11 +36,11 @@ _TABLES = ("world", "roadmap", "solver")
 def read_rows(path: str | Path) -> list[Row]:
     """All rows of a results file; a torn last line is left out. InputError if it is not one."""
     try:
-        if not Path(path).is_file():
+        if Path(path).exists() and not Path(path).is_file():
             raise InputError(f"{path}: expected a file of results")
         data = Path(path).read_bytes()
     except OSError as error:
-        raise InputError(f"{path}: {error.strerror or error}") from None
+        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
     rows = []
     *lines, torn = data.split(b"\n")
     for number, line in enumerate(lines, start=1):

@@ -9,12 +9,9 @@ from pathlib import Path
 from typing import Protocol
 
 from netsp.compare.pool import run_all
-from netsp.compare.rows import Row, RowsFile
+from netsp.compare.rows import FAILED, Row, RowsFile
 from netsp.compare.study import Study, Trial, shard
 from netsp.compare.trial import check, full_row
-
-FAILED = frozenset({"error", "crashed", "killed", "timeout", "out_of_memory"})
-"""Statuses of trials that came to nothing."""
 
 
 class Executor(Protocol):

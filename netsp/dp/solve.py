@@ -161,8 +161,8 @@ def bound_by_walks(run: SearchingRun, costs: LegCosts) -> None:
 
 
 def first_prices(run: SearchingRun, costs: LegCosts) -> Floats:
-    """(n + 1,) for every goal half of the incumbent's two legs there: then its own walk costs
-    nothing less than all prices."""
+    """(n + 1,) for every goal half of the two legs of the incumbent there: its prices pay for its
+    legs, but for half of those of the base."""
     prices = np.zeros(run.graph.goal_count + 1)
     if run.tour is not None:
         rows = np.searchsorted(costs.vertices, np.array(run.tour))

@@ -139,7 +139,7 @@ def _cells_table(by_cell: dict[Cell, list[Row]], best: dict[str, float]) -> str:
             ]
         )  # fmt: skip
     head = ["method", "goals", "tether", "trials", "% over best, median (95 %)", "mean",
-            "seconds, median (95 %)", "proven", "gap %, median", "trials"]  # fmt: skip
+            "seconds, median (95 %)", "proven", "gap %, median", "rows"]  # fmt: skip
     return "<h2>All cells</h2>" + _table(head, body)
 
 

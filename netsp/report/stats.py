@@ -10,8 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.stats import binom
 
-from netsp.compare.rows import Row
-from netsp.compare.run import FAILED
+from netsp.compare.rows import FAILED, Row
 
 Floats = npt.NDArray[np.float64]
 
