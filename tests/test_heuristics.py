@@ -13,8 +13,10 @@ from netsp import Circle, NetspError, Polygon, Problem, solve_graph
 from netsp.anneal import icra2017, rss2016
 from netsp.chance import seeded, uniform
 from netsp.hsignature import concatenate, entangled, signature
+from netsp.legcosts import MEASURE_AT_ONCE
 from netsp.lns import Instance
 from netsp.solvers import ROADMAPS, travel_graph
+from netsp.worlds import random_world as papers_world
 from tests.brute import brute_tour
 from tests.test_contract import random_graph
 from tests.worlds import random_world, small_worlds
@@ -215,3 +217,15 @@ def test_a_goal_on_a_boundary_does_not_make_a_path_of_thousands_of_points():
                 path = ways.path(a, b)
                 assert len(path) < 500
                 assert signature(path, p.representative_points) == ways.word(a, b)
+
+
+def test_greedy_measures_few_legs_of_a_long_tether_and_goes_the_same_way():
+    """Beyond `MEASURE_AT_ONCE` vertices it searches by lower bounds; the walk is that of the whole
+    matrix."""
+    problem = papers_world(2, goals=8, tether_length=500.0)
+    graph, measured = travel_graph(problem), travel_graph(problem)
+    assert len(graph) > MEASURE_AT_ONCE
+    assert measured.costs.shape == (len(graph), len(graph))
+    found = solve_graph(graph, "greedy")
+    assert not graph.measured
+    assert found.tour == solve_graph(measured, "greedy").tour

@@ -19,9 +19,13 @@ from typing import Any
 
 import numpy as np
 
+from netsp.legcosts import MEASURE_AT_ONCE
 from netsp.result import OnProgress, Result
 from netsp.run import Run, read_params
-from netsp.travel import TravelGraph
+from netsp.travel import Floats, Ints, TravelGraph
+
+BATCH = 16
+"""So many legs are measured at a time when the nearest goal is looked for."""
 
 
 @dataclass(frozen=True)
@@ -65,20 +69,41 @@ def solve(
 
 def _nearest_by_tether(run: Run, *, retrace: bool) -> str:
     graph = run.graph
-    costs = graph.costs
-    tour, here = [0], 0
+    tour = [0]
     left = graph.cluster != 0
+    small = graph.measured or len(graph) <= MEASURE_AT_ONCE
+    bounds = graph.costs if small else graph.lower_bounds()
     while left.any():
         run.check()
-        onward = np.where(left, costs[here], np.inf)
-        here = int(np.argmin(onward))
-        if not np.isfinite(onward[here]):
+        here = _nearest(graph, tour[-1], np.flatnonzero(left), bounds[tour[-1]], exact=small)
+        if here is None:
             return "dead end"
         tour.append(here)
         left &= graph.cluster != graph.cluster[here]
     run.iterations = 1
     run.offer(tour, walk=[*tour, *tour[-2::-1]] if retrace else None)
     return "greedy"
+
+
+def _nearest(
+    graph: TravelGraph, here: int, candidates: Ints, bounds: Floats, *, exact: bool
+) -> int | None:
+    """The candidate with the cheapest leg from here; None if no leg leads on. Legs are measured in
+    the order of their lower bounds, until no bound is below the best leg."""
+    candidates = candidates[np.argsort(bounds[candidates], kind="stable")]
+    if exact:
+        return int(candidates[0]) if np.isfinite(bounds[candidates[0]]) else None
+    best, nearest = np.inf, None
+    for batch in np.array_split(candidates, -(-len(candidates) // BATCH)):
+        if bounds[batch[0]] >= best:
+            break
+        star = np.zeros((len(batch) + 1, len(batch) + 1), dtype=bool)
+        star[0] = star[:, 0] = True
+        legs = graph.costs_among([here, *batch], star)[0, 1:]
+        k = int(np.argmin(legs))
+        if legs[k] < best:
+            best, nearest = float(legs[k]), int(batch[k])
+    return nearest
 
 
 def solve_2016(
