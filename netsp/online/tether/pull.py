@@ -1,0 +1,281 @@
+"""Pull a strand taut without letting it through anything: the kernel of the geodesic model.
+
+Invariant: every edge is nowhere deeper than ``slip`` = delta / 8 inside a solid, and every node is
+on a surface or free. No motion in one round exceeds ``stride`` = delta / 4, so during it no point of
+the strand is deeper than slip + stride, and putting a node back on the surface sweeps no deeper than
+twice that: 3/4 delta. A solid thicker than 1.5 delta therefore keeps the strand on its side: the
+homotopy class never changes. (Distances are 1-Lipschitz; that is all the argument needs.)
+
+Taut: with its nodes on rulings (`strand.take_frame`) the strand's length is, to first order in the
+motions along them, a sum over edges; its Hessian is tridiagonal and its minimum one Newton step away
+on cylinders and straight edges, where the rulings do not bend.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from netsp.online.sampling import sample
+from netsp.online.tether.strand import (
+    EX,
+    EY,
+    EZ,
+    NX,
+    NY,
+    NZ,
+    SHARP,
+    STALE,
+    USED,
+    X,
+    Y,
+    Z,
+    gap,
+    insert,
+    length_of,
+    let_go,
+    look_along,
+    moved,
+    remove,
+    sweep_is_free,
+    take_frame,
+)
+
+
+HELD, HELD_SHARP = 0.5, 0.2
+"""A contact holds the strand when at least this share of the two edges' pull goes into the surface:
+else the strand slips off, as where it doubles back."""
+
+
+@njit(cache=True)
+def pull_end(field, strand, count, last, x, y, z, delta, spread, flat, rounds, precision):
+    """Move one end (the robot's if `last`) to (x, y, z) and pull taut. Returns (strand, count,
+    residual): the strand may have been copied to grow; residual is the last round's motion."""
+    stride = 0.25 * delta
+    slip = 0.125 * delta
+    end = count - 1 if last else 0
+    left = 2.0
+    residual = 0.0
+    while left > 0.0:
+        end = count - 1 if last else 0
+        next_to = end - 1 if last else 1
+        ax, ay, az = strand[end, X], strand[end, Y], strand[end, Z]
+        dx, dy, dz = x - ax, y - ay, z - az
+        motion = math.sqrt(dx * dx + dy * dy + dz * dz)
+        f = 1.0
+        while f * motion > 1.001 * stride and not sweep_is_free(
+            field,
+            strand[next_to, X], strand[next_to, Y], strand[next_to, Z],
+            ax, ay, az, ax + f * dx, ay + f * dy, az + f * dz,
+            slip,
+        ):  # fmt: skip
+            f = max(0.5 * f, stride / motion)
+        left = 1.0 - f
+        if f == 1.0:
+            strand[end, X], strand[end, Y], strand[end, Z] = x, y, z
+        else:
+            strand[end, X] += f * dx
+            strand[end, Y] += f * dy
+            strand[end, Z] += f * dz
+        moved(strand, count, end, f * motion)
+        strand, count, residual = pull(
+            field, strand, count, delta, spread, flat, rounds if left == 0.0 else 2, precision
+        )
+    return strand, count, residual
+
+
+@njit(cache=True)
+def pull(field, strand, count, delta, spread, flat, rounds, precision):
+    """Rounds of: put edges back that went too deep, drop nodes that hold nothing, slide the others
+    to where the strand is shortest; until no node moves by more than `precision`."""
+    slip, stride = 0.125 * delta, 0.25 * delta
+    most = 0.0
+    for _ in range(rounds):
+        before = count
+        strand, count = repair(field, strand, count, slip, delta)
+        changed = count != before
+        most = refresh(field, strand, count, spread, flat, stride, delta)
+        count, lifted = lift(field, strand, count, slip, stride)
+        changed = changed or lifted > 0.0
+        most = max(most, slide(field, strand, count, stride, precision))
+        if not changed and most <= precision:
+            break
+    strand, count = repair(field, strand, count, slip, delta)
+    refresh(field, strand, count, spread, flat, stride, 1e30)  # new nodes only
+    return strand, count, most
+
+
+@njit(cache=True)
+def repair(field, strand, count, slip, delta):
+    """Look again along every edge that may have gone too deep; where it has, its deepest point
+    becomes a node on the surface."""
+    i, budget = 0, 64
+    while i < count - 1:
+        if strand[i, USED] > 1.0:
+            low, where = look_along(field, strand, i, slip)
+            if low < -slip and budget > 0:
+                mx = strand[i, X] + where * (strand[i + 1, X] - strand[i, X])
+                my = strand[i, Y] + where * (strand[i + 1, Y] - strand[i, Y])
+                mz = strand[i, Z] + where * (strand[i + 1, Z] - strand[i, Z])
+                for _ in range(2):
+                    d, nx, ny, nz, _ = sample(field, mx, my, mz)
+                    mx, my, mz = mx - d * nx, my - d * ny, mz - d * nz
+                strand, count = insert(strand, count, i + 1, mx, my, mz)
+                budget -= 1
+                continue
+        i += 1
+    return strand, count
+
+
+@njit(cache=True)
+def refresh(field, strand, count, spread, flat, stride, delta):
+    """Take the frames of contacts that have moved; the largest correction of a position."""
+    most = 0.0
+    for i in range(1, count - 1):
+        # a node that was let go stays in the air until it lands (STALE is infinite then)
+        rests = strand[i, NX] != 0.0 or strand[i, NY] != 0.0 or strand[i, NZ] != 0.0
+        if strand[i, STALE] > 0.05 * delta and (rests or strand[i, STALE] == math.inf):
+            by = take_frame(field, strand, i, spread, flat, stride)
+            moved(strand, count, i, by)
+            strand[i, STALE] = 0.0
+            most = max(most, by)
+    return most
+
+
+@njit(cache=True)
+def lift(field, strand, count, slip, stride):
+    """Drop nodes that hold nothing: those that the strand would leave, and those on a line. A node
+    that cannot reach the line between its neighbours freely is only brought nearer."""
+    lifted = 0.0
+    i = 1
+    while i < count - 1:
+        px, py, pz = strand[i, X], strand[i, Y], strand[i, Z]
+        ax, ay, az = strand[i - 1, X], strand[i - 1, Y], strand[i - 1, Z]
+        bx, by, bz = strand[i + 1, X] - ax, strand[i + 1, Y] - ay, strand[i + 1, Z] - az
+        bb = bx * bx + by * by + bz * bz
+        t = 0.0
+        if bb > 0.0:
+            t = min(1.0, max(0.0, ((px - ax) * bx + (py - ay) * by + (pz - az) * bz) / bb))
+        # from the node to the line
+        hx, hy, hz = ax + t * bx - px, ay + t * by - py, az + t * bz - pz
+        h = math.sqrt(hx * hx + hy * hy + hz * hz)
+        la, lb = gap(strand, i - 1, i), gap(strand, i, i + 1)
+        held = False
+        if la > 0.0 and lb > 0.0:
+            fx = (strand[i + 1, X] - px) / lb - (px - ax) / la
+            fy = (strand[i + 1, Y] - py) / lb - (py - ay) / la
+            fz = (strand[i + 1, Z] - pz) / lb - (pz - az) / la
+            pressed = -(fx * strand[i, NX] + fy * strand[i, NY] + fz * strand[i, NZ])
+            share = HELD_SHARP if strand[i, SHARP] == 1.0 else HELD
+            held = pressed > share * math.sqrt(fx * fx + fy * fy + fz * fz)
+        if h <= (0.125 * slip if held else stride):
+            count = remove(strand, count, i)
+            lifted = max(lifted, h)
+            i = max(1, i - 1)
+            continue
+        if not held:
+            f = 1.0
+            while f * h > 1.001 * stride and not (
+                sweep_is_free(
+                    field, ax, ay, az, px, py, pz, px + f * hx, py + f * hy, pz + f * hz, slip
+                )
+                and sweep_is_free(
+                    field, strand[i + 1, X], strand[i + 1, Y], strand[i + 1, Z],
+                    px, py, pz, px + f * hx, py + f * hy, pz + f * hz, slip,
+                )
+            ):  # fmt: skip
+                f = max(0.5 * f, stride / h)
+            lifted = max(lifted, f * h)
+            if f == 1.0:
+                count = remove(strand, count, i)
+                i = max(1, i - 1)
+                continue
+            px, py, pz = px + f * hx, py + f * hy, pz + f * hz
+            d, nx, ny, nz, _ = sample(field, px, py, pz)
+            let_go(strand, i)
+            moved(strand, count, i, f * h)
+            if d < 0.0:
+                px, py, pz = px - d * nx, py - d * ny, pz - d * nz
+                moved(strand, count, i, math.inf)
+            strand[i, X], strand[i, Y], strand[i, Z] = px, py, pz
+        i += 1
+    return count, lifted
+
+
+@njit(cache=True)
+def slide(field, strand, count, stride, precision):
+    """One Newton step of the length in the motions of the contacts along their directions; returns
+    the largest motion."""
+    n = count - 2
+    if n < 1:
+        return 0.0
+    slope, diagonal, beside = np.zeros(n), np.zeros(n), np.zeros(n)
+    for k in range(count - 1):
+        length = gap(strand, k, k + 1)
+        if length < 1e-12:
+            continue
+        ux = (strand[k + 1, X] - strand[k, X]) / length
+        uy = (strand[k + 1, Y] - strand[k, Y]) / length
+        uz = (strand[k + 1, Z] - strand[k, Z]) / length
+        # motions of both ends perpendicular to the edge
+        a = strand[k, EX] * ux + strand[k, EY] * uy + strand[k, EZ] * uz
+        b = strand[k + 1, EX] * ux + strand[k + 1, EY] * uy + strand[k + 1, EZ] * uz
+        if k > 0:
+            slope[k - 1] -= a
+            diagonal[k - 1] += (1.0 - a * a) / length
+        if k < n:
+            slope[k] += b
+            diagonal[k] += (1.0 - b * b) / length
+        if 0 < k < n:
+            ee = (
+                strand[k, EX] * strand[k + 1, EX]
+                + strand[k, EY] * strand[k + 1, EY]
+                + strand[k, EZ] * strand[k + 1, EZ]
+            )
+            beside[k - 1] = -(ee - a * b) / length
+    # a contact that is met head on cannot slide: a small weight keeps the system regular
+    for k in range(n):
+        diagonal[k] = diagonal[k] * (1.0 + 1e-9) + 1e-9
+    for k in range(1, n):
+        w = beside[k - 1] / diagonal[k - 1]
+        diagonal[k] -= w * beside[k - 1]
+        slope[k] -= w * slope[k - 1]
+    most = 0.0
+    for k in range(n - 1, -1, -1):
+        right = slope[k]
+        if k < n - 1:
+            right -= beside[k] * slope[k + 1]
+        slope[k] = right / max(diagonal[k], 1e-12)
+        most = max(most, abs(slope[k]))
+    f = min(1.0, stride / most) if most > 0.0 else 0.0
+    for k in range(n):
+        by = -f * slope[k]
+        if abs(by) <= 0.1 * precision:
+            continue
+        i = k + 1
+        strand[i, X] += by * strand[i, EX]
+        strand[i, Y] += by * strand[i, EY]
+        strand[i, Z] += by * strand[i, EZ]
+        if strand[i, SHARP] == 0.0:  # rulings bend, edges do not
+            d, nx, ny, nz, _ = sample(field, strand[i, X], strand[i, Y], strand[i, Z])
+            strand[i, X] -= d * nx
+            strand[i, Y] -= d * ny
+            strand[i, Z] -= d * nz
+        moved(strand, count, i, abs(by))
+    return f * most
+
+
+
+@njit(cache=True)
+def drive(field, strand, count, path, delta, spread, flat, rounds, precision):
+    """Take the robot along a path (k, 3). Returns (strand, count, lengths after each point)."""
+    lengths = np.empty(len(path))
+    for k in range(len(path)):
+        strand, count, _ = pull_end(
+            field, strand, count, True, path[k, 0], path[k, 1], path[k, 2],
+            delta, spread, flat, rounds, precision,
+        )  # fmt: skip
+        lengths[k] = length_of(strand, count)
+    return strand, count, lengths

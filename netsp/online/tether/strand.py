@@ -1,0 +1,268 @@
+"""A tether as rows of numbers, and what is the same in every model: frames, checks, lengths.
+
+Row i of a strand describes node i and the edge from it to node i + 1. The first node is the anchor,
+the last the robot, the others rest on something. Compiled; positions in metres.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from netsp.online.sampling import distance, lowest_along, sample
+
+X, Y, Z = 0, 1, 2
+"""Position."""
+
+EX, EY, EZ = 3, 4, 5
+"""Unit direction in which the node may slide: where the surface's tangent plane stays the same
+(the ruling of a cylinder, the edge of a box)."""
+
+NX, NY, NZ = 6, 7, 8
+"""Unit normal of the contact, away from the solid."""
+
+EXTRA = 9
+"""Length of the surface's arc over the edge, less the edge."""
+
+REACH0, REACH1, USED = 10, 11, 12
+"""The edge stays free as long as its ends move by less than REACH0 and REACH1, together: USED is
+the sum of the fractions used up. Above 1 the edge must be looked at again."""
+
+STALE = 13
+"""How far the node has moved since its frame was taken."""
+
+SHARP = 14
+"""1 on an edge or corner of the scene, else 0."""
+
+PART = 15
+"""Which solid the node rests on; -1 for voxels."""
+
+WIDTH = 16
+
+SHARP_SINE = 0.5
+"""Normals that differ by more than 30 degrees across a contact mean a sharp edge."""
+
+
+@njit(cache=True)
+def grown(strand, count):
+    """The strand with room for one more node."""
+    if count < len(strand):
+        return strand
+    out = np.zeros((2 * len(strand) + 8, WIDTH))
+    out[:count] = strand[:count]
+    return out
+
+
+@njit(cache=True)
+def insert(strand, count, at, x, y, z):
+    """A new node before row `at`, its frame and the two edges beside it unknown."""
+    strand = grown(strand, count)
+    for i in range(count, at, -1):
+        strand[i] = strand[i - 1]
+    strand[at] = 0.0
+    strand[at, X], strand[at, Y], strand[at, Z] = x, y, z
+    strand[at, STALE] = math.inf
+    strand[at, PART] = -1.0
+    strand[at, REACH0] = strand[at, REACH1] = 1.0
+    strand[at, USED] = strand[at - 1, USED] = math.inf
+    strand[at - 1, EXTRA] = 0.0
+    return strand, count + 1
+
+
+@njit(cache=True)
+def remove(strand, count, at):
+    """Without row `at`; the edge that takes its place is unknown."""
+    for i in range(at, count - 1):
+        strand[i] = strand[i + 1]
+    strand[at - 1, USED] = math.inf
+    strand[at - 1, EXTRA] = 0.0
+    return count - 1
+
+
+@njit(cache=True)
+def gap(strand, i, j):
+    """Distance between two nodes."""
+    return math.sqrt(
+        (strand[i, X] - strand[j, X]) ** 2
+        + (strand[i, Y] - strand[j, Y]) ** 2
+        + (strand[i, Z] - strand[j, Z]) ** 2
+    )
+
+
+@njit(cache=True)
+def length_of(strand, count):
+    """Arc-corrected length of a strand."""
+    total = 0.0
+    for i in range(count - 1):
+        total += gap(strand, i, i + 1) + strand[i, EXTRA]
+    return total
+
+
+@njit(cache=True)
+def moved(strand, count, i, by):
+    """Book a motion of node i against the edges beside it."""
+    strand[i, STALE] += by
+    if i > 0:
+        strand[i - 1, USED] += by / strand[i - 1, REACH1]
+    if i < count - 1:
+        strand[i, USED] += by / strand[i, REACH0]
+
+
+@njit(cache=True)
+def look_along(field, strand, i, tolerance):
+    """Look along edge i: (least distance, its place as a fraction), and book how far its ends may
+    move before the edge is deeper than `tolerance`, and the arc over it."""
+    ax, ay, az = strand[i, X], strand[i, Y], strand[i, Z]
+    bx, by, bz = strand[i + 1, X], strand[i + 1, Y], strand[i + 1, Z]
+    length = gap(strand, i, i + 1)
+    strand[i, EXTRA] = 0.0
+    if length < 1e-9 * tolerance:
+        strand[i, REACH0] = strand[i, REACH1] = tolerance
+        strand[i, USED] = 0.0
+        return 0.0, 0.0
+    low, where, s = math.inf, 0.0, 0.0
+    reach0 = reach1 = 1e6 * tolerance
+    while True:
+        t = s / length
+        d = distance(field, ax + t * (bx - ax), ay + t * (by - ay), az + t * (bz - az))
+        if d < low:
+            low, where = d, t
+        room = max(d + tolerance, 0.0)
+        # a point at fraction t moves by (1 - t) of the first end's motion and t of the second's;
+        # in the gap to the next sample the distance may fall by half of what is skipped
+        if t < 1.0:
+            reach0 = min(reach0, room / (1.0 - t))
+        if t > 0.0:
+            reach1 = min(reach1, room / t)
+        if s >= length:
+            break
+        s = min(length, s + max(d, 0.0) + tolerance)
+    strand[i, REACH0] = max(reach0, 1e-6 * tolerance)
+    strand[i, REACH1] = max(reach1, 1e-6 * tolerance)
+    strand[i, USED] = 0.0
+    if low < 0.0:
+        strand[i, EXTRA] = _arc_over(field, ax, ay, az, bx, by, bz, length, low, where)
+    return low, where
+
+
+@njit(cache=True)
+def _arc_over(field, ax, ay, az, bx, by, bz, length, low, where):
+    """What the surface's arc over an edge is longer than the edge.
+
+    Both ends on the surface: the edge is the chord of an arc of sagitta g, and an arc of half angle
+    a = 2 atan(2 g / c) over a chord c has the length c a / sin a. Only one end on it: the edge
+    leaves the solid again on its way, its inner part is a chord c of which the arc turns only half
+    before it goes off along the tangent; that is longer by r (a - sin a), about (4/3) g^2 / c.
+    """
+    if 0.3 < where < 0.7:
+        g = -distance(field, 0.5 * (ax + bx), 0.5 * (ay + by), 0.5 * (az + bz))
+        if g <= 0.0:
+            return 0.0
+        a = 2.0 * math.atan(2.0 * g / length)
+        return length * (a / math.sin(a) - 1.0)
+    chord = 2.0 * length * min(where, 1.0 - where)
+    if chord <= 0.0:
+        return 0.0
+    return min(4.0 / 3.0 * low * low / chord, 0.5 * -low)
+
+
+@njit(cache=True)
+def let_go(strand, i):
+    """Node i rests on nothing: no direction to slide in, no normal that holds it."""
+    for k in range(EX, NZ + 1):
+        strand[i, k] = 0.0
+    strand[i, SHARP] = strand[i, STALE] = 0.0
+    strand[i, PART] = -1.0
+
+
+@njit(cache=True)
+def take_frame(field, strand, i, spread, flat, reach):
+    """Slide direction and normal of contact i, from the surface a little before and after it.
+
+    The two normals span the plane in which the tether turns over the surface; their cross product
+    is the direction conjugate to the tether. Where they differ much the contact is on a sharp edge,
+    and the node is put on it: the point on both tangent planes. Else the node is put on the
+    surface. spread : distance of the two samples. flat : sines below it mean no curvature. reach :
+    a node is put on a sharp edge from no farther than this. Returns how far the node was moved.
+    """
+    px, py, pz = strand[i, X], strand[i, Y], strand[i, Z]
+    ux, uy, uz = px - strand[i - 1, X], py - strand[i - 1, Y], pz - strand[i - 1, Z]
+    wx, wy, wz = strand[i + 1, X] - px, strand[i + 1, Y] - py, strand[i + 1, Z] - pz
+    lu = math.sqrt(ux * ux + uy * uy + uz * uz)
+    lw = math.sqrt(wx * wx + wy * wy + wz * wz)
+    if lu == 0.0 or lw == 0.0:
+        return 0.0
+    ux, uy, uz, wx, wy, wz = ux / lu, uy / lu, uz / lu, wx / lw, wy / lw, wz / lw
+    s, t = min(spread, 0.5 * lu), min(spread, 0.5 * lw)
+    d1, ax, ay, az, _ = sample(field, px - s * ux, py - s * uy, pz - s * uz)
+    d2, bx, by, bz, _ = sample(field, px + t * wx, py + t * wy, pz + t * wz)
+    ex, ey, ez = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+    sine = math.sqrt(ex * ex + ey * ey + ez * ez)
+    cosine = ax * bx + ay * by + az * bz
+    qx, qy, qz = px, py, pz
+    strand[i, SHARP] = 0.0
+    if sine > SHARP_SINE and cosine > -0.95:
+        # q = p + a n1 + b n2 on both planes
+        r1 = -d1 - s * (ux * ax + uy * ay + uz * az)
+        r2 = -d2 + t * (wx * bx + wy * by + wz * bz)
+        det = 1.0 - cosine * cosine
+        a, b = (r1 - cosine * r2) / det, (r2 - cosine * r1) / det
+        qx, qy, qz = px + a * ax + b * bx, py + a * ay + b * by, pz + a * az + b * bz
+        if (qx - px) ** 2 + (qy - py) ** 2 + (qz - pz) ** 2 <= reach * reach:
+            strand[i, SHARP] = 1.0
+        else:
+            qx, qy, qz = px, py, pz
+    d, nx, ny, nz, part = sample(field, qx, qy, qz)
+    if d > reach:
+        let_go(strand, i)
+        return 0.0
+    qx, qy, qz = qx - d * nx, qy - d * ny, qz - d * nz
+    if strand[i, SHARP] == 1.0:
+        nx, ny, nz = ax + bx, ay + by, az + bz
+        length = math.sqrt(nx * nx + ny * ny + nz * nz)
+        nx, ny, nz = nx / length, ny / length, nz / length
+    # the mean direction of the tether
+    tx, ty, tz = ux + wx, uy + wy, uz + wz
+    length = math.sqrt(tx * tx + ty * ty + tz * tz)
+    if length > 1e-9:
+        tx, ty, tz = tx / length, ty / length, tz / length
+    along = (ex * tx + ey * ty + ez * tz) / sine if sine > 0.0 else 1.0
+    if sine <= flat or (strand[i, SHARP] == 0.0 and abs(along) > 0.95):
+        ex, ey, ez = ny * tz - nz * ty, nz * tx - nx * tz, nx * ty - ny * tx
+        sine = math.sqrt(ex * ex + ey * ey + ez * ez)
+    if sine > 1e-12:
+        strand[i, EX], strand[i, EY], strand[i, EZ] = ex / sine, ey / sine, ez / sine
+    strand[i, NX], strand[i, NY], strand[i, NZ] = nx, ny, nz
+    strand[i, X], strand[i, Y], strand[i, Z] = qx, qy, qz
+    strand[i, PART] = part
+    strand[i, STALE] = 0.0
+    return math.sqrt((qx - px) ** 2 + (qy - py) ** 2 + (qz - pz) ** 2)
+
+
+@njit(cache=True)
+def sweep_is_free(field, cx, cy, cz, ax, ay, az, bx, by, bz, tolerance):
+    """Whether the triangle that an edge sweeps, one end held at c and the other moved from a to b,
+    is free to within `tolerance`: a point at fraction t of the edge moves by t |ab|."""
+    motion = math.sqrt((bx - ax) ** 2 + (by - ay) ** 2 + (bz - az) ** 2)
+    length = math.sqrt((bx - cx) ** 2 + (by - cy) ** 2 + (bz - cz) ** 2)
+    if length == 0.0:
+        return motion <= tolerance
+    s = 0.0
+    while True:
+        t = s / length
+        d = distance(field, cx + t * (bx - cx), cy + t * (by - cy), cz + t * (bz - cz))
+        room = d - t * motion + tolerance
+        if room < 0.0:
+            return False
+        if s >= length:
+            return True
+        s = min(length, s + max(room, 0.25 * tolerance) / (1.0 + motion / length))
+
+
+@njit(cache=True)
+def see(field, ax, ay, az, bx, by, bz, depth, step):
+    """Whether the segment is nowhere deeper than `depth` (negative: nearer than), to within
+    `step`."""
+    return lowest_along(field, ax, ay, az, bx, by, bz, step)[0] >= -depth
