@@ -29,8 +29,10 @@ class GeodesicTether:
     field : the scene.
     delta : metres; resolution. Edges over a surface dip into it by at most delta / 8 (their length
         is corrected for it), and solids thinner than 1.5 delta may be lost.
-    precision : metres; the rounds end when no node moves by more. Default delta / 10,000.
-    rounds : at most so many in one update.
+    precision : metres; the rounds end when no node moves by more. Default delta / 200.
+    rounds : at most so many in one update, and one more for every delta / 4 that the robot moved.
+        Where the tether slips over an edge it may take a few updates to come to rest; until then
+        its length is too long, and `Tether.residual` above `precision`.
 
     >>> from netsp.online import Scene
     >>> scene = Scene(solids=[{"capsule": {"a": [0, 0, -5], "b": [0, 0, 5], "radius": 0.5}}])
@@ -44,7 +46,7 @@ class GeodesicTether:
     field: DistanceField
     delta: float = 0.1
     precision: float | None = None
-    rounds: int = 200
+    rounds: int = 12
 
     name = "geodesic"
 
@@ -54,7 +56,7 @@ class GeodesicTether:
 
     @property
     def _settings(self) -> tuple[float, float, float, int, float]:
-        precision = self.precision if self.precision is not None else 1e-4 * self.delta
+        precision = self.precision if self.precision is not None else 5e-3 * self.delta
         voxel = self.field.voxel
         # normals of voxels are true at the scale of a voxel only, and never to better than a few
         # per cent

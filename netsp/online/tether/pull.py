@@ -20,6 +20,7 @@ from numba import njit
 
 from netsp.online.sampling import sample
 from netsp.online.tether.strand import (
+    CURVE,
     EX,
     EY,
     EZ,
@@ -49,6 +50,11 @@ HELD, HELD_SHARP = 0.5, 0.2
 else the strand slips off, as where it doubles back."""
 
 
+CONVEX = 0.5
+"""Most of a contact's stiffness that convexity may take away: on a sphere all of it goes where the
+strand reaches half way round."""
+
+
 @njit(cache=True)
 def pull_end(field, strand, count, last, x, y, z, delta, spread, flat, rounds, precision):
     """Move one end (the robot's if `last`) to (x, y, z) and pull taut. Returns (strand, count,
@@ -58,6 +64,10 @@ def pull_end(field, strand, count, last, x, y, z, delta, spread, flat, rounds, p
     end = count - 1 if last else 0
     left = 2.0
     residual = 0.0
+    ox, oy, oz = strand[end, X], strand[end, Y], strand[end, Z]
+    way = math.sqrt((x - ox) ** 2 + (y - oy) ** 2 + (z - oz) ** 2)
+    # the last round's count grows with the way: a node moves by at most a stride in each
+    last_rounds = rounds + min(10 * rounds, int(way / stride))
     while left > 0.0:
         end = count - 1 if last else 0
         next_to = end - 1 if last else 1
@@ -81,7 +91,7 @@ def pull_end(field, strand, count, last, x, y, z, delta, spread, flat, rounds, p
             strand[end, Z] += f * dz
         moved(strand, count, end, f * motion)
         strand, count, residual = pull(
-            field, strand, count, delta, spread, flat, rounds if left == 0.0 else 2, precision
+            field, strand, count, delta, spread, flat, last_rounds if left == 0.0 else 2, precision
         )
     return strand, count, residual
 
@@ -91,7 +101,7 @@ def pull(field, strand, count, delta, spread, flat, rounds, precision):
     """Rounds of: put edges back that went too deep, drop nodes that hold nothing, slide the others
     to where the strand is shortest; until no node moves by more than `precision`."""
     slip, stride = 0.125 * delta, 0.25 * delta
-    most = 0.0
+    most, damping = 0.0, 1.0
     for _ in range(rounds):
         before = count
         strand, count = repair(field, strand, count, slip, delta)
@@ -99,7 +109,11 @@ def pull(field, strand, count, delta, spread, flat, rounds, precision):
         most = refresh(field, strand, count, spread, flat, stride, delta)
         count, lifted = lift(field, strand, count, slip, stride)
         changed = changed or lifted > 0.0
-        most = max(most, slide(field, strand, count, stride, precision))
+        was = length_of(strand, count)
+        most = max(most, slide(field, strand, count, stride, precision, damping))
+        # shorter steps where the full one overshoots
+        longer = length_of(strand, count) > was + 1e-3 * precision
+        damping = max(0.1, 0.5 * damping) if longer else min(1.0, 1.5 * damping)
         if not changed and most <= precision:
             break
     strand, count = repair(field, strand, count, slip, delta)
@@ -205,13 +219,14 @@ def lift(field, strand, count, slip, stride):
 
 
 @njit(cache=True)
-def slide(field, strand, count, stride, precision):
+def slide(field, strand, count, stride, precision, damping):
     """One Newton step of the length in the motions of the contacts along their directions; returns
     the largest motion."""
     n = count - 2
     if n < 1:
         return 0.0
     slope, diagonal, beside = np.zeros(n), np.zeros(n), np.zeros(n)
+    pressing = np.zeros(n)
     for k in range(count - 1):
         length = gap(strand, k, k + 1)
         if length < 1e-12:
@@ -225,7 +240,11 @@ def slide(field, strand, count, stride, precision):
         if k > 0:
             slope[k - 1] -= a
             diagonal[k - 1] += (1.0 - a * a) / length
+            pressing[k - 1] -= ux * strand[k, NX] + uy * strand[k, NY] + uz * strand[k, NZ]
         if k < n:
+            pressing[k] += (
+                ux * strand[k + 1, NX] + uy * strand[k + 1, NY] + uz * strand[k + 1, NZ]
+            )
             slope[k] += b
             diagonal[k] += (1.0 - b * b) / length
         if 0 < k < n:
@@ -235,8 +254,11 @@ def slide(field, strand, count, stride, precision):
                 + strand[k, EZ] * strand[k + 1, EZ]
             )
             beside[k - 1] = -(ee - a * b) / length
-    # a contact that is met head on cannot slide: a small weight keeps the system regular
     for k in range(n):
+        # sliding by t takes a contact t^2 curvature / 2 off its tangent plane, where it is pressed
+        bend = max(pressing[k], 0.0) * strand[k + 1, CURVE]
+        diagonal[k] -= min(bend, CONVEX * diagonal[k])
+        # a contact that is met head on cannot slide: a small weight keeps the system regular
         diagonal[k] = diagonal[k] * (1.0 + 1e-9) + 1e-9
     for k in range(1, n):
         w = beside[k - 1] / diagonal[k - 1]
@@ -249,7 +271,7 @@ def slide(field, strand, count, stride, precision):
             right -= beside[k] * slope[k + 1]
         slope[k] = right / max(diagonal[k], 1e-12)
         most = max(most, abs(slope[k]))
-    f = min(1.0, stride / most) if most > 0.0 else 0.0
+    f = min(damping, stride / most) if most > 0.0 else 0.0
     for k in range(n):
         by = -f * slope[k]
         if abs(by) <= 0.1 * precision:

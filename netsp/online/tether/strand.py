@@ -39,7 +39,10 @@ SHARP = 14
 PART = 15
 """Which solid the node rests on; -1 for voxels."""
 
-WIDTH = 16
+CURVE = 16
+"""Curvature of the surface along the slide direction; positive where it is convex."""
+
+WIDTH = 17
 
 SHARP_SINE = 0.5
 """Normals that differ by more than 30 degrees across a contact mean a sharp edge."""
@@ -173,7 +176,7 @@ def let_go(strand, i):
     """Node i rests on nothing: no direction to slide in, no normal that holds it."""
     for k in range(EX, NZ + 1):
         strand[i, k] = 0.0
-    strand[i, SHARP] = strand[i, STALE] = 0.0
+    strand[i, SHARP] = strand[i, STALE] = strand[i, CURVE] = 0.0
     strand[i, PART] = -1.0
 
 
@@ -234,6 +237,18 @@ def take_frame(field, strand, i, spread, flat, reach):
         sine = math.sqrt(ex * ex + ey * ey + ez * ez)
     if sine > 1e-12:
         strand[i, EX], strand[i, EY], strand[i, EZ] = ex / sine, ey / sine, ez / sine
+        ex, ey, ez = ex / sine, ey / sine, ez / sine
+        if strand[i, SHARP] == 0.0:
+            _, ax, ay, az, _ = sample(
+                field, qx - spread * ex, qy - spread * ey, qz - spread * ez
+            )
+            _, bx, by, bz, _ = sample(
+                field, qx + spread * ex, qy + spread * ey, qz + spread * ez
+            )
+            turn = (bx - ax) * ex + (by - ay) * ey + (bz - az) * ez
+            strand[i, CURVE] = turn / (2.0 * spread)
+        else:
+            strand[i, CURVE] = 0.0
     strand[i, NX], strand[i, NY], strand[i, NZ] = nx, ny, nz
     strand[i, X], strand[i, Y], strand[i, Z] = qx, qy, qz
     strand[i, PART] = part
