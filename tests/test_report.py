@@ -2,9 +2,11 @@
 
 import base64
 import csv
+import gzip
 import io
 import json
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,8 +18,11 @@ from netsp.cli import main
 from netsp.compare.rows import SCHEMA, read_rows
 from netsp.compare.run import compare
 from netsp.compare.study import Study
+from netsp.errors import InputError
 from netsp.report import stats
 from netsp.report.page import write_report
+
+STUDIES = Path(__file__).parent.parent / "studies"
 
 
 def row(solver, world, *, length=None, status="feasible", seconds=1.0, **more):
@@ -146,3 +151,22 @@ def test_a_report_does_not_overwrite_its_rows(results, capsys):
     assert main(["report", str(results), "-o", str(results)]) == 2
     assert "is named for two different files" in capsys.readouterr().err
     assert results.read_bytes() == before
+
+
+def test_gzipped_rows_are_read_and_damaged_ones_refused(results, tmp_path):
+    packed = tmp_path / "rows.jsonl.gz"
+    packed.write_bytes(gzip.compress(results.read_bytes()))
+    assert read_rows(packed) == read_rows(results)
+    packed.write_bytes(packed.read_bytes()[:-20])
+    with pytest.raises(InputError, match="gzip"):
+        read_rows(packed)
+
+
+@pytest.mark.parametrize("study", sorted(STUDIES.glob("*.toml")), ids=lambda p: p.stem)
+def test_the_rows_of_the_papers_studies_are_those_of_their_files(study):
+    """Whole: one row for every trial of the study as it stands."""
+    trials = {t.id for t in Study.load(study).trials()}
+    rows = read_rows(STUDIES / "results" / f"{study.stem}.jsonl.gz")
+    assert {r["trial"] for r in rows} == trials
+    assert len(rows) == len(trials)
+    assert {r["study"] for r in rows} == {Study.load(study).sha256}

@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import contextlib
 import fcntl
+import gzip
 import json
 import os
+import zlib
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -34,11 +36,16 @@ _TABLES = ("world", "roadmap", "solver")
 
 
 def read_rows(path: str | Path) -> list[Row]:
-    """All rows of a results file; a torn last line is left out. InputError if it is not one."""
+    """All rows of a results file, gzipped if its name ends in .gz; a torn last line is left out.
+    InputError if it is not one."""
     try:
         if Path(path).exists() and not Path(path).is_file():
             raise InputError(f"{path}: expected a file of results")
         data = Path(path).read_bytes()
+        if Path(path).suffix == ".gz":
+            data = gzip.decompress(data)
+    except (gzip.BadGzipFile, zlib.error, EOFError):
+        raise InputError(f"{path}: not a gzip file, or cut short") from None
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
     rows = []

@@ -193,7 +193,7 @@ class DistanceField:
                 notes=np.array(self.notes, dtype=str),
                 parts=np.array([n for n, _ in self.thickness], dtype=str),
                 thickness=np.array([t for _, t in self.thickness]),
-                **{k: v for k, v in self.arrays._asdict().items()},
+                **dict(self.arrays._asdict().items()),
             )
         except OSError as error:
             raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None

@@ -1,7 +1,7 @@
 """What a distance field says at a point: the one query beneath tether, planner and pictures.
 
-Exact for solids (`netsp.online.solids`), trilinear for voxels, the least of both for both. Compiled; `Field` is a plain tuple
-of arrays, so that every kernel takes it whole.
+Exact for solids (`netsp.online.solids`), trilinear for voxels, the least of both for both.
+Compiled; `Field` is a plain tuple of arrays, so that every kernel takes it whole.
 """
 
 from __future__ import annotations
@@ -67,9 +67,9 @@ def _solids(field, x, y, z):
     d, gx, gy, gz, which = math.inf, 0.0, 0.0, 1.0, -1
     cells, near = field.cells, field.near
     if cells.size > 0:
-        i = int(math.floor((x - near[0]) / near[3]))
-        j = int(math.floor((y - near[1]) / near[3]))
-        k = int(math.floor((z - near[2]) / near[3]))
+        i = math.floor((x - near[0]) / near[3])
+        j = math.floor((y - near[1]) / near[3])
+        k = math.floor((z - near[2]) / near[3])
         ny, nz = int(near[5]), int(near[6])
         if 0 <= i < near[4] and 0 <= j < ny and 0 <= k < nz:
             cell = (i * ny + j) * nz + k
@@ -127,7 +127,7 @@ def _voxel_distance(grid, place, x, y, z):
 
 @njit(cache=True)
 def _voxels(grid, place, x, y, z):
-    i, j, k, u, v, w, inside = _cell(grid, place, x, y, z)
+    _i, _j, _k, _u, _v, _w, inside = _cell(grid, place, x, y, z)
     if not inside:
         return _beyond(place, x, y, z)
     # half a voxel to either side: a central difference does not jump at the cells' faces

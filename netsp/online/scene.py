@@ -299,7 +299,8 @@ class Solid(BaseModel):
     @property
     def shape(self) -> Shape:
         """The shape it is."""
-        return next(s for s in (getattr(self, k) for k in _KINDS) if s is not None)
+        shapes: list[Shape | None] = [getattr(self, k) for k in _KINDS]
+        return next(s for s in shapes if s is not None)
 
 
 class Source(BaseModel):
@@ -433,10 +434,17 @@ class Scene(BaseModel):
                 on_progress=on_progress,
             )
         boxes = [b for s in solids if (b := s.shape.box()) is not None]
+        names = [s.name or f"solids[{k}]" for k, s in enumerate(solids)]
+        thickness = [s.shape.thickness() for s in solids]
         return DistanceField.build(
-            kind, rows, outline, boxes, grid, self.tether_radius,
-            thickness=[(s.name or f"solids[{k}]", s.shape.thickness()) for k, s in enumerate(solids)],
-        )  # fmt: skip
+            kind,
+            rows,
+            outline,
+            boxes,
+            grid,
+            self.tether_radius,
+            list(zip(names, thickness, strict=True)),
+        )
 
 
 def _standing(problem: Problem) -> tuple[Solid, ...]:
@@ -454,7 +462,9 @@ def _standing(problem: Problem) -> tuple[Solid, ...]:
 
 def encode(solids: tuple[Solid, ...]) -> tuple[list[int], list[list[float]], Floats]:
     """Kinds, rows and polygon vertices for `netsp.online.sampling.of_solids`."""
-    kind, rows, outline = [], [], []
+    kind: list[int] = []
+    rows: list[list[float]] = []
+    outline: list[tuple[float, float]] = []
     for solid in solids:
         k, row = solid.shape.row()
         if isinstance(solid.shape, Prism):

@@ -1,14 +1,15 @@
 """Pull a strand taut without letting it through anything: the kernel of the geodesic model.
 
 Invariant: every edge is nowhere deeper than ``slip`` = delta / 8 inside a solid, and every node is
-on a surface or free. No motion in one round exceeds ``stride`` = delta / 4, so during it no point of
-the strand is deeper than slip + stride, and putting a node back on the surface sweeps no deeper than
-twice that: 3/4 delta. A solid thicker than 1.5 delta therefore keeps the strand on its side: the
-homotopy class never changes. (Distances are 1-Lipschitz; that is all the argument needs.)
+on a surface or free. A motion either sweeps free water, or is no longer than ``stride`` =
+delta / 4. So no point of the strand is ever deeper than slip + stride, and putting a node back on
+the surface sweeps no deeper than twice that: 3/4 delta. A solid thicker than 1.5 delta therefore
+keeps the strand on its side: the homotopy class never changes. (Distances are 1-Lipschitz; that is
+all the argument needs.)
 
 Taut: with its nodes on rulings (`strand.take_frame`) the strand's length is, to first order in the
-motions along them, a sum over edges; its Hessian is tridiagonal and its minimum one Newton step away
-on cylinders and straight edges, where the rulings do not bend.
+motions along them, a sum over edges; its Hessian is tridiagonal and its minimum one Newton step
+away on cylinders and straight edges, where the rulings do not bend.
 """
 
 from __future__ import annotations
@@ -43,7 +44,6 @@ from netsp.online.tether.strand import (
     sweep_is_free,
     take_frame,
 )
-
 
 HELD, HELD_SHARP = 0.5, 0.2
 """A contact holds the strand when at least this share of the two edges' pull goes into the surface:
@@ -242,9 +242,7 @@ def slide(field, strand, count, stride, precision, damping):
             diagonal[k - 1] += (1.0 - a * a) / length
             pressing[k - 1] -= ux * strand[k, NX] + uy * strand[k, NY] + uz * strand[k, NZ]
         if k < n:
-            pressing[k] += (
-                ux * strand[k + 1, NX] + uy * strand[k + 1, NY] + uz * strand[k + 1, NZ]
-            )
+            pressing[k] += ux * strand[k + 1, NX] + uy * strand[k + 1, NY] + uz * strand[k + 1, NZ]
             slope[k] += b
             diagonal[k] += (1.0 - b * b) / length
         if 0 < k < n:
@@ -287,7 +285,6 @@ def slide(field, strand, count, stride, precision, damping):
             strand[i, Z] -= d * nz
         moved(strand, count, i, abs(by))
     return f * most
-
 
 
 @njit(cache=True)

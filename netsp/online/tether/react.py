@@ -7,8 +7,8 @@ Where the paper leaves room:
   here (`reading`); the text's jumps over solids and so unwinds a tether from a pipe.
 - ``checkLineOfSight(M, P_tether)`` is given no pair of nodes: taken as (i, j).
 - ``pullNode(P[j], end, delta)`` is listed for nodes in collision, and told of "each node" in the
-  text: here each node is moved by up to delta towards the tether's end, when its two edges stay free
-  and the tether gets shorter.
+  text: here each node is moved by up to delta towards the tether's end, when its two edges stay
+  free and the tether gets shorter.
 - "Until convergence": until a pass shortens the tether by less than 1e-5 m, as in the authors'
   public code, which also uses delta = 0.5 m.
 """
@@ -140,7 +140,7 @@ def _shortcut(field, nodes, delta, clearance, text, slack):
             elif not text:
                 break
         length = math.sqrt(((nodes[i] - nodes[j]) ** 2).sum())
-        pieces = max(1, int(math.ceil(length / delta)))
+        pieces = max(1, math.ceil(length / delta))
         while size + pieces > len(out):
             more = np.empty((2 * len(out), 3))
             more[:size] = out[:size]

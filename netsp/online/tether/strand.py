@@ -239,12 +239,8 @@ def take_frame(field, strand, i, spread, flat, reach):
         strand[i, EX], strand[i, EY], strand[i, EZ] = ex / sine, ey / sine, ez / sine
         ex, ey, ez = ex / sine, ey / sine, ez / sine
         if strand[i, SHARP] == 0.0:
-            _, ax, ay, az, _ = sample(
-                field, qx - spread * ex, qy - spread * ey, qz - spread * ez
-            )
-            _, bx, by, bz, _ = sample(
-                field, qx + spread * ex, qy + spread * ey, qz + spread * ez
-            )
+            _, ax, ay, az, _ = sample(field, qx - spread * ex, qy - spread * ey, qz - spread * ez)
+            _, bx, by, bz, _ = sample(field, qx + spread * ex, qy + spread * ey, qz + spread * ez)
             turn = (bx - ax) * ex + (by - ay) * ey + (bz - az) * ez
             strand[i, CURVE] = turn / (2.0 * spread)
         else:

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from netsp.online.tether.strand import EXTRA, NX, NZ, PART, WIDTH, USED, REACH0, REACH1
+from netsp.online.tether.strand import EXTRA, NX, NZ, PART, REACH0, REACH1, USED, WIDTH
 
 Floats = npt.NDArray[np.float64]
 
