@@ -110,10 +110,25 @@ def _parser() -> argparse.ArgumentParser:
     p.add_argument("--quiet", action="store_true", help="exit code only")
     p.set_defaults(run=_verify)
 
-    p = commands.add_parser("plot", help="draw a problem, or a solution on it")
-    p.add_argument("problem", metavar="PROBLEM")
-    p.add_argument("solution", metavar="SOLUTION", nargs="?")
-    p.add_argument("-o", "--output", required=True, metavar="FILE", help="png, svg or pdf")
+    p = commands.add_parser("plot", help="draw a problem or a scene, with a solution or a tether")
+    p.add_argument("problem", metavar="PROBLEM", help="problem or scene file (JSON)")
+    p.add_argument(
+        "solution", metavar="SOLUTION", nargs="?",
+        help="solution; with a scene: a path from the anchor on (CSV x,y,z or JSON), along which "
+        "the tether is laid",
+    )  # fmt: skip
+    p.add_argument(
+        "-o", "--output", required=True, metavar="FILE",
+        help="png, svg or pdf; a scene also html, to be turned in a browser",
+    )  # fmt: skip
+    p.add_argument(
+        "--tether-model", default="geodesic", metavar="NAME",
+        help="scene: geodesic (default) or react",
+    )  # fmt: skip
+    p.add_argument(
+        "--delta", type=_length, metavar="L",
+        help="scene: resolution of the tether; default by the scene",
+    )  # fmt: skip
     p.add_argument("--roadmap", metavar="NAME", help="draw this roadmap: taut or prm")
     p.add_argument("--samples", type=_positive, metavar="N", help="prm: milestones; default 1000")
     p.add_argument("--seed", type=_natural, default=0, metavar="N", help="prm: random seed")
@@ -182,7 +197,7 @@ def _parser() -> argparse.ArgumentParser:
     p.set_defaults(run=_report)
 
     p = commands.add_parser("schema", help="print the JSON Schema of a file format")
-    p.add_argument("format", choices=("problem", "solution"))
+    p.add_argument("format", choices=("problem", "solution", "scene"))
     p.set_defaults(run=_schema)
     return parser
 
@@ -374,11 +389,15 @@ def _verify(args: argparse.Namespace) -> int:
 
 
 def _plot(args: argparse.Namespace) -> int:
+    _check_writable(args.output)
+    if _is_scene(args.problem):
+        from netsp.online.command import plot_scene
+
+        return plot_scene(args)
     from netsp import plotting
     from netsp.problem import Problem
 
     plotting.check_format(args.output)
-    _check_writable(args.output)
     if args.classes is not None:
         if args.solution or args.roadmap:
             raise InputError(
@@ -403,6 +422,14 @@ def _plot(args: argparse.Namespace) -> int:
     else:
         plotting.save(Problem.load(args.problem), None, args.output)
     return 0
+
+
+def _is_scene(path: str) -> bool:
+    """A file that describes a scene rather than a problem: by its fields."""
+    from netsp.problem import parse_json_object, read_text
+
+    data = parse_json_object(read_text(path), path)
+    return "goals" not in data and bool({"solids", "mesh", "cloud", "problem"} & data.keys())
 
 
 def _goal_number(problem: Problem, text: str) -> int:
@@ -478,6 +505,8 @@ def _schema(args: argparse.Namespace) -> int:
 
     if args.format == "problem":
         from netsp.problem import Problem as Model
+    elif args.format == "scene":
+        from netsp.online.scene import Scene as Model  # type: ignore[assignment]
     else:
         from netsp.solution import Solution as Model  # type: ignore[assignment]
     print(json.dumps(Model.model_json_schema(), indent=1))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import importlib
 import importlib.metadata
 import inspect
@@ -326,6 +327,11 @@ def _tour_of(solution: Solution, graph: TravelGraph) -> list[int] | None:
 
 def versions() -> dict[str, str]:
     """Versions of what computed a solution."""
+    return dict(_versions())
+
+
+@functools.cache
+def _versions() -> dict[str, str]:
     names = ("netsp", "numpy", "numba", "highspy", "pulp", "ompl")
     out = {"python": platform.python_version()}
     for name in names:

@@ -71,8 +71,8 @@ def nearest_sites(sites, points, origin, size, distances, owner):
             for c in range(corners):
                 least = min(least, sites[s, 3 * c + a])
                 most = max(most, sites[s, 3 * c + a])
-            low[a] = max(0, math.floor((least - origin[a]) / size) - 1)
-            high[a] = min(shape[a] - 1, math.ceil((most - origin[a]) / size) + 1)
+            low[a] = max(0, math.floor((least - origin[a]) / size) - 2)
+            high[a] = min(shape[a] - 1, math.ceil((most - origin[a]) / size) + 2)
         for i in range(low[0], high[0] + 1):
             for j in range(low[1], high[1] + 1):
                 for k in range(low[2], high[2] + 1):

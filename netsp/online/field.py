@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import zipfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -202,7 +203,7 @@ class DistanceField:
     def load(cls, path: str | Path) -> DistanceField:
         """Read what `save` wrote; InputError if it is something else."""
         try:
-            with np.load(path, allow_pickle=False) as data:
+            with open(path, "rb") as file, np.load(file, allow_pickle=False) as data:
                 if int(data["version"]) != FILE_VERSION:
                     raise InputError(f"{path}: a distance field of another version")
                 arrays = Field(**{k: data[k] for k in Field._fields})
@@ -219,5 +220,5 @@ class DistanceField:
                 )
         except OSError as error:
             raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
-        except (KeyError, ValueError, TypeError) as error:
+        except (KeyError, ValueError, TypeError, EOFError, zipfile.BadZipFile) as error:
             raise InputError(f"{path}: not a distance field of netsp: {error}") from None

@@ -90,10 +90,11 @@ def _solids(field, x, y, z):
 
 @njit(cache=True)
 def _cell(grid, place, x, y, z):
-    """Cell and the fractions within it; whether the point lies in the grid."""
+    """Cell and the fractions within it; whether the point lies in the grid, to within rounding."""
     nx, ny, nz = grid.shape
     u, v, w = (x - place[0]) / place[3], (y - place[1]) / place[3], (z - place[2]) / place[3]
-    inside = 0.0 <= u <= nx - 1 and 0.0 <= v <= ny - 1 and 0.0 <= w <= nz - 1
+    e = 1e-6
+    inside = -e <= u <= nx - 1 + e and -e <= v <= ny - 1 + e and -e <= w <= nz - 1 + e
     if not inside:
         return 0, 0, 0, 0.0, 0.0, 0.0, False
     i, j, k = min(int(u), nx - 2), min(int(v), ny - 2), min(int(w), nz - 2)
@@ -101,23 +102,32 @@ def _cell(grid, place, x, y, z):
 
 
 @njit(cache=True)
-def _beyond(place, x, y, z):
-    """Outside the grid: distance to the bounding box of all that is solid, a lower bound of the
-    distance that grows as one goes away."""
-    dx = max(place[4] - x, 0.0) + min(place[7] - x, 0.0)
-    dy = max(place[5] - y, 0.0) + min(place[8] - y, 0.0)
-    dz = max(place[6] - z, 0.0) + min(place[9] - z, 0.0)
-    d = math.sqrt(dx * dx + dy * dy + dz * dz)
-    if d == 0.0:
-        return 0.0, 0.0, 0.0, 1.0
-    return d, -dx / d, -dy / d, -dz / d
+def _border(grid, place, x, y, z):
+    """The point of the grid nearest to one outside of it."""
+    nx, ny, nz = grid.shape
+    h = place[3]
+    return (
+        min(max(x, place[0]), place[0] + (nx - 1) * h),
+        min(max(y, place[1]), place[1] + (ny - 1) * h),
+        min(max(z, place[2]), place[2] + (nz - 1) * h),
+    )
 
 
 @njit(cache=True)
 def _voxel_distance(grid, place, x, y, z):
     i, j, k, u, v, w, inside = _cell(grid, place, x, y, z)
     if not inside:
-        return _beyond(place, x, y, z)[0]
+        # all solids lie in the grid, a box: seen from its nearest point c, they are behind it, so
+        # no distance is below hypot(|p - c|, d(c))
+        bx, by, bz = _border(grid, place, x, y, z)
+        i, j, k, u, v, w, _ = _cell(grid, place, bx, by, bz)
+        value = _trilinear(grid, i, j, k, u, v, w)
+        return math.sqrt((x - bx) ** 2 + (y - by) ** 2 + (z - bz) ** 2 + max(value, 0.0) ** 2)
+    return _trilinear(grid, i, j, k, u, v, w)
+
+
+@njit(cache=True)
+def _trilinear(grid, i, j, k, u, v, w):
     a = (1.0 - w) * grid[i, j, k] + w * grid[i, j, k + 1]
     b = (1.0 - w) * grid[i, j + 1, k] + w * grid[i, j + 1, k + 1]
     c = (1.0 - w) * grid[i + 1, j, k] + w * grid[i + 1, j, k + 1]
@@ -127,9 +137,6 @@ def _voxel_distance(grid, place, x, y, z):
 
 @njit(cache=True)
 def _voxels(grid, place, x, y, z):
-    _i, _j, _k, _u, _v, _w, inside = _cell(grid, place, x, y, z)
-    if not inside:
-        return _beyond(place, x, y, z)
     # half a voxel to either side: a central difference does not jump at the cells' faces
     h = 0.5 * place[3]
     d = _voxel_distance(grid, place, x, y, z)

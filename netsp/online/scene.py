@@ -113,21 +113,21 @@ class Box(BaseModel):
     size: tuple[Positive, Positive, Positive]
     rotation: tuple[Number, Number, Number] = (0.0, 0.0, 0.0)
 
-    def _axes(self) -> Floats:
+    def axes(self) -> Floats:
+        """Rows: the axes of the box in the world."""
         from scipy.spatial.transform import Rotation
 
-        # rows are the box's axes in the world
         return np.asarray(Rotation.from_euler("xyz", self.rotation, degrees=True).as_matrix().T)
 
     def row(self) -> Row:
         half = [0.5 * s for s in self.size]
-        return kinds.BOX, [*self.center, *half, *self._axes().ravel()]
+        return kinds.BOX, [*self.center, *half, *self.axes().ravel()]
 
     def thickness(self) -> float:
         return min(self.size)
 
     def box(self) -> Floats:
-        reach = 0.5 * np.abs(self._axes()).T @ np.array(self.size)
+        reach = 0.5 * np.abs(self.axes()).T @ np.array(self.size)
         return np.array([np.array(self.center) - reach, np.array(self.center) + reach])
 
 

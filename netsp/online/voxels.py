@@ -49,7 +49,7 @@ def of_mesh(
     InputError : not readable, no triangles, coordinates that are not finite, a grid too large for
         `memory_limit` (GiB), or trimesh is not installed.
     """
-    vertices, faces = _read_mesh(path)
+    vertices, faces = read_mesh(path)
     return of_triangles(
         vertices * scale, faces, voxel=voxel, memory_limit=memory_limit,
         on_progress=on_progress, source=str(path),
@@ -261,7 +261,8 @@ def _spacing(points: Floats) -> float:
     return float(np.quantile(far[:, -1], 0.95))
 
 
-def _read_mesh(path: str | Path) -> tuple[Floats, npt.NDArray[np.int64]]:
+def read_mesh(path: str | Path) -> tuple[Floats, npt.NDArray[np.int64]]:
+    """Vertices (n, 3) and faces (m, 3) of a mesh file. InputError if there are none."""
     trimesh = _trimesh()
     _exists(path)
     try:
