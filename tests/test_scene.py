@@ -39,7 +39,7 @@ points = st.tuples(*[st.floats(-2, 2)] * 3).map(np.array)
 
 
 @pytest.mark.parametrize("solid", ALL, ids=lambda s: next(iter(s)))
-@settings(max_examples=40)
+@settings(max_examples=40, deadline=None)
 @given(p=points, q=points)
 def test_distances_are_lipschitz_and_gradients_lead_to_the_surface(solid, p, q):
     field = field_of(solid)

@@ -118,11 +118,15 @@ def _voxel_distance(grid, place, x, y, z):
     i, j, k, u, v, w, inside = _cell(grid, place, x, y, z)
     if not inside:
         # all solids lie in the grid, a box: seen from its nearest point c, they are behind it, so
-        # no distance is below hypot(|p - c|, d(c))
+        # no distance is below hypot(|p - c|, d(c)), nor below that to their bounding box
         bx, by, bz = _border(grid, place, x, y, z)
         i, j, k, u, v, w, _ = _cell(grid, place, bx, by, bz)
-        value = _trilinear(grid, i, j, k, u, v, w)
-        return math.sqrt((x - bx) ** 2 + (y - by) ** 2 + (z - bz) ** 2 + max(value, 0.0) ** 2)
+        value = max(_trilinear(grid, i, j, k, u, v, w), 0.0)
+        behind = (x - bx) ** 2 + (y - by) ** 2 + (z - bz) ** 2 + value * value
+        dx = max(place[4] - x, 0.0, x - place[7])
+        dy = max(place[5] - y, 0.0, y - place[8])
+        dz = max(place[6] - z, 0.0, z - place[9])
+        return math.sqrt(max(behind, dx * dx + dy * dy + dz * dz))
     return _trilinear(grid, i, j, k, u, v, w)
 
 

@@ -43,6 +43,7 @@ from netsp.online.tether.strand import (
     remove,
     sweep_is_free,
     take_frame,
+    way_out,
 )
 
 HELD, HELD_SHARP = 0.5, 0.2
@@ -130,12 +131,7 @@ def repair(field, strand, count, slip, delta):
         if strand[i, USED] > 1.0:
             low, where = look_along(field, strand, i, slip)
             if low < -slip and budget > 0:
-                mx = strand[i, X] + where * (strand[i + 1, X] - strand[i, X])
-                my = strand[i, Y] + where * (strand[i + 1, Y] - strand[i, Y])
-                mz = strand[i, Z] + where * (strand[i + 1, Z] - strand[i, Z])
-                for _ in range(2):
-                    d, nx, ny, nz, _ = sample(field, mx, my, mz)
-                    mx, my, mz = mx - d * nx, my - d * ny, mz - d * nz
+                mx, my, mz = way_out(field, strand, i, where, slip)
                 strand, count = insert(strand, count, i + 1, mx, my, mz)
                 budget -= 1
                 continue

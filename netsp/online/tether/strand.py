@@ -127,21 +127,23 @@ def look_along(field, strand, i, tolerance):
         return 0.0, 0.0
     low, where, s = math.inf, 0.0, 0.0
     reach0 = reach1 = 1e6 * tolerance
+    before, step = 0.0, 0.0
     while True:
         t = s / length
         d = distance(field, ax + t * (bx - ax), ay + t * (by - ay), az + t * (bz - az))
         if d < low:
             low, where = d, t
-        room = max(d + tolerance, 0.0)
-        # a point at fraction t moves by (1 - t) of the first end's motion and t of the second's;
-        # in the gap to the next sample the distance may fall by half of what is skipped
-        if t < 1.0:
-            reach0 = min(reach0, room / (1.0 - t))
-        if t > 0.0:
+        if s > 0.0:
+            # between two samples the distance is at least that of both cones: it falls by at most
+            # the way. A point at fraction t moves by (1 - t) of the first end's motion and t of
+            # the second's.
+            room = max(0.5 * (before + d - step) + tolerance, 0.0)
+            reach0 = min(reach0, room / (1.0 - (s - step) / length))
             reach1 = min(reach1, room / t)
         if s >= length:
             break
-        s = min(length, s + max(d, 0.0) + tolerance)
+        before, step = d, min(0.7 * max(d, 0.0) + tolerance, length - s)
+        s = length if s + step >= length * (1.0 - 1e-12) else s + step
     strand[i, REACH0] = max(reach0, 1e-6 * tolerance)
     strand[i, REACH1] = max(reach1, 1e-6 * tolerance)
     strand[i, USED] = 0.0
@@ -181,6 +183,54 @@ def let_go(strand, i):
 
 
 @njit(cache=True)
+def edge_point(ax, ay, az, na, da, bx, by, bz, nb, db, px, py, pz):
+    """The point nearest to p on the planes that touch the solid near a and near b (distances da and
+    db, normals na and nb there), and the sine of their angle; p itself if they are parallel."""
+    cosine = na[0] * nb[0] + na[1] * nb[1] + na[2] * nb[2]
+    det = 1.0 - cosine * cosine
+    if det < 1e-9:
+        return px, py, pz, 0.0
+    # q = p + s na + t nb on both planes
+    r = -da - (px - ax) * na[0] - (py - ay) * na[1] - (pz - az) * na[2]
+    q = -db - (px - bx) * nb[0] - (py - by) * nb[1] - (pz - bz) * nb[2]
+    s, t = (r - cosine * q) / det, (q - cosine * r) / det
+    return (
+        px + s * na[0] + t * nb[0],
+        py + s * na[1] + t * nb[1],
+        pz + s * na[2] + t * nb[2],
+        math.sqrt(det),
+    )
+
+
+@njit(cache=True)
+def way_out(field, strand, i, where, slip):
+    """Where a strand that is too deep at fraction `where` of edge i comes to the surface: on the
+    sharp edge of the solid if it cuts one off, else straight out."""
+    ux = strand[i + 1, X] - strand[i, X]
+    uy = strand[i + 1, Y] - strand[i, Y]
+    uz = strand[i + 1, Z] - strand[i, Z]
+    length = math.sqrt(ux * ux + uy * uy + uz * uz)
+    mx = strand[i, X] + where * ux
+    my = strand[i, Y] + where * uy
+    mz = strand[i, Z] + where * uz
+    s = min(slip, 0.5 * length * min(where, 1.0 - where)) / length
+    ax, ay, az = mx - s * ux, my - s * uy, mz - s * uz
+    bx, by, bz = mx + s * ux, my + s * uy, mz + s * uz
+    da, fx, fy, fz, _ = sample(field, ax, ay, az)
+    db, gx, gy, gz, _ = sample(field, bx, by, bz)
+    qx, qy, qz, sine = edge_point(
+        ax, ay, az, (fx, fy, fz), da, bx, by, bz, (gx, gy, gz), db, mx, my, mz
+    )
+    near = (qx - mx) ** 2 + (qy - my) ** 2 + (qz - mz) ** 2 <= (4.0 * slip) ** 2
+    if sine > SHARP_SINE and near and abs(distance(field, qx, qy, qz)) < 0.1 * slip:
+        return qx, qy, qz
+    for _ in range(2):
+        d, nx, ny, nz, _ = sample(field, mx, my, mz)
+        mx, my, mz = mx - d * nx, my - d * ny, mz - d * nz
+    return mx, my, mz
+
+
+@njit(cache=True)
 def take_frame(field, strand, i, spread, flat, reach):
     """Slide direction and normal of contact i, from the surface a little before and after it.
 
@@ -207,12 +257,10 @@ def take_frame(field, strand, i, spread, flat, reach):
     qx, qy, qz = px, py, pz
     strand[i, SHARP] = 0.0
     if sine > SHARP_SINE and cosine > -0.95:
-        # q = p + a n1 + b n2 on both planes
-        r1 = -d1 - s * (ux * ax + uy * ay + uz * az)
-        r2 = -d2 + t * (wx * bx + wy * by + wz * bz)
-        det = 1.0 - cosine * cosine
-        a, b = (r1 - cosine * r2) / det, (r2 - cosine * r1) / det
-        qx, qy, qz = px + a * ax + b * bx, py + a * ay + b * by, pz + a * az + b * bz
+        qx, qy, qz, _ = edge_point(
+            px - s * ux, py - s * uy, pz - s * uz, (ax, ay, az), d1,
+            px + t * wx, py + t * wy, pz + t * wz, (bx, by, bz), d2, px, py, pz,
+        )  # fmt: skip
         if (qx - px) ** 2 + (qy - py) ** 2 + (qz - pz) ** 2 <= reach * reach:
             strand[i, SHARP] = 1.0
         else:

@@ -1,0 +1,253 @@
+"""The taut tether is as long as geometry says, keeps its class, and forgets how it was driven."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from netsp import InputError, Problem
+from netsp.hsignature import signature
+from netsp.online import GeodesicTether, ReactTether, Scene
+from netsp.online.field import DistanceField
+from netsp.online.voxels import of_triangles
+from netsp.roadmap.paths import TautPaths
+from netsp.worlds import random_world
+
+
+def model(*solids, delta=0.05, kind=GeodesicTether, **more):
+    return kind(Scene(solids=solids).field(), delta, **more)
+
+
+def around(a, b, centre, radius, long_way=False):
+    """Length of the taut path about a circle from a to b, both outside."""
+    u, v = np.subtract(a, centre), np.subtract(b, centre)
+    p, q = np.hypot(*u), np.hypot(*v)
+    turn = abs(math.remainder(math.atan2(v[1], v[0]) - math.atan2(u[1], u[0]), 2 * math.pi))
+    if long_way:
+        turn = 2 * math.pi - turn
+    arc = turn - math.acos(radius / p) - math.acos(radius / q)
+    return math.sqrt(p * p - radius**2) + math.sqrt(q * q - radius**2) + radius * arc
+
+
+def random_drive(rng, field, start, steps, step, low, high):
+    """A path of free straight steps, that wanders."""
+    here, path = np.array(start, dtype=float), []
+    heading = rng.normal(size=3) * [1, 1, 0.1]
+    while len(path) < steps:
+        heading = heading / np.linalg.norm(heading) + 0.5 * rng.normal(size=3) * [1, 1, 0.1]
+        there = here + step * rng.uniform(0.2, 1.0) * heading / np.linalg.norm(heading)
+        inside = (there >= low).all() and (there <= high).all()
+        if inside and field.line_of_sight(here, there) and field.distance(there) > 1e-3:
+            here = there
+            path.append(here)
+        else:
+            heading = rng.normal(size=3) * [1, 1, 0.1]
+    return np.array(path)
+
+
+@pytest.mark.parametrize("family", ["icra2017", "harbour"])
+@pytest.mark.parametrize("seed", range(3))
+def test_among_prisms_length_and_word_are_those_of_the_offline_geometry(family, seed):
+    """Length within 0.5 %, class never wrong; 400 updates a world, looked at every 20."""
+    problem = random_world(seed, family=family, goals=3, tether_length=300.0)
+    field = Scene.from_problem(problem).field()
+    tethers = GeodesicTether(field, 2.0)
+    rng = np.random.default_rng(seed)
+    path = random_drive(rng, field, problem.base, 400, 9.0, [0, 0, -40], [500, 500, 40])
+    tether, checks = tethers.start(problem.base, problem.base), []
+    for k, point in enumerate(path):
+        tether = tethers.update(tether, point)
+        if k % 20 == 19:
+            checks.append((k, tether))
+    there = Problem(
+        base=problem.base, goals=[tuple(t.robot) for _, t in checks], tether_length=10_000,
+        obstacles=problem.obstacles, clearance=problem.clearance,
+    )  # fmt: skip
+    exact = TautPaths(there, 20_000.0)
+    reps = problem.representative_points
+    base = np.array(problem.base)
+    for goal, (k, tether) in enumerate(checks, start=1):
+        word = signature(np.vstack([base, path[: k + 1]])[:, :2], reps)
+        assert signature(tether.nodes[:, :2], reps) == word
+        assert tether.length == pytest.approx(exact.length(0, goal, word), rel=0.005)
+
+
+@pytest.mark.parametrize("turns", [0.7, 3, 5.25])
+@pytest.mark.parametrize("delta", [0.05, 0.2])
+def test_a_helix_on_a_cylinder(turns, delta):
+    """Unrolled it is a straight line: within 0.2 %, and usually within 0.005 %."""
+    tethers = model({"capsule": {"a": [0, 0, -30], "b": [0, 0, 30], "radius": 0.5}}, delta=delta)
+    angle = np.linspace(0.0, 2 * np.pi * turns, int(200 * turns))
+    path = np.column_stack([2 * np.cos(angle), 2 * np.sin(angle), 0.1 * angle])
+    tether, lengths = tethers.drive(tethers.start(path[0], path[0]), path)
+    planar = 2 * math.sqrt(4 - 0.25) + 0.5 * (angle[-1] - 2 * math.acos(0.25))
+    assert tether.length == pytest.approx(math.hypot(planar, 0.1 * angle[-1]), rel=0.002)
+    assert len(tether.contacts) == 1
+    back, _ = tethers.drive(tether, path[::-1])
+    assert back.length == pytest.approx(0.0, abs=0.01)
+    assert (np.diff(lengths) > -1e-3).all()
+
+
+def test_over_a_sphere():
+    tethers = model({"sphere": {"center": [0, 0, 0], "radius": 1}})
+    start = tethers.start([-2, 0, 0.5], [-2, 0, 3])
+    tether, _ = tethers.drive(start, [[2, 0.3, 3], [2, 0, 0.5]])
+    assert tether.length == pytest.approx(around((-2, 0.5), (2, 0.5), (0, 0), 1), rel=1e-3)
+    assert np.abs(tethers.refine(tether).nodes[:, 1]).max() < 0.01
+
+
+@pytest.mark.parametrize(
+    ("a", "via", "b", "centre", "radius"),
+    [  # in the plane of the ring, and through its hole, each in the coordinates of that plane
+        ((1.35, -0.9, 0), (2.5, 0, 0), (1.35, 0.9, 0), (0, 0), 1.3),
+        ((2, 0, 0.1), (0, 0, 1), (1.8, 0, -1), (1, 0), 0.3),
+    ],
+)
+def test_on_a_torus(a, via, b, centre, radius):
+    tethers = model({"torus": {"center": [0, 0, 0], "major_radius": 1, "minor_radius": 0.3}})
+    through = [via, (0, 0, -1), b] if a[1] == 0 else [via, b]
+    tether = tethers.lay([a, *through])
+    tether = tethers.refine(tether)
+    plane = [0, 2] if a[1] == 0 else [0, 1]
+    u, v = np.array(a)[plane], np.array(b)[plane]
+    exact = around(u, v, centre, radius, long_way=a[1] == 0)
+    assert tether.length == pytest.approx(exact, rel=0.002)
+
+
+@pytest.mark.parametrize("dy", [0.0, 1.0, 5.0])
+def test_over_the_edges_of_a_box(dy):
+    """Unfolded it is a straight line."""
+    tethers = model({"box": {"center": [0, 0, 0], "size": [2, 40, 2]}})
+    tether = tethers.lay([(-2, 0, 0), (-2, 0, 3), (2, dy, 3), (2, dy, 0)])
+    tether = tethers.refine(tether)
+    assert tether.length == pytest.approx(math.hypot(2 + 2 * math.sqrt(2), dy), rel=0.002)
+    assert tether.strand[1:-1, 14].all()  # both contacts are on sharp edges
+
+
+def test_voxels_of_a_mesh_give_nearly_the_length_of_the_solid():
+    trimesh = pytest.importorskip("trimesh")
+    mesh = trimesh.creation.cylinder(radius=0.5, height=6, sections=128)
+    field = DistanceField.build([], [], [], [], of_triangles(mesh.vertices, mesh.faces, voxel=0.05), 0)  # fmt: skip # noqa: E501
+    tethers = GeodesicTether(field, 0.1)
+    angle = np.linspace(0.0, 4 * np.pi, 400)
+    path = np.column_stack([2 * np.cos(angle), 2 * np.sin(angle), 0.1 * angle])
+    tether, _ = tethers.drive(tethers.start(path[0], path[0]), path)
+    planar = 2 * math.sqrt(4 - 0.25) + 0.5 * (angle[-1] - 2 * math.acos(0.25))
+    assert tether.length == pytest.approx(math.hypot(planar, 0.1 * angle[-1]), rel=0.005)
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_thin_poles_are_never_passed_and_the_way_back_undoes_the_way_out(seed):
+    """Poles of radius delta, steps of up to 1 m = 10 delta."""
+    rng = np.random.default_rng(seed)
+    poles = rng.uniform(0, 8, (25, 2))
+    tethers = model(*[{"post": {"center": list(c), "radius": 0.1}} for c in poles], delta=0.1)
+    start = np.array([-0.5, -0.5, 0.0])
+    path = random_drive(rng, tethers.field, start, 40, 1.0, [-1, -1, -3], [9, 9, 3])
+    tether, out = tethers.drive(tethers.start(start, start), path)
+    walked = np.vstack([start, path])[:, :2]
+    assert signature(tether.nodes[:, :2], poles) == signature(walked, poles)
+    tether, back = tethers.drive(tether, path[::-1])
+    assert np.allclose(back[::-1], out, rtol=0.001, atol=0.01)
+    assert tethers.update(tether, start).length == pytest.approx(0.0, abs=1e-9)
+
+
+posts = st.lists(st.tuples(st.floats(-3, 3), st.floats(-3, 3)), min_size=1, max_size=4)
+
+
+@settings(max_examples=25, deadline=None)
+@given(posts=posts, seed=st.integers(0, 10**6))
+def test_the_anchor_may_move_as_the_robot_does(posts, seed):
+    """The tether does not know which end is which."""
+    tethers = model(*[{"post": {"center": c, "radius": 0.4}} for c in posts], delta=0.1)
+    ends = np.array([[-5.0, -5.0, 0.0], [5.0, 5.0, 1.0]])
+    assume(tethers.field.line_of_sight(*ends))
+    rng = np.random.default_rng(seed)
+    path = random_drive(rng, tethers.field, ends[1], 15, 1.5, [-6, -6, -2], [6, 6, 2])
+    one, _ = tethers.drive(tethers.start(*ends), path)
+    other = tethers.start(ends[1], ends[0])
+    for point in path:
+        other = tethers.update(other, ends[0], anchor=point)
+    assert other.length == pytest.approx(one.length, rel=1e-3, abs=1e-3)
+    assert np.allclose(other.anchor, path[-1])
+
+
+def test_a_state_is_not_changed_by_looking_ahead():
+    tethers = model({"post": {"center": [0, 0], "radius": 0.5}})
+    tether = tethers.start([-2, 0.6, 0], [2, 0.6, 0])
+    before = tether.strand.copy()
+    far = tethers.update(tether, [2, -3, 0])
+    assert np.array_equal(before, tether.strand)
+    assert far.length > tether.length
+    again = tethers.update(tether, [2, -3, 0])
+    assert np.array_equal(far.strand, again.strand)
+
+
+def test_contacts_say_which_part_is_touched_and_how_long():
+    """Over one post and under the next: mirror images, each within a node of the exact arc."""
+    tethers = model(
+        {"post": {"center": [0, 0], "radius": 0.5}}, {"post": {"center": [3, 0], "radius": 0.5}}
+    )
+    tether = tethers.lay([(-2, 0, 0), (0, 1, 0), (1.5, 0, 0), (3, -1, 0), (5, 0, 0)])
+    assert [c.part for c in tether.contacts] == [0, 1]
+    # tangents from (-2, 0), and across between the posts
+    exact = 0.5 * (math.asin(0.5 / 2) + math.asin(0.5 / 1.5))
+    for contact in tether.contacts:
+        assert contact.length == pytest.approx(exact, abs=0.12)
+        assert contact.first <= contact.last
+
+
+def test_a_finer_resolution_gives_the_same_length():
+    """The capsules of a lattice, a helix about them; halving delta changes it little."""
+    legs = [[-1, -1], [1, -1], [1, 1], [-1, 1]]
+    capsules = [{"a": [x, y, -4], "b": [0.6 * x, 0.6 * y, 4], "radius": 0.2} for x, y in legs]
+    for (x, y), (u, v) in zip(legs, [*legs[1:], legs[0]], strict=True):
+        capsules.append({"a": [x, y, -4], "b": [0.6 * u, 0.6 * v, 4], "radius": 0.12})
+    solids = [{"capsule": c} for c in capsules]
+    angle = np.linspace(0, 5 * np.pi, 500)
+    path = np.column_stack([2.2 * np.cos(angle), 2.2 * np.sin(angle), -2 + 0.25 * angle])
+    lengths = [model(*solids, delta=d).lay(path).length for d in (0.15, 0.075, 0.02)]
+    assert lengths[0] == pytest.approx(lengths[2], rel=0.005)
+    assert lengths[1] == pytest.approx(lengths[2], rel=0.005)
+
+
+def test_what_is_too_thin_is_said():
+    wire = {"name": "wire", "capsule": {"a": [0, 0, 0], "b": [1, 0, 0], "radius": 0.02}}
+    assert "wire" in model(wire, delta=0.1).warnings[0]
+    assert model(wire, delta=0.02).warnings == ()
+
+
+@pytest.mark.parametrize("kind", [GeodesicTether, ReactTether])
+def test_bad_ends_are_named(kind):
+    tethers = model({"post": {"center": [0, 0], "radius": 0.5}}, kind=kind)
+    with pytest.raises(InputError, match=r"anchor: \(0, 0, 0\) lies 0\.5 inside"):
+        tethers.start([0, 0, 0], [1, 0, 0])
+    with pytest.raises(InputError, match="robot: expected three finite"):
+        tethers.start([1, 0, 0], [np.nan, 0, 0])
+    with pytest.raises(InputError, match="not in sight"):
+        tethers.start([-1, 0, 0], [1, 0, 0])
+    tether = tethers.start([1, 0, 0], [1, 1, 0])
+    with pytest.raises(InputError, match=r"robot: .* inside a solid"):
+        tethers.update(tether, [0.1, 0, 0])
+    with pytest.raises(InputError, match="delta"):
+        model({"post": {"center": [0, 0], "radius": 0.5}}, kind=kind, delta=0.0)
+
+
+def test_the_papers_model_in_both_readings():
+    """Three turns about a cylinder: the listing overestimates a little, the text unwinds them."""
+    solid = {"capsule": {"a": [0, 0, -30], "b": [0, 0, 30], "radius": 0.5}}
+    angle = np.linspace(0.0, 6 * np.pi, 600)
+    path = np.column_stack([2 * np.cos(angle), 2 * np.sin(angle), 0.1 * angle])
+    exact = math.hypot(
+        2 * math.sqrt(3.75) + 0.5 * (angle[-1] - 2 * math.acos(0.25)), 0.1 * angle[-1]
+    )
+    listing = model(solid, kind=ReactTether, delta=0.1)
+    tether, _ = listing.drive(listing.start(path[0], path[0]), path)
+    assert exact * 0.999 < tether.length < 1.1 * exact
+    text = model(solid, kind=ReactTether, delta=0.1, reading="text")
+    tether, _ = text.drive(text.start(path[0], path[0]), path)
+    assert tether.length < 0.6 * exact
+    with pytest.raises(InputError, match="reading"):
+        model(solid, kind=ReactTether, reading="both")
