@@ -1,24 +1,25 @@
 """`geodesic`: a tether that is the locally shortest curve of its homotopy class.
 
 Our own model. What it promises, and why, is told in `netsp.online.tether.pull` and docs/tether.md:
-it passes through nothing thicker than 1.5 delta, its length is that of the curve and not of its
+it passes through nothing thicker than 1.8 delta, its length is that of the curve and not of its
 chords, and it depends on the robot's position and the class alone, so driving back undoes driving.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
 from netsp.errors import InputError
 from netsp.online.field import DistanceField
-from netsp.online.tether.pull import drive, pull, pull_end
+from netsp.online.tether.pull import drive, follow, pull
 from netsp.online.tether.strand import STALE, length_of
 from netsp.online.tether.tether import Floats, Tether, strand_of
 
-THINNEST = 1.5
+THINNEST = 1.8
 """In units of delta: no solid thicker than this is ever passed."""
 
 
@@ -28,9 +29,9 @@ class GeodesicTether:
 
     field : the scene.
     delta : metres; resolution. Edges over a surface dip into it by at most delta / 8 (their length
-        is corrected for it), and solids thinner than 1.5 delta may be lost.
+        is corrected for it), and solids thinner than 1.8 delta may be lost.
     precision : metres; the rounds end when no node moves by more. Default delta / 200.
-    rounds : at most so many in one update, and one more for every delta / 4 that the robot moved.
+    rounds : at most so many in one update, and one more for every delta / 5 that the robot moved.
         Where the tether slips over an edge it may take a few updates to come to rest; until then
         its length is too long, and `Tether.residual` above `precision`.
 
@@ -46,7 +47,7 @@ class GeodesicTether:
     field: DistanceField
     delta: float = 0.1
     precision: float | None = None
-    rounds: int = 12
+    rounds: int = 6
 
     name = "geodesic"
 
@@ -54,7 +55,7 @@ class GeodesicTether:
         if not 0.0 < self.delta < np.inf:
             raise InputError(f"delta: expected a positive length, got {self.delta!r}")
 
-    @property
+    @cached_property
     def _settings(self) -> tuple[float, float, float, int, float]:
         precision = self.precision if self.precision is not None else 5e-3 * self.delta
         voxel = self.field.voxel
@@ -110,17 +111,18 @@ class GeodesicTether:
         ------
         InputError : robot or anchor not finite, or deeper than delta / 4 inside a solid.
         """
-        strand, count, residual = tether.strand.copy(), len(tether.strand), tether.residual
-        for end, target in ((False, anchor), (True, robot)):
+        strand, length, residual = tether.strand, tether.length, tether.residual
+        for last, target in ((False, anchor), (True, robot)):
             if target is None:
                 continue
-            x, y, z = self.field.free_point(
-                target, "robot" if end else "anchor", depth=0.25 * self.delta
+            x, y, z = (float(v) for v in np.asarray(target, dtype=float).ravel()[:3])
+            new, residual, length, depth = follow(
+                self.field.arrays, strand, last, x, y, z, *self._settings
             )
-            strand, count, residual = pull_end(
-                self.field.arrays, strand, count, end, x, y, z, *self._settings
-            )
-        return _state(strand, count, residual)
+            if not depth <= 0.25 * self.delta or np.size(target) != 3:
+                self.field.free_point(target, "robot" if last else "anchor", 0.25 * self.delta)
+            strand = new
+        return Tether(strand, length, residual)
 
     def drive(self, tether: Tether, path: npt.ArrayLike) -> tuple[Tether, Floats]:
         """The tether after the robot has followed a path (k, 3), and its length at each point:

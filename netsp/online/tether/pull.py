@@ -1,11 +1,11 @@
 """Pull a strand taut without letting it through anything: the kernel of the geodesic model.
 
-Invariant: every edge is nowhere deeper than ``slip`` = delta / 8 inside a solid, and every node is
-on a surface or free. A motion either sweeps free water, or is no longer than ``stride`` =
-delta / 4. So no point of the strand is ever deeper than slip + stride, and putting a node back on
-the surface sweeps no deeper than twice that: 3/4 delta. A solid thicker than 1.5 delta therefore
-keeps the strand on its side: the homotopy class never changes. (Distances are 1-Lipschitz; that is
-all the argument needs.)
+Invariant: every node is on a surface or free, and no sample of an edge is deeper than ``slip`` =
+delta / 8 inside a solid, the samples so dense that no point between them is deeper than delta / 4.
+A motion either sweeps free water, or is no longer than ``stride`` = delta / 5. So no point of the
+strand is ever deeper than 0.45 delta, and putting a node back on the surface sweeps no deeper than
+twice that. A solid thicker than 1.8 delta therefore keeps the strand on its side: the homotopy
+class never changes. (Distances are 1-Lipschitz; that is all the argument needs.)
 
 Taut: with its nodes on rulings (`strand.take_frame`) the strand's length is, to first order in the
 motions along them, a sum over edges; its Hessian is tridiagonal and its minimum one Newton step
@@ -19,7 +19,7 @@ import math
 import numpy as np
 from numba import njit
 
-from netsp.online.sampling import sample
+from netsp.online.sampling import distance, sample
 from netsp.online.tether.strand import (
     CURVE,
     EX,
@@ -41,15 +41,23 @@ from netsp.online.tether.strand import (
     look_along,
     moved,
     remove,
+    rests,
     sweep_is_free,
     take_frame,
     way_out,
 )
 
+SLIP, STRIDE = 0.125, 0.2
+"""In units of delta; see above."""
+
 HELD, HELD_SHARP = 0.5, 0.2
 """A contact holds the strand when at least this share of the two edges' pull goes into the surface:
 else the strand slips off, as where it doubles back."""
 
+
+DAMPING = 0.01
+"""Added to the stiffness of a contact: one that slides along the strand itself has none of its own,
+and no reason to move."""
 
 CONVEX = 0.5
 """Most of a contact's stiffness that convexity may take away: on a sphere all of it goes where the
@@ -60,8 +68,7 @@ strand reaches half way round."""
 def pull_end(field, strand, count, last, x, y, z, delta, spread, flat, rounds, precision):
     """Move one end (the robot's if `last`) to (x, y, z) and pull taut. Returns (strand, count,
     residual): the strand may have been copied to grow; residual is the last round's motion."""
-    stride = 0.25 * delta
-    slip = 0.125 * delta
+    stride, slip = STRIDE * delta, SLIP * delta
     end = count - 1 if last else 0
     left = 2.0
     residual = 0.0
@@ -101,7 +108,7 @@ def pull_end(field, strand, count, last, x, y, z, delta, spread, flat, rounds, p
 def pull(field, strand, count, delta, spread, flat, rounds, precision):
     """Rounds of: put edges back that went too deep, drop nodes that hold nothing, slide the others
     to where the strand is shortest; until no node moves by more than `precision`."""
-    slip, stride = 0.125 * delta, 0.25 * delta
+    slip, stride = SLIP * delta, STRIDE * delta
     most, damping = 0.0, 1.0
     for _ in range(rounds):
         before = count
@@ -145,8 +152,7 @@ def refresh(field, strand, count, spread, flat, stride, delta):
     most = 0.0
     for i in range(1, count - 1):
         # a node that was let go stays in the air until it lands (STALE is infinite then)
-        rests = strand[i, NX] != 0.0 or strand[i, NY] != 0.0 or strand[i, NZ] != 0.0
-        if strand[i, STALE] > 0.05 * delta and (rests or strand[i, STALE] == math.inf):
+        if strand[i, STALE] > 0.15 * delta and (rests(strand, i) or strand[i, STALE] == math.inf):
             by = take_frame(field, strand, i, spread, flat, stride)
             moved(strand, count, i, by)
             strand[i, STALE] = 0.0
@@ -235,12 +241,12 @@ def slide(field, strand, count, stride, precision, damping):
         b = strand[k + 1, EX] * ux + strand[k + 1, EY] * uy + strand[k + 1, EZ] * uz
         if k > 0:
             slope[k - 1] -= a
-            diagonal[k - 1] += (1.0 - a * a) / length
+            diagonal[k - 1] += (1.0 - a * a + DAMPING) / length
             pressing[k - 1] -= ux * strand[k, NX] + uy * strand[k, NY] + uz * strand[k, NZ]
         if k < n:
             pressing[k] += ux * strand[k + 1, NX] + uy * strand[k + 1, NY] + uz * strand[k + 1, NZ]
             slope[k] += b
-            diagonal[k] += (1.0 - b * b) / length
+            diagonal[k] += (1.0 - b * b + DAMPING) / length
         if 0 < k < n:
             ee = (
                 strand[k, EX] * strand[k + 1, EX]
@@ -281,6 +287,19 @@ def slide(field, strand, count, stride, precision, damping):
             strand[i, Z] -= d * nz
         moved(strand, count, i, abs(by))
     return f * most
+
+
+@njit(cache=True)
+def follow(field, strand, last, x, y, z, delta, spread, flat, rounds, precision):
+    """`pull_end` on a copy, with what its callers ask next. Returns (strand, residual, length,
+    depth): depth is how deep the target lies inside a solid; then nothing is done."""
+    depth = -distance(field, x, y, z)
+    if depth > 0.25 * delta:
+        return strand, 0.0, 0.0, depth
+    strand, count, residual = pull_end(
+        field, strand.copy(), len(strand), last, x, y, z, delta, spread, flat, rounds, precision
+    )
+    return strand[:count].copy(), residual, length_of(strand, count), depth
 
 
 @njit(cache=True)

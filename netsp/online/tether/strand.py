@@ -125,6 +125,8 @@ def look_along(field, strand, i, tolerance):
         strand[i, REACH0] = strand[i, REACH1] = tolerance
         strand[i, USED] = 0.0
         return 0.0, 0.0
+    if length <= 8.0 * tolerance and rests(strand, i) and rests(strand, i + 1):
+        return _look_across(field, strand, i, length, tolerance)
     low, where, s = math.inf, 0.0, 0.0
     reach0 = reach1 = 1e6 * tolerance
     before, step = 0.0, 0.0
@@ -149,6 +151,37 @@ def look_along(field, strand, i, tolerance):
     strand[i, USED] = 0.0
     if low < 0.0:
         strand[i, EXTRA] = _arc_over(field, ax, ay, az, bx, by, bz, length, low, where)
+    return low, where
+
+
+@njit(cache=True)
+def rests(strand, i):
+    """Whether node i rests on something."""
+    return strand[i, NX] != 0.0 or strand[i, NY] != 0.0 or strand[i, NZ] != 0.0
+
+
+@njit(cache=True)
+def _look_across(field, strand, i, length, tolerance):
+    """`look_along` for a short edge between two contacts, by its quarter points: no point of it is
+    farther than an eighth of the edge, at most the tolerance, from one of them."""
+    low, where, middle = math.inf, 0.5, 0.0
+    for k in range(1, 4):
+        t = 0.25 * k
+        d = distance(
+            field,
+            strand[i, X] + t * (strand[i + 1, X] - strand[i, X]),
+            strand[i, Y] + t * (strand[i + 1, Y] - strand[i, Y]),
+            strand[i, Z] + t * (strand[i + 1, Z] - strand[i, Z]),
+        )
+        if k == 2:
+            middle = d
+        if d < low:
+            low, where = d, t
+    strand[i, REACH0] = strand[i, REACH1] = max(low + tolerance, 0.1 * tolerance)
+    strand[i, USED] = 0.0
+    if middle < 0.0:
+        a = 2.0 * math.atan(-2.0 * middle / length)
+        strand[i, EXTRA] = length * (a / math.sin(a) - 1.0)
     return low, where
 
 
