@@ -152,6 +152,37 @@ def test_overlapping_parts_unite_and_cavities_are_solid():
     assert voxel_field(grid).distance([0.0, 0.0, 0.0]) < 0
 
 
+def test_parts_turned_against_each_other_do_not_cancel():
+    box = trimesh.creation.box((2, 1, 1))
+    other = box.copy().apply_translation((1, 0, 0))
+    other.invert()
+    both = trimesh.util.concatenate([box, other])
+    grid = of_triangles(both.vertices, both.faces, voxel=0.04)
+    assert any("inside out" in n for n in grid.notes)
+    assert voxel_field(grid).distance([0.5, 0.0, 0.0]) < -0.4
+
+
+@pytest.mark.parametrize(
+    ("vertices", "faces", "more", "message"),
+    [
+        (np.eye(3), [[0, 1, 7]], {}, "corner"),
+        (np.eye(3)[:, :2], [[0, 1, 2]], {}, "vertices"),
+        (np.eye(4)[:, :3], [[0, 1, 2, 3]], {}, "faces"),
+        (np.eye(3), [[0, 1, 2]], {"voxel": float("nan")}, "voxel"),
+        (np.eye(3), [[0, 1, 2]], {"voxel": -1.0}, "voxel"),
+    ],
+)
+def test_meshes_of_no_use_are_refused(vertices, faces, more, message):
+    with pytest.raises(InputError, match=message):
+        of_triangles(vertices, faces, **more)
+
+
+def test_voxels_too_large_for_a_mesh_are_refused():
+    box = trimesh.creation.box((1, 1, 1))
+    with pytest.raises(InputError, match="smaller voxels"):
+        of_triangles(box.vertices, box.faces, voxel=50.0)
+
+
 def test_an_open_mesh_is_a_shell_and_says_so():
     sheet = trimesh.creation.box((1, 1, 1))
     faces = sheet.faces[np.abs(sheet.face_normals[:, 2] - 1.0) > 1e-9]  # no lid

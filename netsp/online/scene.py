@@ -83,7 +83,7 @@ class Cylinder(BaseModel):
 
     @model_validator(mode="after")
     def _long(self) -> Self:
-        if self.a == self.b:
+        if math.dist(self.a, self.b) < 1e-9:
             raise ValueError("a and b: expected two different points")
         return self
 
@@ -145,15 +145,16 @@ class Torus(BaseModel):
 
     @model_validator(mode="after")
     def _shape(self) -> Self:
-        if not any(self.axis):
-            raise ValueError("axis: expected a direction, got [0, 0, 0]")
+        if math.hypot(*self.axis) < 1e-9:
+            raise ValueError(f"axis: expected a direction, got {list(self.axis)}")
         if self.minor_radius > self.major_radius:
             raise ValueError(
                 f"minor_radius: expected at most major_radius {self.major_radius:g}, "
                 f"got {self.minor_radius:g}"
             )
-        if self.start is not None and not np.any(
-            np.abs(np.cross(self.start, self.axis)) > 1e-9 * np.abs(self.start).max()
+        if self.start is not None and not (
+            np.linalg.norm(np.cross(self.start, self.axis))
+            > 1e-6 * math.hypot(*self.start) * math.hypot(*self.axis)
         ):
             raise ValueError("start: expected a direction across the axis")
         if self.start is None and self.angle < 360.0:
@@ -250,8 +251,8 @@ class HalfSpace(BaseModel):
 
     @model_validator(mode="after")
     def _direction(self) -> Self:
-        if not any(self.normal):
-            raise ValueError("normal: expected a direction, got [0, 0, 0]")
+        if math.hypot(*self.normal) < 1e-9:
+            raise ValueError(f"normal: expected a direction, got {list(self.normal)}")
         return self
 
     def row(self) -> Row:

@@ -67,12 +67,21 @@ def of_triangles(
 ) -> VoxelGrid:
     """The distance grid of triangles: vertices (n, 3), faces (m, 3)."""
     v, f = np.asarray(vertices, dtype=float), np.asarray(faces, dtype=np.int64)
-    if len(f) == 0:
+    if f.size == 0:
         raise InputError(f"{source}: expected a mesh with triangles, got none")
+    if v.ndim != 2 or v.shape[1] != 3 or f.ndim != 2 or f.shape[1] != 3:
+        raise InputError(
+            f"{source}: expected vertices (n, 3) and faces (m, 3), got {v.shape} and {f.shape}"
+        )
+    if f.min() < 0 or f.max() >= len(v):
+        raise InputError(f"{source}: a face has a corner that is none of the {len(v)} vertices")
     if not np.isfinite(v).all():
         raise InputError(f"{source}: a vertex is not finite")
-    triangles = v[f]
     open_edges, uneven = _edges(f, v)
+    turned = 0
+    if not open_edges:
+        f, turned = _outward(f, v)
+    triangles = v[f]
     low, high = triangles.min((0, 1)), triangles.max((0, 1))
     size, origin, counts = _grid(low, high, voxel, memory_limit, source)
     notes = []
@@ -92,7 +101,9 @@ def of_triangles(
                 f"triangles at {uneven} edges are turned against each other: taken as solid "
                 "wherever the mesh winds at all"
             )
-        if np.abs(around).max(initial=0) > 1:
+        if turned:
+            notes.append(f"{turned} parts are turned inside out or cavities: taken as solid")
+        elif np.abs(around).max(initial=0) > 1:
             notes.append("parts of the mesh overlap: taken as their union")
         values = np.where(around != 0, -distances, distances)
     enclosed = _unreached(values)
@@ -100,6 +111,8 @@ def of_triangles(
         values[enclosed] = -np.abs(values[enclosed])
         if not open_edges:
             notes.append("closed cavities count as solid")
+    if not (values < 0.0).any():
+        raise InputError(f"{source}: no solid at voxels of {size:.3g}; expected smaller voxels")
     grow = size if open_edges else 0.0
     _tell(on_progress, "distances", 1.0)
     return VoxelGrid(values, origin, size, np.array([low - grow, high + grow]), tuple(notes))
@@ -219,6 +232,8 @@ def _grid(
     extra: float = 0.0,
 ) -> tuple[float, Floats, tuple[int, int, int]]:  # fmt: skip
     """Voxel size, origin and counts; InputError when the grid would be too large."""
+    if voxel is not None and not 0.0 < voxel < math.inf:
+        raise InputError(f"{source}: voxel: expected a positive length, got {voxel!r}")
     side = float((high - low).max())
     if side <= 0.0:
         raise InputError(f"{source}: all points are the same")
@@ -250,6 +265,25 @@ def _edges(faces: npt.NDArray[np.int64], vertices: Floats) -> tuple[int, int]:
     uses = np.bincount(index.ravel(), minlength=len(undirected))
     balance = np.bincount(index.ravel(), np.where(turned, 1, -1), minlength=len(undirected))
     return int((uses % 2 == 1).sum()), int(((uses % 2 == 0) & (balance != 0)).sum())
+
+
+def _outward(faces: npt.NDArray[np.int64], vertices: Floats) -> tuple[npt.NDArray[np.int64], int]:
+    """The faces with every connected part turned so that its volume is positive, and how many parts
+    were not. So overlapping parts never cancel, and what is in a cavity is solid."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    _, same = np.unique(np.round(vertices, 9), axis=0, return_inverse=True)
+    f = same.ravel()[faces]
+    links = coo_array((np.ones(2 * len(f)), (np.r_[f[:, 0], f[:, 1]], np.r_[f[:, 1], f[:, 2]])))
+    count = int(f.max()) + 1
+    links.resize((count, count))
+    _, part = connected_components(links, directed=False)
+    part = part[f[:, 0]]
+    a, b, c = (vertices[faces[:, k]] - vertices.mean(0) for k in range(3))
+    volume = np.bincount(part, np.einsum("ij,ij->i", a, np.cross(b, c)))
+    wrong = volume[part] < 0.0
+    return np.where(wrong[:, None], faces[:, ::-1], faces), int((volume < 0.0).sum())
 
 
 def _spacing(points: Floats) -> float:

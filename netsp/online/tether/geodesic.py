@@ -1,8 +1,11 @@
 """`geodesic`: a tether that is the locally shortest curve of its homotopy class.
 
 Our own model. What it promises, and why, is told in `netsp.online.tether.pull` and docs/tether.md:
-it passes through nothing thicker than 1.8 delta, its length is that of the curve and not of its
-chords, and it depends on the robot's position and the class alone, so driving back undoes driving.
+it passes through nothing thicker than 1.8 delta, and its length is that of the curve and not of
+its chords. Where the shortest curve of a class is unique (among vertical prisms always), it depends
+on the robot's position and the class alone, so driving back undoes driving. Elsewhere a class may
+have several locally shortest curves (a tether that could slip off the end of a pipe): the tether
+keeps to the one it was driven to as long as there is one.
 """
 
 from __future__ import annotations
@@ -16,7 +19,7 @@ import numpy.typing as npt
 from netsp.errors import InputError
 from netsp.online.field import DistanceField
 from netsp.online.tether.pull import drive, follow, pull
-from netsp.online.tether.strand import STALE, length_of
+from netsp.online.tether.strand import length_of
 from netsp.online.tether.tether import Floats, Tether, strand_of
 
 THINNEST = 1.8
@@ -93,11 +96,13 @@ class GeodesicTether:
         for k, point in enumerate(points):
             self.field.free_point(point, f"path[{k}]")
         tether = self._taut(strand_of(np.array([points[0], points[0]])))
-        return self.drive(tether, points[1:])[0]
+        return self.refine(self.drive(tether, points[1:])[0])
 
-    def _taut(self, strand: Floats) -> Tether:
-        settings = self._settings
-        strand, count, residual = pull(self.field.arrays, strand, len(strand), *settings)
+    def _taut(self, strand: Floats, rounds: int | None = None) -> Tether:
+        delta, spread, flat, usual, precision = self._settings
+        strand, count, residual = pull(
+            self.field.arrays, strand, len(strand), delta, spread, flat, rounds or usual, precision
+        )
         return _state(strand, count, residual)
 
     def update(
@@ -131,19 +136,15 @@ class GeodesicTether:
         points = np.ascontiguousarray(path, dtype=float).reshape(-1, 3)
         if not np.isfinite(points).all():
             raise InputError("path: expected finite coordinates")
-        strand, count, lengths = drive(
+        strand, count, residual, lengths = drive(
             self.field.arrays, tether.strand.copy(), len(tether.strand), points, *self._settings
         )
-        return _state(strand, count, 0.0), lengths
+        return _state(strand, count, residual), lengths
 
     def refine(self, tether: Tether) -> Tether:
-        """The same tether, pulled until nothing moves; after a change of the scene, too."""
-        strand = tether.strand.copy()
-        strand[:, STALE] = np.inf
-        strand[1:-1, :3] = tether.nodes[1:-1]
-        fresh = strand_of(tether.nodes)
-        fresh[:, STALE] = np.inf
-        return self._taut(fresh)
+        """The same tether, every contact looked at afresh, pulled until nothing moves or for 5000
+        rounds (`Tether.residual` tells); after a change of the scene, too."""
+        return self._taut(strand_of(tether.nodes), rounds=5000)
 
     @property
     def warnings(self) -> tuple[str, ...]:

@@ -19,7 +19,7 @@ import math
 import numpy as np
 from numba import njit
 
-from netsp.online.sampling import distance, sample
+from netsp.online.sampling import distance
 from netsp.online.tether.strand import (
     CURVE,
     EX,
@@ -44,6 +44,7 @@ from netsp.online.tether.strand import (
     rests,
     sweep_is_free,
     take_frame,
+    to_surface,
     way_out,
 )
 
@@ -75,7 +76,7 @@ def pull_end(field, strand, count, last, x, y, z, delta, spread, flat, rounds, p
     ox, oy, oz = strand[end, X], strand[end, Y], strand[end, Z]
     way = math.sqrt((x - ox) ** 2 + (y - oy) ** 2 + (z - oz) ** 2)
     # the last round's count grows with the way: a node moves by at most a stride in each
-    last_rounds = rounds + min(10 * rounds, int(way / stride))
+    last_rounds = rounds + min(2000, int(way / stride))
     while left > 0.0:
         end = count - 1 if last else 0
         next_to = end - 1 if last else 1
@@ -139,11 +140,23 @@ def repair(field, strand, count, slip, delta):
             low, where = look_along(field, strand, i, slip)
             if low < -slip and budget > 0:
                 mx, my, mz = way_out(field, strand, i, where, slip)
+                if nearer(strand, i, mx, my, mz, 0.1 * slip):
+                    i += 1  # nothing is gained by a node upon another
+                    continue
                 strand, count = insert(strand, count, i + 1, mx, my, mz)
                 budget -= 1
                 continue
         i += 1
     return strand, count
+
+
+@njit(cache=True)
+def nearer(strand, i, x, y, z, reach):
+    """Whether an end of edge i is nearer to a point than `reach`."""
+    a = (strand[i, X] - x) ** 2 + (strand[i, Y] - y) ** 2 + (strand[i, Z] - z) ** 2
+    j = i + 1
+    b = (strand[j, X] - x) ** 2 + (strand[j, Y] - y) ** 2 + (strand[j, Z] - z) ** 2
+    return min(a, b) < reach * reach
 
 
 @njit(cache=True)
@@ -209,11 +222,11 @@ def lift(field, strand, count, slip, stride):
                 i = max(1, i - 1)
                 continue
             px, py, pz = px + f * hx, py + f * hy, pz + f * hz
-            d, nx, ny, nz, _ = sample(field, px, py, pz)
+            d = distance(field, px, py, pz)
             let_go(strand, i)
             moved(strand, count, i, f * h)
             if d < 0.0:
-                px, py, pz = px - d * nx, py - d * ny, pz - d * nz
+                px, py, pz = to_surface(field, px, py, pz, 1e-3 * stride)
                 moved(strand, count, i, math.inf)
             strand[i, X], strand[i, Y], strand[i, Z] = px, py, pz
         i += 1
@@ -281,10 +294,9 @@ def slide(field, strand, count, stride, precision, damping):
         strand[i, Y] += by * strand[i, EY]
         strand[i, Z] += by * strand[i, EZ]
         if strand[i, SHARP] == 0.0:  # rulings bend, edges do not
-            d, nx, ny, nz, _ = sample(field, strand[i, X], strand[i, Y], strand[i, Z])
-            strand[i, X] -= d * nx
-            strand[i, Y] -= d * ny
-            strand[i, Z] -= d * nz
+            strand[i, X], strand[i, Y], strand[i, Z] = to_surface(
+                field, strand[i, X], strand[i, Y], strand[i, Z], 1e-3 * stride
+            )
         moved(strand, count, i, abs(by))
     return f * most
 
@@ -304,12 +316,13 @@ def follow(field, strand, last, x, y, z, delta, spread, flat, rounds, precision)
 
 @njit(cache=True)
 def drive(field, strand, count, path, delta, spread, flat, rounds, precision):
-    """Take the robot along a path (k, 3). Returns (strand, count, lengths after each point)."""
-    lengths = np.empty(len(path))
+    """Take the robot along a path (k, 3). Returns (strand, count, residual, lengths after each
+    point)."""
+    lengths, residual = np.empty(len(path)), 0.0
     for k in range(len(path)):
-        strand, count, _ = pull_end(
+        strand, count, residual = pull_end(
             field, strand, count, True, path[k, 0], path[k, 1], path[k, 2],
             delta, spread, flat, rounds, precision,
         )  # fmt: skip
         lengths[k] = length_of(strand, count)
-    return strand, count, lengths
+    return strand, count, residual, lengths

@@ -216,6 +216,18 @@ def let_go(strand, i):
 
 
 @njit(cache=True)
+def to_surface(field, x, y, z, tolerance):
+    """From a point near the surface, or not deep, to the surface. Out of one solid may be into
+    another: in the crease between two it goes back and forth, ever less."""
+    for turn in range(12):
+        d, nx, ny, nz, _ = sample(field, x, y, z)
+        if -tolerance <= d and (turn > 0 or d <= tolerance):
+            break
+        x, y, z = x - d * nx, y - d * ny, z - d * nz
+    return x, y, z
+
+
+@njit(cache=True)
 def edge_point(ax, ay, az, na, da, bx, by, bz, nb, db, px, py, pz):
     """The point nearest to p on the planes that touch the solid near a and near b (distances da and
     db, normals na and nb there), and the sine of their angle; p itself if they are parallel."""
@@ -257,10 +269,7 @@ def way_out(field, strand, i, where, slip):
     near = (qx - mx) ** 2 + (qy - my) ** 2 + (qz - mz) ** 2 <= (4.0 * slip) ** 2
     if sine > SHARP_SINE and near and abs(distance(field, qx, qy, qz)) < 0.1 * slip:
         return qx, qy, qz
-    for _ in range(2):
-        d, nx, ny, nz, _ = sample(field, mx, my, mz)
-        mx, my, mz = mx - d * nx, my - d * ny, mz - d * nz
-    return mx, my, mz
+    return to_surface(field, mx, my, mz, 0.01 * slip)
 
 
 @njit(cache=True)
@@ -302,7 +311,8 @@ def take_frame(field, strand, i, spread, flat, reach):
     if d > reach:
         let_go(strand, i)
         return 0.0
-    qx, qy, qz = qx - d * nx, qy - d * ny, qz - d * nz
+    if abs(d) > 1e-4 * reach:
+        qx, qy, qz = to_surface(field, qx, qy, qz, 1e-3 * reach)
     if strand[i, SHARP] == 1.0:
         nx, ny, nz = ax + bx, ay + by, az + bz
         length = math.sqrt(nx * nx + ny * ny + nz * nz)
