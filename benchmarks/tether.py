@@ -15,7 +15,6 @@ import itertools
 import math
 import time
 from collections.abc import Callable, Sequence
-from itertools import pairwise
 
 import numpy as np
 from table import ROOT, head, heading, row
