@@ -196,8 +196,22 @@ def _parser() -> argparse.ArgumentParser:
     )
     p.set_defaults(run=_report)
 
+    p = commands.add_parser("simulate", help="run a mission in a scene with a taut tether")
+    p.add_argument("mission", metavar="MISSION", help="mission file (JSON)")
+    p.add_argument(
+        "--planner", default="predictive", metavar="NAME",
+        help="predictive (default), react, react-draft or none",
+    )  # fmt: skip
+    p.add_argument("--tether", type=_length, metavar="L", help="tether length, in place of its own")
+    p.add_argument("--snap", action="store_true", help="move waypoints out of solids")
+    p.add_argument(
+        "-o", "--output", metavar="RUN", help="folder for log.csv, summary.json and run.png"
+    )
+    p.add_argument("--quiet", action="store_true", help="no progress")
+    p.set_defaults(run=_simulate)
+
     p = commands.add_parser("schema", help="print the JSON Schema of a file format")
-    p.add_argument("format", choices=("problem", "solution", "scene"))
+    p.add_argument("format", choices=("problem", "solution", "scene", "mission"))
     p.set_defaults(run=_schema)
     return parser
 
@@ -500,11 +514,19 @@ def _report(args: argparse.Namespace) -> int:
     return 0
 
 
+def _simulate(args: argparse.Namespace) -> int:
+    from netsp.online.command import run_mission
+
+    return run_mission(args)
+
+
 def _schema(args: argparse.Namespace) -> int:
     import json
 
     if args.format == "problem":
         from netsp.problem import Problem as Model
+    elif args.format == "mission":
+        from netsp.online.mission import Mission as Model  # type: ignore[assignment]
     elif args.format == "scene":
         from netsp.online.scene import Scene as Model  # type: ignore[assignment]
     else:

@@ -1,9 +1,11 @@
-"""What `netsp plot` does with a scene: read a path, lay the tether along it, draw."""
+"""What `netsp plot` does with a scene, and `netsp simulate` with a mission."""
 
 from __future__ import annotations
 
 import argparse
+import json
 import sys
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
@@ -12,7 +14,10 @@ from netsp.errors import InputError
 from netsp.measuring import read_path
 from netsp.online import pictures
 from netsp.online.field import DistanceField
+from netsp.online.mission import Mission
+from netsp.online.planner import Planner
 from netsp.online.scene import Scene
+from netsp.online.simulate import STEP, LogRow, Run, simulate, write_run
 from netsp.online.tether import GeodesicTether, ReactTether, Tether
 from netsp.online.tether.geodesic import THINNEST
 
@@ -41,6 +46,65 @@ def plot_scene(args: argparse.Namespace) -> int:
         )
     pictures.save(scene, args.output, path=path, tether=tether)
     return 0
+
+
+EXIT_NOT_ALL = 4
+"""Some waypoints were given up, or the run was interrupted."""
+
+
+def run_mission(args: argparse.Namespace) -> int:
+    """`netsp simulate MISSION`: returns the exit code."""
+    mission = Mission.load(args.mission)
+    if args.tether is not None:
+        mission = mission.model_copy(update={"tether_length": args.tether})
+    if args.output is not None and Path(args.output).exists() and not Path(args.output).is_dir():
+        raise InputError(f"{args.output}: expected a folder, and it is a file")
+    scene = mission.load_scene()
+    field = scene.field(on_progress=tell)
+    show = not args.quiet and sys.stderr.isatty()
+
+    def on_step(row: LogRow, planner: Planner) -> None:
+        if show and int(row.time / STEP) % 20 == 0:
+            print(
+                f"\r{row.time:7.1f} s  waypoint {row.target}/{len(mission.waypoints)}  "
+                f"{row.mode:<8} tether {row.tether:.2f} of {mission.tether_length:g} {scene.units}   ",
+                end="",
+                file=sys.stderr,
+                flush=True,
+            )
+
+    run = simulate(mission, args.planner, scene=scene, field=field, snap=args.snap, on_step=on_step)
+    if show:
+        print(file=sys.stderr)
+    text = json.dumps(run.summary, indent=1, allow_nan=False)
+    if args.output is not None:
+        write_run(run, args.output)
+        pictures.save_run(run, scene, Path(args.output) / "run.png")
+    else:
+        print(text)
+    if not args.quiet:
+        print(describe(run, scene.units), file=sys.stderr)
+    complete = run.summary["status"] == "done" and not run.summary["skipped"]
+    return 0 if complete else EXIT_NOT_ALL
+
+
+def describe(run: Run, units: str) -> str:
+    """A run in a few lines."""
+    s = run.summary
+    lines = [
+        f"mission  {s['mission']}, planner {s['planner']}: {s['status']}",
+        f"visited  {s['visited']} of {s['waypoints']} waypoints",
+        f"time     {s['inspection_s']:.1f} s, and back along the tether "
+        f"{s['recovery_s']['tether']:.1f} s",
+        f"tether   longest {s['longest_tether_m']:.3f} of {s['tether_length']:g} {units}, "
+        f"too long for {s['exceedance_s']:.1f} s",
+        f"planning {s['replans']} times, median {1e3 * s['replan_median_s']:.1f} ms, worst "
+        f"{1e3 * s['replan_worst_s']:.0f} ms",
+    ]
+    lines += [f"left out {left['waypoint']}: {left['reason']}" for left in s["skipped"][:5]]
+    if len(s["skipped"]) > 5:
+        lines.append(f"         and {len(s['skipped']) - 5} more")
+    return "\n".join(lines)
 
 
 def lay(field: DistanceField, path: Floats, model: str, delta: float) -> Tether:

@@ -171,6 +171,11 @@ class DistanceField:
     def _size(self) -> float:
         return self.voxel or math.nan
 
+    def grown(self, by: float) -> DistanceField:
+        """The field of the same scene with everything grown by a clearance."""
+        arrays = self.arrays._replace(offset=float(self.arrays.offset) + by)
+        return DistanceField(arrays, self.voxel, self.notes, self.thickness)
+
     @property
     def box(self) -> Floats | None:
         """(2, 3) bounding box of the voxels' solid part; None without voxels."""

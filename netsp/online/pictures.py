@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from netsp.errors import InputError
 from netsp.online.scene import HalfSpace, Scene
+from netsp.online.simulate import Run
 from netsp.online.surfaces import Triangles, drawn_points, extent, mesh_of, surface_of
 from netsp.online.tether import Tether
 
@@ -55,6 +56,49 @@ def save(
             metadata = {"Date": None} if Path(file).suffix.lower() == ".svg" else None
             figure = _figure(scene, parts, way, nodes, (low, high), title)
             figure.savefig(file, dpi=150, metadata=metadata)
+    except OSError as error:
+        raise InputError(f"{file}: cannot be written: {error.strerror or error}") from None
+
+
+def save_run(run: Run, scene: Scene, file: str | Path) -> None:
+    """Draw a run: the tether's length over time, the way through the scene and the tether at the
+    end."""
+    from matplotlib.figure import Figure
+
+    t = np.array([r.time for r in run.log])
+    length = np.array([r.tether for r in run.log])
+    way = np.array([[r.x, r.y, r.z] for r in run.log])
+    recovering = np.array([r.mode == "recovery" for r in run.log])
+    limit = run.mission.tether_length
+    figure = Figure(figsize=(12, 5.5), layout="constrained")
+    left, right = figure.subplots(1, 2, width_ratios=[1.3, 1.0])
+    left.fill_between(
+        t, 0, 1, where=recovering, transform=left.get_xaxis_transform(), color="#fff3bf",
+        label="going another way",
+    )  # fmt: skip
+    left.plot(t, length, color=_TETHER, lw=1.4, label="taut tether")
+    left.axhline(limit, color=_ANCHOR, lw=1.0, ls="--", label="its limit")
+    left.set(xlabel="time (s)", ylabel=f"length ({scene.units})", ylim=(0, None))
+    left.legend(loc="lower right", fontsize=8)
+    low, high = extent(scene, way)
+    for _, (vertices, faces) in _parts(scene, low, high):
+        from matplotlib.collections import PolyCollection
+
+        flat: Any = vertices[faces][:, :, [0, 1]]
+        right.add_collection(PolyCollection(flat, facecolors="#d0d7de", linewidths=0))
+    _lines(right, way, run.tether.nodes, (0, 1))
+    right.set(
+        xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal", xlabel="x", ylabel="y"
+    )
+    right.legend(loc="lower right", fontsize=8)
+    right.set_title("from above", fontsize=9)
+    s = run.summary
+    figure.suptitle(
+        f"{s['mission']}, {s['planner']}: {s['visited']} of {s['waypoints']} waypoints in "
+        f"{s['inspection_s']:.0f} s, tether at most {s['longest_tether_m']:.2f} of {limit:g}"
+    )
+    try:
+        figure.savefig(file, dpi=130)
     except OSError as error:
         raise InputError(f"{file}: cannot be written: {error.strerror or error}") from None
 

@@ -33,7 +33,8 @@ class GeodesicTether:
     field : the scene.
     delta : metres; resolution. Edges over a surface dip into it by at most delta / 8 (their length
         is corrected for it), and solids thinner than 1.8 delta may be lost.
-    precision : metres; the rounds end when no node moves by more. Default delta / 200.
+    precision : metres; the rounds end when no node has farther to go, or the tether would get
+        shorter by less than 0.4 of it. Default delta / 200.
     rounds : at most so many in one update, and one more for every delta / 5 that the robot moved.
         Where the tether slips over an edge it may take a few updates to come to rest; until then
         its length is too long, and `Tether.residual` above `precision`.

@@ -30,6 +30,7 @@ from netsp.online.tether.strand import (
     NZ,
     SHARP,
     STALE,
+    STEP,
     USED,
     X,
     Y,
@@ -56,9 +57,17 @@ HELD, HELD_SHARP = 0.5, 0.2
 else the strand slips off, as where it doubles back."""
 
 
-DAMPING = 0.01
-"""Added to the stiffness of a contact: one that slides along the strand itself has none of its own,
-and no reason to move."""
+DAMPING = 0.02
+"""Stiffness of a contact that slides along the strand itself: it has none of its own, and no reason
+to move."""
+
+WORTH = 0.4
+"""A step is not taken unless it shortens the strand by this share of the precision: where all
+positions are nearly as good, rounding would keep the strand moving."""
+
+MOST_GAIN = 10.0
+"""Newton steps are lengthened by at most this: where rulings bend, they fall short of the minimum
+by a factor that shows from one step to the next."""
 
 CONVEX = 0.5
 """Most of a contact's stiffness that convexity may take away: on a sphere all of it goes where the
@@ -110,7 +119,7 @@ def pull(field, strand, count, delta, spread, flat, rounds, precision):
     """Rounds of: put edges back that went too deep, drop nodes that hold nothing, slide the others
     to where the strand is shortest; until no node moves by more than `precision`."""
     slip, stride = SLIP * delta, STRIDE * delta
-    most, damping = 0.0, 1.0
+    most, damping, gain = 0.0, 1.0, 1.0
     for _ in range(rounds):
         before = count
         strand, count = repair(field, strand, count, slip, delta)
@@ -119,7 +128,8 @@ def pull(field, strand, count, delta, spread, flat, rounds, precision):
         count, lifted = lift(field, strand, count, slip, stride)
         changed = changed or lifted > 0.0
         was = length_of(strand, count)
-        most = max(most, slide(field, strand, count, stride, precision, damping))
+        ahead, gain = slide(field, strand, count, stride, precision, damping, gain)
+        most = max(most, ahead)
         # shorter steps where the full one overshoots
         longer = length_of(strand, count) > was + 1e-3 * precision
         damping = max(0.1, 0.5 * damping) if longer else min(1.0, 1.5 * damping)
@@ -234,12 +244,12 @@ def lift(field, strand, count, slip, stride):
 
 
 @njit(cache=True)
-def slide(field, strand, count, stride, precision, damping):
-    """One Newton step of the length in the motions of the contacts along their directions; returns
-    the largest motion."""
+def slide(field, strand, count, stride, precision, damping, gain):
+    """One Newton step of the length in the motions of the contacts along their directions. `gain`
+    is what the step before was multiplied by. Returns (largest way still to go, gain)."""
     n = count - 2
     if n < 1:
-        return 0.0
+        return 0.0, 1.0
     slope, diagonal, beside = np.zeros(n), np.zeros(n), np.zeros(n)
     pressing = np.zeros(n)
     for k in range(count - 1):
@@ -254,12 +264,12 @@ def slide(field, strand, count, stride, precision, damping):
         b = strand[k + 1, EX] * ux + strand[k + 1, EY] * uy + strand[k + 1, EZ] * uz
         if k > 0:
             slope[k - 1] -= a
-            diagonal[k - 1] += (1.0 - a * a + DAMPING) / length
+            diagonal[k - 1] += (1.0 - a * a + DAMPING * a**16) / length
             pressing[k - 1] -= ux * strand[k, NX] + uy * strand[k, NY] + uz * strand[k, NZ]
         if k < n:
             pressing[k] += ux * strand[k + 1, NX] + uy * strand[k + 1, NY] + uz * strand[k + 1, NZ]
             slope[k] += b
-            diagonal[k] += (1.0 - b * b + DAMPING) / length
+            diagonal[k] += (1.0 - b * b + DAMPING * b**16) / length
         if 0 < k < n:
             ee = (
                 strand[k, EX] * strand[k + 1, EX]
@@ -273,6 +283,7 @@ def slide(field, strand, count, stride, precision, damping):
         diagonal[k] -= min(bend, CONVEX * diagonal[k])
         # a contact that is met head on cannot slide: a small weight keeps the system regular
         diagonal[k] = diagonal[k] * (1.0 + 1e-9) + 1e-9
+    pull_along = slope.copy()
     for k in range(1, n):
         w = beside[k - 1] / diagonal[k - 1]
         diagonal[k] -= w * beside[k - 1]
@@ -284,7 +295,21 @@ def slide(field, strand, count, stride, precision, damping):
             right -= beside[k] * slope[k + 1]
         slope[k] = right / max(diagonal[k], 1e-12)
         most = max(most, abs(slope[k]))
-    f = min(damping, stride / most) if most > 0.0 else 0.0
+    # e, the way to go, shrinks by gain * s when a step s = c e was taken gain times: c follows from
+    # two steps, and the next is taken 1 / c times
+    both, last = 0.0, 0.0
+    for k in range(n):
+        both += slope[k] * strand[k + 1, STEP]
+        last += strand[k + 1, STEP] ** 2
+        strand[k + 1, STEP] = slope[k]
+    share = (1.0 - both / last) / gain if last > 0.0 else 1.0
+    gain = 1.0 / min(1.0, max(share, 1.0 / MOST_GAIN))
+    saved = 0.0
+    for k in range(n):
+        saved += 0.5 * gain * pull_along[k] * slope[k]
+    if saved <= WORTH * precision:
+        return 0.0, gain
+    f = min(damping * gain, stride / most) if most > 0.0 else 0.0
     for k in range(n):
         by = -f * slope[k]
         if abs(by) <= 0.1 * precision:
@@ -298,7 +323,7 @@ def slide(field, strand, count, stride, precision, damping):
                 field, strand[i, X], strand[i, Y], strand[i, Z], 1e-3 * stride
             )
         moved(strand, count, i, abs(by))
-    return f * most
+    return max(gain, f) * most, max(f, 1e-3)
 
 
 @njit(cache=True)

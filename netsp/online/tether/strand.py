@@ -42,7 +42,10 @@ PART = 15
 CURVE = 16
 """Curvature of the surface along the slide direction; positive where it is convex."""
 
-WIDTH = 17
+STEP = 17
+"""The node's last Newton step along its direction."""
+
+WIDTH = 18
 
 SHARP_SINE = 0.5
 """Normals that differ by more than 30 degrees across a contact mean a sharp edge."""
@@ -211,7 +214,7 @@ def let_go(strand, i):
     """Node i rests on nothing: no direction to slide in, no normal that holds it."""
     for k in range(EX, NZ + 1):
         strand[i, k] = 0.0
-    strand[i, SHARP] = strand[i, STALE] = strand[i, CURVE] = 0.0
+    strand[i, SHARP] = strand[i, STALE] = strand[i, CURVE] = strand[i, STEP] = 0.0
     strand[i, PART] = -1.0
 
 

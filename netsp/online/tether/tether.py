@@ -34,7 +34,7 @@ class Tether:
 
     Attributes
     ----------
-    strand : (n, 17) what the model keeps of each node (`netsp.online.tether.strand`); never changed
+    strand : (n, 18) what the model keeps of each node (`netsp.online.tether.strand`); never changed
         in place, so a state can be kept, compared and continued from.
     length : metres, along the surface where the tether rests on it.
     residual : metres by which a node still moved when the model stopped.

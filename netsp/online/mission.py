@@ -1,0 +1,119 @@
+"""A mission: what a robot on a tether is to visit in a scene, and within what limits."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from netsp.errors import InputError
+from netsp.online.field import DistanceField
+from netsp.online.scene import Scene
+from netsp.problem import (
+    Name,
+    NonNegative,
+    Point3,
+    Positive,
+    explain,
+    parse_json_object,
+    read_text,
+)
+
+_STRICT = ConfigDict(frozen=True, extra="forbid")
+
+
+class Mission(BaseModel):
+    """Waypoints to visit in their order.
+
+    Attributes
+    ----------
+    scene : scene file, relative to the mission file.
+    anchor : where the tether is fixed; start : where the robot is at first, in sight of it.
+    waypoints : to be visited in this order.
+    tether_length : metres of taut tether that must never be exceeded.
+    clearance : metres that the robot keeps from solids, where it can.
+    reach : metres; a waypoint this near counts as visited.
+    speed : metres per second.
+    delta : metres; resolution of the tether. cell : metres; of the grid that ways are sought on.
+
+    Raises
+    ------
+    InputError : from `load`, in one line.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", title="netsp mission")
+
+    schema_version: Literal[1] = 1
+    name: Name = "mission"
+    scene: str
+    anchor: Point3
+    start: Point3
+    waypoints: Annotated[tuple[Point3, ...], Field(min_length=1)]
+    tether_length: Positive
+    clearance: NonNegative = 0.2
+    reach: Positive = 0.1
+    speed: Positive = 0.3
+    delta: Positive = 0.1
+    cell: Positive = 0.2
+
+    @classmethod
+    def from_json(cls, text: str | bytes, *, source: str = "mission") -> Self:
+        """Parse and validate; `InputError` with one line for anything wrong."""
+        data = parse_json_object(text, source)
+        if data.get("schema_version") != 1 or isinstance(data["schema_version"], bool):
+            raise InputError(
+                f"{source}: schema_version: expected 1, got {data.get('schema_version')!r}"
+            )
+        try:
+            return cls.model_validate(data)
+        except ValidationError as error:
+            raise InputError(f"{source}: {explain(error)}") from None
+
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """Read a mission file; the scene's name becomes relative to the working directory."""
+        mission = cls.from_json(read_text(path), source=str(path))
+        return mission.model_copy(update={"scene": str(Path(path).parent / mission.scene)})
+
+    def checked_waypoints(self, field: DistanceField, *, snap: bool = False) -> Self:
+        """The mission with every waypoint outside of solids: those inside are moved out to the
+        clearance with `snap`, else refused with their numbers (InputError)."""
+        points = np.array(self.waypoints)
+        inside = np.flatnonzero(field.distance(points) < 0.0)
+        if not len(inside):
+            return self
+        if not snap:
+            raise InputError(
+                f"waypoints {', '.join(map(str, inside[:10]))}"
+                f"{' …' if len(inside) > 10 else ''} lie inside a solid; move them out with --snap"
+            )
+        points[inside] = pushed_out(field, points[inside], self.clearance)
+        return self.model_copy(update={"waypoints": tuple(map(tuple, points.tolist()))})
+
+    def load_scene(self) -> Scene:
+        """The scene it takes place in."""
+        return Scene.load(self.scene)
+
+
+def pushed_out(
+    field: DistanceField, points: npt.ArrayLike, clearance: float, rounds: int = 20
+) -> npt.NDArray[np.float64]:
+    """Points (n, 3) moved along the distance's gradient until they are at the clearance, as far as
+    that goes; never to where the distance is smaller than it was."""
+    p = np.array(points, dtype=float).reshape(-1, 3)
+    d = field.distance(p)
+    for _ in range(rounds):
+        short = d < clearance - 1e-6
+        if not short.any():
+            break
+        step = np.where(short, clearance - d, 0.0)[:, None]
+        moved = p + step * field.gradient(p)
+        after = field.distance(moved)
+        better = after > d
+        if not (better & short).any():
+            break
+        p[better], d[better] = moved[better], after[better]
+    return p

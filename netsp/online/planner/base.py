@@ -1,0 +1,122 @@
+"""What all planners share: waypoints, where they are in them, and a way to follow."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from netsp.online.field import DistanceField
+from netsp.online.mission import Mission
+from netsp.online.tether import GeodesicTether, ReactTether, Tether
+from netsp.online.tree import Grid
+
+Floats = npt.NDArray[np.float64]
+
+NORMAL, RECOVERY, HOLD, DONE = "normal", "recovery", "hold", "done"
+
+
+@dataclass(frozen=True)
+class Command:
+    """Where to go now.
+
+    way : (k, 3) points to pass in this order, the first one next. mode : normal, recovery, hold or
+    done. replan_s : seconds that planning took in this step.
+    """
+
+    way: Floats
+    mode: str
+    replan_s: float = 0.0
+
+
+@dataclass
+class Planner:
+    """Follows the waypoints of a mission.
+
+    Attributes
+    ----------
+    index : the waypoint that is next. skipped : waypoints given up, with the reason.
+    """
+
+    mission: Mission
+    scene: DistanceField
+    tethers: GeodesicTether | ReactTether
+    grid: Grid
+    index: int = 0
+    mode: str = NORMAL
+    way: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    skipped: list[tuple[int, str]] = field(default_factory=list)
+    reached: list[int] = field(default_factory=list)
+
+    name = "none"
+
+    @property
+    def target(self) -> Floats:
+        """(3,) the waypoint that is next."""
+        return np.array(self.mission.waypoints[self.index])
+
+    @property
+    def done(self) -> bool:
+        """Whether all waypoints are visited or given up."""
+        return self.index >= len(self.mission.waypoints)
+
+    def step(self, robot: Floats, tether: Tether) -> Command:
+        """What to do now. Never raises: what cannot be planned is held or given up, with the
+        reason."""
+        self._advance(robot)
+        if self.done:
+            return Command(np.array([robot]), DONE)
+        begin = time.perf_counter()
+        planned = self.plan(robot, tether)
+        spent = time.perf_counter() - begin if planned else 0.0
+        if self.done:
+            return Command(np.array([robot]), DONE, spent)
+        return Command(self.way if len(self.way) else np.array([robot]), self.mode, spent)
+
+    def plan(self, robot: Floats, tether: Tether) -> bool:
+        """Set `way` and `mode`; whether anything had to be thought about."""
+        del tether
+        self.way = self.target[None]
+        return False
+
+    def _advance(self, robot: Floats) -> None:
+        """Past the waypoint, when it is reached at the end of the way."""
+        reach = self.mission.reach
+        if self.done:
+            return
+        if len(self.way) <= 1 and np.linalg.norm(self.target - robot) <= reach:
+            self.reached.append(self.index)
+            self._next()
+
+    def _next(self) -> None:
+        self.index += 1
+        self.way, self.mode = np.zeros((0, 3)), NORMAL
+
+    def passed(self, count: int) -> None:
+        """The robot has passed so many points of the way; the last one stays the target."""
+        self.way = self.way[min(count, max(0, len(self.way) - 1)) :]
+
+    def give_up(self, reason: str) -> None:
+        """Leave a waypoint out."""
+        self.skipped.append((self.index, reason))
+        self._next()
+
+
+def dense(way: Floats, step: float) -> Floats:
+    """A way (k, 3) with points at most `step` apart, its first left out."""
+    out = []
+    for a, b in pairwise(way):
+        k = max(1, int(np.ceil(np.linalg.norm(b - a) / step)))
+        out.append(a + (b - a) * (np.arange(1, k + 1) / k)[:, None])
+    return np.vstack(out) if out else np.zeros((0, 3))
+
+
+def points_along(way: Floats, step: float) -> Floats:
+    """Points (n, 3) of a polyline every `step`, both ends among them."""
+    s = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(way, axis=0), axis=1))]
+    n = max(1, int(np.ceil(s[-1] / step)))
+    u = np.linspace(0.0, s[-1], n + 1)
+    return np.column_stack([np.interp(u, s, way[:, k]) for k in range(3)])

@@ -1,0 +1,106 @@
+"""`react`: Algorithms 2 and 3 of Amer et al. 2025; `react-draft`: the draft's acceptance rule.
+
+Where the paper would not run as it stands:
+
+- Algorithm 2 sets mode, k and the recovery path anew at every call; they are kept here.
+- It ends recovery at the end of P_safe but follows P_recovery; one path, the refined one, is both
+  followed and ended at.
+- Its trigger is L > L_max, so the limit is exceeded before anything happens. Kept: this is the
+  paper's planner.
+- Algorithm 3 looks at the tether at the end of a recovery path, not at its longest on the way, and
+  takes the first pivot that will do, not the cheapest. Kept.
+- After a recovery path that was the fallback (the limit as a soft one) the tether is still too
+  long, and the trigger would fire at every step; it fires again for the next waypoint.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from netsp.online.mission import pushed_out
+from netsp.online.planner.base import NORMAL, RECOVERY, Floats, Planner, dense, points_along
+from netsp.online.tether import Tether
+from netsp.online.tree import ShortestTree, length_of, taut
+
+DRAFT_SHARE, DRAFT_GAIN = 0.7, 0.65
+"""The draft accepts a pivot whose tether is below 0.7 L_max and below 0.65 of that of the pivot
+three nodes before."""
+
+
+@dataclass
+class ReactPlanner(Planner):
+    """The paper's planner."""
+
+    draft: bool = False
+    _soft: int = field(default=-1)
+
+    @property
+    def name(self) -> str:  # type: ignore[override]
+        """As it is chosen."""
+        return "react-draft" if self.draft else "react"
+
+    def plan(self, robot: Floats, tether: Tether) -> bool:
+        """Algorithm 2."""
+        if self.mode == RECOVERY and len(self.way):
+            at_end = len(self.way) == 1 and np.linalg.norm(self.way[0] - robot) <= 1e-6
+            if not at_end:
+                return False
+        self.mode = NORMAL
+        if tether.length > self.mission.tether_length and self._soft != self.index:
+            self.way = self._search(robot, tether)
+            self.mode = RECOVERY
+            return True
+        self.way = self.target[None]
+        if not self.scene.line_of_sight(robot, self.target, depth=1e-3):
+            tree = ShortestTree(self.grid, self.target, robot[None])
+            way = tree.way(0)
+            if way is None:
+                self.give_up("no free way to it")
+                return True
+            self.way = taut(self.scene, way, self.mission.clearance, self.tethers.delta)[1:]
+            self.mode = RECOVERY  # to its end, then on
+            return True
+        return False
+
+    def _search(self, robot: Floats, tether: Tether) -> Floats:
+        """Algorithm 3: pivots backwards along the tether, the first that will do."""
+        limit = self.mission.tether_length
+        back = points_along(tether.nodes[::-1], max(self.mission.cell, 0.25))
+        tree = ShortestTree(self.grid, self.target, pushed_out(self.scene, back, 1e-3))
+        lengths = [self._augmented(back, tree, n) for n in range(len(back))]
+        for n, length in enumerate(lengths):
+            if self.draft:
+                before = lengths[n + 3] if n + 3 < len(lengths) else np.inf
+                good = length < DRAFT_SHARE * limit and length < DRAFT_GAIN * before
+            else:
+                good = length <= limit
+            if not good:
+                continue
+            retraced = pushed_out(self.scene, back[: n + 1], self.mission.clearance)
+            onward = tree.way(n)
+            assert onward is not None
+            if self.draft:
+                # back to two nodes before the pivot; the rest is left to normal mode
+                return retraced[1 : max(2, n - 1)]
+            onward = taut(self.scene, onward, self.mission.clearance, self.tethers.delta)
+            return np.vstack([retraced[1:], onward[1:]])
+        self._soft = self.index
+        onward = tree.way(0)
+        if onward is None:
+            return self.target[None]
+        return taut(self.scene, onward, self.mission.clearance, self.tethers.delta)[1:]
+
+    def _augmented(self, back: Floats, tree: ShortestTree, n: int) -> float:
+        """Length of the tether after its part from the anchor to pivot n and the way on from
+        there."""
+        onward = tree.way(n)
+        if onward is None:
+            return np.inf
+        way = np.vstack([back[:n:-1], onward]) if n + 1 < len(back) else onward
+        start = self.tethers.start(way[0], way[0])
+        return self.tethers.drive(start, dense(way, 0.5 * self.mission.cell))[0].length
+
+
+__all__ = ["ReactPlanner", "length_of"]

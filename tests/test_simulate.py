@@ -1,0 +1,175 @@
+"""A mission is flown within its tether, and what cannot be reached is said, not softened."""
+
+import csv
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from netsp import InputError
+from netsp.cli import main
+from netsp.online import Scene
+from netsp.online.mission import Mission, pushed_out
+from netsp.online.planner import PLANNERS
+from netsp.online.simulate import advance, simulate
+from netsp.online.tree import Grid, ShortestTree, length_of, taut
+
+MISSIONS = Path(__file__).parent.parent / "missions"
+POST = Scene(solids=[{"post": {"center": [0, 0], "radius": 0.5}}], bounds=(-4, -4, -1, 4, 4, 1))
+
+
+def mission(waypoints, length, **more):
+    return Mission(
+        scene="-", anchor=(-2, 0, 0), start=(-2, 0.5, 0), waypoints=waypoints, tether_length=length,
+        **{"clearance": 0.2, "delta": 0.1, **more},
+    )  # fmt: skip
+
+
+def fly(planner, waypoints, length, **more):
+    return simulate(mission(waypoints, length, **more), planner, scene=POST)
+
+
+def ring(turns, radius=1.2, steps=16):
+    angle = math.pi + np.arange(1, int(turns * steps) + 1) * 2 * math.pi / steps
+    return [(radius * math.cos(a), radius * math.sin(a), 0.0) for a in angle]
+
+
+def test_without_a_planner_the_tether_winds_up():
+    run = fly("none", ring(3), 5.0)
+    assert run.summary["longest_tether_m"] > 8.0
+    assert run.summary["exceedance_s"] > 10.0
+
+
+@pytest.mark.parametrize("length", [3.6, 4.5, 6.0])
+def test_the_predictive_planner_visits_all_and_never_exceeds_the_tether(length):
+    """Three turns about a post, whose far side is 3.4 m of tether away."""
+    run = fly("predictive", ring(3), length)
+    assert run.summary["visited"] == run.summary["waypoints"]
+    assert run.summary["longest_tether_m"] <= length
+    assert run.summary["exceedance_s"] == 0.0
+    places = np.array([[r.x, r.y, r.z] for r in run.log])
+    assert POST.field().distance(places).min() > 0.15  # clearance, but for its corners
+
+
+def test_what_the_tether_cannot_reach_is_left_out_with_the_reason():
+    run = fly("predictive", [(-2, 1.0, 0), (3.5, 0, 0), (-1, 1, 0)], 4.0)
+    assert run.summary["visited"] == 2
+    (left,) = run.summary["skipped"]
+    assert left["waypoint"] == 1
+    assert "5.6" in left["reason"]
+    assert run.summary["exceedance_s"] == 0.0
+
+
+def test_the_papers_planner_exceeds_the_tether_before_it_turns():
+    run = fly("react", ring(3), 5.0)
+    assert run.summary["visited"] == run.summary["waypoints"]
+    assert 0.0 < run.summary["exceedance_s"] < 20.0
+    assert run.summary["longest_tether_m"] < 5.3
+
+
+@pytest.mark.parametrize("planner", PLANNERS)
+def test_every_planner_ends_and_the_log_is_continuous(planner):
+    run = fly(planner, ring(1.5, steps=8), 5.0)
+    assert run.summary["status"] == "done"
+    places = np.array([[r.x, r.y, r.z] for r in run.log])
+    steps = np.linalg.norm(np.diff(places, axis=0), axis=1)
+    assert steps.max() <= 0.03 + 1e-9  # 0.3 m/s for 0.1 s
+    times = [r.time for r in run.log]
+    assert np.allclose(np.diff(times), 0.1)
+
+
+points = st.tuples(st.floats(-3.5, 3.5), st.floats(-3.5, 3.5), st.floats(-0.8, 0.8))
+
+
+@settings(max_examples=10, deadline=None)
+@given(waypoints=st.lists(points, min_size=1, max_size=6), length=st.floats(3.0, 9.0))
+def test_no_waypoints_make_the_predictive_planner_exceed(waypoints, length):
+    field = POST.field()
+    moved = pushed_out(field, np.array(waypoints), 0.25)
+    run = fly("predictive", [tuple(map(float, p)) for p in moved], length)
+    assert run.summary["exceedance_s"] == 0.0
+    assert run.summary["visited"] + len(run.summary["skipped"]) == len(waypoints)
+
+
+def test_the_basin_mission_is_flown_whole():
+    run = simulate(Mission.load(MISSIONS / "basin.json"))
+    assert run.summary["visited"] == run.summary["waypoints"]
+    assert run.summary["exceedance_s"] == 0.0
+
+
+def test_ways_of_the_tree_are_shortest_and_pull_taut_to_the_truth():
+    field = POST.field()
+    grid = Grid(field, (-4, -4, -1), (4, 4, 1), 0.1, 0.0)
+    tree = ShortestTree(grid, (2, 0.05, 0), [(-2, 0.05, 0), (2, 1, 0)])
+    straight = 0.95
+    assert straight <= tree.lengths[1] <= straight + 0.3  # ends lie beside the centres of cells
+    way = taut(field, tree.way(0), 0.0, 0.05)
+    exact = 2 * math.sqrt(4 - 0.25) + 0.5 * (math.pi - 2 * math.acos(0.25))
+    assert length_of(way) == pytest.approx(exact, rel=0.02)
+    assert tree.lengths[0] >= length_of(way)
+
+
+def test_advance_passes_corners_and_stops_after_its_step():
+    way = np.array([[1.0, 0, 0], [1.0, 1.0, 0]])
+    stops, passed = advance(np.zeros(3), way, 1.25)
+    assert passed == 1
+    assert np.allclose(stops, [[1, 0, 0], [1, 0.25, 0]])
+
+
+def test_waypoints_inside_solids_are_named_or_moved_out():
+    inside = [(-2, 1, 0), (0.1, 0, 0), (0, 0.2, 0)]
+    with pytest.raises(InputError, match="waypoints 1, 2 lie inside"):
+        fly("predictive", inside, 6.0)
+    run = simulate(mission(inside, 6.0), scene=POST, snap=True)
+    assert run.summary["visited"] == 3
+
+
+def test_an_interrupted_run_gives_what_it_has():
+    def stop(row, planner):
+        if row.time >= 1.0:
+            raise KeyboardInterrupt
+
+    run = simulate(mission(ring(3), 6.0), scene=POST, on_step=stop)
+    assert run.summary["status"] == "interrupted"
+    assert 5 < len(run.log) < 20
+
+
+def test_simulate_writes_log_summary_and_picture(tmp_path, capsys):
+    out = tmp_path / "run"
+    assert main(["simulate", str(MISSIONS / "basin.json"), "-o", str(out), "--quiet"]) == 0
+    summary = json.loads((out / "summary.json").read_text())
+    with (out / "log.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert summary["exceedance_s"] == 0.0
+    assert max(float(r["tether"]) for r in rows) == pytest.approx(
+        summary["longest_tether_m"], abs=1e-4
+    )
+    assert (out / "run.png").stat().st_size > 10_000
+    assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize(
+    ("args", "change", "message"),
+    [
+        (["--planner", "magic"], {}, "--planner: expected predictive"),
+        (["--tether", "0.1"], {}, "tether_length: 0.1 is shorter"),
+        ([], {"scene": "missing.json"}, "missing.json: cannot be read"),
+        ([], {"waypoints": []}, "waypoints"),
+        ([], {"anchor": [0, 0, -4]}, "anchor: .* inside a solid"),
+        ([], {"tether": 3}, "tether: unknown field"),
+    ],
+)
+def test_bad_missions_are_named(args, change, message, tmp_path, capsys):
+    data = json.loads((MISSIONS / "basin.json").read_text())
+    data["scene"] = str(MISSIONS.parent / "scenes" / "basin.json")
+    (tmp_path / "m.json").write_text(json.dumps({**data, **change}))
+    assert main(["simulate", str(tmp_path / "m.json"), *args]) == 2
+    error = capsys.readouterr().err.strip()
+    assert len(error.splitlines()) == 1
+    import re
+
+    assert re.search(message, error)
