@@ -67,7 +67,8 @@ def run_mission(args: argparse.Namespace) -> int:
         if show and int(row.time / STEP) % 20 == 0:
             print(
                 f"\r{row.time:7.1f} s  waypoint {row.target}/{len(mission.waypoints)}  "
-                f"{row.mode:<8} tether {row.tether:.2f} of {mission.tether_length:g} {scene.units}   ",
+                f"{row.mode:<8} tether {row.tether:.2f} of {mission.tether_length:g} "
+                f"{scene.units}   ",
                 end="",
                 file=sys.stderr,
                 flush=True,

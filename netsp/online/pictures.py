@@ -80,7 +80,7 @@ def save_run(run: Run, scene: Scene, file: str | Path) -> None:
     left.axhline(limit, color=_ANCHOR, lw=1.0, ls="--", label="its limit")
     left.set(xlabel="time (s)", ylabel=f"length ({scene.units})", ylim=(0, None))
     left.legend(loc="lower right", fontsize=8)
-    low, high = extent(scene, way)
+    low, high = extent(scene, way, run.tether.nodes)
     for _, (vertices, faces) in _parts(scene, low, high):
         from matplotlib.collections import PolyCollection
 

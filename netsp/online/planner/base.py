@@ -70,7 +70,10 @@ class Planner:
         if self.done:
             return Command(np.array([robot]), DONE)
         begin = time.perf_counter()
-        planned = self.plan(robot, tether)
+        planned, given_up = False, -1
+        while not self.done and given_up < len(self.skipped):
+            given_up = len(self.skipped)
+            planned = self.plan(robot, tether) or planned
         spent = time.perf_counter() - begin if planned else 0.0
         if self.done:
             return Command(np.array([robot]), DONE, spent)

@@ -58,8 +58,6 @@ class PredictivePlanner(Planner):
                 f"no way on which the tether fits: its shortest tether is {own:.3g} of "
                 f"{self.mission.tether_length:g}"
             )  # fmt: skip
-            if not self.done:
-                self.plan(robot, tether)
             return True
         self.way, self.mode = way[1:], RECOVERY
         return True
