@@ -251,7 +251,7 @@ def main() -> None:
     print("### Finer and finer (steps of 3 cm; the jacket 10 cm)\n")
     head("scene", "model", "delta", "nodes", "length m", "back m", "median us", "99 % us",
          "worst us")  # fmt: skip
-    finer("pipes", Scene.load(SCENES / "pipes.json"), round_the_pipes, [0.1, 0.06, 0.03])
+    finer("pipes", Scene.load(SCENES / "pipes.json"), round_the_pipes, [0.1, 0.05, 0.025])
     finer("jacket", Scene.load(SCENES / "oc4-jacket.json"), lattice, [0.4, 0.2, 0.05])
     print()
     if args.cloud:

@@ -120,6 +120,8 @@ def pull(field, strand, count, delta, spread, flat, rounds, precision):
     to where the strand is shortest; until no node moves by more than `precision`."""
     slip, stride = SLIP * delta, STRIDE * delta
     most, damping, gain = 0.0, 1.0, 1.0
+    for i in range(count):
+        strand[i, STEP] = 0.0  # steps of another position of the ends say nothing about this one
     for _ in range(rounds):
         before = count
         strand, count = repair(field, strand, count, slip, delta)
