@@ -208,6 +208,25 @@ def finer(name: str, scene: Scene, path: Callable[[], np.ndarray], deltas: list[
             f"{times.max():.0f}")  # fmt: skip
 
 
+def tour(field: DistanceField, file: str, scale: float) -> None:
+    """A tether dragged along the waypoints of a file (CSV, x,y,z first), at two resolutions."""
+    points = np.loadtxt(file, delimiter=",", skiprows=1)[:, :3] * scale
+    way = dense(points)
+    head("delta", "final m", "longest m", "back m", "median us", "99 % us", "differs by > 1 %")
+    before = None
+    for delta in (0.1, 0.05, 0.025):
+        tether, lengths, times, back = driven(GeodesicTether(field, delta), way)
+        differs = (
+            ""
+            if before is None
+            else f"{100 * (np.abs(lengths / before - 1) > 0.01).mean():.0f} % of the way"
+        )
+        before = np.maximum(lengths, 1e-9)
+        row(delta, f"{tether.length:.3f}", f"{lengths.max():.3f}", f"{back:.3f}",
+            f"{np.median(times):.0f}", f"{np.quantile(times, 0.99):.0f}", differs)  # fmt: skip
+    print()
+
+
 def drives(count: int) -> None:
     """Poles of radius delta, steps of up to 10 delta, 20 steps out and back."""
     print("### Thin poles: radius 0.1, delta 0.1, steps of 0.2 to 1 m\n")
@@ -240,6 +259,7 @@ def main() -> None:
     parser.add_argument("--worlds", type=int, default=10)
     parser.add_argument("--drives", type=int, default=0)
     parser.add_argument("--cloud")
+    parser.add_argument("--tour", help="with --cloud: waypoints (CSV) to drag a tether along")
     parser.add_argument("--scale", type=float, default=0.1)
     args = parser.parse_args()
     heading("Taut tethers")
@@ -262,6 +282,9 @@ def main() -> None:
             grid = of_cloud_file(args.cloud, scale=args.scale, voxel=voxel)
             row(voxel, "x".join(map(str, grid.values.shape)), f"{time.perf_counter() - begin:.2f}",
                 "; ".join(grid.notes))  # fmt: skip
+        print()
+        if args.tour:
+            tour(DistanceField.build([], [], [], [], grid, 0.0), args.tour, args.scale)
 
 
 if __name__ == "__main__":
