@@ -128,10 +128,14 @@ def simulate(
                 chosen.give_up(f"not reached in {STUCK:g} s")
                 continue
             stops, passed = advance(robot, command.way, mission.speed * STEP)
-            for stop in stops:
-                tether = tethers.update(tether, stop)
-            robot = stops[-1]
-            chosen.passed(passed)
+            blocked = field.distance(np.array(stops)).min() < -0.2 * mission.delta
+            if blocked:
+                chosen.give_up("the way to it leads through a solid")
+            else:
+                for stop in stops:
+                    tether = tethers.update(tether, stop)
+                robot = stops[-1]
+                chosen.passed(passed)
             now += STEP
     except KeyboardInterrupt:
         interrupted = True

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from netsp.online.field import DistanceField
 from netsp.online.mission import Mission
 from netsp.online.tether import GeodesicTether, ReactTether, Tether
-from netsp.online.tree import Grid
+from netsp.online.tree import Grid, ShortestTree, taut
 
 Floats = npt.NDArray[np.float64]
 
@@ -80,10 +80,30 @@ class Planner:
         return Command(self.way if len(self.way) else np.array([robot]), self.mode, spent)
 
     def plan(self, robot: Floats, tether: Tether) -> bool:
-        """Set `way` and `mode`; whether anything had to be thought about."""
+        """Set `way` and `mode`; whether anything had to be thought about. Here: on to the waypoint,
+        whatever the tether."""
         del tether
-        self.way = self.target[None]
-        return False
+        return False if len(self.way) else self.go_on(robot)
+
+    def go_on(self, robot: Floats) -> bool:
+        """Straight to the waypoint, or the shortest way round what is between; whether that had to
+        be sought."""
+        straight = np.array([robot, self.target])
+        if self.is_free(straight):
+            self.way = straight[1:]
+            return False
+        way = ShortestTree(self.grid, self.target, robot[None]).way(0)
+        if way is None:
+            self.give_up("no free way to it")
+        else:
+            self.way = taut(self.scene, way, self.mission.clearance, self.tethers.delta)[1:]
+        return True
+
+    def is_free(self, way: Floats) -> bool:
+        """Whether a straight way keeps the clearance, or what its ends have of it."""
+        ends = float(self.scene.distance(way).min())
+        room = min(self.mission.clearance, ends) - 1e-3
+        return self.scene.grown(max(0.0, room)).line_of_sight(way[0], way[1], depth=1e-3)
 
     def _advance(self, robot: Floats) -> None:
         """Past the waypoint, when it is reached at the end of the way."""

@@ -47,7 +47,7 @@ class PredictivePlanner(Planner):
         limit = self.mission.tether_length * (1.0 - MARGIN)
         target = self.target
         straight = np.array([robot, target])
-        if self._free(straight) and self._fits(tether, straight, limit):
+        if self.is_free(straight) and self._fits(tether, straight, limit):
             self.way, self.mode = straight[1:], NORMAL
             return True
         way = self._shortest_feasible(robot, tether, limit)
@@ -61,12 +61,6 @@ class PredictivePlanner(Planner):
             return True
         self.way, self.mode = way[1:], RECOVERY
         return True
-
-    def _free(self, way: Floats) -> bool:
-        """Whether a straight way keeps the clearance, or what its ends have of it."""
-        ends = float(self.scene.distance(way).min())
-        room = min(self.mission.clearance, ends) - 1e-3
-        return self.scene.grown(max(0.0, room)).line_of_sight(way[0], way[1], depth=1e-3)
 
     def _fits(self, tether: Tether, way: Floats, limit: float) -> bool:
         """Whether the tether stays within the limit all along a way."""

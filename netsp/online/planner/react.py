@@ -47,22 +47,13 @@ class ReactPlanner(Planner):
             at_end = len(self.way) == 1 and np.linalg.norm(self.way[0] - robot) <= 1e-6
             if not at_end:
                 return False
-        self.mode = NORMAL
+        if self.mode == RECOVERY:
+            self.way, self.mode = self.way[:0], NORMAL
         if tether.length > self.mission.tether_length and self._soft != self.index:
             self.way = self._search(robot, tether)
             self.mode = RECOVERY
             return True
-        self.way = self.target[None]
-        if not self.scene.line_of_sight(robot, self.target, depth=1e-3):
-            tree = ShortestTree(self.grid, self.target, robot[None])
-            way = tree.way(0)
-            if way is None:
-                self.give_up("no free way to it")
-                return True
-            self.way = taut(self.scene, way, self.mission.clearance, self.tethers.delta)[1:]
-            self.mode = RECOVERY  # to its end, then on
-            return True
-        return False
+        return False if len(self.way) else self.go_on(robot)
 
     def _search(self, robot: Floats, tether: Tether) -> Floats:
         """Algorithm 3: pivots backwards along the tether, the first that will do."""
