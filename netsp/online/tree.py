@@ -181,7 +181,8 @@ def taut(field: DistanceField, way: Floats, clearance: float, delta: float) -> F
     ends = field.distance(way[[0, -1]])
     room = max(0.0, min(clearance, float(ends.min()) - 1e-3 * delta))
     model = GeodesicTether(field.grown(room), delta)
-    nodes = model.lay(way).nodes
+    # a way need not be taut to the last millimetre: no more rounds than the driving takes
+    nodes = model.drive(model.start(way[0], way[0]), way[1:])[0].nodes
     return nodes[np.r_[True, np.linalg.norm(np.diff(nodes, axis=0), axis=1) > 1e-9]]
 
 

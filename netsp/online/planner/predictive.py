@@ -64,9 +64,14 @@ class PredictivePlanner(Planner):
 
     def _fits(self, tether: Tether, way: Floats, limit: float) -> bool:
         """Whether the tether stays within the limit all along a way."""
-        step = min(0.5 * self.tethers.delta, 0.5 * self.mission.cell)
-        _, lengths = self.tethers.drive(tether, dense(way, max(step, 0.02)))
-        return bool(lengths.max() <= max(limit, tether.length + 1e-6))
+        fine = max(min(0.5 * self.tethers.delta, 0.5 * self.mission.cell), 0.02)
+        most = max(limit, tether.length + 1e-6)
+        # what is too long at a few places is too long
+        for step in (10.0 * fine, fine):
+            _, lengths = self.tethers.drive(tether, dense(way, step))
+            if lengths.max() > most:
+                return False
+        return True
 
     def _shortest_feasible(self, robot: Floats, tether: Tether, limit: float) -> Floats | None:
         """The shortest way on which the tether fits: on from the robot, or back along the tether to
