@@ -12,7 +12,7 @@ import math
 from collections.abc import Iterable, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -36,6 +36,8 @@ if TYPE_CHECKING:
     import shapely
 
 SCHEMA_VERSION = 1
+
+Model = TypeVar("Model", bound=BaseModel)
 
 RELATIVE_TOLERANCE = 1e-9
 """Lengths below this fraction of the problem's size count as zero (touching, on a boundary)."""
@@ -355,16 +357,7 @@ class Problem(BaseModel):
     @classmethod
     def from_json(cls, text: str | bytes, *, source: str = "problem") -> Self:
         """Parse and validate; `InputError` with one line for anything wrong."""
-        data = parse_json_object(text, source)
-        version = data.get("schema_version", None)
-        if version != SCHEMA_VERSION or isinstance(version, bool):
-            raise InputError(
-                f"{source}: schema_version: expected {SCHEMA_VERSION}, got {version!r}"
-            )
-        try:
-            return cls.model_validate(data)
-        except ValidationError as error:
-            raise InputError(f"{source}: {explain(error)}") from None
+        return read_model(cls, text, source)
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
@@ -394,6 +387,18 @@ def read_text(path: str | Path) -> str:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
     except UnicodeDecodeError:
         raise InputError(f"{path}: not a text file in UTF-8") from None
+
+
+def read_model(model: type[Model], text: str | bytes, source: str) -> Model:
+    """A model of format version 1 from JSON, or `InputError` in one line."""
+    data = parse_json_object(text, source)
+    version = data.get("schema_version", None)
+    if version != SCHEMA_VERSION or isinstance(version, bool):
+        raise InputError(f"{source}: schema_version: expected {SCHEMA_VERSION}, got {version!r}")
+    try:
+        return model.model_validate(data)
+    except ValidationError as error:
+        raise InputError(f"{source}: {explain(error)}") from None
 
 
 def parse_json_object(text: str | bytes, source: str) -> dict[str, Any]:

@@ -9,17 +9,15 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
 from netsp.errors import InputError
 from netsp.problem import (
-    SCHEMA_VERSION,
     Name,
     NonNegative,
     Number,
     Point3,
-    explain,
-    parse_json_object,
+    read_model,
     read_text,
 )
 
@@ -95,16 +93,7 @@ class Solution(BaseModel):
     @classmethod
     def from_json(cls, text: str | bytes, *, source: str = "solution") -> Self:
         """Parse and validate; `InputError` with one line for anything wrong."""
-        data = parse_json_object(text, source)
-        version = data.get("schema_version", None)
-        if version != SCHEMA_VERSION or isinstance(version, bool):
-            raise InputError(
-                f"{source}: schema_version: expected {SCHEMA_VERSION}, got {version!r}"
-            )
-        try:
-            return cls.model_validate(data)
-        except ValidationError as error:
-            raise InputError(f"{source}: {explain(error)}") from None
+        return read_model(cls, text, source)
 
     @classmethod
     def load(cls, path: str | Path) -> Self:

@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Self
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
 from netsp.errors import InputError
 from netsp.online.field import DistanceField
@@ -17,8 +17,7 @@ from netsp.problem import (
     NonNegative,
     Point3,
     Positive,
-    explain,
-    parse_json_object,
+    read_model,
     read_text,
 )
 
@@ -62,15 +61,7 @@ class Mission(BaseModel):
     @classmethod
     def from_json(cls, text: str | bytes, *, source: str = "mission") -> Self:
         """Parse and validate; `InputError` with one line for anything wrong."""
-        data = parse_json_object(text, source)
-        if data.get("schema_version") != 1 or isinstance(data["schema_version"], bool):
-            raise InputError(
-                f"{source}: schema_version: expected 1, got {data.get('schema_version')!r}"
-            )
-        try:
-            return cls.model_validate(data)
-        except ValidationError as error:
-            raise InputError(f"{source}: {explain(error)}") from None
+        return read_model(cls, text, source)
 
     @classmethod
     def load(cls, path: str | Path) -> Self:

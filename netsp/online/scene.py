@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from netsp.errors import InputError
 from netsp.online import solids as kinds
@@ -27,8 +27,7 @@ from netsp.problem import (
     Polygon,
     Positive,
     Problem,
-    explain,
-    parse_json_object,
+    read_model,
     read_text,
 )
 
@@ -360,15 +359,7 @@ class Scene(BaseModel):
     @classmethod
     def from_json(cls, text: str | bytes, *, source: str = "scene") -> Self:
         """Parse and validate; `InputError` with one line for anything wrong."""
-        data = parse_json_object(text, source)
-        if data.get("schema_version") != 1 or isinstance(data["schema_version"], bool):
-            raise InputError(
-                f"{source}: schema_version: expected 1, got {data.get('schema_version')!r}"
-            )
-        try:
-            return cls.model_validate(data)
-        except ValidationError as error:
-            raise InputError(f"{source}: {explain(error)}") from None
+        return read_model(cls, text, source)
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
