@@ -275,9 +275,7 @@ class Problem(BaseModel):
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         self._check_distinct_goals()
-        self._check_free("base", self.base)
-        for k, goal in enumerate(self.goals):
-            self._check_free(self.goal_label(k), goal.position)
+        self._check_free()
         return self
 
     def _check_distinct_goals(self) -> None:
@@ -290,26 +288,28 @@ class Problem(BaseModel):
                     f"{self.goal_label(first)}; expected distinct goals"
                 )
 
-    def _check_free(self, label: str, position: tuple[float, float, float]) -> None:
-        xy = position[:2]
-        tolerance = self.tolerance
+    def _check_free(self) -> None:
+        """Base and goals lie within the bounds and outside of every grown obstacle."""
+        xy, tolerance = self.points[:, :2], self.tolerance
+        outside: npt.NDArray[np.bool_] = np.zeros(len(xy), dtype=bool)
         if self.bounds is not None:
-            xmin, ymin, xmax, ymax = self.bounds
-            if not (
-                xmin - tolerance <= xy[0] <= xmax + tolerance
-                and ymin - tolerance <= xy[1] <= ymax + tolerance
-            ):
+            low, high = np.array(self.bounds[:2]), np.array(self.bounds[2:])
+            outside = np.any((xy < low - tolerance) | (xy > high + tolerance), axis=1)
+        distances = np.array([o.signed_distance(xy) for o in self.obstacles]).reshape(-1, len(xy))
+        inside = distances < self.clearance - tolerance
+        for k in np.flatnonzero(outside | inside.any(axis=0)):
+            position = self.base if k == 0 else self.goals[k - 1].position
+            label = "base" if k == 0 else self.goal_label(int(k) - 1)
+            if outside[k]:
                 raise ValueError(
-                    f"{label}: {_show(position)} is outside bounds {list(self.bounds)}"
+                    f"{label}: {_show(position)} is outside bounds {list(self.bounds or ())}"
                 )
-        for i, obstacle in enumerate(self.obstacles):
-            distance = float(obstacle.signed_distance(xy))
-            if distance < self.clearance - tolerance:
-                grown = f" grown by the clearance {self.clearance:g}" if self.clearance else ""
-                raise ValueError(
-                    f"{label}: {_show(position)} lies inside {self.obstacle_label(i)}{grown} "
-                    f"(by {self.clearance - distance:.6g}); expected a point in free space"
-                )
+            i = int(np.argmax(inside[:, k]))
+            grown = f" grown by the clearance {self.clearance:g}" if self.clearance else ""
+            raise ValueError(
+                f"{label}: {_show(position)} lies inside {self.obstacle_label(i)}{grown} "
+                f"(by {self.clearance - distances[i, k]:.6g}); expected a point in free space"
+            )
 
     @property
     def scale(self) -> float:
