@@ -193,9 +193,10 @@ def random_world(
     for _ in range(GIVE_UP // 100):
         drawn = [place() for _ in range(4 * goals)]
         drawn = [p for p in drawn if free(*p) and math.dist(p, base) <= tether_length]
-        if drawn:
-            reach = _reach(world(drawn))
-            found += [p for p, d in zip(drawn, reach, strict=True) if d <= tether_length]
+        for some in (drawn[: 2 * goals], drawn[2 * goals :]):
+            if some and len(found) < goals:
+                reach = _reach(world(some))
+                found += [p for p, d in zip(some, reach, strict=True) if d <= tether_length]
         if len(found) >= goals:
             return world(found[:goals])
     raise InputError(f"goals: only {len(found)} of {goals} places in reach of the tether found")

@@ -226,6 +226,9 @@ def test_bad_ends_are_named(kind):
         tethers.start([0, 0, 0], [1, 0, 0])
     with pytest.raises(InputError, match="robot: expected three finite"):
         tethers.start([1, 0, 0], [np.nan, 0, 0])
+    for bad in ([np.nan, 0, 0], [np.inf, 0, 0], [0, 1], None, "x"):
+        with pytest.raises(InputError, match="robot: expected three finite"):
+            tethers.update(tethers.start([1, 0, 0], [1, 1, 0]), bad)
     with pytest.raises(InputError, match="not in sight"):
         tethers.start([-1, 0, 0], [1, 0, 0])
     tether = tethers.start([1, 0, 0], [1, 1, 0])

@@ -26,6 +26,17 @@ CELLS = 40
 FILE_VERSION = 1
 
 
+def finite_point(value: npt.ArrayLike, name: str) -> tuple[float, float, float]:
+    """Three finite coordinates; InputError, that names them, if they are something else."""
+    try:
+        x, y, z = (float(v) for v in np.asarray(value, dtype=float))
+    except (TypeError, ValueError):
+        raise InputError(f"{name}: expected three finite coordinates, got {value!r}") from None
+    if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(z)):
+        raise InputError(f"{name}: expected three finite coordinates, got {value!r}")
+    return x, y, z
+
+
 @dataclass(frozen=True)
 class VoxelGrid:
     """Distances at the points of a regular grid, linear in between.
@@ -126,12 +137,7 @@ class DistanceField:
     def free_point(self, value: npt.ArrayLike, name: str, depth: float = 1e-6) -> Floats:
         """A point (3,) as floats; InputError, that names it, if it is not finite, not three numbers
         or deeper than `depth` inside a solid."""
-        try:
-            point = np.asarray(value, dtype=float)
-        except (TypeError, ValueError):
-            raise InputError(f"{name}: expected [x, y, z], got {value!r}") from None
-        if point.shape != (3,) or not np.isfinite(point).all():
-            raise InputError(f"{name}: expected three finite coordinates, got {value!r}")
+        point = np.array(finite_point(value, name))
         d = float(sample_many(self.arrays, point[None])[0, 0])
         if d < -depth:
             shown = ", ".join(f"{v:g}" for v in point)

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.errors import InputError
-from netsp.online.field import DistanceField
+from netsp.online.field import DistanceField, finite_point
 from netsp.online.tether.pull import drive, follow, pull
 from netsp.online.tether.strand import length_of
 from netsp.online.tether.tether import Floats, Tether, strand_of
@@ -119,15 +119,15 @@ class GeodesicTether:
         """
         strand, length, residual = tether.strand, tether.length, tether.residual
         for last, target in ((False, anchor), (True, robot)):
-            if target is None:
+            if target is None and not last:
                 continue
-            x, y, z = (float(v) for v in np.asarray(target, dtype=float).ravel()[:3])
-            new, residual, length, depth = follow(
+            name = "robot" if last else "anchor"
+            x, y, z = finite_point(target, name)
+            strand, residual, length, depth = follow(
                 self.field.arrays, strand, last, x, y, z, *self._settings
             )
-            if not depth <= 0.25 * self.delta or np.size(target) != 3:
-                self.field.free_point(target, "robot" if last else "anchor", 0.25 * self.delta)
-            strand = new
+            if depth > 0.25 * self.delta:
+                self.field.free_point(target, name, 0.25 * self.delta)
         return Tether(strand, length, residual)
 
     def drive(self, tether: Tether, path: npt.ArrayLike) -> tuple[Tether, Floats]:

@@ -124,7 +124,7 @@ def pull(field, strand, count, delta, spread, flat, rounds, precision):
         strand[i, STEP] = 0.0  # steps of another position of the ends say nothing about this one
     for _ in range(rounds):
         before = count
-        strand, count = repair(field, strand, count, slip, delta)
+        strand, count = repair(field, strand, count, slip)
         changed = count != before
         most = refresh(field, strand, count, spread, flat, stride, delta)
         count, lifted = lift(field, strand, count, slip, stride)
@@ -137,13 +137,13 @@ def pull(field, strand, count, delta, spread, flat, rounds, precision):
         damping = max(0.1, 0.5 * damping) if longer else min(1.0, 1.5 * damping)
         if not changed and most <= precision:
             break
-    strand, count = repair(field, strand, count, slip, delta)
+    strand, count = repair(field, strand, count, slip)
     refresh(field, strand, count, spread, flat, stride, 1e30)  # new nodes only
     return strand, count, most
 
 
 @njit(cache=True)
-def repair(field, strand, count, slip, delta):
+def repair(field, strand, count, slip):
     """Look again along every edge that may have gone too deep; where it has, its deepest point
     becomes a node on the surface."""
     i, budget = 0, 64

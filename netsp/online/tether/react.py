@@ -76,7 +76,7 @@ class ReactTether:
         nodes = tether.nodes
         text = self.reading == "text"
         for end, target in ((False, anchor), (True, robot)):
-            if target is None:
+            if target is None and not end:
                 continue
             point = self.field.free_point(
                 target, "robot" if end else "anchor", depth=0.25 * self.delta
