@@ -106,6 +106,7 @@ def simulate(
             f"start, {tether.length:.4g}"
         )
     chosen = make_planner(planner, mission, field, tethers, grid_of(mission, scene, field))
+    chosen.warm_up(np.array(mission.start), tether)
     robot, now, since = np.array(mission.start), 0.0, (0.0, -1)
     log: list[LogRow] = []
     interrupted = False

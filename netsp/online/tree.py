@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import heapq
 import math
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -15,13 +16,17 @@ from numba import njit
 
 from netsp.errors import InputError
 from netsp.online.field import DistanceField
-from netsp.online.sampling import distance
+from netsp.online.sampling import distance, lowest_along
 from netsp.online.tether.geodesic import GeodesicTether
 
 Floats = npt.NDArray[np.float64]
 
 MOST_CELLS = 20_000_000
 """So many cells take about 0.3 GiB."""
+
+
+ROUNDS = 60
+"""A way need not be taut to the last millimetre."""
 
 
 class Grid:
@@ -78,6 +83,15 @@ class Grid:
             if self.field.line_of_sight(p, self.centre(around[k]), depth=1e-3 * self.cell):
                 return np.asarray(around[k])
         return None
+
+
+class Ways(Protocol):
+    """Short ways to one target from some points, however they are found."""
+
+    lengths: Floats
+
+    def way(self, n: int) -> Floats | None:
+        """(k, 3) from point n to the target; None if there is none."""
 
 
 class ShortestTree:
@@ -180,10 +194,65 @@ def taut(field: DistanceField, way: Floats, clearance: float, delta: float) -> F
     at its ends; densely enough for straight lines between its points to keep to it."""
     ends = field.distance(way[[0, -1]])
     room = max(0.0, min(clearance, float(ends.min()) - 1e-3 * delta))
-    model = GeodesicTether(field.grown(room), delta)
-    # a way need not be taut to the last millimetre: no more rounds than the driving takes
-    nodes = model.drive(model.start(way[0], way[0]), way[1:])[0].nodes
+    grown = field.grown(room)
+    # the grown solids are no thinner than twice the room: nothing is lost with a coarser delta
+    coarse, fine = (GeodesicTether(grown, max(delta, share * room)) for share in (1.0, 0.5))
+    step = max(room, delta)
+    line = way
+    for _ in range(2):
+        k = 2 + int(length_of(line) / step)
+        line = shortcut(grown.arrays, _shares(line, k), 0.1 * step)[::-1]
+    nodes = fine.relaxed(coarse.relaxed(line, ROUNDS).nodes, ROUNDS).nodes
     return nodes[np.r_[True, np.linalg.norm(np.diff(nodes, axis=0), axis=1) > 1e-9]]
+
+
+@njit(cache=True)
+def shortcut(field, way, tolerance):
+    """A way without the points that can be left out: from each point straight to the last of those
+    that it sees without a break. The triangles that are swept are as wide as the way's points are
+    apart, so nothing wider is passed over."""
+    out = np.empty_like(way)
+    out[0] = way[0]
+    count, i = 1, 0
+    while i < len(way) - 1:
+        j = i + 1
+        while j + 1 < len(way):
+            low, _ = lowest_along(
+                field, way[i, 0], way[i, 1], way[i, 2],
+                way[j + 1, 0], way[j + 1, 1], way[j + 1, 2], tolerance,
+            )  # fmt: skip
+            if low < -tolerance:
+                break
+            j += 1
+        out[count] = way[j]
+        count += 1
+        i = j
+    return out[:count].copy()
+
+
+def homotopic(field: DistanceField, a: Floats, b: Floats, step: float) -> bool:
+    """Whether two ways between the same ends certainly are of one class: points at most `step`
+    apart, at the same share of both ways, all see one another. Nothing wider than `step` can then
+    stand between the ways."""
+    k = 2 + int(max(length_of(a), length_of(b)) / step)
+    return bool(all_see(field.arrays, _shares(a, k), _shares(b, k), 0.1 * step))
+
+
+def _shares(way: Floats, k: int) -> Floats:
+    s = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(way, axis=0), axis=1))]
+    u = np.linspace(0.0, s[-1], k)
+    return np.column_stack([np.interp(u, s, way[:, axis]) for axis in range(3)])
+
+
+@njit(cache=True)
+def all_see(field, a, b, step):
+    for k in range(len(a)):
+        low, _ = lowest_along(
+            field, a[k, 0], a[k, 1], a[k, 2], b[k, 0], b[k, 1], b[k, 2], step
+        )  # fmt: skip
+        if low < 0.0:
+            return False
+    return True
 
 
 def length_of(way: Floats) -> float:

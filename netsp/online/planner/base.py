@@ -12,7 +12,7 @@ import numpy.typing as npt
 from netsp.online.field import DistanceField
 from netsp.online.mission import Mission
 from netsp.online.tether import GeodesicTether, ReactTether, Tether
-from netsp.online.tree import Grid, ShortestTree, taut
+from netsp.online.tree import Grid, ShortestTree, Ways, taut
 
 Floats = npt.NDArray[np.float64]
 
@@ -79,6 +79,13 @@ class Planner:
             return Command(np.array([robot]), DONE, spent)
         return Command(self.way if len(self.way) else np.array([robot]), self.mode, spent)
 
+    def warm_up(self, robot: Floats, tether: Tether) -> None:
+        """Load what is compiled, so that the first plan takes no longer than the others."""
+        del tether
+        way = self.ways(robot[None]).way(0)
+        if way is not None:
+            self.pulled(way)
+
     def plan(self, robot: Floats, tether: Tether) -> bool:
         """Set `way` and `mode`; whether anything had to be thought about. Here: on to the waypoint,
         whatever the tether."""
@@ -92,12 +99,20 @@ class Planner:
         if self.is_free(straight):
             self.way = straight[1:]
             return False
-        way = ShortestTree(self.grid, self.target, robot[None]).way(0)
+        way = self.ways(robot[None]).way(0)
         if way is None:
             self.give_up("no free way to it")
         else:
-            self.way = taut(self.scene, way, self.mission.clearance, self.tethers.delta)[1:]
+            self.way = self.pulled(way)[1:]
         return True
+
+    def ways(self, points: Floats) -> Ways:
+        """Short ways to the waypoint from each of some points (n, 3)."""
+        return ShortestTree(self.grid, self.target, points)
+
+    def pulled(self, way: Floats) -> Floats:
+        """A way pulled taut in its class, at the clearance."""
+        return taut(self.scene, way, self.mission.clearance, self.tethers.delta)
 
     def is_free(self, way: Floats) -> bool:
         """Whether a straight way keeps the clearance, or what its ends have of it."""

@@ -8,6 +8,7 @@ tether fits (but for the clearance that the robot keeps, and the margin).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -22,13 +23,19 @@ from netsp.online.planner.base import (
     points_along,
 )
 from netsp.online.tether import Tether
-from netsp.online.tree import ShortestTree, length_of, taut
+from netsp.online.tree import homotopic, length_of, taut
 
-MARGIN = 0.005
+MARGIN = 0.004
 """Share of the tether that is kept in reserve for what the simulation does not know."""
 
 PIVOTS = 24
 """At most so many places along the tether to turn at."""
+
+COARSE = 10.0
+"""The tether is first looked at this much farther apart."""
+
+ENOUGH_ROUNDS = 10, 100
+"""Few rounds tell that a tether is short enough, many that it is not."""
 
 
 @dataclass
@@ -46,10 +53,11 @@ class PredictivePlanner(Planner):
         self._planned = self.index
         limit = self.mission.tether_length * (1.0 - MARGIN)
         target = self.target
-        straight = np.array([robot, target])
-        if self.is_free(straight) and self._fits(tether, straight, limit):
-            self.way, self.mode = straight[1:], NORMAL
-            return True
+        for end in (target, self._near_enough(robot, target)):
+            straight = np.array([robot, end])
+            if self.is_free(straight) and self._fits(tether, straight, limit):
+                self.way, self.mode = straight[1:], NORMAL
+                return True
         way = self._shortest_feasible(robot, tether, limit)
         if way is None:
             own = self._own_tether(target)
@@ -62,39 +70,120 @@ class PredictivePlanner(Planner):
         self.way, self.mode = way[1:], RECOVERY
         return True
 
+    def _near_enough(self, robot: Floats, target: Floats) -> Floats:
+        """Where on the straight way the waypoint counts as visited: the tether may fit there only.
+        A fifth of the reach is left for a vehicle that does not stop on the spot."""
+        way = target - robot
+        far = float(np.linalg.norm(way))
+        return target - way * min(1.0, 0.8 * self.mission.reach / max(far, 1e-12))
+
+    def warm_up(self, robot: Floats, tether: Tether) -> None:
+        """See `Planner`."""
+        self._shortest_feasible(robot, tether, self.mission.tether_length)
+
     def _fits(self, tether: Tether, way: Floats, limit: float) -> bool:
-        """Whether the tether stays within the limit all along a way."""
-        fine = max(min(0.5 * self.tethers.delta, 0.5 * self.mission.cell), 0.02)
+        """Whether the tether stays within the limit all along a way.
+
+        A taut tether gets longer by at most the way its end goes. So between points h apart, with
+        lengths a and b, it is at most (a + b + h) / 2 long, and only where that is too much need
+        one look closer.
+        """
         most = max(limit, tether.length + 1e-6)
-        # what is too long at a few places is too long
-        for step in (10.0 * fine, fine):
-            _, lengths = self.tethers.drive(tether, dense(way, step))
+        fine = max(0.5 * self.tethers.delta, 0.02)
+        points = dense(way, COARSE * fine)
+        _, lengths = self.tethers.drive(tether, points)
+        if lengths.max(initial=0.0) > most:
+            return False
+        corners = np.vstack([way[:1], points])
+        steps = np.linalg.norm(np.diff(corners, axis=0), axis=1)
+        close = np.r_[tether.length, lengths[:-1]] + lengths + steps > 2.0 * most
+        if not close.any():
+            return True
+        state = tether
+        for k, near in enumerate(close[: np.flatnonzero(close)[-1] + 1]):
+            stops = dense(corners[k : k + 2], fine) if near else points[k : k + 1]
+            state, lengths = self.tethers.drive(state, stops)
             if lengths.max() > most:
                 return False
         return True
 
     def _shortest_feasible(self, robot: Floats, tether: Tether, limit: float) -> Floats | None:
         """The shortest way on which the tether fits: on from the robot, or back along the tether to
-        a pivot and on from there. One tree serves all pivots; the cheapest are tried first."""
+        a pivot and on from there. One tree serves all pivots.
+
+        What a pivot decides is the class of the tether at the target, and with it its length there.
+        Pivots in a row that lead to one class are taken together; classes that are too long need no
+        more. For the others the way is pulled taut as a whole, the part back along the tether too:
+        there is none shorter in its class. Where the tether is too long on that way, as much of the
+        part back along the tether as need be is left as it is.
+        """
         back = pushed_out(self.scene, tether.nodes[::-1], self.mission.clearance)
         back[0] = robot
         spacing = max(self.mission.cell, length_of(back) / PIVOTS if len(back) > 1 else 0.0)
         pivots = points_along(back, spacing) if len(back) > 1 else back
         pivots[1:] = pushed_out(self.scene, pivots[1:], self.mission.clearance)
-        tree = ShortestTree(self.grid, self.target, pivots)
-        walked = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(pivots, axis=0), axis=1))]
-        for n in np.argsort(walked + tree.lengths, kind="stable"):
-            onward = tree.way(int(n))
-            if onward is None:
+        tree = self.ways(pivots)
+        along = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(back, axis=0), axis=1))]
+        places = np.linspace(0.0, along[-1], len(pivots))
+
+        def taken_back(n: int) -> Floats:
+            """The tether when the robot has followed it back to pivot n."""
+            passed = int(np.searchsorted(along, places[n] - 1e-9, side="right"))
+            return np.vstack([tether.nodes[: max(1, len(back) - passed)], pivots[n]])
+
+        onward = [tree.way(n) for n in range(len(pivots))]
+        whole: list[tuple[float, Floats, int, int]] = []
+        for first, last in self._classes(pivots, onward):
+            on = onward[last]
+            assert on is not None
+            if self._too_long(np.vstack([taken_back(last), on[1:]]), limit):
                 continue
-            onward = taut(self.scene, onward, self.mission.clearance, self.tethers.delta)
-            way = np.vstack([pivots[: n + 1], onward[1:]])
+            way = self.pulled(np.vstack([pivots[: last + 1], on[1:]]))
+            whole.append((length_of(way), way, first, last))
+        best, least = None, np.inf
+        for length, way, first, last in sorted(whole, key=lambda w: w[0]):
+            if length >= least:
+                break
             if self._fits(tether, way, limit):
-                return way
-        return None
+                return way if length < least else best
+            # the more of the tether is taken back, the sooner the rest fits
+            way, low = None, first
+            while low <= last:
+                n = (low + last) // 2
+                on = onward[n]
+                assert on is not None
+                on = self.pulled(on)
+                if self._fits(self.tethers.relaxed(taken_back(n), ENOUGH_ROUNDS[0]), on, limit):
+                    way, last = np.vstack([pivots[: n + 1], on[1:]]), n - 1
+                else:
+                    low = n + 1
+            if way is not None and length_of(way) < least and self._fits(tether, way, limit):
+                best, least = way, length_of(way)
+        return best
+
+    def _classes(
+        self, pivots: Floats, onward: Sequence[Floats | None]
+    ) -> list[tuple[int, int]]:
+        """Pivots in a row often lead to ways of one class: the first and last of each such row."""
+        out, first = [], 0
+        for n, way in enumerate(onward):
+            after = onward[n + 1] if n + 1 < len(onward) else None
+            if way is None:
+                first = n + 1
+            elif after is None or not homotopic(
+                self.scene, way, np.vstack([pivots[n], after]), self.grid.cell
+            ):
+                out.append((first, n))
+                first = n + 1
+        return out
+
+    def _too_long(self, line: Floats, limit: float) -> bool:
+        """Whether a tether that lies along a line is too long even when it is taut."""
+        return all(self.tethers.relaxed(line, rounds).length > limit for rounds in ENOUGH_ROUNDS)
 
     def _own_tether(self, target: Floats) -> float | None:
         """Length of the shortest tether from the anchor to a place."""
-        tree = ShortestTree(self.grid, target, np.array([self.mission.anchor]))
+        tree = self.ways(np.array([self.mission.anchor]))
         way = tree.way(0)
         return None if way is None else length_of(taut(self.scene, way, 0.0, self.tethers.delta))
+

@@ -22,7 +22,7 @@ import numpy as np
 from netsp.online.mission import pushed_out
 from netsp.online.planner.base import NORMAL, RECOVERY, Floats, Planner, dense, points_along
 from netsp.online.tether import Tether
-from netsp.online.tree import ShortestTree, length_of, taut
+from netsp.online.tree import Ways
 
 DRAFT_SHARE, DRAFT_GAIN = 0.7, 0.65
 """The draft accepts a pivot whose tether is below 0.7 L_max and below 0.65 of that of the pivot
@@ -50,16 +50,22 @@ class ReactPlanner(Planner):
         if self.mode == RECOVERY:
             self.way, self.mode = self.way[:0], NORMAL
         if tether.length > self.mission.tether_length and self._soft != self.index:
-            self.way = self._search(robot, tether)
+            self.way = self._search(tether)
             self.mode = RECOVERY
             return True
         return False if len(self.way) else self.go_on(robot)
 
-    def _search(self, robot: Floats, tether: Tether) -> Floats:
+    def warm_up(self, robot: Floats, tether: Tether) -> None:
+        """See `Planner`."""
+        del robot
+        self._search(tether)
+        self._soft = -1
+
+    def _search(self, tether: Tether) -> Floats:
         """Algorithm 3: pivots backwards along the tether, the first that will do."""
         limit = self.mission.tether_length
         back = points_along(tether.nodes[::-1], max(self.mission.cell, 0.25))
-        tree = ShortestTree(self.grid, self.target, pushed_out(self.scene, back, 1e-3))
+        tree = self.ways(pushed_out(self.scene, back, 1e-3))
         lengths = [self._augmented(back, tree, n) for n in range(len(back))]
         for n, length in enumerate(lengths):
             if self.draft:
@@ -75,15 +81,15 @@ class ReactPlanner(Planner):
             if self.draft:
                 # back to two nodes before the pivot; the rest is left to normal mode
                 return retraced[1 : max(2, n - 1)]
-            onward = taut(self.scene, onward, self.mission.clearance, self.tethers.delta)
+            onward = self.pulled(onward)
             return np.vstack([retraced[1:], onward[1:]])
         self._soft = self.index
         onward = tree.way(0)
         if onward is None:
             return self.target[None]
-        return taut(self.scene, onward, self.mission.clearance, self.tethers.delta)[1:]
+        return self.pulled(onward)[1:]
 
-    def _augmented(self, back: Floats, tree: ShortestTree, n: int) -> float:
+    def _augmented(self, back: Floats, tree: Ways, n: int) -> float:
         """Length of the tether after its part from the anchor to pivot n and the way on from
         there."""
         onward = tree.way(n)
@@ -92,6 +98,3 @@ class ReactPlanner(Planner):
         way = np.vstack([back[:n:-1], onward]) if n + 1 < len(back) else onward
         start = self.tethers.start(way[0], way[0])
         return self.tethers.drive(start, dense(way, 0.5 * self.mission.cell))[0].length
-
-
-__all__ = ["ReactPlanner", "length_of"]

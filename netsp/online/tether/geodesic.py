@@ -51,7 +51,7 @@ class GeodesicTether:
     field: DistanceField
     delta: float = 0.1
     precision: float | None = None
-    rounds: int = 6
+    rounds: int = 3
 
     name = "geodesic"
 
@@ -99,6 +99,11 @@ class GeodesicTether:
         tether = self._taut(strand_of(np.array([points[0], points[0]])))
         return self.refine(self.drive(tether, points[1:])[0])
 
+    def relaxed(self, path: npt.ArrayLike, rounds: int) -> Tether:
+        """A tether that lies along a free path (k, 3), pulled for so many rounds: faster than `lay`
+        where the way matters more than the last millimetre."""
+        return self._taut(strand_of(path), rounds)
+
     def _taut(self, strand: Floats, rounds: int | None = None) -> Tether:
         delta, spread, flat, usual, precision = self._settings
         strand, count, residual = pull(
@@ -118,9 +123,8 @@ class GeodesicTether:
         InputError : robot or anchor not finite, or deeper than delta / 4 inside a solid.
         """
         strand, length, residual = tether.strand, tether.length, tether.residual
-        for last, target in ((False, anchor), (True, robot)):
-            if target is None and not last:
-                continue
+        ends = [(True, robot)] if anchor is None else [(False, anchor), (True, robot)]
+        for last, target in ends:
             name = "robot" if last else "anchor"
             x, y, z = finite_point(target, name)
             strand, residual, length, depth = follow(
@@ -145,7 +149,7 @@ class GeodesicTether:
     def refine(self, tether: Tether) -> Tether:
         """The same tether, every contact looked at afresh, pulled until nothing moves or for 5000
         rounds (`Tether.residual` tells); after a change of the scene, too."""
-        return self._taut(strand_of(tether.nodes), rounds=5000)
+        return self.relaxed(tether.nodes, rounds=5000)
 
     @property
     def warnings(self) -> tuple[str, ...]:

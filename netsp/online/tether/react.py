@@ -75,9 +75,8 @@ class ReactTether:
         """The tether after a motion of the robot, of the anchor, or both."""
         nodes = tether.nodes
         text = self.reading == "text"
-        for end, target in ((False, anchor), (True, robot)):
-            if target is None and not end:
-                continue
+        ends = [(True, robot)] if anchor is None else [(False, anchor), (True, robot)]
+        for end, target in ends:
             point = self.field.free_point(
                 target, "robot" if end else "anchor", depth=0.25 * self.delta
             )
