@@ -203,9 +203,26 @@ def _parser() -> argparse.ArgumentParser:
         help="predictive (default), react, react-draft or none",
     )  # fmt: skip
     p.add_argument("--tether", type=_length, metavar="L", help="tether length, in place of its own")
+    p.add_argument(
+        "--vehicle", default="kinematic", metavar="NAME",
+        help="kinematic (default) or bluerov2 (with its dynamics and controller)",
+    )  # fmt: skip
+    p.add_argument("--current", metavar="X,Y,Z", help="current (m/s), in place of the mission's")
+    p.add_argument(
+        "--ways", default="tree", metavar="NAME",
+        help="how ways are found: tree (default), bitstar, rrtstar or prmstar (OMPL)",
+    )  # fmt: skip
+    p.add_argument(
+        "--refine", metavar="NAME", help="none, paper or gradient; default is the planner's own"
+    )
+    p.add_argument("--seed", type=int, default=0, metavar="N", help="of gusts, sampling, refining")
+    p.add_argument("--compare", metavar="NAME", help="fly with another planner too, side by side")
     p.add_argument("--snap", action="store_true", help="move waypoints out of solids")
     p.add_argument(
-        "-o", "--output", metavar="RUN", help="folder for log.csv, summary.json and run.png"
+        "-o",
+        "--output",
+        metavar="RUN",
+        help="folder for log.csv, summary.json, run.png and (with plotly) run.html",
     )
     p.add_argument("--quiet", action="store_true", help="no progress")
     p.set_defaults(run=_simulate)

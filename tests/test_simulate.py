@@ -15,8 +15,9 @@ from netsp.cli import main
 from netsp.online import Scene
 from netsp.online.mission import Mission, pushed_out
 from netsp.online.planner import PLANNERS
-from netsp.online.simulate import advance, simulate
+from netsp.online.simulate import simulate
 from netsp.online.tree import Grid, ShortestTree, length_of, taut
+from netsp.online.vehicle.kinematic import advance
 
 MISSIONS = Path(__file__).parent.parent / "missions"
 POST = Scene(solids=[{"post": {"center": [0, 0], "radius": 0.5}}], bounds=(-4, -4, -1, 4, 4, 1))

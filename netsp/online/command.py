@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -12,10 +13,10 @@ import numpy.typing as npt
 
 from netsp.errors import InputError
 from netsp.measuring import read_path
-from netsp.online import pictures
-from netsp.online.field import DistanceField
+from netsp.online import flights, pictures
+from netsp.online.field import DistanceField, finite_point
 from netsp.online.mission import Mission
-from netsp.online.planner import Planner
+from netsp.online.planner import Options, Planner
 from netsp.online.scene import Scene
 from netsp.online.simulate import STEP, LogRow, Run, simulate, write_run
 from netsp.online.tether import GeodesicTether, ReactTether, Tether
@@ -55,38 +56,79 @@ EXIT_NOT_ALL = 4
 def run_mission(args: argparse.Namespace) -> int:
     """`netsp simulate MISSION`: returns the exit code."""
     mission = Mission.load(args.mission)
+    changes: dict[str, object] = {}
     if args.tether is not None:
-        mission = mission.model_copy(update={"tether_length": args.tether})
+        changes["tether_length"] = args.tether
+    if args.current is not None:
+        changes["current"] = vector(args.current, "--current")
+    mission = mission.model_copy(update=changes)
     if args.output is not None and Path(args.output).exists() and not Path(args.output).is_dir():
         raise InputError(f"{args.output}: expected a folder, and it is a file")
     scene = mission.load_scene()
     field = scene.field(on_progress=tell)
-    show = not args.quiet and sys.stderr.isatty()
+    runs = []
+    for planner in [args.planner, args.compare] if args.compare else [args.planner]:
+        run = simulate(
+            mission, planner, vehicle=args.vehicle,
+            options=Options(args.ways, args.refine, args.seed),
+            scene=scene, field=field, snap=args.snap, seed=args.seed,
+            on_step=None if args.quiet or not sys.stderr.isatty() else live(mission, scene.units),
+        )  # fmt: skip
+        runs.append(run)
+        if not args.quiet:
+            print(
+                ("\r\n" if sys.stderr.isatty() else "") + describe(run, scene.units),
+                file=sys.stderr,
+            )
+        if run.summary["status"] == "interrupted":
+            break
+    if args.output is None:
+        print(json.dumps(runs[0].summary, indent=1, allow_nan=False))
+    else:
+        write_run(runs[0], args.output)
+        if len(runs) > 1:
+            write_run(runs[1], Path(args.output) / runs[1].planner)
+        draw_runs(runs, scene, Path(args.output))
+    complete = runs[0].summary["status"] == "done" and not runs[0].summary["skipped"]
+    return 0 if complete else EXIT_NOT_ALL
+
+
+def draw_runs(runs: list[Run], scene: Scene, folder: Path) -> None:
+    """The pictures of one run, or of two side by side; the page only where plotly is installed."""
+    flights.save_runs(runs, scene, folder / "run.png")
+    try:
+        import plotly  # noqa: F401
+    except ImportError:
+        return
+    flights.save_page(runs, scene, folder / "run.html")
+
+
+def live(mission: Mission, units: str) -> Callable[[LogRow, Planner], None]:
+    """Shows how a mission goes, in one line."""
+    count = len(mission.waypoints)
 
     def on_step(row: LogRow, planner: Planner) -> None:
-        if show and int(row.time / STEP) % 20 == 0:
-            print(
-                f"\r{row.time:7.1f} s  waypoint {row.target}/{len(mission.waypoints)}  "
-                f"{row.mode:<8} tether {row.tether:.2f} of {mission.tether_length:g} "
-                f"{scene.units}   ",
-                end="",
-                file=sys.stderr,
-                flush=True,
-            )
+        del planner
+        if round(row.time / STEP) % 20:
+            return
+        done = int(20 * row.target / count)
+        seen = f"  seen {100 * row.coverage:.0f} %" if mission.camera is not None else ""
+        print(
+            f"\r[{'#' * done:.<20}] {row.time:7.1f} s  waypoint {row.target}/{count}  "
+            f"{row.mode:<8} tether {row.tether:.2f} of {mission.tether_length:g} {units}{seen}   ",
+            end="", file=sys.stderr, flush=True,
+        )  # fmt: skip
 
-    run = simulate(mission, args.planner, scene=scene, field=field, snap=args.snap, on_step=on_step)
-    if show:
-        print(file=sys.stderr)
-    text = json.dumps(run.summary, indent=1, allow_nan=False)
-    if args.output is not None:
-        write_run(run, args.output)
-        pictures.save_run(run, scene, Path(args.output) / "run.png")
-    else:
-        print(text)
-    if not args.quiet:
-        print(describe(run, scene.units), file=sys.stderr)
-    complete = run.summary["status"] == "done" and not run.summary["skipped"]
-    return 0 if complete else EXIT_NOT_ALL
+    return on_step
+
+
+def vector(text: str, name: str) -> tuple[float, float, float]:
+    """Three numbers, separated by commas."""
+    try:
+        x, y, z = (float(v) for v in text.split(","))
+    except ValueError:
+        raise InputError(f"{name}: expected three numbers like 0.1,0,0, got {text!r}") from None
+    return finite_point((x, y, z), name)
 
 
 def describe(run: Run, units: str) -> str:
@@ -102,6 +144,18 @@ def describe(run: Run, units: str) -> str:
         f"planning {s['replans']} times, median {1e3 * s['replan_median_s']:.1f} ms, worst "
         f"{1e3 * s['replan_worst_s']:.0f} ms",
     ]
+    if s["coverage"] is not None:
+        lines.insert(
+            4,
+            f"seen     {100 * s['coverage']:.1f} % of the surface "
+            f"({100 * s['coverage_through']:.1f} % if nothing stood in between)",
+        )
+    if s["control_worst_s"] > 0.0:
+        lines.append(
+            f"control  median {1e3 * s['control_median_s']:.1f} ms, worst "
+            f"{1e3 * s['control_worst_s']:.0f} ms; "
+            f"{s['inspection_s'] / s['wall_s']:.0f} x real time"
+        )
     lines += [f"left out {left['waypoint']}: {left['reason']}" for left in s["skipped"][:5]]
     if len(s["skipped"]) > 5:
         lines.append(f"         and {len(s['skipped']) - 5} more")

@@ -24,6 +24,21 @@ from netsp.problem import (
 _STRICT = ConfigDict(frozen=True, extra="forbid")
 
 
+class Camera(BaseModel):
+    """What the robot sees with.
+
+    range : metres. field_of_view : degrees, both ways. tilt : degrees that it turns up or down at
+    most. patch : metres; pieces of surface that coverage is counted in.
+    """
+
+    model_config = _STRICT
+
+    range: Positive = 2.0
+    field_of_view: Annotated[float, Field(gt=0.0, lt=180.0)] = 70.0
+    tilt: Annotated[float, Field(ge=0.0, le=90.0)] = 90.0
+    patch: Positive = 0.1
+
+
 class Mission(BaseModel):
     """Waypoints to visit in their order.
 
@@ -36,6 +51,10 @@ class Mission(BaseModel):
     clearance : metres that the robot keeps from solids, where it can.
     reach : metres; a waypoint this near counts as visited.
     speed : metres per second.
+    camera : what coverage is counted for; none without. inspect : names of the solids to be seen,
+        default all.
+    current : m/s, a steady current; gusts : m/s, standard deviation of what comes and goes on top.
+        A kinematic vehicle feels neither.
     delta : metres; resolution of the tether. cell : metres; of the grid that ways are sought on.
 
     Raises
@@ -55,6 +74,10 @@ class Mission(BaseModel):
     clearance: NonNegative = 0.2
     reach: Positive = 0.1
     speed: Positive = 0.3
+    camera: Camera | None = None
+    inspect: Annotated[tuple[Name, ...], Field(min_length=1)] | None = None
+    current: Point3 = (0.0, 0.0, 0.0)
+    gusts: NonNegative = 0.0
     delta: Positive = 0.1
     cell: Positive = 0.2
 

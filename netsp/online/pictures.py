@@ -11,7 +11,6 @@ import numpy.typing as npt
 
 from netsp.errors import InputError
 from netsp.online.scene import HalfSpace, Scene
-from netsp.online.simulate import Run
 from netsp.online.surfaces import Triangles, drawn_points, extent, mesh_of, surface_of
 from netsp.online.tether import Tether
 
@@ -46,7 +45,7 @@ def save(
     way = np.zeros((0, 3)) if path is None else np.asarray(path, dtype=float).reshape(-1, 3)
     nodes = np.zeros((0, 3)) if tether is None else tether.nodes
     low, high = extent(scene, way, nodes)
-    parts = _parts(scene, low, high)
+    parts = parts_of(scene, low, high)
     title = title or _title(scene, way, tether)
     try:
         if Path(file).suffix.lower() == INTERACTIVE:
@@ -56,49 +55,6 @@ def save(
             metadata = {"Date": None} if Path(file).suffix.lower() == ".svg" else None
             figure = _figure(scene, parts, way, nodes, (low, high), title)
             figure.savefig(file, dpi=150, metadata=metadata)
-    except OSError as error:
-        raise InputError(f"{file}: cannot be written: {error.strerror or error}") from None
-
-
-def save_run(run: Run, scene: Scene, file: str | Path) -> None:
-    """Draw a run: the tether's length over time, the way through the scene and the tether at the
-    end."""
-    from matplotlib.figure import Figure
-
-    t = np.array([r.time for r in run.log])
-    length = np.array([r.tether for r in run.log])
-    way = np.array([[r.x, r.y, r.z] for r in run.log])
-    recovering = np.array([r.mode == "recovery" for r in run.log])
-    limit = run.mission.tether_length
-    figure = Figure(figsize=(12, 5.5), layout="constrained")
-    left, right = figure.subplots(1, 2, width_ratios=[1.3, 1.0])
-    left.fill_between(
-        t, 0, 1, where=recovering, transform=left.get_xaxis_transform(), color="#fff3bf",
-        label="going another way",
-    )  # fmt: skip
-    left.plot(t, length, color=_TETHER, lw=1.4, label="taut tether")
-    left.axhline(limit, color=_ANCHOR, lw=1.0, ls="--", label="its limit")
-    left.set(xlabel="time (s)", ylabel=f"length ({scene.units})", ylim=(0, None))
-    left.legend(loc="lower right", fontsize=8)
-    low, high = extent(scene, way, run.tether.nodes)
-    for _, (vertices, faces) in _parts(scene, low, high):
-        from matplotlib.collections import PolyCollection
-
-        flat: Any = vertices[faces][:, :, [0, 1]]
-        right.add_collection(PolyCollection(flat, facecolors="#d0d7de", linewidths=0))
-    _lines(right, way, run.tether.nodes, (0, 1))
-    right.set(
-        xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal", xlabel="x", ylabel="y"
-    )
-    right.legend(loc="lower right", fontsize=8)
-    right.set_title("from above", fontsize=9)
-    s = run.summary
-    figure.suptitle(
-        f"{s['mission']}, {s['planner']}: {s['visited']} of {s['waypoints']} waypoints in "
-        f"{s['inspection_s']:.0f} s, tether at most {s['longest_tether_m']:.2f} of {limit:g}"
-    )
-    try:
-        figure.savefig(file, dpi=130)
     except OSError as error:
         raise InputError(f"{file}: cannot be written: {error.strerror or error}") from None
 
@@ -113,7 +69,7 @@ def _title(scene: Scene, way: Floats, tether: Tether | None) -> str:
     return ", ".join(words)
 
 
-def _parts(scene: Scene, low: Floats, high: Floats) -> list[tuple[str, Triangles]]:
+def parts_of(scene: Scene, low: Floats, high: Floats) -> list[tuple[str, Triangles]]:
     """What is drawn of the scene, by name."""
     out = []
     for k, solid in enumerate(scene.all_solids()):
@@ -142,12 +98,12 @@ def _figure(
     for _, (vertices, faces) in parts:
         triangles = vertices[faces]
         ax.add_collection3d(
-            Poly3DCollection(triangles, facecolors=_shaded(triangles), alpha=0.35, linewidths=0)
+            Poly3DCollection(triangles, facecolors=shaded(triangles), alpha=0.35, linewidths=0)
         )
     cloud = drawn_points(scene) if scene.cloud is not None else np.zeros((0, 3))
     if len(cloud):
         ax.plot(*cloud.T, ".", ms=0.6, color=_SOLID)
-    _lines(ax, way, nodes, (0, 1, 2))
+    draw_lines(ax, way, nodes, (0, 1, 2))
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
     ax.set_box_aspect(high - low)
     unit = scene.units
@@ -160,7 +116,7 @@ def _figure(
             panel.add_collection(PolyCollection(flat, facecolors="#d0d7de", linewidths=0))
         if len(cloud):
             panel.plot(cloud[:, a], cloud[:, b], ".", ms=0.4, color="#d0d7de")
-        _lines(panel, way, nodes, (a, b))
+        draw_lines(panel, way, nodes, (a, b))
         panel.set(xlim=(low[a], high[a]), ylim=(low[b], high[b]), aspect="equal")
         panel.set_title(name, fontsize=9)
         panel.set(xlabel=names[a], ylabel=names[b])
@@ -171,7 +127,7 @@ def _figure(
     return figure
 
 
-def _shaded(triangles: Floats) -> Floats:
+def shaded(triangles: Floats) -> Floats:
     """Greys by how much a triangle faces the light."""
     normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     size = np.linalg.norm(normals, axis=1)
@@ -181,7 +137,7 @@ def _shaded(triangles: Floats) -> Floats:
     return np.column_stack([grey, grey, np.minimum(1.0, grey + 0.04)])
 
 
-def _lines(ax: Any, way: Floats, nodes: Floats, axes: tuple[int, ...]) -> None:
+def draw_lines(ax: Any, way: Floats, nodes: Floats, axes: tuple[int, ...]) -> None:
     columns = list(axes)
     if len(way):
         ax.plot(*way[:, columns].T, color=_PATH, lw=0.9, alpha=0.8, label="path")

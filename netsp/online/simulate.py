@@ -7,7 +7,7 @@ import io
 import json
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -15,14 +15,17 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.errors import InputError
+from netsp.online.coverage import Coverage, patches_of
 from netsp.online.field import DistanceField
 from netsp.online.mission import Mission
-from netsp.online.planner import Planner, make_planner
+from netsp.online.planner import Command, Options, Planner, make_planner
 from netsp.online.planner.base import DONE
 from netsp.online.scene import Scene
 from netsp.online.surfaces import extent
 from netsp.online.tether import GeodesicTether, Tether
 from netsp.online.tree import Grid
+from netsp.online.vehicle import Vehicle, make_vehicle
+from netsp.online.water import Water
 
 Floats = npt.NDArray[np.float64]
 
@@ -35,15 +38,19 @@ STUCK = 600.0
 
 @dataclass(frozen=True)
 class LogRow:
-    """One step: seconds, position, index of the target, mode, tether (m), planning (s)."""
+    """One step: seconds, position (m), heading (rad), index of the target, mode, tether (m), share
+    of the surface seen and seen if nothing stood in between, planning (s)."""
 
     time: float
     x: float
     y: float
     z: float
+    yaw: float
     target: int
     mode: str
     tether: float
+    coverage: float
+    coverage_through: float
     replan_s: float
 
 
@@ -73,26 +80,80 @@ def grid_of(mission: Mission, scene: Scene, field: DistanceField) -> Grid:
     return Grid(field, low, high, mission.cell, mission.clearance)
 
 
+@dataclass
+class Simulation:
+    """A robot on a tether in a scene, moved on step by step.
+
+    Attributes
+    ----------
+    tether : the taut one. now : seconds. log : what has been.
+    """
+
+    mission: Mission
+    scene: DistanceField
+    vehicle: Vehicle
+    tethers: GeodesicTether
+    tether: Tether
+    water: Callable[[float], Floats]
+    coverage: Coverage | None = None
+    now: float = 0.0
+    log: list[LogRow] = field(default_factory=list)
+
+    def note(self, planner: Planner, command: Command) -> LogRow:
+        """Write down where things are."""
+        x, y, z = (float(v) for v in self.vehicle.position)
+        seen = self.coverage
+        if seen is not None:
+            seen.look(self.vehicle.position, self.vehicle.yaw)
+        row = LogRow(
+            round(self.now, 6), x, y, z, self.vehicle.yaw, planner.index, command.mode,
+            self.tether.length, seen.share if seen else 0.0, seen.share_through if seen else 0.0,
+            command.replan_s,
+        )  # fmt: skip
+        self.log.append(row)
+        return row
+
+    def go(self, way: Floats, fresh: bool) -> tuple[int, bool]:
+        """One step along a way: how much of it is passed, and whether the vehicle could move. One
+        that runs into a solid is stopped where it was."""
+        robot, yaw = self.vehicle.position, self.vehicle.yaw
+        if self.coverage is not None:
+            yaw = self.coverage.heading(robot, yaw)
+        stops, passed = self.vehicle.go(way, STEP, yaw, self.water(self.now), fresh)
+        self.now += STEP
+        if self.scene.distance(np.array(stops)).min() < -0.2 * self.tethers.delta:
+            self.vehicle.stop_at(robot)
+            return passed, False
+        for stop in stops:
+            self.tether = self.tethers.update(self.tether, stop)
+        return passed, True
+
+
 def simulate(
     mission: Mission,
     planner: str = "predictive",
     *,
+    vehicle: str = "kinematic",
+    options: Options | None = None,
     scene: Scene | None = None,
     field: DistanceField | None = None,
     snap: bool = False,
+    seed: int = 0,
     on_step: Callable[[LogRow, Planner], None] | None = None,
 ) -> Run:
-    """Run a mission with a vehicle that goes straight to where it is told, at its speed.
+    """Run a mission.
 
     Parameters
     ----------
-    planner : name (`netsp.online.planner.PLANNERS`). scene, field : when they are at hand.
+    planner : name (`netsp.online.planner.PLANNERS`). options : how it finds ways.
+    vehicle : name (`netsp.online.vehicle.VEHICLES`). seed : of the gusts.
+    scene, field : when they are at hand.
     snap : move waypoints out of solids. on_step : is told every row; a KeyboardInterrupt ends the
     run, and what was done till then is returned.
 
     Raises
     ------
-    InputError : before the first step: unknown planner, waypoints inside solids, anchor and start
+    InputError : before the first step: unknown names, waypoints inside solids, anchor and start
         not in sight of one another, a tether that is shorter than the way between them.
     """
     scene = scene or mission.load_scene()
@@ -105,73 +166,60 @@ def simulate(
             f"tether_length: {mission.tether_length:g} is shorter than the way from anchor to "
             f"start, {tether.length:.4g}"
         )
-    chosen = make_planner(planner, mission, field, tethers, grid_of(mission, scene, field))
-    chosen.warm_up(np.array(mission.start), tether)
-    robot, now, since = np.array(mission.start), 0.0, (0.0, -1)
-    log: list[LogRow] = []
-    interrupted = False
+    robot = make_vehicle(vehicle, np.array(mission.start), mission.speed)
+    chosen = make_planner(planner, mission, field, tethers, grid_of(mission, scene, field), options)
+    coverage = None
+    if mission.camera is not None:
+        places = np.array([mission.anchor, mission.start, *mission.waypoints])
+        patches = patches_of(scene, field, mission.camera.patch, places, mission.inspect)
+        coverage = Coverage(patches, field, mission.camera)
+    water = Water(mission.current, mission.gusts, seed)
+    chosen.warm_up(robot.position, tether)
+    world = Simulation(mission, field, robot, tethers, tether, water, coverage)
+    since, interrupted = (0.0, -1), False
     begin = time.perf_counter()
     try:
         while True:
-            command = chosen.step(robot, tether)
-            x, y, z = (float(v) for v in robot)
-            row = LogRow(
-                round(now, 6), x, y, z, chosen.index, command.mode, tether.length, command.replan_s
-            )
-            log.append(row)
+            before = chosen.index
+            command = chosen.step(robot.position, world.tether)
+            row = world.note(chosen, command)
             if on_step is not None:
                 on_step(row, chosen)
             if command.mode == DONE:
                 break
             if since[1] != chosen.index:
-                since = (now, chosen.index)
-            elif now - since[0] > STUCK:
+                since = (world.now, chosen.index)
+            elif world.now - since[0] > STUCK:
                 chosen.give_up(f"not reached in {STUCK:g} s")
                 continue
-            stops, passed = advance(robot, command.way, mission.speed * STEP)
-            blocked = field.distance(np.array(stops)).min() < -0.2 * mission.delta
-            if blocked:
-                chosen.give_up("the way to it leads through a solid")
-            else:
-                for stop in stops:
-                    tether = tethers.update(tether, stop)
-                robot = stops[-1]
+            fresh = before != chosen.index or command.replan_s > 0.0 or not world.now
+            passed, moved = world.go(command.way, fresh)
+            if moved:
                 chosen.passed(passed)
-            now += STEP
+            else:
+                chosen.give_up("the way to it leads through a solid")
     except KeyboardInterrupt:
         interrupted = True
-    summary = summarise(mission, chosen, log, tether, time.perf_counter() - begin, interrupted)
-    return Run(mission, planner, tuple(log), tether, summary)
-
-
-def advance(robot: Floats, way: Floats, step: float) -> tuple[list[Floats], int]:
-    """The corners that a robot passes on its next `step` metres of a way and where it ends, and how
-    many points of the way it has passed."""
-    stops: list[Floats] = []
-    here, left = robot, step
-    for passed, point in enumerate(way):
-        far = float(np.linalg.norm(point - here))
-        if far > left:
-            return [*stops, here + (point - here) * (left / far)], passed
-        here, left = point, left - far
-        stops.append(here)
-    return stops or [robot], len(way)
+    wall = time.perf_counter() - begin
+    summary = summarise(mission, chosen, world, wall, interrupted)
+    return Run(mission, planner, tuple(world.log), world.tether, summary)
 
 
 def summarise(
-    mission: Mission, planner: Planner, log: list[LogRow], tether: Tether, wall: float,
-    interrupted: bool,
-) -> dict[str, Any]:  # fmt: skip
+    mission: Mission, planner: Planner, world: Simulation, wall: float, interrupted: bool
+) -> dict[str, Any]:
     """The numbers of a run, as the papers give them.
 
     exceedance_s : seconds with a tether longer than it is. recovery_s : seconds to come back to the
     anchor afterwards, by retracing the tether, or the whole path (the paper does not say which).
     """
+    log, tether = world.log, world.tether
     lengths = np.array([r.tether for r in log])
     places = np.array([[r.x, r.y, r.z] for r in log])
     planned = [r.replan_s for r in log if r.replan_s > 0.0]
     walked = float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
     inspection = log[-1].time if log else 0.0
+    control = world.vehicle.control_s
     by_tether, by_path = tether.length / mission.speed, walked / mission.speed
     return {
         "mission": mission.name,
@@ -190,6 +238,10 @@ def summarise(
         "replans": len(planned),
         "replan_median_s": float(np.median(planned)) if planned else 0.0,
         "replan_worst_s": max(planned, default=0.0),
+        "coverage": log[-1].coverage if world.coverage and log else None,
+        "coverage_through": log[-1].coverage_through if world.coverage and log else None,
+        "control_median_s": float(np.median(control)) if control else 0.0,
+        "control_worst_s": max(control, default=0.0),
         "wall_s": wall,
     }
 

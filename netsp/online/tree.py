@@ -88,8 +88,6 @@ class Grid:
 class Ways(Protocol):
     """Short ways to one target from some points, however they are found."""
 
-    lengths: Floats
-
     def way(self, n: int) -> Floats | None:
         """(k, 3) from point n to the target; None if there is none."""
 

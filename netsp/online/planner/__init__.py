@@ -7,17 +7,18 @@ from collections.abc import Callable
 from netsp.errors import InputError
 from netsp.online.field import DistanceField
 from netsp.online.mission import Mission
-from netsp.online.planner.base import Command, Planner
+from netsp.online.planner.base import Command, Options, Planner, Tethers
 from netsp.online.planner.predictive import PredictivePlanner
 from netsp.online.planner.react import ReactPlanner
-from netsp.online.tether import GeodesicTether, ReactTether
+from netsp.online.refine import REFINEMENTS
+from netsp.online.sampled import OMPL_PLANNERS
 from netsp.online.tree import Grid
 
 
 def _draft(
-    mission: Mission, scene: DistanceField, tethers: GeodesicTether | ReactTether, grid: Grid
+    mission: Mission, scene: DistanceField, tethers: Tethers, grid: Grid, options: Options
 ) -> Planner:
-    return ReactPlanner(mission, scene, tethers, grid, draft=True)
+    return ReactPlanner(mission, scene, tethers, grid, options, draft=True)
 
 
 PLANNERS: dict[str, Callable[..., Planner]] = {
@@ -29,13 +30,18 @@ PLANNERS: dict[str, Callable[..., Planner]] = {
 
 
 def make_planner(
-    name: str, mission: Mission, scene: DistanceField, tethers: GeodesicTether | ReactTether,
-    grid: Grid,
+    name: str, mission: Mission, scene: DistanceField, tethers: Tethers, grid: Grid,
+    options: Options | None = None,
 ) -> Planner:  # fmt: skip
-    """A planner by name. InputError for a name that is none."""
+    """A planner by name. InputError for a name that is none, of the planner or in its options."""
+    options = options or Options()
     if name not in PLANNERS:
         raise InputError(f"--planner: expected {', '.join(PLANNERS)}, got {name!r}")
-    return PLANNERS[name](mission, scene, tethers, grid)
+    if options.ways not in (known := ("tree", *OMPL_PLANNERS)):
+        raise InputError(f"--ways: expected {', '.join(known)}, got {options.ways!r}")
+    if options.refine not in (None, *REFINEMENTS):
+        raise InputError(f"--refine: expected {', '.join(REFINEMENTS)}, got {options.refine!r}")
+    return PLANNERS[name](mission, scene, tethers, grid, options)
 
 
-__all__ = ["PLANNERS", "Command", "Planner", "make_planner"]
+__all__ = ["PLANNERS", "Command", "Options", "Planner", "make_planner"]

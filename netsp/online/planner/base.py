@@ -11,10 +11,17 @@ import numpy.typing as npt
 
 from netsp.online.field import DistanceField
 from netsp.online.mission import Mission
-from netsp.online.tether import GeodesicTether, ReactTether, Tether
+from netsp.online.refine import refined
+from netsp.online.sampled import SampledWays
+from netsp.online.tether import GeodesicTether, Tether
 from netsp.online.tree import Grid, ShortestTree, Ways, taut
 
 Floats = npt.NDArray[np.float64]
+
+Tethers = GeodesicTether
+
+MOST_HOLDS = 20
+"""Steps that a planner may fail at one waypoint before it is given up."""
 
 NORMAL, RECOVERY, HOLD, DONE = "normal", "recovery", "hold", "done"
 
@@ -32,6 +39,18 @@ class Command:
     replan_s: float = 0.0
 
 
+@dataclass(frozen=True)
+class Options:
+    """How ways are found. ways : tree, or one of OMPL's planners (`netsp.online.sampled`).
+    refine : none, paper or gradient (`netsp.online.refine`); default paper for the paper's planners
+    and none for the others, whose ways keep the clearance from the start. seed : of what is random
+    in either."""
+
+    ways: str = "tree"
+    refine: str | None = None
+    seed: int = 0
+
+
 @dataclass
 class Planner:
     """Follows the waypoints of a mission.
@@ -43,15 +62,18 @@ class Planner:
 
     mission: Mission
     scene: DistanceField
-    tethers: GeodesicTether | ReactTether
+    tethers: Tethers
     grid: Grid
+    options: Options = field(default_factory=Options)
     index: int = 0
     mode: str = NORMAL
     way: Floats = field(default_factory=lambda: np.zeros((0, 3)))
     skipped: list[tuple[int, str]] = field(default_factory=list)
     reached: list[int] = field(default_factory=list)
+    _held: int = 0
 
     name = "none"
+    refine = "none"
 
     @property
     def target(self) -> Floats:
@@ -73,11 +95,21 @@ class Planner:
         planned, given_up = False, -1
         while not self.done and given_up < len(self.skipped):
             given_up = len(self.skipped)
-            planned = self.plan(robot, tether) or planned
+            try:
+                planned = self.plan(robot, tether) or planned
+            except Exception as error:  # a vehicle in the water must not be left without a command
+                return self._hold(robot, error, time.perf_counter() - begin)
         spent = time.perf_counter() - begin if planned else 0.0
         if self.done:
             return Command(np.array([robot]), DONE, spent)
         return Command(self.way if len(self.way) else np.array([robot]), self.mode, spent)
+
+    def _hold(self, robot: Floats, error: Exception, spent: float) -> Command:
+        """Stay, and try again at the next step; give the waypoint up after a while."""
+        self._held += 1
+        if self._held > MOST_HOLDS:
+            self.give_up(f"planning failed: {type(error).__name__}: {error}")
+        return Command(np.array([robot]), HOLD, spent)
 
     def warm_up(self, robot: Floats, tether: Tether) -> None:
         """Load what is compiled, so that the first plan takes no longer than the others."""
@@ -103,12 +135,24 @@ class Planner:
         if way is None:
             self.give_up("no free way to it")
         else:
-            self.way = self.pulled(way)[1:]
+            self.way = self.refined(self.pulled(way))[1:]
         return True
 
     def ways(self, points: Floats) -> Ways:
         """Short ways to the waypoint from each of some points (n, 3)."""
-        return ShortestTree(self.grid, self.target, points)
+        if self.options.ways == "tree":
+            return ShortestTree(self.grid, self.target, points)
+        seed = 1000 * self.options.seed + self.index
+        return SampledWays(self.options.ways, self.grid, self.target, points, seed)
+
+    def refined(self, way: Floats) -> Floats:
+        """A way made safer and smoother, as the options have it."""
+        name = self.options.refine or self.refine
+        if name == "none":
+            return way
+        rng = np.random.default_rng([self.options.seed, self.index])
+        even = points_along(way, self.mission.cell)
+        return refined(name, self.scene, even, self.mission.clearance, rng)
 
     def pulled(self, way: Floats) -> Floats:
         """A way pulled taut in its class, at the clearance."""
@@ -131,7 +175,7 @@ class Planner:
 
     def _next(self) -> None:
         self.index += 1
-        self.way, self.mode = np.zeros((0, 3)), NORMAL
+        self.way, self.mode, self._held = np.zeros((0, 3)), NORMAL, 0
 
     def passed(self, count: int) -> None:
         """The robot has passed so many points of the way; the last one stays the target."""

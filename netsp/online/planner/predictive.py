@@ -43,12 +43,13 @@ class PredictivePlanner(Planner):
     """`Planner` with look-ahead."""
 
     _planned: int = field(default=-1)
+    _warned: int = field(default=-1)
 
     name = "predictive"
 
     def plan(self, robot: Floats, tether: Tether) -> bool:
         """One way per waypoint, planned when the robot sets out for it."""
-        if self._planned == self.index and len(self.way):
+        if self._planned == self.index and len(self.way) and not self._surprised(tether):
             return False
         self._planned = self.index
         limit = self.mission.tether_length * (1.0 - MARGIN)
@@ -67,7 +68,20 @@ class PredictivePlanner(Planner):
                 f"{self.mission.tether_length:g}"
             )  # fmt: skip
             return True
+        better = self.refined(way)
+        if better is not way and self._fits(tether, better, limit):
+            way = better
         self.way, self.mode = way[1:], RECOVERY
+        return True
+
+    def _surprised(self, tether: Tether) -> bool:
+        """Whether half of the reserve is used up, as in a current: said once for each waypoint."""
+        if (
+            self._warned == self.index
+            or tether.length <= (1.0 - 0.5 * MARGIN) * self.mission.tether_length
+        ):
+            return False
+        self._warned = self.index
         return True
 
     def _near_enough(self, robot: Floats, target: Floats) -> Floats:
@@ -140,30 +154,30 @@ class PredictivePlanner(Planner):
                 continue
             way = self.pulled(np.vstack([pivots[: last + 1], on[1:]]))
             whole.append((length_of(way), way, first, last))
-        best, least = None, np.inf
+        best: Floats | None = None
+        least = np.inf
         for length, way, first, last in sorted(whole, key=lambda w: w[0]):
             if length >= least:
                 break
             if self._fits(tether, way, limit):
                 return way if length < least else best
             # the more of the tether is taken back, the sooner the rest fits
-            way, low = None, first
+            kept: Floats | None = None
+            low = first
             while low <= last:
                 n = (low + last) // 2
                 on = onward[n]
                 assert on is not None
                 on = self.pulled(on)
                 if self._fits(self.tethers.relaxed(taken_back(n), ENOUGH_ROUNDS[0]), on, limit):
-                    way, last = np.vstack([pivots[: n + 1], on[1:]]), n - 1
+                    kept, last = np.vstack([pivots[: n + 1], on[1:]]), n - 1
                 else:
                     low = n + 1
-            if way is not None and length_of(way) < least and self._fits(tether, way, limit):
-                best, least = way, length_of(way)
+            if kept is not None and length_of(kept) < least and self._fits(tether, kept, limit):
+                best, least = kept, length_of(kept)
         return best
 
-    def _classes(
-        self, pivots: Floats, onward: Sequence[Floats | None]
-    ) -> list[tuple[int, int]]:
+    def _classes(self, pivots: Floats, onward: Sequence[Floats | None]) -> list[tuple[int, int]]:
         """Pivots in a row often lead to ways of one class: the first and last of each such row."""
         out, first = [], 0
         for n, way in enumerate(onward):
@@ -186,4 +200,3 @@ class PredictivePlanner(Planner):
         tree = self.ways(np.array([self.mission.anchor]))
         way = tree.way(0)
         return None if way is None else length_of(taut(self.scene, way, 0.0, self.tethers.delta))
-

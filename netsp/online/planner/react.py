@@ -36,6 +36,8 @@ class ReactPlanner(Planner):
     draft: bool = False
     _soft: int = field(default=-1)
 
+    refine = "paper"
+
     @property
     def name(self) -> str:  # type: ignore[override]
         """As it is chosen."""
@@ -82,12 +84,12 @@ class ReactPlanner(Planner):
                 # back to two nodes before the pivot; the rest is left to normal mode
                 return retraced[1 : max(2, n - 1)]
             onward = self.pulled(onward)
-            return np.vstack([retraced[1:], onward[1:]])
+            return self.refined(np.vstack([retraced, onward[1:]]))[1:]
         self._soft = self.index
         onward = tree.way(0)
         if onward is None:
             return self.target[None]
-        return self.pulled(onward)[1:]
+        return self.refined(self.pulled(onward))[1:]
 
     def _augmented(self, back: Floats, tree: Ways, n: int) -> float:
         """Length of the tether after its part from the anchor to pivot n and the way on from

@@ -1,0 +1,199 @@
+"""What a camera has seen of a structure: patches of its surface, marked as they come into view.
+
+As Amer et al. 2025 (section VI-A) count it, a patch is seen when its centre is within the camera's
+range, its surface faces the camera and it lies within the field of view. They do not ask whether
+something stands in between; here both are counted, with and without.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from netsp.errors import InputError
+from netsp.online.field import DistanceField
+from netsp.online.mission import Camera
+from netsp.online.sampling import lowest_along
+from netsp.online.scene import HalfSpace, Scene
+from netsp.online.surfaces import drawn_points, extent, mesh_of, surface_of
+
+Floats = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
+
+MOST_PATCHES = 200_000
+
+
+@dataclass(frozen=True)
+class Patches:
+    """A surface in pieces. centres, normals : (n, 3), normals outward. areas : (n,)."""
+
+    centres: Floats
+    normals: Floats
+    areas: Floats
+
+
+def patches_of(
+    scene: Scene, field: DistanceField, size: float, places: Floats,
+    inspect: tuple[str, ...] | None = None,
+) -> Patches:  # fmt: skip
+    """The surface of a scene in triangles with sides of at most `size`, without what lies inside
+    another solid. places : (k, 3); what has no end is taken as far as they reach. inspect : names
+    of the solids to be seen; default all but half spaces.
+
+    Raises
+    ------
+    InputError : `inspect` names no solid, or nothing is left to be seen.
+    """
+    low, high = extent(scene, places)
+    solids = scene.all_solids()
+    named = {s.name for s in solids} | ({"mesh"} if scene.mesh else set())
+    named |= {"cloud"} if scene.cloud else set()
+    for name in inspect or ():
+        if name not in named:
+            raise InputError(f"inspect: expected names of solids, got {name!r}")
+    centres, normals, areas = [np.zeros((0, 3))], [np.zeros((0, 3))], [np.zeros(0)]
+    surfaces = [
+        surface_of(s.shape, low, high)
+        for s in solids
+        if not isinstance(s.shape, HalfSpace) and (inspect is None or s.name in inspect)
+    ]
+    if scene.mesh is not None and (inspect is None or "mesh" in inspect):
+        surfaces.append(mesh_of(scene))
+    for vertices, faces in surfaces:
+        triangles = divided(vertices[faces], size)
+        cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+        twice = np.linalg.norm(cross, axis=1)
+        good = twice > 1e-12
+        triangles, cross, twice = triangles[good], cross[good], twice[good]
+        if len(triangles):
+            centres.append(triangles.mean(axis=1))
+            outward = field.gradient(centres[-1])
+            side = np.sign((cross * outward).sum(1))
+            normals.append(cross / twice[:, None] * np.where(side == 0.0, 1.0, side)[:, None])
+            areas.append(0.5 * twice)
+    if scene.cloud is not None and (inspect is None or "cloud" in inspect):
+        points = drawn_points(scene)
+        centres.append(points)
+        normals.append(field.gradient(points))
+        areas.append(np.ones(len(points)))
+    c, n, a = np.vstack(centres), np.vstack(normals), np.concatenate(areas)
+    # a facet lies a little inside of what is round: look a little outside of it
+    bare = field.distance(c + 0.1 * size * n) > 0.0 if len(c) else np.zeros(0, dtype=bool)
+    if not bare.any():
+        raise InputError("inspect: expected a surface to be seen, and there is none")
+    return Patches(c[bare], n[bare], a[bare])
+
+
+def divided(triangles: Floats, size: float) -> Floats:
+    """Triangles (n, 3, 3) halved across their longest sides until none is longer than `size`."""
+    done = []
+    while len(triangles):
+        sides = np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2)
+        small = sides.max(axis=1) <= size
+        done.append(triangles[small])
+        large = triangles[~small]
+        if len(large) > MOST_PATCHES:
+            raise InputError(f"camera.patch: {size:g} makes more than {MOST_PATCHES} patches")
+        k = sides[~small].argmax(axis=1)
+        row = np.arange(len(large))
+        a, b, c = large[row, k], large[row, (k + 1) % 3], large[row, (k + 2) % 3]
+        m = 0.5 * (a + b)
+        triangles = np.concatenate([np.stack([a, m, c], axis=1), np.stack([m, b, c], axis=1)])
+    return np.concatenate(done) if done else np.zeros((0, 3, 3))
+
+
+class Coverage:
+    """What has been seen so far.
+
+    Attributes
+    ----------
+    seen, seen_through : (n,) with and without regard to what stands in between.
+    share, share_through : of the area, the second as the paper counts.
+    """
+
+    def __init__(self, patches: Patches, field: DistanceField, camera: Camera) -> None:
+        self.patches, self.field, self.camera = patches, field, camera
+        self.seen = np.zeros(len(patches.areas), dtype=bool)
+        self.seen_through = self.seen.copy()
+        self.share = self.share_through = 0.0
+        self._shares = patches.areas / patches.areas.sum()
+
+    def look(self, eye: Floats, yaw: float) -> None:
+        """Mark what the camera sees from a place (3,) looking in a horizontal direction (rad), as
+        much up or down as its tilt allows to have the nearest patch in the middle."""
+        near = self._nearest(eye)
+        most = math.radians(self.camera.tilt)
+        pitch = min(max(math.atan2(near[2], math.hypot(near[0], near[1])), -most), most)
+        half = math.tan(math.radians(0.5 * self.camera.field_of_view))
+        open_, through = mark(
+            self.field.arrays, self.patches.centres, self.patches.normals, self._shares, self.seen,
+            self.seen_through, eye, yaw, pitch, half, self.camera.range, 0.1 * self.camera.patch,
+        )  # fmt: skip
+        self.share += open_
+        self.share_through += through
+
+    def heading(self, eye: Floats, before: float) -> float:
+        """The horizontal direction (rad) of the nearest patch; `before` if it is straight above or
+        below."""
+        near = self._nearest(eye)
+        if math.hypot(near[0], near[1]) < 0.2 * float(np.linalg.norm(near)):
+            return before
+        return math.atan2(near[1], near[0])
+
+    def _nearest(self, eye: Floats) -> Floats:
+        """From a place to the nearest patch."""
+        return np.asarray(self.patches.centres[nearest(self.patches.centres, eye)] - eye)
+
+
+@njit(cache=True)
+def nearest(centres, eye):
+    """Which of some points (n, 3) is nearest."""
+    best, at = math.inf, 0
+    for i in range(len(centres)):
+        d = (
+            (centres[i, 0] - eye[0]) ** 2
+            + (centres[i, 1] - eye[1]) ** 2
+            + (centres[i, 2] - eye[2]) ** 2
+        )
+        if d < best:
+            best, at = d, i
+    return at
+
+
+@njit(cache=True)
+def mark(
+    field, centres, normals, shares, seen, seen_through, eye, yaw, pitch, half, reach, off
+):  # fmt: skip
+    """Mark the patches that are in view, no farther than `reach`. half : tangent of half the field
+    of view, which is a square pyramid. Returns the shares that were new, with and without regard
+    to what stands in between."""
+    new, new_through = 0.0, 0.0
+    cy, sy, cp, sp = math.cos(yaw), math.sin(yaw), math.cos(pitch), math.sin(pitch)
+    for i in range(len(centres)):
+        if seen[i]:
+            continue
+        x, y, z = centres[i, 0] - eye[0], centres[i, 1] - eye[1], centres[i, 2] - eye[2]
+        if x * x + y * y + z * z > reach * reach:
+            continue
+        if x * normals[i, 0] + y * normals[i, 1] + z * normals[i, 2] >= 0.0:
+            continue
+        ahead = cp * (cy * x + sy * y) + sp * z
+        left = cy * y - sy * x
+        up = cp * z - sp * (cy * x + sy * y)
+        if ahead <= 0.0 or abs(left) > half * ahead or abs(up) > half * ahead:
+            continue
+        if not seen_through[i]:
+            seen_through[i] = True
+            new_through += shares[i]
+        tx = centres[i, 0] + off * normals[i, 0]
+        ty = centres[i, 1] + off * normals[i, 1]
+        tz = centres[i, 2] + off * normals[i, 2]
+        low, _ = lowest_along(field, eye[0], eye[1], eye[2], tx, ty, tz, 0.25 * off)
+        if low > -0.25 * off:
+            seen[i] = True
+            new += shares[i]
+    return new, new_through

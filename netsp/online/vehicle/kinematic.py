@@ -1,0 +1,88 @@
+"""What a vehicle is to the simulation, and the one that goes exactly where it is told."""
+
+from __future__ import annotations
+
+import math
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+Floats = npt.NDArray[np.float64]
+
+TURN = math.radians(60.0)
+"""Radians per second that a kinematic vehicle turns by at most."""
+
+
+class Vehicle(Protocol):
+    """A robot that can be told a way.
+
+    position : (3,) m. yaw : rad, in which horizontal direction it looks. control_s : seconds of
+    computing that each control step took.
+    """
+
+    control_s: list[float]
+
+    @property
+    def position(self) -> Floats:
+        """(3,) m."""
+
+    @property
+    def yaw(self) -> float:
+        """rad."""
+
+    def go(
+        self, way: Floats, seconds: float, yaw: float, water: Floats, fresh: bool
+    ) -> tuple[list[Floats], int]:
+        """Follow a way (k, 3) for some seconds, turning to `yaw`, in moving water (3,) m/s.
+
+        fresh : the way does not continue the one before. Returns the points that the vehicle passed
+        on straight lines, the last one its new position, and how many points of the way are behind
+        it.
+        """
+
+    def stop_at(self, place: Floats) -> None:
+        """Be at rest at a place (3,)."""
+
+
+class KinematicVehicle:
+    """Goes along the way at its speed, whatever the water does."""
+
+    def __init__(self, place: Floats, speed: float) -> None:
+        self.position: Floats = np.array(place, dtype=float)
+        self.speed = speed
+        self.yaw: float = 0.0
+        self.control_s: list[float] = []
+
+    def go(
+        self, way: Floats, seconds: float, yaw: float, water: Floats, fresh: bool
+    ) -> tuple[list[Floats], int]:
+        """See `Vehicle`."""
+        del water, fresh
+        self.yaw += float(np.clip(turned(yaw - self.yaw), -TURN * seconds, TURN * seconds))
+        stops, passed = advance(self.position, way, self.speed * seconds)
+        self.position = stops[-1]
+        return stops, passed
+
+    def stop_at(self, place: Floats) -> None:
+        """See `Vehicle`."""
+        self.position = np.array(place)
+
+
+def turned(angle: float) -> float:
+    """The same angle between -pi and pi."""
+    return (angle + math.pi) % (2.0 * math.pi) - math.pi
+
+
+def advance(robot: Floats, way: Floats, step: float) -> tuple[list[Floats], int]:
+    """The corners that a robot passes on its next `step` metres of a way and where it ends, and how
+    many points of the way it has passed."""
+    stops: list[Floats] = []
+    here, left = robot, step
+    for passed, point in enumerate(way):
+        far = float(np.linalg.norm(point - here))
+        if far > left:
+            return [*stops, here + (point - here) * (left / far)], passed
+        here, left = point, left - far
+        stops.append(here)
+    return stops or [robot], len(way)
