@@ -192,8 +192,8 @@ def mark(
         tx = centres[i, 0] + off * normals[i, 0]
         ty = centres[i, 1] + off * normals[i, 1]
         tz = centres[i, 2] + off * normals[i, 2]
-        low, _ = lowest_along(field, eye[0], eye[1], eye[2], tx, ty, tz, 0.25 * off)
-        if low > -0.25 * off:
+        low, _ = lowest_along(field, eye[0], eye[1], eye[2], tx, ty, tz, 0.5 * off)
+        if low > -0.5 * off:
             seen[i] = True
             new += shares[i]
     return new, new_through

@@ -32,6 +32,9 @@ Floats = npt.NDArray[np.float64]
 STEP = 0.1
 """Seconds between two decisions of the planner."""
 
+FRAME = 5
+"""Steps between two pictures of the camera."""
+
 STUCK = 600.0
 """Seconds at one waypoint after which it is given up."""
 
@@ -103,7 +106,7 @@ class Simulation:
         """Write down where things are."""
         x, y, z = (float(v) for v in self.vehicle.position)
         seen = self.coverage
-        if seen is not None:
+        if seen is not None and len(self.log) % FRAME == 0:
             seen.look(self.vehicle.position, self.vehicle.yaw)
         row = LogRow(
             round(self.now, 6), x, y, z, self.vehicle.yaw, planner.index, command.mode,

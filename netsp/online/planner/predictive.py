@@ -8,7 +8,7 @@ tether fits (but for the clearance that the robot keeps, and the margin).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -131,28 +131,28 @@ class PredictivePlanner(Planner):
         there is none shorter in its class. Where the tether is too long on that way, as much of the
         part back along the tether as need be is left as it is.
         """
-        back = pushed_out(self.scene, tether.nodes[::-1], self.mission.clearance)
-        back[0] = robot
-        spacing = max(self.mission.cell, length_of(back) / PIVOTS if len(back) > 1 else 0.0)
-        pivots = points_along(back, spacing) if len(back) > 1 else back
-        pivots[1:] = pushed_out(self.scene, pivots[1:], self.mission.clearance)
-        tree = self.ways(pivots)
-        along = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(back, axis=0), axis=1))]
-        places = np.linspace(0.0, along[-1], len(pivots))
+        # the tether back from the robot, finely, off the surfaces; some of its points are pivots
+        nodes = tether.nodes[::-1]
+        along = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(nodes, axis=0), axis=1))]
+        back = points_along(nodes, self.mission.cell)
+        places = np.linspace(0.0, along[-1], len(back))
+        back[1:] = pushed_out(self.scene, back[1:], self.mission.clearance)
+        pivots = np.unique(np.linspace(0, len(back) - 1, PIVOTS + 1).round().astype(int))
+        tree = self.ways(back[pivots])
+        onward = {int(i): tree.way(n) for n, i in enumerate(pivots)}
 
-        def taken_back(n: int) -> Floats:
-            """The tether when the robot has followed it back to pivot n."""
-            passed = int(np.searchsorted(along, places[n] - 1e-9, side="right"))
-            return np.vstack([tether.nodes[: max(1, len(back) - passed)], pivots[n]])
+        def taken_back(i: int) -> Floats:
+            """The tether when the robot has followed it back to point i."""
+            passed = int(np.searchsorted(along, places[i] - 1e-9, side="right"))
+            return np.vstack([tether.nodes[: max(1, len(nodes) - passed)], back[i]])
 
-        onward = [tree.way(n) for n in range(len(pivots))]
         whole: list[tuple[float, Floats, int, int]] = []
-        for first, last in self._classes(pivots, onward):
+        for first, last in self._classes(back, onward):
             on = onward[last]
             assert on is not None
             if self._too_long(np.vstack([taken_back(last), on[1:]]), limit):
                 continue
-            way = self.pulled(np.vstack([pivots[: last + 1], on[1:]]))
+            way = self.pulled(np.vstack([back[: last + 1], on[1:]]))
             whole.append((length_of(way), way, first, last))
         best: Floats | None = None
         least = np.inf
@@ -163,32 +163,41 @@ class PredictivePlanner(Planner):
                 return way if length < least else best
             # the more of the tether is taken back, the sooner the rest fits
             kept: Floats | None = None
-            low = first
-            while low <= last:
-                n = (low + last) // 2
-                on = onward[n]
+            row = [int(i) for i in pivots if first <= i <= last]
+            while row:
+                i = row[(len(row) - 1) // 2]
+                on = onward[i]
                 assert on is not None
                 on = self.pulled(on)
-                if self._fits(self.tethers.relaxed(taken_back(n), ENOUGH_ROUNDS[0]), on, limit):
-                    kept, last = np.vstack([pivots[: n + 1], on[1:]]), n - 1
+                if self._fits(self.tethers.relaxed(taken_back(i), ENOUGH_ROUNDS[0]), on, limit):
+                    kept = np.vstack([back[: i + 1], on[1:]])
+                    row = [j for j in row if j < i]
                 else:
-                    low = n + 1
+                    row = [j for j in row if j > i]
             if kept is not None and length_of(kept) < least and self._fits(tether, kept, limit):
                 best, least = kept, length_of(kept)
         return best
 
-    def _classes(self, pivots: Floats, onward: Sequence[Floats | None]) -> list[tuple[int, int]]:
+    def _classes(self, back: Floats, onward: Mapping[int, Floats | None]) -> list[tuple[int, int]]:
         """Pivots in a row often lead to ways of one class: the first and last of each such row."""
-        out, first = [], 0
-        for n, way in enumerate(onward):
-            after = onward[n + 1] if n + 1 < len(onward) else None
+        out: list[tuple[int, int]] = []
+        first: int | None = None
+        pivots = list(onward)
+        for i, j in zip(pivots, [*pivots[1:], None], strict=True):
+            way, after = onward[i], None if j is None else onward[j]
             if way is None:
-                first = n + 1
-            elif after is None or not homotopic(
-                self.scene, way, np.vstack([pivots[n], after]), self.grid.cell
+                first = None
+                continue
+            first = i if first is None else first
+            if (
+                j is None
+                or after is None
+                or not homotopic(
+                    self.scene, way, np.vstack([back[i : j + 1], after[1:]]), self.grid.cell
+                )
             ):
-                out.append((first, n))
-                first = n + 1
+                out.append((first, i))
+                first = None
         return out
 
     def _too_long(self, line: Floats, limit: float) -> bool:
