@@ -44,7 +44,8 @@ def kinematic(mission: Mission, scene: Scene, field) -> None:
     ):
         s = fly(mission, scene, field, name.split(",")[0], "kinematic", **how)
         row(
-            name, f"{s['inspection_s']:.1f}", *(f"{s['recovery_s'][k]:.0f}" for k in ("tether", "path")),
+            name, f"{s['inspection_s']:.1f}",
+            *(f"{s['recovery_s'][k]:.0f}" for k in ("tether", "path")),
             *(f"{s['total_s'][k]:.0f}" for k in ("tether", "path")), f"{s['longest_tether_m']:.2f}",
             f"{s['exceedance_s']:.1f}", f"{s['visited']} of {s['waypoints']}",
             f"{100 * s['coverage']:.1f}", f"{100 * s['coverage_through']:.1f}",
@@ -79,7 +80,8 @@ def dynamic(mission: Mission, scene: Scene, field, seeds: int) -> None:
             f"{np.median(of('exceedance_s')):.1f}; {of('exceedance_s').max():.1f}",
             f"{of('visited').min()} of {len(mission.waypoints)}",
             f"{1e3 * of('replan_worst_s').max():.0f}",
-            f"{1e3 * np.median(of('control_median_s')):.1f}; {1e3 * of('control_worst_s').max():.0f}",
+            f"{1e3 * np.median(of('control_median_s')):.1f}; "
+            f"{1e3 * of('control_worst_s').max():.0f}",
             f"{(of('inspection_s') / of('wall_s')).min():.0f}",
         )  # fmt: skip
     print()

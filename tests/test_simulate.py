@@ -174,3 +174,57 @@ def test_bad_missions_are_named(args, change, message, tmp_path, capsys):
     import re
 
     assert re.search(message, error)
+
+
+class Broken(PLANNERS["none"]):
+    """A planner that fails at its second waypoint."""
+
+    def plan(self, robot, tether):
+        if self.index == 1:
+            raise ZeroDivisionError("of all things")
+        return super().plan(robot, tether)
+
+
+def test_a_planner_that_fails_holds_says_so_and_goes_on(monkeypatch):
+    monkeypatch.setitem(PLANNERS, "none", Broken)
+    run = fly("none", [(-2, 1, 0), (-2, 1.5, 0), (-2, 2, 0)], 9.0)
+    assert [r.mode for r in run.log].count("hold") >= 10
+    assert run.summary["visited"] == 2
+    assert "ZeroDivisionError: of all things" in run.summary["skipped"][0]["reason"]
+
+
+@pytest.mark.parametrize("planner", ["predictive", "react"])
+def test_a_dynamic_vehicle_in_a_current_keeps_the_tether_too(planner):
+    stormy = mission(
+        ring(1.5), 4.5, current=(0.08, 0.04, 0.0), gusts=0.04, camera={"range": 2.0, "patch": 0.2}
+    )
+    run, again = (
+        simulate(stormy, planner, vehicle="bluerov2", scene=POST, seed=2) for _ in range(2)
+    )
+    assert [r.tether for r in run.log] == [r.tether for r in again.log]
+    assert run.summary["visited"] == len(stormy.waypoints)
+    seen = [r.coverage for r in run.log]
+    assert seen == sorted(seen)
+    assert 0.0 < seen[-1] <= run.summary["coverage_through"] <= 1.0 + 1e-9
+    if planner == "predictive":
+        assert run.summary["exceedance_s"] == 0.0
+
+
+@pytest.mark.parametrize("name", ["basin", "pipes", "jacket"])
+def test_shipped_missions_are_flown_within_their_tether(name):
+    flown = Mission.load(MISSIONS / f"{name}.json")
+    flown = flown.model_copy(update={"waypoints": flown.waypoints[:60], "camera": None})
+    run = simulate(flown)
+    assert run.summary["exceedance_s"] == 0.0
+    assert run.summary["visited"] == run.summary["waypoints"]
+
+
+def test_two_planners_are_drawn_side_by_side(tmp_path):
+    out = tmp_path / "run"
+    code = main(
+        ["simulate", str(MISSIONS / "basin.json"), "--compare", "none", "-o", str(out), "--quiet"]
+    )
+    assert code == 0
+    names = {p.relative_to(out).as_posix() for p in out.rglob("*.*")}
+    assert {"log.csv", "summary.json", "run.png", "run.html", "none/log.csv"} <= names
+    assert "sliders" in (out / "run.html").read_text()

@@ -56,32 +56,31 @@ def patches_of(
         if name not in named:
             raise InputError(f"inspect: expected names of solids, got {name!r}")
     centres, normals, areas = [np.zeros((0, 3))], [np.zeros((0, 3))], [np.zeros(0)]
-    surfaces = [
-        surface_of(s.shape, low, high)
+    own = [
+        (surface_of(s.shape, low, high), Scene(solids=(s,)).field())
         for s in solids
         if not isinstance(s.shape, HalfSpace) and (inspect is None or s.name in inspect)
     ]
     if scene.mesh is not None and (inspect is None or "mesh" in inspect):
-        surfaces.append(mesh_of(scene))
-    for vertices, faces in surfaces:
+        own.append((mesh_of(scene), field))
+    for (vertices, faces), alone in own:
         triangles = divided(vertices[faces], size)
         cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
         twice = np.linalg.norm(cross, axis=1)
         good = twice > 1e-12
-        triangles, cross, twice = triangles[good], cross[good], twice[good]
-        if len(triangles):
-            centres.append(triangles.mean(axis=1))
-            outward = field.gradient(centres[-1])
-            side = np.sign((cross * outward).sum(1))
-            normals.append(cross / twice[:, None] * np.where(side == 0.0, 1.0, side)[:, None])
-            areas.append(0.5 * twice)
+        middle = triangles[good].mean(axis=1)
+        if len(middle):
+            # facets of what is round lie a little inside of it
+            outward = alone.gradient(middle)
+            centres.append(middle - alone.distance(middle)[:, None] * outward)
+            normals.append(outward)
+            areas.append(0.5 * twice[good])
     if scene.cloud is not None and (inspect is None or "cloud" in inspect):
         points = drawn_points(scene)
         centres.append(points)
         normals.append(field.gradient(points))
         areas.append(np.ones(len(points)))
     c, n, a = np.vstack(centres), np.vstack(normals), np.concatenate(areas)
-    # a facet lies a little inside of what is round: look a little outside of it
     bare = field.distance(c + 0.1 * size * n) > 0.0 if len(c) else np.zeros(0, dtype=bool)
     if not bare.any():
         raise InputError("inspect: expected a surface to be seen, and there is none")

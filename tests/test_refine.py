@@ -1,0 +1,91 @@
+"""Refined ways keep their ends and their freedom; ours never lose clearance."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from netsp import InputError
+from netsp.online import Scene
+from netsp.online.planner import Options, make_planner
+from netsp.online.refine import REFINEMENTS, clear, refined, smoothed
+from netsp.online.sampled import OMPL_PLANNERS, SampledWays
+from netsp.online.tree import Grid, homotopic, length_of, taut
+
+POST = Scene(solids=[{"post": {"center": [0, 0], "radius": 0.5}}], bounds=(-3, -3, -1, 3, 3, 1))
+FIELD = POST.field()
+
+
+def arc(radius, seed=0, wobble=0.0):
+    a = np.linspace(0.0, np.pi, 25)
+    way = radius * np.column_stack([np.cos(a), np.sin(a), 0 * a])
+    way[1:-1] += wobble * np.random.default_rng(seed).normal(size=(23, 3))
+    return way
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.sampled_from(REFINEMENTS), st.floats(0.75, 2.0), st.integers(0, 100))
+def test_ends_stay_and_free_ways_stay_free(name, radius, seed):
+    way = arc(radius, seed, 0.03)
+    better = refined(name, FIELD, way, 0.4, np.random.default_rng(seed))
+    assert np.array_equal(better[[0, -1]], way[[0, -1]])
+    assert clear(FIELD, better, 0.0)
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.floats(0.7, 1.2), st.integers(0, 100))
+def test_the_gradient_never_makes_clearance_worse(radius, seed):
+    way = arc(radius, seed, 0.05)
+    better = refined("gradient", FIELD, way, 0.4, np.random.default_rng(0))
+    assert (FIELD.distance(better) >= FIELD.distance(way) - 1e-12).all()
+
+
+def test_the_papers_steps_widen_an_arc_about_a_post_and_are_the_same_for_the_same_seed():
+    way = arc(0.7)
+    a, b = (refined("paper", FIELD, way, 0.3, np.random.default_rng(5)) for _ in range(2))
+    assert np.array_equal(a, b)
+    assert FIELD.distance(a)[8:-8].min() > FIELD.distance(way)[8:-8].min()
+
+
+def test_smoothing_leaves_a_cubic_alone():
+    u = np.linspace(0, 1, 10)
+    line = np.column_stack([u, 2 * u, -u])
+    assert smoothed(line) == pytest.approx(line)
+
+
+@pytest.mark.parametrize("name", OMPL_PLANNERS)
+def test_sampled_ways_are_free_repeatable_and_no_shorter_than_the_shortest(name):
+    pytest.importorskip("ompl")
+    grid = Grid(FIELD, [-3, -3, -1], [3, 3, 1], 0.2, 0.2)
+    start, target = np.array([[-1.5, 0.1, 0.0]]), np.array([1.5, 0.0, 0.0])
+    way, again = (SampledWays(name, grid, target, start, 3).way(0) for _ in range(2))
+    assert np.array_equal(way, again)
+    assert np.array_equal(way[[0, -1]], [start[0], target])
+    assert clear(FIELD, way, 0.1)
+    # round a cylinder of radius 0.7: two tangents and an arc
+    shortest = 2 * np.sqrt(1.5**2 - 0.7**2) + 0.7 * (np.pi - 2 * np.arccos(0.7 / 1.5))
+    assert shortest - 0.06 <= length_of(way) < 2.5 * shortest
+
+
+def test_taut_ways_have_the_closed_form():
+    way = arc(1.5)
+    shortest = 2 * np.sqrt(1.5**2 - 0.7**2) + 0.7 * (np.pi - 2 * np.arccos(0.7 / 1.5))
+    assert length_of(taut(FIELD, way, 0.2, 0.05)) == pytest.approx(shortest, rel=5e-3)
+
+
+def test_ways_on_different_sides_of_a_post_are_told_apart():
+    left, right = arc(1.0), arc(1.0) * [1, -1, 1]
+    assert homotopic(FIELD, left, arc(1.4) * [1 / 1.4, 1.0, 1.0], 0.2)
+    assert not homotopic(FIELD, left, right, 0.2)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (Options(ways="straight"), "--ways: expected tree, rrtstar, bitstar, prmstar"),
+        (Options(refine="polish"), "--refine: expected none, paper, gradient"),
+    ],
+)
+def test_unknown_options_are_named(options, message):
+    with pytest.raises(InputError, match=message):
+        make_planner("predictive", None, None, None, None, options)

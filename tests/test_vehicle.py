@@ -1,0 +1,122 @@
+"""The BlueROV2 obeys its equations, follows its way in a current, and stays within its limits."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from netsp import InputError
+from netsp.online.vehicle import VEHICLES, make_vehicle
+from netsp.online.vehicle.control import HORIZON, PredictiveControl
+from netsp.online.vehicle.dynamics import INERTIA, MOST, derivative, linearised, step
+from netsp.online.vehicle.kinematic import KinematicVehicle, turned
+from netsp.online.water import Water
+
+STILL = np.zeros(3)
+
+
+def rate(state, force, water=STILL):
+    out = np.empty(8)
+    derivative(np.asarray(state, float), np.asarray(force, float), np.asarray(water, float), out)
+    return out
+
+
+@given(
+    st.lists(st.floats(-2, 2), min_size=4, max_size=4), st.floats(-3, 3),
+)  # fmt: skip
+def test_without_thrust_the_water_only_takes_energy(speeds, yaw):
+    """Coriolis terms do no work; damping takes; buoyancy is balanced by a force."""
+    state = np.r_[0, 0, 0, yaw, speeds]
+    lift = rate(np.zeros(8), np.zeros(4))[6] * INERTIA[2]
+    power = float((INERTIA * state[4:] * rate(state, [0, 0, -lift, 0])[4:]).sum())
+    assert power <= 1e-9
+
+
+@pytest.mark.parametrize(("axis", "force"), [(0, 20.0), (1, 20.0), (2, 20.0)])
+def test_steady_speed_balances_thrust_and_drag(axis, force):
+    linear, quadratic = ([13.7, 0, 33][axis], [141, 217, 190][axis])
+    u = (-linear + math.sqrt(linear**2 + 4 * quadratic * force)) / (2 * quadratic)
+    lift = rate(np.zeros(8), np.zeros(4))[6] * INERTIA[2]
+    inputs = np.array([0.0, 0.0, -lift, 0.0])
+    inputs[axis] += force
+    state = np.zeros(8)
+    for _ in range(600):
+        state = step(state, inputs, STILL, 0.05)
+    assert state[4 + axis] == pytest.approx(u, rel=1e-6)
+
+
+def test_a_vehicle_without_thrust_drifts_with_the_current():
+    lift = rate(np.zeros(8), np.zeros(4))[6] * INERTIA[2]
+    state = np.zeros(8)
+    for _ in range(100):
+        state = step(state, np.array([0, 0, -lift, 0]), np.array([0.2, -0.1, 0.05]), 0.1)
+    assert state[:3] == pytest.approx([2.0, -1.0, 0.5])
+
+
+def test_the_linear_model_predicts_small_changes():
+    rng = np.random.default_rng(1)
+    states, forces = rng.normal(size=(4, 8)), 5 * rng.normal(size=(3, 4))
+    by_state, by_force, after = linearised(states, forces, STILL, 0.1)
+    dx, du = 1e-4 * rng.normal(size=8), 1e-3 * rng.normal(size=4)
+    for k in range(3):
+        moved = step(states[k] + dx, forces[k] + du, STILL, 0.1)
+        assert moved == pytest.approx(after[k] + by_state[k] @ dx + by_force[k] @ du, abs=1e-6)
+
+
+@pytest.mark.parametrize("water", [(0.0, 0.0, 0.0), (0.15, -0.1, 0.05)])
+def test_it_follows_a_circle_to_centimetres_whatever_the_current(water):
+    rov = make_vehicle("bluerov2", np.zeros(3), 0.3)
+    angle = np.linspace(0, 2 * np.pi, 60)
+    way = np.column_stack([np.cos(angle) - 1, np.sin(angle), 0.1 * angle])
+    places = []
+    for k in range(230):
+        stops, passed = rov.go(way, 0.1, 0.5, np.array(water), k == 0)
+        way = way[min(passed, len(way) - 1) :]
+        places.append(stops[-1])
+    places = np.array(places)
+    off = np.hypot(places[:, 0] + 1, places[:, 1]) - 1
+    assert np.abs(off[40:]).max() < 0.03
+    assert np.linalg.norm(places[-1] - [0, 0, 0.2 * np.pi]) < 0.05
+    assert turned(rov.yaw - 0.5) == pytest.approx(0.0, abs=0.05)
+
+
+@settings(max_examples=10, deadline=None)
+@given(st.lists(st.floats(-50, 50), min_size=3, max_size=3))
+def test_inputs_stay_within_their_limits(far):
+    control = PredictiveControl()
+    aims = np.tile(np.r_[far, np.zeros(5)], (HORIZON, 1))
+    for _ in range(3):
+        force = control.force(np.zeros(8), aims, STILL)
+        assert (np.abs(force) <= MOST + 1e-9).all()
+        assert (np.abs(control.forces) <= MOST + 1e-9).all()
+
+
+def test_a_stopped_vehicle_is_at_rest_where_it_was_put():
+    for name in VEHICLES:
+        vehicle = make_vehicle(name, np.zeros(3), 0.3)
+        vehicle.go(np.array([[1.0, 0, 0]]), 0.5, 0.0, STILL, True)
+        vehicle.stop_at(np.array([0.1, 0.2, 0.3]))
+        assert vehicle.position == pytest.approx([0.1, 0.2, 0.3])
+
+
+def test_a_kinematic_vehicle_turns_no_faster_than_it_can():
+    vehicle = KinematicVehicle(np.zeros(3), 0.3)
+    vehicle.go(np.array([[1.0, 0, 0]]), 0.1, math.pi, STILL, True)
+    assert abs(vehicle.yaw) == pytest.approx(math.radians(6.0))
+
+
+def test_unknown_vehicles_are_named():
+    with pytest.raises(InputError, match="--vehicle: expected kinematic or bluerov2, got 'boat'"):
+        make_vehicle("boat", np.zeros(3), 0.3)
+
+
+def test_gusts_have_their_spread_and_are_the_same_for_the_same_seed():
+    a, b = Water((0.1, 0, 0), 0.05, 7), Water((0.1, 0, 0), 0.05, 7)
+    x = np.array([a(0.1 * k) for k in range(20000)])
+    assert np.array_equal(x[500], b(50.0))
+    assert x.mean(0) == pytest.approx([0.1, 0, 0], abs=0.01)
+    assert x.std(0) == pytest.approx([0.05] * 3, rel=0.15)
+    assert np.abs(np.diff(x, axis=0)).max() < 0.1
+    assert Water((0.1, 0, 0), 0.0, 7)(3.0) == pytest.approx([0.1, 0, 0])
