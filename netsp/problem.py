@@ -207,6 +207,14 @@ GoalLike = Annotated[
 ]
 
 
+class State(BaseModel):
+    """Where a robot on a tether is: its position, and the word of the taut tether there."""
+
+    model_config = _STRICT
+    position: Point3
+    signature: tuple[int, ...] = ()
+
+
 class Problem(BaseModel):
     """An instance of the Non-Entangling Travelling Salesperson Problem (McCammon & Hollinger 2017,
     section III).
@@ -219,6 +227,9 @@ class Problem(BaseModel):
     tether_length : longest taut tether, measured in 3D from the base.
     clearance : every obstacle is inflated by this (the vehicle's radius).
     bounds : ``(xmin, ymin, xmax, ymax)`` box that robot and tether stay in, or None.
+    state : where the tour starts; None at the base with no tether out. Otherwise the shortest way
+        from there through all goals back to the base is sought, that takes the tether back whole.
+        The tether may be longer than `tether_length` at the start only.
 
     Raises
     ------
@@ -257,6 +268,7 @@ class Problem(BaseModel):
         ),
     ] = None
     units: Name = "m"
+    state: State | None = None
 
     @field_validator("bounds", mode="before")
     @classmethod
@@ -276,7 +288,27 @@ class Problem(BaseModel):
     def _consistent(self) -> Self:
         self._check_distinct_goals()
         self._check_free()
+        self._check_state()
         return self
+
+    def _check_state(self) -> None:
+        """The robot is in free space, and its word names obstacles."""
+        if self.state is None:
+            return
+        xy = np.array(self.state.position[:2])
+        for i, o in enumerate(self.obstacles):
+            depth = self.clearance - float(o.signed_distance(xy))
+            if depth > self.tolerance:
+                raise ValueError(
+                    f"state.position: {_show(self.state.position)} lies inside "
+                    f"{self.obstacle_label(i)} (by {depth:.6g}); expected a point in free space"
+                )
+        for a in self.state.signature:
+            if not 1 <= abs(a) <= len(self.obstacles):
+                raise ValueError(
+                    f"state.signature: expected letters from 1 to {len(self.obstacles)} or their "
+                    f"negatives, got {a}"
+                )
 
     def _check_distinct_goals(self) -> None:
         seen: dict[tuple[float, float, float], int] = {}
@@ -373,6 +405,8 @@ class Problem(BaseModel):
     def sha256(self) -> str:
         """Hash of what the answer depends on: all values, but no names."""
         data = self.model_dump(mode="json", exclude={"name": True, "units": True})
+        if data["state"] is None:  # problems had none before: their hashes stay
+            del data["state"]
         for item in (*data["goals"], *data["obstacles"]):
             item.pop("name", None)
         text = json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)

@@ -65,7 +65,8 @@ class Timings(BaseModel):
 
 
 class Solution(BaseModel):
-    """A tour with its proof status; `path` is a closed polyline from the base to the base.
+    """A tour with its proof status; `path` is a closed polyline from the base to the base, or from
+    the problem's state to the base; `start_tether` is then the taut tether at its start.
 
     Lengths are in the problem's units. `lower_bound` is a proven bound on every admissible tour,
     `gap` is (length - lower_bound) / length. Without a tour, `length` and `gap` are None.
@@ -87,6 +88,7 @@ class Solution(BaseModel):
     entangled: tuple[int, ...] = ()
     tour: tuple[Visit, ...] = ()
     path: tuple[Point3, ...] = ()
+    start_tether: tuple[Point3, ...] = ()
     timings: Timings = Timings()
     versions: dict[str, str] = {}
 
@@ -104,6 +106,8 @@ class Solution(BaseModel):
         """The solution as version-1 JSON."""
         data = self.model_dump(mode="json")
         path = data.pop("path")
+        if not self.start_tether:
+            del data["start_tether"]
         text = json.dumps(data, indent=1, allow_nan=False, ensure_ascii=False)
         rows = ",\n".join("  " + json.dumps(p, allow_nan=False) for p in path)
         return f'{text[:-2]},\n "path": [\n{rows}\n ]\n}}\n'

@@ -93,6 +93,12 @@ def build_roadmap(problem: Problem, roadmap: str = DEFAULT_ROADMAP, **options: A
 
 def travel_graph(problem: Problem, roadmap: str = DEFAULT_ROADMAP, **options: Any) -> TravelGraph:
     """The travel graph of a problem by the named roadmap; errors as `build_roadmap`."""
+    if problem.state is not None:
+        if roadmap != "taut":
+            raise InputError(f"state: needs roadmap 'taut', got {roadmap!r}")
+        from netsp.roadmap.opened import opened_graph
+
+        return opened_graph(problem, **options)
     graph: TravelGraph = build_roadmap(problem, roadmap, **options).travel_graph()
     return graph
 
@@ -132,15 +138,17 @@ def solve_graph(
     if not isinstance(graph, TravelGraph):
         raise InputError(f"graph: expected a TravelGraph, got {graph!r}")
     tour = None if warm_start is None else _as_tour(warm_start, graph)
-    return run(
+    opened: Any = graph if hasattr(graph, "opened") else None
+    result = run(
         graph,
         time_limit=time_limit,
         iteration_limit=iteration_limit,
         rng=np.random.default_rng(_seed(seed)),
         params=params,
         warm_start=tour,
-        on_progress=on_progress,
+        on_progress=opened.listener(on_progress) if opened is not None else on_progress,
     )
+    return opened.opened(result) if opened is not None else result
 
 
 def solve(
@@ -231,6 +239,8 @@ def to_solution(
     else:
         visits, wrapped = _visits(graph, result.tour or ()), ()
         walk = result.walk or (*(result.tour or ()), 0)
+        if problem.state is not None and result.walk is None:
+            walk = walk[1:]  # the tour starts at the state
         legs = [graph.path(u, v) for u, v in pairwise(walk)]
         path = np.vstack([legs[0], *(leg[1:] for leg in legs[1:])]) if legs else np.zeros((0, 3))
     return Solution(
@@ -245,6 +255,9 @@ def to_solution(
         entangled=wrapped,
         tour=visits,
         path=tuple((float(x), float(y), float(z)) for x, y, z in path),
+        start_tether=tuple(
+            (float(x), float(y), float(z)) for x, y, z in getattr(graph, "start_tether", ())
+        ),
         timings=timings or Timings(),
         versions=versions(),
     )
@@ -258,6 +271,7 @@ def _visits(graph: TravelGraph, tour: Sequence[int]) -> tuple[Visit, ...]:
             tether_length=float(graph.tethers[v]),
         )
         for v in tour[1:]
+        if v != getattr(graph, "start", None)
     )
 
 

@@ -75,7 +75,11 @@ def verify(problem: Problem, solution: Solution) -> Verification:
 class _Judge:
     def __init__(self, problem: Problem, solution: Solution) -> None:
         self.problem, self.solution = problem, solution
-        self.path: Floats = np.array(solution.path, dtype=float).reshape(-1, 3)
+        # a path that starts in the middle is judged with the tether that is out already before it
+        before: Floats = np.array(solution.start_tether, dtype=float).reshape(-1, 3)
+        walked: Floats = np.array(solution.path, dtype=float).reshape(-1, 3)
+        self.path: Floats = np.vstack([before, walked])
+        self.out = len(before)
         self.place = PLACE_TOLERANCE * problem.scale
         self.stops: list[int] = []
 
@@ -84,11 +88,14 @@ class _Judge:
         if self.solution.length is None:
             checks.append(Check("has a tour", False, f"status {self.solution.status.value}"))
             return checks
+        if self.problem.state is not None or self.out:
+            checks.append(self._starts())
         checks += [self._closed(), self._every_goal()]
         if not all(c.passed for c in checks[1:]):
             return checks
+        judged = len(checks)
         checks += [self._visited(), self._clear(), *self._bounds()]
-        if not checks[3].passed:
+        if not checks[judged].passed:
             return checks
         checks += [self._words(), self._empty(), *self._tethers(), self._length(), self._status()]
         return checks
@@ -103,6 +110,21 @@ class _Judge:
             else f"solution is for another problem or another version of it "
             f"({self.solution.problem.sha256[:12]}…, this is {self.problem.sha256[:12]}…)",
         )
+
+    def _starts(self) -> Check:
+        """The path starts at the problem's state, with a tether of the state's word."""
+        name, state = "starts at the state", self.problem.state
+        if state is None or self.out < 2 or len(self.path) < self.out + 1:
+            return Check(name, False, "problem and solution disagree on whether there is one")
+        tether = self.path[: self.out]
+        miss = max(
+            np.linalg.norm(self.path[k] - np.array(state.position))
+            for k in (self.out - 1, self.out)
+        )
+        word = reduce(crossings(tether, self.problem.representative_points))
+        if word != reduce(state.signature):
+            return Check(name, False, f"the tether there has the word {list(word)}")
+        return Check(name, bool(miss <= self.place), f"misses it by {miss:.3g}")
 
     def _closed(self) -> Check:
         if len(self.path) < 2:
@@ -138,6 +160,9 @@ class _Judge:
         rays = self.problem.representative_points
         at = 0
         word: Word = ()
+        if self.out:  # goals that the tether passes at the start are not visited by that
+            at = self.out
+            word = reduce(crossings(self.path[: at + 1], rays))
         for visit in self.solution.tour:
             target = self.problem.points[visit.goal + 1]
             gaps = np.linalg.norm(self.path[at:] - target, axis=1)
@@ -218,8 +243,14 @@ class _Judge:
         puller = StringPuller(self.problem, reach=limit)
         pieces = puller.crossings(self.path)
         points = self.problem.points
-        sleeve: list[tuple[int, bool]] = []
-        before, place = 0, 0
+        # the tether that is out at the start is no leg
+        sleeve: list[tuple[int, bool]] = reduce_sleeve(
+            [c for piece in pieces[: self.out] for c in piece]
+        )
+        before, place = self.out, 0
+        if self.problem.state is not None:
+            points = np.vstack([points, self.problem.state.position])
+            place = len(points) - 1
         pulled_total = 0.0
         fits: tuple[float, str] = (-np.inf, "")
         wrong: tuple[float, str] = (-np.inf, "")
@@ -266,7 +297,7 @@ class _Judge:
 
     def _length(self) -> Check:
         stated = float(self.solution.length or 0.0)
-        drawn = float(np.linalg.norm(np.diff(self.path, axis=0), axis=1).sum())
+        drawn = float(np.linalg.norm(np.diff(self.path[self.out :], axis=0), axis=1).sum())
         tiny = 1e-9 * self.problem.scale
         ok = (
             self.pulled_total <= stated * (1.0 + 1e-6) + tiny

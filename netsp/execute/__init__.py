@@ -1,0 +1,7 @@
+"""Carries out a tour online: follows it with the tether model, and repairs it when the world is not
+as it was planned for."""
+
+from netsp.execute.events import Event, Surprises
+from netsp.execute.run import Execution, Options, execute
+
+__all__ = ["Event", "Execution", "Options", "Surprises", "execute"]

@@ -1,0 +1,165 @@
+"""What may happen during a run: the surprise file, and what each event does to the problem."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from netsp.errors import InputError
+from netsp.problem import (
+    Circle,
+    GoalLike,
+    NonNegative,
+    Obstacle,
+    Point2,
+    Point3,
+    Polygon,
+    Positive,
+    Problem,
+    explain,
+    read_model,
+    read_text,
+)
+
+_STRICT = ConfigDict(frozen=True, extra="forbid")
+
+Which = Annotated[int, Field(ge=0)] | str
+"""An obstacle or goal: its index, or its name."""
+
+
+class Move(BaseModel):
+    """An obstacle is somewhere else from now on."""
+
+    model_config = _STRICT
+    obstacle: Which
+    by: Point2
+
+
+class Event(BaseModel):
+    """Something that happens `time` seconds after the start; one of the fields says what.
+
+    appear : an obstacle that is not on the map. vanish : one that is not there after all. move :
+    one that is elsewhere. add_goal, cancel_goal : the task changes. push : metres that the robot is
+    carried off. tether_length : a new limit.
+    """
+
+    model_config = _STRICT
+
+    time: NonNegative
+    appear: Obstacle | None = None
+    vanish: Which | None = None
+    move: Move | None = None
+    add_goal: GoalLike | None = None
+    cancel_goal: Which | None = None
+    push: Point3 | None = None
+    tether_length: Positive | None = None
+
+    @model_validator(mode="after")
+    def _one(self) -> Self:
+        given = [k for k in type(self).model_fields if k != "time" and getattr(self, k) is not None]
+        if len(given) != 1:
+            raise ValueError(
+                "expected one of appear, vanish, move, add_goal, cancel_goal, push, "
+                f"tether_length, got {', '.join(given) or 'none'}"
+            )
+        return self
+
+    @property
+    def kind(self) -> str:
+        """Which of them it is."""
+        return next(
+            k for k in type(self).model_fields if k != "time" and getattr(self, k) is not None
+        )
+
+
+class Surprises(BaseModel):
+    """The surprise file.
+
+    >>> text = '{"schema_version": 1, "events": [{"time": 60, "tether_length": 40}]}'
+    >>> Surprises.from_json(text).events[0].kind
+    'tether_length'
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", title="netsp surprises")
+
+    schema_version: Literal[1] = 1
+    events: tuple[Event, ...]
+
+    @classmethod
+    def from_json(cls, text: str | bytes, *, source: str = "surprises") -> Self:
+        """Parse and validate; `InputError` with one line for anything wrong."""
+        return read_model(cls, text, source)
+
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """Read a surprise file."""
+        return cls.from_json(read_text(path), source=str(path))
+
+    def check(self, problem: Problem) -> None:
+        """InputError for an obstacle or goal that does not exist when the event comes, or an
+        obstacle that would stand on the base or move onto it."""
+        for k, event in enumerate(sorted(self.events, key=lambda e: e.time)):
+            try:
+                problem = changed(problem, event)
+            except InputError as error:
+                raise InputError(f"events[{k}]: {error}") from None
+
+
+def changed(problem: Problem, event: Event) -> Problem:
+    """The problem after an event; goals keep their numbers, cancelled ones too, and so do the
+    obstacles but for those that vanish. Goals inside obstacles are left to the caller.
+
+    Raises
+    ------
+    InputError : it names something that is not there, or puts an obstacle onto the base.
+    """
+    obstacles, goals = list(problem.obstacles), list(problem.goals)
+    update: dict[str, object] = {}
+    if event.appear is not None:
+        obstacles.append(event.appear)
+    elif event.vanish is not None:
+        del obstacles[index_of(event.vanish, obstacles, "vanish")]
+    elif event.move is not None:
+        i = index_of(event.move.obstacle, obstacles, "move.obstacle")
+        obstacles[i] = moved(obstacles[i], event.move.by)
+    elif event.add_goal is not None:
+        goals.append(event.add_goal)
+    elif event.cancel_goal is not None:
+        index_of(event.cancel_goal, goals, "cancel_goal")
+    elif event.tether_length is not None:
+        update["tether_length"] = event.tether_length
+    update |= {"obstacles": tuple(obstacles), "goals": tuple(goals)}
+    out = problem.model_copy(update=update)
+    base = np.array([out.base[:2]])
+    for i, o in enumerate(out.obstacles):
+        if float(o.signed_distance(base)[0]) < out.clearance - out.tolerance:
+            raise InputError(f"{event.kind}: {out.obstacle_label(i)} would stand on the base")
+    return out
+
+
+def moved(obstacle: Circle | Polygon, by: tuple[float, float]) -> Circle | Polygon:
+    """An obstacle elsewhere."""
+    if isinstance(obstacle, Circle):
+        x, y = obstacle.center
+        return obstacle.model_copy(update={"center": (x + by[0], y + by[1])})
+    corners = tuple((x + by[0], y + by[1]) for x, y in obstacle.polygon)
+    try:
+        return Polygon(polygon=corners, name=obstacle.name)
+    except ValidationError as error:
+        raise InputError(f"move: {explain(error)}") from None
+
+
+def index_of(which: int | str, things: list, field: str) -> int:  # type: ignore[type-arg]
+    """Which of some named things is meant; InputError if none is."""
+    if isinstance(which, str):
+        found = [k for k, thing in enumerate(things) if thing.name == which]
+        if len(found) == 1:
+            return found[0]
+        raise InputError(f"{field}: expected the name of one, got {which!r}, of which there are "
+                         f"{len(found)}")  # fmt: skip
+    if which >= len(things):
+        raise InputError(f"{field}: expected a number below {len(things)}, got {which}")
+    return which

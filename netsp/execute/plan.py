@@ -1,0 +1,69 @@
+"""A tour as it is carried out: a leg for every goal that is left, and the leg home."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from netsp.errors import InputError
+from netsp.hsignature import Word, signature
+from netsp.problem import Problem
+from netsp.solution import Solution
+
+Floats = npt.NDArray[np.float64]
+
+HOME = -1
+"""The goal of the last leg."""
+
+
+@dataclass(frozen=True)
+class Leg:
+    """The way to one goal.
+
+    goal : its number in the problem that is carried out, HOME for the base. way : (k, 3), the first
+    point where the leg before ends. word : of the tether there. tether : its length there.
+    """
+
+    goal: int
+    way: Floats
+    word: Word
+    tether: float
+
+    @property
+    def length(self) -> float:
+        """Metres."""
+        return length_of(self.way)
+
+
+def length_of(way: Floats) -> float:
+    """Length of a polyline."""
+    return float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum())
+
+
+def legs_of(problem: Problem, solution: Solution, numbers: list[int] | None = None) -> list[Leg]:
+    """A solution's path cut at its goals. numbers : of the problem's goals in a larger problem.
+
+    Raises
+    ------
+    InputError : the path does not come by a goal in its turn.
+    """
+    path = np.array(solution.path)
+    rays = problem.representative_points
+    before = np.array(solution.start_tether).reshape(-1, 3)
+    place = 1e-6 * problem.scale
+    legs, at = [], 0
+    for visit in solution.tour:
+        target = np.array(problem.goals[visit.goal].position)
+        near = at + np.flatnonzero(np.linalg.norm(path[at:] - target, axis=1) <= place)
+        # several points of the path may lie there: the one with the stated word is meant
+        words = (signature(np.vstack([before, path[: k + 1]])[:, :2], rays) for k in near)
+        k = next((k for k, w in zip(near, words, strict=True) if w == visit.signature), None)
+        if k is None:
+            raise InputError(f"solution: its path does not visit {problem.goal_label(visit.goal)}")
+        goal = visit.goal if numbers is None else numbers[visit.goal]
+        legs.append(Leg(goal, path[at : k + 1], visit.signature, visit.tether_length))
+        at = int(k)
+    legs.append(Leg(HOME, path[at:], (), 0.0))
+    return legs

@@ -1,0 +1,388 @@
+"""Carries out a solution step by step: vehicle, tether, events and repairs, with a log of all."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from netsp.errors import InputError, NetspError
+from netsp.execute.events import Event, Surprises, changed, index_of
+from netsp.execute.plan import HOME, Leg, legs_of, length_of
+from netsp.execute.repair import Repair, broken, repair
+from netsp.hsignature import Word, signature
+from netsp.judge import verify
+from netsp.online.field import DistanceField
+from netsp.online.mission import pushed_out
+from netsp.online.planner.base import dense
+from netsp.online.scene import Scene
+from netsp.online.tether import GeodesicTether, Tether
+from netsp.online.tether.geodesic import THINNEST
+from netsp.online.vehicle import make_vehicle
+from netsp.online.water import Water
+from netsp.problem import Point3, Problem
+from netsp.solution import Solution, Status
+
+Floats = npt.NDArray[np.float64]
+
+RESOLUTION = 1e-4
+"""The tether model is right to this share of the tether length; less is no exceedance."""
+
+PATIENCE = 3.0
+"""A leg is given up when it takes this many times as long as it should, and a minute."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """How a tour is carried out.
+
+    speed : of the vehicle, length units per second. vehicle : `netsp.online.vehicle.VEHICLES`.
+    reach : a goal this near counts as visited by a vehicle with dynamics.
+    delta : resolution of the tether; default from the problem. repair : whether plans are mended.
+    current, gusts, seed : of the water.
+    """
+
+    speed: float = 0.5
+    vehicle: str = "kinematic"
+    reach: float = 0.1
+    delta: float | None = None
+    repair: bool = True
+    current: Point3 = (0.0, 0.0, 0.0)
+    gusts: float = 0.0
+    seed: int = 0
+
+
+@dataclass(frozen=True)
+class Row:
+    """One step: seconds, position, the goal that is next (-1 the base), mode, taut tether and its
+    limit."""
+
+    time: float
+    x: float
+    y: float
+    z: float
+    goal: int
+    mode: str
+    tether: float
+    limit: float
+
+
+@dataclass(frozen=True)
+class Arrival:
+    """A goal (-1: the base) was reached: the word of the online tether there and the planned one,
+    and both lengths."""
+
+    time: float
+    goal: int
+    word: Word
+    planned: Word
+    tether: float
+    planned_tether: float
+
+    @property
+    def as_planned(self) -> bool:
+        """Whether the tether is in the class that the plan says."""
+        return self.word == self.planned
+
+
+@dataclass(frozen=True)
+class Entry:
+    """Something happened, and what was done about it."""
+
+    time: float
+    event: str
+    done: str
+    reason: str
+    planning_s: float = 0.0
+
+
+@dataclass
+class Execution:
+    """What came of it.
+
+    problem : as it is at the end. rows, arrivals, entries : the logs. tether : at the end.
+    tethers : (time, nodes) of the tether now and then, for pictures. lost : goals left out.
+    """
+
+    problem: Problem
+    solution: Solution
+    options: Options
+    rows: list[Row] = field(default_factory=list)
+    arrivals: list[Arrival] = field(default_factory=list)
+    entries: list[Entry] = field(default_factory=list)
+    lost: dict[int, str] = field(default_factory=dict)
+    cancelled: set[int] = field(default_factory=set)
+    tethers: list[tuple[float, Floats]] = field(default_factory=list)
+    free: bool = False
+    walked: float = 0.0
+    interrupted: bool = False
+    wall_s: float = 0.0
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """The numbers. exceedance_s : seconds with a tether longer than it is at that time, but for
+        the seconds after the limit itself was lowered below it."""
+        over = [r.tether > r.limit * (1.0 + RESOLUTION) and r.mode != "shorten" for r in self.rows]
+        steps = np.diff([r.time for r in self.rows], append=self.rows[-1].time if self.rows else 0)
+        goals = [a for a in self.arrivals if a.goal != HOME]
+        return {
+            "problem": self.problem.name,
+            "status": "interrupted" if self.interrupted else "done",
+            "time_s": self.rows[-1].time if self.rows else 0.0,
+            "path": self.walked,
+            "planned_path": self.solution.length,
+            "visited": len(goals),
+            "as_planned": sum(a.as_planned for a in self.arrivals),
+            "lost": [{"goal": g, "reason": why} for g, why in sorted(self.lost.items())],
+            "cancelled": sorted(self.cancelled),
+            "longest_tether": max((r.tether for r in self.rows), default=0.0),
+            "tether_length": self.problem.tether_length,
+            "exceedance_s": float(np.array(steps)[over].sum()) if self.rows else 0.0,
+            "home": bool(self.arrivals and self.arrivals[-1].goal == HOME),
+            "tether_free": self.free,
+            "repairs": sum(e.done in ("local", "replan", "home") for e in self.entries),
+            "planning_worst_s": max((e.planning_s for e in self.entries), default=0.0),
+            "wall_s": self.wall_s,
+        }
+
+
+class _Run:
+    """A run in progress."""
+
+    def __init__(self, problem: Problem, solution: Solution, options: Options) -> None:
+        self.out = Execution(problem, solution, options)
+        self.problem, self.options = problem, options
+        self.legs: list[Leg] = legs_of(problem, solution)
+        self.start = np.array(problem.base if problem.state is None else problem.state.position)
+        self.delta = options.delta or suggested_delta(problem)
+        self._enter(problem)
+        if problem.state is None:
+            self.tether = self.model.start(problem.base, problem.base)
+        else:
+            self.tether = self.model.lay(np.array(solution.start_tether))
+        self.vehicle = make_vehicle(options.vehicle, self.start, options.speed)
+        self.step = 0.1 if options.vehicle != "kinematic" else self.delta / options.speed
+        self.water = Water(options.current, options.gusts, options.seed)
+        self.now, self.mode, self.fresh, self.leg_s = 0.0, "tour", True, 0.0
+        self.way = self.legs[0].way
+
+    def _enter(self, problem: Problem) -> None:
+        """The scene of a problem."""
+        self.problem = self.out.problem = problem
+        self.scene: DistanceField = Scene.from_problem(problem).field()
+        self.model = GeodesicTether(self.scene, self.delta)
+
+    # a step
+
+    def note(self) -> Row:
+        x, y, z = (float(v) for v in self.vehicle.position)
+        goal = self.legs[0].goal if self.legs else HOME
+        limit = self.problem.tether_length
+        if self.mode == "shorten" and self.tether.length <= limit:
+            self.mode = "tour"
+        row = Row(round(self.now, 6), x, y, z, goal, self.mode, self.tether.length, limit)
+        if len(self.out.rows) % 10 == 0:
+            self.out.tethers.append((row.time, self.tether.nodes.copy()))
+        self.out.rows.append(row)
+        return row
+
+    def go(self) -> None:
+        """One step along the way; arrives where the leg ends."""
+        before = self.vehicle.position
+        stops, passed = self.vehicle.go(
+            self.way, self.step, self.vehicle.yaw, self.water(self.now), self.fresh
+        )
+        self.fresh = False
+        self.now += self.step
+        self.leg_s += self.step
+        for stop in stops:
+            inside = float(self.scene.distance(stop)) < -0.2 * self.delta
+            if inside:
+                stop = pushed_out(self.scene, stop, 0.0)[0]
+                self.vehicle.stop_at(stop)
+            self.out.walked += float(np.linalg.norm(stop - before))
+            self.tether = self.model.update(self.tether, stop)
+            before = stop
+        end = self.way[-1]
+        self.way = self.way[min(passed, len(self.way) - 1) :]
+        near = (
+            1e-9 * self.problem.scale if self.options.vehicle == "kinematic" else self.options.reach
+        )
+        if len(self.way) == 1 and float(np.linalg.norm(self.vehicle.position - end)) <= near:
+            self._arrive()
+        elif self.leg_s > 60.0 + PATIENCE * self.legs[0].length / self.options.speed:
+            self._lose(self.legs[0].goal, "not reached in time")
+
+    def _arrive(self) -> None:
+        leg = self.legs.pop(0)
+        word = signature(self.tether.nodes[:, :2], self.problem.representative_points)
+        self.out.arrivals.append(
+            Arrival(round(self.now, 6), leg.goal, word, leg.word, self.tether.length, leg.tether)
+        )
+        self._next()
+
+    def _next(self) -> None:
+        self.leg_s = 0.0
+        if self.legs:
+            self.way, self.fresh = self.legs[0].way, True
+
+    def _lose(self, goal: int, why: str) -> None:
+        if goal == HOME:
+            raise NetspError("internal: the base was not reached")
+        self.out.lost[goal] = why
+        self._mend(f"{self.problem.goal_label(goal)} {why}", [g for g in self.left if g != goal])
+
+    @property
+    def left(self) -> list[int]:
+        """Goals that are planned, in their order."""
+        return [leg.goal for leg in self.legs if leg.goal != HOME]
+
+    # events
+
+    def happen(self, event: Event) -> None:
+        """Let an event come about, and mend what it breaks."""
+        left, must = self.left, None
+        if event.kind == "push":
+            assert event.push is not None
+            self._push(np.array(event.push))
+            must = "pushed off its way"
+        else:
+            before = self.problem
+            self._enter_changed(event)
+            if event.kind == "add_goal":
+                left, must = [*left, len(before.goals)], "a goal was added"
+            elif event.cancel_goal is not None:
+                gone = index_of(event.cancel_goal, list(before.goals), "cancel_goal")
+                if gone in left:
+                    left, must = [g for g in left if g != gone], "a goal was cancelled"
+                    self.out.cancelled.add(gone)
+        if event.tether_length is not None and self.tether.length > event.tether_length:
+            self.mode = "shorten"
+        if must is None:
+            must = broken(self.problem, self.tether.nodes, self._from_here())
+        if must is None:
+            self._enter_log(event.kind, "kept", "nothing that is left of the plan is broken", 0.0)
+        elif not self.options.repair:
+            self._enter_log(event.kind, "ignored", must, 0.0)
+        else:
+            self._mend(must, left, event.kind)
+
+    def _from_here(self) -> list[Leg]:
+        first = self.legs[0]
+        way = np.vstack([self.vehicle.position, self.way])
+        return [Leg(first.goal, way, first.word, first.tether), *self.legs[1:]]
+
+    def _enter_changed(self, event: Event) -> None:
+        """The world after an event: what has come to stand on the tether or the robot has pushed
+        them aside, the shorter way; what is gone lets the tether go."""
+        problem = changed(self.problem, event)
+        self._enter(problem)
+        if event.kind not in ("appear", "vanish", "move"):
+            return
+        robot = self.vehicle.position
+        if float(self.scene.distance(robot)) < 0.0:
+            robot = pushed_out(self.scene, robot, 1e-3 * self.delta)[0]
+            self.vehicle.stop_at(robot)
+        nodes = self.tether.nodes
+        line = np.vstack([nodes[:1], dense(nodes, 0.5 * self.delta), robot])
+        inner = self.scene.distance(line) < 0.0
+        inner[[0, -1]] = False
+        line[inner] = pushed_out(self.scene, line[inner], 1e-3 * self.delta) if inner.any() else 0.0
+        self.tether = self.model.relaxed(line, 5000)
+
+    def _push(self, by: Floats) -> None:
+        """Carry the robot off, as far as there is water."""
+        start = self.vehicle.position
+        stops = dense(np.array([start, start + by]), 0.5 * self.delta)
+        for stop in stops:
+            if float(self.scene.distance(stop)) < 0.0:
+                break
+            self.tether = self.model.update(self.tether, stop)
+            self.vehicle.stop_at(stop)
+
+    def _mend(self, why: str, left: list[int], event: str = "lost") -> None:
+        made: Repair = repair(
+            self.problem, self.vehicle.position, self.tether.nodes, left, self.options.speed, why,
+            self.options.seed,
+        )  # fmt: skip
+        self.legs = made.legs
+        for goal, reason in made.lost:
+            self.out.lost[goal] = reason
+        self._enter_log(event, made.kind, made.reason, made.planning_s)
+        self._next()
+
+    def _enter_log(self, event: str, done: str, reason: str, spent: float) -> None:
+        self.out.entries.append(Entry(round(self.now, 6), event, done, reason, spent))
+
+
+def execute(
+    problem: Problem,
+    solution: Solution,
+    options: Options | None = None,
+    *,
+    surprises: Surprises | None = None,
+    on_step: Callable[[Row], None] | None = None,
+) -> Execution:
+    """Carry out a solution in the scene of its problem, whose obstacles stand from the sea floor to
+    the surface, on a tether that is anchored at the base.
+
+    surprises : what happens on the way. on_step : is told every row; a KeyboardInterrupt ends the
+    run, and what was done till then is returned.
+
+    Raises
+    ------
+    InputError : the solution does not belong to the problem, fails its checks or is a baseline's
+        that entangles; bad options or surprises.
+    """
+    options = options or Options()
+    surprises = surprises or Surprises(events=())
+    if not (np.isfinite(options.speed) and options.speed > 0.0):
+        raise InputError(f"speed: expected a positive number, got {options.speed!r}")
+    if solution.status is Status.INVALID or solution.length is None:
+        raise InputError(f"solution: has status {solution.status.value}; expected a tour that fits")
+    judged = verify(problem, solution)
+    if not judged:
+        failed = next(c for c in judged.checks if not c.passed)
+        raise InputError(f"solution: fails its check {failed.name!r}: {failed.detail}")
+    surprises.check(problem)
+    begin = time.perf_counter()
+    run = _Run(problem, solution, options)
+    coming = sorted(surprises.events, key=lambda e: e.time)
+    try:
+        while run.legs:
+            while coming and coming[0].time <= run.now:
+                run.happen(coming.pop(0))
+            row = run.note()
+            if on_step is not None:
+                on_step(row)
+            run.go()
+        run.note()
+    except KeyboardInterrupt:
+        run.out.interrupted = True
+    run.out.tethers.append((round(run.now, 6), run.tether.nodes.copy()))
+    run.out.free = is_free(run.tether, run.delta)
+    run.out.wall_s = time.perf_counter() - begin
+    return run.out
+
+
+def is_free(tether: Tether, delta: float) -> bool:
+    """Whether a tether can be taken in: straight to the robot, resting on nothing."""
+    straight = float(np.linalg.norm(tether.robot - tether.anchor))
+    return len(tether.nodes) == 2 and tether.length - straight <= 1e-6 * delta
+
+
+def suggested_delta(problem: Problem) -> float:
+    """A resolution for the tether: a three-hundredth of its length, and fine enough for the
+    thinnest obstacle."""
+    thickness = [t for _, t in Scene.from_problem(problem).field().thickness]
+    return float(min([problem.tether_length / 300.0, *(t / (1.1 * THINNEST) for t in thickness)]))
+
+
+__all__ = [
+    "Arrival", "Entry", "Execution", "Options", "Row", "execute", "is_free", "length_of",
+    "suggested_delta",
+]  # fmt: skip

@@ -1,0 +1,176 @@
+"""The travel graph of a problem that starts in the middle: from the robot's present state.
+
+The state is one more augmented goal, with the one class that the tether has now. Sought is a
+path from it through all goals to the base; solvers look for closed tours through the base. So the
+edge between base and state costs nothing, and every other edge at either of them costs a surcharge
+more. A tour takes two edges at the base and two at the state: with the free edge it pays the
+surcharge twice, without it four times. Twice the surcharge is more than some path costs, so the
+shortest tour has the free edge, and is the shortest path and twice the surcharge.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from netsp.errors import InputError, NetspError
+from netsp.hsignature import reduce
+from netsp.problem import Goal, Problem
+from netsp.result import OPTIMALITY_TOLERANCE, Progress, Result
+from netsp.roadmap.paths import TautPaths
+from netsp.roadmap.taut import MAX_CLASSES, TautLegs, TautRoadmap
+from netsp.solution import Status
+from netsp.travel import Bools, Floats, Ints, TravelGraph
+
+ENOUGH = 10.0 * OPTIMALITY_TOLERANCE
+"""A path is called optimal when its bound is within this share of it."""
+
+FAR = 50.0
+"""In units of the tether length: the present tether is looked for up to this length."""
+
+
+class OpenedGraph(TravelGraph):
+    """A travel graph whose tours start at the base, go on to the state for nothing, and from there
+    through the goals.
+
+    Attributes
+    ----------
+    start : vertex of the state. surcharge : see above. within : the legs as they are.
+    start_tether : (n, 3) the taut tether at the start.
+    """
+
+    def __init__(
+        self, within: TravelGraph, start: int, surcharge: float,
+        start_tether: npt.NDArray[np.float64],
+    ) -> None:  # fmt: skip
+        super().__init__(
+            within.cluster, within.signatures, within.tethers,
+            _OpenedLegs(within, start, surcharge), within.roadmap,
+        )  # fmt: skip
+        self.within, self.start, self.surcharge = within, start, surcharge
+        self.start_tether = start_tether
+
+    def as_tour(self, order: tuple[int, ...]) -> tuple[int, ...]:
+        """A closed tour with the state right after the base, whichever way round it was found."""
+        if len(order) > 1 and order[-1] == self.start and order[1] != self.start:
+            return (0, *reversed(order[1:]))
+        return order
+
+    def opened(self, result: Result) -> Result:
+        """A solver's result on this graph as one about the path from the state."""
+        bound = result.lower_bound
+        low = None if bound is None else max(0.0, bound - 2.0 * self.surcharge)
+        tour = None if result.tour is None else self.as_tour(result.tour)
+        if tour is None:
+            return dataclasses.replace(result, lower_bound=low)
+        walk = result.walk or (*tour, 0)
+        if walk[1] != self.start:
+            walk = tuple(reversed(walk))
+        if walk[1] != self.start:
+            raise NetspError("internal: a tour does not start at the state")
+        legs = [(u, v) for u, v in pairwise(walk[1:]) if u != v]
+        length = sum(self.within.walk_length([u, v]) for u, v in legs)
+        status = result.status
+        # proven to a millionth of the surcharged length, which is some lengths of the path
+        if status is Status.OPTIMAL and length - (low or 0.0) > ENOUGH * length:
+            status = Status.FEASIBLE
+        return dataclasses.replace(
+            result, tour=tour, length=length, lower_bound=low, status=status,
+            walk=None if result.walk is None else walk[1:],
+        )  # fmt: skip
+
+    def listener(
+        self, listener: Callable[[Progress], None] | None
+    ) -> Callable[[Progress], None] | None:
+        """Tells a listener about the path instead of the tour."""
+        if listener is None:
+            return None
+        off = 2.0 * self.surcharge
+
+        def tell(p: Progress) -> None:
+            listener(
+                dataclasses.replace(
+                    p,
+                    incumbent=None if p.incumbent is None else p.incumbent - off,
+                    bound=None if p.bound is None else max(0.0, p.bound - off),
+                    current=None if p.current is None else p.current - off,
+                )
+            )
+
+        return tell
+
+
+class _OpenedLegs:
+    """Legs with the surcharge."""
+
+    def __init__(self, within: TravelGraph, start: int, surcharge: float) -> None:
+        self.within, self.start, self.surcharge = within, start, surcharge
+
+    def _charged(self, table: Floats, vertices: Ints) -> Floats:
+        out = np.array(table)
+        at_end = np.isin(vertices, (0, self.start))
+        out += self.surcharge * (at_end[:, None].astype(float) + at_end[None, :])
+        base, start = np.flatnonzero(vertices == 0), np.flatnonzero(vertices == self.start)
+        for i in base:
+            for j in start:
+                out[i, j] = out[j, i] = 0.0
+        return out
+
+    def lengths(self, vertices: Ints, asked: Bools | None = None) -> Floats:
+        return self._charged(self.within.costs_among(vertices, asked), vertices)
+
+    def to_base(self) -> Floats:
+        out = self.within.costs_to_base + self.surcharge
+        out[self.start] = 0.0
+        return np.asarray(out)
+
+    def lower_bounds(self, vertices: Ints) -> Floats:
+        return self._charged(self.within.lower_bounds(vertices), vertices)
+
+    def path(self, u: int, v: int) -> Floats:
+        return self.within.path(u, v)
+
+
+def opened_graph(
+    problem: Problem, *, max_classes: int = MAX_CLASSES, time_limit: float | None = None
+) -> OpenedGraph:
+    """The travel graph of a problem with a state.
+
+    Raises
+    ------
+    InfeasibleError : a goal that no tether within the limit reaches.
+    InputError : no taut tether to the state has its word, or what `TautRoadmap` raises.
+    """
+    state = problem.state
+    assert state is not None
+    last = len(problem.goals) + 1
+    limit = problem.tether_length
+    plain = problem.model_copy(update={"state": None})
+    placed = plain.model_copy(update={"goals": (*plain.goals, Goal(position=state.position))})
+    word = reduce(state.signature)
+    far = TautPaths(placed, FAR * limit)
+    try:
+        planar = far.planar_length(0, last, word)
+    except NetspError:
+        raise InputError(
+            f"state.signature: no taut tether to the robot has the word {list(state.signature)}"
+        ) from None
+    start_tether = far.path(0, last, word)
+    # the goals' classes as ever; the state's own may be one that no tour would choose
+    roadmap = TautRoadmap(plain, max_classes=max_classes, time_limit=time_limit)
+    cluster = np.append(roadmap.cluster, last)
+    words = [*roadmap.signatures, word]
+    lengths = np.append(roadmap.planar, planar)
+    legs = TautLegs(
+        TautPaths(placed, limit + max(limit, planar)), cluster, words, lengths,
+        time_limit=time_limit,
+    )  # fmt: skip
+    part = TravelGraph(cluster, words, legs.to_base(), legs, roadmap="taut")
+    start = len(cluster) - 1
+    nearest = [part.tethers[part.members(c)].min() for c in range(1, last)]
+    some_path = float(part.tethers[start] + 2.0 * sum(nearest))
+    return OpenedGraph(part, start, 0.505 * some_path, start_tether)
