@@ -1,0 +1,82 @@
+"""Between a problem's plane and the earth: azimuthal equidistant, centred on the base.
+
+Distances and directions from the base are exact on the WGS 84 ellipsoid; over 500 m the radial
+error is below a micrometre (UTM is off by metres there, through its grid convergence).
+"""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from netsp.errors import InputError
+
+Floats = npt.NDArray[np.float64]
+
+
+class Projection:
+    """Metres in a problem's plane to degrees and back.
+
+    latitude, longitude : of the base. heading : degrees clockwise from true north that the
+    problem's y axis points to. base : (2,) the base in the problem's plane.
+
+    Raises
+    ------
+    InputError : an origin outside the range, or pyproj is not installed.
+    """
+
+    def __init__(
+        self, latitude: float, longitude: float, heading: float = 0.0,
+        base: tuple[float, float] = (0.0, 0.0),
+    ) -> None:  # fmt: skip
+        if not (math.isfinite(latitude) and abs(latitude) <= 90.0):
+            raise InputError(f"--origin: latitude: expected -90 to 90, got {latitude:g}")
+        if not (math.isfinite(longitude) and abs(longitude) <= 180.0):
+            raise InputError(f"--origin: longitude: expected -180 to 180, got {longitude:g}")
+        if not (math.isfinite(heading) and abs(heading) <= 360.0):
+            raise InputError(f"--origin: heading: expected -360 to 360, got {heading:g}")
+        self.latitude, self.longitude, self.heading = latitude, longitude, heading
+        self.base = np.array(base, dtype=float)
+
+    @classmethod
+    def parse(cls, text: str, base: tuple[float, float] = (0.0, 0.0)) -> Projection:
+        """From ``lat,lon`` or ``lat,lon,heading``."""
+        try:
+            numbers = [float(v) for v in text.split(",")]
+        except ValueError:
+            numbers = []
+        if len(numbers) not in (2, 3):
+            raise InputError(f"--origin: expected lat,lon or lat,lon,heading, got {text!r}")
+        return cls(numbers[0], numbers[1], numbers[2] if len(numbers) == 3 else 0.0, base)
+
+    @cached_property
+    def _transform(self) -> Any:
+        try:
+            from pyproj import Transformer
+        except ImportError:
+            raise InputError(
+                "positions on the earth need pyproj: pip install 'netsp[geo]'"
+            ) from None
+        local = (
+            f"+proj=aeqd +lat_0={self.latitude!r} +lon_0={self.longitude!r} +datum=WGS84 +units=m"
+        )
+        return Transformer.from_crs("EPSG:4326", local, always_xy=True)
+
+    def to_earth(self, xy: npt.ArrayLike) -> Floats:
+        """(n, 2) latitude and longitude of points (n, 2)."""
+        d = np.asarray(xy, dtype=float).reshape(-1, 2) - self.base
+        c, s = math.cos(math.radians(self.heading)), math.sin(math.radians(self.heading))
+        east, north = c * d[:, 0] + s * d[:, 1], -s * d[:, 0] + c * d[:, 1]
+        longitude, latitude = self._transform.transform(east, north, direction="INVERSE")
+        return np.column_stack([latitude, longitude])
+
+    def to_plane(self, latlon: npt.ArrayLike) -> Floats:
+        """(n, 2) points of latitudes and longitudes (n, 2)."""
+        p = np.asarray(latlon, dtype=float).reshape(-1, 2)
+        east, north = self._transform.transform(p[:, 1], p[:, 0])
+        c, s = math.cos(math.radians(self.heading)), math.sin(math.radians(self.heading))
+        return np.asarray(np.column_stack([c * east - s * north, s * east + c * north]) + self.base)

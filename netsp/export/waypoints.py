@@ -1,0 +1,157 @@
+"""A tour as waypoints that are joined by straight lines, safe with a vehicle that cuts corners.
+
+A vehicle goes on to the next waypoint when it is within its acceptance radius of one. So at a bend
+it may cut off the triangle between the bend and the points that far before and after it. Where an
+obstacle reaches into that triangle the bend is moved outward; if that does not help, the radius is
+too large for the site, and that is said.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+import shapely
+
+from netsp.errors import InputError
+from netsp.execute.plan import HOME, legs_of
+from netsp.hsignature import Word, concatenate, crossings, signature
+from netsp.problem import Problem
+from netsp.solution import Solution
+
+Floats = npt.NDArray[np.float64]
+
+STRAIGHT = 1e-6
+"""Bends of fewer radians are none."""
+
+OUTWARD = (1.0, 2.0, 4.0)
+"""A bend is moved outward by so many acceptance radii, the least that helps."""
+
+
+@dataclass(frozen=True)
+class Waypoint:
+    """A place to pass, z up.
+
+    goal : the goal that is visited here, HOME (-1) for the base at the end, None for a bend.
+    word, tether : of the taut tether at a goal.
+    """
+
+    position: tuple[float, float, float]
+    goal: int | None
+    word: Word = ()
+    tether: float = 0.0
+
+
+def waypoints_of(problem: Problem, solution: Solution, radius: float = 0.0) -> list[Waypoint]:
+    """The waypoints of a solution, without the start.
+
+    radius : acceptance radius of the vehicle.
+
+    Raises
+    ------
+    InputError : with this radius corners could be cut through an obstacle, or the class of the
+        straight lines is not the plan's.
+    """
+    legs = legs_of(problem, solution)
+    solids = [o.shape() for o in problem.obstacles]
+    shapely.prepare(solids)
+    points: list[Floats] = [legs[0].way[0]]
+    kinds: list[tuple[int | None, Word, float]] = [(None, (), 0.0)]
+    for leg in legs:
+        for point in leg.way[1:-1]:
+            points.append(point)
+            kinds.append((None, (), 0.0))
+        points.append(leg.way[-1])
+        kinds.append((leg.goal, leg.word, leg.tether))
+    keep = [0]
+    for k in range(1, len(points)):
+        here = points[keep[-1]]
+        if np.linalg.norm(points[k] - here) == 0.0 and kinds[k][0] is None:
+            continue
+        if (
+            k + 1 < len(points)
+            and kinds[k][0] is None
+            and _turn(here, points[k], points[k + 1]) < STRAIGHT
+        ):
+            continue
+        keep.append(k)
+    line = np.array([points[k] for k in keep])
+    marks = [kinds[k] for k in keep]
+    line = _widened(line, marks, solids, radius)
+    _check_class(problem, solution, line, marks)
+    return [
+        Waypoint((float(x), float(y), float(z)), *mark)
+        for (x, y, z), mark in zip(line[1:], marks[1:], strict=True)
+    ]
+
+
+def _turn(a: Floats, b: Floats, c: Floats) -> float:
+    """Angle (rad) by which a way turns at b."""
+    u, v = b - a, c - b
+    lu, lv = np.linalg.norm(u), np.linalg.norm(v)
+    if lu == 0.0 or lv == 0.0:
+        return np.pi
+    return float(np.arctan2(np.linalg.norm(np.cross(u, v)), u @ v))
+
+
+def _widened(line: Floats, marks: list, solids: list, radius: float) -> Floats:  # type: ignore[type-arg]
+    """The bends moved outward where a vehicle could cut through something."""
+    if radius <= 0.0 or not solids:
+        return line
+    tree = shapely.STRtree(solids)
+    out = line.copy()
+    for k in range(1, len(line) - 1):
+        if marks[k][0] is not None or not _cuts(tree, out, k, radius):
+            continue
+        middle = 0.5 * (out[k - 1, :2] + out[k + 1, :2])
+        away = out[k, :2] - middle
+        far = float(np.linalg.norm(away))
+        if far == 0.0:
+            continue
+        for times in OUTWARD:
+            tried = out.copy()
+            tried[k, :2] += away / far * times * radius
+            free = not any(
+                len(tree.query(shapely.LineString(tried[[i, i + 1], :2]), "intersects"))
+                for i in (k - 1, k)
+            )
+            if free and not _cuts(tree, tried, k, radius):
+                out = tried
+                break
+    bad = [k for k in range(1, len(out) - 1) if _cuts(tree, out, k, radius)]
+    if bad:
+        x, y, _ = out[bad[0]]
+        raise InputError(
+            f"--acceptance: {radius:g} would let the vehicle cut a corner at ({x:.6g}, {y:.6g}) "
+            "through an obstacle; expected a smaller radius, or a plan with a larger clearance"
+        )
+    return out
+
+
+def _cuts(tree: shapely.STRtree, line: Floats, k: int, radius: float) -> bool:
+    """Whether an obstacle reaches into the triangle that may be cut off at bend k."""
+    a, b, c = line[k - 1, :2], line[k, :2], line[k + 1, :2]
+    u, v = a - b, c - b
+    lu, lv = float(np.linalg.norm(u)), float(np.linalg.norm(v))
+    if lu == 0.0 or lv == 0.0:
+        return False
+    corner = [b + u * min(1.0, radius / lu), b, b + v * min(1.0, radius / lv)]
+    return bool(len(tree.query(shapely.LineString(corner).convex_hull, "intersects")))
+
+
+def _check_class(problem: Problem, solution: Solution, line: Floats, marks: list) -> None:  # type: ignore[type-arg]
+    """The word of the straight lines at every goal is the plan's, and empty at the end."""
+    rays = problem.representative_points
+    tether = np.array(solution.start_tether).reshape(-1, 3)
+    word = signature(tether[:, :2], rays) if len(tether) else ()
+    solids = [o.shape() for o in problem.obstacles]
+    for (a, b), (goal, planned, _) in zip(pairwise(line), marks[1:], strict=True):
+        word = concatenate(word, crossings(np.array([a, b])[:, :2], rays))
+        step = shapely.LineString([a[:2], b[:2]])
+        inside = [s for s in solids if s.buffer(-1e-6 * problem.scale).intersects(step)]
+        if inside:
+            raise InputError("solution: straight lines between its waypoints enter an obstacle")
+        if goal is not None and word != (planned if goal != HOME else ()):
+            raise InputError("solution: its waypoints are not of the plan's homotopy class")

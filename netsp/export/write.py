@@ -1,0 +1,239 @@
+"""Mission files: QGroundControl plans and waypoint lists for ArduSub, GeoJSON and CSV.
+
+Formats: QGroundControl's plan files and MAVLink's mission items; RFC 7946 for GeoJSON, which has no
+circle, so that obstacles are points with `radius_m`. ArduSub: depth is a negative altitude relative
+to the surface, never 0 (0 has meant "keep the present one"); there is no take-off; the plan ends at
+the base and not with return-to-launch; waypoints without a hold are flown through, so bends are
+held.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from netsp.errors import InputError
+from netsp.execute.plan import HOME
+from netsp.export.projection import Projection
+from netsp.export.waypoints import Waypoint, waypoints_of
+from netsp.problem import Circle, Problem
+from netsp.solution import Solution, write_text
+
+SHALLOWEST = 0.1
+"""Metres of depth that the least altitude stands for."""
+
+MOST_ITEMS = 700
+"""Mission items: MAVLink counts to 65,535, but ArduPilot's storage on common boards ends here."""
+
+NAV_WAYPOINT, RELATIVE_ALTITUDE = 16, 3
+ARDUPILOT, SUBMARINE = 3, 12
+
+
+@dataclass(frozen=True)
+class Settings:
+    """hold : whole seconds at goals. bend : at bends, at least 1. speed : m/s. most : items."""
+
+    hold: int = 5
+    bend: int = 1
+    speed: float = 0.5
+    most: int = MOST_ITEMS
+
+
+def export(
+    problem: Problem, solution: Solution, file: str | Path, kind: str,
+    projection: Projection | None = None, *, acceptance: float = 0.0,
+    settings: Settings | None = None,
+) -> list[Waypoint]:  # fmt: skip
+    """Write a solution as a mission file; returns its waypoints.
+
+    kind : one of `FORMATS`. projection : needed by all but csv. acceptance : the vehicle's
+    acceptance radius (m).
+
+    Raises
+    ------
+    InputError : an unknown kind, no projection, more waypoints than the format allows, waypoints
+        that would not be of the plan's class.
+    """
+    if kind not in FORMATS:
+        raise InputError(f"--format: expected {', '.join(FORMATS)}, got {kind!r}")
+    if projection is None and kind != "csv":
+        raise InputError(f"--origin: format {kind!r} needs lat,lon or lat,lon,heading of the base")
+    settings = settings or Settings()
+    if not 0 <= settings.hold <= 3600 or not 1 <= settings.bend <= 3600:
+        raise InputError(
+            f"--hold: expected whole seconds, at bends at least 1, got {settings.hold} and "
+            f"{settings.bend}"
+        )
+    points = waypoints_of(problem, solution, acceptance)
+    if len(points) > settings.most and kind in ("plan", "wpl"):
+        raise InputError(
+            f"solution: needs {len(points)} waypoints, and the vehicle takes {settings.most}; "
+            "raise --most if yours takes more"
+        )
+    write_text(file, FORMATS[kind](problem, points, projection, settings))
+    return points
+
+
+def altitude(z: float) -> float:
+    """The relative altitude that stands for a height."""
+    return round(min(z, -SHALLOWEST), 3)
+
+
+def _hold(point: Waypoint, settings: Settings) -> int:
+    return settings.hold if point.goal not in (None, HOME) else settings.bend
+
+
+def _plan(
+    problem: Problem, points: list[Waypoint], projection: Projection | None, settings: Settings
+) -> str:
+    assert projection is not None
+    places = projection.to_earth([p.position[:2] for p in points])
+    items = [
+        {
+            "type": "SimpleItem", "command": NAV_WAYPOINT, "frame": RELATIVE_ALTITUDE,
+            "autoContinue": True, "doJumpId": k + 1, "AltitudeMode": 1,
+            "Altitude": altitude(p.position[2]), "AMSLAltAboveTerrain": None,
+            "params": [_hold(p, settings), 0, 0, None, _degrees(lat), _degrees(lon),
+                       altitude(p.position[2])],
+        }
+        for k, (p, (lat, lon)) in enumerate(zip(points, places, strict=True))
+    ]  # fmt: skip
+    circles: list[Any] = []
+    polygons: list[Any] = []
+    for o in problem.obstacles:
+        if isinstance(o, Circle):
+            ((lat, lon),) = projection.to_earth([o.center])
+            centre = {"center": [_degrees(lat), _degrees(lon)], "radius": round(o.radius, 3)}
+            circles.append({"version": 1, "inclusion": False, "circle": centre})
+        else:
+            corners = [[_degrees(a), _degrees(b)] for a, b in projection.to_earth(o.polygon)]
+            polygons.append({"version": 1, "inclusion": False, "polygon": corners})
+    plan = {
+        "fileType": "Plan", "version": 1, "groundStation": "QGroundControl",
+        "geoFence": {"version": 2, "circles": circles, "polygons": polygons},
+        "rallyPoints": {"version": 2, "points": []},
+        "mission": {
+            "version": 2, "firmwareType": ARDUPILOT, "vehicleType": SUBMARINE,
+            "globalPlanAltitudeMode": 1, "cruiseSpeed": settings.speed,
+            "hoverSpeed": settings.speed,
+            "plannedHomePosition": [projection.latitude, projection.longitude, 0],
+            "items": items,
+        },
+    }  # fmt: skip
+    return json.dumps(plan, indent=1, allow_nan=False) + "\n"
+
+
+def _wpl(
+    problem: Problem, points: list[Waypoint], projection: Projection | None, settings: Settings
+) -> str:
+    del problem
+    assert projection is not None
+    rows: list[list[Any]] = [
+        [0, 1, 0, NAV_WAYPOINT, 0, 0, 0, 0, projection.latitude, projection.longitude, 0, 1]
+    ]
+    places = projection.to_earth([p.position[:2] for p in points])
+    for k, (p, (lat, lon)) in enumerate(zip(points, places, strict=True)):
+        rows.append([k + 1, 0, RELATIVE_ALTITUDE, NAV_WAYPOINT, _hold(p, settings), 0, 0, 0,
+                     _degrees(lat), _degrees(lon), altitude(p.position[2]), 1])  # fmt: skip
+    return "QGC WPL 110\n" + "".join("\t".join(map(_cell, r)) + "\n" for r in rows)
+
+
+def _cell(value: Any) -> str:
+    return f"{value:.9f}" if isinstance(value, float) else str(value)
+
+
+def _degrees(value: float) -> float:
+    """To nine places: a tenth of a millimetre."""
+    return round(float(value), 9)
+
+
+def _geojson(
+    problem: Problem, points: list[Waypoint], projection: Projection | None, settings: Settings
+) -> str:
+    del settings
+    assert projection is not None
+
+    def lonlat(xy: Any, z: float | None = None) -> list[float]:
+        ((lat, lon),) = projection.to_earth([xy])
+        return [_degrees(lon), _degrees(lat)] + ([] if z is None else [z])
+
+    def feature(kind: str, shape: str, coordinates: Any, **more: Any) -> dict[str, Any]:
+        properties = {"kind": kind, **{k: v for k, v in more.items() if v is not None}}
+        return {
+            "type": "Feature", "properties": properties,
+            "geometry": {"type": shape, "coordinates": coordinates},
+        }  # fmt: skip
+
+    stops = {p.goal: (n, p) for n, p in enumerate(q for q in points if q.goal not in (None, HOME))}
+    features = [
+        feature("base", "Point", lonlat(problem.base[:2], problem.base[2]),
+                tether_length=problem.tether_length, clearance=problem.clearance)
+    ]  # fmt: skip
+    for k, goal in enumerate(problem.goals):
+        visit, point = stops.get(k, (None, None))
+        features.append(
+            feature(
+                "goal", "Point", lonlat(goal.position[:2], goal.position[2]), name=goal.name,
+                visit=None if visit is None else visit + 1,
+                tether_length=None if point is None else point.tether,
+                signature=None if point is None else list(point.word),
+            )
+        )  # fmt: skip
+    for o in problem.obstacles:
+        if isinstance(o, Circle):
+            features.append(
+                feature("obstacle", "Point", lonlat(o.center), radius_m=o.radius, name=o.name)
+            )
+        else:
+            ring = [lonlat(c) for c in _counter_clockwise(o.polygon)]
+            features.append(feature("obstacle", "Polygon", [[*ring, ring[0]]], name=o.name))
+    line = [lonlat(problem.base[:2], problem.base[2])]
+    line += [lonlat(p.position[:2], p.position[2]) for p in points]
+    features.append(feature("path", "LineString", line))
+    return json.dumps({"type": "FeatureCollection", "features": features}, allow_nan=False) + "\n"
+
+
+def _counter_clockwise(corners: Any) -> Any:
+    """RFC 7946 wants outer rings so."""
+    c = np.array(corners)
+    x, y = c[:, 0], c[:, 1]
+    area = float((x * np.roll(y, -1) - np.roll(x, -1) * y).sum())
+    return corners if area > 0.0 else corners[::-1]
+
+
+def _csv(
+    problem: Problem, points: list[Waypoint], projection: Projection | None, settings: Settings
+) -> str:
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    head = ["x", "y", "z", "kind", "goal", "name", "hold_s", "tether_length", "signature"]
+    table.writerow(head + (["latitude", "longitude"] if projection else []))
+    places = projection.to_earth([p.position[:2] for p in points]) if projection else None
+    for k, p in enumerate(points):
+        visited = p.goal not in (None, HOME)
+        row: list[Any] = [*(f"{v:.6f}" for v in p.position)]
+        row += ["goal" if visited else "base" if p.goal == HOME else "bend"]
+        row += [p.goal, problem.goals[p.goal or 0].name or ""] if visited else ["", ""]
+        row += [_hold(p, settings), f"{p.tether:.6f}" if visited else ""]
+        row += [" ".join(map(str, p.word)) if visited else ""]
+        if places is not None:
+            row += [f"{v:.9f}" for v in places[k]]
+        table.writerow(row)
+    return text.getvalue()
+
+
+FORMATS: dict[str, Callable[[Problem, list[Waypoint], Projection | None, Settings], str]] = {
+    "plan": _plan,
+    "wpl": _wpl,
+    "geojson": _geojson,
+    "csv": _csv,
+}
+
+__all__ = ["FORMATS", "Settings", "altitude", "export"]

@@ -1,0 +1,207 @@
+"""The order in which to visit waypoints so that the tether stays short: NE-TSP in space.
+
+Offline, a goal and the class of its tether make one vertex, and legs belong to classes, so that no
+tour can wind the tether up. The same here, with classes found by the tether model: the shortest
+tether to each waypoint, and those that come of going straight on to it from its neighbours. A leg
+within a class is the straight line if the tether that comes of it is that of the class; between any
+two classes there is the way back along one tether and out along the other, pulled taut. What comes
+out is a generalised TSP, which our own solvers take.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from netsp.errors import InputError
+from netsp.lns import Instance, best_classes
+from netsp.online.field import DistanceField
+from netsp.online.mission import Mission
+from netsp.online.planner.base import points_along
+from netsp.online.simulate import Run, grid_of, simulate
+from netsp.online.tether import GeodesicTether, Tether
+from netsp.online.tree import ShortestTree, taut
+from netsp.solvers import solve_graph
+from netsp.travel import TravelGraph
+
+Floats = npt.NDArray[np.float64]
+
+NEIGHBOURS = 12
+"""Waypoints nearest to each that legs are sought to."""
+
+MOST_CLASSES = 3
+"""Classes of tether kept for each waypoint."""
+
+ROUNDS = 150
+"""Of pulling a tether taut."""
+
+SHARE = 0.99
+"""Of the tether that classes may need: the rest is for what lies between the waypoints."""
+
+
+@dataclass(frozen=True)
+class Ordered:
+    """A mission in another order.
+
+    mission : the waypoints reordered. order : old numbers in the new order. before, after : both
+    flown by `predictive`; after is before when no better order was found.
+    """
+
+    mission: Mission
+    order: tuple[int, ...]
+    before: Run
+    after: Run
+
+
+@dataclass
+class _Classes:
+    """Tethers to the waypoints: waypoint and state of each vertex."""
+
+    point: list[int]
+    tether: list[Tether]
+
+    def find(self, n: int, tether: Tether, delta: float) -> int | None:
+        """The vertex of a waypoint with the same tether."""
+        for v, (m, other) in enumerate(zip(self.point, self.tether, strict=True)):
+            if m == n and alike(tether, other, delta):
+                return v
+        return None
+
+
+def alike(a: Tether, b: Tether, delta: float) -> bool:
+    """Whether two tethers between the same ends are the same, by length and middle."""
+    if abs(a.length - b.length) > delta:
+        return False
+    middle = (points_along(t.nodes, 0.51 * t.length + 1e-9)[1] for t in (a, b))
+    return bool(np.linalg.norm(next(middle) - next(middle)) < 2.0 * delta)
+
+
+def reorder(
+    mission: Mission, *, time_limit: float = 20.0, seed: int = 0,
+    on_progress: Callable[[str], None] | None = None,
+) -> Ordered:  # fmt: skip
+    """Find an order of a mission's waypoints with less total time (inspection, and taking the
+    tether in afterwards) in which the tether stays within its limit.
+
+    The new order is flown by `predictive` before it is believed; the given one is kept unless the
+    new one visits as many waypoints, never exceeds the tether and takes less time.
+
+    Raises
+    ------
+    InputError : as `simulate`.
+    """
+    tell = on_progress or (lambda _: None)
+    scene = mission.load_scene()
+    field = scene.field()
+    mission = mission.checked_waypoints(field).model_copy(update={"camera": None})
+    tell("flying the given order")
+    before = simulate(mission, scene=scene, field=field)
+    tell("tethers and legs")
+    graph, points, start = travel_graph(mission, field, scene_grid=grid_of(mission, scene, field))
+    given = [start.index(n) + 1 for n in range(len(mission.waypoints)) if n in start]
+    tell("order")
+    instance = Instance.of(graph)
+    _, warm = best_classes(np.array(given), instance.start, instance.costs)
+    result = solve_graph(
+        graph, "lns", time_limit=time_limit, iteration_limit=400, seed=seed,
+        warm_start=[int(v) for v in instance.original(warm)],
+    )  # fmt: skip
+    assert result.tour is not None
+    best, after = tuple(range(len(mission.waypoints))), before
+    tour = [points[v] for v in result.tour[1:]]
+    rest = [n for n in range(len(mission.waypoints)) if n not in tour]
+    for candidate in (tour, tour[::-1]):
+        order = (*candidate, *rest)
+        tell("flying the new order")
+        run = simulate(_in_order(mission, order), scene=scene, field=field)
+        if _better(run, after):
+            best, after = order, run
+    full = Mission.model_validate(_in_order(mission, best).model_dump())
+    return Ordered(full, best, before, after)
+
+
+def _in_order(mission: Mission, order: tuple[int, ...]) -> Mission:
+    return mission.model_copy(update={"waypoints": tuple(mission.waypoints[n] for n in order)})
+
+
+def _better(run: Run, than: Run) -> bool:
+    a, b = run.summary, than.summary
+    return bool(
+        a["visited"] >= b["visited"]
+        and a["exceedance_s"] <= b["exceedance_s"]
+        and a["total_s"]["tether"] < b["total_s"]["tether"]
+    )
+
+
+def travel_graph(
+    mission: Mission, field: DistanceField, scene_grid: object
+) -> tuple[TravelGraph, list[int], list[int]]:
+    """Classes and legs of a mission: the graph, the waypoint of each vertex (-1: the anchor), and
+    the waypoints in the order of the clusters. Waypoints that no tether reaches are left out."""
+    grid = scene_grid
+    model = GeodesicTether(field, mission.delta)
+    anchor, limit = np.array(mission.anchor), SHARE * mission.tether_length
+    points = np.array(mission.waypoints)
+    tree = ShortestTree(grid, anchor, points)  # type: ignore[arg-type]
+    found = _Classes([], [])
+    for n in range(len(points)):
+        way = tree.way(n)
+        if way is None:
+            continue
+        tether = model.relaxed(way[::-1], 2 * ROUNDS)
+        if tether.length <= limit:
+            found.point.append(n)
+            found.tether.append(tether)
+    near = np.argsort(np.linalg.norm(points[:, None] - points[None], axis=2), axis=1)[
+        :, 1 : NEIGHBOURS + 1
+    ]
+    straight: dict[tuple[int, int], float] = {}
+    v = 0
+    while v < len(found.point):
+        n = found.point[v]
+        for m in near[n]:
+            way = np.array([points[n], points[m]])
+            if not _free(field, way, mission.clearance):
+                continue
+            there, lengths = model.drive(found.tether[v], way[1:])
+            if lengths.max() > limit:
+                continue
+            w = found.find(int(m), there, mission.delta)
+            if w is None and found.point.count(int(m)) < MOST_CLASSES:
+                w = len(found.point)
+                found.point.append(int(m))
+                found.tether.append(there)
+            if w is not None:
+                straight[v, w] = float(np.linalg.norm(way[1] - way[0]))
+        v += 1
+    count = len(found.point)
+    reach = np.array([t.length for t in found.tether])
+    costs = np.zeros((count + 1, count + 1))
+    costs[1:, 1:] = reach[:, None] + reach[None, :]
+    costs[0, 1:] = costs[1:, 0] = reach
+    neighbours = {(n, int(m)) for n in range(len(points)) for m in near[n]}
+    for v in range(count):
+        for w in range(v + 1, count):
+            pair = (found.point[v], found.point[w])
+            if pair not in neighbours and pair[::-1] not in neighbours:
+                continue
+            leg = min(straight.get((v, w), np.inf), straight.get((w, v), np.inf))
+            if not np.isfinite(leg):
+                line = np.vstack([found.tether[v].nodes[::-1], found.tether[w].nodes[1:]])
+                way = taut(field, line, mission.clearance, mission.delta)
+                leg = float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum())
+            costs[v + 1, w + 1] = costs[w + 1, v + 1] = min(leg, costs[v + 1, w + 1])
+    reached = sorted(set(found.point))
+    if not reached:
+        raise InputError("waypoints: no tether within the limit reaches any of them")
+    cluster = [0, *(reached.index(n) + 1 for n in found.point)]
+    return TravelGraph.from_costs(costs, cluster), [-1, *found.point], reached
+
+
+def _free(field: DistanceField, way: Floats, clearance: float) -> bool:
+    """Whether a straight way keeps the clearance, or what its ends have of it."""
+    room = max(0.0, min(clearance, float(field.distance(way).min())) - 1e-3)
+    return field.grown(room).line_of_sight(way[0], way[1], depth=1e-3)
