@@ -11,9 +11,19 @@ import argparse
 import contextlib
 import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from netsp.arguments import (
+    check_writable,
+    length,
+    natural,
+    option,
+    positive,
+    seconds,
+    shard,
+)
+from netsp.commands import add_online
 from netsp.errors import InputError, NetspError
 
 if TYPE_CHECKING:
@@ -66,27 +76,27 @@ def _parser() -> argparse.ArgumentParser:
         "--option",
         action="append",
         default=[],
-        type=_option,
+        type=option,
         metavar="NAME=VALUE",
         help="an option of the solver, as docs/solvers.md lists them; may be repeated",
     )
     p.add_argument("--roadmap", default="taut", metavar="NAME", help="taut (default) or prm")
-    p.add_argument("--samples", type=_positive, metavar="N", help="prm: milestones; default 1000")
+    p.add_argument("--samples", type=positive, metavar="N", help="prm: milestones; default 1000")
     p.add_argument("--shortcut", action="store_true", help="prm: pull every leg taut in its class")
     p.add_argument(
         "--max-classes",
-        type=_positive,
+        type=positive,
         metavar="N",
         help="taut: most classes of all goals together",
     )
     p.add_argument(
         "--mip-backend", metavar="NAME", help="highs (default) or cbc, for the solvers built on mip"
     )
-    p.add_argument("--time-limit", type=_seconds, metavar="S", help="seconds; default none")
+    p.add_argument("--time-limit", type=seconds, metavar="S", help="seconds; default none")
     p.add_argument(
-        "--iteration-limit", type=_positive, metavar="N", help="of the solver; default none"
+        "--iteration-limit", type=positive, metavar="N", help="of the solver; default none"
     )
-    p.add_argument("--seed", type=_natural, default=0, metavar="N", help="random seed; default 0")
+    p.add_argument("--seed", type=natural, default=0, metavar="N", help="random seed; default 0")
     p.add_argument("--warm-start", metavar="SOLUTION", help="start from this solution's tour")
     p.add_argument("-o", "--output", metavar="FILE", help="write the solution here (else stdout)")
     p.add_argument("--plot", metavar="FILE", help="draw the solution (png, svg or pdf)")
@@ -126,12 +136,12 @@ def _parser() -> argparse.ArgumentParser:
         help="scene: geodesic (default) or react",
     )  # fmt: skip
     p.add_argument(
-        "--delta", type=_length, metavar="L",
+        "--delta", type=length, metavar="L",
         help="scene: resolution of the tether; default by the scene",
     )  # fmt: skip
     p.add_argument("--roadmap", metavar="NAME", help="draw this roadmap: taut or prm")
-    p.add_argument("--samples", type=_positive, metavar="N", help="prm: milestones; default 1000")
-    p.add_argument("--seed", type=_natural, default=0, metavar="N", help="prm: random seed")
+    p.add_argument("--samples", type=positive, metavar="N", help="prm: milestones; default 1000")
+    p.add_argument("--seed", type=natural, default=0, metavar="N", help="prm: random seed")
     p.add_argument(
         "--classes", metavar="GOAL", help="draw all taut tethers to this goal (number or name)"
     )
@@ -144,13 +154,13 @@ def _parser() -> argparse.ArgumentParser:
         metavar="NAME",
         help="icra2017 (default), rss2016, clustered, array or harbour",
     )
-    p.add_argument("--seed", type=_natural, default=0, metavar="N", help="of all draws; default 0")
-    p.add_argument("--goals", type=_positive, metavar="N", help="default 20; rss2016: 5 to 10")
-    p.add_argument("--obstacles", type=_natural, metavar="N", help="default 20; rss2016: 5 to 10")
-    p.add_argument("--tether", type=_length, default=300.0, metavar="L", help="default 300")
-    p.add_argument("--side", type=_length, default=500.0, metavar="L", help="default 500")
+    p.add_argument("--seed", type=natural, default=0, metavar="N", help="of all draws; default 0")
+    p.add_argument("--goals", type=positive, metavar="N", help="default 20; rss2016: 5 to 10")
+    p.add_argument("--obstacles", type=natural, metavar="N", help="default 20; rss2016: 5 to 10")
+    p.add_argument("--tether", type=length, default=300.0, metavar="L", help="default 300")
+    p.add_argument("--side", type=length, default=500.0, metavar="L", help="default 500")
     p.add_argument(
-        "--radii", type=_length, nargs=2, default=(10.0, 30.0), metavar="R",
+        "--radii", type=length, nargs=2, default=(10.0, 30.0), metavar="R",
         help="least and most; default 10 30",
     )  # fmt: skip
     p.add_argument("-o", "--output", metavar="FILE", help="write the problem here (else stdout)")
@@ -162,20 +172,20 @@ def _parser() -> argparse.ArgumentParser:
         "study", metavar="STUDY", nargs="?", help="study file (TOML); or the flags below"
     )
     p.add_argument("-o", "--output", required=True, metavar="FILE", help="results (JSON lines)")
-    p.add_argument("--goals", type=_positive, nargs="+", metavar="N")
-    p.add_argument("--tethers", type=_length, nargs="+", metavar="L")
+    p.add_argument("--goals", type=positive, nargs="+", metavar="N")
+    p.add_argument("--tethers", type=length, nargs="+", metavar="L")
     p.add_argument("--solvers", nargs="+", metavar="NAME")
     p.add_argument("--roadmaps", nargs="+", metavar="NAME", help="default taut")
-    p.add_argument("--worlds", type=_positive, metavar="N", help="per cell; default 10")
+    p.add_argument("--worlds", type=positive, metavar="N", help="per cell; default 10")
     p.add_argument("--family", metavar="NAME", help="of the worlds; default icra2017")
     p.add_argument(
-        "--seeds", type=_natural, nargs="+", metavar="N", help="of the solvers; default 0"
+        "--seeds", type=natural, nargs="+", metavar="N", help="of the solvers; default 0"
     )
-    p.add_argument("--time-limit", type=_seconds, metavar="S", help="of a trial; default 120")
-    p.add_argument("--memory-limit", type=_length, metavar="GIB", help="of a trial; default none")
-    p.add_argument("--jobs", type=_positive, default=1, metavar="N", help="processes; default 1")
+    p.add_argument("--time-limit", type=seconds, metavar="S", help="of a trial; default 120")
+    p.add_argument("--memory-limit", type=length, metavar="GIB", help="of a trial; default none")
+    p.add_argument("--jobs", type=positive, default=1, metavar="N", help="processes; default 1")
     p.add_argument(
-        "--shard", type=_shard, default=(1, 1), metavar="I/N", help="only the I-th of N parts"
+        "--shard", type=shard, default=(1, 1), metavar="I/N", help="only the I-th of N parts"
     )
     p.add_argument(
         "--scheduler", metavar="ADDRESS", help="run on a Dask cluster, tcp://host:port, not here"
@@ -188,47 +198,22 @@ def _parser() -> argparse.ArgumentParser:
     p.add_argument("-o", "--output", required=True, metavar="FILE")
     p.set_defaults(run=_combine)
 
-    p = commands.add_parser("report", help="one page about the results of a comparison")
-    p.add_argument("results", metavar="RESULTS", help="rows of `netsp compare`")
+    p = commands.add_parser("report", help="one page about a comparison, a solution or a run")
+    p.add_argument(
+        "results", metavar="RESULTS",
+        help="rows of `netsp compare`, a solution file, or the folder of `netsp execute`",
+    )  # fmt: skip
+    p.add_argument("--problem", metavar="FILE", help="the problem of a solution file")
     p.add_argument("-o", "--output", required=True, metavar="FILE", help="the page (HTML)")
     p.add_argument(
         "--figures", choices=("svg", "png", "pdf"), help="save the figures beside the page, too"
     )
     p.set_defaults(run=_report)
 
-    p = commands.add_parser("simulate", help="run a mission in a scene with a taut tether")
-    p.add_argument("mission", metavar="MISSION", help="mission file (JSON)")
-    p.add_argument(
-        "--planner", default="predictive", metavar="NAME",
-        help="predictive (default), react, react-draft or none",
-    )  # fmt: skip
-    p.add_argument("--tether", type=_length, metavar="L", help="tether length, in place of its own")
-    p.add_argument(
-        "--vehicle", default="kinematic", metavar="NAME",
-        help="kinematic (default) or bluerov2 (with its dynamics and controller)",
-    )  # fmt: skip
-    p.add_argument("--current", metavar="X,Y,Z", help="current (m/s), in place of the mission's")
-    p.add_argument(
-        "--ways", default="tree", metavar="NAME",
-        help="how ways are found: tree (default), bitstar, rrtstar or prmstar (OMPL)",
-    )  # fmt: skip
-    p.add_argument(
-        "--refine", metavar="NAME", help="none, paper or gradient; default is the planner's own"
-    )
-    p.add_argument("--seed", type=int, default=0, metavar="N", help="of gusts, sampling, refining")
-    p.add_argument("--compare", metavar="NAME", help="fly with another planner too, side by side")
-    p.add_argument("--snap", action="store_true", help="move waypoints out of solids")
-    p.add_argument(
-        "-o",
-        "--output",
-        metavar="RUN",
-        help="folder for log.csv, summary.json, run.png and (with plotly) run.html",
-    )
-    p.add_argument("--quiet", action="store_true", help="no progress")
-    p.set_defaults(run=_simulate)
+    add_online(commands)
 
     p = commands.add_parser("schema", help="print the JSON Schema of a file format")
-    p.add_argument("format", choices=("problem", "solution", "scene", "mission"))
+    p.add_argument("format", choices=("problem", "solution", "scene", "mission", "surprises"))
     p.set_defaults(run=_schema)
     return parser
 
@@ -244,71 +229,6 @@ class _Version(argparse.Action):
         parser.exit()
 
 
-def _above_zero(what: str) -> Callable[[str], float]:
-    def read(text: str) -> float:
-        try:
-            value = float(text)
-        except ValueError:
-            value = -1.0
-        if not 0.0 < value < float("inf"):
-            raise argparse.ArgumentTypeError(f"expected a positive number{what}, got {text!r}")
-        return value
-
-    return read
-
-
-_seconds, _length = _above_zero(" of seconds"), _above_zero("")
-
-
-def _shard(text: str) -> tuple[int, int]:
-    part, _, of = text.partition("/")
-    if not (part.isdigit() and of.isdigit() and 1 <= int(part) <= int(of)):
-        raise argparse.ArgumentTypeError(f"expected I/N with 1 <= I <= N, got {text!r}")
-    return int(part), int(of)
-
-
-def _option(text: str) -> tuple[str, str]:
-    name, equals, value = text.partition("=")
-    if not (name and equals):
-        raise argparse.ArgumentTypeError(f"expected NAME=VALUE, got {text!r}")
-    return name, value
-
-
-def _natural(text: str) -> int:
-    try:
-        value = int(text)
-    except ValueError:
-        value = -1
-    if value < 0:
-        raise argparse.ArgumentTypeError(f"expected a whole number from 0 on, got {text!r}")
-    return value
-
-
-def _positive(text: str) -> int:
-    value = _natural(text)
-    if value == 0:
-        raise argparse.ArgumentTypeError("expected a whole number from 1 on, got '0'")
-    return value
-
-
-def _check_writable(*paths: str | None) -> None:
-    """InputError before the work starts rather than after it."""
-    given = [os.path.realpath(p) for p in paths if p is not None and not p.startswith("/dev/")]
-    twice = [name for name in given if given.count(name) > 1]
-    if twice:
-        raise InputError(f"{twice[0]}: is named for two different files")
-    for path in paths:
-        if path is None:
-            continue
-        folder = os.path.dirname(os.path.abspath(path))
-        if os.path.isdir(path):
-            raise InputError(f"{path}: cannot be written: it is a directory")
-        if not os.path.isdir(folder):
-            raise InputError(f"{path}: cannot be written: no directory {folder}")
-        if not os.access(path if os.path.exists(path) else folder, os.W_OK):
-            raise InputError(f"{path}: cannot be written: permission denied")
-
-
 def _solve(args: argparse.Namespace) -> int:
     from netsp.problem import Problem
     from netsp.progress import ProgressTable, summary
@@ -316,7 +236,7 @@ def _solve(args: argparse.Namespace) -> int:
 
     problem = Problem.load(args.problem)
     warm = Solution.load(args.warm_start) if args.warm_start else None
-    _check_writable(args.output, args.plot, args.plot_trace)
+    check_writable(args.output, args.plot, args.plot_trace)
     if args.plot or args.plot_trace:
         from netsp import plotting
 
@@ -420,7 +340,7 @@ def _verify(args: argparse.Namespace) -> int:
 
 
 def _plot(args: argparse.Namespace) -> int:
-    _check_writable(args.output)
+    check_writable(args.output)
     if _is_scene(args.problem):
         from netsp.online.command import plot_scene
 
@@ -486,7 +406,7 @@ def _world(args: argparse.Namespace) -> int:
     from netsp.solution import write_text
     from netsp.worlds import reachable_world
 
-    _check_writable(args.output, args.plot)
+    check_writable(args.output, args.plot)
     if args.plot:
         from netsp import plotting
 
@@ -524,17 +444,17 @@ def _combine(args: argparse.Namespace) -> int:
 
 
 def _report(args: argparse.Namespace) -> int:
+    if not args.results.endswith((".jsonl", ".jsonl.gz")):
+        from netsp.report.tour import report_tour
+
+        check_writable(args.output)
+        report_tour(args.results, args.problem, args.output)
+        return 0
     from netsp.report.page import write_report
 
-    _check_writable(args.results, args.output)
+    check_writable(args.results, args.output)
     write_report(args.results, args.output, args.figures)
     return 0
-
-
-def _simulate(args: argparse.Namespace) -> int:
-    from netsp.online.command import run_mission
-
-    return run_mission(args)
 
 
 def _schema(args: argparse.Namespace) -> int:
@@ -544,6 +464,8 @@ def _schema(args: argparse.Namespace) -> int:
         from netsp.problem import Problem as Model
     elif args.format == "mission":
         from netsp.online.mission import Mission as Model  # type: ignore[assignment]
+    elif args.format == "surprises":
+        from netsp.execute.events import Surprises as Model  # type: ignore[assignment]
     elif args.format == "scene":
         from netsp.online.scene import Scene as Model  # type: ignore[assignment]
     else:

@@ -22,9 +22,14 @@ from netsp.problem import Problem
 from netsp.solution import Solution
 
 Floats = npt.NDArray[np.float64]
+Mark = tuple[int | None, Word, float]
+"""Goal, word and tether of a waypoint, as in `Waypoint`."""
 
 STRAIGHT = 1e-6
 """Bends of fewer radians are none."""
+
+COARSE = np.radians(30.0)
+"""Bends of an arc are joined up to this turn: 3.5 % of its radius farther out."""
 
 OUTWARD = (1.0, 2.0, 4.0)
 """A bend is moved outward by so many acceptance radii, the least that helps."""
@@ -58,7 +63,7 @@ def waypoints_of(problem: Problem, solution: Solution, radius: float = 0.0) -> l
     solids = [o.shape() for o in problem.obstacles]
     shapely.prepare(solids)
     points: list[Floats] = [legs[0].way[0]]
-    kinds: list[tuple[int | None, Word, float]] = [(None, (), 0.0)]
+    kinds: list[Mark] = [(None, (), 0.0)]
     for leg in legs:
         for point in leg.way[1:-1]:
             points.append(point)
@@ -79,12 +84,66 @@ def waypoints_of(problem: Problem, solution: Solution, radius: float = 0.0) -> l
         keep.append(k)
     line = np.array([points[k] for k in keep])
     marks = [kinds[k] for k in keep]
+    line, marks = _coarsened(line, marks, [o.shape(problem.clearance) for o in problem.obstacles])
     line = _widened(line, marks, solids, radius)
     _check_class(problem, solution, line, marks)
     return [
         Waypoint((float(x), float(y), float(z)), *mark)
         for (x, y, z), mark in zip(line[1:], marks[1:], strict=True)
     ]
+
+
+def _coarsened(
+    line: Floats, marks: list[Mark], grown: list[shapely.Polygon]
+) -> tuple[Floats, list[Mark]]:
+    """Arcs with fewer bends: those in a row that turn one way by `COARSE` or less in all become the
+    one where the line before them meets the line after them, farther out, if that is free."""
+    slim = [g.buffer(-1e-6 * float(np.ptp(line[:, :2]))) for g in grown]
+    tree = shapely.STRtree(slim) if slim else None
+    out, kept, k = [line[0]], [marks[0]], 1
+    while k < len(line):
+        best = None
+        m = k
+        total = 0.0
+        while m + 1 < len(line) and marks[m][0] is None:
+            total += _side(out[-1] if m == k else line[m - 1], line[m], line[m + 1])
+            if abs(total) > COARSE:
+                break
+            corner = _meeting(out[-1], line[k], line[m], line[m + 1]) if m > k else line[k]
+            if corner is not None:
+                ways = [shapely.LineString([a[:2], b[:2]])
+                        for a, b in ((out[-1], corner), (corner, line[m + 1]))]  # fmt: skip
+                if tree is None or not any(len(tree.query(w, "intersects")) for w in ways):
+                    best = (m, corner)
+            m += 1
+        if best is None:
+            out.append(line[k])
+            kept.append(marks[k])
+            k += 1
+        else:
+            out.append(best[1])
+            kept.append(marks[k])
+            k = best[0] + 1
+    return np.array(out), kept
+
+
+def _side(a: Floats, b: Floats, c: Floats) -> float:
+    """Signed angle in the plan by which a way turns at b."""
+    u, v = (b - a)[:2], (c - b)[:2]
+    return float(np.arctan2(u[0] * v[1] - u[1] * v[0], u @ v))
+
+
+def _meeting(a: Floats, b: Floats, c: Floats, d: Floats) -> Floats | None:
+    """Where the line from a through b meets the line through c to d, between b and c; None if it
+    does not. Its height is between theirs."""
+    u, v, w = (b - a)[:2], (d - c)[:2], (c - a)[:2]
+    cross = u[0] * v[1] - u[1] * v[0]
+    if abs(cross) < 1e-12:
+        return None
+    s, t = (w[0] * v[1] - w[1] * v[0]) / cross, (w[0] * u[1] - w[1] * u[0]) / cross
+    if s < 1.0 - 1e-9 or t > 1e-9:
+        return None
+    return np.array([*(a[:2] + s * u), 0.5 * (b[2] + c[2])])
 
 
 def _turn(a: Floats, b: Floats, c: Floats) -> float:
@@ -96,7 +155,9 @@ def _turn(a: Floats, b: Floats, c: Floats) -> float:
     return float(np.arctan2(np.linalg.norm(np.cross(u, v)), u @ v))
 
 
-def _widened(line: Floats, marks: list, solids: list, radius: float) -> Floats:  # type: ignore[type-arg]
+def _widened(
+    line: Floats, marks: list[Mark], solids: list[shapely.Polygon], radius: float
+) -> Floats:
     """The bends moved outward where a vehicle could cut through something."""
     if radius <= 0.0 or not solids:
         return line
@@ -141,7 +202,7 @@ def _cuts(tree: shapely.STRtree, line: Floats, k: int, radius: float) -> bool:
     return bool(len(tree.query(shapely.LineString(corner).convex_hull, "intersects")))
 
 
-def _check_class(problem: Problem, solution: Solution, line: Floats, marks: list) -> None:  # type: ignore[type-arg]
+def _check_class(problem: Problem, solution: Solution, line: Floats, marks: list[Mark]) -> None:
     """The word of the straight lines at every goal is the plan's, and empty at the end."""
     rays = problem.representative_points
     tether = np.array(solution.start_tether).reshape(-1, 3)

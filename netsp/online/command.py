@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -21,6 +22,8 @@ from netsp.online.scene import Scene
 from netsp.online.simulate import STEP, LogRow, Run, simulate, write_run
 from netsp.online.tether import GeodesicTether, ReactTether, Tether
 from netsp.online.tether.geodesic import THINNEST
+from netsp.problem import read_text
+from netsp.solution import write_text
 
 Floats = npt.NDArray[np.float64]
 
@@ -129,6 +132,39 @@ def vector(text: str, name: str) -> tuple[float, float, float]:
     except ValueError:
         raise InputError(f"{name}: expected three numbers like 0.1,0,0, got {text!r}") from None
     return finite_point((x, y, z), name)
+
+
+def run_order(args: argparse.Namespace) -> int:
+    """`netsp order MISSION`: returns the exit code."""
+    from netsp.online.order import reorder
+
+    mission = Mission.load(args.mission)
+    scene_file = Mission.from_json(read_text(args.mission)).scene
+    say = None if args.quiet else lambda text: print(f"netsp: {text} …", file=sys.stderr)
+    found = reorder(mission, time_limit=args.time_limit, seed=args.seed, on_progress=say)
+    kept = found.order == tuple(range(len(mission.waypoints)))
+    if not args.quiet:
+        for name, run in (("given", found.before), ("new", found.after)):
+            s = run.summary
+            print(
+                f"{name:<6} inspection {s['inspection_s']:.1f} s, with the tether taken in "
+                f"{s['total_s']['tether']:.1f} s, tether at most {s['longest_tether_m']:.2f} of "
+                f"{s['tether_length']:g}, {s['visited']} of {s['waypoints']} visited",
+                file=sys.stderr,
+            )
+        if kept:
+            print("netsp: no better order was found", file=sys.stderr)
+    placed = scene_file
+    if args.output is not None and not Path(scene_file).is_absolute():
+        there = Path(args.mission).parent / scene_file
+        placed = os.path.relpath(there, Path(args.output).parent)
+    full = found.mission.model_copy(update={"scene": placed, "camera": mission.camera})
+    text = json.dumps(full.model_dump(mode="json", exclude_none=True), indent=1) + "\n"
+    if args.output is None:
+        sys.stdout.write(text)
+    else:
+        write_text(args.output, text)
+    return 0
 
 
 def describe(run: Run, units: str) -> str:

@@ -1,0 +1,79 @@
+"""Types of command-line arguments, and the check of places to write to."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from collections.abc import Callable
+
+from netsp.errors import InputError
+
+
+def _above_zero(what: str) -> Callable[[str], float]:
+    def read(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            value = -1.0
+        if not 0.0 < value < float("inf"):
+            raise argparse.ArgumentTypeError(f"expected a positive number{what}, got {text!r}")
+        return value
+
+    return read
+
+
+seconds, length = _above_zero(" of seconds"), _above_zero("")
+"""A positive number."""
+
+
+def shard(text: str) -> tuple[int, int]:
+    """The I-th of N parts."""
+    part, _, of = text.partition("/")
+    if not (part.isdigit() and of.isdigit() and 1 <= int(part) <= int(of)):
+        raise argparse.ArgumentTypeError(f"expected I/N with 1 <= I <= N, got {text!r}")
+    return int(part), int(of)
+
+
+def option(text: str) -> tuple[str, str]:
+    """A name and its value."""
+    name, equals, value = text.partition("=")
+    if not (name and equals):
+        raise argparse.ArgumentTypeError(f"expected NAME=VALUE, got {text!r}")
+    return name, value
+
+
+def natural(text: str) -> int:
+    """A whole number from 0 on."""
+    try:
+        value = int(text)
+    except ValueError:
+        value = -1
+    if value < 0:
+        raise argparse.ArgumentTypeError(f"expected a whole number from 0 on, got {text!r}")
+    return value
+
+
+def positive(text: str) -> int:
+    """A whole number from 1 on."""
+    value = natural(text)
+    if value == 0:
+        raise argparse.ArgumentTypeError("expected a whole number from 1 on, got '0'")
+    return value
+
+
+def check_writable(*paths: str | None) -> None:
+    """InputError before the work starts rather than after it."""
+    given = [os.path.realpath(p) for p in paths if p is not None and not p.startswith("/dev/")]
+    twice = [name for name in given if given.count(name) > 1]
+    if twice:
+        raise InputError(f"{twice[0]}: is named for two different files")
+    for path in paths:
+        if path is None:
+            continue
+        folder = os.path.dirname(os.path.abspath(path))
+        if os.path.isdir(path):
+            raise InputError(f"{path}: cannot be written: it is a directory")
+        if not os.path.isdir(folder):
+            raise InputError(f"{path}: cannot be written: no directory {folder}")
+        if not os.access(path if os.path.exists(path) else folder, os.W_OK):
+            raise InputError(f"{path}: cannot be written: permission denied")

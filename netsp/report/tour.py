@@ -1,0 +1,342 @@
+"""One self-contained page about a solution or a run: a map with a slider that moves the robot and
+its taut tether, the goals in their order, the checks, measures of entanglement, a run's log."""
+
+from __future__ import annotations
+
+import csv
+import html
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from netsp.errors import InputError
+from netsp.execute.plan import HOME, legs_of
+from netsp.execute.run import suggested_delta
+from netsp.hsignature.measures import measure
+from netsp.judge import verify
+from netsp.online.scene import Scene
+from netsp.online.tether import GeodesicTether
+from netsp.problem import Circle, Problem
+from netsp.report.page import STYLE
+from netsp.solution import Solution, write_text
+
+Floats = npt.NDArray[np.float64]
+
+FRAMES = 240
+WIDTH = 900.0
+
+TOUR_STYLE = """
+#map { border: 1px solid #d5dbe1; background: #f7fbff; width: 100%; max-width: 900px }
+#slider { width: 100%; max-width: 900px } .chart { max-width: 900px; width: 100% }
+.ok { color: #2b8a3e } .bad { color: #c92a2a } @media print { #slider, .noprint { display: none } }
+"""
+
+SCRIPT = """
+const data = JSON.parse(document.getElementById("frames").textContent);
+const slider = document.getElementById("slider");
+function show(k) {
+  const f = data[k];
+  document.getElementById("tether").setAttribute("points", f.t);
+  document.getElementById("robot").setAttribute("cx", f.r[0]);
+  document.getElementById("robot").setAttribute("cy", f.r[1]);
+  document.getElementById("done").setAttribute("points", f.p);
+  document.getElementById("state").textContent = f.s;
+}
+slider.max = data.length - 1;
+slider.addEventListener("input", () => show(Number(slider.value)));
+show(0);
+"""
+
+
+def report_tour(source: str | Path, problem_file: str | Path | None, output: str | Path) -> None:
+    """Write the page about a solution file (its problem is named, or lies in a run's folder) or the
+    folder of a run.
+
+    Raises
+    ------
+    InputError : files that cannot be read, or do not belong together.
+    """
+    place = Path(source)
+    run = place if place.is_dir() else None
+    if run is not None:
+        problem_file = problem_file or run / "problem.json"
+        place = run / "solution.json"
+    if problem_file is None:
+        raise InputError(f"{source}: a solution does not hold its problem; expected --problem FILE")
+    solution = Solution.load(place)
+    problem = Problem.load(problem_file)
+    if run is None and problem.sha256 != solution.problem.sha256:
+        raise InputError(f"{source}: solves another problem than {problem_file} (sha256 differs)")
+    if solution.length is None:
+        raise InputError(f"{source}: has no tour (status {solution.status.value})")
+    rows = _table(run / "log.csv") if run else []
+    tethers = json.loads((run / "tethers.json").read_text(encoding="utf-8")) if run else None
+    write_text(output, page(problem, solution, rows, tethers, run))
+
+
+def page(
+    problem: Problem, solution: Solution, rows: list[dict[str, str]],
+    tethers: list[dict[str, Any]] | None, run: Path | None,
+) -> str:  # fmt: skip
+    """The page as HTML. rows, tethers : of a run, else empty."""
+    frames = _frames_of_run(rows, tethers) if tethers else _frames_of_plan(problem, solution)
+    view = _View(problem, np.vstack([f["nodes"] for f in frames]))
+    title = f"{problem.name}: {'a run' if run else 'a tour'}"
+    parts = [
+        f"<h1>{html.escape(title)}</h1>",
+        _summary(problem, solution, run),
+        '<h2>Map</h2><p class="note">The dashed line is the tour. Move the slider: the thick line '
+        "is the tether, pulled taut round the obstacles as it is when the robot is there.</p>",
+        _map(problem, solution, view),
+        '<input id="slider" type="range" min="0" value="0" aria-label="position along the tour">',
+        '<p id="state" class="note"></p>',
+        "<h2>Goals in their order</h2>", _goals(problem, solution, run),
+    ]  # fmt: skip
+    if run is None or problem.sha256 == solution.problem.sha256:
+        parts += ["<h2>Checks</h2>", _checks(problem, solution)]
+    parts += ["<h2>Measures of entanglement</h2>", _measures(problem, solution)]
+    if rows:
+        parts += ["<h2>Log</h2>", _charts(rows), _events(run)]
+    shown = [
+        {
+            "t": view.points(f["nodes"]), "r": view.point(f["nodes"][-1]),
+            "p": view.points(f["path"]), "s": f["text"],
+        }
+        for f in frames
+    ]  # fmt: skip
+    data = json.dumps(shown, allow_nan=False).replace("<", "\\u003c")
+    return (
+        f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>{html.escape(title)}'
+        f'</title><link rel="icon" href="data:,"><style>{STYLE}{TOUR_STYLE}</style></head><body>'
+        + "\n".join(parts)
+        + f'<script type="application/json" id="frames">{data}</script>'
+        + f"<script>{SCRIPT}</script></body></html>\n"
+    )
+
+
+class _View:
+    """From the plan to the picture."""
+
+    def __init__(self, problem: Problem, more: Floats) -> None:
+        xy = [problem.points[:, :2], more[:, :2]]
+        for o in problem.obstacles:
+            c = np.array([o.center]) if isinstance(o, Circle) else np.array(o.polygon)
+            r = o.radius if isinstance(o, Circle) else 0.0
+            xy += [c - r, c + r]
+        every = np.vstack(xy)
+        low, high = every.min(axis=0), every.max(axis=0)
+        room = 0.04 * float((high - low).max()) + 1e-9
+        self.low, self.high = low - room, high + room
+        self.scale = WIDTH / float(self.high[0] - self.low[0])
+        self.height = float(self.high[1] - self.low[1]) * self.scale
+
+    def point(self, p: npt.ArrayLike) -> list[float]:
+        x, y = np.asarray(p, dtype=float)[:2]
+        return [
+            round(float(x - self.low[0]) * self.scale, 2),
+            round(float(self.high[1] - y) * self.scale, 2),
+        ]
+
+    def points(self, line: Floats) -> str:
+        return " ".join(f"{x},{y}" for x, y in (self.point(p) for p in line))
+
+
+def _frames_of_plan(problem: Problem, solution: Solution) -> list[dict[str, Any]]:
+    """The tether at even steps along the tour, by the model that watches it online."""
+    model = GeodesicTether(Scene.from_problem(problem).field(), suggested_delta(problem))
+    path = np.array(solution.path)
+    s = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))]
+    if problem.state is None:
+        state = model.start(problem.base, problem.base)
+    else:
+        state = model.lay(np.array(solution.start_tether))
+    frames, at = [], 0
+    for u in np.linspace(0.0, s[-1], FRAMES + 1):
+        here = np.array([np.interp(u, s, path[:, k]) for k in range(3)])
+        passed = int(np.searchsorted(s, u))
+        state = model.drive(state, np.vstack([path[at:passed], here]))[0]
+        at = max(at, passed)
+        text = (
+            f"{u:.4g} of {s[-1]:.4g} {problem.units}; tether {state.length:.4g} of "
+            f"{problem.tether_length:g} {problem.units}"
+        )
+        frames.append(
+            {"nodes": state.nodes, "path": np.vstack([path[:passed], here]), "text": text}
+        )
+    return frames
+
+
+def _frames_of_run(
+    rows: list[dict[str, str]], tethers: list[dict[str, Any]]
+) -> list[dict[str, Any]]:
+    times = np.array([float(r["time"]) for r in rows])
+    way = np.array([[float(r[k]) for k in "xyz"] for r in rows])
+    step = max(1, len(tethers) // FRAMES)
+    chosen = tethers[::step] + ([tethers[-1]] if (len(tethers) - 1) % step else [])
+    frames = []
+    for frame in chosen:
+        nodes = np.array(frame["nodes"], dtype=float)
+        k = min(int(np.searchsorted(times, frame["time"])), len(rows) - 1)
+        row = rows[k]
+        thin = max(1, k // 400)
+        text = (
+            f"{frame['time']:.4g} s; tether {float(row['tether']):.4g} of {float(row['limit']):g}; "
+            f"next: {'the base' if int(row['goal']) == HOME else 'goal ' + row['goal']}"
+        )
+        frames.append({"nodes": nodes, "path": np.vstack([way[:k:thin], nodes[-1:]]), "text": text})
+    return frames
+
+
+def _summary(problem: Problem, solution: Solution, run: Path | None) -> str:
+    gap = "" if solution.gap is None else f", at most {100 * solution.gap:.2g} % above the shortest"
+    lines = [
+        f"{len(problem.goals)} goals, {len(problem.obstacles)} obstacles, a tether of "
+        f"{problem.tether_length:g} {problem.units}. The plan is {solution.length:.6g} "
+        f"{problem.units} long ({solution.status.value} by {html.escape(solution.solver)}{gap})."
+    ]
+    if run is not None:
+        s = json.loads((run / "summary.json").read_text(encoding="utf-8"))
+        lines.append(
+            f"Carried out in {s['time_s']:.5g} s over {s['path']:.6g} {problem.units}: "
+            f"{s['visited']} goals visited, the tether at most {s['longest_tether']:.5g} long, "
+            f"longer than allowed for {s['exceedance_s']:.3g} s, "
+            f"{'taken in free' if s['tether_free'] else 'not taken in free'} at the end."
+        )
+    return "".join(f"<p>{line}</p>" for line in lines)
+
+
+def _map(problem: Problem, solution: Solution, view: _View) -> str:
+    shapes = []
+    for i, o in enumerate(problem.obstacles):
+        title = f"<title>{html.escape(problem.obstacle_label(i))}</title>"
+        if isinstance(o, Circle):
+            x, y = view.point(o.center)
+            shapes.append(f'<circle cx="{x}" cy="{y}" r="{o.radius * view.scale:.2f}" '
+                          f'fill="#d0d7de" stroke="#868e96">{title}</circle>')  # fmt: skip
+        else:
+            shapes.append(f'<polygon points="{view.points(np.array(o.polygon))}" fill="#d0d7de" '
+                          f'stroke="#868e96">{title}</polygon>')  # fmt: skip
+    shapes.append(f'<polyline points="{view.points(np.array(solution.path))}" fill="none" '
+                  'stroke="#868e96" stroke-dasharray="5 4"/>')  # fmt: skip
+    shapes.append('<polyline id="done" fill="none" stroke="#74c0fc" stroke-width="2"/>')
+    shapes.append('<polyline id="tether" fill="none" stroke="#d9480f" stroke-width="3"/>')
+    visit = {v.goal: n + 1 for n, v in enumerate(solution.tour)}
+    for k, goal in enumerate(problem.goals):
+        x, y = view.point(goal.position)
+        label = str(visit.get(k, "–"))
+        shapes.append(f'<circle cx="{x}" cy="{y}" r="5" fill="#2b8a3e"><title>'
+                      f"{html.escape(problem.goal_label(k))}</title></circle>"
+                      f'<text x="{x + 7}" y="{y - 6}" font-size="12">{label}</text>')  # fmt: skip
+    x, y = view.point(problem.base)
+    shapes.append(f'<rect x="{x - 6}" y="{y - 6}" width="12" height="12" fill="#1b2631">'
+                  "<title>base</title></rect>")  # fmt: skip
+    shapes.append('<circle id="robot" r="6" fill="#f08c00" stroke="#1b2631"/>')
+    return (f'<svg id="map" viewBox="0 0 {WIDTH:g} {view.height:.1f}" role="img" '
+            f'aria-label="map">{"".join(shapes)}</svg>')  # fmt: skip
+
+
+def _goals(problem: Problem, solution: Solution, run: Path | None) -> str:
+    legs = legs_of(problem, solution) if run is None else None
+    arrived = {int(r["goal"]): r for r in _table(run / "visits.csv")} if run else {}
+    head = ["visit", "goal", "tether", "slack", "word"]
+    head += ["leg", "at"] if legs else ["reached at (s)", "tether online"]
+    body, total = [], 0.0
+    for n, v in enumerate(solution.tour):
+        cells = [
+            str(n + 1), html.escape(problem.goal_label(v.goal)), f"{v.tether_length:.5g}",
+            f"{problem.tether_length - v.tether_length:.5g}",
+            html.escape(" ".join(map(str, v.signature)) or "empty"),
+        ]  # fmt: skip
+        if legs:
+            total += legs[n].length
+            cells += [f"{legs[n].length:.5g}", f"{total:.6g}"]
+        else:
+            row = arrived.get(v.goal)
+            cells += (
+                [f"{float(row['time']):.1f}", f"{float(row['tether']):.5g}"] if row else ["–"] * 2
+            )
+        body.append("<tr>" + "".join(f"<td>{c}</td>" for c in cells) + "</tr>")
+    top = "<tr>" + "".join(f"<th>{h}</th>" for h in head) + "</tr>"
+    return f"<table>{top}{''.join(body)}</table>"
+
+
+def _checks(problem: Problem, solution: Solution) -> str:
+    rows = "".join(
+        f'<tr><td class="{"ok" if c.passed else "bad"}">{"ok" if c.passed else "FAIL"}</td>'
+        f'<td style="text-align:left">{html.escape(c.name)}</td>'
+        f'<td style="text-align:left">{html.escape(c.detail)}</td></tr>'
+        for c in verify(problem, solution).checks
+    )
+    return f"<table>{rows}</table>"
+
+
+def _measures(problem: Problem, solution: Solution) -> str:
+    if problem.state is not None or problem.sha256 != solution.problem.sha256:
+        return '<p class="note">Measured for whole tours on the map that they were made for.</p>'
+    m = measure(problem, np.array(solution.path))
+
+    def names(which: tuple[int, ...] | None) -> str:
+        return ", ".join(problem.obstacle_label(i) for i in which or ()) or "none"
+
+    turns = "all zero" if not any(m.winding or ()) else str(m.winding)
+    rows = [
+        ("word of the whole tour", " ".join(map(str, m.signature)) or "empty"),
+        ("obstacles wound around", names(m.entangled)),
+        ("winding numbers", turns),
+        ("crossings of the path with itself", str(m.self_crossings)),
+        ("obstacles in the convex hull of the path", names(m.convex_hull)),
+        ("against linear homotopy", names(m.linear_homotopy)),
+        ("against local visibility homotopy", names(m.local_visibility)),
+    ]
+    body = "".join(
+        f'<tr><td>{k}</td><td style="text-align:left">{html.escape(v)}</td></tr>' for k, v in rows
+    )
+    return f"<table>{body}</table>"
+
+
+def _charts(rows: list[dict[str, str]]) -> str:
+    """The tether and its limit over time."""
+    t = np.array([float(r["time"]) for r in rows])
+    thin = slice(None, None, max(1, len(t) // 1200))
+    length, limit = (np.array([float(r[k]) for r in rows]) for k in ("tether", "limit"))
+    top = 1.05 * float(max(length.max(), limit.max()))
+    span = float(t[-1]) or 1.0
+
+    def line(values: Floats) -> str:
+        return " ".join(
+            f"{50 + 830 * a / span:.1f},{180 - 165 * b / top:.1f}"
+            for a, b in zip(t[thin], values[thin], strict=True)
+        )
+
+    return (
+        '<svg class="chart" viewBox="0 0 900 210" role="img" aria-label="tether over time">'
+        f'<polyline points="{line(limit)}" fill="none" stroke="#495057" stroke-dasharray="5 4"/>'
+        f'<polyline points="{line(length)}" fill="none" stroke="#d9480f" stroke-width="2"/>'
+        '<line x1="50" y1="180" x2="880" y2="180" stroke="#868e96"/>'
+        f'<text x="50" y="198" font-size="12">0</text><text x="845" y="198" font-size="12">'
+        f'{span:.5g} s</text><text x="2" y="20" font-size="12">{top:.4g}</text>'
+        '<text x="2" y="180" font-size="12">0</text></svg>'
+        '<p class="note">Taut tether (solid) and its limit (dashed).</p>'
+    )
+
+
+def _events(run: Path | None) -> str:
+    events = _table(run / "events.csv") if run else []
+    if not events:
+        return "<p>Nothing unforeseen happened.</p>"
+    names = ("time", "event", "done", "reason", "planning_s")
+    top = "<tr>" + "".join(f"<th>{n}</th>" for n in names) + "</tr>"
+    body = "".join(
+        "<tr>" + "".join(f"<td>{html.escape(e[n])}</td>" for n in names) + "</tr>" for e in events
+    )
+    return f"<table>{top}{body}</table>"
+
+
+def _table(file: Path) -> list[dict[str, str]]:
+    try:
+        return list(csv.DictReader(file.read_text(encoding="utf-8").splitlines()))
+    except OSError as error:
+        raise InputError(f"{file}: cannot be read: {error.strerror or error}") from None
