@@ -46,8 +46,9 @@ class Repair:
     planning_s: float
 
 
-def broken(problem: Problem, tether: Floats, legs: list[Leg]) -> str | None:
-    """What is wrong with what is left of a plan; None if nothing is. tether : (k, 3) the taut
+def broken(problem: Problem, tether: Floats, legs: list[Leg]) -> tuple[str | None, list[Leg]]:
+    """What is wrong with what is left of a plan, None if nothing is; and the legs with the words
+    and tethers that they have among the obstacles that there are now. tether : (k, 3) the taut
     tether now. The ways of the legs follow on each other, the first starts at the robot."""
     rays = problem.representative_points
     word = signature(tether[:, :2], rays)
@@ -55,23 +56,27 @@ def broken(problem: Problem, tether: Floats, legs: list[Leg]) -> str | None:
     for leg in legs:
         obstacle = _in_the_way(problem, leg.way)
         if obstacle is not None:
-            return f"{problem.obstacle_label(obstacle)} stands in the way to {_label(problem, leg)}"
+            label = problem.obstacle_label(obstacle)
+            return f"{label} stands in the way to {_label(problem, leg)}", legs
     rest = problem.model_copy(update={"goals": tuple(problem.goals[g] for g in left)})
     tethers = TautPaths(rest, FAR * problem.tether_length)
+    now: list[Leg] = []
     for k, leg in enumerate(legs):
         word = concatenate(word, crossings(leg.way[:, :2], rays))
         if leg.goal == HOME:
+            now.append(leg)
             break
         try:
             needs = tethers.length(0, k + 1, word)
         except NetspError:
-            return f"no tether of the planned class reaches {_label(problem, leg)}"
+            return f"no tether of the planned class reaches {_label(problem, leg)}", legs
         if needs > problem.tether_length + tethers.margin:
             return (
                 f"the tether is too short at {_label(problem, leg)}: {needs:.6g} of "
                 f"{problem.tether_length:g}"
-            )
-    return "the tether would not come home free" if word else None
+            ), legs
+        now.append(Leg(leg.goal, leg.way, word, needs))
+    return ("the tether would not come home free", legs) if word else (None, now)
 
 
 def _label(problem: Problem, leg: Leg) -> str:

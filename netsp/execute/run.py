@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from netsp.errors import InputError, NetspError
 from netsp.execute.events import Event, Surprises, changed, index_of
-from netsp.execute.plan import HOME, Leg, legs_of, length_of
+from netsp.execute.plan import HOME, Leg, legs_of
 from netsp.execute.repair import Repair, broken, repair
 from netsp.hsignature import Word, signature
 from netsp.judge import verify
@@ -173,7 +173,7 @@ class _Run:
     def _enter(self, problem: Problem) -> None:
         """The scene of a problem."""
         self.problem = self.out.problem = problem
-        self.scene: DistanceField = Scene.from_problem(problem).field()
+        self.scene: DistanceField = scene_of(problem).field()
         self.model = GeodesicTether(self.scene, self.delta)
 
     # a step
@@ -219,7 +219,9 @@ class _Run:
 
     def _arrive(self) -> None:
         leg = self.legs.pop(0)
-        word = signature(self.tether.nodes[:, :2], self.problem.representative_points)
+        # a vehicle with dynamics stops near the goal: what counts is the class at the goal itself
+        line = np.vstack([self.tether.nodes, leg.way[-1]])
+        word = signature(line[:, :2], self.problem.representative_points)
         self.out.arrivals.append(
             Arrival(round(self.now, 6), leg.goal, word, leg.word, self.tether.length, leg.tether)
         )
@@ -263,7 +265,9 @@ class _Run:
         if event.tether_length is not None and self.tether.length > event.tether_length:
             self.mode = "shorten"
         if must is None:
-            must = broken(self.problem, self.tether.nodes, self._from_here())
+            must, legs = broken(self.problem, self.tether.nodes, self._from_here())
+            if must is None:
+                self.legs = legs
         if must is None:
             self._enter_log(event.kind, "kept", "nothing that is left of the plan is broken", 0.0)
         elif not self.options.repair:
@@ -375,14 +379,19 @@ def is_free(tether: Tether, delta: float) -> bool:
     return len(tether.nodes) == 2 and tether.length - straight <= 1e-6 * delta
 
 
+def scene_of(problem: Problem) -> Scene:
+    """The scene of a problem; where there is no obstacle, with a solid far below the base, because
+    a scene needs one."""
+    if problem.obstacles:
+        return Scene.from_problem(problem)
+    x, y, z = problem.base
+    far = 1e3 * (problem.tether_length + problem.scale)
+    stone = {"sphere": {"center": [x, y, z - far], "radius": problem.tether_length}}
+    return Scene.model_validate({"schema_version": 1, "name": problem.name, "solids": [stone]})
+
+
 def suggested_delta(problem: Problem) -> float:
     """A resolution for the tether: a three-hundredth of its length, and fine enough for the
     thinnest obstacle."""
-    thickness = [t for _, t in Scene.from_problem(problem).field().thickness]
+    thickness = [t for _, t in scene_of(problem).field().thickness]
     return float(min([problem.tether_length / 300.0, *(t / (1.1 * THINNEST) for t in thickness)]))
-
-
-__all__ = [
-    "Arrival", "Entry", "Execution", "Options", "Row", "execute", "is_free", "length_of",
-    "suggested_delta",
-]  # fmt: skip

@@ -14,10 +14,9 @@ import numpy.typing as npt
 
 from netsp.errors import InputError
 from netsp.execute.plan import HOME, legs_of
-from netsp.execute.run import suggested_delta
+from netsp.execute.run import scene_of, suggested_delta
 from netsp.hsignature.measures import measure
 from netsp.judge import verify
-from netsp.online.scene import Scene
 from netsp.online.tether import GeodesicTether
 from netsp.problem import Circle, Problem
 from netsp.report.page import STYLE
@@ -47,7 +46,8 @@ function show(k) {
 }
 slider.max = data.length - 1;
 slider.addEventListener("input", () => show(Number(slider.value)));
-show(0);
+slider.value = Math.floor(data.length / 3);
+show(Number(slider.value));
 """
 
 
@@ -146,7 +146,7 @@ class _View:
 
 def _frames_of_plan(problem: Problem, solution: Solution) -> list[dict[str, Any]]:
     """The tether at even steps along the tour, by the model that watches it online."""
-    model = GeodesicTether(Scene.from_problem(problem).field(), suggested_delta(problem))
+    model = GeodesicTether(scene_of(problem).field(), suggested_delta(problem))
     path = np.array(solution.path)
     s = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))]
     if problem.state is None:

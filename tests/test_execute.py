@@ -1,0 +1,255 @@
+"""A tour is carried out as planned, and mended when the world is not as it was planned for."""
+
+import csv
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from netsp import Circle, InputError, Problem, Solution, solve
+from netsp.cli import main
+from netsp.execute import Options, Surprises, execute
+from netsp.execute.plan import HOME, legs_of
+from netsp.execute.repair import broken
+from netsp.worlds import random_world
+
+PROBLEMS = Path(__file__).parent.parent / "problems"
+FAST = Options(speed=1.0)
+
+
+@pytest.fixture(scope="module")
+def world():
+    problem = random_world(goals=8, tether_length=300, seed=2)
+    return problem, solve(problem)
+
+
+def events(*what):
+    return Surprises.model_validate({"schema_version": 1, "events": what})
+
+
+def on_the_way(solution, leg, share=0.5):
+    """A place on a leg of a solution's path (n: the n-th visit)."""
+    legs = legs_of(*solution)
+    way = legs[leg].way
+    s = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(way, axis=0), axis=1))]
+    return [float(np.interp(share * s[-1], s, way[:, k])) for k in range(2)]
+
+
+def check(run, goals):
+    """What must hold of every run."""
+    s = run.summary
+    assert s["exceedance_s"] == 0.0
+    assert s["home"]
+    assert s["tether_free"]
+    assert all(a.as_planned for a in run.arrivals)
+    assert s["visited"] + len(s["lost"]) + len(run.cancelled) == goals
+    for a in run.arrivals:
+        if a.goal != HOME:
+            assert a.tether == pytest.approx(a.planned_tether, rel=2e-3)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_without_surprise_the_plan_is_what_happens(seed):
+    problem = random_world(goals=10, tether_length=300, seed=seed)
+    solution = solve(problem)
+    run = execute(problem, solution, FAST)
+    check(run, 10)
+    assert run.summary["path"] == pytest.approx(solution.length, rel=2e-3)
+    assert [a.goal for a in run.arrivals] == [*(v.goal for v in solution.tour), HOME]
+    assert not run.entries
+
+
+@pytest.mark.parametrize("leg", range(7))
+def test_an_obstacle_on_the_way_is_gone_round(world, leg):
+    problem, solution = world
+    circle = {"center": on_the_way((problem, solution), leg), "radius": 8.0}
+    run = execute(problem, solution, FAST, surprises=events({"time": 1.0, "appear": circle}))
+    check(run, 8)
+    (entry,) = run.entries
+    assert entry.done in ("local", "replan")
+    field = Circle(**circle)
+    places = np.array([[r.x, r.y] for r in run.rows])
+    assert field.signed_distance(places).min() > -0.3
+
+
+def test_an_obstacle_elsewhere_changes_nothing(world):
+    problem, solution = world
+    away = {"center": [-900.0, -900.0], "radius": 5.0}
+    run = execute(problem, solution, FAST, surprises=events({"time": 50.0, "appear": away}))
+    check(run, 8)
+    assert [e.done for e in run.entries] == ["kept"]
+    assert run.summary["path"] == pytest.approx(solution.length, rel=2e-3)
+
+
+def test_an_obstacle_within_the_loop_would_be_wrapped_and_is_not():
+    """Not on the way, but on one side of it: the plan, kept, would wind the tether about it."""
+    goals = [(20, 15), (20, -15)]
+    problem = Problem(base=(0, 0), goals=goals, tether_length=60)
+    solution = solve(problem)
+    inside = {"time": 1.0, "appear": {"center": [15.0, 0.0], "radius": 2.0}}
+    run = execute(problem, solution, FAST, surprises=events(inside))
+    check(run, 2)
+    assert "would not come home free" in run.entries[0].reason
+    blind = execute(problem, solution, Options(speed=1.0, repair=False), surprises=events(inside))
+    assert not blind.summary["tether_free"]
+
+
+def test_goals_are_added_and_cancelled(world):
+    problem, solution = world
+    last, extra = solution.tour[-1].goal, np.add(problem.base[:2], 5.0)
+    what = [
+        {"time": 10.0, "cancel_goal": last},
+        {"time": 20.0, "add_goal": {"name": "extra", "position": extra.tolist()}},
+    ]
+    run = execute(problem, solution, FAST, surprises=events(*what))
+    check(run, 9)
+    goals = [a.goal for a in run.arrivals]
+    assert last not in goals
+    assert 8 in goals
+    assert run.problem.goals[8].name == "extra"
+
+
+def test_a_robot_that_is_pushed_comes_back_to_its_task(world):
+    problem, solution = world
+    run = execute(
+        problem, solution, FAST, surprises=events({"time": 60.0, "push": [12.0, -9.0, 0.0]})
+    )
+    check(run, 8)
+    places = np.array([[r.x, r.y] for r in run.rows])
+    assert np.linalg.norm(np.diff(places, axis=0), axis=1).max() > 5.0
+
+
+def test_a_shorter_tether_loses_what_is_too_far_and_says_so(world):
+    problem, solution = world
+    reach = sorted(v.tether_length for v in solution.tour)
+    limit = 0.5 * (reach[-1] + reach[-2])
+    far = max(solution.tour, key=lambda v: v.tether_length).goal
+    run = execute(problem, solution, FAST, surprises=events({"time": 1.0, "tether_length": limit}))
+    check(run, 8)
+    if run.lost:
+        assert set(run.lost) == {far}
+        assert "out of reach" in run.lost[far]
+
+
+def test_what_vanishes_sets_the_tether_free(world):
+    problem, solution = world
+    run = execute(problem, solution, FAST, surprises=events({"time": 80.0, "vanish": 0}))
+    check(run, 8)
+    assert len(run.problem.obstacles) == len(problem.obstacles) - 1
+
+
+def test_a_goal_under_an_obstacle_is_left_out_with_the_reason(world):
+    problem, solution = world
+    goal = solution.tour[3].goal
+    on = {"center": list(problem.goals[goal].position[:2]), "radius": 5.0}
+    run = execute(problem, solution, FAST, surprises=events({"time": 1.0, "appear": on}))
+    check(run, 8)
+    assert "stands on it" in run.lost[goal]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_many_surprises_at_once(seed):
+    rng = np.random.default_rng(seed)
+    problem = random_world(goals=8, tether_length=300, seed=20 + seed)
+    solution = solve(problem)
+    what = [{"time": 30.0, "push": rng.uniform(-10, 10, 3).round(2).tolist()}]
+    for leg in (2, 5):
+        circle = {"center": on_the_way((problem, solution), leg, 0.3), "radius": 6.0}
+        what.append({"time": float(rng.uniform(20, 200)), "appear": circle})
+    what.append({"time": 100.0, "move": {"obstacle": 1, "by": rng.uniform(-8, 8, 2).tolist()}})
+    base = np.array(problem.base[:2])
+    if np.linalg.norm(np.array(problem.obstacles[1].center) - base) < 60:
+        what.pop()
+    run = execute(problem, solution, FAST, surprises=events(*what))
+    check(run, 8)
+
+
+def test_what_is_whole_is_not_called_broken(world):
+    problem, solution = world
+    tether = np.array([problem.base, problem.base])
+    why, legs = broken(problem, tether, legs_of(problem, solution))
+    assert why is None
+    assert [leg.word for leg in legs] == [*(v.signature for v in solution.tour), ()]
+
+
+def test_a_dynamic_vehicle_in_a_current_carries_it_out_too():
+    problem = Problem.load(PROBLEMS / "wharf.json")
+    run = execute(
+        problem, solve(problem),
+        Options(vehicle="bluerov2", speed=0.4, current=(0.05, 0.03, 0.0), gusts=0.02),
+    )  # fmt: skip
+    s = run.summary
+    assert s["visited"] == len(problem.goals)
+    assert s["as_planned"] == len(problem.goals) + 1
+    assert s["exceedance_s"] == 0.0
+
+
+def test_the_same_seed_gives_the_same_run(world):
+    problem, solution = world
+    circle = {"center": on_the_way((problem, solution), 4), "radius": 8.0}
+    a, b = (
+        execute(problem, solution, FAST, surprises=events({"time": 1.0, "appear": circle}))
+        for _ in range(2)
+    )
+    assert a.rows == b.rows
+
+
+def test_execute_writes_its_logs_and_pictures(tmp_path, capsys):
+    problem, solution, run = PROBLEMS / "wharf.json", tmp_path / "s.json", tmp_path / "run"
+    assert main(["solve", str(problem), "-o", str(solution), "--quiet"]) == 0
+    surprises = tmp_path / "surprises.json"
+    surprises.write_text('{"schema_version": 1, "events": [{"time": 20, "push": [1, 1, 0]}]}')
+    code = main(
+        ["execute", str(problem), str(solution), "--surprise", str(surprises), "-o", str(run)]
+    )
+    assert code == 0
+    assert "push: local" in capsys.readouterr().err
+    names = {p.name for p in run.iterdir()}
+    assert names >= {"log.csv", "visits.csv", "events.csv", "summary.json", "run.png"}
+    with open(run / "visits.csv") as file:
+        rows = list(csv.DictReader(file))
+    assert all(r["as_planned"] == "True" for r in rows)
+    assert len(rows) == 9
+    summary = json.loads((run / "summary.json").read_text())
+    assert summary["tether_free"]
+
+
+@pytest.mark.parametrize(
+    ("event", "message"),
+    [
+        ({"time": 1}, "expected one of appear"),
+        ({"time": 1, "vanish": 0, "push": [0, 0, 0]}, "got vanish, push"),
+        ({"time": 1, "vanish": 99}, r"events\[0\]: vanish: expected a number below 8, got 99"),
+        ({"time": 1, "vanish": "no such"}, "expected the name of one, got 'no such'"),
+        ({"time": 1, "cancel_goal": 99}, "cancel_goal: expected a number below 8"),
+        ({"time": -1, "push": [0, 0, 0]}, r"events\[0\].*time"),
+        ({"time": 1, "appear": {"center": [0, 0], "radius": 2}}, "would stand on the base"),
+        ({"time": 1, "tether_length": 0}, "tether_length"),
+    ],
+)
+def test_bad_surprises_are_named(event, message, tmp_path, capsys):
+    file, solution = tmp_path / "e.json", tmp_path / "s.json"
+    file.write_text(json.dumps({"schema_version": 1, "events": [event]}))
+    problem = PROBLEMS / "wharf.json"
+    main(["solve", str(problem), "-o", str(solution), "--quiet"])
+    assert main(["execute", str(problem), str(solution), "--surprise", str(file)]) == 2
+    err = capsys.readouterr().err.strip().splitlines()[-1]
+
+    assert re.search(message, err), err
+
+
+def test_solutions_that_do_not_belong_or_fail_are_refused(world):
+    problem, solution = world
+    other = random_world(goals=8, tether_length=300, seed=3)
+    with pytest.raises(InputError, match="belongs to the problem"):
+        execute(other, solution)
+    wrong = solution.model_copy(update={"tour": solution.tour[::-1]})
+    with pytest.raises(InputError, match="fails its check"):
+        execute(problem, wrong)
+    blind = solve(problem, "greedy-tsp")
+    if blind.status.value == "invalid":
+        with pytest.raises(InputError, match="has status invalid"):
+            execute(problem, blind)
+    assert isinstance(solution, Solution)
