@@ -23,9 +23,13 @@ PLANNERS = ("none", "react", "react-draft", "predictive")
 CURRENT, GUSTS = (0.08, 0.05, 0.0), 0.04
 
 
-def fly(mission: Mission, scene: Scene, field, planner: str, vehicle: str, seed: int = 0, **how):
+def fly(
+    mission: Mission, scene: Scene, field, planner: str, vehicle: str, seed: int = 0,
+    tether_model: str = "geodesic", **how,
+):  # fmt: skip
     return simulate(
-        mission, planner, vehicle=vehicle, options=Options(**how), scene=scene, field=field,
+        mission, planner, vehicle=vehicle, tether_model=tether_model, options=Options(**how),
+        scene=scene, field=field,
         snap=True, seed=seed,
     ).summary  # fmt: skip
 
@@ -40,6 +44,8 @@ def kinematic(mission: Mission, scene: Scene, field) -> None:
     for name, how in (
         *((p, {}) for p in PLANNERS),
         ("react, unrefined", {"refine": "none"}),
+        ("react, its own tether", {"tether_model": "react"}),
+        ("react-draft, its own tether", {"tether_model": "react"}),
         ("predictive, BIT*", {"ways": "bitstar"}),
     ):
         s = fly(mission, scene, field, name.split(",")[0], "kinematic", **how)

@@ -21,6 +21,10 @@ def add_online(commands: Any) -> None:
         "--vehicle", default="kinematic", metavar="NAME",
         help="kinematic (default) or bluerov2 (with its dynamics and controller)",
     )  # fmt: skip
+    p.add_argument(
+        "--tether-model", default="geodesic", metavar="NAME",
+        help="that the planner believes: geodesic (default) or react",
+    )  # fmt: skip
     p.add_argument("--current", metavar="X,Y,Z", help="current (m/s), in place of the mission's")
     p.add_argument(
         "--ways", default="tree", metavar="NAME",

@@ -228,3 +228,14 @@ def test_two_planners_are_drawn_side_by_side(tmp_path):
     names = {p.relative_to(out).as_posix() for p in out.rglob("*.*")}
     assert {"log.csv", "summary.json", "run.png", "run.html", "none/log.csv"} <= names
     assert "sliders" in (out / "run.html").read_text()
+
+
+def test_planners_may_believe_the_papers_tether_and_the_log_tells_the_truth():
+    run = simulate(mission(ring(2), 5.0), "react", tether_model="react", scene=POST)
+    own = simulate(mission(ring(2), 5.0), "react", scene=POST)
+    assert run.summary["visited"] == own.summary["visited"]
+    assert run.summary["longest_tether_m"] < 6.0
+    with pytest.raises(InputError, match="planner 'predictive' needs geodesic, got 'react'"):
+        simulate(mission(ring(2), 5.0), "predictive", tether_model="react", scene=POST)
+    with pytest.raises(InputError, match="--tether-model: expected geodesic or react"):
+        simulate(mission(ring(2), 5.0), "react", tether_model="rope", scene=POST)

@@ -19,15 +19,20 @@ from netsp.online.coverage import Coverage, patches_of
 from netsp.online.field import DistanceField
 from netsp.online.mission import Mission
 from netsp.online.planner import Command, Options, Planner, make_planner
-from netsp.online.planner.base import DONE
+from netsp.online.planner.base import DONE, Tethers
 from netsp.online.scene import Scene
 from netsp.online.surfaces import extent
-from netsp.online.tether import GeodesicTether, Tether
+from netsp.online.tether import GeodesicTether, ReactTether, Tether
 from netsp.online.tree import Grid
 from netsp.online.vehicle import Vehicle, make_vehicle
 from netsp.online.water import Water
 
 Floats = npt.NDArray[np.float64]
+
+MODELS: dict[str, Callable[[DistanceField, float], Tethers]] = {
+    "geodesic": GeodesicTether,
+    "react": ReactTether,
+}
 
 STEP = 0.1
 """Seconds between two decisions of the planner."""
@@ -89,7 +94,8 @@ class Simulation:
 
     Attributes
     ----------
-    tether : the taut one. now : seconds. log : what has been.
+    tether : the taut one, by the geodesic model. model, believed : another model that the planner
+    believes in, and its tether. now : seconds. log : what has been.
     """
 
     mission: Mission
@@ -99,6 +105,8 @@ class Simulation:
     tether: Tether
     water: Callable[[float], Floats]
     coverage: Coverage | None = None
+    model: Tethers | None = None
+    believed: Tether | None = None
     now: float = 0.0
     log: list[LogRow] = field(default_factory=list)
 
@@ -129,6 +137,8 @@ class Simulation:
             return passed, False
         for stop in stops:
             self.tether = self.tethers.update(self.tether, stop)
+            if self.model is not None and self.believed is not None:
+                self.believed = self.model.update(self.believed, stop)
         return passed, True
 
 
@@ -137,6 +147,7 @@ def simulate(
     planner: str = "predictive",
     *,
     vehicle: str = "kinematic",
+    tether_model: str = "geodesic",
     options: Options | None = None,
     scene: Scene | None = None,
     field: DistanceField | None = None,
@@ -149,6 +160,7 @@ def simulate(
     Parameters
     ----------
     planner : name (`netsp.online.planner.PLANNERS`). options : how it finds ways.
+    tether_model : geodesic or react: what the planner believes; what is logged is the geodesic one.
     vehicle : name (`netsp.online.vehicle.VEHICLES`). seed : of the gusts.
     scene, field : when they are at hand.
     snap : move waypoints out of solids. on_step : is told every row; a KeyboardInterrupt ends the
@@ -170,7 +182,12 @@ def simulate(
             f"start, {tether.length:.4g}"
         )
     robot = make_vehicle(vehicle, np.array(mission.start), mission.speed)
-    chosen = make_planner(planner, mission, field, tethers, grid_of(mission, scene, field), options)
+    if tether_model not in MODELS:
+        raise InputError(f"--tether-model: expected {' or '.join(MODELS)}, got {tether_model!r}")
+    believed = None if tether_model == "geodesic" else MODELS[tether_model](field, mission.delta)
+    chosen = make_planner(
+        planner, mission, field, believed or tethers, grid_of(mission, scene, field), options
+    )
     coverage = None
     if mission.camera is not None:
         places = np.array([mission.anchor, mission.start, *mission.waypoints])
@@ -178,13 +195,15 @@ def simulate(
         coverage = Coverage(patches, field, mission.camera)
     water = Water(mission.current, mission.gusts, seed)
     chosen.warm_up(robot.position, tether)
-    world = Simulation(mission, field, robot, tethers, tether, water, coverage)
+    world = Simulation(mission, field, robot, tethers, tether, water, coverage, believed)
+    if believed is not None:
+        world.believed = believed.start(mission.anchor, mission.start)
     since, interrupted = (0.0, -1), False
     begin = time.perf_counter()
     try:
         while True:
             before = chosen.index
-            command = chosen.step(robot.position, world.tether)
+            command = chosen.step(robot.position, world.believed or world.tether)
             row = world.note(chosen, command)
             if on_step is not None:
                 on_step(row, chosen)

@@ -62,6 +62,8 @@ def report_tour(source: str | Path, problem_file: str | Path | None, output: str
     place = Path(source)
     run = place if place.is_dir() else None
     if run is not None:
+        if (run / "mission.json").exists() and not (run / "solution.json").exists():
+            raise InputError(f"{source}: a run of `netsp simulate`; its page is run.html in there")
         problem_file = problem_file or run / "problem.json"
         place = run / "solution.json"
     if problem_file is None:

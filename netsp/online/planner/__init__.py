@@ -12,6 +12,7 @@ from netsp.online.planner.predictive import PredictivePlanner
 from netsp.online.planner.react import ReactPlanner
 from netsp.online.refine import REFINEMENTS
 from netsp.online.sampled import OMPL_PLANNERS
+from netsp.online.tether import GeodesicTether
 from netsp.online.tree import Grid
 
 
@@ -41,6 +42,10 @@ def make_planner(
         raise InputError(f"--ways: expected {', '.join(known)}, got {options.ways!r}")
     if options.refine not in (None, *REFINEMENTS):
         raise InputError(f"--refine: expected {', '.join(REFINEMENTS)}, got {options.refine!r}")
+    if name == "predictive" and not isinstance(tethers, GeodesicTether):
+        raise InputError(
+            f"--tether-model: planner 'predictive' needs geodesic, got {tethers.name!r}"
+        )
     return PLANNERS[name](mission, scene, tethers, grid, options)
 
 

@@ -13,12 +13,12 @@ from netsp.online.field import DistanceField
 from netsp.online.mission import Mission
 from netsp.online.refine import refined
 from netsp.online.sampled import SampledWays
-from netsp.online.tether import GeodesicTether, Tether
+from netsp.online.tether import GeodesicTether, ReactTether, Tether
 from netsp.online.tree import Grid, ShortestTree, Ways, taut
 
 Floats = npt.NDArray[np.float64]
 
-Tethers = GeodesicTether
+Tethers = GeodesicTether | ReactTether
 
 MOST_HOLDS = 20
 """Steps that a planner may fail at one waypoint before it is given up."""

@@ -22,7 +22,7 @@ from netsp.online.planner.base import (
     dense,
     points_along,
 )
-from netsp.online.tether import Tether
+from netsp.online.tether import GeodesicTether, Tether
 from netsp.online.tree import homotopic, length_of, taut
 
 MARGIN = 0.004
@@ -90,6 +90,11 @@ class PredictivePlanner(Planner):
         way = target - robot
         far = float(np.linalg.norm(way))
         return target - way * min(1.0, 0.8 * self.mission.reach / max(far, 1e-12))
+
+    @property
+    def _model(self) -> GeodesicTether:
+        assert isinstance(self.tethers, GeodesicTether)
+        return self.tethers
 
     def warm_up(self, robot: Floats, tether: Tether) -> None:
         """See `Planner`."""
@@ -169,7 +174,7 @@ class PredictivePlanner(Planner):
                 on = onward[i]
                 assert on is not None
                 on = self.pulled(on)
-                if self._fits(self.tethers.relaxed(taken_back(i), ENOUGH_ROUNDS[0]), on, limit):
+                if self._fits(self._model.relaxed(taken_back(i), ENOUGH_ROUNDS[0]), on, limit):
                     kept = np.vstack([back[: i + 1], on[1:]])
                     row = [j for j in row if j < i]
                 else:
@@ -202,7 +207,7 @@ class PredictivePlanner(Planner):
 
     def _too_long(self, line: Floats, limit: float) -> bool:
         """Whether a tether that lies along a line is too long even when it is taut."""
-        return all(self.tethers.relaxed(line, rounds).length > limit for rounds in ENOUGH_ROUNDS)
+        return all(self._model.relaxed(line, rounds).length > limit for rounds in ENOUGH_ROUNDS)
 
     def _own_tether(self, target: Floats) -> float | None:
         """Length of the shortest tether from the anchor to a place."""
