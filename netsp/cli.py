@@ -12,7 +12,7 @@ import contextlib
 import os
 import sys
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 from netsp.arguments import (
     check_writable,
@@ -39,7 +39,7 @@ EXIT_INTERRUPTED = 130
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
     try:
-        args = _parser().parse_args(argv)
+        args = _parser().parse_args(_joined(sys.argv[1:] if argv is None else argv))
         return int(args.run(args))
     except NetspError as error:
         print(f"netsp: {error}", file=sys.stderr)
@@ -53,8 +53,30 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 0
 
 
+class _Parser(argparse.ArgumentParser):
+    """Says what is wrong in one line, as everything here does."""
+
+    def error(self, message: str) -> NoReturn:
+        raise InputError(f"{message} ({self.prog} --help)")
+
+
+VECTORS = ("--origin", "--base", "--current")
+"""Flags whose values may begin with a minus and are no numbers to argparse."""
+
+
+def _joined(argv: Sequence[str]) -> list[str]:
+    """`--origin -33,151` as `--origin=-33,151`."""
+    out: list[str] = []
+    for word in argv:
+        if out and out[-1] in VECTORS and word[:1] == "-" and word[1:2].isdigit():
+            out[-1] += f"={word}"
+        else:
+            out.append(word)
+    return out
+
+
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="netsp",
         description="Shortest non-entangling tours for tethered underwater robots, with proof.",
         epilog="Exit codes: 0 done, 1 internal error, 2 bad input, 3 proven infeasible, "

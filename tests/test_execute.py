@@ -253,3 +253,72 @@ def test_solutions_that_do_not_belong_or_fail_are_refused(world):
         with pytest.raises(InputError, match="has status invalid"):
             execute(problem, blind)
     assert isinstance(solution, Solution)
+
+
+AWAY = {"center": [-900.0, -900.0], "radius": 5.0}
+CORNER = Problem(base=(0, 0), goals=[(40, 0), (40, 20)], tether_length=80)
+
+
+@pytest.mark.parametrize("when", [97.0, 197.0])
+def test_events_near_the_end_of_a_leg_take_no_time_from_it(when):
+    problem = Problem(base=(0, 0), goals=[(100, 0)], tether_length=150)
+    run = execute(
+        problem, solve(problem), FAST, surprises=events({"time": when, "appear": AWAY})
+    )  # fmt: skip
+    check(run, 1)
+    assert not run.lost
+
+
+@pytest.mark.parametrize("centre", [(20.0, 0.0), (20.0, 0.5), (18.0, -3.0), (24.0, 1.0)])
+@pytest.mark.parametrize("clearance", [0.0, 1.0])
+def test_an_obstacle_upon_the_robot_or_its_tether_puts_them_aside(centre, clearance):
+    problem = CORNER.model_copy(update={"clearance": clearance})
+    what = {"time": 20.0, "appear": {"center": list(centre), "radius": 5.0}}
+    run = execute(problem, solve(problem), FAST, surprises=events(what))
+    check(run, 2)
+
+
+def test_obstacles_that_touch_are_gone_round_together():
+    what = [
+        {"time": 20.0, "appear": {"center": [20.0, y], "radius": 3.0}} for y in (6.0, 0.0, -6.0)
+    ]
+    check(execute(CORNER, solve(CORNER), FAST, surprises=events(*what)), 2)
+
+
+def test_a_base_that_is_walled_in_but_for_a_gap_is_reached_through_it():
+    wall = [[-5, -5], [8, -5], [8, 5], [-5, 5], [-5, 0.1], [-4, 0.1], [-4, 4], [7, 4], [7, -4],
+            [-4, -4], [-4, -0.1], [-5, -0.1]]  # fmt: skip
+    what = {"time": 20.0, "appear": {"polygon": wall}}
+    check(execute(CORNER, solve(CORNER), FAST, surprises=events(what)), 2)
+
+
+def test_a_push_ends_where_the_tether_holds():
+    what = {"time": 20.0, "push": [0.0, 500.0, 0.0]}
+    run = execute(CORNER, solve(CORNER), FAST, surprises=events(what))
+    check(run, 2)
+    assert run.summary["longest_tether"] <= 80.0
+
+
+def test_without_repair_nothing_is_mended_and_nothing_forgotten():
+    what = [{"time": 1.0, "add_goal": [5, 5]}, {"time": 2.0, "cancel_goal": 0}]
+    run = execute(CORNER, solve(CORNER), Options(speed=1.0, repair=False), surprises=events(*what))
+    assert run.summary["visited"] == 2
+    assert not run.cancelled
+    assert "not mended" in run.lost[2]
+    wall = {"time": 1.0, "appear": {"polygon": [[10, -40], [12, -40], [12, 40], [10, 40]]}}
+    run = execute(CORNER, solve(CORNER), Options(speed=1.0, repair=False), surprises=events(wall))
+    assert set(run.lost) == {0, 1}
+    assert {e.done for e in run.entries} == {"ignored"}
+
+
+def test_events_after_the_end_are_said_to_be():
+    what = {"time": 1e6, "add_goal": [5, 5]}
+    run = execute(CORNER, solve(CORNER), FAST, surprises=events(what))
+    assert "after the end" in run.lost[2]
+    assert run.entries[-1].done == "ignored"
+
+
+def test_a_resolution_that_obstacles_slip_through_is_refused():
+    problem = Problem.load(PROBLEMS / "wharf.json")
+    with pytest.raises(InputError, match=r"delta: expected at most 0\.6667"):
+        execute(problem, solve(problem), Options(delta=1000.0))

@@ -230,3 +230,73 @@ def test_bad_maps_are_named(text, message, tmp_path, capsys):
     site.write_text(text)
     assert main(["import", str(site), "--base", "55,12", "--tether", "50"]) == 2
     assert message in capsys.readouterr().err
+
+
+def collection(*features):
+    base = {"type": "Feature", "properties": {"kind": "base", "tether_length": 100},
+            "geometry": {"type": "Point", "coordinates": [12.0, 55.0]}}  # fmt: skip
+    goal = {"type": "Feature", "properties": {},
+            "geometry": {"type": "Point", "coordinates": [12.0003, 55.0]}}  # fmt: skip
+    return {"type": "FeatureCollection", "features": [base, goal, *features]}
+
+
+def shape(form, coordinates, **properties):
+    geometry = {"type": form, "coordinates": coordinates}
+    return {"type": "Feature", "properties": properties, "geometry": geometry}
+
+
+RING = [[12.0005, 55.0], [12.0007, 55.0], [12.0006, 55.0002], [12.0005, 55.0]]
+
+
+@pytest.mark.parametrize(
+    ("feature", "message"),
+    [
+        (shape("Polygon", []), "expected a polygon with an outer ring"),
+        (shape("Polygon", None), "expected a polygon with an outer ring"),
+        (shape("Polygon", [RING[:3]]), "expected a closed ring"),
+        (shape("Polygon", [RING, RING]), "without holes"),
+        (shape("MultiPolygon", [[]]), "expected a polygon with an outer ring"),
+        (shape("Polygon", [RING], kind="base"), "a base cannot be a Polygon"),
+        (shape("LineString", RING, kind="obstacle"), "cannot be a LineString"),
+        (shape("Point", [12, 55], kind="spaceship"), "got 'Point' of kind 'spaceship'"),
+        (shape("Point", [float("nan"), 55]), "within 180 and 90 degrees"),
+        ({**shape("Point", [12, 55]), "properties": [1]}, "expected an object"),
+        (shape("Point", [12.001, 55], kind="base"), "expected one base, got 2"),
+    ],
+)
+def test_odd_features_are_named(feature, message, tmp_path):
+    site = tmp_path / "s.geojson"
+    site.write_text(json.dumps(collection(feature)))
+    with pytest.raises(InputError, match=message):
+        read_site(site, None)
+
+
+def test_repeated_corners_and_features_without_a_place_do_no_harm(tmp_path):
+    site = tmp_path / "s.geojson"
+    twice = [*RING[:2], RING[1], *RING[2:]]
+    nowhere = {"type": "Feature", "properties": {}, "geometry": None}
+    site.write_text(json.dumps(collection(shape("Polygon", [twice]), nowhere)))
+    problem = read_site(site, None)
+    assert len(problem.obstacles[0].polygon) == 3
+
+
+def test_southern_and_western_places_can_be_typed(tmp_path, capsys):
+    site = tmp_path / "s.geojson"
+    site.write_text(json.dumps(collection()))
+    assert main(["import", str(site), "--base", "-33.1,-151.2", "--tether", "2e7"]) == 0
+    assert main(["import", str(site), "--base", "99,10"]) == 2
+    assert "--base: latitude" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "argv",
+    [
+        ["execute", "p.json"], ["simulate", "m.json", "--seed", "x"], ["nonsense"],
+        ["export", "s.json", "--problem", "p.json", "--most", "0", "-o", "x"],
+    ],
+)  # fmt: skip
+def test_wrong_flags_take_one_line(argv, capsys):
+    assert main(argv) == 2
+    err = capsys.readouterr().err
+    assert len(err.strip().splitlines()) == 1
+    assert err.startswith("netsp: ")

@@ -1,5 +1,6 @@
 """The taut tether is as long as geometry says, keeps its class, and forgets how it was driven."""
 
+import itertools
 import math
 
 import numpy as np
@@ -254,3 +255,15 @@ def test_the_papers_model_in_both_readings():
     assert tether.length < 0.6 * exact
     with pytest.raises(InputError, match="reading"):
         model(solid, kind=ReactTether, reading="both")
+
+
+def test_a_strand_laid_densely_round_something_stays_on_its_side():
+    """Nodes on a line are dropped in a round only if that does not add up to a way through."""
+    box = Scene(solids=[{"prism": {"polygon": [[-8, -8], [8, -8], [8, 8], [-8, 8]]}}])
+    model = GeodesicTether(box.field(), 0.5)
+    corners = [(-20, -9, 0), (-9, -9, 0), (-8.3, 8.3, 0), (9, 9, 0), (20, 9, 0)]
+    path = np.vstack([np.linspace(a, b, 80) for a, b in itertools.pairwise(corners)])
+    lengths = [model.relaxed(path, n).length for n in (5, 50, 2000)]
+    assert model.relaxed(path, 2000).length == pytest.approx(model.lay(path).length, rel=2e-3)
+    assert lengths[0] >= lengths[1] - 1e-6 >= lengths[2] - 2e-6
+    assert box.field().distance(model.relaxed(path, 2000).nodes).min() > -0.1

@@ -33,8 +33,8 @@ def run_execute(args: argparse.Namespace) -> int:
     surprises = Surprises.load(args.surprise) if args.surprise else None
     if args.planner not in ("repair", "none"):
         raise InputError(f"--planner: expected repair or none, got {args.planner!r}")
-    if args.output is not None and Path(args.output).exists() and not Path(args.output).is_dir():
-        raise InputError(f"{args.output}: expected a folder, and it is a file")
+    if args.output is not None:
+        make_folder(args.output)
     options = Options(
         speed=args.speed, vehicle=args.vehicle, delta=args.delta, repair=args.planner == "repair",
         current=vector(args.current, "--current") if args.current else (0.0, 0.0, 0.0),
@@ -101,11 +101,7 @@ def describe(done: Execution) -> str:
 
 def write_execution(done: Execution, folder: str | Path) -> None:
     """log.csv, visits.csv, events.csv, tethers.json, summary.json, and the problem and solution."""
-    place = Path(folder)
-    try:
-        place.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be made: {error.strerror or error}") from None
+    place = make_folder(folder)
     write_text(place / "log.csv", _table([asdict(r) for r in done.rows]))
     visits = [
         {**asdict(a), "word": " ".join(map(str, a.word)), "planned": " ".join(map(str, a.planned)),
@@ -120,6 +116,19 @@ def write_execution(done: Execution, folder: str | Path) -> None:
     write_text(place / "tethers.json", json.dumps(frames, allow_nan=False) + "\n")
     write_text(place / "problem.json", done.problem.to_json())
     write_text(place / "solution.json", done.solution.to_json())
+
+
+def make_folder(folder: str | Path) -> Path:
+    """The folder, made if need be; InputError if that cannot be done or nothing be written."""
+    place = Path(folder)
+    try:
+        place.mkdir(parents=True, exist_ok=True)
+        probe = place / ".netsp"
+        probe.touch()
+        probe.unlink()
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be written to: {error.strerror or error}") from None
+    return place
 
 
 def _table(rows: Sequence[dict[str, Any]]) -> str:

@@ -101,7 +101,7 @@ class Surprises(BaseModel):
     def check(self, problem: Problem) -> None:
         """InputError for an obstacle or goal that does not exist when the event comes, or an
         obstacle that would stand on the base or move onto it."""
-        for k, event in enumerate(sorted(self.events, key=lambda e: e.time)):
+        for k, event in sorted(enumerate(self.events), key=lambda e: e[1].time):
             try:
                 problem = changed(problem, event)
             except InputError as error:

@@ -184,11 +184,8 @@ def _out_of_reach(problem: Problem, order: list[int], state: State) -> list[int]
 
 def _home(problem: Problem, state: State) -> Leg:
     """Back along the tether to the base."""
-    last = len(problem.goals) + 1
-    placed = problem.model_copy(
-        update={"goals": (*problem.goals, Goal(position=state.position)), "state": None}
-    )
-    back = TautPaths(placed, FAR * problem.tether_length).path(0, last, state.signature)[::-1]
+    placed = problem.model_copy(update={"goals": (Goal(position=state.position),), "state": None})
+    back = TautPaths(placed, FAR * problem.tether_length).path(0, 1, state.signature)[::-1]
     return Leg(HOME, np.ascontiguousarray(back), (), 0.0)
 
 

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.errors import InputError, NetspError
+from netsp.execute.aside import aside
 from netsp.execute.events import Event, Surprises, changed, index_of
 from netsp.execute.plan import HOME, Leg, legs_of
 from netsp.execute.repair import Repair, broken, repair
@@ -234,8 +235,18 @@ class _Run:
 
     def _lose(self, goal: int, why: str) -> None:
         if goal == HOME:
-            raise NetspError("internal: the base was not reached")
+            self.legs = []
+            self._enter_log("lost", "given up", f"the base was {why}", 0.0)
+            return
         self.out.lost[goal] = why
+        if not self.options.repair:
+            self.legs.pop(0)
+            first = self.legs[0]
+            way = np.vstack([self.vehicle.position, first.way[1:]])
+            self.legs[0] = Leg(first.goal, way, first.word, first.tether)
+            self._enter_log("lost", "ignored", f"{self.problem.goal_label(goal)} {why}", 0.0)
+            self._next()
+            return
         self._mend(f"{self.problem.goal_label(goal)} {why}", [g for g in self.left if g != goal])
 
     @property
@@ -261,19 +272,31 @@ class _Run:
                 gone = index_of(event.cancel_goal, list(before.goals), "cancel_goal")
                 if gone in left:
                     left, must = [g for g in left if g != gone], "a goal was cancelled"
-                    self.out.cancelled.add(gone)
+                    if self.options.repair:
+                        self.out.cancelled.add(gone)
         if event.tether_length is not None and self.tether.length > event.tether_length:
             self.mode = "shorten"
         if must is None:
             must, legs = broken(self.problem, self.tether.nodes, self._from_here())
             if must is None:
                 self.legs = legs
+                self.way, self.leg_s = self.legs[0].way[1:], 0.0
         if must is None:
             self._enter_log(event.kind, "kept", "nothing that is left of the plan is broken", 0.0)
         elif not self.options.repair:
             self._enter_log(event.kind, "ignored", must, 0.0)
+            for goal in set(left) - set(self.left):
+                self.out.lost[goal] = "was added, and plans are not mended"
         else:
             self._mend(must, left, event.kind)
+
+    def too_late(self, event: Event) -> None:
+        """An event after the end."""
+        self._enter_log(event.kind, "ignored", f"came at {event.time:g} s, after the end", 0.0)
+        if event.add_goal is not None:
+            problem = changed(self.problem, event)
+            self.problem = self.out.problem = problem
+            self.out.lost[len(problem.goals) - 1] = "was added after the end"
 
     def _from_here(self) -> list[Leg]:
         first = self.legs[0]
@@ -287,16 +310,11 @@ class _Run:
         self._enter(problem)
         if event.kind not in ("appear", "vanish", "move"):
             return
-        robot = self.vehicle.position
-        if float(self.scene.distance(robot)) < 0.0:
-            robot = pushed_out(self.scene, robot, 1e-3 * self.delta)[0]
-            self.vehicle.stop_at(robot)
-        nodes = self.tether.nodes
-        line = np.vstack([nodes[:1], dense(nodes, 0.5 * self.delta), robot])
-        inner = self.scene.distance(line) < 0.0
-        inner[[0, -1]] = False
-        line[inner] = pushed_out(self.scene, line[inner], 1e-3 * self.delta) if inner.any() else 0.0
-        self.tether = self.model.relaxed(line, 5000)
+        line = aside(problem, self.tether.nodes, 1e-2 * self.delta)
+        if not np.array_equal(line[-1], self.vehicle.position):
+            self.vehicle.stop_at(line[-1])
+        anchor = self.model.start(line[0], line[0])
+        self.tether = self.model.refine(self.model.drive(anchor, line[1:])[0])
 
     def _push(self, by: Floats) -> None:
         """Carry the robot off, as far as there is water."""
@@ -305,14 +323,25 @@ class _Run:
         for stop in stops:
             if float(self.scene.distance(stop)) < 0.0:
                 break
-            self.tether = self.model.update(self.tether, stop)
+            tether = self.model.update(self.tether, stop)
+            if tether.length > max(self.problem.tether_length, self.tether.length):
+                break  # held by its tether
+            self.tether = tether
             self.vehicle.stop_at(stop)
 
     def _mend(self, why: str, left: list[int], event: str = "lost") -> None:
-        made: Repair = repair(
-            self.problem, self.vehicle.position, self.tether.nodes, left, self.options.speed, why,
-            self.options.seed,
-        )  # fmt: skip
+        try:
+            made = repair(
+                self.problem, self.vehicle.position, self.tether.nodes, left, self.options.speed,
+                why, self.options.seed,
+            )  # fmt: skip
+        except NetspError as error:
+            # what is always possible: back along the tether
+            home = Leg(HOME, np.ascontiguousarray(self.tether.nodes[::-1]), (), 0.0)
+            lost = tuple((g, f"planning failed: {error}") for g in left)
+            made = Repair(
+                "home", f"{why}; planning failed: {error}", [home], lost, home.length, 0.0
+            )
         self.legs = made.legs
         for goal, reason in made.lost:
             self.out.lost[goal] = reason
@@ -353,6 +382,12 @@ def execute(
         failed = next(c for c in judged.checks if not c.passed)
         raise InputError(f"solution: fails its check {failed.name!r}: {failed.detail}")
     surprises.check(problem)
+    coarsest = coarsest_delta(problem)
+    if options.delta is not None and not 0.0 < options.delta <= coarsest:
+        raise InputError(
+            f"delta: expected at most {coarsest:.4g}, or the tether would slip through the "
+            f"thinnest obstacle, got {options.delta!r}"
+        )
     begin = time.perf_counter()
     run = _Run(problem, solution, options)
     coming = sorted(surprises.events, key=lambda e: e.time)
@@ -365,6 +400,8 @@ def execute(
                 on_step(row)
             run.go()
         run.note()
+        for event in coming:
+            run.too_late(event)
     except KeyboardInterrupt:
         run.out.interrupted = True
     run.out.tethers.append((round(run.now, 6), run.tether.nodes.copy()))
@@ -393,5 +430,10 @@ def scene_of(problem: Problem) -> Scene:
 def suggested_delta(problem: Problem) -> float:
     """A resolution for the tether: a three-hundredth of its length, and fine enough for the
     thinnest obstacle."""
+    return min(problem.tether_length / 300.0, coarsest_delta(problem) / 1.1)
+
+
+def coarsest_delta(problem: Problem) -> float:
+    """The coarsest resolution at which a tether passes through no obstacle."""
     thickness = [t for _, t in scene_of(problem).field().thickness]
-    return float(min([problem.tether_length / 300.0, *(t / (1.1 * THINNEST) for t in thickness)]))
+    return float(min([problem.tether_length / 20.0, *(t / THINNEST for t in thickness)]))

@@ -48,7 +48,7 @@ def run_export(args: argparse.Namespace) -> int:
 
 def run_import(args: argparse.Namespace) -> int:
     """`netsp import SITE`: returns the exit code."""
-    projection = Projection.parse(args.base) if args.base else None
+    projection = Projection.parse(args.base, name="--base") if args.base else None
     problem = read_site(
         args.site, projection, tether=args.tether, clearance=args.clearance, radius=args.radius
     )

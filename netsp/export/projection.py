@@ -31,27 +31,29 @@ class Projection:
 
     def __init__(
         self, latitude: float, longitude: float, heading: float = 0.0,
-        base: tuple[float, float] = (0.0, 0.0),
+        base: tuple[float, float] = (0.0, 0.0), name: str = "--origin",
     ) -> None:  # fmt: skip
         if not (math.isfinite(latitude) and abs(latitude) <= 90.0):
-            raise InputError(f"--origin: latitude: expected -90 to 90, got {latitude:g}")
+            raise InputError(f"{name}: latitude: expected -90 to 90, got {latitude:g}")
         if not (math.isfinite(longitude) and abs(longitude) <= 180.0):
-            raise InputError(f"--origin: longitude: expected -180 to 180, got {longitude:g}")
+            raise InputError(f"{name}: longitude: expected -180 to 180, got {longitude:g}")
         if not (math.isfinite(heading) and abs(heading) <= 360.0):
-            raise InputError(f"--origin: heading: expected -360 to 360, got {heading:g}")
+            raise InputError(f"{name}: heading: expected -360 to 360, got {heading:g}")
         self.latitude, self.longitude, self.heading = latitude, longitude, heading
         self.base = np.array(base, dtype=float)
 
     @classmethod
-    def parse(cls, text: str, base: tuple[float, float] = (0.0, 0.0)) -> Projection:
+    def parse(
+        cls, text: str, base: tuple[float, float] = (0.0, 0.0), name: str = "--origin"
+    ) -> Projection:
         """From ``lat,lon`` or ``lat,lon,heading``."""
         try:
             numbers = [float(v) for v in text.split(",")]
         except ValueError:
             numbers = []
         if len(numbers) not in (2, 3):
-            raise InputError(f"--origin: expected lat,lon or lat,lon,heading, got {text!r}")
-        return cls(numbers[0], numbers[1], numbers[2] if len(numbers) == 3 else 0.0, base)
+            raise InputError(f"{name}: expected lat,lon or lat,lon,heading, got {text!r}")
+        return cls(numbers[0], numbers[1], numbers[2] if len(numbers) == 3 else 0.0, base, name)
 
     @cached_property
     def _transform(self) -> Any:

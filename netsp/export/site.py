@@ -8,6 +8,7 @@ other points are goals. A `kind` property of base, goal, obstacle or path decide
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 from typing import Any
 
@@ -39,8 +40,15 @@ def read_site(
     features = data.get("features")
     if data.get("type") != "FeatureCollection" or not isinstance(features, list):
         raise InputError(f"{file}: expected a GeoJSON FeatureCollection")
-    parts = [_part(f, k, file) for k, f in enumerate(features)]
-    base = next((p for p in parts if p["kind"] == "base"), None)
+    crs = data.get("crs")
+    if crs is not None and "CRS84" not in json.dumps(crs) and "4326" not in json.dumps(crs):
+        raise InputError(f"{file}: crs: expected WGS 84 as RFC 7946 has it, got {crs}"[:200])
+    found = [_part(f, k, file) for k, f in enumerate(features)]
+    parts = [p for p in found if p is not None]
+    bases = [p for p in parts if p["kind"] == "base"]
+    if len(bases) > 1:
+        raise InputError(f"{file}: expected one base, got {len(bases)}")
+    base = bases[0] if bases else None
     if projection is None:
         if base is None:
             raise InputError(f"{file}: has no base; expected --base lat,lon")
@@ -57,7 +65,9 @@ def read_site(
 
     goals: list[Any] = []
     obstacles: list[Any] = []
-    for k, part in enumerate(parts):
+    for k, part in enumerate(found):
+        if part is None:
+            continue
         label = {"name": str(part["properties"]["name"])} if part["properties"].get("name") else {}
         if part["kind"] == "goal":
             goals.append({"position": place(part["coordinates"]), **label})
@@ -71,8 +81,8 @@ def read_site(
         elif part["kind"] == "obstacle":
             for rings in part["coordinates"]:
                 corners = [place(c)[:2] for c in rings[0]]
-                if len(corners) > 1 and np.allclose(corners[0], corners[-1], atol=1e-9):
-                    corners.pop()
+                corners = [c for c, d in zip(corners, [*corners[1:], corners[0]], strict=True)
+                           if not np.allclose(c, d, atol=1e-6)]  # fmt: skip
                 obstacles.append({"polygon": corners, **label})
     if not goals:
         raise InputError(f"{file}: has no goal: a Point without radius_m")
@@ -90,36 +100,79 @@ def read_site(
         raise InputError(f"{file}: {explain(error)}") from None
 
 
-def _part(feature: Any, k: int, file: str | Path) -> dict[str, Any]:
-    """What a feature is: kind, shape, coordinates, properties."""
+KINDS = {
+    "base": ("Point",),
+    "goal": ("Point",),
+    "obstacle": ("Point", "Polygon", "MultiPolygon"),
+    "path": ("LineString", "MultiLineString"),
+}
+"""Which shapes a kind may have."""
+
+
+def _part(feature: Any, k: int, file: str | Path) -> dict[str, Any] | None:
+    """What a feature is: kind, shape, coordinates, properties; None if it is nowhere."""
     where = f"{file}: features[{k}]"
-    geometry = feature.get("geometry") if isinstance(feature, dict) else None
-    if not isinstance(geometry, dict) or "coordinates" not in geometry:
+    if not isinstance(feature, dict) or "geometry" not in feature:
         raise InputError(f"{where}: expected a feature with a geometry")
-    properties = feature.get("properties") or {}
-    shape, coordinates = geometry.get("type"), geometry["coordinates"]
-    kind = properties.get("kind")
-    if shape in ("Polygon", "MultiPolygon"):
-        coordinates = [coordinates] if shape == "Polygon" else coordinates
-        kind = kind or "obstacle"
-        flat = [c for rings in coordinates for ring in rings for c in ring]
-    elif shape == "Point":
-        standing = (
-            "radius_m" in properties
-            or properties.get("seamark:type") in STANDING
-            or properties.get("seamark:landmark:category") == "windmotor"
+    geometry, properties = feature["geometry"], feature.get("properties") or {}
+    if geometry is None:
+        return None  # RFC 7946: a feature without a place
+    if not isinstance(geometry, dict) or not isinstance(properties, dict):
+        raise InputError(f"{where}: expected an object as geometry and as properties")
+    shape, coordinates = geometry.get("type"), geometry.get("coordinates")
+    standing = (
+        "radius_m" in properties
+        or str(properties.get("seamark:type")) in STANDING
+        or properties.get("seamark:landmark:category") == "windmotor"
+    )
+    usual = {
+        "Point": "obstacle" if standing else "goal", "Polygon": "obstacle",
+        "MultiPolygon": "obstacle", "LineString": "path", "MultiLineString": "path",
+    }  # fmt: skip
+    kind = properties.get("kind", usual.get(str(shape)))
+    if not isinstance(kind, str) or kind not in KINDS:
+        raise InputError(
+            f"{where}: expected a {', '.join(usual)} of kind {', '.join(KINDS)}, got {shape!r} of "
+            f"kind {kind!r}"
         )
-        kind = kind or ("obstacle" if standing else "goal")
-        flat = [coordinates]
-    else:
-        return {"kind": "other", "shape": shape, "coordinates": [], "properties": properties}
-    for c in flat:
-        good = isinstance(c, list) and len(c) >= 2 and all(
-            isinstance(v, (int, float)) and not isinstance(v, bool) for v in c
-        )  # fmt: skip
-        if not good or abs(c[0]) > 180.0 or abs(c[1]) > 90.0:
-            raise InputError(
-                f"{where}: expected [longitude, latitude] within 180 and 90 degrees, got "
-                f"{json.dumps(c)[:60]}"
-            )
+    if shape not in KINDS[kind]:
+        raise InputError(
+            f"{where}: a {kind} cannot be a {shape}; expected {' or '.join(KINDS[kind])}"
+        )
+    if kind != "path":
+        if shape == "Point":
+            _check_place(coordinates, where)
+        else:
+            coordinates = [coordinates] if shape == "Polygon" else coordinates
+            _check_polygons(coordinates, where)
     return {"kind": kind, "shape": shape, "coordinates": coordinates, "properties": properties}
+
+
+def _check_polygons(polygons: Any, where: str) -> None:
+    """InputError unless they are lists of one closed ring each."""
+    if not isinstance(polygons, list) or not polygons:
+        raise InputError(f"{where}: expected a polygon with an outer ring")
+    for rings in polygons:
+        if not isinstance(rings, list) or not rings or not isinstance(rings[0], list):
+            raise InputError(f"{where}: expected a polygon with an outer ring")
+        if len(rings) > 1:
+            raise InputError(
+                f"{where}: expected a polygon without holes, got {len(rings) - 1}; an obstacle "
+                "with a pool inside must be split"
+            )
+        for place in rings[0]:
+            _check_place(place, where)
+        if len(rings[0]) < 4 or rings[0][0] != rings[0][-1]:
+            raise InputError(f"{where}: expected a closed ring of four positions or more")
+
+
+def _check_place(c: Any, where: str) -> None:
+    """InputError unless it is a longitude, a latitude and perhaps a height."""
+    good = isinstance(c, list) and len(c) >= 2 and all(
+        isinstance(v, (int, float)) and not isinstance(v, bool) and math.isfinite(v) for v in c
+    )  # fmt: skip
+    if not good or abs(c[0]) > 180.0 or abs(c[1]) > 90.0:
+        raise InputError(
+            f"{where}: expected [longitude, latitude] within 180 and 90 degrees, got "
+            f"{json.dumps(c)[:60]}"
+        )

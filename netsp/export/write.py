@@ -68,8 +68,7 @@ def export(
     settings = settings or Settings()
     if not 0 <= settings.hold <= 3600 or not 1 <= settings.bend <= 3600:
         raise InputError(
-            f"--hold: expected whole seconds, at bends at least 1, got {settings.hold} and "
-            f"{settings.bend}"
+            f"--hold: expected whole seconds from 0 to 3600 (at bends from 1), got {settings.hold}"
         )
     points = waypoints_of(problem, solution, acceptance)
     if len(points) > settings.most and kind in ("plan", "wpl"):

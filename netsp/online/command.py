@@ -17,7 +17,7 @@ from netsp.measuring import read_path
 from netsp.online import flights, pictures
 from netsp.online.field import DistanceField, finite_point
 from netsp.online.mission import Mission
-from netsp.online.planner import Options, Planner
+from netsp.online.planner import PLANNERS, Options, Planner
 from netsp.online.scene import Scene
 from netsp.online.simulate import STEP, LogRow, Run, simulate, write_run
 from netsp.online.tether import GeodesicTether, ReactTether, Tether
@@ -69,6 +69,8 @@ def run_mission(args: argparse.Namespace) -> int:
         raise InputError(f"{args.output}: expected a folder, and it is a file")
     scene = mission.load_scene()
     field = scene.field(on_progress=tell)
+    if args.compare is not None and args.compare not in PLANNERS:
+        raise InputError(f"--compare: expected {', '.join(PLANNERS)}, got {args.compare!r}")
     runs = []
     for planner in [args.planner, args.compare] if args.compare else [args.planner]:
         run = simulate(

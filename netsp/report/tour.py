@@ -18,7 +18,7 @@ from netsp.execute.run import scene_of, suggested_delta
 from netsp.hsignature.measures import measure
 from netsp.judge import verify
 from netsp.online.tether import GeodesicTether
-from netsp.problem import Circle, Problem
+from netsp.problem import Circle, Problem, read_text
 from netsp.report.page import STYLE
 from netsp.solution import Solution, write_text
 
@@ -66,17 +66,25 @@ def report_tour(source: str | Path, problem_file: str | Path | None, output: str
             raise InputError(f"{source}: a run of `netsp simulate`; its page is run.html in there")
         problem_file = problem_file or run / "problem.json"
         place = run / "solution.json"
+    solution = Solution.load(place)
     if problem_file is None:
         raise InputError(f"{source}: a solution does not hold its problem; expected --problem FILE")
-    solution = Solution.load(place)
     problem = Problem.load(problem_file)
     if run is None and problem.sha256 != solution.problem.sha256:
         raise InputError(f"{source}: solves another problem than {problem_file} (sha256 differs)")
     if solution.length is None:
         raise InputError(f"{source}: has no tour (status {solution.status.value})")
     rows = _table(run / "log.csv") if run else []
-    tethers = json.loads((run / "tethers.json").read_text(encoding="utf-8")) if run else None
-    write_text(output, page(problem, solution, rows, tethers, run))
+    if run is not None and not rows:
+        raise InputError(f"{run / 'log.csv'}: holds no row")
+    tethers = _json(run / "tethers.json") if run else None
+    try:
+        text = page(problem, solution, rows, tethers, run)
+    except (KeyError, IndexError, ValueError, TypeError) as error:
+        raise InputError(
+            f"{source}: a file of the run is damaged: {type(error).__name__}: {error}"
+        ) from None
+    write_text(output, text)
 
 
 def page(
@@ -200,7 +208,7 @@ def _summary(problem: Problem, solution: Solution, run: Path | None) -> str:
         f"{problem.units} long ({solution.status.value} by {html.escape(solution.solver)}{gap})."
     ]
     if run is not None:
-        s = json.loads((run / "summary.json").read_text(encoding="utf-8"))
+        s = _json(run / "summary.json")
         lines.append(
             f"Carried out in {s['time_s']:.5g} s over {s['path']:.6g} {problem.units}: "
             f"{s['visited']} goals visited, the tether at most {s['longest_tether']:.5g} long, "
@@ -337,8 +345,12 @@ def _events(run: Path | None) -> str:
     return f"<table>{top}{body}</table>"
 
 
-def _table(file: Path) -> list[dict[str, str]]:
+def _json(file: Path) -> Any:
     try:
-        return list(csv.DictReader(file.read_text(encoding="utf-8").splitlines()))
-    except OSError as error:
-        raise InputError(f"{file}: cannot be read: {error.strerror or error}") from None
+        return json.loads(read_text(file))
+    except json.JSONDecodeError as error:
+        raise InputError(f"{file}: not JSON: {error.msg}") from None
+
+
+def _table(file: Path) -> list[dict[str, str]]:
+    return list(csv.DictReader(read_text(file).splitlines()))

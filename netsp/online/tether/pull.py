@@ -127,8 +127,9 @@ def pull(field, strand, count, delta, spread, flat, rounds, precision):
         strand, count = repair(field, strand, count, slip)
         changed = count != before
         most = refresh(field, strand, count, spread, flat, stride, delta)
+        before = count
         count, lifted = lift(field, strand, count, slip, stride)
-        changed = changed or lifted > 0.0
+        changed = changed or lifted > 0.0 or count != before
         was = length_of(strand, count)
         ahead, gain = slide(field, strand, count, stride, precision, damping, gain)
         most = max(most, ahead)
@@ -146,7 +147,7 @@ def pull(field, strand, count, delta, spread, flat, rounds, precision):
 def repair(field, strand, count, slip):
     """Look again along every edge that may have gone too deep; where it has, its deepest point
     becomes a node on the surface."""
-    i, budget = 0, 64
+    i, budget = 0, 64 + 2 * count
     while i < count - 1:
         if strand[i, USED] > 1.0:
             low, where = look_along(field, strand, i, slip)
@@ -214,7 +215,8 @@ def lift(field, strand, count, slip, stride):
         if h <= (0.125 * slip if held else stride):
             count = remove(strand, count, i)
             lifted = max(lifted, h)
-            i = max(1, i - 1)
+            # short ways are not looked at before the next round: two in a row would add up
+            i = max(1, i - 1) if held else i + 1
             continue
         if not held:
             f = 1.0

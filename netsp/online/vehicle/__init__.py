@@ -28,7 +28,7 @@ def make_vehicle(name: str, place: npt.NDArray[np.float64], speed: float) -> Veh
 
     Raises
     ------
-    InputError : a name that is none, or a vehicle whose packages are not installed.
+    InputError : a name that is none.
     """
     if name not in VEHICLES:
         raise InputError(f"--vehicle: expected {' or '.join(VEHICLES)}, got {name!r}")

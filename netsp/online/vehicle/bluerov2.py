@@ -38,8 +38,9 @@ class BlueRov2:
         self._control = PredictiveControl()
         self._carrot = np.array(place, dtype=float)
         self._drift = np.zeros(3)
+        # what is compiled is loaded before the first step
         self._control.force(self.state, np.tile(self.state, (HORIZON, 1)), self._drift)
-        self._control.forces[:] = 0.0
+        self._control.forces = np.zeros((HORIZON, 4))
 
     @property
     def position(self) -> Floats:
