@@ -37,7 +37,7 @@ MODELS: dict[str, Callable[[DistanceField, float], Tethers]] = {
 STEP = 0.1
 """Seconds between two decisions of the planner."""
 
-FRAME = 5
+FRAME = 2
 """Steps between two pictures of the camera."""
 
 STUCK = 600.0
