@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from netsp.errors import InfeasibleError, InputError, NetspError, VerificationError
     from netsp.judge import Verification, verify
-    from netsp.problem import Circle, Goal, Polygon, Problem
+    from netsp.problem import Circle, Goal, Polygon, Problem, State
     from netsp.result import Progress, Result
     from netsp.solution import Solution, Status
     from netsp.solvers import solve, solve_graph, travel_graph
@@ -35,6 +35,7 @@ _PUBLIC = {
     "Progress": "result",
     "Result": "result",
     "Solution": "solution",
+    "State": "problem",
     "Status": "solution",
     "TravelGraph": "travel",
     "Verification": "judge",
@@ -56,6 +57,7 @@ __all__ = [
     "Progress",
     "Result",
     "Solution",
+    "State",
     "Status",
     "TravelGraph",
     "Verification",
