@@ -138,7 +138,6 @@ def solve_graph(
     if not isinstance(graph, TravelGraph):
         raise InputError(f"graph: expected a TravelGraph, got {graph!r}")
     tour = None if warm_start is None else _as_tour(warm_start, graph)
-    opened: Any = graph if hasattr(graph, "opened") else None
     result = run(
         graph,
         time_limit=time_limit,
@@ -146,9 +145,9 @@ def solve_graph(
         rng=np.random.default_rng(_seed(seed)),
         params=params,
         warm_start=tour,
-        on_progress=opened.listener(on_progress) if opened is not None else on_progress,
+        on_progress=graph.telling(on_progress),
     )
-    return opened.opened(result) if opened is not None else result
+    return graph.told(result)
 
 
 def solve(
@@ -239,8 +238,6 @@ def to_solution(
     else:
         visits, wrapped = _visits(graph, result.tour or ()), ()
         walk = result.walk or (*(result.tour or ()), 0)
-        if problem.state is not None and result.walk is None:
-            walk = walk[1:]  # the tour starts at the state
         legs = [graph.path(u, v) for u, v in pairwise(walk)]
         path = np.vstack([legs[0], *(leg[1:] for leg in legs[1:])]) if legs else np.zeros((0, 3))
     return Solution(
@@ -255,9 +252,7 @@ def to_solution(
         entangled=wrapped,
         tour=visits,
         path=tuple((float(x), float(y), float(z)) for x, y, z in path),
-        start_tether=tuple(
-            (float(x), float(y), float(z)) for x, y, z in getattr(graph, "start_tether", ())
-        ),
+        start_tether=tuple((float(x), float(y), float(z)) for x, y, z in graph.start_tether),
         timings=timings or Timings(),
         versions=versions(),
     )
@@ -271,7 +266,7 @@ def _visits(graph: TravelGraph, tour: Sequence[int]) -> tuple[Visit, ...]:
             tether_length=float(graph.tethers[v]),
         )
         for v in tour[1:]
-        if v != getattr(graph, "start", None)
+        if v != graph.start
     )
 
 

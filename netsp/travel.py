@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -22,6 +22,9 @@ from scipy.sparse.csgraph import connected_components
 from netsp.errors import InputError
 from netsp.hsignature import Word
 from netsp.ways import Ways
+
+if TYPE_CHECKING:
+    from netsp.result import OnProgress, Result
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -55,7 +58,12 @@ class TravelGraph:
     tethers : (V,) taut tether lengths in 3D.
     roadmap : name of the roadmap it came from.
     legs_s : seconds spent measuring legs so far.
+    start : vertex of the state that tours start from (`netsp.roadmap.opened`), None for the base.
+    start_tether : (n, 3) the tether that is out at the start.
     """
+
+    start: int | None = None
+    start_tether: Floats = np.zeros((0, 3))
 
     def __init__(
         self,
@@ -222,6 +230,14 @@ class TravelGraph:
     def path(self, u: int, v: int) -> Floats:
         """(n, 3) polyline of the leg from vertex u to vertex v."""
         return self._legs.path(u, v)
+
+    def told(self, result: Result) -> Result:
+        """A solver's result as callers are to see it."""
+        return result
+
+    def telling(self, listener: OnProgress | None) -> OnProgress | None:
+        """A listener to a solver's progress, told what callers are to see."""
+        return listener
 
 
 class _PartOfLegs:

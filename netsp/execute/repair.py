@@ -191,7 +191,9 @@ def _home(problem: Problem, state: State) -> Leg:
 
 def _keeping_order(graph: OpenedGraph, goals: int) -> Result:
     """The shortest path through the goals in their order: classes by dynamic programming."""
-    at = np.array([graph.start])
+    start = graph.start
+    assert start is not None
+    at = np.array([start])
     reach = np.zeros(1)
     layers: list[tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]] = []
     for c in range(1, goals + 1):
@@ -209,7 +211,7 @@ def _keeping_order(graph: OpenedGraph, goals: int) -> Result:
     for members, best in reversed(layers):
         tour.append(int(members[k]))
         k = int(best[k])
-    full = (0, graph.start, *reversed(tour))
+    full = (0, start, *reversed(tour))
     return Result(
         status=Status.FEASIBLE, tour=full, length=length, lower_bound=None, trace=(),
     )  # fmt: skip

@@ -125,9 +125,11 @@ class Execution:
 
     @property
     def summary(self) -> dict[str, Any]:
-        """The numbers. exceedance_s : seconds with a tether longer than it is at that time, but for
-        the seconds after the limit itself was lowered below it."""
-        over = [r.tether > r.limit * (1.0 + RESOLUTION) and r.mode != "shorten" for r in self.rows]
+        """The numbers. exceedance_s : seconds with a tether longer than it is at that time;
+        shortening_s : the same after the limit itself was lowered below it, until it fits."""
+        long = np.array([r.tether > r.limit * (1.0 + RESOLUTION) for r in self.rows], dtype=bool)
+        lowered = np.array([r.mode == "shorten" for r in self.rows], dtype=bool)
+        over, shortening = long & ~lowered, long & lowered
         steps = np.diff([r.time for r in self.rows], append=self.rows[-1].time if self.rows else 0)
         goals = [a for a in self.arrivals if a.goal != HOME]
         return {
@@ -143,6 +145,7 @@ class Execution:
             "longest_tether": max((r.tether for r in self.rows), default=0.0),
             "tether_length": self.problem.tether_length,
             "exceedance_s": float(np.array(steps)[over].sum()) if self.rows else 0.0,
+            "shortening_s": float(np.array(steps)[shortening].sum()) if self.rows else 0.0,
             "home": bool(self.arrivals and self.arrivals[-1].goal == HOME),
             "tether_free": self.free,
             "repairs": sum(e.done in ("local", "replan", "home") for e in self.entries),

@@ -99,6 +99,7 @@ def reorder(
     mission = mission.checked_waypoints(field).model_copy(update={"camera": None})
     tell("flying the given order")
     before = simulate(mission, scene=scene, field=field)
+    _not_interrupted(before)
     tell("tethers and legs")
     graph, points, start = travel_graph(mission, field, scene_grid=grid_of(mission, scene, field))
     given = [start.index(n) + 1 for n in range(len(mission.waypoints)) if n in start]
@@ -117,10 +118,17 @@ def reorder(
         order = (*candidate, *rest)
         tell("flying the new order")
         run = simulate(_in_order(mission, order), scene=scene, field=field)
+        _not_interrupted(run)
         if _better(run, after):
             best, after = order, run
     full = Mission.model_validate(_in_order(mission, best).model_dump())
     return Ordered(full, best, before, after)
+
+
+def _not_interrupted(run: Run) -> None:
+    """Ctrl-C ends a flight with what there is of it; here it is to end all."""
+    if run.summary["status"] == "interrupted":
+        raise KeyboardInterrupt
 
 
 def _in_order(mission: Mission, order: tuple[int, ...]) -> Mission:

@@ -11,7 +11,6 @@ shortest tour has the free edge, and is the shortest path and twice the surcharg
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
@@ -20,7 +19,7 @@ import numpy.typing as npt
 from netsp.errors import InputError, NetspError
 from netsp.hsignature import reduce
 from netsp.problem import Goal, Problem
-from netsp.result import OPTIMALITY_TOLERANCE, Progress, Result
+from netsp.result import OPTIMALITY_TOLERANCE, OnProgress, Progress, Result
 from netsp.roadmap.paths import TautPaths
 from netsp.roadmap.taut import MAX_CLASSES, TautLegs, TautRoadmap
 from netsp.solution import Status
@@ -60,7 +59,7 @@ class OpenedGraph(TravelGraph):
             return (0, *reversed(order[1:]))
         return order
 
-    def opened(self, result: Result) -> Result:
+    def told(self, result: Result) -> Result:
         """A solver's result on this graph as one about the path from the state."""
         bound = result.lower_bound
         low = None if bound is None else max(0.0, bound - 2.0 * self.surcharge)
@@ -80,12 +79,10 @@ class OpenedGraph(TravelGraph):
             status = Status.FEASIBLE
         return dataclasses.replace(
             result, tour=tour, length=length, lower_bound=low, status=status,
-            walk=None if result.walk is None else walk[1:],
+            walk=walk[1:],
         )  # fmt: skip
 
-    def listener(
-        self, listener: Callable[[Progress], None] | None
-    ) -> Callable[[Progress], None] | None:
+    def telling(self, listener: OnProgress | None) -> OnProgress | None:
         """Tells a listener about the path instead of the tour."""
         if listener is None:
             return None
