@@ -27,6 +27,10 @@ class LimitReachedError(NetspError):
     exit_code = 4
 
 
+class MemoryLimitError(LimitReachedError):
+    """The work would take more memory than there is; the message says what to lower."""
+
+
 class VerificationError(NetspError):
     """A solution failed its independent check."""
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -96,26 +95,3 @@ def relative_gap(length: float | None, bound: float | None) -> float | None:
 def proven(length: float, bound: float) -> bool:
     """Whether the bound proves the length optimal."""
     return length - bound <= OPTIMALITY_TOLERANCE * max(length, 1e-300)
-
-
-class Clock:
-    """Time since the start, and how much of a limit is left."""
-
-    def __init__(self, limit: float | None) -> None:
-        self.start = time.monotonic()
-        self.limit = limit
-
-    @property
-    def elapsed(self) -> float:
-        """Seconds since the start."""
-        return time.monotonic() - self.start
-
-    @property
-    def left(self) -> float:
-        """Seconds left; inf without a limit."""
-        return float("inf") if self.limit is None else self.limit - self.elapsed
-
-    @property
-    def up(self) -> bool:
-        """Whether the limit is reached."""
-        return self.left <= 0.0

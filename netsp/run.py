@@ -10,8 +10,9 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from netsp.clock import Clock, TimeLimit
 from netsp.errors import InputError, LimitReachedError
-from netsp.result import Clock, OnProgress, Progress, Result, proven
+from netsp.result import OnProgress, Progress, Result, proven
 from netsp.solution import Status
 from netsp.travel import TravelGraph
 
@@ -32,12 +33,12 @@ class Run:
     def __init__(
         self,
         graph: TravelGraph,
-        time_limit: float | None = None,
+        time_limit: TimeLimit = None,
         iteration_limit: int | None = None,
         on_progress: OnProgress | None = None,
     ) -> None:
         self.graph = graph
-        self.clock = Clock(time_limit)
+        self.clock = Clock.of(time_limit)
         self.iterations = 0
         self.iteration_limit = math.inf if iteration_limit is None else iteration_limit
         self.on_progress = on_progress

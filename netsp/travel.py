@@ -10,6 +10,7 @@ Solvers see this class and nothing beneath it.
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Protocol
@@ -57,6 +58,7 @@ class TravelGraph:
     signatures : V words, that of the tether at each vertex.
     tethers : (V,) taut tether lengths in 3D.
     roadmap : name of the roadmap it came from.
+    least_left_out : no class that is not a vertex has a shorter tether; inf if none is left out.
     legs_s : seconds spent measuring legs so far.
     start : vertex of the state that tours start from (`netsp.roadmap.opened`), None for the base.
     start_tether : (n, 3) the tether that is out at the start.
@@ -73,11 +75,13 @@ class TravelGraph:
         legs: Legs,
         roadmap: str = "custom",
         ways: Callable[[bool, Callable[[], None]], Ways] | None = None,
+        least_left_out: float = math.inf,
     ) -> None:
         self.cluster: Ints = np.asarray(cluster, dtype=np.int64)
         self.signatures = tuple(signatures)
         self.tethers: Floats = np.asarray(tethers, dtype=float)
         self.roadmap = roadmap
+        self.least_left_out = least_left_out
         self.legs_s = 0.0
         self._legs = legs
         self._costs: Floats | None = None

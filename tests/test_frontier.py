@@ -14,7 +14,7 @@ from netsp.lns import Instance, Search
 from netsp.mip.flows import min_cuts
 from netsp.mip.solve import MipRun
 from netsp.mip.subtours import branches
-from netsp.result import Clock
+from netsp.clock import Clock
 from netsp.roadmap.slits import _taut, build_slits, slit_lengths
 from netsp.roadmap.taut import TautRoadmap
 from tests.brute import brute_tour

@@ -8,9 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.chance import seeded
+from netsp.clock import Clock
 from netsp.lns.layers import Instance, best_classes
 from netsp.lns.ruin import descend, ruin_and_recreate, two_opt
-from netsp.result import Clock
 
 Ints = npt.NDArray[np.int64]
 

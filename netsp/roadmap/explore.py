@@ -1,9 +1,10 @@
 """Enumeration of taut paths by depth-first search over the tangent graph, guided by words.
 
 One kernel serves two questions. *Which classes reach a goal within the tether?* — the trie of words
-grows as the search goes, holding the non-looping words. *How long are the legs between given
-classes?* — the trie is given, holding the wanted words and their prefixes. These are the trie's
-*core*. Each taut path is generated once, and in its class it is the only one (docs/theory.md).
+grows as the search goes, holding all words, or the non-looping ones. *How long are the legs between
+given classes?* — the trie is given, holding the wanted words and their prefixes. These are the
+trie's *core*. Each taut path is generated once, and in its class it is the only one
+(docs/theory.md).
 
 A ray that passes through another obstacle can be crossed and crossed back by one taut path, so the
 word on the way may leave the core for a while. Such *pending* letters are followed exactly as long
@@ -15,11 +16,13 @@ letters).
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+from netsp.clock import NEVER, Flag
 from netsp.geometry import more_rows
 from netsp.roadmap.tangents import TangentGraph
 
@@ -31,6 +34,9 @@ SAME = 1e4
 """Two arrivals at a directed arc with one word are one path when their lengths agree to this many
 margins (1e-6 of the size). Where outlines touch from inside, hopping between them and back takes no
 length but rounding; less tolerance would let that go on for ever."""
+
+GIVEN, NON_LOOPING, ALL = range(3)
+"""Which words may join the trie: none but those given, those that do not loop, or all."""
 
 PARENT, LETTER, CHILD, SIBLING, CORE = range(5)
 """Columns of a trie's nodes. SIBLING chains the children of one parent."""
@@ -69,11 +75,12 @@ class Trie:
 
     def word(self, node: int) -> tuple[int, ...]:
         """The word of a node."""
-        if node == 0:
-            return ()
-        if node not in self.words:
-            parent, letter = self.nodes[node, :2]
-            self.words[node] = (*self.word(int(parent)), int(letter))
+        above = [node]
+        while above[-1] and above[-1] not in self.words:
+            above.append(int(self.nodes[above[-1], PARENT]))
+        self.words.setdefault(0, ())
+        for parent, child in pairwise(above[::-1]):
+            self.words[child] = (*self.words[parent], int(self.nodes[child, LETTER]))
         return self.words[node]
 
 
@@ -145,7 +152,7 @@ def _in_box(a, x, y, pending, margin):
 
 
 @njit(cache=True, nogil=True)
-def _walk(node, lo, hi, x, y, letters, trie, limit, size, grow, pending, margin):
+def _walk(node, lo, hi, x, y, letters, trie, limit, size, rule, pending, margin):
     """The trie node after the letters lo … hi on the way to a bend at (x, y), made where it may
     exist; -1 if no wanted word can follow. Returns node, size."""
     for k in range(lo, hi):
@@ -155,8 +162,8 @@ def _walk(node, lo, hi, x, y, letters, trie, limit, size, grow, pending, margin)
             continue
         c = trie_child(node, a, trie)
         if c < 0:
-            joins = grow and trie[node, CORE] == 1
-            if joins:
+            joins = rule != GIVEN and trie[node, CORE] == 1
+            if joins and rule == NON_LOOPING:
                 v = node
                 while v > 0:
                     if trie[v, LETTER] == a:
@@ -178,13 +185,17 @@ def _walk(node, lo, hi, x, y, letters, trie, limit, size, grow, pending, margin)
 @njit(cache=True, nogil=True)
 def explore(
     source, start, target, length, ends, first, turn, gap, letters, segment_row, arrival_row,
-    gap_row, radius, arc_nodes, pending, margin, longest, trie, limit, size, grow, keep, cap,
+    gap_row, radius, arc_nodes, pending, margin, longest, trie, limit, size, rule, keep, cap,
+    rest, aim, within, most, stop,
 ):  # fmt: skip
     """All taut paths from node `source` whose words stay in (or pend from) the core.
 
-    longest : most letters that one step can write. grow : whether new non-looping words join the
-    core. keep : whether to keep the search tree, so that paths can be written out. cap : most
-    states to visit.
+    longest : most letters that one step can write. rule : which new words join the core. keep :
+    whether to keep the search tree, so that paths can be written out. cap : most states to visit.
+    rest : per tangent, the least length from its end to where the search is going (0 where it goes
+    everywhere). aim : the one point asked for, -1 for all. within : per point, the longest path
+    that is reported; most : so many reports end the search. stop : ends it when its first number is
+    not 0.
 
     Returns trie, limit, size; per hit (goal point, trie node, state, departure) and (length, angle
     slid before the departure); the tree as (parent state, departure) and angle slid; whether the
@@ -217,7 +228,7 @@ def explore(
         if not keep:
             count = top
         visited += 1
-        if visited > cap:
+        if visited > cap or hits >= most or stop[0] != 0:
             return (trie, limit, size), (h_i[:hits], h_f[:hits]), (s_i[:count], s_f[:count]), True
         if start[node] == start[node + 1]:
             continue
@@ -232,17 +243,19 @@ def explore(
             reached = here + length[e]
             x, y = ends[e, 2], ends[e, 3]
             w, size = _walk(
-                t, segment_row[e, 0], segment_row[e, 1], x, y, letters, trie, limit, size, grow,
+                t, segment_row[e, 0], segment_row[e, 1], x, y, letters, trie, limit, size, rule,
                 pending, margin,
             )  # fmt: skip
             goal = target[e]
-            if w >= 0 and reached <= limit[w]:
+            if w >= 0 and reached + rest[e] <= limit[w]:
                 if goal >= arc_nodes:
-                    if trie[w, CORE] == 1:
+                    point = goal - arc_nodes
+                    asked = (aim < 0 or point == aim) and reached <= within[point]
+                    if trie[w, CORE] == 1 and asked:
                         if hits == len(h_i):
                             h_i = more_int_rows(h_i)
                             h_f = more_rows(h_f)
-                        h_i[hits, 0], h_i[hits, 1] = goal - arc_nodes, w
+                        h_i[hits, 0], h_i[hits, 1] = point, w
                         h_i[hits, 2], h_i[hits, 3] = sid, e
                         h_f[hits, 0], h_f[hits, 1] = reached, slid
                         hits += 1
@@ -271,7 +284,7 @@ def explore(
                             slots = len(seen_key)
                         w, size = _walk(
                             w, arrival_row[e, 0], arrival_row[e, 1], ends[f, 0], ends[f, 1],
-                            letters, trie, limit, size, grow, pending, margin,
+                            letters, trie, limit, size, rule, pending, margin,
                         )  # fmt: skip
                         if w >= 0:
                             if count == len(s_i) or top == len(stack):
@@ -290,7 +303,7 @@ def explore(
             following = e + 1 if e + 1 < start[node + 1] else start[node]
             t, size = _walk(
                 t, gap_row[e, 0], gap_row[e, 1], ends[following, 0], ends[following, 1], letters,
-                trie, limit, size, grow, pending, margin,
+                trie, limit, size, rule, pending, margin,
             )  # fmt: skip
             if t < 0:
                 break
@@ -348,17 +361,31 @@ def run_explore(
     trie: Trie,
     *,
     margin: float,
-    grow: bool = False,
+    rule: int = GIVEN,
     keep: bool = False,
     cap: int | None = None,
+    toward: tuple[int, Floats] | None = None,
+    within: Floats | None = None,
+    most: int | None = None,
+    stop: Flag = NEVER,
 ) -> Found:
-    """Run the kernel from point `source`; updates the trie."""
+    """Run the kernel from point `source`; updates the trie.
+
+    toward : a point, and per tangent the least length from its end to that point: only paths to it
+    are sought. within : (points,) longest path to each that counts. most : hits, about. stop : of a
+    clock.
+    """
+    no_limit = np.iinfo(np.int64).max
+    aim, rest = toward or (-1, np.zeros(len(graph.target)))
+    if within is None:
+        within = np.full(len(graph.points), np.inf)
     (trie.nodes, trie.limit, trie.size), (h_i, h_f), (s_i, s_f), capped = explore(
         graph.point_node(source), graph.start, graph.target, graph.length, graph.ends,
         graph.first, graph.turn, graph.gap, graph.letters, graph.segment_row, graph.arrival_row,
         graph.gap_row, graph.radius, 2 * len(graph.arcs), graph.pending, margin,
-        graph.longest_step, trie.nodes, trie.limit, trie.size, grow, keep,
-        np.iinfo(np.int64).max if cap is None else cap,
+        graph.longest_step, trie.nodes, trie.limit, trie.size, rule, keep,
+        no_limit if cap is None else cap, rest, aim, within, no_limit if most is None else most,
+        stop,
     )  # fmt: skip
     return Found(
         h_i[:, 0],

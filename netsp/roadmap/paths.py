@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -14,13 +15,10 @@ from netsp.hsignature import Word
 from netsp.problem import Problem
 from netsp.roadmap.explore import Trie, run_explore
 from netsp.roadmap.outline import Outline, build_outline
-from netsp.roadmap.tangents import TangentGraph, build_tangents
+from netsp.roadmap.shortest import ContactGraph
+from netsp.roadmap.tangents import ARC_STEP, TangentGraph, build_tangents
 
 Floats = npt.NDArray[np.float64]
-
-ARC_STEP = math.radians(3.0)
-"""Arcs are drawn as circumscribed chords of at most this turn: 0.023 % longer than the arc."""
-
 
 class TautPaths:
     """Taut paths between the base (point 0) and the goals (points 1 …) of a problem.
@@ -38,6 +36,11 @@ class TautPaths:
         # what rounding and the extra growth of obstacles can add to a length
         self.margin = 100.0 * self.outline.margin
         self._z = problem.points[:, 2]
+
+    @cached_property
+    def contacts(self) -> ContactGraph:
+        """Shortest paths in any class over the same tangents."""
+        return ContactGraph(self.outline, self.tangents)
 
     def length(self, a: int, b: int, word: Word) -> float:
         """3D length of the taut path of a word from point a to point b."""

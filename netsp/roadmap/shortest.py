@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -13,8 +13,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from netsp.roadmap.outline import Outline
-from netsp.roadmap.paths import ARC_STEP
-from netsp.roadmap.tangents import build_tangents
+from netsp.roadmap.tangents import ARC_STEP, TangentGraph, build_tangents
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -30,15 +29,23 @@ class ShortestPaths(Protocol):
         """(k, 2) polyline of the path from the source to a target along a tree."""
 
 
+class Rest(NamedTuple):
+    """Shortest lengths to a point. source : from the base. to_end : (e,) from the end of every
+    tangent."""
+
+    source: float
+    to_end: Floats
+
+
 class ContactGraph:
     """Exact shortest paths: tangents join contact points across free space, arcs along the outline.
 
     Nodes 0 … points-1 are the outline's points (base, goals); then two for every tangent.
     """
 
-    def __init__(self, outline: Outline) -> None:
+    def __init__(self, outline: Outline, tangents: TangentGraph | None = None) -> None:
         self.outline = outline
-        t = self.tangents = build_tangents(outline, np.inf)
+        t = self.tangents = build_tangents(outline, np.inf) if tangents is None else tangents
         arcs, points = len(t.arcs), len(t.points)
         self.points = points
         edges = len(t.target)
@@ -79,6 +86,17 @@ class ContactGraph:
         rows = np.arange(self.points) if sources is None else np.asarray(sources)
         found = dijkstra(self._graph, directed=False, indices=rows)
         return np.asarray(found[:, : self.points])
+
+    def rest(self, goal: int) -> Rest:
+        """What is left to a point from the base and from the end of every tangent."""
+        found = dijkstra(self._graph, directed=False, indices=goal)
+        ends = np.where(
+            self.tangents.target >= 2 * len(self.tangents.arcs),
+            self.tangents.target - 2 * len(self.tangents.arcs),
+            self.points + 2 * np.arange(len(self.tangents.target)) + 1,
+        )
+        # a rounding less, so that it is never more than what is left
+        return Rest(float(found[0]), np.asarray(found[ends]) * (1.0 - 1e-12))
 
     def tree(self, source: int) -> tuple[Floats, Ints]:
         """Length to every node and the node before it."""

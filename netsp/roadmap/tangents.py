@@ -22,6 +22,9 @@ from netsp.roadmap.outline import Outline
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
+ARC_STEP = math.radians(3.0)
+"""Arcs are drawn as circumscribed chords of at most this turn: 0.023 % longer than the arc."""
+
 ANGLE_TOLERANCE = 1e-7
 """A departure this little before the arrival counts as straight on (radians)."""
 

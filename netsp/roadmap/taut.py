@@ -8,24 +8,26 @@ else; obstacles are vertical, so a 3D length is ``hypot(planar taut length, dz)`
 
 from __future__ import annotations
 
-import math
 import os
-import time
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from netsp.errors import InfeasibleError, InputError, LimitReachedError, NetspError
+from netsp.clock import NEVER, Clock, Flag, TimeLimit
+from netsp.errors import InputError, LimitReachedError, NetspError
 from netsp.hsignature import Word, concatenate, invert
+from netsp.memory import ask
 from netsp.problem import Problem
+from netsp.roadmap.classes import TetherTree, find_classes
 from netsp.roadmap.explore import (
+    ALL,
     CORE,
     LETTER,
+    NON_LOOPING,
     PARENT,
     Trie,
     add_child,
@@ -35,7 +37,6 @@ from netsp.roadmap.explore import (
     trie_child,
 )
 from netsp.roadmap.paths import TautPaths
-from netsp.roadmap.reach import explain_unreached
 from netsp.roadmap.slits import Slits, build_slits, slit_lengths
 from netsp.roadmap.ways import taut_ways
 from netsp.travel import TravelGraph
@@ -48,61 +49,59 @@ MAX_CLASSES = 20_000
 """Default for the most augmented goals a travel graph may have. All legs of so many would take
 3 GiB; solvers that bound and eliminate first measure a small part of them."""
 
-STATES_PER_CLASS = 200
+RULES = {"all": ALL, "non-looping": NON_LOOPING}
+"""Which classes a roadmap holds, by name."""
 
 UNTIMED = 250
 """Legs among so few vertices are measured whatever the time: the length of a tour, say."""
 
 
-@dataclass(frozen=True)
-class TetherTree:
-    """Tethers as paths in a tree of bends, rooted at the base.
-
-    last : (V,) last bend of each vertex's tether. parent, length : (bends,) the bend before (-1 at
-    the root), and the length of tether up to the bend.
-    """
-
-    last: Ints
-    parent: Ints
-    length: Floats
-
-    @cached_property
-    def depth(self) -> Ints:
-        """(bends,) bends before each; a bend comes after its parent in the arrays."""
-        depth = np.zeros(len(self.parent), dtype=np.int64)
-        for k in range(1, len(depth)):
-            depth[k] = depth[self.parent[k]] + 1
-        return depth
-
-
 class TautRoadmap:
     """Classes and legs of one problem.
+
+    classes : ``all`` whose taut tether fits, or ``non-looping``, the rule of the 2017 paper, which
+        drops some of them (`netsp.hsignature.is_looping`; docs/theory.md, fact 7).
+    max_classes : when there are more, the shortest of every goal are kept, about as many of each.
+    time_limit : seconds, or the clock of the run. When it ends while classes are sought, those
+        found till then are kept; when it ends while legs are measured, `lengths` raises.
+
+    Attributes
+    ----------
+    complete : whether every class is here.
+    least_left_out : no class that is not here has a shorter tether; inf if it is complete.
 
     Raises
     ------
     InfeasibleError : a goal that no taut tether reaches; names it and the tether that would do.
-    InputError : more classes than `max_classes`.
-    LimitReachedError : `time_limit` seconds were up while legs were measured.
+    InputError : an unknown rule, a bad number of classes.
     """
 
     def __init__(
         self,
         problem: Problem,
         *,
+        classes: str = "all",
         max_classes: int = MAX_CLASSES,
-        time_limit: float | None = None,
+        time_limit: TimeLimit = None,
     ) -> None:
-        if max_classes < 1:
+        if not isinstance(max_classes, (int, np.integer)) or max_classes < 1:
             raise InputError(f"max_classes: expected a positive whole number, got {max_classes!r}")
+        if classes not in RULES:
+            raise InputError(
+                f"classes: unknown {classes!r}; expected one of {', '.join(RULES)}"
+            )
         self.problem = problem
+        self.clock = Clock.of(time_limit)
         self.paths = TautPaths(problem)
         self.outline, self.tangents = self.paths.outline, self.paths.tangents
         self._margin = self.paths.margin
         self._z = problem.points[:, 2]
-        self.cluster, self.signatures, self.planar, tree = self._classes(max_classes)
+        found = find_classes(self.paths, RULES[classes], int(max_classes), self.clock)
+        self.cluster, self.signatures, self.planar = found.cluster, found.signatures, found.planar
+        self.complete, self.least_left_out = found.complete, found.least_left_out
         self.tethers: Floats = np.hypot(self.planar, self._z[self.cluster] - self._z[0])
         self.legs = TautLegs(
-            self.paths, self.cluster, self.signatures, self.planar, tree, time_limit
+            self.paths, self.cluster, self.signatures, self.planar, found.tree, self.clock
         )
 
     def travel_graph(self) -> TravelGraph:
@@ -114,55 +113,16 @@ class TautRoadmap:
             self.legs,
             roadmap="taut",
             ways=partial(taut_ways, self.problem),
+            least_left_out=self.least_left_out,
         )
-
-    # classes
-
-    def _classes(self, max_classes: int) -> tuple[Ints, list[Word], Floats, TetherTree]:
-        """Clusters, words, planar lengths and tether tree of all admissible augmented goals, base
-        first."""
-        limit = self.problem.tether_length + self._margin
-        trie = Trie.root(limit)
-        found = run_explore(
-            self.tangents,
-            0,
-            trie,
-            grow=True,
-            keep=True,
-            margin=self.outline.margin,
-            cap=max(1_000_000, STATES_PER_CLASS * max_classes),
-        )
-        goal, word, length, capped = found.goal, found.word, found.length, found.capped
-        reach = np.hypot(length, self._z[goal] - self._z[0])
-        admissible = (goal > 0) & (reach <= limit)
-        best: dict[tuple[int, int], tuple[float, int]] = {}
-        for k in np.flatnonzero(admissible):
-            key = (int(goal[k]), int(word[k]))
-            found_here = (float(length[k]), int(found.state[k]))
-            best[key] = min(best.get(key, (math.inf, 0)), found_here)
-        if capped or len(best) > max_classes:
-            count = f"{len(best)} classes so far" if capped else f"{len(best)} classes"
-            raise InputError(
-                f"tether_length: {self.problem.tether_length:g} admits too many homotopy classes "
-                f"({count}, limit {max_classes}); lower tether_length or raise max_classes"
-            )
-        missing = sorted(set(range(1, len(self._z))) - {g for g, _ in best})
-        if missing:
-            raise InfeasibleError(explain_unreached(self.problem, self.outline, missing))
-        order = sorted(best, key=lambda k: (k[0], best[k][0], trie.word(k[1])))
-        cluster = np.array([0, *(g for g, _ in order)], dtype=np.int64)
-        words: list[Word] = [(), *(trie.word(w) for _, w in order)]
-        planar = np.array([0.0, *(best[k][0] for k in order)])
-        last = np.array([0, *(best[k][1] for k in order)], dtype=np.int64)
-        return cluster, words, planar, TetherTree(last, found.tree[:, 3], found.tree_length)
 
 
 class TautLegs:
     """Exact legs between given augmented goals. Satisfies `netsp.travel.Legs`.
 
     cluster, signatures, planar : goal (0 is the base), word and planar taut tether length of each
-    vertex. tree : where their tethers part, if known. time_limit : seconds from now after which
-    `lengths` raises LimitReachedError.
+    vertex. tree : where their tethers part, if known. time_limit : seconds from now, or a clock,
+    after which `lengths` raises LimitReachedError.
     """
 
     def __init__(
@@ -172,7 +132,7 @@ class TautLegs:
         signatures: Sequence[Word],
         planar: Floats,
         tree: TetherTree | None = None,
-        time_limit: float | None = None,
+        time_limit: TimeLimit = None,
     ) -> None:
         self.paths, self.cluster, self.planar = paths, cluster, planar
         self.signatures = list(signatures)
@@ -180,7 +140,7 @@ class TautLegs:
         self._slits: Slits | None = None
         nothing = np.zeros(1, dtype=np.int64)
         self._tree = tree or TetherTree(np.zeros_like(cluster), nothing - 1, np.zeros(1))
-        self._deadline = math.inf if time_limit is None else time.monotonic() + time_limit
+        self._clock = Clock.of(time_limit)
 
     def lengths(self, vertices: Ints, asked: Bools | None = None) -> Floats:
         """(k, k) 3D leg lengths among the given vertices; inf within a cluster, and where `asked`
@@ -191,6 +151,13 @@ class TautLegs:
         """
         vertices = np.asarray(vertices, dtype=np.int64)
         cluster = self.cluster[vertices]
+        ask(
+            2.0 * 8.0 * len(vertices) ** 2,
+            f"legs between {len(vertices)} homotopy classes",
+            "lower tether_length or max_classes",
+        )
+        # what takes a fraction of a second is measured all the same, or there would be no tour
+        stop = self._clock.flag if len(vertices) > UNTIMED else NEVER
         out = np.full((len(vertices), len(vertices)), np.inf)
         flat = [np.array(self.signatures[v], dtype=np.int64) for v in vertices]
         row = np.concatenate([[0], np.cumsum([len(w) for w in flat])]).astype(np.int64)
@@ -204,28 +171,26 @@ class TautLegs:
         def measure(g: int) -> None:
             here = np.flatnonzero(cluster == g)
             there = np.flatnonzero(cluster > g)
-            if len(there) == 0 or self._late(len(vertices)):
+            if len(there) == 0 or stop[0]:
                 return
             if g == 0:
                 block = np.broadcast_to(planar[there], (len(here), len(there)))
             else:
-                block = self._legs_from(g, here, there, asked, letters, row, planar, cluster, last)
+                block = self._legs_from(
+                    g, here, there, asked, letters, row, planar, cluster, last, stop
+                )
             block = np.hypot(block, (self._z[g] - self._z[cluster[there]])[None, :])
             out[np.ix_(here, there)] = block
             out[np.ix_(there, here)] = block.T
 
         with ThreadPoolExecutor(os.cpu_count()) as pool:
             list(pool.map(measure, goals.tolist()))
-        if self._late(len(vertices)):
+        if stop[0]:
             raise LimitReachedError(
                 f"time limit reached while measuring the legs between {len(vertices)} homotopy "
                 "classes; lower tether_length or raise the limit"
             )
         return out
-
-    def _late(self, vertices: int) -> bool:
-        """Whether time is up; what takes a fraction of a second is measured all the same."""
-        return vertices > UNTIMED and time.monotonic() > self._deadline
 
     def _legs_from(
         self,
@@ -238,6 +203,7 @@ class TautLegs:
         planar: Floats,
         cluster: Ints,
         last: Ints,
+        stop: Flag,
     ) -> Floats:
         """(len(here), len(there)) planar lengths of all legs from the classes of goal g."""
         nodes, limit, size, head, entry_goal, entry_next, pair = _wanted(
@@ -260,7 +226,10 @@ class TautLegs:
             g,
             Trie(nodes, limit, size),
             margin=self.paths.outline.margin,
+            stop=stop,
         )
+        if hits.capped:  # the time is up; the caller says so
+            return np.full((len(here), len(there)), np.inf)
         found = _match(
             hits.goal, hits.word, hits.length, head[:size], entry_goal, entry_next, len(entry_goal)
         )

@@ -1,0 +1,141 @@
+"""One clock for a whole run, which compiled loops can hear.
+
+A compiled loop cannot look at the time, and Python cannot interrupt it. So every clock has a `flag`,
+an array of one number that a watching thread sets to 1 when the time is up; loops that may last look
+at it now and then and end with what they have.
+"""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+import math
+import threading
+import time
+from collections.abc import Callable
+from typing import TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from netsp.errors import LimitReachedError
+
+Flag = npt.NDArray[np.int64]
+T = TypeVar("T")
+
+NEVER: Flag = np.zeros(1, dtype=np.int64)
+"""The flag of a clock without a limit."""
+
+
+class Clock:
+    """Time since the start, and how much of a limit is left.
+
+    limit : seconds from now, None for no limit. within : a clock that this one may not outlast.
+    """
+
+    def __init__(self, limit: float | None = None, *, within: Clock | None = None) -> None:
+        self.start = time.monotonic()
+        self.deadline = math.inf if limit is None else self.start + limit
+        if within is not None:
+            self.deadline = min(self.deadline, within.deadline)
+        self._flag: Flag | None = None
+
+    @classmethod
+    def of(cls, limit: TimeLimit) -> Clock:
+        """A clock that starts now, from seconds, a clock that it may not outlast, or no limit."""
+        return cls(within=limit) if isinstance(limit, Clock) else cls(limit)
+
+    @property
+    def limit(self) -> float | None:
+        """Seconds from the start to the deadline; None without a limit."""
+        return None if self.deadline == math.inf else self.deadline - self.start
+
+    @property
+    def elapsed(self) -> float:
+        """Seconds since the start."""
+        return time.monotonic() - self.start
+
+    @property
+    def left(self) -> float:
+        """Seconds left; inf without a limit."""
+        return self.deadline - time.monotonic()
+
+    @property
+    def up(self) -> bool:
+        """Whether the limit is reached."""
+        return self.left <= 0.0
+
+    @property
+    def flag(self) -> Flag:
+        """(1,) 0 until the time is up, then 1; for compiled loops."""
+        if self._flag is None:
+            self._flag = np.zeros(1, dtype=np.int64)
+            if self.up:
+                self._flag[0] = 1
+            elif self.deadline < math.inf:
+                _WATCH.add(self.deadline, self._flag)
+        return self._flag
+
+    def check(self, doing: str) -> None:
+        """Raise LimitReachedError, which says what was being done, when the time is up."""
+        if self.up:
+            raise LimitReachedError(f"time limit reached while {doing}")
+
+    def interruptible(self, call: Callable[[], T]) -> T:
+        """Make a call that hears the flag, in a thread, so that Ctrl-C ends it at once."""
+        outcome: list[T] = []
+        failure: list[BaseException] = []
+
+        def body() -> None:
+            try:
+                outcome.append(call())
+            except BaseException as error:
+                failure.append(error)
+
+        thread = threading.Thread(target=body, daemon=True)
+        flag = self.flag
+        thread.start()
+        try:
+            while thread.is_alive():
+                thread.join(0.2)
+        except KeyboardInterrupt:
+            flag[0] = 1
+            thread.join()
+            raise
+        if failure:
+            raise failure[0]
+        return outcome[0]
+
+
+TimeLimit = float | Clock | None
+"""Seconds, or the clock of the run that the work belongs to, or no limit."""
+
+
+class _Watch:
+    """The one thread that sets flags when their time comes."""
+
+    def __init__(self) -> None:
+        self._queue: list[tuple[float, int, Flag]] = []
+        self._count = itertools.count()
+        self._changed = threading.Condition()
+        self._thread: threading.Thread | None = None
+
+    def add(self, deadline: float, flag: Flag) -> None:
+        with self._changed:
+            heapq.heappush(self._queue, (deadline, next(self._count), flag))
+            if self._thread is None or not self._thread.is_alive():
+                self._thread = threading.Thread(target=self._run, daemon=True, name="netsp-clock")
+                self._thread.start()
+            self._changed.notify()
+
+    def _run(self) -> None:
+        with self._changed:
+            while True:
+                while self._queue and self._queue[0][0] <= time.monotonic():
+                    heapq.heappop(self._queue)[2][0] = 1
+                # a day at most, which every platform's wait can hold
+                wait = self._queue[0][0] - time.monotonic() if self._queue else 86400.0
+                self._changed.wait(min(max(wait, 0.0), 86400.0))
+
+
+_WATCH = _Watch()

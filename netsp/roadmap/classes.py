@@ -1,0 +1,221 @@
+"""Which classes reach each goal: all whose taut tether fits, or the shortest where they are too many.
+
+All classes come from one search from the base up to the tether length. Thin obstacles or a long
+tether can make their number explode. Then each goal is searched for by itself, guided by the exact
+shortest length that is left to it, up to a length that its own number of classes sets: the classes
+found are its shortest, and no class left out has a shorter tether than the longest of them.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from netsp.clock import Clock
+from netsp.errors import InfeasibleError
+from netsp.hsignature import Word
+from netsp.roadmap.explore import Found, Trie, run_explore
+from netsp.roadmap.paths import TautPaths
+from netsp.roadmap.reach import explain_unreached
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+STATES_PER_CLASS = 200
+"""So many states of the search for every class that may be kept, then the search is given up."""
+
+FIRST_EXCESS, GROWTH, SHRINK = 1 / 64, 4.0, 16.0
+"""A goal by itself is first searched for with this share of the tether beyond what it needs at
+least; the share grows while there are too few classes and shrinks while there are too many."""
+
+STEPS = 16
+"""Searches for one goal at most."""
+
+SHARE = 0.5
+"""Of the time, the part that may go into classes before a roadmap makes do with some."""
+
+
+@dataclass(frozen=True)
+class TetherTree:
+    """Tethers as paths in a tree of bends, rooted at the base.
+
+    last : (V,) last bend of each vertex's tether. parent, length : (bends,) the bend before (-1 at
+    the root), and the length of tether up to the bend.
+    """
+
+    last: Ints
+    parent: Ints
+    length: Floats
+
+    @cached_property
+    def depth(self) -> Ints:
+        """(bends,) bends before each; a bend comes after its parent in the arrays."""
+        depth = np.zeros(len(self.parent), dtype=np.int64)
+        for k in range(1, len(depth)):
+            depth[k] = depth[self.parent[k]] + 1
+        return depth
+
+
+@dataclass(frozen=True)
+class Classes:
+    """Augmented goals, base first: cluster (V,), word and planar tether length of each.
+
+    tree : where the tethers part, None if unknown. least_left_out : no class that is not here has a
+    shorter tether (in space); inf if all are here.
+    """
+
+    cluster: Ints
+    signatures: list[Word]
+    planar: Floats
+    tree: TetherTree | None
+    least_left_out: float = math.inf
+
+    @property
+    def complete(self) -> bool:
+        """Whether every class is here."""
+        return self.least_left_out == math.inf
+
+
+def find_classes(paths: TautPaths, rule: int, most: int, clock: Clock) -> Classes:
+    """The classes of every goal, at most about `most` in all; fewer when the time is up.
+
+    Raises InfeasibleError for a goal that no tether within the limit reaches.
+    """
+    search = _Search(paths, rule, most, Clock(SHARE * clock.left, within=clock))
+    found = search.everything()
+    return found if found is not None else search.shortest()
+
+
+class _Search:
+    def __init__(self, paths: TautPaths, rule: int, most: int, clock: Clock) -> None:
+        self.paths, self.rule, self.most, self.clock = paths, rule, most, clock
+        self.problem = paths.problem
+        points = self.problem.points
+        self.goals = len(points) - 1
+        self.dz = np.abs(points[:, 2] - points[0, 2])
+        self.limit = self.problem.tether_length + paths.margin
+        # a hypotenuse within the limit, and a rounding more
+        self.within = np.sqrt(np.maximum(self.limit**2 - self.dz**2, 0.0)) * (1.0 + 1e-15)
+        self.within[0] = -1.0
+
+    def everything(self) -> Classes | None:
+        """All classes; None if they are too many, or the time is too short."""
+        trie = Trie.root(self.limit)
+        found = self.clock.interruptible(
+            lambda: run_explore(
+                self.paths.tangents, 0, trie, margin=self.paths.outline.margin, rule=self.rule,
+                keep=True, cap=max(1_000_000, STATES_PER_CLASS * self.most),
+                within=self.within, most=4 * self.most + 1000, stop=self.clock.flag,
+            )
+        )  # fmt: skip
+        best = self._best(found)
+        if found.capped or len(best) > self.most:
+            return None
+        missing = sorted(set(range(1, self.goals + 1)) - {g for g, _ in best})
+        if missing:
+            raise InfeasibleError(explain_unreached(self.problem, self.paths.outline, missing))
+        order = sorted(best, key=lambda k: (k[0], best[k][0], trie.word(k[1])))
+        last = np.array([0, *(best[k][1] for k in order)], dtype=np.int64)
+        tree = TetherTree(last, found.tree[:, 3], found.tree_length)
+        rows = [(g, best[g, w][0], trie.word(w)) for g, w in order]
+        return _together(rows, tree, math.inf)
+
+    def shortest(self) -> Classes:
+        """The shortest classes of every goal, about as many of each; at least one, whatever the
+        time."""
+        share = max(1, self.most // self.goals)
+        rows: list[tuple[int, float, Word]] = []
+        left_out = math.inf
+        missing = []
+        for g in range(1, self.goals + 1):
+            own, beyond = self._of_goal(g, share)
+            if not own:
+                missing.append(g)
+            rows += [(g, length, word) for length, word in own]
+            left_out = min(left_out, math.hypot(beyond, self.dz[g]))
+        if missing:
+            raise InfeasibleError(explain_unreached(self.problem, self.paths.outline, missing))
+        return _together(rows, None, left_out)
+
+    def _of_goal(self, g: int, share: int) -> tuple[list[tuple[float, Word]], float]:
+        """The shortest classes of one goal, in order, and the planar length up to which they are
+        all (inf if there are no more within the tether)."""
+        rest = self.paths.contacts.rest(g)
+        least, most = float(rest.source), float(self.within[g])
+        if least > most:
+            return [], math.inf
+        known: list[tuple[float, Word]] = []
+        known_to = 0.0
+        low, high = 0.0, math.inf  # excesses known to give too few, too many
+        excess = FIRST_EXCESS * max(most - least, 0.0) if not self.clock.up else 0.0
+        for _ in range(STEPS):
+            reach = min(least + excess + self.paths.margin, most)
+            found, words = self._within(g, rest.to_end, reach, share)
+            if found is None:
+                high = excess
+                if self.clock.up and known:
+                    break
+                excess = max(low + (high - low) / SHRINK, 0.0)
+                continue
+            known, known_to = words, reach
+            if reach >= most:
+                known_to = math.inf
+                break
+            if len(words) >= share or self.clock.up:
+                break
+            low = excess
+            excess = max(GROWTH * excess, 1e-6 * most)
+            if excess >= high:
+                excess = low + 0.5 * (high - low)
+        if len(known) > share:
+            known_to = min(known_to, known[share - 1][0])
+            known = known[:share]
+        return known, known_to
+
+    def _within(
+        self, g: int, rest: Floats, reach: float, share: int
+    ) -> tuple[Found | None, list[tuple[float, Word]]]:
+        """The classes of a goal up to a planar length; None if there are too many to look at."""
+        trie = Trie.root(reach)
+        within = np.full(self.goals + 1, -1.0)
+        within[g] = reach
+        # the first tether of all is found whatever the time
+        stop = Clock(None).flag if self.clock.up else self.clock.flag
+        found = run_explore(
+            self.paths.tangents, 0, trie, margin=self.paths.outline.margin, rule=self.rule,
+            cap=max(20_000, STATES_PER_CLASS * share), toward=(g, rest), within=within,
+            most=8 * share + 64, stop=stop,
+        )  # fmt: skip
+        if found.capped:
+            return None, []
+        best = self._best(found)
+        rows = sorted((length, trie.word(w)) for (_, w), (length, _) in best.items())
+        return found, rows
+
+    def _best(self, found: Found) -> dict[tuple[int, int], tuple[float, int]]:
+        """Shortest (length, last bend) by (goal, word) among the hits within the tether."""
+        reach = np.hypot(found.length, self.dz[found.goal])
+        rows = np.flatnonzero((found.goal > 0) & (reach <= self.limit))
+        best: dict[tuple[int, int], tuple[float, int]] = {}
+        for goal, word, length, state in zip(
+            found.goal[rows].tolist(), found.word[rows].tolist(), found.length[rows].tolist(),
+            found.state[rows].tolist(), strict=True,
+        ):  # fmt: skip
+            best[goal, word] = min(best.get((goal, word), (math.inf, 0)), (length, state))
+        return best
+
+
+def _together(
+    rows: list[tuple[int, float, Word]], tree: TetherTree | None, left_out: float
+) -> Classes:
+    return Classes(
+        np.array([0, *(g for g, _, _ in rows)], dtype=np.int64),
+        [(), *(word for _, _, word in rows)],
+        np.array([0.0, *(length for _, length, _ in rows)]),
+        tree,
+        left_out,
+    )
