@@ -16,11 +16,12 @@ from typing import Any
 
 import numpy as np
 
+from netsp.clock import Clock, TimeLimit
 from netsp.lns import Instance
 from netsp.lns.solve import solve as search
 from netsp.mip.solve import MipRun
 from netsp.mip.solve import solve as prove
-from netsp.result import Clock, OnProgress, Progress, Result
+from netsp.result import OnProgress, Progress, Result
 from netsp.run import read_params
 from netsp.travel import Floats, TravelGraph
 
@@ -52,7 +53,7 @@ class Params:
 def solve(
     graph: TravelGraph,
     *,
-    time_limit: float | None = None,
+    time_limit: TimeLimit = None,
     iteration_limit: int | None = None,
     rng: np.random.Generator | None = None,
     params: Mapping[str, Any] | None = None,
@@ -65,10 +66,10 @@ def solve(
         rounds = max(500, ROUNDS_PER_GOAL * graph.goal_count)
         run = MipRun(graph, time_limit, iteration_limit, on_progress, rng=rng, search_rounds=rounds)
         return run.solve(chosen.backend, warm_start, walks=graph.goal_count <= FEW_GOALS)
-    clock = Clock(time_limit)
+    clock = Clock.of(time_limit)
     found = search(
         graph,
-        time_limit=None if time_limit is None else SHARE * time_limit,
+        time_limit=Clock(SHARE * clock.left, within=clock) if clock.limit else None,
         iteration_limit=iteration_limit,
         rng=rng,
         warm_start=warm_start,
@@ -85,8 +86,7 @@ def solve(
             on_progress(rows[-1])
 
     over_goals = TravelGraph.from_costs(_between_goals(graph), range(graph.goal_count + 1))
-    left = None if time_limit is None else max(clock.left, 0.1)
-    bound = prove(over_goals, time_limit=left, rng=rng, on_progress=tell).lower_bound
+    bound = prove(over_goals, time_limit=clock, rng=rng, on_progress=tell).lower_bound
     return replace(
         found,
         # the ways are shortest up to rounding

@@ -1,8 +1,8 @@
 """One clock for a whole run, which compiled loops can hear.
 
-A compiled loop cannot look at the time, and Python cannot interrupt it. So every clock has a `flag`,
-an array of one number that a watching thread sets to 1 when the time is up; loops that may last look
-at it now and then and end with what they have.
+A compiled loop cannot look at the time, and Python cannot interrupt it. So every clock has a
+`flag`, an array of one number that a watching thread sets to 1 when the time is up; loops that may
+last look at it now and then and end with what they have.
 """
 
 from __future__ import annotations

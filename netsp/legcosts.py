@@ -9,10 +9,15 @@ from __future__ import annotations
 
 import numpy as np
 
+from netsp.memory import ask
 from netsp.travel import Bools, Floats, Ints, TravelGraph
 
 MEASURE_AT_ONCE = 400
 """So many vertices or fewer are measured altogether: that takes a second at most."""
+
+
+BYTES_PER_LEG = 50.0
+"""Of memory that a proof takes: the values, reduced costs, and what is in between."""
 
 
 class LegCosts:
@@ -31,6 +36,11 @@ class LegCosts:
         if graph.measured or len(graph) <= MEASURE_AT_ONCE:
             self.values = np.array(graph.costs)
             return
+        ask(
+            BYTES_PER_LEG * len(graph) ** 2,
+            f"bounding every tour over {len(graph)} homotopy classes",
+            "lower tether_length or max_classes, or use solver 'lns'",
+        )
         self.values = graph.lower_bounds()
         self.exact = np.zeros(self.values.shape, dtype=bool)
         self.values[0] = self.values[:, 0] = graph.costs_to_base

@@ -24,7 +24,10 @@ def available() -> float:
         free.append(1024.0 * float(rows["MemAvailable"].split()[0]))
     for most, used in (
         ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory.current"),
-        ("/sys/fs/cgroup/memory/memory.limit_in_bytes", "/sys/fs/cgroup/memory/memory.usage_in_bytes"),
+        (
+            "/sys/fs/cgroup/memory/memory.limit_in_bytes",
+            "/sys/fs/cgroup/memory/memory.usage_in_bytes",
+        ),
     ):
         with contextlib.suppress(OSError, ValueError):
             free.append(float(Path(most).read_text()) - float(Path(used).read_text()))
@@ -49,6 +52,6 @@ def ask(size: float, what: str, advice: str) -> None:
     there = SHARE * available()
     if size > there:
         raise MemoryLimitError(
-            f"{what} would take {size / 2**30:.3g} GiB of memory, and {there / 2**30:.3g} GiB can be "
-            f"had; {advice}"
+            f"{what} would take {size / 2**30:.3g} GiB of memory, and {there / 2**30:.3g} GiB can "
+            f"be had; {advice}"
         )

@@ -14,7 +14,7 @@ from netsp.clock import Clock, TimeLimit
 from netsp.errors import InputError, LimitReachedError
 from netsp.result import OnProgress, Progress, Result, proven
 from netsp.solution import Status
-from netsp.travel import TravelGraph
+from netsp.travel import UNTIMED, TravelGraph, least_tethers
 
 P = TypeVar("P")
 
@@ -101,6 +101,24 @@ class Run:
             self.offer([0, int(there[np.argmin(self.graph.costs_among([0, *there])[0, 1:])])])
         self.bound = self.length
         return True
+
+    def start(self) -> None:
+        """Take a first tour before anything that takes long: the goals in the class of least
+        tether, each the nearest to the one before, by the bounds of legs where goals are many."""
+        graph = self.graph
+        if self.tour is not None or graph.measured or len(graph) <= UNTIMED:
+            return
+        core = least_tethers(graph.costs_to_base, graph.cluster, 1)
+        with graph.on_clock(None):  # a few legs; without them there would be nothing to show
+            few = len(core) <= UNTIMED
+            near = graph.costs_among(core) if few else graph.lower_bounds(core)
+            tour, left = [0], np.ones(len(core), dtype=bool)
+            left[0] = False
+            while left.any():
+                k = int(np.argmin(np.where(left, near[tour[-1]], np.inf)))
+                tour.append(k)
+                left[k] = False
+            self.offer(core[tour].tolist())
 
     def raise_bound(self, bound: float) -> None:
         """Take a lower bound if it is better; never above the incumbent."""

@@ -23,11 +23,14 @@ from netsp.problem import (
 
 
 class Status(StrEnum):
-    """What is proven. `OPTIMAL` speaks of the travel graph; with the exact roadmap the travel graph
-    holds every admissible tour of the continuous world. `INVALID` marks the tour of a baseline that
-    is blind to the tether: it entangles obstacles or overstretches the tether."""
+    """What is proven. `OPTIMAL` speaks of the travel graph; with the exact roadmap and all classes
+    the travel graph holds every admissible tour of the continuous world. `OPTIMAL_OF_KEPT` is the
+    shortest tour over the homotopy classes that the roadmap kept, where it had to leave some out:
+    they were too many, or the time was too short. `INVALID` marks the tour of a baseline that is
+    blind to the tether: it entangles obstacles or overstretches the tether."""
 
     OPTIMAL = "optimal"
+    OPTIMAL_OF_KEPT = "optimal_of_kept"
     FEASIBLE = "feasible"
     INFEASIBLE = "infeasible"
     NO_SOLUTION_FOUND = "no_solution_found"
@@ -35,6 +38,10 @@ class Status(StrEnum):
 
 
 _STRICT = ConfigDict(frozen=True, extra="forbid")
+
+
+KeptClasses = Literal["all", "non-looping", "shortest"]
+"""Which homotopy classes a roadmap held."""
 
 
 class ProblemReference(BaseModel):
@@ -69,7 +76,9 @@ class Solution(BaseModel):
     the problem's state to the base; `start_tether` is then the taut tether at its start.
 
     Lengths are in the problem's units. `lower_bound` is a proven bound on every admissible tour,
-    `gap` is (length - lower_bound) / length. Without a tour, `length` and `gap` are None.
+    `gap` is (length - lower_bound) / length. `classes` says which homotopy classes the roadmap
+    held: `all`, `non-looping`, or `shortest`, the shortest of every goal. Without a tour, `length`
+    and `gap` are None.
     `entangled` lists the obstacles (0-based) that the path is wrapped around; only an `invalid`
     tour has any.
     """
@@ -80,6 +89,7 @@ class Solution(BaseModel):
     problem: ProblemReference
     solver: str
     roadmap: str
+    classes: KeptClasses | None = None
     seed: int | None = None
     status: Status
     length: Number | None
@@ -108,6 +118,8 @@ class Solution(BaseModel):
         path = data.pop("path")
         if not self.start_tether:
             del data["start_tether"]
+        if self.classes is None:
+            del data["classes"]
         text = json.dumps(data, indent=1, allow_nan=False, ensure_ascii=False)
         rows = ",\n".join("  " + json.dumps(p, allow_nan=False) for p in path)
         return f'{text[:-2]},\n "path": [\n{rows}\n ]\n}}\n'

@@ -7,13 +7,13 @@ import importlib
 import importlib.metadata
 import inspect
 import platform
-import time
 from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
+from netsp.clock import Clock, TimeLimit
 from netsp.errors import InputError
 from netsp.hsignature import entangled
 from netsp.problem import Problem
@@ -107,7 +107,7 @@ def solve_graph(
     graph: TravelGraph,
     solver: str = DEFAULT_SOLVER,
     *,
-    time_limit: float | None = None,
+    time_limit: TimeLimit = None,
     iteration_limit: int | None = None,
     seed: int = 0,
     params: Mapping[str, Any] | None = None,
@@ -118,7 +118,8 @@ def solve_graph(
 
     Parameters
     ----------
-    time_limit : seconds; the best tour so far is returned when they are up.
+    time_limit : seconds, or the clock of a run that this one is a part of; the best tour so far is
+        returned when it is up.
     iteration_limit : of the solver; each says what one is. Under an iteration limit alone, the same
         seed gives the same answer.
     seed : of the solver's random generator.
@@ -138,15 +139,18 @@ def solve_graph(
     if not isinstance(graph, TravelGraph):
         raise InputError(f"graph: expected a TravelGraph, got {graph!r}")
     tour = None if warm_start is None else _as_tour(warm_start, graph)
-    result = run(
-        graph,
-        time_limit=time_limit,
-        iteration_limit=iteration_limit,
-        rng=np.random.default_rng(_seed(seed)),
-        params=params,
-        warm_start=tour,
-        on_progress=graph.telling(on_progress),
-    )
+    rng = np.random.default_rng(_seed(seed))
+    clock = Clock.of(time_limit)
+    with graph.on_clock(clock):
+        result = run(
+            graph,
+            time_limit=clock,
+            iteration_limit=iteration_limit,
+            rng=rng,
+            params=params,
+            warm_start=tour,
+            on_progress=graph.telling(on_progress),
+        )
     return graph.told(result)
 
 
@@ -167,7 +171,8 @@ def solve(
 
     Parameters
     ----------
-    roadmap_options : for ``taut``: ``max_classes``; for ``prm``: ``samples``, ``shortcut``.
+    roadmap_options : for ``taut``: ``classes``, ``max_classes``; for ``prm``: ``samples``,
+        ``shortcut``.
     time_limit : seconds for the whole call; the best tour so far is returned when it is up.
     iteration_limit : of the solver; each says what one is.
     seed : feeds the solver's random generator, and the sampling of a roadmap that samples.
@@ -191,27 +196,27 @@ def solve(
     if warm_start is not None and warm_start.problem.sha256 != problem.sha256:
         raise InputError("warm_start: it is the solution of another problem (sha256 differs)")
     check_solver(solver, params)  # before the long work
-    begin = time.monotonic()
-    options: dict[str, Any] = {"time_limit": time_limit, **(roadmap_options or {})}
+    clock = Clock(time_limit)
+    options: dict[str, Any] = {"time_limit": clock, **(roadmap_options or {})}
     if roadmap in SEEDED_ROADMAPS:
         options.setdefault("seed", seed)
     graph = travel_graph(problem, roadmap, **options)
-    built = time.monotonic()
+    built = clock.elapsed
     result = solve_graph(
         graph,
         solver,
-        time_limit=None if time_limit is None else max(time_limit - (built - begin), 1e-3),
+        time_limit=clock,
         iteration_limit=iteration_limit,
         seed=seed,
         params=params,
         warm_start=_tour_of(warm_start, graph) if warm_start is not None else None,
         on_progress=on_progress,
     )
-    total = time.monotonic() - begin
+    total = clock.elapsed
     timings = Timings(
-        roadmap_s=round(built - begin, 6),
+        roadmap_s=round(built, 6),
         matrix_s=round(graph.legs_s, 6),
-        solve_s=round(max(total - (built - begin) - graph.legs_s, 0.0), 6),
+        solve_s=round(max(total - built - graph.legs_s, 0.0), 6),
         total_s=round(total, 6),
     )
     return to_solution(problem, graph, result, solver, seed, timings)
@@ -244,6 +249,7 @@ def to_solution(
         problem=ProblemReference(name=problem.name, sha256=problem.sha256),
         solver=solver,
         roadmap=graph.roadmap,
+        classes=graph.classes,
         seed=seed,
         status=result.status,
         length=result.length,
@@ -282,8 +288,8 @@ def _blind_visits(problem: Problem, walked: Trajectory) -> tuple[Visit, ...]:
     )
 
 
-def _check_limits(time_limit: float | None, iteration_limit: int | None) -> None:
-    if time_limit is not None:
+def _check_limits(time_limit: TimeLimit, iteration_limit: int | None) -> None:
+    if time_limit is not None and not isinstance(time_limit, Clock):
         number = isinstance(time_limit, (int, float, np.number)) and time_limit is not True
         if not (number and time_limit > 0):
             raise InputError(

@@ -10,9 +10,11 @@ Solvers see this class and nothing beneath it.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -20,30 +22,43 @@ import numpy.typing as npt
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
+from netsp.clock import Clock
 from netsp.errors import InputError
 from netsp.hsignature import Word
 from netsp.ways import Ways
 
 if TYPE_CHECKING:
     from netsp.result import OnProgress, Result
+    from netsp.solution import KeptClasses
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
 
 
+UNTIMED = 50
+"""Legs among so few vertices, or as many single legs as there are among them, are measured whatever
+the time: the length of a tour, say."""
+
+
 class Legs(Protocol):
     """What a roadmap offers: lengths of legs between vertices, and their paths."""
 
-    def lengths(self, vertices: Ints, asked: Bools | None = None) -> Floats:
+    def lengths(
+        self, vertices: Ints, asked: Bools | None = None, clock: Clock | None = None
+    ) -> Floats:
         """(k, k) symmetric leg lengths among the given vertices; inf within a cluster. Where
-        `asked` (k, k, symmetric) is given and false, anything."""
+        `asked` (k, k, symmetric) is given and false, anything. LimitReachedError when the clock is
+        up before many are measured."""
 
     def to_base(self) -> Floats:
         """(V,) lengths of the legs from the base."""
 
-    def lower_bounds(self, vertices: Ints) -> Floats:
-        """(k, k) lower bounds on the leg lengths, much cheaper than the lengths."""
+    def lower_bounds(
+        self, vertices: Ints, rows: Ints | None = None, clock: Clock | None = None
+    ) -> Floats:
+        """(k, k) lower bounds on the leg lengths, much cheaper than the lengths; with `rows`, only
+        those from so many of the vertices (positions among them)."""
 
     def path(self, u: int, v: int) -> Floats:
         """(n, 3) polyline of the leg from vertex u to vertex v."""
@@ -58,7 +73,9 @@ class TravelGraph:
     signatures : V words, that of the tether at each vertex.
     tethers : (V,) taut tether lengths in 3D.
     roadmap : name of the roadmap it came from.
-    least_left_out : no class that is not a vertex has a shorter tether; inf if none is left out.
+    classes : which homotopy classes the roadmap holds (`Solution.classes`), None if unknown.
+    least_left_out : no class left out for want of time or room has a shorter tether; inf if none
+        is left out.
     legs_s : seconds spent measuring legs so far.
     start : vertex of the state that tours start from (`netsp.roadmap.opened`), None for the base.
     start_tether : (n, 3) the tether that is out at the start.
@@ -75,14 +92,17 @@ class TravelGraph:
         legs: Legs,
         roadmap: str = "custom",
         ways: Callable[[bool, Callable[[], None]], Ways] | None = None,
+        classes: KeptClasses | None = None,
         least_left_out: float = math.inf,
     ) -> None:
         self.cluster: Ints = np.asarray(cluster, dtype=np.int64)
         self.signatures = tuple(signatures)
         self.tethers: Floats = np.asarray(tethers, dtype=float)
         self.roadmap = roadmap
+        self.classes = classes
         self.least_left_out = least_left_out
         self.legs_s = 0.0
+        self.clock: Clock | None = None
         self._legs = legs
         self._costs: Floats | None = None
         self._make_ways = ways
@@ -144,10 +164,19 @@ class TravelGraph:
             return np.asarray(self._costs[np.ix_(chosen, chosen)])
         return self._measured(chosen, asked)
 
+    @contextmanager
+    def on_clock(self, clock: Clock | None) -> Iterator[None]:
+        """While a solver runs, its clock ends the measuring of legs, too (LimitReachedError)."""
+        before, self.clock = self.clock, clock
+        try:
+            yield
+        finally:
+            self.clock = before
+
     def _measured(self, vertices: Ints, asked: Bools | None = None) -> Floats:
         begin = time.monotonic()
         try:
-            return self._legs.lengths(vertices, asked)
+            return self._legs.lengths(vertices, asked, self.clock)
         finally:
             self.legs_s += time.monotonic() - begin
 
@@ -197,13 +226,17 @@ class TravelGraph:
         found = [self._place.get((c, tuple(w)), -1) for c, w in zip(order, words, strict=True)]
         return None if -1 in found else found
 
-    def lower_bounds(self, vertices: npt.ArrayLike | None = None) -> Floats:
+    def lower_bounds(
+        self, vertices: npt.ArrayLike | None = None, rows: npt.ArrayLike | None = None
+    ) -> Floats:
         """(k, k) lower bounds on the leg costs among some vertices (default all), without computing
-        the legs; inf within a cluster."""
+        the legs; inf within a cluster. rows : (r,) positions among the vertices; then (r, k)."""
         chosen = np.arange(len(self)) if vertices is None else np.asarray(vertices, dtype=np.int64)
-        bounds = self._legs.lower_bounds(chosen)
+        some = None if rows is None else np.asarray(rows, dtype=np.int64)
+        bounds = self._legs.lower_bounds(chosen, some, self.clock)
         cluster = self.cluster[chosen]
-        bounds[cluster[:, None] == cluster[None, :]] = np.inf
+        own = cluster if some is None else cluster[some]
+        bounds[own[:, None] == cluster[None, :]] = np.inf
         return bounds
 
     def members(self, cluster: int) -> Ints:
@@ -218,7 +251,9 @@ class TravelGraph:
         """Length of the legs from each vertex to the next."""
         w = np.asarray(walk, dtype=np.int64)
         used, at = np.unique(w, return_inverse=True)
-        among = self.costs_among(used)
+        asked = np.zeros((len(used), len(used)), dtype=bool)
+        asked[at[:-1], at[1:]] = asked[at[1:], at[:-1]] = True
+        among = self.costs_among(used, asked)
         return float(among[at[:-1], at[1:]].sum())
 
     def is_tour(self, tour: Sequence[int]) -> bool:
@@ -237,11 +272,34 @@ class TravelGraph:
 
     def told(self, result: Result) -> Result:
         """A solver's result as callers are to see it."""
-        return result
+        # out to a goal and back in a class that was left out is at least twice its tether
+        return self.within_kept(result, 2.0 * self.least_left_out)
+
+    def within_kept(self, result: Result, otherwise: float) -> Result:
+        """A result over the classes kept as one about all: tours that use a class that was left out
+        are no shorter than `otherwise`."""
+        from netsp.result import proven
+        from netsp.solution import Status
+
+        bound, length = result.lower_bound, result.length
+        if bound is None or otherwise >= bound:
+            return result
+        status = result.status
+        if status is Status.OPTIMAL and length is not None and not proven(length, otherwise):
+            status = Status.OPTIMAL_OF_KEPT
+        return dataclasses.replace(result, lower_bound=otherwise, status=status)
 
     def telling(self, listener: OnProgress | None) -> OnProgress | None:
         """A listener to a solver's progress, told what callers are to see."""
         return listener
+
+
+def least_tethers(tethers: Floats, cluster: Ints, classes: int) -> Ints:
+    """Vertices of the shortest tethers of every cluster, at most so many of each, in order."""
+    order = np.lexsort((tethers, cluster))
+    grouped = cluster[order]
+    rank = np.arange(len(order)) - np.searchsorted(grouped, grouped)
+    return np.asarray(np.sort(order[rank < classes]), dtype=np.int64)
 
 
 class _PartOfLegs:
@@ -250,14 +308,20 @@ class _PartOfLegs:
     def __init__(self, graph: TravelGraph, chosen: Ints) -> None:
         self.graph, self.chosen = graph, chosen
 
-    def lengths(self, vertices: Ints, asked: Bools | None = None) -> Floats:
-        return self.graph.costs_among(self.chosen[vertices], asked)
+    def lengths(
+        self, vertices: Ints, asked: Bools | None = None, clock: Clock | None = None
+    ) -> Floats:
+        with self.graph.on_clock(clock or self.graph.clock):
+            return self.graph.costs_among(self.chosen[vertices], asked)
 
     def to_base(self) -> Floats:
         return np.asarray(self.graph.costs_to_base[self.chosen])
 
-    def lower_bounds(self, vertices: Ints) -> Floats:
-        return self.graph.lower_bounds(self.chosen[vertices])
+    def lower_bounds(
+        self, vertices: Ints, rows: Ints | None = None, clock: Clock | None = None
+    ) -> Floats:
+        with self.graph.on_clock(clock or self.graph.clock):
+            return self.graph.lower_bounds(self.chosen[vertices], rows)
 
     def path(self, u: int, v: int) -> Floats:
         return self.graph.path(int(self.chosen[u]), int(self.chosen[v]))
@@ -269,14 +333,18 @@ class _CostTable:
     def __init__(self, costs: Floats, cluster: Ints) -> None:
         self.costs, self.cluster = costs, cluster
 
-    def lengths(self, vertices: Ints, asked: Bools | None = None) -> Floats:
+    def lengths(
+        self, vertices: Ints, asked: Bools | None = None, clock: Clock | None = None
+    ) -> Floats:
         return self.costs[np.ix_(vertices, vertices)].copy()
 
     def to_base(self) -> Floats:
         return np.asarray(self.costs[0])
 
-    def lower_bounds(self, vertices: Ints) -> Floats:
-        return self.lengths(vertices)
+    def lower_bounds(
+        self, vertices: Ints, rows: Ints | None = None, clock: Clock | None = None
+    ) -> Floats:
+        return self.lengths(vertices) if rows is None else self.lengths(vertices)[rows]
 
     def path(self, u: int, v: int) -> Floats:
         raise InputError(f"no path from vertex {u} to {v}: this travel graph was made from costs")

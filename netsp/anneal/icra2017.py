@@ -20,13 +20,18 @@ from numba import njit
 
 from netsp.anneal.cooling import Cooling, Schedule
 from netsp.chance import below, metropolis, seeded
+from netsp.clock import TimeLimit
 from netsp.lns.layers import Instance
+from netsp.lns.solve import core_of
 from netsp.result import OnProgress, Result
 from netsp.run import Run, read_params
 from netsp.travel import TravelGraph
 
 PROPOSALS_PER_GOAL = 1_000_000
 """Default number of proposals, times the number of goals, when nothing is limited."""
+
+MOST_VERTICES = 4000
+"""So many classes at most, those of least tether, are walked over: all their legs are measured."""
 
 CHUNK = 100_000
 """Proposals between two looks at the clock: some milliseconds."""
@@ -48,7 +53,7 @@ class Params(Cooling):
 def solve(
     graph: TravelGraph,
     *,
-    time_limit: float | None = None,
+    time_limit: TimeLimit = None,
     iteration_limit: int | None = None,
     rng: np.random.Generator | None = None,
     params: Mapping[str, Any] | None = None,
@@ -67,14 +72,17 @@ def solve(
 
 
 def _anneal(run: Run, rng: np.random.Generator, chosen: Params) -> None:
+    warm = run.tour is not None
+    run.start()
     run.check()
     graph = run.graph
-    instance = Instance.of(graph)
+    core = core_of(run, vertices=MOST_VERTICES)
+    instance = Instance.among(graph, core)
     goals = graph.goal_count
     state = np.zeros(goals + 1, dtype=np.int64)
-    if run.tour is not None:
+    if warm:
         place = np.empty(len(graph), dtype=np.int64)
-        place[instance.order] = np.arange(len(graph))
+        place[instance.labels] = np.arange(len(instance.labels))
         state[:] = place[np.array(run.tour)]
     else:
         for k, c in enumerate(rng.permutation(np.arange(1, goals + 1))):

@@ -29,6 +29,7 @@ from numba import njit
 
 from netsp.anneal.cooling import Cooling, Schedule
 from netsp.chance import below, metropolis, seeded
+from netsp.clock import TimeLimit
 from netsp.result import OnProgress, Result
 from netsp.run import Run, read_params
 from netsp.travel import TravelGraph
@@ -64,7 +65,7 @@ class Params(Cooling):
 def solve(
     graph: TravelGraph,
     *,
-    time_limit: float | None = None,
+    time_limit: TimeLimit = None,
     iteration_limit: int | None = None,
     rng: np.random.Generator | None = None,
     params: Mapping[str, Any] | None = None,

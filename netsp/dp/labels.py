@@ -19,12 +19,12 @@ LOW = (1 << CHUNK) - 1
 
 
 @njit(cache=True, nogil=True)
-def completions(costs, goal, start, prices, alive, least, onward):
+def completions(costs, goal, start, prices, alive, least, onward, stop):
     """Walks without memory but that of the goal before last: bounds on how labels are completed.
 
     least : (n + 1, V) cost of the best k visits ending at v. onward : (n + 1, n + 1, V) cost of the
     best k visits of which the last is to goal h, and of the leg from there to vertex v, whose goal
-    is not that of the visit before.
+    is not that of the visit before. stop : of a clock; the tables are unfinished when it is set.
     """
     count = len(goal)
     n = len(start) - 2
@@ -40,6 +40,8 @@ def completions(costs, goal, start, prices, alive, least, onward):
             best = least[k, v]
             if best == np.inf:
                 continue
+            if stop[0] != 0:
+                return
             h = goal[v]
             row = onward[k, h]
             for g in range(n + 1):
@@ -80,13 +82,14 @@ def translate(tables, g, h, memory):
 
 @njit(cache=True, nogil=True)
 def extend(
-    costs, start, first, last, bits, tables, pointer, cost, memory, onward, limit, cut, prices
+    costs, start, first, last, bits, tables, pointer, cost, memory, onward, limit, cut, prices, stop
 ):
     """Labels of the next layer at goals first to last - 1, from those of this layer.
 
     pointer, cost, memory : labels of vertex v are pointer[v] to pointer[v + 1] - 1, cheapest first.
     onward : (n + 1, V) of the visits still to make. limit : (V,) most that a label may cost before
     the price is taken off. A label is kept if none costs less and remembers no more.
+    stop : of a clock; labels are missing when it is set.
     """
     n = len(start) - 2
     room, used_up = 1024, 0
@@ -109,6 +112,8 @@ def extend(
         for g in range(1, n + 1):
             if g == h:
                 continue
+            if stop[0] != 0:
+                break
             for u in range(start[g], start[g + 1]):
                 most = cut - onward[h, u]
                 leg = costs[u, begin : begin + size]

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from netsp.clock import TimeLimit
 from netsp.dp.walks import Walks
 from netsp.errors import InputError
 from netsp.legcosts import MEASURE_AT_ONCE, LegCosts
@@ -64,7 +65,7 @@ class Params:
 def solve(
     graph: TravelGraph,
     *,
-    time_limit: float | None = None,
+    time_limit: TimeLimit = None,
     iteration_limit: int | None = None,
     rng: np.random.Generator | None = None,
     params: Mapping[str, Any] | None = None,
@@ -90,6 +91,7 @@ def solve(
     with run.until_stopped():
         run.offer(warm_start)
         if not run.trivial():
+            run.start()
             costs = LegCosts(graph)
             run.search(costs)
             run.report("heuristic", vertices=len(costs))
@@ -104,7 +106,7 @@ def fits(graph: TravelGraph) -> bool:
 
 def bound_by_walks(run: SearchingRun, costs: LegCosts) -> None:
     """Raise the bound of a run and forget vertices, until the proof is done or progress stalls."""
-    walks = Walks(costs.cluster, costs.values)
+    walks = Walks(costs.cluster, costs.values, run.clock.flag)
     prices = first_prices(run, costs)
     direction: Floats = np.zeros(walks.n + 1)
     best, kept, step, vain = -np.inf, prices, STEP, 0

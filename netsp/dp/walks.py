@@ -21,6 +21,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
+from netsp.clock import NEVER, Flag
 from netsp.dp.labels import completions, extend, join, step_back
 from netsp.dp.memory import Memory
 from netsp.travel import Bools, Floats, Ints
@@ -52,10 +53,11 @@ class Walks:
 
     cluster : (V,). values : (V, V) symmetric costs of legs, inf where there is none. alive :
     (n + 1, V) whether a better tour may make its k-th visit there, with vertices taken in `order`,
-    which groups them by goal.
+    which groups them by goal. stop : of the clock; `check` must then raise.
     """
 
-    def __init__(self, cluster: Ints, values: Floats) -> None:
+    def __init__(self, cluster: Ints, values: Floats, stop: Flag = NEVER) -> None:
+        self.stop = stop
         self.n = int(cluster.max())
         self.alive: Bools = np.ones((self.n + 1, len(cluster)), dtype=bool)
         self.alive[0] = False
@@ -100,7 +102,7 @@ class Walks:
         cut = cutoff - float(prices[1:].sum()) + self.rounding(prices)
         least = np.empty((n + 1, len(goal)))
         onward = np.empty((n + 1, n + 1, len(goal)))
-        completions(self.values, goal, start, prices, self.alive, least, onward)
+        completions(self.values, goal, start, prices, self.alive, least, onward, self.stop)
         check()
         layers = self._layers(prices, cut, least, onward, check)
         pointer, cost, _ = layers[n]
@@ -150,11 +152,12 @@ class Walks:
                 def part(p: tuple[int, int], k: int = k) -> Labels:
                     labels: Labels = extend(
                         self.values, start, p[0], p[1], bits, tables, *layers[k - 1],
-                        onward[n + 1 - k], limits[k - 1], cut, prices,
+                        onward[n + 1 - k], limits[k - 1], cut, prices, self.stop,
                     )  # fmt: skip
                     return labels
 
                 layers.append(_together(list(pool.map(part, parts))))
+        check()
         return layers
 
     def _parts(self) -> list[tuple[int, int]]:

@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from netsp.clock import TimeLimit
 from netsp.legcosts import MEASURE_AT_ONCE
 from netsp.result import OnProgress, Result
 from netsp.run import Run, read_params
@@ -48,7 +49,7 @@ class NoParams:
 def solve(
     graph: TravelGraph,
     *,
-    time_limit: float | None = None,
+    time_limit: TimeLimit = None,
     iteration_limit: int | None = None,
     rng: np.random.Generator | None = None,
     params: Mapping[str, Any] | None = None,
@@ -63,6 +64,7 @@ def solve(
     with run.until_stopped():
         run.offer(warm_start)
         if not run.trivial():
+            run.start()
             stage = _nearest_by_tether(run, retrace=chosen.retrace == "path" and graph.geometric)
     return run.finish(stage)
 
@@ -72,10 +74,12 @@ def _nearest_by_tether(run: Run, *, retrace: bool) -> str:
     tour = [0]
     left = graph.cluster != 0
     small = graph.measured or len(graph) <= MEASURE_AT_ONCE
-    bounds = graph.costs if small else graph.lower_bounds()
+    every = np.arange(len(graph))
     while left.any():
         run.check()
-        here = _nearest(graph, tour[-1], np.flatnonzero(left), bounds[tour[-1]], exact=small)
+        at = tour[-1]
+        bounds = graph.costs[at] if small else graph.lower_bounds(every, [at])[0]
+        here = _nearest(graph, at, np.flatnonzero(left), bounds, exact=small)
         if here is None:
             return "dead end"
         tour.append(here)
@@ -109,7 +113,7 @@ def _nearest(
 def solve_2016(
     graph: TravelGraph,
     *,
-    time_limit: float | None = None,
+    time_limit: TimeLimit = None,
     iteration_limit: int | None = None,
     rng: np.random.Generator | None = None,
     params: Mapping[str, Any] | None = None,

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from netsp.clock import TimeLimit
 from netsp.greedy.backtracking import NoParams
 from netsp.hsignature import Word, concatenate, entangled
 from netsp.result import OnProgress, Result, Trajectory
@@ -24,7 +25,7 @@ from netsp.travel import TravelGraph
 def solve(
     graph: TravelGraph,
     *,
-    time_limit: float | None = None,
+    time_limit: TimeLimit = None,
     iteration_limit: int | None = None,
     rng: np.random.Generator | None = None,
     params: Mapping[str, Any] | None = None,

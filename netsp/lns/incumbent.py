@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from netsp.clock import TimeLimit
 from netsp.legcosts import LegCosts
-from netsp.lns.layers import Instance, least_tethers
+from netsp.lns.layers import Instance
 from netsp.lns.search import Search
 from netsp.result import OPTIMALITY_TOLERANCE, OnProgress
 from netsp.run import Run
-from netsp.travel import Ints, TravelGraph
+from netsp.travel import Ints, TravelGraph, least_tethers
 
 CORE = 800
 """About so many vertices, those of least tether, are measured for the heuristic while the other
@@ -29,7 +30,7 @@ class SearchingRun(Run):
     def __init__(
         self,
         graph: TravelGraph,
-        time_limit: float | None = None,
+        time_limit: TimeLimit = None,
         iteration_limit: int | None = None,
         on_progress: OnProgress | None = None,
         *,
@@ -60,7 +61,7 @@ class SearchingRun(Run):
         """Local search, then ruin and recreate, from the incumbent if there is one."""
         instance = self.instance(costs, np.zeros(0, dtype=np.int64) if more is None else more)
         start = None if self.tour is None else self.graph.cluster[list(self.tour)]
-        search = Search(instance, self.rng, start)
+        search = Search(instance, self.rng, start, self.clock)
         search.settle()
         search.run(self.search_rounds, self.clock)
         self.take(search)

@@ -47,6 +47,13 @@ class Instance:
         """All of a travel graph."""
         return cls(graph.cluster, graph.costs)
 
+    @classmethod
+    def among(cls, graph: TravelGraph, core: Ints) -> Instance:
+        """Some vertices of a travel graph, all if they are as many."""
+        if len(core) == len(graph):
+            return cls.of(graph)
+        return cls(graph.cluster[core], graph.costs_among(core), core)
+
     @cached_property
     def cluster_costs(self) -> Floats:
         """(m + 1, m + 1) least leg cost between clusters; inf on the diagonal."""
@@ -71,14 +78,6 @@ class Instance:
     def original(self, tour: npt.ArrayLike) -> tuple[int, ...]:
         """Labels of the vertices at positions in `order`."""
         return tuple(int(v) for v in self.labels[np.asarray(tour, dtype=np.int64)])
-
-
-def least_tethers(tethers: Floats, cluster: Ints, classes: int) -> Ints:
-    """Vertices of the shortest tethers of every cluster, at most so many of each, in order."""
-    order = np.lexsort((tethers, cluster))
-    grouped = cluster[order]
-    rank = np.arange(len(order)) - np.searchsorted(grouped, grouped)
-    return np.asarray(np.sort(order[rank < classes]), dtype=np.int64)
 
 
 @njit(cache=True)

@@ -111,7 +111,7 @@ def insert_best(c, order, n, start, costs, near, ahead, behind, blink, chance):
 
 
 @njit(cache=True, nogil=True)
-def descend(order, start, costs, near, ahead, behind, chance):
+def descend(order, start, costs, near, ahead, behind, chance, stop):
     """Take every cluster out and put it back where it costs least, until nothing improves; returns
     the length."""
     n = len(order)
@@ -121,6 +121,8 @@ def descend(order, start, costs, near, ahead, behind, chance):
     while improved:
         improved = False
         for c in range(1, n):
+            if stop[0] != 0:
+                return length
             size = 0
             for k in range(n):
                 if order[k] != c:
@@ -154,7 +156,7 @@ def tour_length(order, start, costs, ahead, behind):
 
 
 @njit(cache=True, nogil=True)
-def two_opt(order, start, costs, nearest, ahead, behind):
+def two_opt(order, start, costs, nearest, ahead, behind, stop):
     """Reverse stretches of the order as long as that shortens the tour; candidates are those whose
     two new legs could be shorter than the two old ones; returns the length."""
     n = len(order)
@@ -166,6 +168,8 @@ def two_opt(order, start, costs, nearest, ahead, behind):
     while improved:
         improved = False
         for i in range(1, n - 1):
+            if stop[0] != 0:
+                return length
             for j in range(i + 1, n):
                 after = tour[j + 1] if j + 1 < n else 0
                 c_after = order[j + 1] if j + 1 < n else 0

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.chance import seeded
-from netsp.clock import Clock
+from netsp.clock import NEVER, Clock
 from netsp.lns.layers import Instance, best_classes
 from netsp.lns.ruin import descend, ruin_and_recreate, two_opt
 
@@ -16,6 +16,9 @@ Ints = npt.NDArray[np.int64]
 
 HOT, COLD = 0.1, 1e-3
 """First and last temperature of ruin and recreate, in mean legs of the tour."""
+
+STEPS = 100
+"""Temperatures from first to last, when the rounds are limited."""
 
 CHUNK_SECONDS = 0.02
 """About the time between two looks at the clock."""
@@ -31,7 +34,7 @@ def local_search(
 ) -> tuple[float, tuple[int, ...]]:
     """Best (length, vertices of the travel graph) after `rounds` of ruin and recreate or when the
     clock runs out. Deterministic by `rng` as long as the clock does not."""
-    search = Search(instance, rng, start_order)
+    search = Search(instance, rng, start_order, clock)
     search.settle()
     search.run(rounds, clock)
     return search.best()
@@ -45,8 +48,10 @@ class Search:
         instance: Instance,
         rng: np.random.Generator,
         start_order: npt.ArrayLike | None = None,
+        clock: Clock | None = None,
     ) -> None:
         self.instance = instance
+        self._stop = NEVER if clock is None else clock.flag
         order = _insertion(instance.cluster_costs) if start_order is None else start_order
         self.order: Ints = np.array(order, dtype=np.int64)
         n = len(self.order)
@@ -63,11 +68,24 @@ class Search:
         before = np.inf
         while True:
             self.length = descend(
-                self.order, i.start, i.costs, i.near, self._ahead, self._behind, self.chance
+                self.order,
+                i.start,
+                i.costs,
+                i.near,
+                self._ahead,
+                self._behind,
+                self.chance,
+                self._stop,
             )
             if n > 3:
                 self.length = two_opt(
-                    self.order, i.start, i.costs, i.cluster_costs, self._ahead, self._behind
+                    self.order,
+                    i.start,
+                    i.costs,
+                    i.cluster_costs,
+                    self._ahead,
+                    self._behind,
+                    self._stop,
                 )
             if not self.length < before * (1.0 - 1e-12):
                 break
@@ -87,17 +105,19 @@ class Search:
         n = len(self.order)
         done, chunk = 0, 1
         leg = self.length / n
+        # the temperature falls in steps of so many rounds, whatever the time that they take
+        step = 1 if progress else max(1, int(rounds) // STEPS)
         while done < rounds and n > 3 and not clock.up:
-            share = progress() if progress else done / rounds
+            share = progress() if progress else (done - done % step) / rounds
             theta = leg * HOT * (COLD / HOT) ** min(share, 1.0)
-            count = int(min(chunk, rounds - done))
+            count = int(min(chunk, rounds - done if progress else step - done % step))
             begin = clock.elapsed
             self.length, self.best_length = ruin_and_recreate(
                 self.order, self.best_order, self.length, self.best_length, count, theta,
                 i.start, i.costs, i.cluster_costs, i.near, i.rank, self.chance,
             )  # fmt: skip
             done += count
-            if clock.elapsed - begin < CHUNK_SECONDS and chunk < max(1, rounds / 100):
+            if clock.elapsed - begin < CHUNK_SECONDS and chunk < max(1, rounds / STEPS):
                 chunk *= 2
             if tell:
                 tell(count)

@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from netsp.lns.layers import Instance, least_tethers
+from netsp.clock import TimeLimit
+from netsp.lns.layers import Instance
 from netsp.lns.search import Search
 from netsp.result import OnProgress, Result
 from netsp.run import Run, read_params
-from netsp.travel import TravelGraph
+from netsp.travel import Ints, TravelGraph, least_tethers
 
 ROUNDS_PER_GOAL = 300
 """Default number of rounds, times the number of goals, when nothing is limited."""
@@ -40,7 +41,7 @@ class Params:
 def solve(
     graph: TravelGraph,
     *,
-    time_limit: float | None = None,
+    time_limit: TimeLimit = None,
     iteration_limit: int | None = None,
     rng: np.random.Generator | None = None,
     params: Mapping[str, Any] | None = None,
@@ -55,6 +56,7 @@ def solve(
     with run.until_stopped():
         run.offer(warm_start)
         if not run.trivial():
+            run.start()
             _search(run, rng, chosen)
     return run.finish("done")
 
@@ -62,10 +64,7 @@ def solve(
 def _search(run: Run, rng: np.random.Generator, chosen: Params) -> None:
     graph = run.graph
     run.check()
-    classes = chosen.classes or most_classes(graph, MOST_VERTICES)
-    core = least_tethers(graph.costs_to_base, graph.cluster, classes)
-    if run.tour is not None:
-        core = np.union1d(core, run.tour)
+    core = core_of(run, chosen.classes)
     instance = Instance(graph.cluster[core], graph.costs_among(core), core)
     by_clock = run.clock.limit is not None and run.iteration_limit == np.inf
     if not by_clock and run.iteration_limit == np.inf:
@@ -74,7 +73,8 @@ def _search(run: Run, rng: np.random.Generator, chosen: Params) -> None:
     begin = run.clock.elapsed
     for k in range(chosen.restarts):
         start = None if run.tour is None else graph.cluster[list(run.tour)]
-        search = Search(instance, rng, start)
+        run.check()
+        search = Search(instance, rng, start, run.clock)
         search.settle()
         _take(run, search)
         run.report("settled", current=search.length)
@@ -91,6 +91,15 @@ def _search(run: Run, rng: np.random.Generator, chosen: Params) -> None:
 
         rounds = total * (k + 1) // chosen.restarts - total * k // chosen.restarts
         search.run(np.inf if by_clock else rounds, run.clock, progress if by_clock else None, tell)
+
+
+def core_of(run: Run, classes: int = 0, vertices: int = MOST_VERTICES) -> Ints:
+    """The classes of least tether that a search looks at, and those of the incumbent: so many of
+    every goal, by default (0) as many as make so many vertices in all."""
+    graph = run.graph
+    some = classes or most_classes(graph, vertices)
+    core = least_tethers(graph.costs_to_base, graph.cluster, some)
+    return np.union1d(core, run.tour) if run.tour is not None else core
 
 
 def _take(run: Run, search: Search) -> None:

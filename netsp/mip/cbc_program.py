@@ -8,6 +8,7 @@ import numpy as np
 import pulp
 
 from netsp.mip.cbc import run_cbc
+from netsp.mip.cutpool import CutPool
 from netsp.mip.program import (
     Bools,
     Cut,
@@ -43,9 +44,14 @@ class CbcRelaxation:
         self.clusters = int(cluster.max()) + 1
         self.legs: Ints = np.zeros((0, 2), dtype=np.int64)
         self.costs: Floats = np.zeros(0)
-        self.cuts: list[Cut] = []
+        self.pool = CutPool()
         self.infeasible = False
         self.add_legs(legs, costs)
+
+    @property
+    def cuts(self) -> list[Cut]:
+        """Cuts in the program, in the order of their rows."""
+        return self.pool.cuts
 
     def add_legs(self, legs: Ints, costs: Floats) -> None:
         """Bring legs (k, 2) into the program."""
@@ -58,7 +64,8 @@ class CbcRelaxation:
 
     def restrict(self, keep: Bools) -> None:
         """Renumber legs and cuts for the vertices marked; no other has a leg in the program."""
-        self.cluster, self.legs, self.cuts = restricted(self.cluster, self.legs, self.cuts, keep)
+        self.cluster, self.legs, cuts = restricted(self.cluster, self.legs, self.cuts, keep)
+        self.pool.replace(cuts)
 
     def set_costs(self, costs: Floats) -> None:
         """Set the costs of all legs in the program."""
@@ -66,11 +73,11 @@ class CbcRelaxation:
 
     def add_cuts(self, cuts: list[Cut]) -> None:
         """Bring cuts into the program."""
-        self.cuts = [*self.cuts, *cuts]
+        self.pool.add(cuts)
 
     def keep_cuts(self, keep: Bools) -> None:
         """Take all cuts out of the program but those marked."""
-        self.cuts = [c for c, k in zip(self.cuts, keep, strict=True) if k]
+        self.pool.keep(keep)
 
     def solve(self, time_left: float) -> Point | None:
         """The optimum with duals; None if there is none or the time ran out."""

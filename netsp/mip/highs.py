@@ -10,6 +10,7 @@ from typing import Any
 import highspy
 import numpy as np
 
+from netsp.mip.cutpool import CutPool
 from netsp.mip.program import (
     Bools,
     Cut,
@@ -63,13 +64,18 @@ class HighsRelaxation:
         self.cluster = cluster
         self.clusters = int(cluster.max()) + 1
         self.legs: Ints = np.zeros((0, 2), dtype=np.int64)
-        self.cuts: list[Cut] = []
+        self.pool = CutPool()
         self.infeasible = False
         self._scale = scale_of(costs)
         self._highs = _solver()
         twos = np.full(self.clusters, 2.0)
         self._highs.addRows(self.clusters, twos, twos, *_NONE)
         self.add_legs(legs, costs)
+
+    @property
+    def cuts(self) -> list[Cut]:
+        """Cuts in the program, in the order of their rows."""
+        return self.pool.cuts
 
     def add_legs(self, legs: Ints, costs: Floats) -> None:
         """Bring legs (k, 2) into the program, with their coefficients in every row."""
@@ -96,7 +102,8 @@ class HighsRelaxation:
 
     def restrict(self, keep: Bools) -> None:
         """Renumber legs and cuts for the vertices marked; no other has a leg in the program."""
-        self.cluster, self.legs, self.cuts = restricted(self.cluster, self.legs, self.cuts, keep)
+        self.cluster, self.legs, cuts = restricted(self.cluster, self.legs, self.cuts, keep)
+        self.pool.replace(cuts)
 
     def set_costs(self, costs: Floats) -> None:
         """Set the costs of all legs in the program."""
@@ -112,13 +119,13 @@ class HighsRelaxation:
         no_limit = np.full(n, highspy.kHighsInf)
         least = np.array([-2.0 * c.room for c in cuts])
         self._highs.addRows(n, least, no_limit, *_compressed(block))
-        self.cuts = [*self.cuts, *cuts]
+        self.pool.add(cuts)
 
     def keep_cuts(self, keep: Bools) -> None:
         """Take all cuts out of the program but those marked."""
         gone = self.clusters + np.flatnonzero(~keep)
         self._highs.deleteRows(len(gone), gone.astype(np.int32))
-        self.cuts = [c for c, k in zip(self.cuts, keep, strict=True) if k]
+        self.pool.keep(keep)
 
     def solve(self, time_left: float) -> Point | None:
         """The optimum with duals; None if there is none or the time ran out."""

@@ -23,10 +23,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 import numpy.typing as npt
+
+if TYPE_CHECKING:
+    from netsp.mip.cutpool import CutPool
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -152,13 +155,17 @@ class IntegerOutcome:
 class Relaxation(Protocol):
     """The linear relaxation over a changing set of legs and cuts.
 
-    legs : (k, 2) legs u < v in the program. cuts : cuts in the program. infeasible : whether the
+    legs : (k, 2) legs u < v in the program. pool : its cuts. infeasible : whether the
     last solve found that there is no solution.
     """
 
     legs: Ints
-    cuts: list[Cut]
+    pool: CutPool
     infeasible: bool
+
+    @property
+    def cuts(self) -> list[Cut]:
+        """Cuts in the program."""
 
     def add_legs(self, legs: Ints, costs: Floats) -> None:
         """Bring legs (k, 2) into the program."""

@@ -22,11 +22,16 @@ from typing import Any
 
 import numpy as np
 
-from netsp.lns import Instance, best_classes, least_tethers
+from netsp.clock import TimeLimit
+from netsp.lns import Instance, best_classes
+from netsp.lns.solve import core_of
 from netsp.mip.solve import MipRun, Params
 from netsp.result import OnProgress, Progress, Result
 from netsp.run import Run, read_params
-from netsp.travel import TravelGraph
+from netsp.travel import TravelGraph, least_tethers
+
+MOST_POLISHED = 4000
+"""Most classes, those of least tether, among which the last choice is made."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +54,7 @@ class ReducedParams(Params):
 def solve(
     graph: TravelGraph,
     *,
-    time_limit: float | None = None,
+    time_limit: TimeLimit = None,
     iteration_limit: int | None = None,
     rng: np.random.Generator | None = None,
     params: Mapping[str, Any] | None = None,
@@ -83,6 +88,7 @@ def solve(
         outer.offer(warm_start)
         if outer.trivial():
             return outer.finish("trivial")
+        outer.start()
         place = {int(v): k for k, v in enumerate(kept)}
         start = [place.get(int(v), -1) for v in warm_start] if warm_start is not None else []
         result = part.solve(chosen.backend, start if start and -1 not in start else None)
@@ -90,7 +96,8 @@ def solve(
         if result.tour is not None:
             outer.offer(kept[np.array(result.tour)].tolist())
             if chosen.polish and not whole:
-                instance = Instance.of(graph)
+                outer.check()
+                instance = Instance.among(graph, core_of(outer, vertices=MOST_POLISHED))
                 order = graph.cluster[kept[np.array(result.tour[1:])]]
                 _, tour = best_classes(order, instance.start, instance.costs)
                 outer.offer(instance.original(tour))

@@ -25,11 +25,6 @@ NEAREST = 4
 PRICED_PER_VERTEX = 3
 """Most legs per vertex that one pricing round brings in."""
 
-IDLE, SLACK = 16, 2
-"""A cut leaves the LP after so many rounds in a row without a price, rounds in which it was slack
-counting twice (a cut between vertices that the LP leaves alone is tight and means nothing).
-Separation finds it again if need be."""
-
 PRICE_EVERY, PRICE_SELDOM = 4, 32
 """Rounds of cuts between two looks at the prices of all legs, unless no cut is found; every look
 that brings hardly a leg and raises the bound by little doubles the first, up to the second."""
@@ -67,7 +62,6 @@ class Root:
         legs = self._first_legs()
         self.lp = relaxation(costs.cluster, legs, costs.values[legs[:, 0], legs[:, 1]])
         self.point: Point | None = None
-        self._idle: dict[int, int] = {}
 
     # the incumbent among the vertices left
 
@@ -274,19 +268,10 @@ class Root:
         when the bound has risen: on a plateau they would only come back."""
         assert point.slack is not None
         assert point.duals is not None
-        idle = self._idle
-        for cut, slack, price in zip(
-            self.lp.cuts, point.slack.tolist(), point.duals.cut.tolist(), strict=True
-        ):
-            if price < -1e-9:
-                idle[id(cut)] = 0
-            else:
-                idle[id(cut)] = idle.get(id(cut), 0) + (SLACK if slack > 1e-6 else 1)
-        keep = np.array([idle[id(cut)] < IDLE for cut in self.lp.cuts], dtype=bool)
-        if risen and (~keep).sum() > 0.1 * len(keep):
-            for k in np.flatnonzero(~keep):
-                del idle[id(self.lp.cuts[k])]
-            self.lp.keep_cuts(keep)
+        self.lp.pool.count(point.duals.cut, point.slack)
+        active = self.lp.pool.active() if risen else None
+        if active is not None:
+            self.lp.keep_cuts(active)
 
 
 def tour_legs(tour: Sequence[int] | Ints) -> Ints:

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from netsp.clock import TimeLimit
 from netsp.dp.solve import bound_by_walks
 from netsp.legcosts import LegCosts
 from netsp.lns import Search
@@ -67,7 +68,7 @@ class Params:
 def solve(
     graph: TravelGraph,
     *,
-    time_limit: float | None = None,
+    time_limit: TimeLimit = None,
     iteration_limit: int | None = None,
     rng: np.random.Generator | None = None,
     params: Mapping[str, Any] | None = None,
@@ -96,6 +97,7 @@ class MipRun(SearchingRun):
         with self.until_stopped():
             self.offer(warm_start)
             if not self.trivial():
+                self.start()
                 costs = LegCosts(self.graph)
                 self.search(costs)
                 self.report("heuristic", vertices=len(costs))
@@ -159,7 +161,9 @@ class MipRun(SearchingRun):
             order = follow(point.legs, point.y, cluster)
         if sorted(order) != list(range(self.graph.goal_count + 1)):
             return
-        search = Search(self.instance(costs, np.flatnonzero(point.x > 1e-6)), self.rng, order)
+        search = Search(
+            self.instance(costs, np.flatnonzero(point.x > 1e-6)), self.rng, order, self.clock
+        )
         search.settle()
         self.take(search)
 

@@ -9,6 +9,7 @@ its tail, leading to the word with the edge's crossings appended and reduced.
 from __future__ import annotations
 
 import heapq
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
@@ -17,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+from netsp.clock import NEVER, Flag
 from netsp.errors import InputError, NetspError
 from netsp.hsignature import Word
 from netsp.roadmap.explore import LETTER, PARENT, Trie, add_child, longer, more_int_rows, trie_child
@@ -33,6 +35,7 @@ class AugmentedGraph:
     """Vertices (milestone, word) with the edges between them; vertex 0 is (base, empty word).
 
     milestone, node, length : (n,) milestone, word (as a trie node), shortest length from the base.
+    complete : whether nothing was left out for want of time.
     start, target, cost : compressed rows of the edges, both ways.
     points : (milestones, 3).
     """
@@ -45,6 +48,7 @@ class AugmentedGraph:
     target: Ints
     cost: Floats
     trie: Trie
+    complete: bool = True
 
     def __len__(self) -> int:
         return len(self.milestone)
@@ -60,13 +64,17 @@ class AugmentedGraph:
         n = len(self)
         return csr_array((self.cost, self.target, self.start), shape=(n, n))
 
-    def distances(self, sources: Ints, targets: Ints) -> Floats:
-        """(sources, targets) shortest lengths within the graph, by Dijkstra; inf if not joined."""
+    def distances(
+        self, sources: Ints, targets: Ints, check: Callable[[], None] = lambda: None
+    ) -> Floats:
+        """(sources, targets) shortest lengths within the graph, by Dijkstra; inf if not joined.
+        check : called now and then; may raise to stop."""
         from scipy.sparse.csgraph import dijkstra
 
         out = np.empty((len(sources), len(targets)))
-        step = max(1, 20_000_000 // max(len(self), 1))
+        step = max(1, 1_000_000 // max(len(self), 1))
         for k in range(0, len(sources), step):
+            check()
             rows = dijkstra(self._matrix, directed=True, indices=sources[k : k + step])
             out[k : k + step] = rows[:, targets]
         return out
@@ -123,11 +131,13 @@ def augment(
     letters: tuple[Ints, Ints],
     tether_length: float,
     cap: int,
+    stop: Flag = NEVER,
 ) -> AugmentedGraph:
     """Augment a roadmap from milestone 0, the base.
 
     points : (n, 3); edges : (k, 2); letters : the edges' ray crossings, and row starts into them.
-    cap : most vertices; more is an InputError.
+    cap : most vertices; more is an InputError. stop : of a clock; the vertices nearest to the base
+    are there when it is set.
     """
     n = len(points)
     cost = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
@@ -137,8 +147,8 @@ def augment(
     # a directed edge is its undirected number, with the sign of its sense
     number = np.concatenate([np.arange(len(edges)), -1 - np.arange(len(edges))])[order]
     head = np.concatenate([edges[:, 1], edges[:, 0]])[order]
-    milestone, node, length, trie, size, ok = _reach(
-        start, number, head, cost, letters[0], letters[1], float(tether_length), cap
+    milestone, node, length, trie, size, ok, complete = _reach(
+        start, number, head, cost, letters[0], letters[1], float(tether_length), cap, stop
     )
     if not ok:
         raise InputError(
@@ -149,8 +159,9 @@ def augment(
         start, number, head, letters[0], letters[1], milestone, node, trie, n
     )
     return AugmentedGraph(
-        points, milestone, node, length, row, target, cost[edge], Trie(trie, np.zeros(0), size)
-    )
+        points, milestone, node, length, row, target, cost[edge],
+        Trie(trie, np.zeros(0), size), complete,
+    )  # fmt: skip
 
 
 @njit(cache=True)
@@ -190,7 +201,7 @@ def _loops(node, trie):
 
 
 @njit(cache=True)
-def _reach(start, number, head, cost, letters, row, limit, cap):
+def _reach(start, number, head, cost, letters, row, limit, cap, stop):
     """Dijkstra over (milestone, word) from (0, empty word), up to the tether length."""
     trie = np.full((256, 5), -1, dtype=np.int64)
     trie[0, LETTER] = 0
@@ -214,6 +225,17 @@ def _reach(start, number, head, cost, letters, row, limit, cap):
     heap_d[0], heap_v[0, 0] = 0.0, 0
     heap = 1
     while heap > 0:
+        if stop[0] != 0:
+            # what is not closed yet may still be reached by shorter ways
+            kept = 0
+            for i in range(count):
+                if closed[i, 0] == 1:
+                    ids[kept, 0], ids[kept, 1], length[kept] = ids[i, 0], ids[i, 1], length[i]
+                    kept += 1
+            return (
+                ids[:kept, 0].copy(), ids[:kept, 1].copy(), length[:kept].copy(), trie, size, True,
+                False,
+            )  # fmt: skip
         d, v = heap_d[0], heap_v[0, 0]
         heap -= 1
         _sift_down(heap_d, heap_v, heap)
@@ -239,7 +261,10 @@ def _reach(start, number, head, cost, letters, row, limit, cap):
                 if w2 != w and _loops(w2, trie):
                     continue
                 if count == cap:
-                    return ids[:, 0], ids[:, 1], length, trie, size, False
+                    return (
+                        ids[:count, 0].copy(), ids[:count, 1].copy(), length[:count].copy(), trie,
+                        size, False, False,
+                    )  # fmt: skip
                 if count == len(ids):
                     ids = more_int_rows(ids)
                     longer_length = longer(length)
@@ -275,7 +300,15 @@ def _reach(start, number, head, cost, letters, row, limit, cap):
                     heap_v = more_int_rows(heap_v)
                 _sift_up(heap_d, heap_v, heap, reached, u)
                 heap += 1
-    return ids[:count, 0].copy(), ids[:count, 1].copy(), length[:count].copy(), trie, size, True
+    return (
+        ids[:count, 0].copy(),
+        ids[:count, 1].copy(),
+        length[:count].copy(),
+        trie,
+        size,
+        True,
+        True,
+    )
 
 
 @njit(cache=True)

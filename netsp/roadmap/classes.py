@@ -1,4 +1,4 @@
-"""Which classes reach each goal: all whose taut tether fits, or the shortest where they are too many.
+"""Which classes reach each goal: all whose taut tether fits, or the shortest of too many.
 
 All classes come from one search from the base up to the tether length. Thin obstacles or a long
 tether can make their number explode. Then each goal is searched for by itself, guided by the exact

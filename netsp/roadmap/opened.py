@@ -16,6 +16,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
+from netsp.clock import Clock, TimeLimit
 from netsp.errors import InputError, NetspError
 from netsp.hsignature import reduce
 from netsp.problem import Goal, Problem
@@ -49,6 +50,7 @@ class OpenedGraph(TravelGraph):
         super().__init__(
             within.cluster, within.signatures, within.tethers,
             _OpenedLegs(within, start, surcharge), within.roadmap,
+            classes=within.classes, least_left_out=within.least_left_out,
         )  # fmt: skip
         self.within, self.start, self.surcharge = within, start, surcharge
         self.start_tether = start_tether
@@ -77,10 +79,11 @@ class OpenedGraph(TravelGraph):
         # proven to a millionth of the surcharged length, which is some lengths of the path
         if status is Status.OPTIMAL and length - (low or 0.0) > ENOUGH * length:
             status = Status.FEASIBLE
-        return dataclasses.replace(
-            result, tour=tour, length=length, lower_bound=low, status=status,
-            walk=walk[1:],
-        )  # fmt: skip
+        # home from a goal in a class that was left out is at least its tether
+        path = dataclasses.replace(
+            result, tour=tour, length=length, lower_bound=low, status=status, walk=walk[1:]
+        )
+        return self.within_kept(path, self.least_left_out)
 
     def telling(self, listener: OnProgress | None) -> OnProgress | None:
         """Tells a listener about the path instead of the tour."""
@@ -107,35 +110,42 @@ class _OpenedLegs:
     def __init__(self, within: TravelGraph, start: int, surcharge: float) -> None:
         self.within, self.start, self.surcharge = within, start, surcharge
 
-    def _charged(self, table: Floats, vertices: Ints) -> Floats:
+    def _charged(self, table: Floats, rows: Ints, columns: Ints) -> Floats:
         out = np.array(table)
-        at_end = np.isin(vertices, (0, self.start))
-        out += self.surcharge * (at_end[:, None].astype(float) + at_end[None, :])
-        base, start = np.flatnonzero(vertices == 0), np.flatnonzero(vertices == self.start)
-        for i in base:
-            for j in start:
-                out[i, j] = out[j, i] = 0.0
+        ends = (0, self.start)
+        out += self.surcharge * np.isin(rows, ends)[:, None]
+        out += self.surcharge * np.isin(columns, ends)[None, :]
+        for one, other in (ends, ends[::-1]):
+            out[np.ix_(rows == one, columns == other)] = 0.0
         return out
 
-    def lengths(self, vertices: Ints, asked: Bools | None = None) -> Floats:
-        return self._charged(self.within.costs_among(vertices, asked), vertices)
+    def lengths(
+        self, vertices: Ints, asked: Bools | None = None, clock: Clock | None = None
+    ) -> Floats:
+        with self.within.on_clock(clock or self.within.clock):
+            return self._charged(self.within.costs_among(vertices, asked), vertices, vertices)
 
     def to_base(self) -> Floats:
         out = self.within.costs_to_base + self.surcharge
         out[self.start] = 0.0
         return np.asarray(out)
 
-    def lower_bounds(self, vertices: Ints) -> Floats:
-        return self._charged(self.within.lower_bounds(vertices), vertices)
+    def lower_bounds(
+        self, vertices: Ints, rows: Ints | None = None, clock: Clock | None = None
+    ) -> Floats:
+        some = vertices if rows is None else vertices[rows]
+        with self.within.on_clock(clock or self.within.clock):
+            return self._charged(self.within.lower_bounds(vertices, rows), some, vertices)
 
     def path(self, u: int, v: int) -> Floats:
         return self.within.path(u, v)
 
 
 def opened_graph(
-    problem: Problem, *, max_classes: int = MAX_CLASSES, time_limit: float | None = None
-) -> OpenedGraph:
-    """The travel graph of a problem with a state.
+    problem: Problem, *, classes: str = "all", max_classes: int = MAX_CLASSES,
+    time_limit: TimeLimit = None,
+) -> OpenedGraph:  # fmt: skip
+    """The travel graph of a problem with a state; options as of `TautRoadmap`.
 
     Raises
     ------
@@ -144,6 +154,7 @@ def opened_graph(
     """
     state = problem.state
     assert state is not None
+    clock = Clock.of(time_limit)
     last = len(problem.goals) + 1
     limit = problem.tether_length
     plain = problem.model_copy(update={"state": None})
@@ -158,15 +169,18 @@ def opened_graph(
         ) from None
     start_tether = far.path(0, last, word)
     # the goals' classes as ever; the state's own may be one that no tour would choose
-    roadmap = TautRoadmap(plain, max_classes=max_classes, time_limit=time_limit)
+    roadmap = TautRoadmap(plain, classes=classes, max_classes=max_classes, time_limit=clock)
     cluster = np.append(roadmap.cluster, last)
     words = [*roadmap.signatures, word]
     lengths = np.append(roadmap.planar, planar)
     legs = TautLegs(
-        TautPaths(placed, limit + max(limit, planar)), cluster, words, lengths,
-        time_limit=time_limit,
+        TautPaths(placed, limit + max(limit, planar)), cluster, words, lengths
     )  # fmt: skip
-    part = TravelGraph(cluster, words, legs.to_base(), legs, roadmap="taut")
+    part = TravelGraph(
+        cluster, words, legs.to_base(), legs, roadmap="taut",
+        classes=classes if roadmap.complete else "shortest",
+        least_left_out=roadmap.least_left_out,
+    )  # fmt: skip
     start = len(cluster) - 1
     nearest = [part.tethers[part.members(c)].min() for c in range(1, last)]
     some_path = float(part.tethers[start] + 2.0 * sum(nearest))

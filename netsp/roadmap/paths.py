@@ -20,6 +20,7 @@ from netsp.roadmap.tangents import ARC_STEP, TangentGraph, build_tangents
 
 Floats = npt.NDArray[np.float64]
 
+
 class TautPaths:
     """Taut paths between the base (point 0) and the goals (points 1 …) of a problem.
 

@@ -12,13 +12,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from netsp.errors import InfeasibleError, InputError, NetspError
+from netsp.clock import Clock, TimeLimit
+from netsp.errors import InfeasibleError, InputError, LimitReachedError
 from netsp.geometry import depth_in_obstacle, segment_blocked
 from netsp.hsignature import Word
 from netsp.problem import Circle, Problem
@@ -30,7 +32,7 @@ from netsp.roadmap.reach import explain_unreached
 from netsp.roadmap.shortest import MilestoneGraph
 from netsp.roadmap.taut import TautLegs
 from netsp.roadmap.ways import sub_goals, tabulate
-from netsp.travel import TravelGraph
+from netsp.travel import UNTIMED, TravelGraph
 from netsp.ways import Ways
 
 Floats = npt.NDArray[np.float64]
@@ -39,6 +41,9 @@ Bools = npt.NDArray[np.bool_]
 
 SAMPLES = 1000
 """Milestones, as in the paper."""
+
+SHARE = 0.4
+"""Of the time, the part that sampling may take."""
 
 MAX_AUGMENTED = 2_000_000
 """Most vertices of the augmented graph (milestone, word)."""
@@ -55,12 +60,14 @@ class PrmRoadmap:
     Attributes
     ----------
     milestones : (n, 3) base, goals, then samples. edges : (k, 2) pairs of milestones.
-    augmented : the graph over (milestone, word).
+    augmented : the graph over (milestone, word). complete : whether the time sufficed for all the
+    samples and all of that graph.
 
     Raises
     ------
     InputError : bad options, OMPL not installed, or too many augmented vertices.
-    InfeasibleError : a goal that no path over the roadmap reaches within the tether.
+    InfeasibleError : a goal that no tether within the limit reaches, which is proven exactly.
+    LimitReachedError : a goal that this roadmap does not reach, though a tether would.
     """
 
     def __init__(
@@ -71,16 +78,19 @@ class PrmRoadmap:
         seed: int = 0,
         shortcut: bool = False,
         max_augmented: int = MAX_AUGMENTED,
-        time_limit: float | None = None,
+        time_limit: TimeLimit = None,
     ) -> None:
-        if samples < 1:
+        if not isinstance(samples, (int, np.integer)) or samples < 1:
             raise InputError(f"samples: expected a positive whole number, got {samples!r}")
         self.problem = problem
         self.paths = TautPaths(problem)
         outline = self.paths.outline
         fixed = problem.points.copy()
         fixed[:, :2] = outline.points
-        sampled = _sample(problem, outline, samples, seed)
+        clock = Clock.of(time_limit)
+        self.clock = clock
+        sampled = _sample(problem, outline, samples, seed, Clock(SHARE * clock.left, within=clock))
+        self.complete = len(sampled[0]) >= samples
         local = np.vstack([fixed, sampled[0]])
         self.milestones: Floats = local + np.append(outline.origin, 0.0)
         own = np.asarray(sampled[1], dtype=np.int64).reshape(-1, 2) + len(fixed)
@@ -96,27 +106,43 @@ class PrmRoadmap:
             _edge_letters(self.edges, exact, outline.rays),
             problem.tether_length,
             max_augmented,
+            clock.flag,
         )
+        self.complete &= self.augmented.complete
         self.cluster, self.signatures, self._vertex = self._classes()
-        planar = np.array(
-            [
-                self.paths.planar_length(0, int(c), w) if c else 0.0
-                for c, w in zip(self.cluster, self.signatures, strict=True)
-            ]
-        )
+        planar = self._taut_lengths(clock)
         z = problem.points[:, 2]
         self.tethers: Floats = np.hypot(planar, z[self.cluster] - z[0])
         self.shortcut = shortcut
-        self._taut = TautLegs(
-            self.paths, self.cluster, self.signatures, planar, time_limit=time_limit
-        )
+        self._taut = TautLegs(self.paths, self.cluster, self.signatures, planar)
 
     def travel_graph(self) -> TravelGraph:
         """The travel graph over this roadmap. Tethers are the taut ones of their classes; that
         they fit was decided by the length along the roadmap, which is no shorter."""
         return TravelGraph(
-            self.cluster, self.signatures, self.tethers, self, roadmap="prm", ways=self._ways
-        )
+            self.cluster, self.signatures, self.tethers, self, roadmap="prm", ways=self._ways,
+            classes="non-looping" if self.complete else "shortest",
+            least_left_out=math.inf if self.complete else 0.0,
+        )  # fmt: skip
+
+    def _taut_lengths(self, clock: Clock) -> Floats:
+        """Planar length of the taut tether of every class; when the time is up, only the shortest
+        class of every goal stays."""
+        planar = np.zeros(len(self.cluster))
+        for v in range(1, len(planar)):
+            if clock.up:
+                first = np.unique(self.cluster, return_index=True)[1]
+                keep = np.union1d(np.arange(v), first)
+                self.complete = False
+                self.cluster, self._vertex = self.cluster[keep], self._vertex[keep]
+                self.signatures = [self.signatures[k] for k in keep]
+                rest = [
+                    self.paths.planar_length(0, int(self.cluster[k]), self.signatures[k])
+                    for k in range(v, len(keep))
+                ]
+                return np.concatenate([planar[:v], rest])
+            planar[v] = self.paths.planar_length(0, int(self.cluster[v]), self.signatures[v])
+        return planar
 
     def _ways(self, with_sub_goals: bool, check: Callable[[], None]) -> Ways:
         """Ways in any class along the milestones; sub-goals are joined as base and goals are."""
@@ -140,24 +166,40 @@ class PrmRoadmap:
         rows = np.flatnonzero((g.milestone >= 1) & (g.milestone <= goals))
         missing = sorted(set(range(1, goals + 1)) - set(g.milestone[rows].tolist()))
         if missing:
-            try:
-                reason = explain_unreached(self.problem, self.paths.outline, missing)
-            except NetspError as error:  # pragma: no cover - the reason is a courtesy
-                reason = str(error)
-            raise InfeasibleError(f"no path over the prm roadmap (try more samples): {reason}")
+            # a sample proves nothing; the exact shortest tether does
+            reach = self.paths.contacts.lengths([0])[0]
+            points = self.problem.points
+            needs = np.hypot(reach, points[:, 2] - points[0, 2])[: len(points)]
+            beyond = [k for k in missing if needs[k] > self.problem.tether_length]
+            if beyond:
+                raise InfeasibleError(explain_unreached(self.problem, self.paths.outline, beyond))
+            k = missing[0]
+            more = f" and {len(missing) - 1} more goals" if len(missing) > 1 else ""
+            raise LimitReachedError(
+                f"no path over the prm roadmap reaches {self.problem.goal_label(k - 1)}{more} "
+                f"within the tether ({needs[k]:.6g} of {self.problem.tether_length:g} would do); "
+                "try more samples, or roadmap 'taut'"
+            )
         rows = rows[np.lexsort((g.length[rows], g.milestone[rows]))]
         cluster = np.concatenate([[0], g.milestone[rows]]).astype(np.int64)
         words: list[Word] = [(), *(g.word(int(v)) for v in rows)]
         return cluster, words, np.concatenate([[0], rows]).astype(np.int64)
 
-    def lengths(self, vertices: Ints, asked: Bools | None = None) -> Floats:
+    def lengths(
+        self, vertices: Ints, asked: Bools | None = None, clock: Clock | None = None
+    ) -> Floats:
         """(k, k) leg lengths among the given vertices, along the augmented graph; inf within a
-        cluster."""
+        cluster. LimitReachedError when the clock is up before many are measured."""
         vertices = np.asarray(vertices, dtype=np.int64)
         if self.shortcut:
-            return self._taut.lengths(vertices, asked)
+            return self._taut.lengths(vertices, asked, clock)
         rows = self._vertex[vertices]
-        out = self.augmented.distances(rows, rows)
+        check = partial(
+            (clock or Clock()).check, f"measuring legs over {len(self.augmented)} states"
+        )
+        out = self.augmented.distances(
+            rows, rows, (lambda: None) if len(rows) <= UNTIMED else check
+        )
         out = np.minimum(out, out.T)  # equal but for the order of summation
         cluster = self.cluster[vertices]
         out[cluster[:, None] == cluster[None, :]] = np.inf
@@ -169,10 +211,12 @@ class PrmRoadmap:
             return self._taut.to_base()
         return np.asarray(self.augmented.length[self._vertex])
 
-    def lower_bounds(self, vertices: Ints) -> Floats:
+    def lower_bounds(
+        self, vertices: Ints, rows: Ints | None = None, clock: Clock | None = None
+    ) -> Floats:
         """(k, k) lower bounds on leg lengths: a leg along the roadmap is no shorter than the taut
         leg, for which see `TautLegs.lower_bounds`."""
-        return self._taut.lower_bounds(vertices)
+        return self._taut.lower_bounds(vertices, rows, clock)
 
     def path(self, u: int, v: int) -> Floats:
         """(n, 3) polyline of the leg from vertex u to vertex v."""
@@ -219,7 +263,7 @@ def sampling_box(problem: Problem) -> tuple[Floats, Floats]:
 
 
 def _sample(
-    problem: Problem, outline: Outline, samples: int, seed: int
+    problem: Problem, outline: Outline, samples: int, seed: int, clock: Clock
 ) -> tuple[Floats, list[tuple[int, int]]]:
     """Milestones (n, 3) and edges of OMPL's PRM*."""
     ob, og, ou = _ompl()
@@ -254,7 +298,7 @@ def _sample(
         grow = planner.growRoadmapPtc
     else:  # pragma: no cover - other releases of OMPL overload one name
         grow = planner.growRoadmap
-    grow(ob.PlannerTerminationCondition(lambda: planner.milestoneCount() >= samples))
+    grow(ob.PlannerTerminationCondition(lambda: planner.milestoneCount() >= samples or clock.up))
     data = ob.PlannerData(info)
     planner.getPlannerData(data)
     count = data.numVertices()

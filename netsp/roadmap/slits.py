@@ -29,6 +29,7 @@ import numpy.typing as npt
 import shapely
 from numba import njit
 
+from netsp.clock import NEVER, Flag
 from netsp.hsignature import Word
 from netsp.problem import Circle, Problem
 
@@ -82,21 +83,30 @@ def build_slits(problem: Problem) -> Slits:
     return Slits(rank, points[order, 0], ends[order, 0], ends[order, 1])
 
 
-def slit_lengths(slits: Slits, places: Floats, cluster: Ints, signatures: Sequence[Word]) -> Floats:
+def slit_lengths(
+    slits: Slits, places: Floats, cluster: Ints, signatures: Sequence[Word],
+    rows: Ints | None = None, stop: Flag = NEVER,
+) -> Floats:  # fmt: skip
     """(V, V) planar lengths among slits of the legs between vertices; 0 within a cluster.
 
-    places : (m + 1, 2) base and goals. cluster, signatures : of the vertices.
+    places : (m + 1, 2) base and goals. cluster, signatures : of the vertices. rows : (r,) only the
+    legs from so many of the vertices, then (r, V). stop : of a clock; unfinished when it is set.
     """
     n = len(cluster)
     flat = [np.array(w, dtype=np.int64) for w in signatures]
     row = np.concatenate([[0], np.cumsum([len(w) for w in flat])]).astype(np.int64)
     letters = np.concatenate(flat).astype(np.int64) if row[-1] else np.zeros(0, np.int64)
     cell = np.array([slits.cell(x) for x in places[:, 0]], dtype=np.int64)
-    out = np.zeros((n, n))
-    args = (places, cell, cluster, letters, row, slits.rank, slits.x, slits.bottom, slits.top, out)
-    blocks = [(k, min(k + ROWS, n)) for k in range(0, n, ROWS)]
+    whole = rows is None
+    asked: Ints = np.arange(n) if rows is None else rows
+    out = np.zeros((len(asked), n))
+    args = (
+        asked, whole, places, cell, cluster, letters, row, slits.rank, slits.x, slits.bottom,
+        slits.top, out, stop,
+    )  # fmt: skip
+    blocks = [(k, min(k + ROWS, len(asked))) for k in range(0, len(asked), ROWS)]
     if len(blocks) < 4:
-        _rows(0, n, *args)
+        _rows(0, len(asked), *args)
     else:
         with ThreadPoolExecutor(os.cpu_count()) as pool:
             list(pool.map(lambda b: _rows(b[0], b[1], *args), blocks))
@@ -104,15 +114,21 @@ def slit_lengths(slits: Slits, places: Floats, cluster: Ints, signatures: Sequen
 
 
 @njit(cache=True, nogil=True)
-def _rows(first, last, places, cell, cluster, letters, row, rank, x, bottom, top, out):
-    """Fill rows first … last - 1, and the columns with the same numbers, beyond the diagonal."""
+def _rows(
+    first, last, asked, whole, places, cell, cluster, letters, row, rank, x, bottom, top, out, stop
+):
+    """Fill rows first … last - 1, which are those of the vertices `asked`; of the whole matrix only
+    what is beyond the diagonal, and the columns with the same numbers."""
     longest = 0
     for v in range(len(cluster)):
         longest = max(longest, row[v + 1] - row[v])
     size = (2 * longest + 2) * (len(x) + 2) + 2
     gate = np.empty((size, 3))
-    for u in range(first, last):
-        for v in range(u + 1, len(cluster)):
+    for k in range(first, last):
+        if stop[0] != 0:
+            return
+        u = asked[k]
+        for v in range(u + 1 if whole else 0, len(cluster)):
             if cluster[u] == cluster[v]:
                 continue
             d = _length(
@@ -120,8 +136,9 @@ def _rows(first, last, places, cell, cluster, letters, row, rank, x, bottom, top
                 places[cluster[v], 0], places[cluster[v], 1], cell[cluster[v]], row[v], row[v + 1],
                 letters, rank, x, bottom, top, gate,
             )  # fmt: skip
-            out[u, v] = d
-            out[v, u] = d
+            out[k, v] = d
+            if whole:
+                out[v, k] = d
 
 
 @njit(cache=True, nogil=True)

@@ -39,7 +39,7 @@ from netsp.roadmap.explore import (
 from netsp.roadmap.paths import TautPaths
 from netsp.roadmap.slits import Slits, build_slits, slit_lengths
 from netsp.roadmap.ways import taut_ways
-from netsp.travel import TravelGraph
+from netsp.travel import UNTIMED, TravelGraph
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -52,8 +52,8 @@ MAX_CLASSES = 20_000
 RULES = {"all": ALL, "non-looping": NON_LOOPING}
 """Which classes a roadmap holds, by name."""
 
-UNTIMED = 250
-"""Legs among so few vertices are measured whatever the time: the length of a tour, say."""
+BLOCK = 256
+"""Rows of a matrix that are worked on at a time, so that what is in between stays small."""
 
 
 class TautRoadmap:
@@ -87,10 +87,8 @@ class TautRoadmap:
         if not isinstance(max_classes, (int, np.integer)) or max_classes < 1:
             raise InputError(f"max_classes: expected a positive whole number, got {max_classes!r}")
         if classes not in RULES:
-            raise InputError(
-                f"classes: unknown {classes!r}; expected one of {', '.join(RULES)}"
-            )
-        self.problem = problem
+            raise InputError(f"classes: unknown {classes!r}; expected one of {', '.join(RULES)}")
+        self.problem, self.classes = problem, classes
         self.clock = Clock.of(time_limit)
         self.paths = TautPaths(problem)
         self.outline, self.tangents = self.paths.outline, self.paths.tangents
@@ -100,9 +98,7 @@ class TautRoadmap:
         self.cluster, self.signatures, self.planar = found.cluster, found.signatures, found.planar
         self.complete, self.least_left_out = found.complete, found.least_left_out
         self.tethers: Floats = np.hypot(self.planar, self._z[self.cluster] - self._z[0])
-        self.legs = TautLegs(
-            self.paths, self.cluster, self.signatures, self.planar, found.tree, self.clock
-        )
+        self.legs = TautLegs(self.paths, self.cluster, self.signatures, self.planar, found.tree)
 
     def travel_graph(self) -> TravelGraph:
         """The travel graph over this roadmap; legs are computed when first asked for."""
@@ -113,6 +109,7 @@ class TautRoadmap:
             self.legs,
             roadmap="taut",
             ways=partial(taut_ways, self.problem),
+            classes=self.classes if self.complete else "shortest",
             least_left_out=self.least_left_out,
         )
 
@@ -121,8 +118,7 @@ class TautLegs:
     """Exact legs between given augmented goals. Satisfies `netsp.travel.Legs`.
 
     cluster, signatures, planar : goal (0 is the base), word and planar taut tether length of each
-    vertex. tree : where their tethers part, if known. time_limit : seconds from now, or a clock,
-    after which `lengths` raises LimitReachedError.
+    vertex. tree : where their tethers part, if known.
     """
 
     def __init__(
@@ -132,7 +128,6 @@ class TautLegs:
         signatures: Sequence[Word],
         planar: Floats,
         tree: TetherTree | None = None,
-        time_limit: TimeLimit = None,
     ) -> None:
         self.paths, self.cluster, self.planar = paths, cluster, planar
         self.signatures = list(signatures)
@@ -140,11 +135,12 @@ class TautLegs:
         self._slits: Slits | None = None
         nothing = np.zeros(1, dtype=np.int64)
         self._tree = tree or TetherTree(np.zeros_like(cluster), nothing - 1, np.zeros(1))
-        self._clock = Clock.of(time_limit)
 
-    def lengths(self, vertices: Ints, asked: Bools | None = None) -> Floats:
+    def lengths(
+        self, vertices: Ints, asked: Bools | None = None, clock: Clock | None = None
+    ) -> Floats:
         """(k, k) 3D leg lengths among the given vertices; inf within a cluster, and where `asked`
-        is given and false.
+        is given and false. LimitReachedError when the clock is up before all of many are measured.
 
         Lengths are translation-invariant on the cover: all pairs with the same goals and the same
         relative word share one taut path, so each goal is searched once, for all relative words.
@@ -157,7 +153,8 @@ class TautLegs:
             "lower tether_length or max_classes",
         )
         # what takes a fraction of a second is measured all the same, or there would be no tour
-        stop = self._clock.flag if len(vertices) > UNTIMED else NEVER
+        count = len(vertices) ** 2 if asked is None else int(asked.sum())
+        stop = clock.flag if clock is not None and count > UNTIMED**2 else NEVER
         out = np.full((len(vertices), len(vertices)), np.inf)
         flat = [np.array(self.signatures[v], dtype=np.int64) for v in vertices]
         row = np.concatenate([[0], np.cumsum([len(w) for w in flat])]).astype(np.int64)
@@ -247,23 +244,38 @@ class TautLegs:
         """(V,) 3D lengths of the legs from the base, which are the tethers."""
         return np.asarray(np.hypot(self.planar, self._z[self.cluster] - self._z[0]))
 
-    def lower_bounds(self, vertices: Ints) -> Floats:
+    def lower_bounds(
+        self, vertices: Ints, rows: Ints | None = None, clock: Clock | None = None
+    ) -> Floats:
         """(k, k) lower bounds on leg lengths: a leg is no shorter than its class among slits
         (`netsp.roadmap.slits`), nor than the difference of its two tethers (triangle inequality on
-        the cover)."""
+        the cover). rows : (r,) positions among the vertices; then (r, k)."""
         vertices = np.asarray(vertices, dtype=np.int64)
         if self._slits is None:
             self._slits = build_slits(self.paths.problem)
-        cluster, planar = self.cluster[vertices], self.planar[vertices]
-        low = slit_lengths(
-            self._slits, self.paths.outline.places, cluster, [self.signatures[v] for v in vertices]
+        cluster, planar, z = self.cluster[vertices], self.planar[vertices], self._z
+        own = np.arange(len(vertices)) if rows is None else np.asarray(rows, dtype=np.int64)
+        ask(
+            3.0 * 8.0 * len(own) * len(vertices),
+            f"bounds on the legs between {len(vertices)} homotopy classes",
+            "lower tether_length or max_classes",
         )
-        np.maximum(low, np.abs(planar[:, None] - planar[None, :]), out=low)
-        # rounding must not lift a bound above the length
-        low -= self.paths.margin
-        np.maximum(low, 0.0, out=low)
-        if np.ptp(self._z) > 0.0:
-            np.hypot(low, self._z[cluster][:, None] - self._z[cluster][None, :], out=low)
+        stop = NEVER if clock is None else clock.flag
+        words = [self.signatures[v] for v in vertices]
+        low = slit_lengths(self._slits, self.paths.outline.places, cluster, words, rows, stop)
+        if stop[0]:
+            raise LimitReachedError(
+                f"time limit reached while bounding the legs between {len(vertices)} homotopy "
+                "classes; lower tether_length or raise the limit"
+            )
+        for first in range(0, len(own), BLOCK):
+            part, block = own[first : first + BLOCK], low[first : first + BLOCK]
+            np.maximum(block, np.abs(planar[part][:, None] - planar[None, :]), out=block)
+            # rounding must not lift a bound above the length
+            block -= self.paths.margin
+            np.maximum(block, 0.0, out=block)
+            if np.ptp(z) > 0.0:
+                np.hypot(block, z[cluster[part]][:, None] - z[cluster][None, :], out=block)
         return low
 
     def relative_word(self, u: int, v: int) -> Word:
