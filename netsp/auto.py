@@ -3,9 +3,11 @@
 Up to `PROVABLE` vertices it proves: the heuristic finds the tour; for up to `FEW_GOALS` goals walks
 (`netsp.dp`) bound it, which at that size ends with a proof more often than not; cutting planes
 (`netsp.mip`) do the rest, or all of it with more goals, on the vertices that are left. Beyond
-`PROVABLE` the matrices would not fit into a few gigabytes: then `lns` searches among the classes of
-least tether, and the bound comes from the goals alone, as the travelling salesperson's tour over
-the shortest ways between them in any class. That bound is weak, and true.
+`PROVABLE` the matrices would not fit into a few gigabytes. Few goals are then proven over the
+classes of least tether, which proves the tour for good where it is no longer than twice the tether
+of every other class. With many, `lns` searches among them, and the bound comes from the goals
+alone, as the travelling salesperson's tour over the shortest ways between them in any class. That
+bound is weak, and true.
 """
 
 from __future__ import annotations
@@ -23,10 +25,13 @@ from netsp.mip.solve import MipRun
 from netsp.mip.solve import solve as prove
 from netsp.result import OnProgress, Progress, Result
 from netsp.run import read_params
-from netsp.travel import Floats, TravelGraph
+from netsp.travel import Floats, TravelGraph, least_tethers
 
-PROVABLE = 7_000
-"""Most vertices of a travel graph that `mip` is asked to bound: about 2 GiB of matrices."""
+PROVABLE = 10_000
+"""Most vertices of a travel graph that `mip` is asked to bound: about 4 GiB of matrices."""
+
+MOST_KEPT = 3_000
+"""With more vertices and few goals, about so many, those of least tether, are proven over."""
 
 FEW_GOALS = 24
 """Most goals for which walks come first: with more, remembering them costs more than cuts do."""
@@ -67,6 +72,10 @@ def solve(
         run = MipRun(graph, time_limit, iteration_limit, on_progress, rng=rng, search_rounds=rounds)
         return run.solve(chosen.backend, warm_start, walks=graph.goal_count <= FEW_GOALS)
     clock = Clock.of(time_limit)
+    if graph.goal_count <= FEW_GOALS:
+        return _over_shortest(
+            graph, clock, iteration_limit, rng, chosen.backend, warm_start, on_progress
+        )
     found = search(
         graph,
         time_limit=Clock(SHARE * clock.left, within=clock) if clock.limit else None,
@@ -93,6 +102,31 @@ def solve(
         lower_bound=min(length, (bound or 0.0) * (1.0 - 1e-9)),
         trace=tuple(rows),
     )
+
+
+def _over_shortest(
+    graph: TravelGraph, clock: Clock, iteration_limit: int | None,
+    rng: np.random.Generator | None, backend: str, warm_start: Sequence[int] | None,
+    on_progress: OnProgress | None,
+) -> Result:  # fmt: skip
+    """Prove over the classes of least tether; tours by way of the others are bounded by the way
+    there and back."""
+    core = least_tethers(graph.costs_to_base, graph.cluster, MOST_KEPT // graph.goal_count)
+    if warm_start is not None:
+        core = np.union1d(core, np.asarray(warm_start, dtype=np.int64))
+    others = np.ones(len(graph), dtype=bool)
+    others[core] = False
+    place = {int(v): k for k, v in enumerate(core)}
+    warm = None if warm_start is None else [place[int(v)] for v in warm_start]
+    run = MipRun(
+        graph.subgraph(core), clock, iteration_limit, on_progress, rng=rng,
+        search_rounds=max(500, ROUNDS_PER_GOAL * graph.goal_count),
+    )  # fmt: skip
+    found = run.solve(backend, warm, walks=True)
+    if found.tour is None:
+        return found
+    whole = replace(found, tour=tuple(int(core[v]) for v in found.tour))
+    return graph.within_kept(whole, graph.least_by_way_of(float(graph.tethers[others].min())))
 
 
 def _between_goals(graph: TravelGraph) -> Floats:

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from netsp.clock import Clock, TimeLimit
-from netsp.errors import InputError, LimitReachedError
+from netsp.errors import InputError, LimitReachedError, MemoryLimitError
 from netsp.result import OnProgress, Progress, Result, proven
 from netsp.solution import Status
 from netsp.travel import UNTIMED, TravelGraph, least_tethers
@@ -72,17 +72,18 @@ class Run:
         return True
 
     @contextmanager
-    def until_stopped(self) -> Iterator[None]:
-        """Run the body until it is done, a limit is reached or Ctrl-C is pressed. A limit that is
-        reached while legs are measured counts the same, if there is a tour to show."""
+    def until_stopped(self, *, blind: bool = False) -> Iterator[None]:
+        """Run the body until it is done, a limit is reached, also while legs are measured, or
+        Ctrl-C is pressed. Where it has no tour yet by then, it gets the nearest one that there is,
+        unless it is blind: then its own is all that it may show."""
         try:
             yield
-        except (Stop, KeyboardInterrupt):
+        except MemoryLimitError:
+            raise
+        except (Stop, LimitReachedError, KeyboardInterrupt):
             self.stopped = True
-        except LimitReachedError:
-            if self.tour is None:
-                raise
-            self.stopped = True
+            if not blind:
+                self.start()
 
     def finish(self, stage: str, **more: Any) -> Result:
         """The last report, which says so if the run was stopped, and the outcome."""
@@ -103,10 +104,10 @@ class Run:
         return True
 
     def start(self) -> None:
-        """Take a first tour before anything that takes long: the goals in the class of least
-        tether, each the nearest to the one before, by the bounds of legs where goals are many."""
+        """Take a first tour, whatever the time: the goals in the class of least tether, each the
+        nearest to the one before, by the bounds of legs where goals are many."""
         graph = self.graph
-        if self.tour is not None or graph.measured or len(graph) <= UNTIMED:
+        if self.tour is not None or not graph.roadmapped:
             return
         core = least_tethers(graph.costs_to_base, graph.cluster, 1)
         with graph.on_clock(None):  # a few legs; without them there would be nothing to show

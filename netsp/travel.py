@@ -181,6 +181,12 @@ class TravelGraph:
             self.legs_s += time.monotonic() - begin
 
     @property
+    def roadmapped(self) -> bool:
+        """Whether every vertex has a leg to every other of another goal, as over a roadmap; costs
+        given as a matrix promise nothing."""
+        return not isinstance(self._legs, _CostTable)
+
+    @property
     def geometric(self) -> bool:
         """Whether a problem's geometry lies beneath, so that legs can be walked and retraced."""
         return self._make_ways is not None
@@ -272,8 +278,11 @@ class TravelGraph:
 
     def told(self, result: Result) -> Result:
         """A solver's result as callers are to see it."""
-        # out to a goal and back in a class that was left out is at least twice its tether
-        return self.within_kept(result, 2.0 * self.least_left_out)
+        return self.within_kept(result, self.least_by_way_of(self.least_left_out))
+
+    def least_by_way_of(self, tether: float) -> float:
+        """No tour by way of a class with so long a tether is shorter: it goes there and back."""
+        return 2.0 * tether
 
     def within_kept(self, result: Result, otherwise: float) -> Result:
         """A result over the classes kept as one about all: tours that use a class that was left out

@@ -73,7 +73,6 @@ def solve(
 
 def _anneal(run: Run, rng: np.random.Generator, chosen: Params) -> None:
     warm = run.tour is not None
-    run.start()
     run.check()
     graph = run.graph
     core = core_of(run, vertices=MOST_VERTICES)

@@ -81,7 +81,7 @@ def solve(
     chosen = read_params(Params, "anneal-2016", params)
     rng = rng or np.random.default_rng(0)
     run = Run(graph, time_limit, iteration_limit, on_progress)
-    with run.until_stopped():
+    with run.until_stopped(blind=True):
         run.offer(warm_start)
         if not run.trivial():
             _anneal(run, rng, chosen)

@@ -91,7 +91,6 @@ def solve(
     with run.until_stopped():
         run.offer(warm_start)
         if not run.trivial():
-            run.start()
             costs = LegCosts(graph)
             run.search(costs)
             run.report("heuristic", vertices=len(costs))

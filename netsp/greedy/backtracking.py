@@ -64,7 +64,6 @@ def solve(
     with run.until_stopped():
         run.offer(warm_start)
         if not run.trivial():
-            run.start()
             stage = _nearest_by_tether(run, retrace=chosen.retrace == "path" and graph.geometric)
     return run.finish(stage)
 

@@ -14,20 +14,19 @@ import numpy.typing as npt
 import shapely
 
 from netsp.hsignature import Word, concatenate, crossings, entangled, reduce
-from netsp.judge.stringpull import StringPuller, reduce_sleeve
+from netsp.judge.solids import Inset, bridges
+from netsp.judge.stringpull import PLACE_TOLERANCE, StringPuller, reduce_sleeve
 from netsp.problem import Circle, Problem
 from netsp.solution import Solution, Status
 
 Floats = npt.NDArray[np.float64]
 
-PLACE_TOLERANCE = 1e-6
-"""How far, relative to the largest coordinate, a path may miss a point or enter an obstacle."""
-
 LENGTH_TOLERANCE = 1e-3
 """How much longer than the stated length the drawn path may be (arcs are circumscribed)."""
 
-TAUT_TOLERANCE = 1e-4
-"""How far the stated tether length may lie from the recomputed one, which stands on polygons."""
+TAUT_TOLERANCE = 1e-7
+"""How far, as a share of the tether, a stated length may lie from the one found again: the offline
+geometry stands off from what it touches by some 1e-8 of the problem's size."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +79,10 @@ class _Judge:
         walked: Floats = np.array(solution.path, dtype=float).reshape(-1, 3)
         self.path: Floats = np.vstack([before, walked])
         self.out = len(before)
-        self.place = PLACE_TOLERANCE * problem.scale
+        self.place = max(PLACE_TOLERANCE * problem.scale, problem.tolerance)
+        self.puller = StringPuller(problem, problem.tether_length, self.place)
+        # what standing off from boundaries and rounding of coordinates do to a length
+        self.tiny = 3e-8 * problem.scale + 10.0 * problem.tolerance
         self.stops: list[int] = []
 
     def run(self) -> list[Check]:
@@ -182,27 +184,42 @@ class _Judge:
         return Check("visits every goal in order", True, f"{len(self.path)} path points")
 
     def _clear(self) -> Check:
-        line = shapely.LineString(self.path[:, :2])
-        worst, where = -np.inf, ""
-        for i, o in enumerate(self.problem.obstacles):
-            if isinstance(o, Circle):
-                depth = o.radius + self.problem.clearance - line.distance(shapely.Point(o.center))
-            else:
-                shape = shapely.Polygon(o.polygon)
-                depth = self.problem.clearance - line.distance(shape)
-                if shape.buffer(-self.place, join_style="mitre").intersects(line):
-                    depth = np.inf
-            if depth > worst:
-                worst, where = float(depth), self.problem.obstacle_label(i)
+        name = "enters no obstacle"
         if not self.problem.obstacles:
-            return Check("enters no obstacle", True, "there are none")
-        ok = worst <= self.place
-        detail = (
-            f"keeps {max(-worst, 0.0):.3g} from the nearest, {where}"
-            if ok
-            else f"enters {where} by {worst:.3g}"
+            return Check(name, True, "there are none")
+        line = shapely.LineString(self.path[:, :2] - self.puller.origin)
+        shapely.prepare(line)
+        nearest, where = np.inf, ""
+        for i, solid in enumerate(self.puller.solids):
+            room = self._room(i, line)
+            label = self.problem.obstacle_label(i)
+            if room < -solid.depth or self._pierced(i, solid, line):
+                how = f"by {-room:.3g}" if room < -solid.depth else "and leaves it elsewhere"
+                return Check(name, False, f"enters {label} {how}")
+            if room < nearest:
+                nearest, where = room, label
+        for i, j, ends in bridges(self.problem, self.puller.solids, self.problem.tolerance):
+            if line.intersects(shapely.LineString(ends)):
+                one, other = self.problem.obstacle_label(i), self.problem.obstacle_label(j)
+                return Check(name, False, f"passes between {one} and {other}, which touch")
+        return Check(name, True, f"keeps {max(nearest, 0.0):.3g} from the nearest, {where}")
+
+    def _room(self, i: int, line: shapely.LineString) -> float:
+        """How far the path stays from an obstacle grown by the clearance; negative inside, and of a
+        polygon's own inside not told."""
+        o, origin = self.problem.obstacles[i], self.puller.origin
+        if isinstance(o, Circle):
+            centre = shapely.Point(np.array(o.center) - origin)
+            return float(line.distance(centre)) - o.radius - self.problem.clearance
+        shape = shapely.Polygon(np.array(o.polygon) - origin)
+        return float(line.distance(shape)) - self.problem.clearance
+
+    def _pierced(self, i: int, solid: Inset, line: shapely.LineString) -> bool:
+        """Whether the path meets a polygon drawn in by the tolerance or, if the polygon is thinner,
+        by a part of its thickness."""
+        return not isinstance(self.problem.obstacles[i], Circle) and bool(
+            line.intersects(solid.shape)
         )
-        return Check("enters no obstacle", ok, detail)
 
     def _bounds(self) -> list[Check]:
         if self.problem.bounds is None:
@@ -232,6 +249,13 @@ class _Judge:
 
     def _empty(self) -> Check:
         word = reduce(crossings(self.path, self.problem.representative_points))
+        if self.solution.entangled and not word:
+            stated = ", ".join(map(str, self.solution.entangled))
+            return Check(
+                "total word is empty",
+                False,
+                f"yet the solution states entangled obstacles {stated}",
+            )
         if word:
             names = ", ".join(self.problem.obstacle_label(i - 1) for i in entangled(word))
             return Check("total word is empty", False, f"{list(word)}: entangles {names}")
@@ -240,7 +264,7 @@ class _Judge:
     def _tethers(self) -> list[Check]:
         """The second opinion: triangulate, pull each prefix and each leg taut."""
         limit = self.problem.tether_length
-        puller = StringPuller(self.problem, reach=limit)
+        puller = self.puller
         pieces = puller.crossings(self.path)
         points = self.problem.points
         # the tether that is out at the start is no leg
@@ -271,7 +295,7 @@ class _Judge:
             label = self.problem.goal_label(point - 1)
             fits = max(fits, (float(low), label))
             stated = self.solution.tour[k].tether_length
-            slack = TAUT_TOLERANCE * limit
+            slack = TAUT_TOLERANCE * limit + self.tiny
             wrong = max(wrong, (float(max(low - stated, stated - high) - slack), label))
         self.pulled_total = pulled_total
         excess = fits[0] - limit
@@ -283,7 +307,7 @@ class _Judge:
             ),
             Check(
                 "taut tether fits",
-                excess <= 1e-9 * limit + self.place,
+                excess <= 1e-9 * limit + self.tiny,
                 f"longest {fits[0]:.6g} of {limit:g}, at {fits[1]}",
             ),
             Check(
@@ -291,17 +315,17 @@ class _Judge:
                 wrong[0] <= 0.0,
                 f"within {TAUT_TOLERANCE:g} of the tether length"
                 if wrong[0] <= 0.0
-                else f"off by {wrong[0] + TAUT_TOLERANCE * limit:.6g} at {wrong[1]}",
+                else f"off by {wrong[0] + TAUT_TOLERANCE * limit + self.tiny:.6g} at {wrong[1]}",
             ),
         ]
 
     def _length(self) -> Check:
         stated = float(self.solution.length or 0.0)
         drawn = float(np.linalg.norm(np.diff(self.path[self.out :], axis=0), axis=1).sum())
-        tiny = 1e-9 * self.problem.scale
+        tiny = self.tiny * (len(self.stops) + 1)
         ok = (
-            self.pulled_total <= stated * (1.0 + 1e-6) + tiny
-            and stated <= drawn * (1.0 + 1e-6) + tiny
+            self.pulled_total <= stated * (1.0 + 1e-7) + tiny
+            and stated <= drawn * (1.0 + 1e-7) + tiny
             and drawn <= stated * (1.0 + LENGTH_TOLERANCE) + tiny
         )
         return Check(

@@ -1,10 +1,11 @@
 """Pull a path taut within its homotopy class: constrained Delaunay triangles and the funnel.
 
-An independent road to taut lengths. Circles become inscribed polygons, so every length found is a
-lower bound on the true taut length; free space is triangulated; a path is the sequence of triangle
-edges it crosses; cancelling an edge crossed back at once gives the *reduced* sequence, which is the
-path's homotopy class; the shortest path through a sequence of edges is found with the funnel
-algorithm (Lee & Preparata 1984; Chazelle 1982; Hershberger & Snoeyink 1994).
+An independent road to taut lengths. Circles become inscribed polygons; free space is triangulated;
+a path is the sequence of triangle edges it crosses; cancelling an edge crossed back at once gives
+the *reduced* sequence, which is the path's homotopy class; the shortest path through a sequence of
+edges is found with the funnel algorithm (Lee & Preparata 1984; Chazelle 1982; Hershberger &
+Snoeyink 1994). Its corners tell which disks the taut path touches, and with that its exact length
+(`netsp.judge.chain`).
 """
 
 from __future__ import annotations
@@ -16,14 +17,20 @@ import numpy as np
 import numpy.typing as npt
 import shapely
 
-from netsp.problem import Circle, Problem
+from netsp.judge.chain import contacts_of, exact_length
+from netsp.judge.solids import SIDES, inset
+from netsp.problem import Problem
 
 Floats = npt.NDArray[np.float64]
+
+PLACE_TOLERANCE = 1e-7
+"""How far, relative to the problem's size, a path may miss a point or enter an obstacle."""
 
 
 @dataclass(frozen=True)
 class Pulled:
-    """A taut planar length: `low` is a bound from inscribed polygons, `high` adds what the circles
+    """A taut planar length between two bounds. They agree where the contacts with the disks
+    themselves were found; else `low` is among inscribed polygons, and `high` adds what the circles
     stand proud of them along the bends (an estimate: it assumes no bend moves elsewhere)."""
 
     low: float
@@ -33,36 +40,29 @@ class Pulled:
 class StringPuller:
     """Triangulated free space of a problem's plan.
 
-    sides : edges of the polygon that stands in for a circle.
+    reach : how far from base, goals and obstacles a path may go. place : the judge's tolerance.
     """
 
-    def __init__(self, problem: Problem, reach: float, sides: int = 256) -> None:
+    def __init__(self, problem: Problem, reach: float, place: float | None = None) -> None:
         self.problem = problem
-        self.sides = sides
-        shrink = 1e-7 * problem.scale
+        self.place = PLACE_TOLERANCE * problem.scale if place is None else place
         self.origin = np.array(problem.base[:2])
-        shapes = []
-        proud = 0.0
-        for o in problem.obstacles:
-            if isinstance(o, Circle):
-                r = o.radius + problem.clearance - shrink
-                # a phase no drawing has, so that symmetric worlds give no degenerate triangles
-                angle = 2.0 * np.pi * (np.arange(sides) + 0.2371) / sides
-                ring = np.column_stack([np.cos(angle), np.sin(angle)]) * r + (
-                    np.array(o.center) - self.origin
-                )
-                shapes.append(shapely.Polygon(ring))
-                proud = max(proud, r * (1.0 - math.cos(math.pi / sides)) + shrink)
-            else:
-                grown = shapely.Polygon(np.array(o.polygon) - self.origin)
-                if problem.clearance > 0.0:
-                    grown = grown.buffer(problem.clearance, quad_segs=sides // 4)
-                    proud = max(proud, problem.clearance * (1.0 - math.cos(math.pi / sides)))
-                shapes.append(grown.buffer(-shrink, join_style="mitre"))
-        self.proud = proud
+        self.solids = [inset(problem, o, self.place, self.origin) for o in problem.obstacles]
+        shapes = [s.shape for s in self.solids]
+        disks = [s.disks for s in self.solids]
+        self.disks: Floats = np.vstack(disks) if disks else np.zeros((0, 3))
+        self._disk_at = {
+            (float(x), float(y)): tuple(s.disks[k].tolist())
+            for s in self.solids
+            for (x, y), k in zip(s.ring, s.owner, strict=True)
+        }
+        self.proud = max(
+            (float(s.disks[:, 2].max()) * (1.0 - math.cos(math.pi / SIDES)) + s.depth
+             for s in self.solids), default=0.0,
+        )  # fmt: skip
         if problem.bounds is not None:
             bounds = np.array(problem.bounds) - np.tile(self.origin, 2)
-            box = shapely.box(*bounds).buffer(shrink, join_style="mitre")
+            box = shapely.box(*bounds).buffer(self.place, join_style="mitre")
         else:
             box = shapely.MultiPoint(problem.points[:, :2] - self.origin)
             box = shapely.union_all([box, *shapes]).envelope.buffer(2.0 * reach, join_style="mitre")
@@ -104,6 +104,11 @@ class StringPuller:
             # coming from the left of u→v, v lies on the left hand
             portals.append((v, u) if from_left else (u, v))
         corners = _funnel(a, b, portals)
+        own = [(float(x), float(y)) for x, y in corners[1:-1]]
+        contacts = contacts_of(corners, [self._disk_at.get(p, (*p, 0.0)) for p in own])
+        exact = exact_length(a, b, contacts, self.disks, 1e-3 * self.place)
+        if exact is not None:
+            return Pulled(exact, exact)
         d = np.diff(corners, axis=0)
         low = float(np.hypot(d[:, 0], d[:, 1]).sum())
         heading = np.unwrap(np.arctan2(d[:, 1], d[:, 0])) if len(d) > 1 else np.zeros(1)

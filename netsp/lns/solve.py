@@ -56,7 +56,6 @@ def solve(
     with run.until_stopped():
         run.offer(warm_start)
         if not run.trivial():
-            run.start()
             _search(run, rng, chosen)
     return run.finish("done")
 

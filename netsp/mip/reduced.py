@@ -88,7 +88,6 @@ def solve(
         outer.offer(warm_start)
         if outer.trivial():
             return outer.finish("trivial")
-        outer.start()
         place = {int(v): k for k, v in enumerate(kept)}
         start = [place.get(int(v), -1) for v in warm_start] if warm_start is not None else []
         result = part.solve(chosen.backend, start if start and -1 not in start else None)

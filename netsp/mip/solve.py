@@ -97,7 +97,6 @@ class MipRun(SearchingRun):
         with self.until_stopped():
             self.offer(warm_start)
             if not self.trivial():
-                self.start()
                 costs = LegCosts(self.graph)
                 self.search(costs)
                 self.report("heuristic", vertices=len(costs))

@@ -172,7 +172,7 @@ class _Search:
             if excess >= high:
                 excess = low + 0.5 * (high - low)
         if len(known) > share:
-            known_to = min(known_to, known[share - 1][0])
+            known_to = min(known_to, known[share][0])
             known = known[:share]
         return known, known_to
 
@@ -192,9 +192,10 @@ class _Search:
         )  # fmt: skip
         if found.capped:
             return None, []
-        best = self._best(found)
-        rows = sorted((length, trie.word(w)) for (_, w), (length, _) in best.items())
-        return found, rows
+        nearest = sorted((length, w) for (_, w), (length, _) in self._best(found).items())
+        # one more than can be kept tells how long the shortest is that is not
+        rows = [(length, trie.word(w)) for length, w in nearest[: share + 1]]
+        return found, sorted(rows)
 
     def _best(self, found: Found) -> dict[tuple[int, int], tuple[float, int]]:
         """Shortest (length, last bend) by (goal, word) among the hits within the tether."""

@@ -191,7 +191,8 @@ def explore(
     """All taut paths from node `source` whose words stay in (or pend from) the core.
 
     longest : most letters that one step can write. rule : which new words join the core. keep :
-    whether to keep the search tree, so that paths can be written out. cap : most states to visit.
+    whether to keep the search tree, so that paths can be written out. cap : most departures to
+    look at.
     rest : per tangent, the least length from its end to where the search is going (0 where it goes
     everywhere). aim : the one point asked for, -1 for all. within : per point, the longest path
     that is reported; most : so many reports end the search. stop : ends it when its first number is
@@ -227,13 +228,15 @@ def explore(
         slid, so_far = s_f[sid, 0], s_f[sid, 1]
         if not keep:
             count = top
-        visited += 1
-        if visited > cap or hits >= most or stop[0] != 0:
-            return (trie, limit, size), (h_i[:hits], h_f[:hits]), (s_i[:count], s_f[:count]), True
         if start[node] == start[node + 1]:
             continue
         r = radius[node]
         while True:
+            visited += 1
+            if visited > cap or hits >= most or stop[0] != 0:
+                # the state that is being looked at counts as kept
+                hit, tree = (h_i[:hits], h_f[:hits]), (s_i[: count + 1], s_f[: count + 1])
+                return (trie, limit, size), hit, tree, True
             here = so_far + r * slid
             if here > limit[t]:
                 break

@@ -85,6 +85,11 @@ class OpenedGraph(TravelGraph):
         )
         return self.within_kept(path, self.least_left_out)
 
+    def least_by_way_of(self, tether: float) -> float:
+        """No path by way of a class with so long a tether is shorter than the way home from there;
+        the surcharge counts as in every tour."""
+        return tether + 2.0 * self.surcharge
+
     def telling(self, listener: OnProgress | None) -> OnProgress | None:
         """Tells a listener about the path instead of the tour."""
         if listener is None:
@@ -178,7 +183,7 @@ def opened_graph(
     )  # fmt: skip
     part = TravelGraph(
         cluster, words, legs.to_base(), legs, roadmap="taut",
-        classes=classes if roadmap.complete else "shortest",
+        classes=roadmap.rule if roadmap.complete else "shortest",
         least_left_out=roadmap.least_left_out,
     )  # fmt: skip
     start = len(cluster) - 1

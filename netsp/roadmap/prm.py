@@ -81,7 +81,9 @@ class PrmRoadmap:
         time_limit: TimeLimit = None,
     ) -> None:
         if not isinstance(samples, (int, np.integer)) or samples < 1:
-            raise InputError(f"samples: expected a positive whole number, got {samples!r}")
+            raise InputError(
+                f"roadmap 'prm': samples: expected a positive whole number, got {samples!r}"
+            )
         self.problem = problem
         self.paths = TautPaths(problem)
         outline = self.paths.outline

@@ -39,6 +39,7 @@ from netsp.roadmap.explore import (
 from netsp.roadmap.paths import TautPaths
 from netsp.roadmap.slits import Slits, build_slits, slit_lengths
 from netsp.roadmap.ways import taut_ways
+from netsp.solution import KeptClasses
 from netsp.travel import UNTIMED, TravelGraph
 
 Floats = npt.NDArray[np.float64]
@@ -88,7 +89,8 @@ class TautRoadmap:
             raise InputError(f"max_classes: expected a positive whole number, got {max_classes!r}")
         if classes not in RULES:
             raise InputError(f"classes: unknown {classes!r}; expected one of {', '.join(RULES)}")
-        self.problem, self.classes = problem, classes
+        self.problem = problem
+        self.rule: KeptClasses = "non-looping" if RULES[classes] == NON_LOOPING else "all"
         self.clock = Clock.of(time_limit)
         self.paths = TautPaths(problem)
         self.outline, self.tangents = self.paths.outline, self.paths.tangents
@@ -109,7 +111,7 @@ class TautRoadmap:
             self.legs,
             roadmap="taut",
             ways=partial(taut_ways, self.problem),
-            classes=self.classes if self.complete else "shortest",
+            classes=self.rule if self.complete else "shortest",
             least_left_out=self.least_left_out,
         )
 

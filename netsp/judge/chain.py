@@ -1,0 +1,140 @@
+"""The exact length of a taut path, from the corners of one around polygons.
+
+Around inscribed polygons a taut path has corners; those in a row on one disk, turning one way, are
+one contact with that disk. Through contacts with given senses there is one alternation of common
+tangents and arcs, and its length is in closed form. A contact whose arc would be run backwards was
+the polygon's doing and goes; a disk that a tangent still enters (by less than the polygon stood
+back from it) is a contact, too. What has neither is the taut path among the disks themselves.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+Floats = npt.NDArray[np.float64]
+
+ROUNDS = 60
+"""Contacts that may come or go before the path is given up."""
+
+
+@dataclass(frozen=True)
+class Contact:
+    """A disk that a path bends around. sense : 1 with the disk on the left, -1 on the right. turn :
+    about how far the path turns there, radians."""
+
+    x: float
+    y: float
+    radius: float
+    sense: int
+    turn: float
+
+
+def contacts_of(corners: Floats, disk_of: list[tuple[float, float, float]]) -> list[Contact]:
+    """The contacts of a polyline whose inner corners stand on the given disks (x, y, radius)."""
+    out: list[Contact] = []
+    d = np.diff(corners, axis=0)
+    keep = np.hypot(*d.T) > 0.0
+    heading = np.arctan2(d[:, 1], d[:, 0])
+    before = None
+    for k in range(len(d)):
+        if not keep[k]:
+            continue
+        if before is not None:
+            turn = math.remainder(heading[k] - before, 2.0 * math.pi)
+            x, y, r = disk_of[k - 1]
+            sense = 1 if turn > 0.0 else -1
+            last = out[-1] if out else None
+            if last and (last.x, last.y, last.sense) == (x, y, sense):
+                out[-1] = Contact(x, y, r, sense, last.turn + abs(turn))
+            elif turn != 0.0:
+                out.append(Contact(x, y, r, sense, abs(turn)))
+        before = heading[k]
+    return out
+
+
+def exact_length(
+    a: Floats, b: Floats, contacts: list[Contact], disks: Floats, slack: float
+) -> float | None:
+    """Length of the taut path from a to b by way of contacts, among disks (d, 3); None if no
+    consistent set of contacts is found. slack : depth in a disk that counts as none."""
+    chain = list(contacts)
+    for _ in range(ROUNDS):
+        nodes = [(a[0], a[1], 0.0, 0), *((c.x, c.y, c.radius, c.sense) for c in chain)]
+        nodes.append((b[0], b[1], 0.0, 0))
+        legs = [_tangent(p, q) for p, q in pairwise(nodes)]
+        length = sum(leg[1] for leg in legs)
+        backward, worst = -1, -1e-9
+        turns = []
+        for k, c in enumerate(chain):
+            raw = c.sense * (legs[k + 1][0] - legs[k][0])
+            turn = raw + 2.0 * math.pi * round((c.turn - raw) / (2.0 * math.pi))
+            turns.append(turn)
+            if turn < worst:
+                backward, worst = k, turn
+        if backward >= 0:
+            del chain[backward]
+            continue
+        entered = _entered(a, b, chain, legs, disks, slack)
+        if entered is None:
+            return length + sum(c.radius * t for c, t in zip(chain, turns, strict=True))
+        at, contact = entered
+        chain = [Contact(c.x, c.y, c.radius, c.sense, t) for c, t in zip(chain, turns, strict=True)]
+        chain.insert(at, contact)
+    return None
+
+
+def _tangent(
+    p: tuple[float, float, float, int], q: tuple[float, float, float, int]
+) -> tuple[float, float]:
+    """Heading and length of the common tangent of two oriented disks.
+
+    With n the left normal of the tangent, it touches disk i at c_i - s_i r_i n, so
+    (c_2 - c_1) · n = s_2 r_2 - s_1 r_1.
+    """
+    dx, dy = q[0] - p[0], q[1] - p[1]
+    d = math.hypot(dx, dy)
+    off = q[3] * q[2] - p[3] * p[2]
+    if d <= abs(off):  # a point on a boundary, or disks that touch from inside
+        return math.atan2(dy, dx) - math.copysign(0.5 * math.pi, off) if d else 0.0, 0.0
+    return math.atan2(dy, dx) - math.asin(off / d), math.sqrt((d - off) * (d + off))
+
+
+def _entered(
+    a: Floats,
+    b: Floats,
+    chain: list[Contact],
+    legs: list[tuple[float, float]],
+    disks: Floats,
+    slack: float,
+) -> tuple[int, Contact] | None:
+    """The disk that a tangent enters deepest, as a contact, and its place in the chain."""
+    if len(disks) == 0:
+        return None
+    deepest, found = slack, None
+    for k, (heading, length) in enumerate(legs):
+        ux, uy = math.cos(heading), math.sin(heading)
+        if k == 0:
+            x, y = float(a[0]), float(a[1])
+        else:
+            c = chain[k - 1]
+            x, y = c.x + c.sense * c.radius * uy, c.y - c.sense * c.radius * ux
+        dx, dy = disks[:, 0] - x, disks[:, 1] - y
+        along = dx * ux + dy * uy
+        side = dy * ux - dx * uy  # > 0: the centre is on the left
+        depth = np.where((along > 0.0) & (along < length), disks[:, 2] - np.abs(side), -np.inf)
+        for j in (k - 1, k):  # its own two disks
+            if 0 <= j < len(chain):
+                own = (disks[:, 0] == chain[j].x) & (disks[:, 1] == chain[j].y)
+                depth[own] = -np.inf
+        i = int(np.argmax(depth))
+        if depth[i] > deepest:
+            deepest = float(depth[i])
+            sense = 1 if side[i] > 0.0 else -1
+            cx, cy, r = disks[i].tolist()
+            found = k, Contact(cx, cy, r, sense, 0.0)
+    return found
