@@ -22,7 +22,6 @@ from netsp import Circle, Polygon, Problem, Solution, Status, solve, verify
 from netsp.errors import NetspError
 from netsp.solution import ProblemReference
 
-
 FEW = {"max_classes": 1000}
 """Specks of obstacles have tens of thousands of classes; the judge need not wait for them."""
 

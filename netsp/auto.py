@@ -72,7 +72,7 @@ def solve(
         run = MipRun(graph, time_limit, iteration_limit, on_progress, rng=rng, search_rounds=rounds)
         return run.solve(chosen.backend, warm_start, walks=graph.goal_count <= FEW_GOALS)
     clock = Clock.of(time_limit)
-    if graph.goal_count <= FEW_GOALS:
+    if graph.goal_count <= FEW_GOALS and graph.roadmapped:
         return _over_shortest(
             graph, clock, iteration_limit, rng, chosen.backend, warm_start, on_progress
         )
@@ -126,7 +126,8 @@ def _over_shortest(
     if found.tour is None:
         return found
     whole = replace(found, tour=tuple(int(core[v]) for v in found.tour))
-    return graph.within_kept(whole, graph.least_by_way_of(float(graph.tethers[others].min())))
+    least = float(graph.tethers[others].min(initial=np.inf))
+    return graph.within_kept(whole, graph.least_by_way_of(least))
 
 
 def _between_goals(graph: TravelGraph) -> Floats:

@@ -14,7 +14,7 @@ import numpy as np
 import shapely
 
 from netsp import Circle, Problem
-from netsp.hsignature import Word, concatenate, crossings, invert, is_looping
+from netsp.hsignature import Word, concatenate, crossings, invert
 
 
 class BruteForce:
@@ -61,7 +61,7 @@ class BruteForce:
             self.near[a].append((int(b), d, word))
             self.near[b].append((int(a), d, invert(word)))
 
-    def lengths(self, source: int, limit: float, repeats: int = 2) -> dict[tuple[int, Word], float]:
+    def lengths(self, source: int, limit: float, repeats: int = 8) -> dict[tuple[int, Word], float]:
         """Shortest planar length of every class from a point to every point, up to the limit; words
         that repeat a signed letter more than `repeats` times are not followed."""
         goals = len(self.problem.points)
@@ -83,18 +83,19 @@ class BruteForce:
         return {k: d for k, d in best.items() if k[0] < goals}
 
     def optimum(self) -> float:
-        """Length of the shortest non-entangling tour, by trying every order and every class."""
+        """Length of the shortest non-entangling tour, by trying every order and every class whose
+        tether fits."""
         p = self.problem
         z = p.points[:, 2]
         limit = p.tether_length
         tethers = {
             k: d
             for k, d in self.lengths(0, limit).items()
-            if not is_looping(k[1]) and k[0] > 0 and math.hypot(d, z[k[0]] - z[0]) <= limit
+            if k[0] > 0 and math.hypot(d, z[k[0]] - z[0]) <= limit
         }
         goals = len(p.goals)
         classes = [[w for g, w in tethers if g == k + 1] for k in range(goals)]
-        legs = [self.lengths(k + 1, 2 * limit, repeats=4) for k in range(goals)]
+        legs = [self.lengths(k + 1, 2 * limit) for k in range(goals)]
         best = math.inf
         for order in itertools.permutations(range(goals)):
             g = order[0] + 1

@@ -10,11 +10,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp import NetspError, Polygon, Problem, Status, solve, solve_graph, travel_graph, verify
+from netsp.clock import Clock
 from netsp.lns import Instance, Search
 from netsp.mip.flows import min_cuts
 from netsp.mip.solve import MipRun
 from netsp.mip.subtours import branches
-from netsp.clock import Clock
 from netsp.roadmap.slits import _taut, build_slits, slit_lengths
 from netsp.roadmap.taut import TautRoadmap
 from tests.brute import brute_tour
@@ -191,11 +191,33 @@ def test_auto_gives_a_tour_and_a_true_bound_where_mip_would_not_fit(monkeypatch)
     problem = random_world(1, goals=8, tether=300.0)
     best = solve(problem, "mip")
     monkeypatch.setattr(netsp.auto, "PROVABLE", 10)
+    monkeypatch.setattr(netsp.auto, "FEW_GOALS", 4)
     solution = solve(problem, "auto", iteration_limit=2_000)
     assert verify(problem, solution)
     assert solution.lower_bound is not None
     assert 0.3 * best.length < solution.lower_bound <= best.length * (1 + 1e-9)
     assert solution.length >= best.length * (1 - 1e-6)
+
+
+@pytest.mark.parametrize("kept", [16, 40, 4000])
+def test_few_goals_are_proven_over_the_shortest_classes(monkeypatch, kept):
+    """The status claims no more than was looked at, the bound holds for all."""
+    import netsp.auto
+
+    problem = random_world(1, goals=8, tether=300.0)
+    best = solve(problem, "mip")
+    monkeypatch.setattr(netsp.auto, "PROVABLE", 10)
+    monkeypatch.setattr(netsp.auto, "MOST_KEPT", kept)
+    solution = solve(problem, "auto")
+    assert verify(problem, solution)
+    assert solution.lower_bound is not None
+    assert 0.0 < solution.lower_bound <= best.length * (1 + 1e-9)
+    assert solution.length >= best.length * (1 - 1e-6)
+    if solution.status is Status.OPTIMAL:
+        assert solution.length == pytest.approx(best.length, rel=1e-6)
+    else:
+        assert solution.status is Status.OPTIMAL_OF_KEPT
+    assert (solution.status is Status.OPTIMAL) == (kept == 4000)
 
 
 def test_the_root_reports_what_is_left():

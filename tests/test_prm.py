@@ -7,6 +7,7 @@ import pytest
 import shapely
 
 from netsp import Circle, InfeasibleError, InputError, Problem, Status, solve, verify
+from netsp.errors import LimitReachedError
 from netsp.hsignature import concatenate, crossings, is_looping, signature
 from netsp.roadmap.prm import PrmRoadmap
 from netsp.roadmap.taut import TautRoadmap
@@ -172,6 +173,18 @@ def test_bad_options_are_named(world):
         solve(world, roadmap="prm", roadmap_options={"size": 3})
 
 
+def test_a_goal_that_only_the_samples_miss_is_not_called_infeasible():
+    problem = Problem(
+        base=(0, 0),
+        goals=[(10, 0)],
+        tether_length=11.9,
+        obstacles=[Circle(center=(5, 0), radius=3)],
+    )
+    assert solve(problem).length == pytest.approx(2 * 11.86, rel=1e-2)
+    with pytest.raises(LimitReachedError, match=r"prm roadmap reaches goals\[0\].*more samples"):
+        PrmRoadmap(problem, samples=60)
+
+
 def test_a_goal_the_roadmap_cannot_reach_is_infeasible_with_the_reason():
     problem = Problem(
         base=(0, 0),
@@ -179,5 +192,5 @@ def test_a_goal_the_roadmap_cannot_reach_is_infeasible_with_the_reason():
         tether_length=11.0,
         obstacles=[Circle(center=(5, 0), radius=3)],
     )
-    with pytest.raises(InfeasibleError, match=r"no path over the prm roadmap.*goals\[0\] is out"):
+    with pytest.raises(InfeasibleError, match=r"goals\[0\] is out of reach"):
         PrmRoadmap(problem, samples=200)

@@ -9,10 +9,12 @@ import shapely
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from netsp import Circle, InfeasibleError, InputError, Polygon, Problem
+from netsp import Circle, InfeasibleError, InputError, Polygon, Problem, Status, solve, verify
+from netsp.clock import Clock
 from netsp.errors import LimitReachedError
 from netsp.hsignature import crossings, is_looping, reduce, signature
 from netsp.roadmap.taut import TautRoadmap
+from netsp.worlds import random_world as papers_world
 from tests.brute import BruteForce
 from tests.worlds import random_world, small_worlds
 
@@ -57,7 +59,7 @@ def check_against_brute_force(problem, sides=32):
     roadmap = reachable(problem)
     brute = BruteForce(problem, sides)
     limit = problem.tether_length
-    found = {k: d for k, d in brute.lengths(0, limit).items() if k[0] > 0 and not is_looping(k[1])}
+    found = {k: d for k, d in brute.lengths(0, limit).items() if k[0] > 0}
     # polygons are inscribed, so brute lengths are short by less than this
     error = 2.0 * limit * (math.pi / sides) ** 2
     if roadmap is None:
@@ -72,6 +74,9 @@ def check_against_brute_force(problem, sides=32):
     for k, d in found.items():
         if d < limit - error:
             assert k in exact, f"class {k} of length {d} missed"
+    # the paper's rule: the same but for the words that loop
+    papers = classes(TautRoadmap(problem, classes="non-looping"))
+    assert papers == {k: d for k, d in exact.items() if not is_looping(k[1])}
 
 
 @relaxed
@@ -93,7 +98,7 @@ def test_legs_agree_with_brute_force(problem):
     if roadmap is None or len(roadmap.cluster) > 60:
         return
     brute = BruteForce(problem, 32)
-    found = brute.lengths(1, 2 * problem.tether_length, repeats=4)
+    found = brute.lengths(1, 2 * problem.tether_length)
     costs = roadmap.travel_graph().costs
     error = 4.0 * problem.tether_length * (math.pi / 32) ** 2
     for u in np.flatnonzero(roadmap.cluster == 1):
@@ -112,7 +117,7 @@ def test_laws_of_a_random_world(seed):
     # each class once
     keys = list(zip(graph.cluster.tolist(), graph.signatures, strict=True))
     assert len(set(keys)) == n
-    assert all(w == reduce(w) and not is_looping(w) for w in graph.signatures)
+    assert all(w == reduce(w) for w in graph.signatures)
     # symmetric; no leg within a cluster
     assert (costs == costs.T).all()
     same = graph.cluster[:, None] == graph.cluster[None, :]
@@ -174,7 +179,7 @@ def test_tether_along_a_leg_stays_below_its_worse_end(seed):
                 obstacles=problem.obstacles,
                 tether_length=worse * 1.01,
             )
-            taut = classes(TautRoadmap(there)) if not is_looping(word) else {(1, word): 0.0}
+            taut = classes(TautRoadmap(there))
             assert taut[1, word] <= worse * (1 + 1e-3)
 
 
@@ -290,10 +295,88 @@ def test_polygons_that_touch_in_a_corner_leave_no_gap():
     assert list(lengths) == pytest.approx([4 + 2 * math.sqrt(2)] * 2, abs=1e-6)
 
 
-def test_too_many_classes_is_a_clear_error():
+def test_of_too_many_classes_the_shortest_of_every_goal_are_kept():
     problem = random_world(0, goals=5, tether=400.0)
-    with pytest.raises(InputError, match=r"too many homotopy classes.*limit 50"):
-        TautRoadmap(problem, max_classes=50)
+    whole, part = TautRoadmap(problem), TautRoadmap(problem, max_classes=50)
+    assert whole.complete
+    assert not part.complete
+    assert part.least_left_out < 400.0
+    for goal in range(1, 6):
+        kept = np.sort(part.planar[part.cluster == goal])
+        assert 1 <= len(kept) <= 10
+        assert np.allclose(kept, np.sort(whole.planar[whole.cluster == goal])[: len(kept)])
+    # no class left out has a shorter tether than is said
+    words = {(int(c), w) for c, w in zip(part.cluster, part.signatures, strict=True)}
+    left_out = [
+        t for c, w, t in zip(whole.cluster, whole.signatures, whole.tethers, strict=True)
+        if (int(c), w) not in words
+    ]  # fmt: skip
+    assert min(left_out) >= part.least_left_out - 1e-6
+
+
+@pytest.mark.parametrize("rule", ["none", 3, None])
+def test_an_unknown_rule_of_classes_is_refused(rule):
+    with pytest.raises(InputError, match="classes: unknown"):
+        TautRoadmap(random_world(0, goals=2, tether=200.0), classes=rule)
+
+
+def test_a_speck_of_an_obstacle_winds_up_no_endless_search():
+    """A tether winds a thousand times around a wire; the shortest classes are found all the same,
+    and the tour that is shorter than twice any other tether is proven."""
+    problem = Problem(
+        base=(0, 0), goals=[(6, 1)], obstacles=[Circle(center=(3, 0.5), radius=1e-4)],
+        tether_length=20,
+    )  # fmt: skip
+    solution = solve(problem, roadmap_options={"max_classes": 100})
+    assert solution.classes == "shortest"
+    assert solution.status is Status.OPTIMAL
+    assert solution.length == pytest.approx(2 * math.hypot(6, 1), rel=1e-6)
+    assert solution.lower_bound is not None
+    assert verify(problem, solution)
+
+
+def moved(problem, turn=0.0, mirror=False, shift=(0.0, 0.0), order=None):
+    """The same world elsewhere: mirrored, turned, moved, its obstacles renumbered."""
+    c, s = math.cos(turn), math.sin(turn)
+
+    def there(p):
+        x, y = (-p[0], p[1]) if mirror else (p[0], p[1])
+        return (c * x - s * y + shift[0], s * x + c * y + shift[1], *p[2:])
+
+    obstacles = [
+        Circle(center=there(o.center), radius=o.radius) if isinstance(o, Circle)
+        else Polygon(polygon=[there(p) for p in o.polygon])
+        for o in problem.obstacles
+    ]  # fmt: skip
+    return Problem(
+        base=there(problem.base),
+        goals=[there(g.position) for g in problem.goals],
+        obstacles=[obstacles[k] for k in order] if order is not None else obstacles,
+        tether_length=problem.tether_length,
+        clearance=problem.clearance,
+    )
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_where_a_world_lies_and_how_it_is_numbered_changes_neither_classes_nor_optimum(seed):
+    """Which words loop depends on the direction of the rays; which classes there are does not."""
+    rng = np.random.default_rng(seed)
+    family = "harbour" if seed % 2 else "icra2017"
+    problem = papers_world(seed, family=family, goals=5, tether_length=330.0)
+    lengths, best = np.sort(TautRoadmap(problem).tethers), solve(problem).length
+    turn, shift = float(rng.uniform(0, 2 * math.pi)), rng.uniform(-1e3, 1e3, 2)
+    order = rng.permutation(len(problem.obstacles))
+    for other in (
+        moved(problem, turn=turn),
+        moved(problem, mirror=True),
+        moved(problem, shift=shift),
+        moved(problem, order=order),
+        moved(problem, turn, True, shift, order),
+    ):
+        found = np.sort(TautRoadmap(other).tethers)
+        assert len(found) == len(lengths)
+        assert np.allclose(found, lengths, atol=1e-5)
+        assert solve(other).length == pytest.approx(best, rel=1e-6)
 
 
 def test_polygons_bend_at_their_convex_vertices_only():
@@ -339,6 +422,13 @@ def test_polygons_agree_with_brute_force(parts, clearance, data):
 def test_bounds_cut_off_what_lies_outside(problem, top):
     if any(p[1] > top for p in problem.points):
         return
+    # of an obstacle that touches the bounds an inscribed polygon cannot tell if it shuts the gap
+    walls = np.array([-9.0, 9.0, -9.0, top])
+    for o in problem.obstacles:
+        low, high = np.array(o.shape().bounds[:2]), np.array(o.shape().bounds[2:])
+        ends = np.array([low[0], high[0], low[1], high[1]])
+        if (np.abs(ends - walls) < 0.05 + problem.clearance).any():
+            return
     check_against_brute_force(problem.model_copy(update={"bounds": (-9.0, -9.0, 9.0, top)}))
 
 
@@ -465,6 +555,17 @@ def test_a_far_origin_changes_nothing():
 
 
 def test_time_up_while_measuring_legs_says_where_it_stood():
-    graph = TautRoadmap(random_world(0, goals=20, tether=400.0), time_limit=1e-9).travel_graph()
-    with pytest.raises(LimitReachedError, match="time limit reached while measuring the legs"):
+    graph = TautRoadmap(random_world(0, goals=20, tether=400.0)).travel_graph()
+    said = "time limit reached while measuring the legs"
+    with graph.on_clock(Clock(1e-9)), pytest.raises(LimitReachedError, match=said):
         graph.costs  # noqa: B018
+
+
+def test_time_up_while_classes_are_sought_leaves_some_of_every_goal():
+    problem = random_world(0, goals=20, tether=400.0)
+    roadmap = TautRoadmap(problem, time_limit=1e-9)
+    assert not roadmap.complete
+    assert set(roadmap.cluster.tolist()) == set(range(21))
+    solution = solve(problem, time_limit=1e-9)
+    assert solution.status in (Status.FEASIBLE, Status.OPTIMAL_OF_KEPT)
+    assert verify(problem, solution)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 
 from netsp import Circle, InfeasibleError, Problem, solve, travel_graph, verify
-from netsp.hsignature import is_looping, signature
+from netsp.hsignature import signature
 from netsp.judge.stringpull import StringPuller, reduce_sleeve
 from netsp.roadmap.taut import TautRoadmap
 from netsp.solution import ProblemReference, Status
@@ -199,4 +199,3 @@ def test_every_solution_of_a_small_world_is_verified(problem):
         return
     verdict = verify(problem, solve(problem))
     assert verdict, f"{problem.to_json()}\n{verdict}"
-    assert not any(is_looping(w) for w in graph.signatures)

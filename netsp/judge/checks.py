@@ -21,6 +21,9 @@ from netsp.solution import Solution, Status
 
 Floats = npt.NDArray[np.float64]
 
+STAND_OFF = 3e-8
+"""As a share of the problem's size, what standing off from a boundary may add to a length."""
+
 LENGTH_TOLERANCE = 1e-3
 """How much longer than the stated length the drawn path may be (arcs are circumscribed)."""
 
@@ -81,8 +84,12 @@ class _Judge:
         self.out = len(before)
         self.place = max(PLACE_TOLERANCE * problem.scale, problem.tolerance)
         self.puller = StringPuller(problem, problem.tether_length, self.place)
-        # what standing off from boundaries and rounding of coordinates do to a length
-        self.tiny = 3e-8 * problem.scale + 10.0 * problem.tolerance
+        self.tiny = 5.0 * problem.tolerance
+        xy = problem.points[:, :2]
+        near = [float(o.signed_distance(xy).min()) - problem.clearance for o in problem.obstacles]
+        if min(near, default=np.inf) < self.place:
+            # the offline geometry stands off from boundaries, which moves the ends of its paths
+            self.tiny += STAND_OFF * problem.scale
         self.stops: list[int] = []
 
     def run(self) -> list[Check]:

@@ -24,8 +24,13 @@ Ints = npt.NDArray[np.int64]
 SHARE = 0.2
 """Of the room at a corner, or of a radius, the part that an inset may take."""
 
-SIDES = 256
-"""Edges of the polygon that stands in for a circle."""
+SIDES, SIDES_AT_CORNER = 64, 32
+"""Edges of the polygon that stands in for a circle, and for the whole circle that a clearance would
+draw around a corner. They decide which way a path goes round; lengths come from the disks."""
+
+NO_ROOM = 10.0
+"""In tolerances: with less clearance a polygon is not grown, for its rounded corners would be of
+rounding themselves."""
 
 PHASE = 0.2371
 """Of a side: a phase no drawing has, so that symmetric worlds give no degenerate triangles."""
@@ -60,15 +65,16 @@ def inset(problem: Problem, obstacle: Circle | Polygon, place: float, origin: Fl
         return Inset(shapely.Polygon(ring), ring, owner, disks, by)
     v = counterclockwise(np.array(obstacle.polygon) - origin)
     disks = np.column_stack([v, np.full(len(v), c)])
-    if c == 0.0:
+    if c <= NO_ROOM * place:
         back = np.minimum(place, SHARE * room(v))
         shape = shapely.Polygon(v + back[:, None] * _inward(v))
         if not shape.is_valid:  # needles of rounding: better too strict than blind
             shape = shapely.Polygon(v)
         ring = shapely.get_coordinates(shape)[:-1]
-        return Inset(shape, ring, np.arange(len(v)), disks, float(back.max()))
+        by = min(place, SHARE * c) if c else float(back.max())
+        return Inset(shape, ring, np.arange(len(v)), disks, by)
     by = min(place, SHARE * c)
-    shape = shapely.Polygon(v).buffer(c - by, quad_segs=SIDES // 4)
+    shape = shapely.Polygon(v).buffer(c - by, quad_segs=SIDES_AT_CORNER // 4)
     ring = shapely.get_coordinates(shape.exterior)[:-1]
     away = np.hypot(ring[:, None, 0] - v[None, :, 0], ring[:, None, 1] - v[None, :, 1])
     return Inset(shapely.Polygon(ring), ring, np.argmin(away, axis=1), disks, by)
