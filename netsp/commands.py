@@ -59,6 +59,10 @@ def add_online(commands: Any) -> None:
         "--planner", default="repair", metavar="NAME",
         help="repair (default): mend what breaks; none: go on with the plan",
     )  # fmt: skip
+    p.add_argument(
+        "--planning-limit", type=seconds, default=2.0, metavar="S",
+        help="for mending a plan, while the robot holds its place; default 2",
+    )  # fmt: skip
     p.add_argument("--delta", type=length, metavar="D", help="resolution of the tether")
     p.add_argument("--seed", type=natural, default=0, metavar="N", help="of gusts and solvers")
     p.add_argument("-o", "--output", metavar="RUN", help="folder for logs, summary and run.png")

@@ -23,6 +23,9 @@ from netsp.solution import Solution, write_text
 EXIT_NOT_ALL = 4
 """Goals were left out, or the run was interrupted."""
 
+EXIT_DEFECT = 1
+"""Planning failed for a reason that is ours; the robot came home along its tether."""
+
 EXIT_NOT_FREE = 5
 """The tether was too long for a while, or did not come home free."""
 
@@ -38,7 +41,7 @@ def run_execute(args: argparse.Namespace) -> int:
     options = Options(
         speed=args.speed, vehicle=args.vehicle, delta=args.delta, repair=args.planner == "repair",
         current=vector(args.current, "--current") if args.current else (0.0, 0.0, 0.0),
-        gusts=args.gusts, seed=args.seed,
+        gusts=args.gusts, seed=args.seed, planning_limit=args.planning_limit,
     )  # fmt: skip
     show = not args.quiet and sys.stderr.isatty()
     done = execute(
@@ -54,6 +57,8 @@ def run_execute(args: argparse.Namespace) -> int:
     if not args.quiet:
         print(describe(done), file=sys.stderr)
     s = done.summary
+    if s["defects"]:
+        return EXIT_DEFECT
     if s["exceedance_s"] > 0.0 or (s["home"] and not s["tether_free"]):
         return EXIT_NOT_FREE
     return EXIT_NOT_ALL if s["lost"] or s["status"] != "done" else 0

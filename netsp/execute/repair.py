@@ -9,27 +9,31 @@ when that promises to save more time than planning takes.
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 import shapely
 
-from netsp.errors import InfeasibleError, NetspError
+from netsp.clock import Clock
+from netsp.errors import LimitReachedError, NetspError
 from netsp.execute.plan import HOME, Leg, legs_of
 from netsp.hsignature import concatenate, crossings, signature
 from netsp.problem import Circle, Goal, Problem, State
 from netsp.result import Result
 from netsp.roadmap.opened import FAR, OpenedGraph, opened_graph
 from netsp.roadmap.paths import TautPaths
+from netsp.roadmap.reach import explain_unreached
 from netsp.solution import Status
 from netsp.solvers import solve_graph, to_solution
 
 Floats = npt.NDArray[np.float64]
 
 REPLAN_S = 2.0
-"""Seconds that planning the rest of a tour anew may take."""
+"""Seconds that planning the rest of a tour may take; the robot holds its place meanwhile."""
+
+MOST_CLASSES = 4_000
+"""Most classes that a repair looks at; of more, the shortest of every goal."""
 
 
 @dataclass(frozen=True)
@@ -102,40 +106,33 @@ def _in_the_way(problem: Problem, way: Floats) -> int | None:
 
 def repair(
     problem: Problem, robot: Floats, tether: Floats, left: list[int], speed: float, why: str,
-    seed: int = 0,
+    seed: int = 0, limit: float = REPLAN_S,
 ) -> Repair:  # fmt: skip
     """A plan from the present state through the goals `left` (numbers in the problem, in their
-    order) and home. Goals that cannot be reached are left out, with the reason."""
-    begin = time.perf_counter()
-    lost: list[tuple[int, str]] = []
+    order) and home. Goals that cannot be reached are left out, with the reason.
+
+    limit : seconds that all of it may take.
+    """
+    clock = Clock(limit)
     word = signature(tether[:, :2], problem.representative_points)
-    state = State(position=tuple(robot.tolist()), signature=word)
-    order, graph = list(left), None
-    while order:
-        order, gone = _in_free_water(problem, order)
-        lost += gone
-        if not order:
-            break
-        try:
-            graph = opened_graph(_rest(problem, order, state))
-            break
-        except InfeasibleError as error:
-            far = _out_of_reach(problem, order, state)
-            lost += [(g, str(error) if len(far) == 1 else "no tether reaches it") for g in far]
-            order = [g for g in order if g not in far]
-    if graph is None:
+    state = State(position=_outside(problem, robot), signature=word)
+    order, lost = _reachable(problem, left)
+    if not order:
         legs = [_home(problem, state)]
-        return Repair("home", why, legs, tuple(lost), legs[0].length, time.perf_counter() - begin)
+        return Repair("home", why, legs, tuple(lost), legs[0].length, clock.elapsed)
     rest = _rest(problem, order, state)
-    local = _keeping_order(graph, len(order))
-    least = _least(graph, len(order))
+    graph = opened_graph(rest, max_classes=MOST_CLASSES, time_limit=clock)
+    with graph.within.on_clock(clock):
+        local = _keeping_order(graph, len(order))
     assert local.length is not None
-    saving = (local.length - least) / speed
+    # with a short time left a new plan has less of it to pay for itself
+    replan_s = max(clock.left, 0.0)
     chosen, kind = local, "local"
     reason = f"{why}; in the same order {local.length:.6g}"
-    if saving > REPLAN_S:
-        found = solve_graph(graph, "auto", time_limit=REPLAN_S, seed=seed, warm_start=local.tour)
-        if found.length is not None and found.length < local.length - speed * REPLAN_S:
+    saving = (local.length - _least(graph, len(order), clock)) / speed
+    if saving > replan_s > 0.0:
+        found = solve_graph(graph, "auto", time_limit=clock, seed=seed, warm_start=local.tour)
+        if found.length is not None and found.length < local.length - speed * replan_s:
             chosen, kind = found, "replan"
             reason += f", in a new one {found.length:.6g}"
         else:
@@ -144,9 +141,47 @@ def repair(
         reason += f", a new one saves {saving:.2g} s at most"
     solution = to_solution(rest, graph, chosen, "auto", seed)
     legs = legs_of(rest, solution, order)
-    return Repair(
-        kind, reason, legs, tuple(lost), float(chosen.length or 0.0), time.perf_counter() - begin
-    )
+    return Repair(kind, reason, legs, tuple(lost), float(chosen.length or 0.0), clock.elapsed)
+
+
+def _reachable(problem: Problem, left: list[int]) -> tuple[list[int], list[tuple[int, str]]]:
+    """The goals that a taut tether within the limit reaches, in their order, and the others with
+    the reason."""
+    order, lost = _in_free_water(problem, left)
+    if not order:
+        return order, lost
+    goals = tuple(problem.goals[g] for g in order)
+    plain = problem.model_copy(update={"goals": goals, "state": None})
+    paths = TautPaths(plain)
+    planar = paths.contacts.lengths([0])[0][1:]
+    needs = np.hypot(planar, plain.points[1:, 2] - plain.points[0, 2])
+    beyond = [k for k in range(len(order)) if needs[k] > problem.tether_length + paths.margin]
+    lost += [(order[k], explain_unreached(plain, paths.outline, [k + 1])) for k in beyond]
+    return [g for k, g in enumerate(order) if k not in beyond], lost
+
+
+def _outside(problem: Problem, robot: Floats) -> tuple[float, float, float]:
+    """The robot's place, moved out of what the tether model's resolution has let it enter."""
+    place = np.array(robot, dtype=float)
+    for _ in range(10):
+        depth = [problem.clearance - float(o.signed_distance(place[:2])) for o in problem.obstacles]
+        i = int(np.argmax(depth)) if depth else -1
+        if i < 0 or depth[i] <= 0.0:
+            break
+        obstacle, here = problem.obstacles[i], place[:2].copy()
+        rim = obstacle.shape(problem.clearance).exterior
+        near = np.array(rim.interpolate(rim.project(shapely.Point(here))).coords[0])
+        if isinstance(obstacle, Circle):
+            # a circle's rim is drawn as a polygon inside of it
+            away = here - obstacle.center
+            size = float(np.hypot(*away))
+            reach = obstacle.radius + problem.clearance
+            near = obstacle.center + away * (reach / size) if size else near
+        away = near - here
+        size = float(np.hypot(*away))
+        place[:2] = near + (away / size if size else 0.0) * 1e-7 * problem.scale
+    x, y, z = place.tolist()
+    return (x, y, z)
 
 
 def _rest(problem: Problem, order: list[int], state: State) -> Problem:
@@ -171,17 +206,6 @@ def _in_free_water(problem: Problem, order: list[int]) -> tuple[list[int], list[
     return kept, gone
 
 
-def _out_of_reach(problem: Problem, order: list[int], state: State) -> list[int]:
-    """Goals that no tether within the limit reaches."""
-    out = []
-    for g in order:
-        try:
-            opened_graph(_rest(problem, [g], state))
-        except InfeasibleError:
-            out.append(g)
-    return out or list(order)
-
-
 def _home(problem: Problem, state: State) -> Leg:
     """Back along the tether to the base."""
     placed = problem.model_copy(update={"goals": (Goal(position=state.position),), "state": None})
@@ -190,7 +214,8 @@ def _home(problem: Problem, state: State) -> Leg:
 
 
 def _keeping_order(graph: OpenedGraph, goals: int) -> Result:
-    """The shortest path through the goals in their order: classes by dynamic programming."""
+    """The shortest path through the goals in their order: classes by dynamic programming. When the
+    time is up, the other goals are taken in the class of least tether."""
     start = graph.start
     assert start is not None
     at = np.array([start])
@@ -199,8 +224,19 @@ def _keeping_order(graph: OpenedGraph, goals: int) -> Result:
     for c in range(1, goals + 1):
         members = graph.members(c)
         both = np.concatenate([at, members])
-        legs = graph.within.costs_among(both)[: len(at), len(at) :]
-        total = reach[:, None] + legs
+        asked = np.zeros((len(both), len(both)), dtype=bool)
+        asked[: len(at), len(at) :] = asked[len(at) :, : len(at)] = True
+        try:
+            legs = graph.within.costs_among(both, asked)
+        except LimitReachedError:
+            best_so_far, shortest = int(reach.argmin()), int(graph.tethers[members].argmin())
+            members = members[[shortest]]
+            with graph.within.on_clock(None):
+                d = graph.within.costs_among([at[best_so_far], members[0]])[0, 1]
+            layers.append((members, np.array([best_so_far])))
+            reach, at = reach[[best_so_far]] + d, members
+            continue
+        total = reach[:, None] + legs[: len(at), len(at) :]
         best = total.argmin(axis=0)
         layers.append((members, best))
         reach, at = total[best, np.arange(len(members))], members
@@ -212,16 +248,19 @@ def _keeping_order(graph: OpenedGraph, goals: int) -> Result:
         tour.append(int(members[k]))
         k = int(best[k])
     full = (0, start, *reversed(tour))
-    return Result(
-        status=Status.FEASIBLE, tour=full, length=length, lower_bound=None, trace=(),
-    )  # fmt: skip
+    # walked from the state on: the way there is behind the robot
+    return Result(full, length, None, Status.FEASIBLE, walk=(*full[1:], 0))
 
 
-def _least(graph: OpenedGraph, goals: int) -> float:
+def _least(graph: OpenedGraph, goals: int, clock: Clock) -> float:
     """A quick lower bound on every path: half the two cheapest legs at each goal, and one at each
-    end."""
+    end; 0 if the time does not suffice."""
     vertices = np.arange(len(graph))
-    bounds = graph.within.lower_bounds(vertices)
+    try:
+        with graph.within.on_clock(clock):
+            bounds = graph.within.lower_bounds(vertices)
+    except LimitReachedError:
+        return 0.0
     cluster = graph.cluster
     ends, total = [0, int(cluster[graph.start])], 0.0
     for c in range(goals + 2):

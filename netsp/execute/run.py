@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from netsp.errors import InputError, NetspError
+from netsp.errors import InputError
 from netsp.execute.aside import aside
 from netsp.execute.events import Event, Surprises, changed, index_of
 from netsp.execute.plan import HOME, Leg, legs_of
-from netsp.execute.repair import Repair, broken, repair
+from netsp.execute.repair import REPLAN_S, Repair, broken, repair
 from netsp.hsignature import Word, signature
 from netsp.judge import verify
 from netsp.online.field import DistanceField
@@ -33,6 +33,9 @@ Floats = npt.NDArray[np.float64]
 RESOLUTION = 1e-4
 """The tether model is right to this share of the tether length; less is no exceedance."""
 
+HOLD_STEP = 0.1
+"""Seconds between two rows of the log while the robot holds its place."""
+
 PATIENCE = 3.0
 """A leg is given up when it takes this many times as long as it should, and a minute."""
 
@@ -44,6 +47,7 @@ class Options:
     speed : of the vehicle, length units per second. vehicle : `netsp.online.vehicle.VEHICLES`.
     reach : a goal this near counts as visited by a vehicle with dynamics.
     delta : resolution of the tether; default from the problem. repair : whether plans are mended.
+    planning_limit : seconds that mending a plan may take; the robot holds its place meanwhile.
     current, gusts, seed : of the water.
     """
 
@@ -52,6 +56,7 @@ class Options:
     reach: float = 0.1
     delta: float | None = None
     repair: bool = True
+    planning_limit: float = REPLAN_S
     current: Point3 = (0.0, 0.0, 0.0)
     gusts: float = 0.0
     seed: int = 0
@@ -59,8 +64,9 @@ class Options:
 
 @dataclass(frozen=True)
 class Row:
-    """One step: seconds, position, the goal that is next (-1 the base), mode, taut tether and its
-    limit."""
+    """One step: seconds, position, the goal that is next (-1 the base), mode (tour, shorten or
+    hold), taut tether and its limit, and whether the limit was lowered below the tether, which is
+    being shortened."""
 
     time: float
     x: float
@@ -70,6 +76,7 @@ class Row:
     mode: str
     tether: float
     limit: float
+    shortening: bool = False
 
 
 @dataclass(frozen=True)
@@ -128,7 +135,7 @@ class Execution:
         """The numbers. exceedance_s : seconds with a tether longer than it is at that time;
         shortening_s : the same after the limit itself was lowered below it, until it fits."""
         long = np.array([r.tether > r.limit * (1.0 + RESOLUTION) for r in self.rows], dtype=bool)
-        lowered = np.array([r.mode == "shorten" for r in self.rows], dtype=bool)
+        lowered = np.array([r.shortening for r in self.rows], dtype=bool)
         over, shortening = long & ~lowered, long & lowered
         steps = np.diff([r.time for r in self.rows], append=self.rows[-1].time if self.rows else 0)
         goals = [a for a in self.arrivals if a.goal != HOME]
@@ -148,6 +155,7 @@ class Execution:
             "shortening_s": float(np.array(steps)[shortening].sum()) if self.rows else 0.0,
             "home": bool(self.arrivals and self.arrivals[-1].goal == HOME),
             "tether_free": self.free,
+            "defects": sum(e.done == "defect" for e in self.entries),
             "repairs": sum(e.done in ("local", "replan", "home") for e in self.entries),
             "planning_worst_s": max((e.planning_s for e in self.entries), default=0.0),
             "wall_s": self.wall_s,
@@ -172,6 +180,7 @@ class _Run:
         self.step = 0.1 if options.vehicle != "kinematic" else self.delta / options.speed
         self.water = Water(options.current, options.gusts, options.seed)
         self.now, self.mode, self.fresh, self.leg_s = 0.0, "tour", True, 0.0
+        self.shorten = False
         self.way = self.legs[0].way
 
     def _enter(self, problem: Problem) -> None:
@@ -186,9 +195,10 @@ class _Run:
         x, y, z = (float(v) for v in self.vehicle.position)
         goal = self.legs[0].goal if self.legs else HOME
         limit = self.problem.tether_length
-        if self.mode == "shorten" and self.tether.length <= limit:
-            self.mode = "tour"
-        row = Row(round(self.now, 6), x, y, z, goal, self.mode, self.tether.length, limit)
+        if self.shorten and self.tether.length <= limit:
+            self.shorten = False
+        mode = self.mode if self.mode == "hold" or not self.shorten else "shorten"
+        row = Row(round(self.now, 6), x, y, z, goal, mode, self.tether.length, limit, self.shorten)
         if len(self.out.rows) % 10 == 0:
             self.out.tethers.append((row.time, self.tether.nodes.copy()))
         self.out.rows.append(row)
@@ -278,7 +288,7 @@ class _Run:
                     if self.options.repair:
                         self.out.cancelled.add(gone)
         if event.tether_length is not None and self.tether.length > event.tether_length:
-            self.mode = "shorten"
+            self.shorten = True
         if must is None:
             must, legs = broken(self.problem, self.tether.nodes, self._from_here())
             if must is None:
@@ -333,23 +343,38 @@ class _Run:
             self.vehicle.stop_at(stop)
 
     def _mend(self, why: str, left: list[int], event: str = "lost") -> None:
+        begin = time.perf_counter()
         try:
             made = repair(
                 self.problem, self.vehicle.position, self.tether.nodes, left, self.options.speed,
-                why, self.options.seed,
+                why, self.options.seed, self.options.planning_limit,
             )  # fmt: skip
-        except NetspError as error:
-            # what is always possible: back along the tether
+        except Exception as error:
+            # The robot must come home whatever is wrong with us; that something is, is logged and
+            # counted, and the command says so by its exit code. What is always possible: back
+            # along the tether.
             home = Leg(HOME, np.ascontiguousarray(self.tether.nodes[::-1]), (), 0.0)
-            lost = tuple((g, f"planning failed: {error}") for g in left)
-            made = Repair(
-                "home", f"{why}; planning failed: {error}", [home], lost, home.length, 0.0
-            )
+            what = f"{type(error).__name__}: {error}"
+            lost = tuple((g, f"a defect of netsp ended planning ({what})") for g in left)
+            reason = f"{why}; a defect of netsp ended planning ({what})"
+            spent = time.perf_counter() - begin
+            made = Repair("defect", reason, [home], lost, home.length, spent)
+        self._enter_log(event, made.kind, made.reason, made.planning_s)
+        self._hold(self.options.planning_limit)
         self.legs = made.legs
         for goal, reason in made.lost:
             self.out.lost[goal] = reason
-        self._enter_log(event, made.kind, made.reason, made.planning_s)
         self._next()
+
+    def _hold(self, seconds: float) -> None:
+        """Stay where the robot is while a plan is made: until the plan is due, however soon it was
+        ready, so that the same seed gives the same run."""
+        mode, self.mode = self.mode, "hold"
+        until = self.now + seconds
+        while self.now < until:
+            self.note()
+            self.now = min(self.now + HOLD_STEP, until)
+        self.mode = mode
 
     def _enter_log(self, event: str, done: str, reason: str, spent: float) -> None:
         self.out.entries.append(Entry(round(self.now, 6), event, done, reason, spent))
@@ -376,6 +401,10 @@ def execute(
     """
     options = options or Options()
     surprises = surprises or Surprises(events=())
+    if not (np.isfinite(options.planning_limit) and options.planning_limit > 0.0):
+        raise InputError(
+            f"planning_limit: expected a positive number, got {options.planning_limit!r}"
+        )
     if not (np.isfinite(options.speed) and options.speed > 0.0):
         raise InputError(f"speed: expected a positive number, got {options.speed!r}")
     if solution.status is Status.INVALID or solution.length is None:
