@@ -6,7 +6,7 @@ Worlds: circles, polygons (`harbour`), and every file of `problems/`. A run is g
 is home with its tether free, was never in an obstacle, never on a tether that was too long (but
 while it shortens one whose limit was lowered), visited every goal that is not lost, and lost
 exactly those that a judge of its own calls unreachable: a visibility graph of Shapely's, which
-knows nothing of netsp's roadmap. Goals that are reachable within a per mille of the tether are left to either.
+knows nothing of netsp's roadmap. Goals within three per mille of the tether are left to either.
 """
 
 from __future__ import annotations

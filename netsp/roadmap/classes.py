@@ -17,8 +17,8 @@ import numpy.typing as npt
 
 from netsp.clock import Clock
 from netsp.errors import InfeasibleError
-from netsp.hsignature import Word
-from netsp.roadmap.explore import Found, Trie, run_explore
+from netsp.hsignature import Word, is_looping, signature
+from netsp.roadmap.explore import NON_LOOPING, Found, Trie, run_explore
 from netsp.roadmap.paths import TautPaths
 from netsp.roadmap.reach import explain_unreached
 
@@ -60,18 +60,43 @@ class TetherTree:
         return depth
 
 
+Bends = tuple[tuple[int, float], ...]
+"""A tether as the tangents that it takes, each with the length of tether at its end, but for the
+last, which ends at the goal."""
+
+
+class _GrowingTree:
+    """A tree of bends from tethers one by one."""
+
+    def __init__(self) -> None:
+        self.parent, self.length = [-1], [0.0]
+        self._child: dict[tuple[int, int], int] = {}
+
+    def last(self, bends: Bends) -> int:
+        """The last bend of a tether, whose bends are in the tree from now on."""
+        at = 0
+        for tangent, length in bends:
+            found = self._child.get((at, tangent))
+            if found is None:
+                found = self._child[at, tangent] = len(self.parent)
+                self.parent.append(at)
+                self.length.append(length)
+            at = found
+        return at
+
+
 @dataclass(frozen=True)
 class Classes:
     """Augmented goals, base first: cluster (V,), word and planar tether length of each.
 
-    tree : where the tethers part, None if unknown. least_left_out : no class that is not here has a
+    tree : where the tethers part. least_left_out : no class that is not here has a
     shorter tether (in space); inf if all are here.
     """
 
     cluster: Ints
     signatures: list[Word]
     planar: Floats
-    tree: TetherTree | None
+    tree: TetherTree
     least_left_out: float = math.inf
 
     @property
@@ -128,36 +153,47 @@ class _Search:
         """The shortest classes of every goal, about as many of each; at least one, whatever the
         time."""
         share = max(1, self.most // self.goals)
-        rows: list[tuple[int, float, Word]] = []
-        left_out = math.inf
-        missing = []
-        for g in range(1, self.goals + 1):
-            own, beyond = self._of_goal(g, share)
-            if not own:
-                missing.append(g)
-            rows += [(g, length, word) for length, word in own]
-            left_out = min(left_out, math.hypot(beyond, self.dz[g]))
+        contacts = self.paths.contacts
+        planar, before = contacts.tree(0)
+        missing = [g for g in range(1, self.goals + 1) if planar[g] > self.within[g]]
         if missing:
             raise InfeasibleError(explain_unreached(self.problem, self.paths.outline, missing))
-        return _together(rows, None, left_out)
+        rays = self.problem.representative_points - self.paths.outline.origin
+        rows: list[tuple[int, float, Word]] = []
+        tree = _GrowingTree()
+        last = [0]
+        left_out = math.inf
+        for g in range(1, self.goals + 1):
+            word = signature(contacts.draw(0, g, before), rays)
+            nearest = (float(planar[g]), word, contacts.bends(0, g, before, planar))
+            own, beyond = [nearest], nearest[0]
+            if not (self.clock.up or (self.rule == NON_LOOPING and is_looping(nearest[1]))):
+                own, beyond = self._of_goal(g, share)
+                own = own or [nearest]
+            rows += [(g, length, word) for length, word, _ in own]
+            last += [tree.last(bends) for _, _, bends in own]
+            left_out = min(left_out, math.hypot(beyond, self.dz[g]))
+        together = TetherTree(
+            np.array(last, dtype=np.int64), np.array(tree.parent, dtype=np.int64),
+            np.array(tree.length),
+        )  # fmt: skip
+        return _together(rows, together, left_out)
 
-    def _of_goal(self, g: int, share: int) -> tuple[list[tuple[float, Word]], float]:
+    def _of_goal(self, g: int, share: int) -> tuple[list[tuple[float, Word, Bends]], float]:
         """The shortest classes of one goal, in order, and the planar length up to which they are
         all (inf if there are no more within the tether)."""
         rest = self.paths.contacts.rest(g)
         least, most = float(rest.source), float(self.within[g])
-        if least > most:
-            return [], math.inf
-        known: list[tuple[float, Word]] = []
-        known_to = 0.0
+        known: list[tuple[float, Word, Bends]] = []
+        known_to = least
         low, high = 0.0, math.inf  # excesses known to give too few, too many
-        excess = FIRST_EXCESS * max(most - least, 0.0) if not self.clock.up else 0.0
+        excess = FIRST_EXCESS * max(most - least, 0.0)
         for _ in range(STEPS):
             reach = min(least + excess + self.paths.margin, most)
             found, words = self._within(g, rest.to_end, reach, share)
             if found is None:
                 high = excess
-                if self.clock.up and known:
+                if self.clock.up:
                     break
                 excess = max(low + (high - low) / SHRINK, 0.0)
                 continue
@@ -178,23 +214,21 @@ class _Search:
 
     def _within(
         self, g: int, rest: Floats, reach: float, share: int
-    ) -> tuple[Found | None, list[tuple[float, Word]]]:
+    ) -> tuple[Found | None, list[tuple[float, Word, Bends]]]:
         """The classes of a goal up to a planar length; None if there are too many to look at."""
         trie = Trie.root(reach)
         within = np.full(self.goals + 1, -1.0)
         within[g] = reach
-        # the first tether of all is found whatever the time
-        stop = Clock(None).flag if self.clock.up else self.clock.flag
         found = run_explore(
             self.paths.tangents, 0, trie, margin=self.paths.outline.margin, rule=self.rule,
-            cap=max(20_000, STATES_PER_CLASS * share), toward=(g, rest), within=within,
-            most=8 * share + 64, stop=stop,
+            keep=True, cap=max(20_000, STATES_PER_CLASS * share), toward=(g, rest), within=within,
+            most=8 * share + 64, stop=self.clock.flag,
         )  # fmt: skip
         if found.capped:
             return None, []
-        nearest = sorted((length, w) for (_, w), (length, _) in self._best(found).items())
+        nearest = sorted((length, w, s) for (_, w), (length, s) in self._best(found).items())
         # one more than can be kept tells how long the shortest is that is not
-        rows = [(length, trie.word(w)) for length, w in nearest[: share + 1]]
+        rows = [(length, trie.word(w), _bends(found, s)) for length, w, s in nearest[: share + 1]]
         return found, sorted(rows)
 
     def _best(self, found: Found) -> dict[tuple[int, int], tuple[float, int]]:
@@ -210,9 +244,15 @@ class _Search:
         return best
 
 
-def _together(
-    rows: list[tuple[int, float, Word]], tree: TetherTree | None, left_out: float
-) -> Classes:
+def _bends(found: Found, state: int) -> Bends:
+    out: list[tuple[int, float]] = []
+    while found.tree[state, 3] >= 0:
+        out.append((int(found.tree[state, 4]), float(found.tree_length[state])))
+        state = int(found.tree[state, 3])
+    return tuple(reversed(out))
+
+
+def _together(rows: list[tuple[int, float, Word]], tree: TetherTree, left_out: float) -> Classes:
     return Classes(
         np.array([0, *(g for g, _, _ in rows)], dtype=np.int64),
         [(), *(word for _, _, word in rows)],

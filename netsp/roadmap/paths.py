@@ -21,6 +21,11 @@ from netsp.roadmap.tangents import ARC_STEP, TangentGraph, build_tangents
 Floats = npt.NDArray[np.float64]
 
 
+DEEPER, FIRST = 1.3, 32.0
+"""A path is sought up to this multiple of the distance, then up to so much more and so on, from the
+`FIRST`-th part of the longest possible on."""
+
+
 class TautPaths:
     """Taut paths between the base (point 0) and the goals (points 1 …) of a problem.
 
@@ -47,13 +52,15 @@ class TautPaths:
         """3D length of the taut path of a word from point a to point b."""
         return math.hypot(self.planar_length(a, b, word), float(self._z[b] - self._z[a]))
 
-    def planar_length(self, a: int, b: int, word: Word) -> float:
-        """Length in the plan of the taut path of a word from point a to point b."""
-        return self._pieces(a, b, word)[0]
+    def planar_length(self, a: int, b: int, word: Word, longest: float | None = None) -> float:
+        """Length in the plan of the taut path of a word from point a to point b. longest : that it
+        is known not to exceed."""
+        return self._pieces(a, b, word, longest)[0]
 
-    def path(self, a: int, b: int, word: Word) -> Floats:
-        """(n, 3) polyline of the taut path of a word from point a to point b (0 is the base)."""
-        _, pieces = self._pieces(a, b, word)
+    def path(self, a: int, b: int, word: Word, longest: float | None = None) -> Floats:
+        """(n, 3) polyline of the taut path of a word from point a to point b (0 is the base).
+        longest : a planar length that it is known not to exceed."""
+        _, pieces = self._pieces(a, b, word, longest)
         xy = self._polyline(a, b, pieces)
         steps = np.hypot(*np.diff(xy, axis=0).T)
         total = float(steps.sum())
@@ -76,16 +83,24 @@ class TautPaths:
                 pass
         raise InputError(f"solution: tour: no taut tether to goal {goal} has the word {list(word)}")
 
-    def _pieces(self, a: int, b: int, word: Word) -> tuple[float, list[tuple[int, float]]]:
+    def _pieces(
+        self, a: int, b: int, word: Word, longest: float | None = None
+    ) -> tuple[float, list[tuple[int, float]]]:
         """Length, and (departure, angle slid before it) along the taut path of a word."""
-        limit = self._longest + self.margin
-        trie = Trie.of_word(word, limit)
-        found = run_explore(self.tangents, a, trie, keep=True, margin=self.outline.margin)
-        wanted = np.flatnonzero((found.goal == b) & (found.word == len(word)))
-        if len(wanted) == 0:
-            raise NetspError(f"internal: no taut path of word {word} from point {a} to point {b}")
-        best = int(wanted[np.argmin(found.length[wanted])])
-        return float(found.length[best]), found.pieces(best)
+        most = (self._longest if longest is None else longest) + self.margin
+        apart = math.dist(self.outline.points[a], self.outline.points[b])
+        # a search costs far more the longer the paths may be, and no class has two taut paths
+        limit = min(DEEPER * apart + self.margin, most)
+        while True:
+            trie = Trie.of_word(word, limit)
+            found = run_explore(self.tangents, a, trie, keep=True, margin=self.outline.margin)
+            wanted = np.flatnonzero((found.goal == b) & (found.word == len(word)))
+            if len(wanted):
+                best = int(wanted[np.argmin(found.length[wanted])])
+                return float(found.length[best]), found.pieces(best)
+            if limit >= most:
+                raise NetspError(f"internal: no taut path of word {word} from {a} to {b}")
+            limit = min(max(DEEPER * limit, most / FIRST), most)
 
     def _polyline(self, a: int, b: int, pieces: Sequence[tuple[int, float]]) -> Floats:
         """Tangents and circumscribed arcs as one polyline, finer where a gap is narrow."""

@@ -8,6 +8,7 @@ else; obstacles are vertical, so a 3D length is ``hypot(planar taut length, dz)`
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -149,6 +150,8 @@ class TautLegs:
         """
         vertices = np.asarray(vertices, dtype=np.int64)
         cluster = self.cluster[vertices]
+        if asked is not None and asked.sum() <= 2 * len(vertices):
+            return self._few(vertices, asked)
         ask(
             2.0 * 8.0 * len(vertices) ** 2,
             f"legs between {len(vertices)} homotopy classes",
@@ -287,8 +290,31 @@ class TautLegs:
     def path(self, u: int, v: int) -> Floats:
         """(n, 3) polyline of the taut leg from vertex u to vertex v, arcs circumscribed; height
         changes in proportion to planar length."""
-        word = self.relative_word(u, v)
-        return self.paths.path(int(self.cluster[u]), int(self.cluster[v]), word)
+        word, longest = self.relative_word(u, v), self._longest(u, v)
+        return self.paths.path(int(self.cluster[u]), int(self.cluster[v]), word, longest)
+
+    def _longest(self, u: int, v: int) -> float:
+        """More than the planar length of a leg: back along one tether to where the other parts."""
+        s, t, tree = int(self._tree.last[u]), int(self._tree.last[v]), self._tree
+        while s != t:
+            if tree.depth[s] >= tree.depth[t]:
+                s = int(tree.parent[s])
+            else:
+                t = int(tree.parent[t])
+        return float(self.planar[u] + self.planar[v] - 2.0 * tree.length[s])
+
+    def _few(self, vertices: Ints, asked: Bools) -> Floats:
+        """As `lengths`, for a few legs: each is a search of its own."""
+        out = np.full(asked.shape, np.inf)
+        for i, j in np.argwhere(np.triu(asked, 1)):
+            u, v = int(vertices[i]), int(vertices[j])
+            a, b = int(self.cluster[u]), int(self.cluster[v])
+            if a == b:
+                continue
+            word, longest = self.relative_word(u, v), self._longest(u, v)
+            planar = self.paths.planar_length(a, b, word, longest)
+            out[i, j] = out[j, i] = math.hypot(planar, self._z[a] - self._z[b])
+        return out
 
 
 @njit(cache=True, nogil=True)
