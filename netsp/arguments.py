@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from netsp.errors import InputError
 
@@ -42,14 +42,20 @@ def option(text: str) -> tuple[str, str]:
     return name, value
 
 
+LARGEST = 2**62
+"""Largest whole number that is taken."""
+
+
 def natural(text: str) -> int:
     """A whole number from 0 on."""
     try:
         value = int(text)
     except ValueError:
         value = -1
-    if value < 0:
-        raise argparse.ArgumentTypeError(f"expected a whole number from 0 on, got {text!r}")
+    if not 0 <= value <= LARGEST:
+        raise argparse.ArgumentTypeError(
+            f"expected a whole number from 0 to {LARGEST}, got {text!r}"
+        )
     return value
 
 
@@ -61,8 +67,12 @@ def positive(text: str) -> int:
     return value
 
 
-def check_writable(*paths: str | None) -> None:
-    """InputError before the work starts rather than after it."""
+def check_writable(*paths: str | None, inputs: Sequence[str | None] = ()) -> None:
+    """InputError before the work starts rather than after it; what is read is never written to."""
+    read = {os.path.realpath(p) for p in inputs if p is not None}
+    for path in paths:
+        if path is not None and os.path.realpath(path) in read:
+            raise InputError(f"{path}: would be overwritten, and it is an input")
     given = [os.path.realpath(p) for p in paths if p is not None and not p.startswith("/dev/")]
     twice = [name for name in given if given.count(name) > 1]
     if twice:

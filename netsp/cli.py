@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import errno
+import io
 import os
 import sys
 from collections.abc import Sequence
@@ -31,6 +33,7 @@ if TYPE_CHECKING:
     from netsp.result import Progress
     from netsp.solution import Solution
 
+EXIT_BAD_INPUT = 2
 EXIT_NO_SOLUTION = 4
 EXIT_NOT_VERIFIED = 5
 EXIT_INTERRUPTED = 130
@@ -38,19 +41,47 @@ EXIT_INTERRUPTED = 130
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
+    # both are None when they were closed before we began
+    sys.stdout, sys.stderr = sys.stdout or _Closed(), sys.stderr or io.StringIO()
     try:
         args = _parser().parse_args(_joined(sys.argv[1:] if argv is None else argv))
-        return int(args.run(args))
+        code = int(args.run(args))
+        sys.stdout.flush()
+        return code
     except NetspError as error:
         print(f"netsp: {error}", file=sys.stderr)
         return error.exit_code
+    except MemoryError:
+        print(
+            "netsp: out of memory; lower tether_length, --max-classes or the size of what is asked",
+            file=sys.stderr,
+        )
+        return EXIT_NO_SOLUTION
     except KeyboardInterrupt:
         print("netsp: interrupted before there was anything to write", file=sys.stderr)
         return EXIT_INTERRUPTED
     except BrokenPipeError:
-        # the reader has gone (| head); keep Python from complaining while it closes stdout
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _forget_stdout()  # the reader has gone (| head)
         return 0
+    except OSError as error:
+        if error.errno not in (errno.ENOSPC, errno.EBADF, errno.EIO, errno.EFBIG, errno.EDQUOT):
+            raise
+        _forget_stdout()
+        print(f"netsp: output cannot be written: {error.strerror}", file=sys.stderr)
+        return EXIT_BAD_INPUT
+
+
+def _forget_stdout() -> None:
+    """Keep Python from complaining while it closes a stdout that takes nothing any more."""
+    with contextlib.suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+class _Closed(io.TextIOBase):
+    """A standard output that was closed before we began."""
+
+    def write(self, text: str) -> int:
+        raise OSError(errno.EBADF, "standard output is closed")
 
 
 class _Parser(argparse.ArgumentParser):
@@ -103,6 +134,10 @@ def _parser() -> argparse.ArgumentParser:
         help="an option of the solver, as docs/solvers.md lists them; may be repeated",
     )
     p.add_argument("--roadmap", default="taut", metavar="NAME", help="taut (default) or prm")
+    p.add_argument(
+        "--classes", metavar="RULE",
+        help="taut: all homotopy classes (default), or non-looping as in the 2017 paper",
+    )  # fmt: skip
     p.add_argument("--samples", type=positive, metavar="N", help="prm: milestones; default 1000")
     p.add_argument("--shortcut", action="store_true", help="prm: pull every leg taut in its class")
     p.add_argument(
@@ -252,13 +287,14 @@ class _Version(argparse.Action):
 
 
 def _solve(args: argparse.Namespace) -> int:
+    from netsp.files import write_text
     from netsp.problem import Problem
     from netsp.progress import ProgressTable, summary
-    from netsp.solution import Solution, write_text
+    from netsp.solution import Solution
 
     problem = Problem.load(args.problem)
     warm = Solution.load(args.warm_start) if args.warm_start else None
-    check_writable(args.output, args.plot, args.plot_trace)
+    check_writable(args.output, args.plot, args.plot_trace, inputs=(args.problem, args.warm_start))
     if args.plot or args.plot_trace:
         from netsp import plotting
 
@@ -330,6 +366,7 @@ def _roadmap_options(args: argparse.Namespace) -> dict[str, object]:
         "samples": args.samples,
         "shortcut": args.shortcut or None,
         "max_classes": getattr(args, "max_classes", None),
+        "classes": args.classes if args.run is _solve else None,
     }
     return {name: value for name, value in options.items() if value is not None}
 
@@ -362,7 +399,7 @@ def _verify(args: argparse.Namespace) -> int:
 
 
 def _plot(args: argparse.Namespace) -> int:
-    check_writable(args.output)
+    check_writable(args.output, inputs=(args.problem, args.solution))
     if _is_scene(args.problem):
         from netsp.online.command import plot_scene
 
@@ -399,7 +436,8 @@ def _plot(args: argparse.Namespace) -> int:
 
 def _is_scene(path: str) -> bool:
     """A file that describes a scene rather than a problem: by its fields."""
-    from netsp.problem import parse_json_object, read_text
+    from netsp.files import read_text
+    from netsp.problem import parse_json_object
 
     data = parse_json_object(read_text(path), path)
     return "goals" not in data and bool({"solids", "mesh", "cloud", "problem"} & data.keys())
@@ -425,7 +463,7 @@ def _load_pair(problem: str, solution: str) -> tuple[Problem, Solution]:
 
 
 def _world(args: argparse.Namespace) -> int:
-    from netsp.solution import write_text
+    from netsp.files import write_text
     from netsp.worlds import reachable_world
 
     check_writable(args.output, args.plot)
@@ -469,12 +507,12 @@ def _report(args: argparse.Namespace) -> int:
     if not args.results.endswith((".jsonl", ".jsonl.gz")):
         from netsp.report.tour import report_tour
 
-        check_writable(args.output)
+        check_writable(args.output, inputs=(args.results, args.problem))
         report_tour(args.results, args.problem, args.output)
         return 0
     from netsp.report.page import write_report
 
-    check_writable(args.results, args.output)
+    check_writable(args.output, inputs=(args.results,))
     write_report(args.results, args.output, args.figures)
     return 0
 

@@ -33,7 +33,9 @@ def add_online(commands: Any) -> None:
     p.add_argument(
         "--refine", metavar="NAME", help="none, paper or gradient; default is the planner's own"
     )
-    p.add_argument("--seed", type=int, default=0, metavar="N", help="of gusts, sampling, refining")
+    p.add_argument(
+        "--seed", type=natural, default=0, metavar="N", help="of gusts, sampling, refining"
+    )
     p.add_argument("--compare", metavar="NAME", help="fly with another planner too, side by side")
     p.add_argument("--snap", action="store_true", help="move waypoints out of solids")
     p.add_argument(
@@ -129,19 +131,19 @@ def _execute(args: argparse.Namespace) -> int:
 def _order(args: argparse.Namespace) -> int:
     from netsp.online.command import run_order
 
-    check_writable(args.output)
+    check_writable(args.output, inputs=(args.mission,))
     return run_order(args)
 
 
 def _export(args: argparse.Namespace) -> int:
     from netsp.export.command import run_export
 
-    check_writable(args.output)
+    check_writable(args.output, inputs=(args.solution, args.problem))
     return run_export(args)
 
 
 def _import(args: argparse.Namespace) -> int:
     from netsp.export.command import run_import
 
-    check_writable(args.output)
+    check_writable(args.output, inputs=(args.site,))
     return run_import(args)

@@ -2,11 +2,36 @@
 
 from __future__ import annotations
 
+import re
+
+LONGEST_QUOTE = 80
+"""Characters of a quoted value that a message shows."""
+
+_QUOTED = re.compile(r"(['\"])((?:(?!\1).){%d,}?)\1" % (LONGEST_QUOTE + 1), re.S)
+_WORD = re.compile(r"[^\s/'\"]{%d,}" % (2 * LONGEST_QUOTE))
+
+
+def brief(message: str) -> str:
+    """A message in one line, its quoted values and endless words cut short; what cannot be printed
+    is escaped."""
+
+    def cut(found: re.Match[str]) -> str:
+        return f"{found[1]}{found[2][: LONGEST_QUOTE - 1]}…{found[1]}"
+
+    text = _WORD.sub(lambda w: w[0][: LONGEST_QUOTE - 1] + "…", _QUOTED.sub(cut, message))
+    return "".join(
+        c if c.isprintable() else c.encode("unicode_escape", "backslashreplace").decode()
+        for c in text
+    )
+
 
 class NetspError(Exception):
     """Base of all netsp errors that a user can act on; `exit_code` is what the CLI returns."""
 
     exit_code = 1
+
+    def __init__(self, message: object = "") -> None:
+        super().__init__(brief(str(message)))
 
 
 class InputError(NetspError):

@@ -10,8 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.errors import InputError
+from netsp.files import read_text
 from netsp.hsignature.measures import Measures, measure
-from netsp.problem import LARGEST, Problem, read_text
+from netsp.problem import LARGEST, Problem
 from netsp.roadmap.paths import TautPaths
 from netsp.solution import Solution
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from netsp.errors import InputError
+from netsp.literal import literal
 from netsp.problem import Circle, Problem
 from netsp.result import Progress
 from netsp.roadmap.paths import TautPaths
@@ -47,7 +48,7 @@ def _write(figure: Any, path: str | Path) -> None:
     check_format(path)
     try:
         metadata = {"Date": None} if Path(path).suffix.lower() == ".svg" else None
-        figure.savefig(path, dpi=150, metadata=metadata)
+        literal(figure).savefig(path, dpi=150, metadata=metadata)
     except OSError as error:
         raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
 

@@ -30,6 +30,7 @@ from pydantic import (
 )
 
 from netsp.errors import InputError
+from netsp.files import read_text
 from netsp.polygons import check_polygon, polygon_interior_point, polygon_signed_distance
 
 if TYPE_CHECKING:
@@ -49,7 +50,7 @@ LARGEST = 1e12
 def _number(value: Any) -> Any:
     """Numbers only: no strings, no booleans; numpy scalars are welcome."""
     if isinstance(value, bool | np.bool_) or not isinstance(value, int | float | np.number):
-        raise ValueError(f"expected a number, got {value!r}")
+        raise ValueError(f"expected a number, got {_brief(value)}")
     try:
         number = float(value)
     except OverflowError:
@@ -57,7 +58,7 @@ def _number(value: Any) -> Any:
     if not math.isfinite(number):
         raise ValueError(f"expected a finite number, got {_brief(value)}")
     if abs(number) > LARGEST:
-        raise ValueError(f"expected a magnitude of at most {LARGEST:g}, got {value!r}")
+        raise ValueError(f"expected a magnitude of at most {LARGEST:g}, got {_brief(value)}")
     return number
 
 
@@ -75,7 +76,7 @@ def _coordinates(value: Any, sizes: tuple[int, ...]) -> tuple[float, ...]:
     if isinstance(value, np.ndarray):
         value = value.tolist()
     if not isinstance(value, Sequence) or isinstance(value, str) or len(value) not in sizes:
-        raise ValueError(f"expected {text}, got {value!r}")
+        raise ValueError(f"expected {text}, got {_brief(value)}")
     return tuple(_number(v) for v in value)
 
 
@@ -278,7 +279,7 @@ class Problem(BaseModel):
         if isinstance(value, np.ndarray):
             value = value.tolist()
         if not isinstance(value, Sequence) or isinstance(value, str) or len(value) != 4:
-            raise ValueError(f"expected [xmin, ymin, xmax, ymax], got {value!r}")
+            raise ValueError(f"expected [xmin, ymin, xmax, ymax], got {_brief(value)}")
         box = tuple(_number(v) for v in value)
         if not (box[0] < box[2] and box[1] < box[3]):
             raise ValueError(f"expected xmin < xmax and ymin < ymax, got {list(box)}")
@@ -346,17 +347,22 @@ class Problem(BaseModel):
     @property
     def scale(self) -> float:
         """Size of the problem, the unit of every tolerance: the largest coordinate difference from
-        the base to anything. Geometry is computed relative to the base, so far-off origins (UTM)
+        the base to any goal and any obstacle within the tether's reach. Geometry is computed relative to the base, so far-off origins (UTM)
         cost no precision."""
-        xy = [self.base[:2], *(g.position[:2] for g in self.goals)]
+        base = np.array(self.base[:2])
+        reach = self.tether_length + self.clearance
+        away = [float(np.abs(self.points[:, :2] - base).max())]
         for o in self.obstacles:
             if isinstance(o, Circle):
-                (x, y), r = o.center, o.radius
-                xy += [(x - r, y - r), (x + r, y + r)]
+                off = np.abs(np.array(o.center) - base)
+                near, far = float(np.hypot(*off)) - o.radius, float(off.max()) + o.radius
             else:
-                xy += list(o.polygon)
-        away = np.abs(np.array(xy) - np.array(self.base[:2])).max()
-        return float(max(away, 1e-9 * self.tether_length))
+                corners = np.array(o.polygon)
+                near = max(float(o.signed_distance(base)), 0.0)
+                far = float(np.abs(corners - base).max())
+            if near <= reach:
+                away.append(far)
+        return max(*away, 1e-9 * self.tether_length)
 
     @property
     def tolerance(self) -> float:
@@ -411,16 +417,6 @@ class Problem(BaseModel):
             item.pop("name", None)
         text = json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)
         return hashlib.sha256(text.encode()).hexdigest()
-
-
-def read_text(path: str | Path) -> str:
-    """Contents of a UTF-8 text file, or `InputError` in one line."""
-    try:
-        return Path(path).read_text(encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
-    except UnicodeDecodeError:
-        raise InputError(f"{path}: not a text file in UTF-8") from None
 
 
 def read_model(model: type[Model], text: str | bytes, source: str) -> Model:

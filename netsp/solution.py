@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 import json
-import os
-import tempfile
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from netsp.errors import InputError
+from netsp.files import read_text, write_text
 from netsp.problem import (
     Name,
     NonNegative,
     Number,
     Point3,
     read_model,
-    read_text,
 )
 
 
@@ -127,28 +124,3 @@ class Solution(BaseModel):
     def save(self, path: str | Path) -> None:
         """Write the solution file whole or not at all; `InputError` if it cannot be written."""
         write_text(path, self.to_json())
-
-
-def write_text(path: str | Path, text: str) -> None:
-    """Write a file by renaming a finished one into place, so that it is never half there."""
-    target = Path(path)
-    if target.exists() and not target.is_file():  # /dev/stdout and the like
-        try:
-            target.write_text(text, encoding="utf-8")
-        except OSError as error:
-            raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
-        return
-    try:
-        handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8") as stream:
-            stream.write(text)
-        umask = os.umask(0)
-        os.umask(umask)
-        os.chmod(name, 0o666 & ~umask)
-        os.replace(name, target)
-    except OSError as error:
-        Path(name).unlink(missing_ok=True)
-        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None

@@ -64,6 +64,8 @@ ROADMAPS: dict[str, str] = {
 
 SEEDED_ROADMAPS = frozenset({"prm"})
 
+LARGEST_SEED = 2**62
+
 DEFAULT_SOLVER = "auto"
 DEFAULT_ROADMAP = "taut"
 
@@ -80,6 +82,8 @@ def build_roadmap(problem: Problem, roadmap: str = DEFAULT_ROADMAP, **options: A
 
     Raises InputError for an unknown roadmap or option, InfeasibleError if a goal cannot be reached.
     """
+    if not isinstance(problem, Problem):
+        raise InputError(f"problem: expected a Problem, got {problem!r}")
     build = _load(ROADMAPS, "roadmap", roadmap)
     known = {k for k, p in inspect.signature(build).parameters.items() if p.kind == p.KEYWORD_ONLY}
     unknown = sorted(set(options) - known)
@@ -93,6 +97,8 @@ def build_roadmap(problem: Problem, roadmap: str = DEFAULT_ROADMAP, **options: A
 
 def travel_graph(problem: Problem, roadmap: str = DEFAULT_ROADMAP, **options: Any) -> TravelGraph:
     """The travel graph of a problem by the named roadmap; errors as `build_roadmap`."""
+    if not isinstance(problem, Problem):
+        raise InputError(f"problem: expected a Problem, got {problem!r}")
     if problem.state is not None:
         if roadmap != "taut":
             raise InputError(f"state: needs roadmap 'taut', got {roadmap!r}")
@@ -192,6 +198,11 @@ def solve(
     >>> solve(problem).length
     10.0
     """
+    if not isinstance(problem, Problem):
+        raise InputError(f"problem: expected a Problem, got {problem!r}")
+    if warm_start is not None and not isinstance(warm_start, Solution):
+        raise InputError(f"warm_start: expected a Solution, got {warm_start!r}")
+    _seed(seed)
     _check_limits(time_limit, iteration_limit)
     if warm_start is not None and warm_start.problem.sha256 != problem.sha256:
         raise InputError("warm_start: it is the solution of another problem (sha256 differs)")
@@ -304,8 +315,9 @@ def _check_limits(time_limit: TimeLimit, iteration_limit: int | None) -> None:
 
 
 def _seed(seed: int) -> int:
-    if not (isinstance(seed, (int, np.integer)) and seed >= 0):
-        raise InputError(f"seed: expected a whole number from 0 on, got {seed!r}")
+    whole = isinstance(seed, (int, np.integer)) and seed is not True
+    if not (whole and 0 <= seed <= LARGEST_SEED):
+        raise InputError(f"seed: expected a whole number from 0 to {LARGEST_SEED}, got {seed!r}")
     return int(seed)
 
 

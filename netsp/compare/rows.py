@@ -9,15 +9,14 @@ from __future__ import annotations
 
 import contextlib
 import fcntl
-import gzip
 import json
 import os
-import zlib
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 from netsp.errors import InputError
+from netsp.files import read_bytes, read_gzip
 
 SCHEMA = "netsp-trial/1"
 Row = dict[str, Any]
@@ -38,16 +37,7 @@ _TABLES = ("world", "roadmap", "solver")
 def read_rows(path: str | Path) -> list[Row]:
     """All rows of a results file, gzipped if its name ends in .gz; a torn last line is left out.
     InputError if it is not one."""
-    try:
-        if Path(path).exists() and not Path(path).is_file():
-            raise InputError(f"{path}: expected a file of results")
-        data = Path(path).read_bytes()
-        if Path(path).suffix == ".gz":
-            data = gzip.decompress(data)
-    except (gzip.BadGzipFile, zlib.error, EOFError):
-        raise InputError(f"{path}: not a gzip file, or cut short") from None
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
+    data = read_gzip(path) if Path(path).suffix == ".gz" else read_bytes(path)
     rows = []
     *lines, torn = data.split(b"\n")
     for number, line in enumerate(lines, start=1):
@@ -77,10 +67,33 @@ def _parsed(line: bytes) -> Row | None:
         and all(isinstance(row.get(name), dict) for name in _TABLES)
         and isinstance(row["solver"].get("label"), str)
         and isinstance(row["roadmap"].get("label"), str)
-        and {"seed", "goals", "tether_length", "family"} <= row["world"].keys()
-        and isinstance(row.get("length", 0.0), int | float | None)
+        and all(_fits(row["world"].get(k), kinds) for k, kinds in _WORLD.items())
+        and all(_fits(row.get(k), kinds) for k, kinds in _VALUES.items())
+        and all(isinstance(v, str) for v in (row.get("versions") or {}).values())
+        and all(
+            isinstance(p, list) and len(p) == 3 and all(_fits(v, _MAYBE) for v in p)
+            for p in row.get("history") or ()
+        )
     )
     return row if good else None
+
+
+_MAYBE = (int, float, type(None))
+_WORLD: dict[str, tuple[type, ...]] = {
+    "seed": (int,), "goals": (int,), "tether_length": (int, float), "family": (str,),
+}  # fmt: skip
+_VALUES: dict[str, tuple[type, ...]] = {
+    "seed": (int,), "length": _MAYBE, "lower_bound": _MAYBE, "gap": _MAYBE, "total_s": _MAYBE,
+    "roadmap_s": _MAYBE, "matrix_s": _MAYBE, "solve_s": _MAYBE, "longest_tether": _MAYBE,
+    "entangled": (int, type(None)), "redrawn": (int, type(None)),
+    "problem_sha256": (str, type(None)), "versions": (dict, type(None)),
+    "history": (list, type(None)),
+}  # fmt: skip
+"""Which types the fields of a row may have; a page is made of them without asking again."""
+
+
+def _fits(value: object, kinds: tuple[type, ...]) -> bool:
+    return isinstance(value, kinds) and not isinstance(value, bool)
 
 
 def _no_constant(name: str) -> None:

@@ -16,9 +16,10 @@ from netsp.errors import InputError
 from netsp.execute.events import Surprises
 from netsp.execute.pictures import save_execution
 from netsp.execute.run import Execution, Options, Row, execute
+from netsp.files import cell, write_text
 from netsp.online.command import vector
 from netsp.problem import Problem
-from netsp.solution import Solution, write_text
+from netsp.solution import Solution
 
 EXIT_NOT_ALL = 4
 """Goals were left out, or the run was interrupted."""
@@ -109,7 +110,7 @@ def write_execution(done: Execution, folder: str | Path) -> None:
     place = make_folder(folder)
     write_text(place / "log.csv", _table([asdict(r) for r in done.rows]))
     visits = [
-        {**asdict(a), "word": " ".join(map(str, a.word)), "planned": " ".join(map(str, a.planned)),
+        {**asdict(a), "word": _letters(a.word), "planned": _letters(a.planned),
          "as_planned": a.as_planned}
         for a in done.arrivals
     ]  # fmt: skip
@@ -143,6 +144,10 @@ def _table(rows: Sequence[dict[str, Any]]) -> str:
     table = csv.DictWriter(text, fieldnames=list(rows[0]), lineterminator="\n")
     table.writeheader()
     table.writerows(
-        {k: round(v, 6) if isinstance(v, float) else v for k, v in r.items()} for r in rows
+        {
+            k: round(v, 6) if isinstance(v, float) else cell(v) if isinstance(v, str) else v
+            for k, v in r.items()
+        }
+        for r in rows
     )
     return text.getvalue()

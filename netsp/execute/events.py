@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from netsp.errors import InputError
+from netsp.files import read_text
 from netsp.problem import (
     Circle,
     GoalLike,
@@ -21,7 +22,6 @@ from netsp.problem import (
     Problem,
     explain,
     read_model,
-    read_text,
 )
 
 _STRICT = ConfigDict(frozen=True, extra="forbid")

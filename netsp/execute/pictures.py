@@ -8,6 +8,7 @@ import numpy as np
 
 from netsp.errors import InputError
 from netsp.execute.run import Execution
+from netsp.literal import literal
 from netsp.problem import Circle
 
 
@@ -59,6 +60,6 @@ def save_execution(done: Execution, file: str | Path) -> None:
         f"tether at most {s['longest_tether']:.5g} of {s['tether_length']:g}"
     )
     try:
-        figure.savefig(file, dpi=120)
+        literal(figure).savefig(file, dpi=120)
     except OSError as error:
         raise InputError(f"{file}: cannot be written: {error.strerror or error}") from None

@@ -9,9 +9,10 @@ from netsp.errors import InputError
 from netsp.export.projection import Projection
 from netsp.export.site import read_site
 from netsp.export.write import SHALLOWEST, Settings, export
+from netsp.files import write_text
 from netsp.judge import verify
 from netsp.problem import Problem
-from netsp.solution import Solution, write_text
+from netsp.solution import Solution
 
 
 def run_export(args: argparse.Namespace) -> int:

@@ -17,7 +17,8 @@ from pydantic import ValidationError
 
 from netsp.errors import InputError
 from netsp.export.projection import Projection
-from netsp.problem import Problem, explain, parse_json_object, read_text
+from netsp.files import read_text
+from netsp.problem import Problem, explain, parse_json_object
 
 STANDING = {"pile", "platform", "obstruction"}
 

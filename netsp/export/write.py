@@ -23,8 +23,9 @@ from netsp.errors import InputError
 from netsp.execute.plan import HOME
 from netsp.export.projection import Projection
 from netsp.export.waypoints import Waypoint, waypoints_of
+from netsp.files import cell, write_text
 from netsp.problem import Circle, Problem
-from netsp.solution import Solution, write_text
+from netsp.solution import Solution
 
 SHALLOWEST = 0.1
 """Metres of depth that the least altitude stands for."""
@@ -219,7 +220,7 @@ def _csv(
         visited = p.goal not in (None, HOME)
         row: list[Any] = [*(f"{v:.6f}" for v in p.position)]
         row += ["goal" if visited else "base" if p.goal == HOME else "bend"]
-        row += [p.goal, problem.goals[p.goal or 0].name or ""] if visited else ["", ""]
+        row += [p.goal, cell(problem.goals[p.goal or 0].name)] if visited else ["", ""]
         row += [_hold(p, settings), f"{p.tether:.6f}" if visited else ""]
         row += [" ".join(map(str, p.word)) if visited else ""]
         if places is not None:

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 import shapely
 
+from netsp.errors import InputError
 from netsp.hsignature import Word, concatenate, crossings, entangled, reduce
 from netsp.judge.solids import Inset, bridges
 from netsp.judge.stringpull import PLACE_TOLERANCE, StringPuller, reduce_sleeve
@@ -71,6 +72,11 @@ def verify(problem: Problem, solution: Solution) -> Verification:
     another method, fits the tether length and has the stated length; and that length, bound, gap
     and status are consistent.
     """
+    for name, value, kind in (("problem", problem, Problem), ("solution", solution, Solution)):
+        if not isinstance(value, kind):
+            raise InputError(f"{name}: expected a {kind.__name__}, got {value!r}")
+    # copies of a model may hold what its validation would have turned into a status
+    solution = solution.model_copy(update={"status": Status(solution.status)})
     return Verification(tuple(_Judge(problem, solution).run()))
 
 

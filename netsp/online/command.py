@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.errors import InputError
+from netsp.files import read_text, write_text
 from netsp.measuring import read_path
 from netsp.online import flights, pictures
 from netsp.online.field import DistanceField, finite_point
@@ -22,8 +23,6 @@ from netsp.online.scene import Scene
 from netsp.online.simulate import STEP, LogRow, Run, simulate, write_run
 from netsp.online.tether import GeodesicTether, ReactTether, Tether
 from netsp.online.tether.geodesic import THINNEST
-from netsp.problem import read_text
-from netsp.solution import write_text
 
 Floats = npt.NDArray[np.float64]
 

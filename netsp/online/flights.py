@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.errors import InputError
+from netsp.literal import literal
 from netsp.online.pictures import (
     draw_lines,
     layout,
@@ -86,7 +87,7 @@ def save_runs(runs: Sequence[Run], scene: Scene, file: str | Path) -> None:
         _in_space(ax, run, scene)
     figure.suptitle(runs[0].mission.name)
     try:
-        figure.savefig(file, dpi=120)
+        literal(figure).savefig(file, dpi=120)
     except OSError as error:
         raise InputError(f"{file}: cannot be written: {error.strerror or error}") from None
 

@@ -10,6 +10,7 @@ import numpy.typing as npt
 from pydantic import BaseModel, ConfigDict, Field
 
 from netsp.errors import InputError
+from netsp.files import read_text
 from netsp.online.field import DistanceField
 from netsp.online.scene import Scene
 from netsp.problem import (
@@ -18,7 +19,6 @@ from netsp.problem import (
     Point3,
     Positive,
     read_model,
-    read_text,
 )
 
 _STRICT = ConfigDict(frozen=True, extra="forbid")

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.errors import InputError
+from netsp.literal import literal
 from netsp.online.scene import HalfSpace, Scene
 from netsp.online.surfaces import Triangles, drawn_points, extent, mesh_of, surface_of
 from netsp.online.tether import Tether
@@ -54,7 +55,7 @@ def save(
         else:
             metadata = {"Date": None} if Path(file).suffix.lower() == ".svg" else None
             figure = _figure(scene, parts, way, nodes, (low, high), title)
-            figure.savefig(file, dpi=150, metadata=metadata)
+            literal(figure).savefig(file, dpi=150, metadata=metadata)
     except OSError as error:
         raise InputError(f"{file}: cannot be written: {error.strerror or error}") from None
 

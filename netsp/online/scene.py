@@ -15,6 +15,7 @@ import numpy.typing as npt
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from netsp.errors import InputError
+from netsp.files import read_text
 from netsp.online import solids as kinds
 from netsp.online.field import DistanceField
 from netsp.problem import (
@@ -28,7 +29,6 @@ from netsp.problem import (
     Positive,
     Problem,
     read_model,
-    read_text,
 )
 
 _STRICT = ConfigDict(frozen=True, extra="forbid")

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from netsp.compare.rows import Row
+from netsp.literal import literal
 from netsp.report.stats import Cell, Summary, gap_over_time, over_best, profile, summary
 
 STYLES = ("-", "--", "-.", ":")
@@ -128,7 +129,7 @@ def svg(figure: Any) -> str:
     from matplotlib import pyplot as plt
 
     out = io.StringIO()
-    figure.savefig(out, format="svg")
+    literal(figure).savefig(out, format="svg")
     plt.close(figure)
     text = out.getvalue()
     return text[text.index("<svg") :]

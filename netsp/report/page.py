@@ -12,6 +12,9 @@ from typing import Any
 
 from netsp.compare.rows import Row, read_rows
 from netsp.errors import InputError
+from netsp.files import cell as plain_cell
+from netsp.files import write_text
+from netsp.literal import literal
 from netsp.report import figures
 from netsp.report.stats import (
     Cell,
@@ -22,7 +25,6 @@ from netsp.report.stats import (
     over_best,
     summary,
 )
-from netsp.solution import write_text
 
 STYLE = """
 body { font: 15px/1.5 system-ui, sans-serif; color: #1b2631; margin: 2em auto; max-width: 72em;
@@ -90,7 +92,7 @@ def write_report(results: str | Path, output: str | Path, pictures: str | None =
 
 def _save(figure: Any, path: Path) -> None:
     try:
-        figure.savefig(path, dpi=150)
+        literal(figure).savefig(path, dpi=150)
     except OSError as error:
         raise InputError(f"{path}: cannot be written: {error.strerror}") from None
 
@@ -102,11 +104,12 @@ def _head(rows: list[Row], source: str) -> str:
     shown: dict[str, str] = next((r["versions"] for r in rows if r.get("versions")), {})
     return (
         f"<h1>{html.escape(rows[0]['study_name'])}</h1>"
-        f"<p>{len(rows)} trials of {html.escape(source)} ({statuses}), "
+        f"<p>{len(rows)} trials of {html.escape(source)} ({html.escape(statuses)}), "
         f"{len({r.get('problem_sha256') for r in rows})} problems; {redrawn} of them drawn again "
         "because a first draw did not fit. "
-        f"Finished {min(r['finished'] for r in rows)} to {max(r['finished'] for r in rows)}.</p>"
-        f'<p class="note">Study {rows[0]["study"][:16]}; '
+        f"Finished {html.escape(min(r['finished'] for r in rows))} to "
+        f"{html.escape(max(r['finished'] for r in rows))}.</p>"
+        f'<p class="note">Study {html.escape(rows[0]["study"][:16])}; '
         f"{html.escape(', '.join(sorted({r['machine'] for r in rows})))}; "
         f"{html.escape(', '.join(f'{k} {v}' for k, v in shown.items()))}"
         f"{' (and other versions)' if len(versions) > 1 else ''}.</p>"
@@ -135,7 +138,7 @@ def _cells_table(by_cell: dict[Cell, list[Row]], best: dict[str, float]) -> str:
                 else f"{seconds.median:.3g} ({seconds.low:.3g} to {seconds.high:.3g})",
                 sum(r["status"] == "optimal" for r in rows),
                 "" if gaps is None else f"{gaps.median:.3g}",
-                f"<details><summary>rows</summary><code>{ids}</code></details>",
+                f"<details><summary>rows</summary><code>{html.escape(ids)}</code></details>",
             ]
         )  # fmt: skip
     head = ["method", "goals", "tether", "trials", "% over best, median (95 %)", "mean",
@@ -176,8 +179,8 @@ def _failures_table(rows: list[Row]) -> str:
         return "<h2>Failures</h2><p>None.</p>"
     body = [
         [html.escape(r["solver"]["label"]), r["world"]["seed"], r["world"]["goals"],
-         f"{r['world']['tether_length']:g}", r["status"], html.escape(r["message"][:200]),
-         f"<code>{r['trial']}</code>"]
+         f"{r['world']['tether_length']:g}", html.escape(r["status"]), html.escape(r["message"][:200]),
+         f"<code>{html.escape(r['trial'])}</code>"]
         for r in failed
     ]  # fmt: skip
     head = ["solver", "world", "goals", "tether", "status", "message", "trial"]
@@ -195,9 +198,10 @@ def _rows_link(rows: list[Row], best: dict[str, float]) -> str:
     for r in rows:
         world, over = r["world"], over_best(r, best)
         writer.writerow(
-            [r["trial"], world["family"], world["seed"], world["goals"], world["tether_length"],
-             r["roadmap"]["label"], r["solver"]["label"], r["seed"],
-             "" if over is None else f"{over:.6g}", *(r.get(name, "") for name in names)]
+            [plain_cell(r["trial"]), plain_cell(world["family"]), world["seed"], world["goals"],
+             world["tether_length"], plain_cell(r["roadmap"]["label"]), plain_cell(r["solver"]["label"]),
+             r["seed"], "" if over is None else f"{over:.6g}",
+             *(plain_cell(v) if isinstance(v := r.get(name, ""), str) else v for name in names)]
         )  # fmt: skip
     data = base64.b64encode(out.getvalue().encode()).decode()
     return (

@@ -15,12 +15,13 @@ import numpy.typing as npt
 from netsp.errors import InputError
 from netsp.execute.plan import HOME, legs_of
 from netsp.execute.run import scene_of, suggested_delta
+from netsp.files import read_text, write_text
 from netsp.hsignature.measures import measure
 from netsp.judge import verify
 from netsp.online.tether import GeodesicTether
-from netsp.problem import Circle, Problem, read_text
+from netsp.problem import Circle, Problem
 from netsp.report.page import STYLE
-from netsp.solution import Solution, write_text
+from netsp.solution import Solution
 
 Floats = npt.NDArray[np.float64]
 
@@ -201,16 +202,17 @@ def _frames_of_run(
 
 
 def _summary(problem: Problem, solution: Solution, run: Path | None) -> str:
+    units = html.escape(problem.units)
     gap = "" if solution.gap is None else f", at most {100 * solution.gap:.2g} % above the shortest"
     lines = [
         f"{len(problem.goals)} goals, {len(problem.obstacles)} obstacles, a tether of "
-        f"{problem.tether_length:g} {problem.units}. The plan is {solution.length:.6g} "
-        f"{problem.units} long ({solution.status.value} by {html.escape(solution.solver)}{gap})."
+        f"{problem.tether_length:g} {units}. The plan is {solution.length:.6g} "
+        f"{units} long ({solution.status.value} by {html.escape(solution.solver)}{gap})."
     ]
     if run is not None:
         s = _json(run / "summary.json")
         lines.append(
-            f"Carried out in {s['time_s']:.5g} s over {s['path']:.6g} {problem.units}: "
+            f"Carried out in {s['time_s']:.5g} s over {s['path']:.6g} {units}: "
             f"{s['visited']} goals visited, the tether at most {s['longest_tether']:.5g} long, "
             f"longer than allowed for {s['exceedance_s']:.3g} s, "
             f"{'taken in free' if s['tether_free'] else 'not taken in free'} at the end."

@@ -271,7 +271,7 @@ def _sample(
     ob, og, ou = _ompl()
     ou.noOutputHandler()
     # the generator is the process's own, but each planner's is seeded from it when made
-    ou.RNG.setSeed(seed + 1)
+    ou.RNG.setSeed(int(seed) % (2**32 - 2) + 1)
     low, high = sampling_box(problem)
     low, high = low - np.append(outline.origin, 0.0), high - np.append(outline.origin, 0.0)
     flat = bool(low[2] == high[2])

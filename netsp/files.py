@@ -1,0 +1,105 @@
+"""Reading and writing whole files: kind and size are looked at first, no file is half written."""
+
+from __future__ import annotations
+
+import os
+import stat
+import tempfile
+import zlib
+from pathlib import Path
+
+from netsp.errors import InputError
+
+MOST_BYTES = 256 * 2**20
+"""Largest file that is read, unpacked if it is packed: a problem of a million goals is smaller."""
+
+CHUNK = 2**20
+
+
+def read_bytes(path: str | Path, most: int = MOST_BYTES) -> bytes:
+    """Contents of a regular file of at most so many bytes, or `InputError` in one line. Pipes and
+    devices may never end, so they are refused."""
+    try:
+        status = os.stat(path)
+        if not stat.S_ISREG(status.st_mode):
+            kind = "a directory" if stat.S_ISDIR(status.st_mode) else "a pipe or a device"
+            raise InputError(f"{path}: cannot be read: expected a file, got {kind}")
+        if status.st_size > most:
+            raise InputError(
+                f"{path}: cannot be read: {status.st_size / 2**20:.4g} MiB; expected at most "
+                f"{most / 2**20:g} MiB"
+            )
+        with open(path, "rb") as stream:
+            data = stream.read(most + 1)
+    except (OSError, ValueError) as error:  # ValueError: a null character in the name
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"{path}: cannot be read: {reason}") from None
+    if len(data) > most:
+        raise InputError(f"{path}: cannot be read: more than {most / 2**20:g} MiB")
+    return data
+
+
+def read_text(path: str | Path) -> str:
+    """Contents of a UTF-8 text file, or `InputError` in one line."""
+    try:
+        return read_bytes(path).decode("utf-8")
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: not a text file in UTF-8") from None
+
+
+def read_gzip(path: str | Path, most: int = MOST_BYTES) -> bytes:
+    """Contents of a gzipped file that unpacks to at most so many bytes, or `InputError`."""
+    data = read_bytes(path)
+    out, size = [], 0
+    try:
+        while data:
+            unpack = zlib.decompressobj(wbits=31)
+            while data and not unpack.eof:
+                piece = unpack.decompress(data, CHUNK)
+                data = unpack.unconsumed_tail
+                size += len(piece)
+                if size > most:
+                    raise InputError(f"{path}: unpacks to more than {most / 2**20:g} MiB")
+                out.append(piece)
+                if not data and not piece:
+                    break
+            if not unpack.eof:
+                raise zlib.error("cut short")
+            data = unpack.unused_data
+    except zlib.error:
+        raise InputError(f"{path}: not a gzip file, or cut short") from None
+    return b"".join(out)
+
+
+def write_text(path: str | Path, text: str) -> None:
+    """Write a file by renaming a finished one into place, so that it is never half there; through a
+    symbolic link, what it points to is replaced."""
+    target = Path(os.path.realpath(path)) if os.path.islink(path) else Path(path)
+    if target.exists() and not target.is_file():  # /dev/stdout and the like
+        try:
+            target.write_text(text, encoding="utf-8")
+        except OSError as error:
+            raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
+        return
+    try:
+        handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name[:80]}.")
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8") as stream:
+            stream.write(text)
+        umask = os.umask(0)
+        os.umask(umask)
+        os.chmod(name, 0o666 & ~umask)
+        os.replace(name, target)
+    except OSError as error:
+        Path(name).unlink(missing_ok=True)
+        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
+
+
+def cell(text: str | None) -> str:
+    """A text as a cell of a table that a spreadsheet takes for no formula (OWASP, "CSV injection"):
+    what begins like one gets an apostrophe."""
+    text = text or ""
+    risky = text.lstrip()[:1] in ("=", "+", "-", "@") or text[:1] in ("\t", "\r")
+    return f"'{text}" if risky else text
