@@ -33,9 +33,7 @@ def add_online(commands: Any) -> None:
     p.add_argument(
         "--refine", metavar="NAME", help="none, paper or gradient; default is the planner's own"
     )
-    p.add_argument(
-        "--seed", type=natural, default=0, metavar="N", help="of gusts, sampling, refining"
-    )
+    p.add_argument("--seed", type=natural, default=0, metavar="N", help="of gusts and sampling")
     p.add_argument("--compare", metavar="NAME", help="fly with another planner too, side by side")
     p.add_argument("--snap", action="store_true", help="move waypoints out of solids")
     p.add_argument(

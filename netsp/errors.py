@@ -7,8 +7,8 @@ import re
 LONGEST_QUOTE = 80
 """Characters of a quoted value that a message shows."""
 
-_QUOTED = re.compile(r"(['\"])((?:(?!\1).){%d,}?)\1" % (LONGEST_QUOTE + 1), re.S)
-_WORD = re.compile(r"[^\s/'\"]{%d,}" % (2 * LONGEST_QUOTE))
+_QUOTED = re.compile(rf"(['\"])((?:(?!\1).){{{LONGEST_QUOTE + 1},}}?)\1", re.S)
+_WORD = re.compile(rf"[^\s/'\"]{{{2 * LONGEST_QUOTE},}}")
 
 
 def brief(message: str) -> str:

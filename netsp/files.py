@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import stat
 import tempfile
 import zlib
@@ -14,6 +15,8 @@ MOST_BYTES = 256 * 2**20
 """Largest file that is read, unpacked if it is packed: a problem of a million goals is smaller."""
 
 CHUNK = 2**20
+
+_NUMBERS = re.compile(r"[-+0-9. eE]*")
 
 
 def read_bytes(path: str | Path, most: int = MOST_BYTES) -> bytes:
@@ -101,5 +104,7 @@ def cell(text: str | None) -> str:
     """A text as a cell of a table that a spreadsheet takes for no formula (OWASP, "CSV injection"):
     what begins like one gets an apostrophe."""
     text = text or ""
+    if _NUMBERS.fullmatch(text):
+        return text
     risky = text.lstrip()[:1] in ("=", "+", "-", "@") or text[:1] in ("\t", "\r")
     return f"'{text}" if risky else text

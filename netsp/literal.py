@@ -6,8 +6,8 @@ from typing import Any
 
 
 def literal(figure: Any) -> Any:
-    """The figure (Matplotlib's), its texts not read as mathematics but for the labels of ticks, which
-    Matplotlib writes itself. To be called right before it is saved."""
+    """The figure (Matplotlib's), its texts not read as mathematics but for the labels of ticks,
+    which Matplotlib writes itself. To be called right before it is saved."""
     from matplotlib.text import Text
 
     ticks = set()

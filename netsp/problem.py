@@ -347,8 +347,8 @@ class Problem(BaseModel):
     @property
     def scale(self) -> float:
         """Size of the problem, the unit of every tolerance: the largest coordinate difference from
-        the base to any goal and any obstacle within the tether's reach. Geometry is computed relative to the base, so far-off origins (UTM)
-        cost no precision."""
+        the base to any goal and any obstacle within the tether's reach. Geometry is computed
+        relative to the base, so far-off origins (UTM) cost no precision."""
         base = np.array(self.base[:2])
         reach = self.tether_length + self.clearance
         away = [float(np.abs(self.points[:, :2] - base).max())]

@@ -110,7 +110,7 @@ def write_execution(done: Execution, folder: str | Path) -> None:
     place = make_folder(folder)
     write_text(place / "log.csv", _table([asdict(r) for r in done.rows]))
     visits = [
-        {**asdict(a), "word": _letters(a.word), "planned": _letters(a.planned),
+        {**asdict(a), "word": " ".join(map(str, a.word)), "planned": " ".join(map(str, a.planned)),
          "as_planned": a.as_planned}
         for a in done.arrivals
     ]  # fmt: skip

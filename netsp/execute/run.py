@@ -328,6 +328,8 @@ class _Run:
             self.vehicle.stop_at(line[-1])
         anchor = self.model.start(line[0], line[0])
         self.tether = self.model.refine(self.model.drive(anchor, line[1:])[0])
+        if self.tether.length > problem.tether_length:
+            self.shorten = True  # pushed aside it is longer, whoever is to blame
 
     def _push(self, by: Floats) -> None:
         """Carry the robot off, as far as there is water."""
@@ -437,7 +439,8 @@ def execute(
     except KeyboardInterrupt:
         run.out.interrupted = True
     run.out.tethers.append((round(run.now, 6), run.tether.nodes.copy()))
-    run.out.free = is_free(run.tether, run.delta)
+    # a corner may have held it back for the few rounds of an update
+    run.out.free = is_free(run.model.refine(run.tether), run.delta)
     run.out.wall_s = time.perf_counter() - begin
     return run.out
 

@@ -179,8 +179,8 @@ def _failures_table(rows: list[Row]) -> str:
         return "<h2>Failures</h2><p>None.</p>"
     body = [
         [html.escape(r["solver"]["label"]), r["world"]["seed"], r["world"]["goals"],
-         f"{r['world']['tether_length']:g}", html.escape(r["status"]), html.escape(r["message"][:200]),
-         f"<code>{html.escape(r['trial'])}</code>"]
+         f"{r['world']['tether_length']:g}", html.escape(r["status"]),
+         html.escape(r["message"][:200]), f"<code>{html.escape(r['trial'])}</code>"]
         for r in failed
     ]  # fmt: skip
     head = ["solver", "world", "goals", "tether", "status", "message", "trial"]
@@ -199,8 +199,8 @@ def _rows_link(rows: list[Row], best: dict[str, float]) -> str:
         world, over = r["world"], over_best(r, best)
         writer.writerow(
             [plain_cell(r["trial"]), plain_cell(world["family"]), world["seed"], world["goals"],
-             world["tether_length"], plain_cell(r["roadmap"]["label"]), plain_cell(r["solver"]["label"]),
-             r["seed"], "" if over is None else f"{over:.6g}",
+             world["tether_length"], plain_cell(r["roadmap"]["label"]),
+             plain_cell(r["solver"]["label"]), r["seed"], "" if over is None else f"{over:.6g}",
              *(plain_cell(v) if isinstance(v := r.get(name, ""), str) else v for name in names)]
         )  # fmt: skip
     data = base64.b64encode(out.getvalue().encode()).decode()
