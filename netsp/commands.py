@@ -83,8 +83,8 @@ def add_online(commands: Any) -> None:
     p.add_argument("solution", metavar="SOLUTION", help="solution file (JSON)")
     p.add_argument("--problem", required=True, metavar="FILE", help="the problem it solves")
     p.add_argument(
-        "--format", default="plan", metavar="NAME",
-        help="plan (QGroundControl, default), wpl (QGC WPL 110), geojson or csv",
+        "--format", metavar="NAME",
+        help="plan (QGroundControl), wpl (QGC WPL 110), geojson or csv; default by the file's name",
     )  # fmt: skip
     p.add_argument(
         "--origin", metavar="LAT,LON[,HEADING]",
@@ -97,8 +97,12 @@ def add_online(commands: Any) -> None:
     p.add_argument("--hold", type=natural, default=5, metavar="S", help="at goals; default 5")
     p.add_argument("--speed", type=length, default=0.5, metavar="V", help="m/s; default 0.5")
     p.add_argument(
-        "--most", type=positive, default=700, metavar="N", help="waypoints at most; default 700"
+        "--most", type=positive, default=650, metavar="N", help="waypoints at most; default 650"
     )
+    p.add_argument(
+        "--margin", default="0.3,0.2", metavar="SLACK[,CLEARANCE]",
+        help="warn when less tether is left or lines come nearer to an obstacle; default 0.3,0.2",
+    )  # fmt: skip
     p.add_argument("-o", "--output", required=True, metavar="FILE")
     p.set_defaults(run=_export)
 

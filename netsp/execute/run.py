@@ -334,6 +334,9 @@ class _Run:
     def _push(self, by: Floats) -> None:
         """Carry the robot off, as far as there is water."""
         start = self.vehicle.position
+        # farther than the tether goes there and back nothing is carried
+        far = 2.0 * max(self.problem.tether_length, self.tether.length) + self.delta
+        by = by * min(1.0, far / max(float(np.linalg.norm(by)), 1e-300))
         stops = dense(np.array([start, start + by]), 0.5 * self.delta)
         for stop in stops:
             if float(self.scene.distance(stop)) < 0.0:

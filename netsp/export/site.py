@@ -85,6 +85,11 @@ def read_site(
                 corners = [c for c, d in zip(corners, [*corners[1:], corners[0]], strict=True)
                            if not np.allclose(c, d, atol=1e-6)]  # fmt: skip
                 obstacles.append({"polygon": corners, **label})
+    for what, things in (("goals", goals), ("obstacles", obstacles)):
+        names = [t["name"] for t in things if "name" in t]
+        twice = next((n for n in names if names.count(n) > 1), None)
+        if twice is not None:
+            raise InputError(f"{file}: two {what} are named {twice!r}; expected names of their own")
     if not goals:
         raise InputError(f"{file}: has no goal: a Point without radius_m")
     z = base["coordinates"][2:3] if base is not None else []

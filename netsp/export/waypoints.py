@@ -18,7 +18,7 @@ import shapely
 from netsp.errors import InputError
 from netsp.execute.plan import HOME, legs_of
 from netsp.hsignature import Word, concatenate, crossings, signature
-from netsp.problem import Problem
+from netsp.problem import Circle, Problem
 from netsp.solution import Solution
 
 Floats = npt.NDArray[np.float64]
@@ -39,14 +39,17 @@ OUTWARD = (1.0, 2.0, 4.0)
 class Waypoint:
     """A place to pass, z up.
 
-    goal : the goal that is visited here, HOME (-1) for the base at the end, None for a bend.
-    word, tether : of the taut tether at a goal.
+    goal : the goal that is visited here, HOME (-1) for the base at the end, None for a bend and
+    for the start. word, tether : of the taut tether at a goal. heading : degrees clockwise from
+    north, None where it does not matter.
     """
 
     position: tuple[float, float, float]
     goal: int | None
     word: Word = ()
     tether: float = 0.0
+    start: bool = False
+    heading: float | None = None
 
 
 def waypoints_of(problem: Problem, solution: Solution, radius: float = 0.0) -> list[Waypoint]:
@@ -91,6 +94,19 @@ def waypoints_of(problem: Problem, solution: Solution, radius: float = 0.0) -> l
         Waypoint((float(x), float(y), float(z)), *mark)
         for (x, y, z), mark in zip(line[1:], marks[1:], strict=True)
     ]
+
+
+def clearance_of(problem: Problem, points: list[Waypoint]) -> float:
+    """How near the straight lines between waypoints come to any obstacle (not grown)."""
+    line = shapely.LineString([p.position[:2] for p in points])
+    return min(
+        (
+            line.distance(shapely.Point(o.center)) - o.radius if isinstance(o, Circle)
+            else line.distance(shapely.Polygon(o.polygon))
+            for o in problem.obstacles
+        ),
+        default=float("inf"),
+    )  # fmt: skip
 
 
 def _coarsened(

@@ -142,6 +142,35 @@ class Simulation:
         return passed, True
 
 
+FARTHEST = 1000.0
+"""A waypoint may be so many tether lengths from the anchor."""
+
+MOST_STEPS, MOST_NODES = 5_000_000, 200_000
+"""Steps of a run, and nodes of a tether, beyond which a mission is taken for a mistake of units."""
+
+
+def _check_size(mission: Mission) -> None:
+    """InputError for a mission that would take for ever."""
+    places = np.array([mission.start, *mission.waypoints])
+    far = float(np.abs(places - np.array(mission.anchor)).max())
+    if far > FARTHEST * mission.tether_length:
+        raise InputError(
+            f"waypoints: one is {far:g} from the anchor; expected at most {FARTHEST:g} times the "
+            f"tether_length {mission.tether_length:g}: mixed units?"
+        )
+    way = float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
+    if way / (mission.speed * STEP) > MOST_STEPS:
+        raise InputError(
+            f"speed: {mission.speed:g} takes {way / (mission.speed * STEP):.2g} steps of {STEP:g} "
+            f"s for the waypoints; expected at most {MOST_STEPS:g}"
+        )
+    if mission.tether_length / mission.delta > MOST_NODES:
+        raise InputError(
+            f"delta: {mission.delta:g} makes {mission.tether_length / mission.delta:.2g} nodes of "
+            f"a tether; expected at most {MOST_NODES:g}"
+        )
+
+
 def simulate(
     mission: Mission,
     planner: str = "predictive",
@@ -171,6 +200,7 @@ def simulate(
     InputError : before the first step: unknown names, waypoints inside solids, anchor and start
         not in sight of one another, a tether that is shorter than the way between them.
     """
+    _check_size(mission)
     scene = scene or mission.load_scene()
     field = field or scene.field()
     mission = mission.checked_waypoints(field, snap=snap)

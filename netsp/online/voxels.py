@@ -10,6 +10,7 @@ the grid from its border, and what it does not reach is solid.
 from __future__ import annotations
 
 import math
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.errors import InputError
+from netsp.files import MOST_BYTES
 from netsp.online.closest import nearest_sites, sweep, windings
 from netsp.online.field import VoxelGrid
 
@@ -352,6 +354,20 @@ def _numeric(row: list[str]) -> bool:
 def _exists(path: str | Path) -> None:
     if not Path(path).is_file():
         raise InputError(f"{path}: cannot be read: no such file")
+    size = Path(path).stat().st_size
+    if size > MOST_BYTES:
+        raise InputError(
+            f"{path}: cannot be read: {size / 2**20:.4g} MiB; expected at most "
+            f"{MOST_BYTES / 2**20:g} MiB"
+        )
+    if Path(path).suffix.lower() == ".npz":
+        try:
+            with zipfile.ZipFile(path) as archive:
+                unpacked = sum(part.file_size for part in archive.infolist())
+        except zipfile.BadZipFile:
+            raise InputError(f"{path}: cannot be read: not an npz file") from None
+        if unpacked > 4 * MOST_BYTES:
+            raise InputError(f"{path}: unpacks to more than {4 * MOST_BYTES / 2**20:g} MiB")
 
 
 def _line(error: Exception) -> str:
