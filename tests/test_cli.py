@@ -128,7 +128,8 @@ def test_a_warm_start_of_another_problem_is_refused(tmp_path, capsys):
     other = str(PROBLEMS / "known" / "square.json")
     assert main(["solve", other, "--warm-start", str(out)]) == 2
     assert "another problem" in capsys.readouterr().err
-    assert main(["solve", SMALL, "--warm-start", str(out), "-o", str(out), "--quiet"]) == 0
+    again = str(tmp_path / "again.json")
+    assert main(["solve", SMALL, "--warm-start", str(out), "-o", again, "--quiet"]) == 0
 
 
 def test_plot_draws_problem_and_solution(tmp_path):

@@ -105,7 +105,13 @@ def test_a_plan_is_what_qgroundcontrol_and_mavsdk_want(plan, tmp_path):
     assert set(data) >= {"geoFence", "rallyPoints", "mission", "groundStation"}
     mission = data["mission"]
     assert (mission["firmwareType"], mission["vehicleType"]) == (3, 12)
-    assert [i["doJumpId"] for i in mission["items"]] == list(range(1, len(points) + 1))
+    assert [i["doJumpId"] for i in mission["items"]] == list(range(1, len(points) + 2))
+    # the speed takes effect as an item after the first waypoint, and with no change of throttle
+    speed = mission["items"].pop(1)
+    assert (speed["command"], speed["frame"]) == (178, 2)
+    assert speed["params"] == [1, 0.5, -1, 0, 0, 0, 0]
+    # the vehicle goes straight to the first item from where it was armed: that is the base, held
+    assert points[0].position == SITE.base
     for item in mission["items"]:
         assert item["command"] == 16  # no take-off (22), no return to launch (20)
         assert item["frame"] == 3
@@ -129,9 +135,11 @@ def test_waypoint_lists_load_in_pymavlink(plan, tmp_path):
     assert lines[0] == "QGC WPL 110"
     assert all(len(row.split("\t")) == 12 for row in lines[1:])
     loader = mavwp.MAVWPLoader()
-    assert loader.load(str(file)) == len(points) + 1
+    assert loader.load(str(file)) == len(points) + 2
+    speed = loader.wp(2)
+    assert (speed.command, speed.param1, speed.param2, speed.param3) == (178, 1, 0.5, -1)
     for k, p in enumerate(points):
-        item = loader.wp(k + 1)
+        item = loader.wp(k + 1 if k == 0 else k + 2)
         assert (item.command, item.frame) == (16, 3)
         xy = projection().to_plane([[item.x, item.y]])[0]
         assert xy == pytest.approx(p.position[:2], abs=1e-3)

@@ -149,7 +149,7 @@ def test_a_report_on_nothing_is_refused(tmp_path, capsys):
 def test_a_report_does_not_overwrite_its_rows(results, capsys):
     before = results.read_bytes()
     assert main(["report", str(results), "-o", str(results)]) == 2
-    assert "is named for two different files" in capsys.readouterr().err
+    assert "would be overwritten, and it is an input" in capsys.readouterr().err
     assert results.read_bytes() == before
 
 

@@ -142,11 +142,12 @@ def changed(problem: Problem, event: Event) -> Problem:
 
 def moved(obstacle: Circle | Polygon, by: tuple[float, float]) -> Circle | Polygon:
     """An obstacle elsewhere."""
-    if isinstance(obstacle, Circle):
-        x, y = obstacle.center
-        return obstacle.model_copy(update={"center": (x + by[0], y + by[1])})
-    corners = tuple((x + by[0], y + by[1]) for x, y in obstacle.polygon)
     try:
+        if isinstance(obstacle, Circle):
+            x, y = obstacle.center
+            centre = (x + by[0], y + by[1])
+            return Circle(center=centre, radius=obstacle.radius, name=obstacle.name)
+        corners = tuple((x + by[0], y + by[1]) for x, y in obstacle.polygon)
         return Polygon(polygon=corners, name=obstacle.name)
     except ValidationError as error:
         raise InputError(f"move: {explain(error)}") from None

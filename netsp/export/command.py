@@ -105,8 +105,8 @@ def margins(text: str) -> tuple[float, float]:
 
 
 LEAST_SLACK, LEAST_CLEARANCE = 0.3, 0.2
-"""Metres: a vehicle that flew exported missions was off by 0.13 m in clearance and took up to 0.16 m
-more tether than planned."""
+"""Metres: a vehicle that flew exported missions lost 0.13 m of clearance and took up to 0.16 m more
+tether than planned."""
 
 
 def warnings(

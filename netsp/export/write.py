@@ -43,8 +43,8 @@ GROUND_SPEED, KEEP_THROTTLE = 1, -1
 
 STOP_S, STOP_GROWTH = 3.5, 0.4
 """ArduSub stops at every waypoint. A leg takes so many seconds more than at full speed, when it is
-long enough to reach that at 0.5 m/s; with the speed that grows by the power given. On five simulated
-flights the times so predicted are within 6 % of those flown; 6 s were seen at 2 m/s."""
+long enough to reach that at 0.5 m/s; with the speed that grows by the power given. On five
+simulated flights the times so predicted are within 7 % of those flown; 6 s were seen at 2 m/s."""
 ARDUPILOT, SUBMARINE = 3, 12
 
 

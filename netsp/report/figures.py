@@ -58,7 +58,8 @@ def by_goals(
         if log:
             panel.set_yscale("log")
     axes[0][0].set_ylabel(label)
-    axes[0][-1].legend(fontsize="x-small", loc="upper left", bbox_to_anchor=(1.02, 1.0))
+    if axes[0][-1].get_legend_handles_labels()[0]:
+        axes[0][-1].legend(fontsize="x-small", loc="upper left", bbox_to_anchor=(1.02, 1.0))
     return figure
 
 
@@ -98,7 +99,8 @@ def performance(by_method: dict[str, list[Row]]) -> Any | None:
     panel.set(xscale="log", xlim=(1.0, most), ylim=(-0.02, 1.02), ylabel="share proven",
               xlabel="time over that of the fastest")  # fmt: skip
     panel.grid(alpha=0.3)
-    panel.legend(fontsize="x-small", loc="lower right")
+    if panel.get_legend_handles_labels()[0]:
+        panel.legend(fontsize="x-small", loc="lower right")
     return figure
 
 
@@ -120,7 +122,8 @@ def anytime(by_method: dict[str, list[Row]], best: dict[str, float]) -> Any | No
     panel.set_yscale("symlog", linthresh=0.1)
     panel.set_ylim(bottom=-0.02)
     panel.grid(alpha=0.3)
-    panel.legend(fontsize="x-small", loc="upper left", bbox_to_anchor=(1.02, 1.0))
+    if panel.get_legend_handles_labels()[0]:
+        panel.legend(fontsize="x-small", loc="upper left", bbox_to_anchor=(1.02, 1.0))
     return figure
 
 

@@ -1,0 +1,289 @@
+"""Input that nobody would write on purpose ends in one line, exit code 2, nothing written."""
+
+import gzip
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from matplotlib.figure import Figure
+
+from netsp import Circle, InputError, Problem, Solution, solve, verify
+from netsp.cli import main
+from netsp.errors import brief
+from netsp.execute import Options, Surprises, execute
+from netsp.files import cell, read_gzip, write_text
+from netsp.literal import literal
+from netsp.online.mission import Mission
+
+ROOT = Path(__file__).parent.parent
+SMALL = str(ROOT / "problems" / "known" / "triangle.json")
+WHARF = ROOT / "problems" / "wharf.json"
+NASTY = ["$\\frac{$", "$", "a$b$c", "=1+1", "<script>alert(1)</script>", "-2+3", "@x", "_é"]
+
+
+def one_line(capsys) -> str:
+    err = capsys.readouterr().err
+    assert err.startswith("netsp: "), err
+    assert err.count("\n") == 1, err
+    assert "Traceback" not in err
+    assert len(err) < 1000
+    return err
+
+
+def nasty(name: str) -> Problem:
+    return Problem(
+        name=name, units=name[:20], base=(0, 0), tether_length=9,
+        goals=[{"name": name, "position": (5, 1)}, {"name": name + "2", "position": (5, -1)}],
+        obstacles=[Circle(center=(3, 0), radius=0.5, name=name)],
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("name", NASTY)
+def test_a_name_is_drawn_as_it_is_in_every_picture(name, tmp_path):
+    """Matplotlib takes what is between two dollars for a formula, and most are none."""
+    problem = nasty(name)
+    file, tour = tmp_path / "p.json", tmp_path / "s.json"
+    file.write_text(problem.to_json())
+    code = main(["solve", str(file), "-o", str(tour), "--quiet", "--plot", str(tmp_path / "a.svg"),
+                 "--plot-trace", str(tmp_path / "b.svg")])  # fmt: skip
+    assert code == 0
+    for k, more in enumerate([["--roadmap", "taut"], ["--classes", "0"], [str(tour)]]):
+        assert main(["plot", str(file), *more, "-o", str(tmp_path / f"{k}.png")]) == 0
+    assert main(["execute", str(file), str(tour), "-o", str(tmp_path / "run"), "--quiet"]) == 0
+    page = tmp_path / "page.html"
+    assert main(["report", str(tour), "--problem", str(file), "-o", str(page)]) == 0
+    assert "<script>alert(1)" not in page.read_text()
+
+
+def test_dollars_are_literal_and_the_labels_of_ticks_are_not():
+    figure = Figure()
+    axes = figure.subplots()
+    axes.loglog([1, 1e6], [1, 1e6])
+    axes.set_title("$\\frac{$ and $")
+    literal(figure).canvas.draw()
+    assert axes.title.get_text() == "$\\frac{$ and $"
+    assert not axes.title.get_parse_math()
+    assert axes.xaxis.get_major_ticks()[0].label1.get_parse_math()
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        '{"schema_version": 1, "base": [0, 0], "goals": [[1, 1]], "tether_length": %s}'
+        % ("9" * 400),
+        '{"schema_version": 1, "base": [1e301, 0], "goals": [[1, 1]], "tether_length": 5}',
+        '{"schema_version": 1, "base": [0, 0], "goals": [[1, 1]], "tether_length": 1e999}',
+        '{"schema_version": 1, "name": "a\\u0000b", "base": [0, 0], "goals": [[1, 1]], '
+        '"tether_length": 5}',
+        '{"schema_version": 1, "name": "\\ud800", "base": [0, 0], "goals": [[1, 1]], '
+        '"tether_length": 5}',
+        '{"schema_version": 1, "name": "%s", "base": [0, 0], "goals": [[1, 1]], '
+        '"tether_length": 5}' % ("x" * 5000),
+        '{"schema_version": 1, "%s": 1, "base": [0, 0], "goals": [[1, 1]], "tether_length": 5}'
+        % ("y" * 5000),
+        "[" * 100_000,
+    ],
+)  # fmt: skip
+def test_absurd_numbers_and_names_are_told_in_one_short_line(text, tmp_path, capsys):
+    file, out = tmp_path / "p.json", tmp_path / "out.json"
+    file.write_text(text)
+    out.write_text("precious")
+    assert main(["solve", str(file), "-o", str(out)]) == 2
+    one_line(capsys)
+    assert out.read_text() == "precious"
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["solve", "{}"], ["verify", "{}", "{}"], ["plot", "{}", "-o", "x.png"],
+        ["simulate", "{}"], ["execute", "{}", "{}"], ["import", "{}"], ["compare", "{}", "-o", "r"],
+        ["report", "{}", "-o", "x.html"], ["order", "{}"],
+    ],
+)  # fmt: skip
+def test_pipes_devices_and_folders_are_no_input(command, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    pipe = tmp_path / "pipe.jsonl"
+    os.mkfifo(pipe)
+    for source in (str(pipe), "/dev/zero", str(tmp_path)):
+        if command[0] == "report" and source == str(tmp_path):
+            continue  # the folder of a run is what it reads
+        assert main([word.format(source) for word in command]) == 2
+        one_line(capsys)
+
+
+def test_a_bomb_of_zeros_is_not_unpacked(tmp_path, capsys):
+    bomb = tmp_path / "r.jsonl.gz"
+    with gzip.open(bomb, "wb", compresslevel=9) as stream:
+        for _ in range(300):
+            stream.write(b"\0" * 2**20)
+    assert bomb.stat().st_size < 2**20
+    assert main(["report", str(bomb), "-o", str(tmp_path / "x.html")]) == 2
+    assert "unpacks to more than" in one_line(capsys)
+
+
+def test_gzip_is_read_whole_in_one_member_or_many(tmp_path):
+    file = tmp_path / "a.gz"
+    file.write_bytes(gzip.compress(b"one ") + gzip.compress(b"two"))
+    assert read_gzip(file) == b"one two"
+    file.write_bytes(gzip.compress(b"one" * 1000)[:-9])
+    with pytest.raises(InputError, match="not a gzip file, or cut short"):
+        read_gzip(file)
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no full device on this system")
+def test_a_full_or_closed_stdout_is_told():
+    run = [sys.executable, "-m", "netsp", "solve", SMALL, "--quiet"]
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(run, stdout=full, stderr=subprocess.PIPE, text=True, cwd=ROOT)
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert "No space left" in done.stderr
+    words = " ".join(map(repr, run)).replace("'", '"')
+    done = subprocess.run(["sh", "-c", f"{words} >&-"], stderr=subprocess.PIPE, text=True, cwd=ROOT)
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert "closed" in done.stderr
+
+
+def test_an_output_is_no_input_and_a_link_is_followed(tmp_path, capsys):
+    problem = tmp_path / "p.json"
+    problem.write_text(Path(SMALL).read_text())
+    for name in (problem, tmp_path / "link.json"):
+        if name != problem:
+            name.symlink_to(problem)
+        assert main(["solve", str(problem), "-o", str(name)]) == 2
+        assert "it is an input" in one_line(capsys)
+    target, link = tmp_path / "t.json", tmp_path / "l.json"
+    target.write_text("old")
+    link.symlink_to(target)
+    assert main(["solve", str(problem), "-o", str(link), "--quiet"]) == 0
+    assert link.is_symlink()
+    assert Solution.load(target).length == 12.0
+    write_text(link, "new")
+    assert (link.is_symlink(), target.read_text()) == (True, "new")
+
+
+@pytest.mark.parametrize("seed", ["-1", "1e3", "99999999999999999999999999", "x"])
+def test_seeds_of_any_size_or_sign(seed, capsys):
+    for command in (["solve", SMALL], ["simulate", str(ROOT / "missions" / "basin.json")],
+                    ["world"]):  # fmt: skip
+        assert main([*command, "--seed", seed]) == 2
+        assert "--seed" in one_line(capsys)
+
+
+@pytest.mark.parametrize("seed", [0, 2**31, 2**62])
+def test_large_seeds_work_everywhere(seed):
+    pytest.importorskip("ompl")
+    problem = Problem.load(SMALL)
+    assert solve(problem, "lns", seed=seed, iteration_limit=5).length == pytest.approx(12.0)
+    few = {"samples": 300}
+    assert solve(nasty("pile"), roadmap="prm", roadmap_options=few, seed=seed).length
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"speed": 1e-9}, {"delta": 1e-9}, {"cell": 1e-9}, {"waypoints": [[1e11, 0, 0]]},
+        {"waypoints": [[1e301, 0, 0]]}, {"tether_length": "x" * 999}, {"cell": 0},
+    ],
+)  # fmt: skip
+def test_missions_of_absurd_size_are_refused(change, tmp_path, capsys):
+    data = json.loads((ROOT / "missions" / "basin.json").read_text())
+    data["scene"] = str(ROOT / "scenes" / "basin.json")
+    file = tmp_path / "m.json"
+    file.write_text(json.dumps(data | change))
+    assert main(["simulate", str(file), "--quiet"]) == 2
+    assert next(iter(change)) in one_line(capsys)
+
+
+@pytest.mark.parametrize(
+    "event", [{"push": [1e12, 0, 0]}, {"push": [-1e12, 1e12, 0]},
+              {"move": {"obstacle": 0, "by": [9e11, 9e11]}}],
+)  # fmt: skip
+def test_pushes_and_moves_of_any_length_end(event):
+    problem = nasty("pile")
+    events = Surprises.model_validate({"schema_version": 1, "events": [{"time": 3, **event}]})
+    run = execute(problem, solve(problem), Options(speed=0.5), surprises=events)
+    assert run.summary["home"]
+    assert run.summary["tether_free"]
+    assert run.summary["exceedance_s"] == 0.0
+
+
+def test_library_calls_with_wrong_types_are_told():
+    problem = Problem.load(SMALL)
+    solution = solve(problem)
+    for call in (
+        lambda: solve(None), lambda: solve(problem, warm_start="x"), lambda: solve(problem, 3),
+        lambda: verify(None, solution), lambda: verify(problem, None), lambda: solve("a" * 999),
+    ):  # fmt: skip
+        with pytest.raises(InputError) as caught:
+            call()
+        assert len(str(caught.value)) < 300
+    # a copy may hold a status as text, as files do
+    assert verify(problem, solution.model_copy(update={"status": "optimal"}))
+
+
+def test_messages_cut_what_they_quote():
+    long = "z" * 3000
+    assert len(brief(f"field: expected a number, got {long!r}; and {long}")) < 300
+    assert brief("a 'short' one, and it's fine") == "a 'short' one, and it's fine"
+    assert "\n" not in brief("two\nlines")
+
+
+def test_cells_of_a_table_are_no_formulas():
+    assert [cell(t) for t in ("=1+1", "@x", "+a", "-b", "\tq", "pile 3", "-2 3 1", None)] == [
+        "'=1+1", "'@x", "'+a", "'-b", "'\tq", "pile 3", "-2 3 1", "",
+    ]  # fmt: skip
+
+
+def test_two_of_one_name_are_refused_on_import(tmp_path, capsys):
+    point = {"type": "Point", "coordinates": [12.7, 55.5]}
+    features = [
+        {"type": "Feature", "properties": {"kind": "base", "tether_length": 50}, "geometry": point},
+        *({"type": "Feature", "properties": {"kind": "goal", "name": "A1"},
+           "geometry": {"type": "Point", "coordinates": [12.7 + 1e-4 * k, 55.5001]}}
+          for k in (1, 2)),
+    ]  # fmt: skip
+    file = tmp_path / "site.geojson"
+    file.write_text(json.dumps({"type": "FeatureCollection", "features": features}))
+    assert main(["import", str(file), "-o", str(tmp_path / "p.json")]) == 2
+    assert "two goals are named 'A1'" in one_line(capsys)
+
+
+def test_damaged_rows_are_told_and_a_page_escapes_every_field(tmp_path, capsys):
+    rows, evil = tmp_path / "r.jsonl", "<img src=x onerror=alert(1)>"
+    assert main(["compare", "-o", str(rows), "--goals", "3", "--tethers", "200", "--solvers",
+                 "greedy", "--worlds", "1", "--quiet"]) == 0  # fmt: skip
+    good = json.loads(rows.read_text())
+
+    def walk(value, path=()):
+        items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(
+            value, list) else ()  # fmt: skip
+        for key, child in items:
+            yield (*path, key)
+            yield from walk(child, (*path, key))
+
+    for path in list(walk(good)):
+        for bad in (evil, None, [], {}, -1, True, 1e308):
+            damaged = json.loads(json.dumps(good))
+            at = damaged
+            for key in path[:-1]:
+                at = at[key]
+            at[path[-1]] = bad
+            rows.write_text(json.dumps(damaged) + "\n")
+            page = tmp_path / "x.html"
+            code = main(["report", str(rows), "-o", str(page)])
+            assert code in (0, 2), (path, bad)
+            if code == 2:
+                one_line(capsys)
+            else:
+                capsys.readouterr()
+                assert evil not in page.read_text(), path
+
+
+def test_missions_read_from_text_keep_to_their_types():
+    with pytest.raises(InputError, match="waypoints"):
+        Mission.from_json('{"schema_version": 1, "scene": "s", "anchor": [0, 0, 0], '
+                          '"start": [0, 0, 0], "waypoints": [], "tether_length": 5}')  # fmt: skip
