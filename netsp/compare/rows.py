@@ -17,6 +17,7 @@ from typing import Any
 
 from netsp.errors import InputError
 from netsp.files import read_bytes, read_gzip
+from netsp.problem import LARGEST
 
 SCHEMA = "netsp-trial/1"
 Row = dict[str, Any]
@@ -67,11 +68,19 @@ def _parsed(line: bytes) -> Row | None:
         and all(isinstance(row.get(name), dict) for name in _TABLES)
         and isinstance(row["solver"].get("label"), str)
         and isinstance(row["roadmap"].get("label"), str)
+        and all(
+            isinstance(s, int) and s is not True
+            for s in (row.get("seed"), row["world"].get("seed"))
+        )
         and all(_fits(row["world"].get(k), kinds) for k, kinds in _WORLD.items())
         and all(_fits(row.get(k), kinds) for k, kinds in _VALUES.items())
+        and (row.get("length") is None or (row.get("total_s") or 0.0) > 0.0)
         and all(isinstance(v, str) for v in (row.get("versions") or {}).values())
         and all(
-            isinstance(p, list) and len(p) == 3 and all(_fits(v, _MAYBE) for v in p)
+            isinstance(p, list)
+            and len(p) == 3
+            and _fits(p[0], (int, float))
+            and all(_fits(v, _MAYBE) for v in p[1:])
             for p in row.get("history") or ()
         )
     )
@@ -80,10 +89,10 @@ def _parsed(line: bytes) -> Row | None:
 
 _MAYBE = (int, float, type(None))
 _WORLD: dict[str, tuple[type, ...]] = {
-    "seed": (int,), "goals": (int,), "tether_length": (int, float), "family": (str,),
+    "goals": (int,), "tether_length": (int, float), "family": (str,),
 }  # fmt: skip
 _VALUES: dict[str, tuple[type, ...]] = {
-    "seed": (int,), "length": _MAYBE, "lower_bound": _MAYBE, "gap": _MAYBE, "total_s": _MAYBE,
+    "length": _MAYBE, "lower_bound": _MAYBE, "gap": _MAYBE, "total_s": _MAYBE,
     "roadmap_s": _MAYBE, "matrix_s": _MAYBE, "solve_s": _MAYBE, "longest_tether": _MAYBE,
     "entangled": (int, type(None)), "redrawn": (int, type(None)),
     "problem_sha256": (str, type(None)), "versions": (dict, type(None)),
@@ -93,7 +102,9 @@ _VALUES: dict[str, tuple[type, ...]] = {
 
 
 def _fits(value: object, kinds: tuple[type, ...]) -> bool:
-    return isinstance(value, kinds) and not isinstance(value, bool)
+    if isinstance(value, bool) or not isinstance(value, kinds):
+        return False
+    return not isinstance(value, int | float) or abs(value) <= LARGEST
 
 
 def _no_constant(name: str) -> None:
