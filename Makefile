@@ -4,12 +4,13 @@ PYTHON ?= python3
 BIN     = $(VENV)/bin
 DEMO   ?= demo
 
-.PHONY: demo test lint bench clean
+.PHONY: demo test accept tables lint bench clean
 .DELETE_ON_ERROR:
 
 $(VENV)/.installed: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[dev]'
+	$(BIN)/netsp warm-up --quiet
 	touch $@
 
 demo: $(VENV)/.installed
@@ -24,6 +25,14 @@ test: $(VENV)/.installed
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/python -m pytest -n auto --dist worksteal
+
+# every figure of README and docs, measured on this commit
+accept: $(VENV)/.installed
+	$(BIN)/python benchmarks/accept.py
+
+# the tables of the docs, written from the rows that the benchmarks keep
+tables: $(VENV)/.installed
+	$(BIN)/python benchmarks/tables.py
 
 lint: $(VENV)/.installed
 	$(BIN)/ruff check --fix .

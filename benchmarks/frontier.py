@@ -3,6 +3,7 @@
     python benchmarks/frontier.py                     every cell, 10 worlds, 300 s each: many hours
     python benchmarks/frontier.py --worlds 3 --limit 60
     python benchmarks/frontier.py --cells 60:300,60:350
+    python benchmarks/frontier.py --rules             all classes, and the non-looping ones
     python benchmarks/frontier.py --heuristic         `lns` against the best known
     python benchmarks/frontier.py --peers             other people's solvers on the same graphs
 
@@ -17,6 +18,7 @@ import resource
 import statistics
 import sys
 import time
+from dataclasses import dataclass
 
 import numpy as np
 from peers import EXACT, HEURISTIC
@@ -45,33 +47,52 @@ def world(seed: int, goals: int, tether: float, many: bool) -> Problem:
     return random_world(seed, goals=goals, tether_length=tether)
 
 
-def proofs(cells: list[tuple[int, float]], worlds: int, limit: float, many: bool) -> None:
-    """One row a cell."""
-    head("goals", "tether", "classes", "proven", "median s", "worst s", "mean gap %", "worst gap %",
+@dataclass(frozen=True)
+class Outcome:
+    """Of one world: seconds, classes, gap in per cent, why it failed."""
+
+    seconds: float
+    classes: int = 0
+    gap: float = 100.0
+    proven: bool = False
+    verified: bool = False
+    failed: str = ""
+
+
+def proof(problem: Problem, limit: float, classes: str = "all") -> Outcome:
+    """From problem to proof, and the tour judged."""
+    begin = time.perf_counter()
+    try:
+        solution = solve(problem, time_limit=limit, roadmap_options={"classes": classes})
+    except NetspError as error:
+        return Outcome(time.perf_counter() - begin, failed=f" ({str(error)[:40]}…)")
+    seconds = time.perf_counter() - begin
+    return Outcome(
+        seconds, len(travel_graph(problem, classes=classes)),
+        100.0 * (solution.gap if solution.gap is not None else 1.0),
+        solution.status is Status.OPTIMAL, bool(verify(problem, solution)),
+    )  # fmt: skip
+
+
+def proofs(
+    cells: list[tuple[int, float]], worlds: int, limit: float, many: bool, rules: list[str]
+) -> None:
+    """One row a cell and rule of classes."""
+    head("goals", "tether", "rule", "classes", "proven", "median s", "worst s", "mean gap %", "worst gap %",
          "verified", "peak GiB")  # fmt: skip
     for goals, tether in cells:
-        times, gaps, sizes, proven, verified, failed = [], [], [], 0, 0, ""
-        for seed in range(worlds):
-            problem = world(seed, goals, tether, many)
-            begin = time.perf_counter()
-            try:
-                solution = solve(problem, time_limit=limit)
-            except NetspError as error:
-                failed = f" ({str(error)[:40]}…)"
-                times.append(time.perf_counter() - begin)
-                continue
-            times.append(time.perf_counter() - begin)
-            sizes.append(len(travel_graph(problem)))
-            proven += solution.status is Status.OPTIMAL
-            verified += bool(verify(problem, solution))
-            gaps.append(100.0 * (solution.gap if solution.gap is not None else 1.0))
-        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
-        row(
-            goals, f"{tether:g}", f"{min(sizes, default=0)} to {max(sizes, default=0)}",
-            f"{proven}/{worlds}{failed}", f"{statistics.median(times):.2f}", f"{max(times):.2f}",
-            f"{np.mean(gaps or [100.0]):.3f}", f"{max(gaps, default=100.0):.3f}",
-            f"{verified}/{worlds}", f"{peak:.2f}",
-        )  # fmt: skip
+        for rule in rules:
+            found = [proof(world(s, goals, tether, many), limit, rule) for s in range(worlds)]
+            times, gaps = [f.seconds for f in found], [f.gap for f in found]
+            sizes = [f.classes for f in found if f.classes] or [0]
+            failed = next((f.failed for f in found if f.failed), "")
+            peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
+            row(
+                goals, f"{tether:g}", rule, f"{min(sizes)} to {max(sizes)}",
+                f"{sum(f.proven for f in found)}/{worlds}{failed}",
+                f"{statistics.median(times):.2f}", f"{max(times):.2f}", f"{np.mean(gaps):.3f}",
+                f"{max(gaps):.3f}", f"{sum(f.verified for f in found)}/{worlds}", f"{peak:.2f}",
+            )  # fmt: skip
 
 
 def heuristic(worlds: int) -> None:
@@ -152,6 +173,7 @@ def main() -> None:
     parser.add_argument("--worlds", type=int, default=10)
     parser.add_argument("--limit", type=float, default=300.0, help="seconds a world")
     parser.add_argument("--many", action="store_true", help="50 circles of radius 10 to 20")
+    parser.add_argument("--rules", action="store_true", help="both rules of classes side by side")
     parser.add_argument("--heuristic", action="store_true")
     parser.add_argument("--peers", action="store_true")
     parser.add_argument("--plot", help="of --peers, a performance profile")
@@ -167,7 +189,8 @@ def main() -> None:
         cells = CELLS
         if args.cells:
             cells = [(int(c.split(":")[0]), float(c.split(":")[1])) for c in args.cells.split(",")]
-        proofs([(n, float(t)) for n, t in cells], args.worlds, args.limit, args.many)
+        rules = ["non-looping", "all"] if args.rules else ["all"]
+        proofs([(n, float(t)) for n, t in cells], args.worlds, args.limit, args.many, rules)
 
 
 if __name__ == "__main__":

@@ -13,6 +13,7 @@ import argparse
 import functools
 import statistics
 import time
+from collections.abc import Iterable
 
 import numpy as np
 from table import head, heading, row
@@ -81,6 +82,17 @@ def table_one(backend: str) -> None:
         "all", "", "", f"{proofs}/160", "", f"{statistics.median(every):.3f}",
         f"{max(every):.3f}", "104/160",
     )  # fmt: skip
+
+
+def over_optimum(solver: str, worlds: Iterable[int], **kwargs: object) -> list[float]:
+    """Per cent above the proven optimum at the paper's largest cell, of every world."""
+    out = []
+    for seed in worlds:
+        problem, graph, _ = world(seed, 20, 350.0)
+        best = run(problem, graph, "mip")[0].length
+        result, _, good = run(problem, graph, solver, **kwargs)
+        out.append(100.0 * (result.length / best - 1.0) if good else np.inf)
+    return out
 
 
 def heuristics(goals: int = 20, tether: float = 350.0) -> None:

@@ -70,6 +70,9 @@ def models(field: DistanceField, delta: float) -> list[tuple[str, object]]:
     ]
 
 
+BALL = {"sphere": {"center": [0, 0, 0], "radius": 1}}
+
+
 def helix(radius: float, turns: float, rise: float, steps: int) -> np.ndarray:
     angle = np.linspace(0.0, 2 * np.pi * turns, steps)
     return np.column_stack([radius * np.cos(angle), radius * np.sin(angle), rise * angle])
@@ -95,10 +98,8 @@ def dense(points: Sequence[Sequence[float]], step: float = 0.03) -> np.ndarray:
     return np.vstack(out)
 
 
-def closed_forms() -> None:
-    """Truths that can be written down."""
-    print("### Closed forms (delta 0.1; steps of 3 cm)\n")
-    head("what", "model", "nodes", "error %", "back m", "median us", "worst us")
+def closed_cases() -> list[tuple[str, dict, np.ndarray, float]]:
+    """(name, solid, path, length) of truths that can be written down."""
     long = {"capsule": {"a": [0, 0, -30], "b": [0, 0, 30], "radius": 0.5}}
     cases: list[tuple[str, dict, np.ndarray, float]] = []
     for turns in (1, 3, 6):
@@ -106,7 +107,7 @@ def closed_forms() -> None:
         planar = 2 * math.sqrt(3.75) + 0.5 * (angle - 2 * math.acos(0.25))
         path = dense(helix(2.0, turns, 0.1, 200 * turns))
         cases.append((f"helix, {turns} turns", long, path, math.hypot(planar, 0.1 * angle)))
-    ball = {"sphere": {"center": [0, 0, 0], "radius": 1}}
+    ball = BALL
     over = dense([(-2, 0, 0.5), (-2, 0, 3), (2, 0.3, 3), (2, 0, 0.5)])
     cases.append(("sphere", ball, over, around((-2, 0.5), (2, 0.5), (0, 0), 1)))
     ring = {"torus": {"center": [0, 0, 0], "major_radius": 1, "minor_radius": 0.3}}
@@ -116,12 +117,52 @@ def closed_forms() -> None:
     box = {"box": {"center": [0, 0, 0], "size": [2, 40, 2]}}
     edges = dense([(-2, 0, 0), (-2, 0, 3), (2, 5, 3), (2, 5, 0)])
     cases.append(("two edges of a box", box, edges, math.hypot(2 + 2 * math.sqrt(2), 5)))
-    for name, solid, path, truth in cases:
+    return cases
+
+
+def closed_forms() -> None:
+    """Both models against them."""
+    print("### Closed forms (delta 0.1; steps of 3 cm)\n")
+    head("what", "model", "nodes", "error %", "back m", "median us", "worst us")
+    for name, solid, path, truth in closed_cases():
         for label, model in models(Scene(solids=[solid]).field(), 0.1):
             tether, _, times, back = driven(model, path)
             row(name, label, len(tether.nodes), f"{100 * (tether.length / truth - 1):.4f}",
                 f"{back:.4f}", f"{np.median(times):.0f}", f"{times.max():.0f}")  # fmt: skip
     print()
+
+
+def prism_world(
+    family: str, seed: int, make: Callable[[DistanceField], object] | None = None
+) -> tuple[list[float], int, float, list[float]]:
+    """Errors in per cent at every 20th of 400 updates, wrong classes, what is left on the way back,
+    and microseconds of each update, in a world whose truth the offline geometry knows."""
+    problem = random_world(seed, family=family, goals=3, tether_length=300.0)
+    field = Scene.from_problem(problem).field()
+    model = make(field) if make else GeodesicTether(field, 2.0)
+    rng, base = np.random.default_rng(seed), np.array(problem.base)
+    path = wander(rng, field, base, 400, 9.0, [0, 0, -40], [500, 500, 40])
+    stops = list(range(19, 400, 20))
+    there = Problem(
+        base=problem.base, goals=[tuple(path[k]) for k in stops], tether_length=10_000,
+        obstacles=problem.obstacles, clearance=problem.clearance,
+    )  # fmt: skip
+    exact, reps = TautPaths(there, 20_000.0), problem.representative_points
+    words = [signature(np.vstack([base, path[: k + 1]])[:, :2], reps) for k in stops]
+    truth = [exact.length(0, g + 1, w) for g, w in enumerate(words)]
+    times, errors, wrong = [], [], 0
+    tether = model.start(base, base)
+    for k, point in enumerate(path):
+        begin = time.perf_counter()
+        tether = model.update(tether, point)
+        times.append(1e6 * (time.perf_counter() - begin))
+        if k in stops:
+            g = stops.index(k)
+            errors.append(100 * (tether.length / truth[g] - 1))
+            wrong += signature(tether.nodes[:, :2], reps) != words[g]
+    for point in [*path[::-1][1:], base]:
+        tether = model.update(tether, point)
+    return errors, wrong, tether.length, times[2:]
 
 
 def prisms(worlds: int) -> None:
@@ -132,32 +173,10 @@ def prisms(worlds: int) -> None:
     for family in ("icra2017", "harbour"):
         found: dict[str, list[list[float]]] = {}
         for seed in range(worlds):
-            problem = random_world(seed, family=family, goals=3, tether_length=300.0)
-            field = Scene.from_problem(problem).field()
-            rng, base = np.random.default_rng(seed), np.array(problem.base)
-            path = wander(rng, field, base, 400, 9.0, [0, 0, -40], [500, 500, 40])
-            stops = list(range(19, 400, 20))
-            there = Problem(
-                base=problem.base, goals=[tuple(path[k]) for k in stops], tether_length=10_000,
-                obstacles=problem.obstacles, clearance=problem.clearance,
-            )  # fmt: skip
-            exact, reps = TautPaths(there, 20_000.0), problem.representative_points
-            words = [signature(np.vstack([base, path[: k + 1]])[:, :2], reps) for k in stops]
-            truth = [exact.length(0, g + 1, w) for g, w in enumerate(words)]
-            for label, model in models(field, 2.0)[: 3 if seed == 0 else 1]:  # the paper's is slow
-                times, errors, wrong = [], [], 0
-                tether = model.start(base, base)
-                for k, point in enumerate(path):
-                    begin = time.perf_counter()
-                    tether = model.update(tether, point)
-                    times.append(1e6 * (time.perf_counter() - begin))
-                    if k in stops:
-                        g = stops.index(k)
-                        errors.append(100 * (tether.length / truth[g] - 1))
-                        wrong += signature(tether.nodes[:, :2], reps) != words[g]
-                for point in [*path[::-1][1:], base]:
-                    tether = model.update(tether, point)
-                found.setdefault(label, []).append([errors, wrong, tether.length, times[2:]])
+            for k in range(3 if seed == 0 else 1):  # the paper's is slow
+                label = models(Scene(solids=[BALL]).field(), 2.0)[k][0]
+                row_ = prism_world(family, seed, lambda f, k=k: models(f, 2.0)[k][1])
+                found.setdefault(label, []).append(list(row_))
         for label, rows in found.items():
             errors = np.concatenate([r[0] for r in rows])
             times = np.concatenate([r[3] for r in rows])

@@ -1,0 +1,77 @@
+"""How far runs go over their time limit, whatever the size of the problem.
+
+    python benchmarks/limits.py [--limit 1]
+
+Two problems that are too large for what is asked: 200 goals at tether 500 (some 20,000 classes are
+kept of many more), and 67 turbines with 13 km of tether (millions of classes).
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Iterator
+
+import numpy as np
+from table import head, heading, row
+
+from netsp import Circle, Problem, solve
+from netsp.errors import NetspError
+from netsp.solvers import BLIND, SOLVERS
+from netsp.worlds import random_world
+
+
+def turbines() -> Problem:
+    """A wind farm of 67 turbines with far too long a tether."""
+    rng = np.random.default_rng(0)
+    places = [
+        (900.0 * (k % 9) + rng.uniform(-100, 100), 900.0 * (k // 9) + rng.uniform(-100, 100))
+        for k in range(67)
+    ]
+    return Problem(
+        name="turbines", base=(-500, -500), goals=[(x + 20, y + 20) for x, y in places],
+        obstacles=[Circle(center=p, radius=5) for p in places], tether_length=13_000,
+    )  # fmt: skip
+
+
+def runs(limit: float) -> Iterator[tuple[str, str, float, str]]:
+    """(solver, problem, seconds over the limit, status) for every solver and both problems."""
+    warm = random_world(0, goals=6, tether_length=500.0)
+    problems = [random_world(0, goals=200, tether_length=500.0), turbines()]
+    names = ["200 goals", "67 turbines"]
+    for solver in SOLVERS:
+        for problem in (warm, random_world(0, goals=20, tether_length=500.0)):
+            solve(problem, solver, time_limit=0.5)  # compiled before it counts
+        for name, problem in zip(names, problems, strict=True):
+            begin = time.monotonic()
+            try:
+                status = solve(problem, solver, time_limit=limit).status.value
+            except NetspError as error:
+                status = str(error)
+            yield solver, name, time.monotonic() - begin - limit, status
+
+
+def worst(limit: float) -> tuple[float, str, int]:
+    """The most seconds over the limit, where, and how many runs of solvers that are not blind had
+    no tour to show."""
+    found = list(runs(limit))
+    solver, name, over, _ = max(found, key=lambda r: r[2])
+    blind = {*BLIND, "anneal-2016"}
+    silent = sum(s not in blind and "feasible" not in r and "optimal" not in r
+                 for s, _, _, r in found)  # fmt: skip
+    return over, f"{solver}, {name}", silent
+
+
+def main() -> None:
+    """Print one row a run."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--limit", type=float, default=1.0)
+    args = parser.parse_args()
+    heading(f"Time limits ({args.limit:g} s)")
+    head("solver", "problem", "over s", "status")
+    for solver, name, over, status in runs(args.limit):
+        row(solver, name, f"{over:.2f}", status)
+
+
+if __name__ == "__main__":
+    main()
