@@ -203,7 +203,8 @@ def killed() -> tuple[str, bool]:
         ids = [json.loads(line)["trial"] for line in rows.read_text().splitlines()]
         whole = rows.read_bytes().startswith(kept)
     held = again.returncode == 0 and len(ids) == len(set(ids)) == 40 and whole
-    return f"{len(set(ids))} of 40 trials, {kept.count(b'\n')} before the kill", held
+    before = kept.count(b"\n")
+    return f"{len(set(ids))} of 40 trials, {before} before the kill", held
 
 
 def cold_start() -> tuple[str, bool]:

@@ -78,8 +78,8 @@ def proofs(
     cells: list[tuple[int, float]], worlds: int, limit: float, many: bool, rules: list[str]
 ) -> None:
     """One row a cell and rule of classes."""
-    head("goals", "tether", "rule", "classes", "proven", "median s", "worst s", "mean gap %", "worst gap %",
-         "verified", "peak GiB")  # fmt: skip
+    head("goals", "tether", "rule", "classes", "proven", "median s", "worst s", "mean gap %",
+         "worst gap %", "verified", "peak GiB")  # fmt: skip
     for goals, tether in cells:
         for rule in rules:
             found = [proof(world(s, goals, tether, many), limit, rule) for s in range(worlds)]

@@ -1,6 +1,7 @@
 """`auto`: the solver by the size of the problem; always a tour, a bound and a gap.
 
-Up to `PROVABLE` vertices it proves: the heuristic finds the tour; for up to `FEW_GOALS` goals walks
+With up to eight goals or so all sets of goals are gone through (`netsp.exact`). Up to `PROVABLE`
+vertices it proves: the heuristic finds the tour; for up to `FEW_GOALS` goals walks
 (`netsp.dp`) bound it, which at that size ends with a proof more often than not; cutting planes
 (`netsp.mip`) do the rest, or all of it with more goals, on the vertices that are left. Beyond
 `PROVABLE` the matrices would not fit into a few gigabytes. Few goals are then proven over the
@@ -18,13 +19,14 @@ from typing import Any
 
 import numpy as np
 
+from netsp import exact
 from netsp.clock import Clock, TimeLimit
 from netsp.lns import Instance
 from netsp.lns.solve import solve as search
 from netsp.mip.solve import MipRun
 from netsp.mip.solve import solve as prove
 from netsp.result import OnProgress, Progress, Result
-from netsp.run import read_params
+from netsp.run import Run, read_params
 from netsp.travel import Floats, TravelGraph, least_tethers
 
 PROVABLE = 10_000
@@ -67,6 +69,13 @@ def solve(
 ) -> Result:
     """Solve by size. Iterations are those of the solver chosen."""
     chosen = read_params(Params, "auto", params)
+    if exact.fits(graph):
+        small = Run(graph, time_limit, iteration_limit, on_progress)
+        with small.until_stopped():
+            small.offer(warm_start)
+            if not small.trivial():
+                exact.solve(small)
+        return small.finish("proven" if small.done else "exact")
     if len(graph) <= PROVABLE:
         rounds = max(500, ROUNDS_PER_GOAL * graph.goal_count)
         run = MipRun(graph, time_limit, iteration_limit, on_progress, rng=rng, search_rounds=rounds)

@@ -269,6 +269,10 @@ def _parser() -> argparse.ArgumentParser:
 
     add_online(commands)
 
+    p = commands.add_parser("warm-up", help="compile everything now, not at the first use")
+    p.add_argument("--quiet", action="store_true", help="no progress")
+    p.set_defaults(run=_warm_up)
+
     p = commands.add_parser("schema", help="print the JSON Schema of a file format")
     p.add_argument("format", choices=("problem", "solution", "scene", "mission", "surprises"))
     p.set_defaults(run=_schema)
@@ -312,7 +316,9 @@ def _solve(args: argparse.Namespace) -> int:
         if args.plot_trace:
             rows.append(row)
 
-    with table or contextlib.nullcontext():
+    from netsp.compiling import told
+
+    with table or contextlib.nullcontext(), told(sys.stderr) if table else contextlib.nullcontext():
         if table:
             table.begin(problem)
         solution = solve(
@@ -514,6 +520,17 @@ def _report(args: argparse.Namespace) -> int:
 
     check_writable(args.output, inputs=(args.results,))
     write_report(args.results, args.output, args.figures)
+    return 0
+
+
+def _warm_up(args: argparse.Namespace) -> int:
+    from netsp.compiling import steps, told
+
+    with contextlib.nullcontext() if args.quiet else told(sys.stderr):
+        for name, step in steps():
+            if not args.quiet:
+                print(f"warm-up: {name}", file=sys.stderr, flush=True)
+            step()
     return 0
 
 

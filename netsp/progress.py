@@ -43,7 +43,7 @@ class ProgressTable:
         self._patience.start()
 
     def _explain(self) -> None:
-        self._print("building the roadmap … (the first run on a machine compiles for some 20 s)")
+        self._print("building the roadmap …")
 
     def __call__(self, row: Progress) -> None:
         news = (

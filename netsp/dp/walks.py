@@ -81,7 +81,7 @@ class Walks:
 
     def restrict(self, keep: Bools) -> None:
         """Forget the rows that are not marked; `set_values` must follow."""
-        self.alive = self.alive[:, keep[self.order]]
+        self.alive = np.ascontiguousarray(self.alive[:, keep[self.order]])
         self._group(self.cluster[keep])
 
     @property

@@ -166,8 +166,7 @@ class TautLegs:
         letters = np.concatenate(flat).astype(np.int64) if row[-1] else np.zeros(0, np.int64)
         planar, last = self.planar[vertices], self._tree.last[vertices]
         if asked is None:
-            asked = np.ones((1, 1), dtype=bool)
-            asked = np.broadcast_to(asked, out.shape)
+            asked = np.ones(out.shape, dtype=bool)
         goals = np.unique(cluster)
 
         def measure(g: int) -> None:
