@@ -102,7 +102,7 @@ def main() -> None:
     head(
         "worlds", "all good", "never too long", "words as planned", "home and free",
         "path over plan % (median; worst)", "goals left out", "done about it",
-        "planning s (median; worst)",
+        "planning s (median; worst)", name="execute",
     )  # fmt: skip
     table("no surprise", plain)
     table("one obstacle", surprised)

@@ -46,7 +46,7 @@ def ratios(folder: Path) -> list[float]:
 def main() -> None:
     """One row a flight."""
     heading("Recorded flights")
-    head("mission", "predicted s", "flown s", "ratio")
+    head("mission", "predicted s", "flown s", "ratio", name="flown")
     for name, predicted, flown in flights(Path(sys.argv[1])):
         row(name, f"{predicted:.0f}", f"{flown:.0f}", f"{predicted / flown:.2f}")
 

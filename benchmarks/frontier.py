@@ -79,7 +79,8 @@ def proofs(
 ) -> None:
     """One row a cell and rule of classes."""
     head("goals", "tether", "rule", "classes", "proven", "median s", "worst s", "mean gap %",
-         "worst gap %", "verified", "peak GiB")  # fmt: skip
+         "worst gap %", "verified", "peak GiB",
+         name="frontier-rules" if len(rules) > 1 else "frontier-largest")  # fmt: skip
     for goals, tether in cells:
         for rule in rules:
             found = [proof(world(s, goals, tether, many), limit, rule) for s in range(worlds)]

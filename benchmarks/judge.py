@@ -186,7 +186,7 @@ def main() -> None:
     heading("The judge")
     right, false, refused, accepted = count(args.worlds)
     head("worlds", "right ones accepted", "right ones refused", "false ones refused",
-         "false ones accepted")  # fmt: skip
+         "false ones accepted", name="judge")  # fmt: skip
     row(args.worlds, right, len(refused), false, len(accepted))
     print()
     for line in [*refused, *accepted]:

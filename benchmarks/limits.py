@@ -68,7 +68,7 @@ def main() -> None:
     parser.add_argument("--limit", type=float, default=1.0)
     args = parser.parse_args()
     heading(f"Time limits ({args.limit:g} s)")
-    head("solver", "problem", "over s", "status")
+    head("solver", "problem", "over s", "status", name="limits")
     for solver, name, over, status in runs(args.limit):
         row(solver, name, f"{over:.2f}", status)
 

@@ -75,7 +75,7 @@ def main() -> None:
     parser.add_argument("--pairs", type=int, default=200)
     args = parser.parse_args()
     heading("Same seed, same result")
-    head("pairs", "the same to the byte")
+    head("pairs", "the same to the byte", name="repeat")
     same, count = pairs(args.pairs)
     row(count, same)
 

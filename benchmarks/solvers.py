@@ -99,7 +99,7 @@ def heuristics(goals: int = 20, tether: float = 350.0) -> None:
     """Per cent above the proven optimum at the paper's largest cell."""
     print(f"\n### Heuristics, {goals} goals, tether {tether:g}, per cent above the optimum\n")
     head("solver", "limit", "mean %", "median %", "worst %", "optimal", "median s", "worst s",
-         "verified")  # fmt: skip
+         "verified", name="heuristics")  # fmt: skip
     ten = {"time_limit": 10.0}
     cases = [
         ("reduced-mip", "none", {}),

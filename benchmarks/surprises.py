@@ -220,7 +220,8 @@ def main() -> None:
     args = parser.parse_args()
     heading("Surprises")
     head("kind", "runs", "good", "goals visited", "goals lost", "local", "replan", "home",
-         "kept", "planning s (median; worst)")  # fmt: skip
+         "kept", "planning s (median; worst)",
+         name=None if args.kind else "surprises")  # fmt: skip
     kinds = [args.kind] if args.kind else list(KINDS)
     bad = []
     for kind in kinds:

@@ -1,36 +1,62 @@
-"""What the benchmark scripts share: where the project is, the heading, a table that grows."""
+"""What the benchmark scripts share: where the project is, the heading, a table that grows, and the
+rows that are kept for the docs (`benchmarks/tables.py`) when a script is called with `--keep`."""
 
 from __future__ import annotations
 
 import datetime
+import json
 import os
 import platform
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent
+RESULTS = ROOT / "benchmarks" / "results"
 sys.path.insert(0, str(ROOT))
+
+KEEP = "--keep" in sys.argv
+if KEEP:
+    sys.argv.remove("--keep")
+
+_kept: dict[str, Any] = {}
+
+
+def _source() -> dict[str, str]:
+    """Date, commit and machine."""
+    commit = subprocess.run(
+        ["git", "rev-parse", "--short", "HEAD"], cwd=ROOT, capture_output=True, text=True
+    ).stdout.strip()
+    return {
+        "date": str(datetime.date.today()),
+        "commit": commit or "unknown",
+        "machine": f"{os.cpu_count()} cores {platform.machine()}, "
+        f"Python {platform.python_version()}",
+    }
 
 
 def heading(title: str) -> None:
     """Title, date, commit and machine, as markdown."""
-    commit = subprocess.run(
-        ["git", "rev-parse", "--short", "HEAD"], cwd=ROOT, capture_output=True, text=True
-    ).stdout.strip()
+    s = _source()
     print(f"## {title}\n")
-    print(
-        f"{datetime.date.today()}, commit {commit or 'unknown'}, {os.cpu_count()} cores "
-        f"{platform.machine()}, Python {platform.python_version()}\n"
-    )
+    print(f"{s['date']}, commit {s['commit']}, {s['machine']}\n")
 
 
-def head(*columns: str) -> None:
-    """First two lines of a markdown table."""
+def head(*columns: str, name: str | None = None) -> None:
+    """First two lines of a markdown table. name : under which its rows are kept."""
     print("| " + " | ".join(columns) + " |")
     print("|" + "---|" * len(columns), flush=True)
+    _kept.clear()
+    if name is not None and KEEP:
+        _kept.update({"name": name, "columns": list(columns), "rows": [], **_source()})
 
 
 def row(*cells: object) -> None:
     """One line of a markdown table."""
     print("| " + " | ".join(str(c) for c in cells) + " |", flush=True)
+    if _kept:
+        _kept["rows"].append([str(c) for c in cells])
+        RESULTS.mkdir(exist_ok=True)
+        text = json.dumps(_kept, indent=1, ensure_ascii=False)
+        (RESULTS / f"{_kept['name']}.json").write_text(text + "\n", encoding="utf-8")
