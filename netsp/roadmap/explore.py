@@ -244,11 +244,13 @@ def explore(
                 trie = more_int_rows(trie)
                 limit = longer(limit)
             reached = here + length[e]
-            x, y = ends[e, 2], ends[e, 3]
-            w, size = _walk(
-                t, segment_row[e, 0], segment_row[e, 1], x, y, letters, trie, limit, size, rule,
-                pending, margin,
-            )  # fmt: skip
+            w = -1
+            if reached + rest[e] <= limit[0]:  # no word may be longer
+                x, y = ends[e, 2], ends[e, 3]
+                w, size = _walk(
+                    t, segment_row[e, 0], segment_row[e, 1], x, y, letters, trie, limit, size,
+                    rule, pending, margin,
+                )  # fmt: skip
             goal = target[e]
             if w >= 0 and reached + rest[e] <= limit[w]:
                 if goal >= arc_nodes:
