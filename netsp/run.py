@@ -110,6 +110,12 @@ class Run:
         if self.tour is not None or not graph.roadmapped:
             return
         core = least_tethers(graph.costs_to_base, graph.cluster, 1)
+        if not graph.quick_legs:
+            # out and back to every goal: those legs are the tethers, which are known
+            out = core[1:].tolist()
+            walk = [0, *(w for v in out for w in (v, 0))]
+            self.offer([0, *out], walk=walk, length=2.0 * float(graph.costs_to_base[out].sum()))
+            return
         with graph.on_clock(None):  # a few legs; without them there would be nothing to show
             few = len(core) <= UNTIMED
             near = graph.costs_among(core) if few else graph.lower_bounds(core)

@@ -187,6 +187,11 @@ class TravelGraph:
         return not isinstance(self._legs, _CostTable)
 
     @property
+    def quick_legs(self) -> bool:
+        """Whether a leg by itself is quickly measured."""
+        return bool(getattr(self._legs, "quick", True))
+
+    @property
     def geometric(self) -> bool:
         """Whether a problem's geometry lies beneath, so that legs can be walked and retraced."""
         return self._make_ways is not None

@@ -191,6 +191,7 @@ def test_auto_gives_a_tour_and_a_true_bound_where_mip_would_not_fit(monkeypatch)
     problem = random_world(1, goals=8, tether=300.0)
     best = solve(problem, "mip")
     monkeypatch.setattr(netsp.auto, "PROVABLE", 10)
+    monkeypatch.setattr(netsp.auto.exact, "MOST_SUMS", 0.0)
     monkeypatch.setattr(netsp.auto, "FEW_GOALS", 4)
     solution = solve(problem, "auto", iteration_limit=2_000)
     assert verify(problem, solution)
@@ -207,6 +208,7 @@ def test_few_goals_are_proven_over_the_shortest_classes(monkeypatch, kept):
     problem = random_world(1, goals=8, tether=300.0)
     best = solve(problem, "mip")
     monkeypatch.setattr(netsp.auto, "PROVABLE", 10)
+    monkeypatch.setattr(netsp.auto.exact, "MOST_SUMS", 0.0)
     monkeypatch.setattr(netsp.auto, "MOST_KEPT", kept)
     solution = solve(problem, "auto")
     assert verify(problem, solution)
@@ -218,6 +220,18 @@ def test_few_goals_are_proven_over_the_shortest_classes(monkeypatch, kept):
     else:
         assert solution.status is Status.OPTIMAL_OF_KEPT
     assert (solution.status is Status.OPTIMAL) == (kept == 4000)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_sets_of_goals_and_cutting_planes_agree(seed):
+    from netsp import exact
+
+    graph = travel_graph(random_world(seed, goals=7, tether=280.0))
+    assert exact.fits(graph)
+    small, cut = solve_graph(graph, "auto"), solve_graph(graph, "mip")
+    assert small.status is cut.status is Status.OPTIMAL
+    assert small.length == pytest.approx(cut.length, rel=2e-6)
+    assert graph.tour_length(small.tour) == pytest.approx(small.length)
 
 
 def test_the_root_reports_what_is_left():
@@ -247,6 +261,7 @@ def test_auto_bounds_large_graphs_without_geometry_too(monkeypatch):
     graph = random_graph(4, goals=6)
     best = brute_tour(graph)
     monkeypatch.setattr(netsp.auto, "PROVABLE", 5)
+    monkeypatch.setattr(netsp.auto.exact, "MOST_SUMS", 0.0)
     result = solve_graph(graph, "auto", iteration_limit=500)
     assert 0.0 < result.lower_bound <= best * (1 + 1e-9)
     assert result.length >= best * (1 - 1e-9)

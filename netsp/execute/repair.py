@@ -17,7 +17,7 @@ import shapely
 
 from netsp.clock import Clock
 from netsp.errors import LimitReachedError, NetspError
-from netsp.execute.plan import HOME, Leg, legs_of
+from netsp.execute.plan import HOME, Leg, legs_of, length_of
 from netsp.hsignature import concatenate, crossings, signature
 from netsp.problem import Circle, Goal, Problem, State
 from netsp.result import Result
@@ -63,7 +63,7 @@ def broken(problem: Problem, tether: Floats, legs: list[Leg]) -> tuple[str | Non
             label = problem.obstacle_label(obstacle)
             return f"{label} stands in the way to {_label(problem, leg)}", legs
     rest = problem.model_copy(update={"goals": tuple(problem.goals[g] for g in left)})
-    tethers = TautPaths(rest, FAR * problem.tether_length)
+    tethers = TautPaths(rest, FAR * max(problem.tether_length, length_of(tether)))
     now: list[Leg] = []
     for k, leg in enumerate(legs):
         word = concatenate(word, crossings(leg.way[:, :2], rays))
@@ -116,9 +116,9 @@ def repair(
     clock = Clock(limit)
     word = signature(tether[:, :2], problem.representative_points)
     state = State(position=_outside(problem, robot), signature=word)
-    order, lost = _reachable(problem, left)
+    order, lost = reachable(problem, left)
     if not order:
-        legs = [_home(problem, state)]
+        legs = [_home(problem, state, FAR * max(problem.tether_length, length_of(tether)))]
         return Repair("home", why, legs, tuple(lost), legs[0].length, clock.elapsed)
     rest = _rest(problem, order, state)
     graph = opened_graph(rest, max_classes=MOST_CLASSES, time_limit=clock)
@@ -144,7 +144,7 @@ def repair(
     return Repair(kind, reason, legs, tuple(lost), float(chosen.length or 0.0), clock.elapsed)
 
 
-def _reachable(problem: Problem, left: list[int]) -> tuple[list[int], list[tuple[int, str]]]:
+def reachable(problem: Problem, left: list[int]) -> tuple[list[int], list[tuple[int, str]]]:
     """The goals that a taut tether within the limit reaches, in their order, and the others with
     the reason."""
     order, lost = _in_free_water(problem, left)
@@ -156,7 +156,9 @@ def _reachable(problem: Problem, left: list[int]) -> tuple[list[int], list[tuple
     planar = paths.contacts.lengths([0])[0][1:]
     needs = np.hypot(planar, plain.points[1:, 2] - plain.points[0, 2])
     beyond = [k for k in range(len(order)) if needs[k] > problem.tether_length + paths.margin]
-    lost += [(order[k], explain_unreached(plain, paths.outline, [k + 1])) for k in beyond]
+    for k in beyond:
+        why = explain_unreached(plain, paths.outline, [k + 1])
+        lost.append((order[k], why.replace(plain.goal_label(k), problem.goal_label(order[k]))))
     return [g for k, g in enumerate(order) if k not in beyond], lost
 
 
@@ -206,10 +208,10 @@ def _in_free_water(problem: Problem, order: list[int]) -> tuple[list[int], list[
     return kept, gone
 
 
-def _home(problem: Problem, state: State) -> Leg:
-    """Back along the tether to the base."""
+def _home(problem: Problem, state: State, longest: float) -> Leg:
+    """Back along the tether, which is no longer than that, to the base."""
     placed = problem.model_copy(update={"goals": (Goal(position=state.position),), "state": None})
-    back = TautPaths(placed, FAR * problem.tether_length).path(0, 1, state.signature)[::-1]
+    back = TautPaths(placed, longest).path(0, 1, state.signature)[::-1]
     return Leg(HOME, np.ascontiguousarray(back), (), 0.0)
 
 

@@ -14,7 +14,7 @@ from netsp.errors import InputError
 from netsp.execute.aside import aside
 from netsp.execute.events import Event, Surprises, changed, index_of
 from netsp.execute.plan import HOME, Leg, legs_of
-from netsp.execute.repair import REPLAN_S, Repair, broken, repair
+from netsp.execute.repair import REPLAN_S, Repair, broken, reachable, repair
 from netsp.hsignature import Word, signature
 from netsp.judge import verify
 from netsp.online.field import DistanceField
@@ -181,6 +181,7 @@ class _Run:
         self.water = Water(options.current, options.gusts, options.seed)
         self.now, self.mode, self.fresh, self.leg_s = 0.0, "tour", True, 0.0
         self.shorten = False
+        self.unreachable: set[int] = set()
         self.way = self.legs[0].way
 
     def _enter(self, problem: Problem) -> None:
@@ -289,6 +290,11 @@ class _Run:
                         self.out.cancelled.add(gone)
         if event.tether_length is not None and self.tether.length > event.tether_length:
             self.shorten = True
+        back = self._in_reach_again() if self.options.repair else []
+        if back:
+            left, must = [*left, *back], "goals are in reach again"
+            for goal in back:
+                del self.out.lost[goal]
         if must is None:
             must, legs = broken(self.problem, self.tether.nodes, self._from_here())
             if must is None:
@@ -302,6 +308,13 @@ class _Run:
                 self.out.lost[goal] = "was added, and plans are not mended"
         else:
             self._mend(must, left, event.kind)
+
+    def _in_reach_again(self) -> list[int]:
+        """Goals that no tether reached, and one does now."""
+        away = [g for g in self.unreachable if g in self.out.lost]
+        back = reachable(self.problem, away)[0] if away else []
+        self.unreachable -= set(back)
+        return back
 
     def too_late(self, event: Event) -> None:
         """An event after the end."""
@@ -369,6 +382,8 @@ class _Run:
         self.legs = made.legs
         for goal, reason in made.lost:
             self.out.lost[goal] = reason
+        if made.kind != "defect":
+            self.unreachable |= {goal for goal, _ in made.lost}
         self._next()
 
     def _hold(self, seconds: float) -> None:

@@ -35,6 +35,9 @@ SHALLOWEST = 0.1
 MOST_ITEMS = 650
 """Mission items: MAVLink counts to 65,535, but ArduSub takes 655 with home and the speed."""
 
+FASTEST = 20.0
+"""Metres per second that no underwater vehicle reaches."""
+
 MOST_FENCE_POINTS = 70
 """Fence points that ArduSub stores without a card, about."""
 
@@ -79,6 +82,8 @@ def export(
     if projection is None and kind != "csv":
         raise InputError(f"--origin: format {kind!r} needs lat,lon or lat,lon,heading of the base")
     settings = settings or Settings()
+    if settings.speed is not None and not 0.0 < settings.speed <= FASTEST:
+        raise InputError(f"--speed: expected at most {FASTEST:g} m/s, got {settings.speed!r}")
     if not 0 <= settings.hold <= 3600 or not 1 <= settings.bend <= 3600:
         raise InputError(
             f"--hold: expected whole seconds from 0 to 3600 (at bends from 1), got {settings.hold}"

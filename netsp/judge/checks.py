@@ -367,6 +367,8 @@ class _Judge:
                 )
         if s.status is Status.OPTIMAL and (gap is None or gap > 1e-5):
             return Check("bound, gap and status agree", False, f"optimal, but gap is {gap}")
+        if s.status is Status.INVALID:
+            return Check("bound, gap and status agree", False, "invalid, by its own status")
         if s.status in (Status.INFEASIBLE, Status.NO_SOLUTION_FOUND):
             return Check("bound, gap and status agree", False, f"{s.status.value}, yet has a tour")
         shown = "no bound" if gap is None else f"gap {gap:.2g}"

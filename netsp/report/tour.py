@@ -75,6 +75,11 @@ def report_tour(source: str | Path, problem_file: str | Path | None, output: str
         raise InputError(f"{source}: solves another problem than {problem_file} (sha256 differs)")
     if solution.length is None:
         raise InputError(f"{source}: has no tour (status {solution.status.value})")
+    drawn = float(np.linalg.norm(np.diff(np.array(solution.path), axis=0), axis=1).sum())
+    if drawn > 100.0 * (solution.length + problem.scale):
+        raise InputError(
+            f"{source}: path: is {drawn:.4g} long; expected about length, {solution.length:.4g}"
+        )
     rows = _table(run / "log.csv") if run else []
     if run is not None and not rows:
         raise InputError(f"{run / 'log.csv'}: holds no row")

@@ -79,6 +79,13 @@ class AugmentedGraph:
             out[k : k + step] = rows[:, targets]
         return out
 
+    def tree(self, source: int) -> Ints:
+        """(n,) the vertex before each on a shortest path from a source."""
+        from scipy.sparse.csgraph import dijkstra
+
+        _, before = dijkstra(self._matrix, directed=True, indices=source, return_predecessors=True)
+        return np.asarray(before, dtype=np.int64)
+
     def path(self, u: int, v: int, method: Literal["astar", "dijkstra"] = "astar") -> list[int]:
         """Vertices of a shortest path from u to v. A* is guided by the straight-line distance,
         which never exceeds the way along edges, so both methods find the same length."""

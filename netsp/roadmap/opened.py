@@ -165,7 +165,9 @@ def opened_graph(
     plain = problem.model_copy(update={"state": None})
     placed = plain.model_copy(update={"goals": (*plain.goals, Goal(position=state.position))})
     word = reduce(state.signature)
-    far = TautPaths(placed, FAR * limit)
+    # a tether that is out may be far longer than a limit that was lowered since
+    around = max([np.hypot(*(np.array(state.position[:2]) - plain.base[:2])), plain.scale])
+    far = TautPaths(placed, FAR * max(limit, float(around)))
     try:
         planar = far.planar_length(0, last, word)
     except NetspError:

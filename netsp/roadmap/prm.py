@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -220,11 +220,32 @@ class PrmRoadmap:
         leg, for which see `TautLegs.lower_bounds`."""
         return self._taut.lower_bounds(vertices, rows, clock)
 
+    @property
+    def quick(self) -> bool:
+        """Whether a leg by itself is quickly measured: not by a search of the whole graph."""
+        return self.shortcut
+
+    @cached_property
+    def _before(self) -> Ints:
+        """(n,) the augmented vertex before each on its shortest path from the base."""
+        return self.augmented.tree(int(self._vertex[0]))
+
+    def _from_base(self, row: int) -> list[int]:
+        out = [row]
+        while out[-1] != self._vertex[0]:
+            out.append(int(self._before[out[-1]]))
+        return out[::-1]
+
     def path(self, u: int, v: int) -> Floats:
         """(n, 3) polyline of the leg from vertex u to vertex v."""
         if self.shortcut:
             return self._taut.path(u, v)
-        rows = self.augmented.path(int(self._vertex[u]), int(self._vertex[v]))
+        a, b = int(self._vertex[u]), int(self._vertex[v])
+        if self._vertex[0] in (a, b):
+            rows = self._from_base(b if a == self._vertex[0] else a)
+            rows = rows if a == self._vertex[0] else rows[::-1]
+        else:
+            rows = self.augmented.path(a, b)
         out = self.milestones[self.augmented.milestone[rows]].copy()
         out[0] = self.problem.points[self.cluster[u]]
         out[-1] = self.problem.points[self.cluster[v]]

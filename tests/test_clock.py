@@ -1,0 +1,111 @@
+"""One clock for a whole run: compiled loops hear it, and nothing goes on for long after it."""
+
+import time
+
+import numpy as np
+import pytest
+
+from netsp import Problem, Status, solve, solve_graph, travel_graph, verify
+from netsp.clock import NEVER, Clock
+from netsp.errors import LimitReachedError, MemoryLimitError
+from netsp.memory import ask, available
+from netsp.mip.cutpool import IDLE, CutPool
+from netsp.mip.program import Cut
+from netsp.worlds import random_world
+
+
+def test_a_flag_is_set_when_the_time_is_up_and_not_before():
+    clock, late = Clock(0.15), Clock(30.0)
+    flag = clock.flag
+    assert (flag[0], late.flag[0], Clock().flag[0], NEVER[0]) == (0, 0, 0, 0)
+    time.sleep(0.4)
+    assert flag[0] == 1
+    assert clock.up
+    assert late.flag[0] == 0
+    with pytest.raises(LimitReachedError, match="while counting"):
+        clock.check("counting")
+
+
+def test_a_clock_within_another_does_not_outlast_it():
+    outer = Clock(5.0)
+    assert Clock(50.0, within=outer).left <= 5.0
+    assert Clock(1.0, within=outer).left <= 1.0
+    assert Clock.of(outer).left <= 5.0
+    assert Clock.of(None).limit is None
+
+
+def test_a_call_in_a_thread_gives_its_result_and_its_error():
+    assert Clock().interruptible(lambda: 7) == 7
+    with pytest.raises(ZeroDivisionError):
+        Clock().interruptible(lambda: 1 // 0)
+
+
+@pytest.mark.parametrize("solver", ["auto", "mip", "lns", "greedy", "anneal"])
+def test_a_limit_of_nothing_still_gives_a_tour_that_holds(solver):
+    problem = random_world(0, goals=30, tether_length=350.0)
+    solution = solve(problem, solver, time_limit=1e-6)
+    assert solution.status in (Status.FEASIBLE, Status.OPTIMAL_OF_KEPT)
+    assert verify(problem, solution)
+
+
+def test_a_graph_made_without_a_limit_keeps_to_that_of_its_solver():
+    graph = travel_graph(random_world(0, goals=60, tether_length=450.0))
+    solve_graph(travel_graph(random_world(0, goals=10, tether_length=450.0)), "mip", time_limit=2.0)
+    begin = time.monotonic()
+    result = solve_graph(graph, "mip", time_limit=0.5)
+    assert result.tour is not None
+    # ten times the promise, for a busy machine: the gate measures the second
+    assert time.monotonic() - begin < 10.0
+    assert graph.clock is None
+
+
+def test_memory_is_asked_for_before_it_is_taken():
+    ask(1e3, "a crumb", "nothing")
+    assert available() > 0
+    with pytest.raises(MemoryLimitError, match=r"legs would take .* GiB of memory.*lower tether"):
+        ask(1e18, "legs", "lower tether_length")
+
+
+def test_a_cut_pool_never_gives_one_cut_the_count_of_another():
+    """Counters go with their cuts, however cuts are replaced, dropped and added."""
+    rng = np.random.default_rng(0)
+    pool, counts = CutPool(), {}
+    made = 0
+    for _ in range(300):
+        new = [Cut(np.ones(3, dtype=bool), made + k) for k in range(int(rng.integers(0, 4)))]
+        made += len(new)
+        pool.add(new)
+        counts |= {c.cluster: 0 for c in new}
+        prices = np.where(rng.random(len(pool)) < 0.2, -1.0, 0.0)
+        slack = np.where(rng.random(len(pool)) < 0.5, 1.0, 0.0)
+        pool.count(prices, slack)
+        for cut, price, room in zip(pool.cuts, prices, slack, strict=True):
+            counts[cut.cluster] = 0 if price < 0 else counts[cut.cluster] + (2 if room else 1)
+        # restricted to other vertices, every cut is a new object
+        pool.replace([Cut(c.inside.copy(), c.cluster) for c in pool.cuts])
+        assert [counts[c.cluster] for c in pool.cuts] == pool.idle.tolist()
+        active = pool.active()
+        if active is not None:
+            pool.keep(active)
+            assert (pool.idle < IDLE).all()
+
+
+def test_the_same_iterations_give_the_same_tour_whatever_the_machine_does(monkeypatch):
+    """The temperature of ruin and recreate falls by rounds, not by how many fit into a moment."""
+    import netsp.lns.search as search
+
+    problem = random_world(2, goals=25, tether_length=300.0)
+    found = set()
+    for seconds in (0.02, 1e-9, 10.0):
+        monkeypatch.setattr(search, "CHUNK_SECONDS", seconds)
+        solution = solve(problem, "lns", seed=5, iteration_limit=300)
+        found.add((solution.length, tuple(v.goal for v in solution.tour)))
+    assert len(found) == 1
+
+
+def test_a_problem_far_from_what_matters_keeps_its_tolerances():
+    near = Problem(base=(0, 0), goals=[(3, 4)], obstacles=[], tether_length=6)
+    rock = {"center": (1e9, 0), "radius": 5}
+    far = Problem(base=(0, 0), goals=[(3, 4)], obstacles=[rock], tether_length=6)
+    assert far.scale == near.scale
+    assert solve(far).length == pytest.approx(10.0, abs=1e-9)
