@@ -21,9 +21,12 @@ from netsp.roadmap.tangents import ARC_STEP, TangentGraph, build_tangents
 Floats = npt.NDArray[np.float64]
 
 
-DEEPER, FIRST = 1.3, 32.0
-"""A path is sought up to this multiple of the distance, then up to so much more and so on, from the
-`FIRST`-th part of the longest possible on."""
+FIRST, DEEPEST, LEAST = 1.02, 1.3, 1 / 32
+"""A path is sought up to the first multiple of the distance, then up to more, in steps that grow to
+the second, from the third share of the longest possible on."""
+
+MOST_KNOWN = 5000
+"""Paths that are remembered."""
 
 
 class TautPaths:
@@ -42,6 +45,7 @@ class TautPaths:
         # what rounding and the extra growth of obstacles can add to a length
         self.margin = 100.0 * self.outline.margin
         self._z = problem.points[:, 2]
+        self._known: dict[tuple[int, int, Word], tuple[float, list[tuple[int, float]]]] = {}
 
     @cached_property
     def contacts(self) -> ContactGraph:
@@ -87,10 +91,20 @@ class TautPaths:
         self, a: int, b: int, word: Word, longest: float | None = None
     ) -> tuple[float, list[tuple[int, float]]]:
         """Length, and (departure, angle slid before it) along the taut path of a word."""
+        key = (a, b, tuple(word))
+        if key not in self._known:
+            if len(self._known) >= MOST_KNOWN:
+                self._known.clear()
+            self._known[key] = self._search(a, b, word, longest)
+        return self._known[key]
+
+    def _search(
+        self, a: int, b: int, word: Word, longest: float | None
+    ) -> tuple[float, list[tuple[int, float]]]:
         most = (self._longest if longest is None else longest) + self.margin
         apart = math.dist(self.outline.points[a], self.outline.points[b])
         # a search costs far more the longer the paths may be, and no class has two taut paths
-        limit = min(DEEPER * apart + self.margin, most)
+        limit, step = min(FIRST * apart + self.margin, most), FIRST
         while True:
             trie = Trie.of_word(word, limit)
             found = run_explore(self.tangents, a, trie, keep=True, margin=self.outline.margin)
@@ -100,7 +114,8 @@ class TautPaths:
                 return float(found.length[best]), found.pieces(best)
             if limit >= most:
                 raise NetspError(f"internal: no taut path of word {word} from {a} to {b}")
-            limit = min(max(DEEPER * limit, most / FIRST), most)
+            step = min(step**2, DEEPEST)
+            limit = min(max(step * limit, LEAST * most), most)
 
     def _polyline(self, a: int, b: int, pieces: Sequence[tuple[int, float]]) -> Floats:
         """Tangents and circumscribed arcs as one polyline, finer where a gap is narrow."""

@@ -38,12 +38,14 @@ def taut_ways(
 ) -> Ways:
     """The ways over tangents and arcs: exact shortest paths."""
     places, side = sub_goals(problem, with_sub_goals)
+    check()
     outline = build_outline(problem)
     outline = replace(
         outline,
         points=np.vstack([outline.points, places]),
         places=np.vstack([outline.places, places]),
     )
+    check()
     graph = ContactGraph(outline)
     return tabulate(problem, outline, graph, np.arange(graph.points), places, side, check)
 
@@ -111,6 +113,7 @@ def tabulate(
         planar[a] = length[terminals]
         row[a, 0] = len(letters)
         for p in range(count):
+            check()
             if np.isfinite(planar[a, p]) and p != a:
                 xy = graph.draw(int(terminals[a]), int(terminals[p]), before)
                 letters += signature(xy, middles)
