@@ -41,6 +41,7 @@ def check(run, goals):
     """What must hold of every run."""
     s = run.summary
     assert s["exceedance_s"] == 0.0
+    assert s["defects"] == 0
     assert s["home"]
     assert s["tether_free"]
     assert all(a.as_planned for a in run.arrivals)
@@ -322,3 +323,71 @@ def test_a_resolution_that_obstacles_slip_through_is_refused():
     problem = Problem.load(PROBLEMS / "wharf.json")
     with pytest.raises(InputError, match=r"delta: expected at most 0\.6667"):
         execute(problem, solve(problem), Options(delta=1000.0))
+
+
+def test_a_repair_in_the_same_order_starts_at_the_robot(world):
+    """The tether that is out is no part of the path to come: it is behind the robot."""
+    from netsp.execute.repair import repair
+
+    problem, solution = world
+    robot = np.add(solution.path[0], (0.0, 0.5, 0.0))
+    order = [v.goal for v in solution.tour]
+    made = repair(problem, robot, np.array([problem.base, robot]), order, 1e9, "a test")
+    assert made.kind == "local"
+    assert [leg.goal for leg in made.legs] == [*order, HOME]
+    assert np.allclose(made.legs[0].way[0], robot)
+    assert sum(leg.length for leg in made.legs) == pytest.approx(made.length, rel=1e-3)
+    assert made.length == pytest.approx(solution.length, rel=0.02)
+
+
+def test_a_defect_is_no_reason_it_is_counted_and_told_by_the_exit_code(
+    world, tmp_path, monkeypatch
+):
+    import netsp.execute.run
+
+    def broken_repair(*_):
+        raise RuntimeError("something that nobody foresaw")
+
+    monkeypatch.setattr(netsp.execute.run, "repair", broken_repair)
+    problem, solution = world
+    (tmp_path / "p.json").write_text(problem.to_json())
+    solution.save(tmp_path / "s.json")
+    what = [{"time": 90.0, "push": [30.0, 5.0, 0.0]}]
+    (tmp_path / "e.json").write_text(json.dumps({"schema_version": 1, "events": what}))
+    code = main(["execute", str(tmp_path / "p.json"), str(tmp_path / "s.json"), "--surprise",
+                 str(tmp_path / "e.json"), "-o", str(tmp_path / "run"), "--quiet"])  # fmt: skip
+    assert code == 1
+    summary = json.loads((tmp_path / "run" / "summary.json").read_text())
+    assert summary["defects"] == 1
+    assert summary["home"]
+    assert summary["tether_free"]
+    assert "something that nobody foresaw" in (tmp_path / "run" / "events.csv").read_text()
+
+
+def test_planning_takes_its_time_and_the_robot_holds_its_place(world):
+    problem, solution = world
+    push = events({"time": 30.0, "push": [4.0, 4.0, 0.0]})
+    run = execute(problem, solution, Options(speed=1.0, planning_limit=1.5), surprises=push)
+    check(run, 8)
+    held = [r for r in run.rows if r.mode == "hold"]
+    assert held[-1].time - held[0].time == pytest.approx(1.5, abs=0.2)
+    assert len({(r.x, r.y, r.z) for r in held}) == 1
+    assert max(e.planning_s for e in run.entries) < 1.5 + 1.0
+
+
+def test_goals_come_back_when_the_tether_gets_longer(world):
+    problem, solution = world
+    what = [{"time": 5.0, "tether_length": 60.0}, {"time": 8.0, "tether_length": 300.0}]
+    run = execute(problem, solution, FAST, surprises=events(*what))
+    check(run, 8)
+    assert not run.lost
+    assert run.summary["visited"] == 8
+
+
+def test_a_tether_far_longer_than_its_new_limit_still_comes_home(world):
+    problem, solution = world
+    run = execute(problem, solution, FAST, surprises=events({"time": 200, "tether_length": 1e-9}))
+    assert run.summary["defects"] == 0
+    assert run.summary["home"]
+    assert run.summary["tether_free"]
+    assert all("out of reach" in why for why in run.lost.values())
