@@ -41,7 +41,7 @@ def tasks(count: int) -> list[list[object]]:
     out = []
     for k in range(count):
         solver, limit = SOLVERS[k % len(SOLVERS)]
-        out.append([k, 8 + k % 17, (250.0, 300.0, 350.0, 450.0)[k % 4], solver, limit])
+        out.append([k, 7 + k % 8, (250.0, 300.0, 350.0)[k % 3], solver, limit])
     return out
 
 
