@@ -77,6 +77,9 @@ class Run:
         Ctrl-C is pressed. Where it has no tour yet by then, it gets the nearest one that there is,
         unless it is blind: then its own is all that it may show."""
         try:
+            if not blind and not self.graph.complete and self.clock.limit is not None:
+                # a roadmap that was cut short says that nothing here is quick
+                self.start()
             yield
         except MemoryLimitError:
             raise

@@ -66,6 +66,10 @@ SEEDED_ROADMAPS = frozenset({"prm"})
 
 LARGEST_SEED = 2**62
 
+SPARE = 0.4
+"""Of a time limit, what is kept for drawing the tour when a roadmap was cut short; a second at
+most."""
+
 DEFAULT_SOLVER = "auto"
 DEFAULT_ROADMAP = "taut"
 
@@ -213,10 +217,12 @@ def solve(
         options.setdefault("seed", seed)
     graph = travel_graph(problem, roadmap, **options)
     built = clock.elapsed
+    # what is too large for its time takes long to draw, too
+    spare = 0.0 if graph.complete else min(SPARE * (time_limit or 0.0), 1.0)
     result = solve_graph(
         graph,
         solver,
-        time_limit=clock,
+        time_limit=Clock(clock.left - spare, within=clock) if spare else clock,
         iteration_limit=iteration_limit,
         seed=seed,
         params=params,

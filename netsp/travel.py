@@ -22,7 +22,7 @@ import numpy.typing as npt
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
-from netsp.clock import Clock
+from netsp.clock import NEVER, Clock, Flag
 from netsp.errors import InputError
 from netsp.hsignature import Word
 from netsp.ways import Ways
@@ -91,7 +91,7 @@ class TravelGraph:
         tethers: npt.ArrayLike,
         legs: Legs,
         roadmap: str = "custom",
-        ways: Callable[[bool, Callable[[], None]], Ways] | None = None,
+        ways: Callable[[bool, Callable[[], None], Flag], Ways] | None = None,
         classes: KeptClasses | None = None,
         least_left_out: float = math.inf,
     ) -> None:
@@ -187,6 +187,11 @@ class TravelGraph:
         return not isinstance(self._legs, _CostTable)
 
     @property
+    def complete(self) -> bool:
+        """Whether no class was left out for want of time or room."""
+        return self.least_left_out == math.inf
+
+    @property
     def quick_legs(self) -> bool:
         """Whether a leg by itself is quickly measured."""
         return bool(getattr(self._legs, "quick", True))
@@ -205,7 +210,8 @@ class TravelGraph:
                 "solver: needs the geometry of a problem, and this travel graph has none"
             )
         if sub_goals not in self._ways:
-            self._ways[sub_goals] = self._make_ways(sub_goals, check)
+            stop = NEVER if self.clock is None else self.clock.flag
+            self._ways[sub_goals] = self._make_ways(sub_goals, check, stop)
         return self._ways[sub_goals]
 
     def subgraph(self, vertices: npt.ArrayLike) -> TravelGraph:

@@ -35,7 +35,7 @@ least; the share grows while there are too few classes and shrinks while there a
 STEPS = 16
 """Searches for one goal at most."""
 
-SHARE = 0.5
+SHARE = 0.3
 """Of the time, the part that may go into classes before a roadmap makes do with some."""
 
 

@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from netsp.clock import Clock, TimeLimit
+from netsp.clock import NEVER, Clock, Flag, TimeLimit
 from netsp.errors import InfeasibleError, InputError, LimitReachedError
 from netsp.geometry import depth_in_obstacle, segment_blocked
 from netsp.hsignature import Word
@@ -146,8 +146,9 @@ class PrmRoadmap:
             planar[v] = self.paths.planar_length(0, int(self.cluster[v]), self.signatures[v])
         return planar
 
-    def _ways(self, with_sub_goals: bool, check: Callable[[], None]) -> Ways:
+    def _ways(self, with_sub_goals: bool, check: Callable[[], None], stop: Flag = NEVER) -> Ways:
         """Ways in any class along the milestones; sub-goals are joined as base and goals are."""
+        del stop  # nothing compiled takes long here
         places, side = sub_goals(self.problem, with_sub_goals)
         outline = self.paths.outline
         fixed = len(self.problem.points)

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+from netsp.clock import NEVER, Flag
 from netsp.geometry import TWO_PI, more_rows, segment_blocked
 from netsp.roadmap.letters import arc_letters, segment_letters
 from netsp.roadmap.outline import Outline
@@ -82,8 +83,9 @@ class TangentGraph:
         return 2 * len(self.arcs) + p
 
 
-def build_tangents(outline: Outline, reach: float) -> TangentGraph:
-    """All free tangents whose ends lie within `reach` of the base (inf for all).
+def build_tangents(outline: Outline, reach: float, stop: Flag = NEVER) -> TangentGraph:
+    """All free tangents whose ends lie within `reach` of the base (inf for all); some are missing
+    when the flag of a clock is set.
 
     Nothing farther from the base than the tether is ever touched: a leg between two admissible
     goals stays in the ball of that radius, which is convex in the covering space.
@@ -110,6 +112,7 @@ def build_tangents(outline: Outline, reach: float) -> TangentGraph:
         b.grow,
         b.box,
         b.eps,
+        stop,
     )
     source, target = rows[:, 0].astype(np.int64), rows[:, 1].astype(np.int64)
     key, arrival_key, length = rows[:, 2], rows[:, 3], rows[:, 4]
@@ -249,13 +252,15 @@ def _key(theta, sense, start, end, full):
 
 
 @njit(cache=True)
-def _tangents(place, a_count, full, base, reach, circles, edges, edge_start, grow, box, eps):
+def _tangents(place, a_count, full, base, reach, circles, edges, edge_start, grow, box, eps, stop):
     """All free directed segments between arcs and points, unsorted: rows of source, target, key,
     arrival key, length, ends (4), angles (2). place : arcs, then points as arcs of radius 0."""
     out = np.empty((256, 11))
     n = 0
     total = len(place)
     for i in range(total):
+        if stop[0] != 0:
+            break
         for j in range(i + 1, total):
             xi, yi, ri, si, ei = place[i, 0], place[i, 1], place[i, 2], place[i, 3], place[i, 4]
             xj, yj, rj, sj, ej = place[j, 0], place[j, 1], place[j, 2], place[j, 3], place[j, 4]

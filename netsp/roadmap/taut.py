@@ -289,6 +289,8 @@ class TautLegs:
     def path(self, u: int, v: int) -> Floats:
         """(n, 3) polyline of the taut leg from vertex u to vertex v, arcs circumscribed; height
         changes in proportion to planar length."""
+        if u > v:  # searched once for both senses
+            return self.path(v, u)[::-1].copy()
         word, longest = self.relative_word(u, v), self._longest(u, v)
         return self.paths.path(int(self.cluster[u]), int(self.cluster[v]), word, longest)
 

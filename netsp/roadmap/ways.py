@@ -17,10 +17,12 @@ import numpy.typing as npt
 import shapely
 from numba import njit
 
+from netsp.clock import NEVER, Flag
 from netsp.hsignature import signature
 from netsp.problem import Problem
 from netsp.roadmap.outline import Outline, build_outline
 from netsp.roadmap.shortest import ContactGraph, ShortestPaths
+from netsp.roadmap.tangents import build_tangents
 from netsp.ways import Ways
 
 Floats = npt.NDArray[np.float64]
@@ -34,9 +36,11 @@ OFF = 0.05
 
 
 def taut_ways(
-    problem: Problem, with_sub_goals: bool, check: Callable[[], None] = lambda: None
-) -> Ways:
-    """The ways over tangents and arcs: exact shortest paths."""
+    problem: Problem, with_sub_goals: bool, check: Callable[[], None] = lambda: None,
+    stop: Flag = NEVER,
+) -> Ways:  # fmt: skip
+    """The ways over tangents and arcs: exact shortest paths. check : may raise to stop; and it does
+    when the flag is set."""
     places, side = sub_goals(problem, with_sub_goals)
     check()
     outline = build_outline(problem)
@@ -45,8 +49,10 @@ def taut_ways(
         points=np.vstack([outline.points, places]),
         places=np.vstack([outline.places, places]),
     )
+    tangents = build_tangents(outline, np.inf, stop)
     check()
-    graph = ContactGraph(outline)
+    graph = ContactGraph(outline, tangents)
+    check()
     return tabulate(problem, outline, graph, np.arange(graph.points), places, side, check)
 
 
