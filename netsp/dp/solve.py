@@ -91,6 +91,7 @@ def solve(
     with run.until_stopped():
         run.offer(warm_start)
         if not run.trivial():
+            run.begin()
             costs = LegCosts(graph)
             run.search(costs)
             run.report("heuristic", vertices=len(costs))

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from netsp.clock import TimeLimit
-from netsp.legcosts import LegCosts
+from netsp.legcosts import MEASURE_AT_ONCE, LegCosts
 from netsp.lns.layers import Instance
 from netsp.lns.search import Search
 from netsp.result import OPTIMALITY_TOLERANCE, OnProgress
@@ -19,6 +19,9 @@ from netsp.travel import Ints, TravelGraph, least_tethers
 CORE = 800
 """About so many vertices, those of least tether, are measured for the heuristic while the other
 legs are only bounded."""
+
+FEW_CLASSES = 3
+"""Classes per goal of the first tour of all."""
 
 MOST_CLASSES = 12
 """Most classes per goal among them."""
@@ -42,6 +45,18 @@ class SearchingRun(Run):
         self.search_rounds = search_rounds
         self.bound = 0.0
         self._core: tuple[int, Instance] | None = None
+
+    def begin(self) -> None:
+        """A first tour, among few classes, before all legs are bounded: with very many classes that
+        takes long, and whoever stops the run meanwhile wants a tour."""
+        graph = self.graph
+        if self.tour is not None or len(graph) <= MEASURE_AT_ONCE or not graph.roadmapped:
+            return
+        core = least_tethers(graph.costs_to_base, graph.cluster, FEW_CLASSES)
+        search = Search(Instance.among(graph, core), self.rng, clock=self.clock)
+        search.settle()
+        self.take(search)
+        self.report("begun", vertices=len(graph))
 
     def instance(self, costs: LegCosts, more: Ints) -> Instance:
         """What the heuristic searches: everything if it is measured, else the classes of least

@@ -97,6 +97,7 @@ class MipRun(SearchingRun):
         with self.until_stopped():
             self.offer(warm_start)
             if not self.trivial():
+                self.begin()
                 costs = LegCosts(self.graph)
                 self.search(costs)
                 self.report("heuristic", vertices=len(costs))
