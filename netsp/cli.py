@@ -26,17 +26,19 @@ from netsp.arguments import (
     shard,
 )
 from netsp.commands import add_online
-from netsp.errors import InputError, NetspError
+from netsp.errors import (
+    EXIT_BAD_INPUT,
+    EXIT_INTERRUPTED,
+    EXIT_NOT_ALL,
+    EXIT_NOT_VERIFIED,
+    InputError,
+    NetspError,
+)
 
 if TYPE_CHECKING:
     from netsp.problem import Problem
     from netsp.result import Progress
     from netsp.solution import Solution
-
-EXIT_BAD_INPUT = 2
-EXIT_NO_SOLUTION = 4
-EXIT_NOT_VERIFIED = 5
-EXIT_INTERRUPTED = 130
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -56,7 +58,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             "netsp: out of memory; lower tether_length, --max-classes or the size of what is asked",
             file=sys.stderr,
         )
-        return EXIT_NO_SOLUTION
+        return EXIT_NOT_ALL
     except KeyboardInterrupt:
         print("netsp: interrupted before there was anything to write", file=sys.stderr)
         return EXIT_INTERRUPTED
@@ -351,7 +353,7 @@ def _solve(args: argparse.Namespace) -> int:
 
 _EXIT = {
     "infeasible": 3,
-    "no_solution_found": EXIT_NO_SOLUTION,
+    "no_solution_found": EXIT_NOT_ALL,
     "invalid": EXIT_NOT_VERIFIED,
 }
 

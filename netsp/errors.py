@@ -4,6 +4,12 @@ from __future__ import annotations
 
 import re
 
+EXIT_DEFECT, EXIT_BAD_INPUT, EXIT_INFEASIBLE = 1, 2, 3
+"""A defect of ours (whatever moved is safely home); input that cannot be used; no solution."""
+
+EXIT_NOT_ALL, EXIT_NOT_VERIFIED, EXIT_INTERRUPTED = 4, 5, 130
+"""No tour, or goals left out; a check that failed, or a tether too long or not free; Ctrl-C."""
+
 LONGEST_QUOTE = 80
 """Characters of a quoted value that a message shows."""
 
@@ -28,7 +34,7 @@ def brief(message: str) -> str:
 class NetspError(Exception):
     """Base of all netsp errors that a user can act on; `exit_code` is what the CLI returns."""
 
-    exit_code = 1
+    exit_code = EXIT_DEFECT
 
     def __init__(self, message: object = "") -> None:
         super().__init__(brief(str(message)))
@@ -37,19 +43,19 @@ class NetspError(Exception):
 class InputError(NetspError):
     """Input that cannot be used. The message is one line: field, value, what was expected."""
 
-    exit_code = 2
+    exit_code = EXIT_BAD_INPUT
 
 
 class InfeasibleError(NetspError):
     """The problem is proven to have no solution; the message names the goal and the reason."""
 
-    exit_code = 3
+    exit_code = EXIT_INFEASIBLE
 
 
 class LimitReachedError(NetspError):
     """The time was up before there was any solution; the message says where the work stood."""
 
-    exit_code = 4
+    exit_code = EXIT_NOT_ALL
 
 
 class MemoryLimitError(LimitReachedError):
@@ -59,4 +65,4 @@ class MemoryLimitError(LimitReachedError):
 class VerificationError(NetspError):
     """A solution failed its independent check."""
 
-    exit_code = 5
+    exit_code = EXIT_NOT_VERIFIED

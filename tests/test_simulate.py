@@ -191,6 +191,14 @@ def test_a_planner_that_fails_holds_says_so_and_goes_on(monkeypatch):
     assert [r.mode for r in run.log].count("hold") >= 10
     assert run.summary["visited"] == 2
     assert "ZeroDivisionError: of all things" in run.summary["skipped"][0]["reason"]
+    assert run.summary["defects"] >= 10
+
+
+def test_a_defect_of_planning_makes_the_command_fail(monkeypatch, tmp_path, capsys):
+    monkeypatch.setitem(PLANNERS, "none", Broken)
+    place = MISSIONS / "basin.json"
+    assert main(["simulate", str(place), "--planner", "none", "-o", str(tmp_path / "run")]) == 1
+    assert "defect" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("planner", ["predictive", "react"])

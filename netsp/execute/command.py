@@ -12,7 +12,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from netsp.errors import InputError
+from netsp.errors import EXIT_DEFECT, EXIT_NOT_ALL, EXIT_NOT_VERIFIED, InputError
 from netsp.execute.events import Surprises
 from netsp.execute.pictures import save_execution
 from netsp.execute.run import Execution, Options, Row, execute
@@ -20,15 +20,6 @@ from netsp.files import cell, write_text
 from netsp.online.command import vector
 from netsp.problem import Problem
 from netsp.solution import Solution
-
-EXIT_NOT_ALL = 4
-"""Goals were left out, or the run was interrupted."""
-
-EXIT_DEFECT = 1
-"""Planning failed for a reason that is ours; the robot came home along its tether."""
-
-EXIT_NOT_FREE = 5
-"""The tether was too long for a while, or did not come home free."""
 
 
 def run_execute(args: argparse.Namespace) -> int:
@@ -61,7 +52,7 @@ def run_execute(args: argparse.Namespace) -> int:
     if s["defects"]:
         return EXIT_DEFECT
     if s["exceedance_s"] > 0.0 or (s["home"] and not s["tether_free"]):
-        return EXIT_NOT_FREE
+        return EXIT_NOT_VERIFIED
     return EXIT_NOT_ALL if s["lost"] or s["status"] != "done" else 0
 
 

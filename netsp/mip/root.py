@@ -8,6 +8,7 @@ What is ruled out is forgotten, so the rounds get cheaper as the proof gets clos
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -41,6 +42,32 @@ PATIENCE, WORTH = 15, 0.02
 the gap; on lengths it has four times the patience, for nothing but branching comes after it."""
 
 
+@dataclass(frozen=True)
+class Warm:
+    """A program over some of the vertices: their numbers in the graph, legs (k, 2) by these
+    numbers, and cuts over the vertices in their order."""
+
+    vertices: Ints
+    legs: Ints
+    cuts: list[Cut]
+
+    def cuts_over(self, costs: LegCosts) -> list[Cut]:
+        """The cuts over all vertices left: a vertex that is not in the program goes with the one
+        there that is nearest, or with its cluster where the set must be a union of clusters. A cut
+        of (4) holds for any set without the base: all that a poor choice loses is strength."""
+        place = np.searchsorted(costs.vertices, self.vertices)
+        near = np.argmin(costs.values[:, place], axis=1)
+        near[place] = np.arange(len(place))
+        one_of = np.zeros(int(costs.cluster.max()) + 1, dtype=np.int64)
+        one_of[costs.cluster[place]] = np.arange(len(place))
+        whole = one_of[costs.cluster]
+        return [replace(c, inside=c.inside[whole if c.teeth else near]) for c in self.cuts]
+
+    def legs_over(self, costs: LegCosts) -> Ints:
+        """(k, 2) rows of its legs."""
+        return np.searchsorted(costs.vertices, self.legs)
+
+
 class Root:
     """The relaxation over what is left of a travel graph.
 
@@ -54,13 +81,17 @@ class Root:
         costs: LegCosts,
         relaxation: Callable[[Ints, Ints, Floats], Relaxation],
         offer: Callable[[Root, Point], None],
+        warm: Warm | None = None,
     ) -> None:
         self.run, self.costs, self.offer = run, costs, offer
         graph = costs.graph
         self.branch = branches([graph.signatures[v] for v in costs.vertices])
         self.dead: Bools = ~np.isfinite(costs.values)
-        legs = self._first_legs()
+        warm = warm if warm and np.isin(warm.vertices, costs.vertices).all() else None
+        legs = self._first_legs() if warm is None else self._warm_legs(warm)
         self.lp = relaxation(costs.cluster, legs, costs.values[legs[:, 0], legs[:, 1]])
+        if warm is not None:
+            self.lp.add_cuts(warm.cuts_over(costs))
         self.point: Point | None = None
 
     # the incumbent among the vertices left
@@ -162,6 +193,11 @@ class Root:
         )
         legs = np.unique(np.sort(pairs, axis=1), axis=0)
         return np.asarray(legs[np.isfinite(values[legs[:, 0], legs[:, 1]])])
+
+    def _warm_legs(self, warm: Warm) -> Ints:
+        """The legs of a program over some of the vertices, and the incumbent's."""
+        legs = np.vstack([np.sort(warm.legs_over(self.costs), axis=1), tour_legs(self.tour())])
+        return np.unique(legs, axis=0)
 
     def _missing_tour_legs(self) -> bool:
         """Bring the incumbent's legs into the LP; whether any was missing."""

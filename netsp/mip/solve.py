@@ -19,7 +19,7 @@ from netsp.legcosts import LegCosts
 from netsp.lns import Search
 from netsp.lns.incumbent import SearchingRun
 from netsp.mip.program import IntegerProgram, Point
-from netsp.mip.root import Root, tour_legs
+from netsp.mip.root import Root, Warm, tour_legs
 from netsp.mip.subtours import component_cuts, follow, tour_from
 from netsp.result import OnProgress, Result
 from netsp.run import Stop, read_params
@@ -88,7 +88,9 @@ def solve(
 
 
 class MipRun(SearchingRun):
-    """State of one solve."""
+    """State of one solve. root : once there is one."""
+
+    root: Root | None = None
 
     def solve(
         self, backend: str, warm_start: Sequence[int] | None, *, walks: bool = False
@@ -98,20 +100,41 @@ class MipRun(SearchingRun):
             self.offer(warm_start)
             if not self.trivial():
                 self.begin()
-                costs = LegCosts(self.graph)
-                self.search(costs)
-                self.report("heuristic", vertices=len(costs))
-                if walks:
-                    bound_by_walks(self, costs)
-                if not (self.done or self.infeasible):
-                    self.cut(costs, backend)
+                warm = None
+                if not walks:
+                    with self.core() as core:
+                        if core is not None:
+                            core.prove(backend)
+                            warm = core.program()
+                self.prove(backend, walks=walks, warm=warm)
         return self.finish("proven" if self.done else "open")
 
-    def cut(self, costs: LegCosts, backend: str) -> None:
+    def prove(self, backend: str, *, walks: bool = False, warm: Warm | None = None) -> None:
+        """Heuristic, walks if wanted, cutting planes, until it is proven.
+
+        warm : what a proof over a core of the classes has left; it has searched already.
+        """
+        costs = LegCosts(self.graph)
+        if warm is None:
+            self.search(costs)
+            self.report("heuristic", vertices=len(costs))
+        if walks:
+            bound_by_walks(self, costs)
+        if not (self.done or self.infeasible):
+            self.cut(costs, backend, warm)
+
+    def program(self) -> Warm | None:
+        """The program of the root of a run over a core, by vertices of the outer run."""
+        if self.root is None or self.outer is None:
+            return None
+        core = self.outer[1][self.root.costs.vertices]
+        return Warm(core, core[self.root.lp.legs], list(self.root.lp.cuts))
+
+    def cut(self, costs: LegCosts, backend: str, warm: Warm | None) -> None:
         """Root and integer rounds over what is left of the vertices."""
         self._gap_searched = self.length
         relaxation, integer = (_load(path) for path in BACKENDS[backend])
-        root = Root(self, costs, relaxation, self.round)
+        self.root = root = Root(self, costs, relaxation, self.round, warm)
         root.solve()
         if not self.done and root.point is not None:
             used = np.flatnonzero(root.point.x > 1e-6)

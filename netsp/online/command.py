@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from netsp.errors import InputError
+from netsp.errors import EXIT_DEFECT, EXIT_NOT_ALL, InputError
 from netsp.files import read_text, write_text
 from netsp.measuring import read_path
 from netsp.online import flights, pictures
@@ -49,10 +49,6 @@ def plot_scene(args: argparse.Namespace) -> int:
         )
     pictures.save(scene, args.output, path=path, tether=tether)
     return 0
-
-
-EXIT_NOT_ALL = 4
-"""Some waypoints were given up, or the run was interrupted."""
 
 
 def run_mission(args: argparse.Namespace) -> int:
@@ -93,6 +89,8 @@ def run_mission(args: argparse.Namespace) -> int:
         if len(runs) > 1:
             write_run(runs[1], Path(args.output) / runs[1].planner)
         draw_runs(runs, scene, Path(args.output))
+    if any(r.summary["defects"] for r in runs):
+        return EXIT_DEFECT
     complete = runs[0].summary["status"] == "done" and not runs[0].summary["skipped"]
     return 0 if complete else EXIT_NOT_ALL
 
@@ -181,6 +179,8 @@ def describe(run: Run, units: str) -> str:
         f"planning {s['replans']} times, median {1e3 * s['replan_median_s']:.1f} ms, worst "
         f"{1e3 * s['replan_worst_s']:.0f} ms",
     ]
+    if s["defects"]:
+        lines.append(f"defect   planning failed {s['defects']} times; please report the mission")
     if s["coverage"] is not None:
         lines.insert(
             4,

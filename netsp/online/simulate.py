@@ -287,6 +287,7 @@ def summarise(
         "visited": len(planner.reached),
         "waypoints": len(mission.waypoints),
         "skipped": [{"waypoint": k, "reason": why} for k, why in planner.skipped],
+        "defects": len(planner.defects),
         "replans": len(planned),
         "replan_median_s": float(np.median(planned)) if planned else 0.0,
         "replan_worst_s": max(planned, default=0.0),

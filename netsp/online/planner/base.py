@@ -31,7 +31,7 @@ class Command:
     """Where to go now.
 
     way : (k, 3) points to pass in this order, the first one next. mode : normal, recovery, hold or
-    done. replan_s : seconds that planning took in this step.
+    done. replan_s : seconds of CPU that planning took in this step.
     """
 
     way: Floats
@@ -57,7 +57,8 @@ class Planner:
 
     Attributes
     ----------
-    index : the waypoint that is next. skipped : waypoints given up, with the reason.
+    index : the waypoint that is next. skipped : waypoints given up, with the reason. defects :
+    what went wrong in planning that never should, one text each time.
     """
 
     mission: Mission
@@ -69,6 +70,7 @@ class Planner:
     mode: str = NORMAL
     way: Floats = field(default_factory=lambda: np.zeros((0, 3)))
     skipped: list[tuple[int, str]] = field(default_factory=list)
+    defects: list[str] = field(default_factory=list)
     reached: list[int] = field(default_factory=list)
     _held: int = 0
 
@@ -91,15 +93,15 @@ class Planner:
         self._advance(robot)
         if self.done:
             return Command(np.array([robot]), DONE)
-        begin = time.perf_counter()
+        begin = time.process_time()
         planned, given_up = False, -1
         while not self.done and given_up < len(self.skipped):
             given_up = len(self.skipped)
             try:
                 planned = self.plan(robot, tether) or planned
             except Exception as error:  # a vehicle in the water must not be left without a command
-                return self._hold(robot, error, time.perf_counter() - begin)
-        spent = time.perf_counter() - begin if planned else 0.0
+                return self._hold(robot, error, time.process_time() - begin)
+        spent = time.process_time() - begin if planned else 0.0
         if self.done:
             return Command(np.array([robot]), DONE, spent)
         return Command(self.way if len(self.way) else np.array([robot]), self.mode, spent)
@@ -107,8 +109,9 @@ class Planner:
     def _hold(self, robot: Floats, error: Exception, spent: float) -> Command:
         """Stay, and try again at the next step; give the waypoint up after a while."""
         self._held += 1
+        self.defects.append(f"{type(error).__name__}: {error}")
         if self._held > MOST_HOLDS:
-            self.give_up(f"planning failed: {type(error).__name__}: {error}")
+            self.give_up(f"a defect of netsp ended planning ({self.defects[-1]})")
         return Command(np.array([robot]), HOLD, spent)
 
     def warm_up(self, robot: Floats, tether: Tether) -> None:
