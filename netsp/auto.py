@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from netsp import exact
+from netsp.arrays import Floats
 from netsp.clock import Clock, TimeLimit
 from netsp.lns import Instance
 from netsp.lns.solve import solve as search
@@ -27,7 +28,7 @@ from netsp.mip.solve import MipRun
 from netsp.mip.solve import solve as prove
 from netsp.result import OnProgress, Progress, Result
 from netsp.run import Run, read_params
-from netsp.travel import Floats, TravelGraph, least_tethers
+from netsp.travel import TravelGraph, least_tethers
 
 PROVABLE = 10_000
 """Most vertices of a travel graph that `mip` is asked to bound: about 4 GiB of matrices."""

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from netsp.arrays import Floats
 from netsp.run import Run
-from netsp.travel import Floats, TravelGraph
+from netsp.travel import TravelGraph
 
 MOST_SUMS = 2e8
 """About a second."""

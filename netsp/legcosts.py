@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from netsp.arrays import Bools, Floats, Ints
 from netsp.memory import ask
-from netsp.travel import Bools, Floats, Ints, TravelGraph
+from netsp.travel import TravelGraph
 
 MEASURE_AT_ONCE = 400
 """So many vertices or fewer are measured altogether: that takes a second at most."""

@@ -9,14 +9,13 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.files import read_text
 from netsp.hsignature.measures import Measures, measure
 from netsp.problem import LARGEST, Problem
 from netsp.roadmap.paths import TautPaths
 from netsp.solution import Solution
-
-Floats = npt.NDArray[np.float64]
 
 DEFINITIONS = (
     ("obstacle-free convex hull", "convex_hull"),

@@ -5,13 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import numpy as np
-import numpy.typing as npt
-
+from netsp.arrays import Floats
 from netsp.hsignature import Word
 from netsp.solution import Status
-
-Floats = npt.NDArray[np.float64]
 
 OPTIMALITY_TOLERANCE = 1e-6
 """A tour is called optimal when (length - bound) <= this fraction of its length. Bounds are

@@ -22,6 +22,7 @@ import numpy.typing as npt
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
+from netsp.arrays import Bools, Floats, Ints
 from netsp.clock import NEVER, Clock, Flag
 from netsp.errors import InputError
 from netsp.hsignature import Word
@@ -30,10 +31,6 @@ from netsp.ways import Ways
 if TYPE_CHECKING:
     from netsp.result import OnProgress, Result
     from netsp.solution import KeptClasses
-
-Floats = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
-Bools = npt.NDArray[np.bool_]
 
 
 UNTIMED = 50

@@ -11,12 +11,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from netsp.arrays import Floats, Ints
 from netsp.hsignature import Word, concatenate, invert
-
-Floats = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
 
 DIRECT = -1
 """Instead of a sub-goal: the shortest way of all."""

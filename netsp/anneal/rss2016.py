@@ -24,17 +24,15 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from numba import njit
 
 from netsp.anneal.cooling import Cooling, Schedule
+from netsp.arrays import Ints
 from netsp.chance import below, metropolis, seeded
 from netsp.clock import TimeLimit
 from netsp.result import OnProgress, Result
 from netsp.run import Run, read_params
 from netsp.travel import TravelGraph
-
-Ints = npt.NDArray[np.int64]
 
 PROPOSALS_PER_GOAL = 20_000
 """Default number of proposals, times the number of goals, when nothing is limited."""

@@ -12,7 +12,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-Ints = npt.NDArray[np.int64]
+from netsp.arrays import Ints
+
 Masks = npt.NDArray[np.int32]
 
 CHUNK = 7

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from netsp.arrays import Floats
 from netsp.clock import TimeLimit
 from netsp.dp.walks import Walks
 from netsp.errors import InputError
@@ -24,7 +25,7 @@ from netsp.legcosts import MEASURE_AT_ONCE, LegCosts
 from netsp.lns.incumbent import SearchingRun
 from netsp.result import OnProgress, Result
 from netsp.run import read_params
-from netsp.travel import Floats, TravelGraph
+from netsp.travel import TravelGraph
 
 STEP, SHORTER = 0.5, 0.7
 """First step of the prices as a share of the gap, and its factor after `STALL` passes in vain."""

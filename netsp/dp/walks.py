@@ -21,10 +21,10 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
+from netsp.arrays import Bools, Floats, Ints
 from netsp.clock import NEVER, Flag
 from netsp.dp.labels import completions, extend, join, step_back
 from netsp.dp.memory import Memory
-from netsp.travel import Bools, Floats, Ints
 
 ROUNDING = 1e-12
 """Relative rounding allowed for: some hundred additions at 1.1e-16 each, with room to spare."""

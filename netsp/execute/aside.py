@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 import shapely
 from shapely.ops import substring
 
+from netsp.arrays import Floats
 from netsp.problem import Problem
-
-Floats = npt.NDArray[np.float64]
 
 
 def aside(problem: Problem, nodes: Floats, by: float) -> Floats:

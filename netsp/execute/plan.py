@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.hsignature import Word, signature
 from netsp.problem import Problem
 from netsp.solution import Solution
-
-Floats = npt.NDArray[np.float64]
 
 HOME = -1
 """The goal of the last leg."""

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 import shapely
 
+from netsp.arrays import Floats
 from netsp.clock import Clock
 from netsp.errors import LimitReachedError, NetspError
 from netsp.execute.plan import HOME, Leg, legs_of, length_of
@@ -26,8 +27,6 @@ from netsp.roadmap.paths import TautPaths
 from netsp.roadmap.reach import explain_unreached
 from netsp.solution import Status
 from netsp.solvers import solve_graph, to_solution
-
-Floats = npt.NDArray[np.float64]
 
 REPLAN_S = 2.0
 """Seconds that planning the rest of a tour may take; the robot holds its place meanwhile."""

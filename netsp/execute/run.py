@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.execute.aside import aside
 from netsp.execute.events import Event, Surprises, changed, index_of
@@ -27,8 +27,6 @@ from netsp.online.vehicle import make_vehicle
 from netsp.online.water import Water
 from netsp.problem import Point3, Problem
 from netsp.solution import Solution, Status
-
-Floats = npt.NDArray[np.float64]
 
 RESOLUTION = 1e-4
 """The tether model is right to this share of the tether length; less is no exceedance."""

@@ -13,9 +13,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from netsp.arrays import Floats
 from netsp.errors import InputError
-
-Floats = npt.NDArray[np.float64]
 
 
 class Projection:

@@ -12,16 +12,15 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 import shapely
 
+from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.execute.plan import HOME, legs_of
 from netsp.hsignature import Word, concatenate, crossings, signature
 from netsp.problem import Circle, Problem
 from netsp.solution import Solution
 
-Floats = npt.NDArray[np.float64]
 Mark = tuple[int | None, Word, float]
 """Goal, word and tether of a waypoint, as in `Waypoint`."""
 

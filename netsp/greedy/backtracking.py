@@ -19,11 +19,12 @@ from typing import Any
 
 import numpy as np
 
+from netsp.arrays import Floats, Ints
 from netsp.clock import TimeLimit
 from netsp.legcosts import MEASURE_AT_ONCE
 from netsp.result import OnProgress, Result
 from netsp.run import Run, read_params
-from netsp.travel import Floats, Ints, TravelGraph
+from netsp.travel import TravelGraph
 
 BATCH = 16
 """So many legs are measured at a time when the nearest goal is looked for."""

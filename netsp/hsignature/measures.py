@@ -33,11 +33,10 @@ import numpy as np
 import numpy.typing as npt
 import shapely
 
+from netsp.arrays import Floats
 from netsp.hsignature.rays import crossings
 from netsp.hsignature.words import Word, entangled, reduce
 from netsp.problem import Problem
-
-Floats = npt.NDArray[np.float64]
 
 TOUCHING = 1e-6
 """How deep, relative to the size of the problem, a tether may reach into an obstacle it touches."""

@@ -14,9 +14,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
-Floats = npt.NDArray[np.float64]
+from netsp.arrays import Floats
 
 ROUNDS = 60
 """Contacts that may come or go before the path is given up."""

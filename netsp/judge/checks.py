@@ -10,17 +10,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import shapely
 
+from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.hsignature import Word, concatenate, crossings, entangled, reduce
 from netsp.judge.solids import Inset, bridges
 from netsp.judge.stringpull import PLACE_TOLERANCE, StringPuller, reduce_sleeve
 from netsp.problem import Circle, Problem
 from netsp.solution import Solution, Status
-
-Floats = npt.NDArray[np.float64]
 
 STAND_OFF = 3e-8
 """As a share of the problem's size, what standing off from a boundary may add to a length."""

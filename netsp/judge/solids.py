@@ -12,14 +12,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import shapely
 
+from netsp.arrays import Floats, Ints
 from netsp.polygons import counterclockwise
 from netsp.problem import Circle, Polygon, Problem
-
-Floats = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
 
 SHARE = 0.2
 """Of the room at a corner, or of a radius, the part that an inset may take."""

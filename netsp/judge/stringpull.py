@@ -17,11 +17,10 @@ import numpy as np
 import numpy.typing as npt
 import shapely
 
+from netsp.arrays import Floats
 from netsp.judge.chain import contacts_of, exact_length
 from netsp.judge.solids import SIDES, inset
 from netsp.problem import Problem
-
-Floats = npt.NDArray[np.float64]
 
 PLACE_TOLERANCE = 1e-7
 """How far, relative to the problem's size, a path may miss a point or enter an obstacle."""

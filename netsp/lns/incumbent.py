@@ -16,6 +16,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from netsp.arrays import Ints
 from netsp.clock import Clock, TimeLimit
 from netsp.errors import LimitReachedError
 from netsp.legcosts import MEASURE_AT_ONCE, LegCosts
@@ -23,7 +24,7 @@ from netsp.lns.layers import Instance
 from netsp.lns.search import Search
 from netsp.result import OPTIMALITY_TOLERANCE, OnProgress
 from netsp.run import Run, Stop
-from netsp.travel import Ints, TravelGraph, least_tethers
+from netsp.travel import TravelGraph, least_tethers
 
 CORE = 800
 """About so many vertices, those of least tether, are measured for the heuristic while the other

@@ -8,11 +8,8 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+from netsp.arrays import Floats, Ints
 from netsp.travel import TravelGraph
-
-Floats = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
-
 
 NEAR = 12
 """A cluster is put back next to one of so many nearest clusters."""

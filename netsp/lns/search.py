@@ -7,12 +7,11 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
+from netsp.arrays import Ints
 from netsp.chance import seeded
 from netsp.clock import NEVER, Clock
 from netsp.lns.layers import Instance, best_classes
 from netsp.lns.ruin import descend, ruin_and_recreate, two_opt
-
-Ints = npt.NDArray[np.int64]
 
 HOT, COLD = 0.1, 1e-3
 """First and last temperature of ruin and recreate, in mean legs of the tour."""

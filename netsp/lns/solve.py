@@ -8,12 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from netsp.arrays import Ints
 from netsp.clock import TimeLimit
 from netsp.lns.layers import Instance
 from netsp.lns.search import Search
 from netsp.result import OnProgress, Result
 from netsp.run import Run, read_params
-from netsp.travel import Ints, TravelGraph, least_tethers
+from netsp.travel import TravelGraph, least_tethers
 
 ROUNDS_PER_GOAL = 300
 """Default number of rounds, times the number of goals, when nothing is limited."""

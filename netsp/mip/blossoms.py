@@ -16,7 +16,8 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from netsp.mip.program import Bools, Cut, Floats, Ints
+from netsp.arrays import Bools, Floats, Ints
+from netsp.mip.program import Cut
 
 VIOLATION = 0.02
 """Least violation worth a cut."""

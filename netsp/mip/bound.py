@@ -21,9 +21,8 @@ from fractions import Fraction
 import numpy as np
 import numpy.typing as npt
 
+from netsp.arrays import Floats
 from netsp.mip.program import Cut, Duals
-
-Floats = npt.NDArray[np.float64]
 
 ROUNDING = 1e-12
 """Relative rounding allowed for: some thousand additions at 1.1e-16 each, with room to spare."""

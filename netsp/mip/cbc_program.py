@@ -7,14 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 import pulp
 
+from netsp.arrays import Bools, Floats, Ints
 from netsp.mip.cbc import run_cbc
 from netsp.mip.cutpool import CutPool
 from netsp.mip.program import (
-    Bools,
     Cut,
-    Floats,
     IntegerOutcome,
-    Ints,
     Point,
     cut_coefficients,
     duals_of_relaxation,

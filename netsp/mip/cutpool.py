@@ -10,7 +10,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from netsp.mip.program import Bools, Cut, Floats, Ints
+from netsp.arrays import Bools, Floats, Ints
+from netsp.mip.program import Cut
 
 IDLE, SLACK = 16, 2
 """A cut leaves the LP after so many rounds in a row without a price, rounds in which it was slack

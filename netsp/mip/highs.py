@@ -10,13 +10,11 @@ from typing import Any
 import highspy
 import numpy as np
 
+from netsp.arrays import Bools, Floats, Ints
 from netsp.mip.cutpool import CutPool
 from netsp.mip.program import (
-    Bools,
     Cut,
-    Floats,
     IntegerOutcome,
-    Ints,
     Point,
     cut_coefficients,
     duals_of_relaxation,

@@ -26,14 +26,11 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
-import numpy.typing as npt
+
+from netsp.arrays import Bools, Floats, Ints
 
 if TYPE_CHECKING:
     from netsp.mip.cutpool import CutPool
-
-Floats = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
-Bools = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True)

@@ -14,9 +14,10 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from netsp.arrays import Bools, Floats, Ints
 from netsp.hsignature import Word
 from netsp.mip.flows import min_cuts
-from netsp.mip.program import Bools, Cut, Floats, Ints
+from netsp.mip.program import Cut
 
 VIOLATION = 1e-4
 """Least violation worth a cut."""

@@ -10,8 +10,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
+from netsp.arrays import Floats
 from netsp.errors import EXIT_DEFECT, EXIT_NOT_ALL, InputError
 from netsp.files import read_text, write_text
 from netsp.measuring import read_path
@@ -23,8 +23,6 @@ from netsp.online.scene import Scene
 from netsp.online.simulate import STEP, LogRow, Run, simulate, write_run
 from netsp.online.tether import GeodesicTether, ReactTether, Tether
 from netsp.online.tether.geodesic import THINNEST
-
-Floats = npt.NDArray[np.float64]
 
 MODELS = {"geodesic": GeodesicTether, "react": ReactTether}
 

@@ -11,18 +11,15 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from numba import njit
 
+from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.online.field import DistanceField
 from netsp.online.mission import Camera
 from netsp.online.sampling import lowest_along
 from netsp.online.scene import HalfSpace, Scene
 from netsp.online.surfaces import drawn_points, extent, mesh_of, surface_of
-
-Floats = npt.NDArray[np.float64]
-Bools = npt.NDArray[np.bool_]
 
 MOST_PATCHES = 200_000
 

@@ -12,10 +12,9 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.online.sampling import Field, candidates, lowest_along, of_solids, sample_many
-
-Floats = npt.NDArray[np.float64]
 
 ASK_ALL = 6
 """So many solids or fewer are all asked at every point."""

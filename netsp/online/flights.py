@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.literal import literal
 from netsp.online.pictures import (
@@ -26,8 +27,6 @@ from netsp.online.scene import Scene
 from netsp.online.simulate import Run
 from netsp.online.surfaces import extent
 from netsp.online.tether import GeodesicTether, Tether
-
-Floats = npt.NDArray[np.float64]
 
 COLOURS = ("#c2255c", "#1971c2")
 FRAMES = 120

@@ -14,8 +14,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.lns import Instance, best_classes
 from netsp.online.field import DistanceField
@@ -26,8 +26,6 @@ from netsp.online.tether import GeodesicTether, Tether
 from netsp.online.tree import ShortestTree, taut
 from netsp.solvers import solve_graph
 from netsp.travel import TravelGraph
-
-Floats = npt.NDArray[np.float64]
 
 NEIGHBOURS = 12
 """Waypoints nearest to each that legs are sought to."""

@@ -9,13 +9,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.literal import literal
 from netsp.online.scene import HalfSpace, Scene
 from netsp.online.surfaces import Triangles, drawn_points, extent, mesh_of, surface_of
 from netsp.online.tether import Tether
-
-Floats = npt.NDArray[np.float64]
 
 _SOLID, _PATH, _TETHER, _ANCHOR, _ROBOT = "#9aa5b1", "#0b69a3", "#e8590c", "#c92a2a", "#2b8a3e"
 

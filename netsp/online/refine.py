@@ -15,12 +15,10 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
+from netsp.arrays import Floats
 from netsp.online.field import DistanceField
 from netsp.online.mission import pushed_out
-
-Floats = npt.NDArray[np.float64]
 
 REFINEMENTS = ("none", "paper", "gradient")
 

@@ -9,13 +9,11 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.online.sampling import distance, lowest_along
 from netsp.online.tree import Grid
-
-Floats = npt.NDArray[np.float64]
 
 OMPL_PLANNERS = {"rrtstar": "RRTstar", "bitstar": "BITstar", "prmstar": "PRMstar"}
 

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.files import read_text
 from netsp.online import solids as kinds
@@ -34,7 +35,6 @@ from netsp.problem import (
 _STRICT = ConfigDict(frozen=True, extra="forbid")
 
 Row = tuple[int, list[float]]
-Floats = npt.NDArray[np.float64]
 
 
 class Sphere(BaseModel):

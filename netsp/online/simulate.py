@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.online.coverage import Coverage, patches_of
 from netsp.online.field import DistanceField
@@ -26,8 +26,6 @@ from netsp.online.tether import GeodesicTether, ReactTether, Tether
 from netsp.online.tree import Grid
 from netsp.online.vehicle import Vehicle, make_vehicle
 from netsp.online.water import Water
-
-Floats = npt.NDArray[np.float64]
 
 MODELS: dict[str, Callable[[DistanceField, float], Tethers]] = {
     "geodesic": GeodesicTether,

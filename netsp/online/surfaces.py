@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.online.scene import (
     Box,
@@ -19,7 +20,6 @@ from netsp.online.scene import (
     Torus,
 )
 
-Floats = npt.NDArray[np.float64]
 Faces = npt.NDArray[np.int64]
 Triangles = tuple[Floats, Faces]
 

@@ -14,12 +14,11 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.online.field import DistanceField
 from netsp.online.sampling import distance, lowest_along
 from netsp.online.tether.geodesic import GeodesicTether
-
-Floats = npt.NDArray[np.float64]
 
 MOST_CELLS = 20_000_000
 """So many cells take about 0.3 GiB."""

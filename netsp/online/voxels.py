@@ -18,12 +18,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.files import MOST_BYTES
 from netsp.online.closest import nearest_sites, sweep, windings
 from netsp.online.field import VoxelGrid
 
-Floats = npt.NDArray[np.float64]
 Progress = Callable[[str, float], None] | None
 
 DEFAULT_VOXELS = 200

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from netsp.arrays import Floats
 from netsp.problem import Point3
-
-Floats = npt.NDArray[np.float64]
 
 GUST_S = 5.0
 """Seconds over which a gust is forgotten."""

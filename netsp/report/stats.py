@@ -7,12 +7,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.stats import binom
 
+from netsp.arrays import Floats
 from netsp.compare.rows import FAILED, Row
-
-Floats = npt.NDArray[np.float64]
 
 CONFIDENCE = 0.95
 """Of the intervals about medians."""

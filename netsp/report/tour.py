@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.execute.plan import HOME, legs_of
 from netsp.execute.run import scene_of, suggested_delta
@@ -22,8 +23,6 @@ from netsp.online.tether import GeodesicTether
 from netsp.problem import Circle, Problem
 from netsp.report.page import STYLE
 from netsp.solution import Solution
-
-Floats = npt.NDArray[np.float64]
 
 FRAMES = 240
 WIDTH = 900.0

@@ -15,9 +15,9 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-import numpy.typing as npt
 from numba import njit
 
+from netsp.arrays import Floats, Ints
 from netsp.clock import NEVER, Flag
 from netsp.errors import InputError, NetspError
 from netsp.hsignature import Word
@@ -25,9 +25,6 @@ from netsp.roadmap.explore import LETTER, PARENT, Trie, add_child, longer, more_
 
 if TYPE_CHECKING:
     import networkx
-
-Floats = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True)

@@ -19,16 +19,12 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 from numba import njit
 
+from netsp.arrays import Floats, Ints
 from netsp.clock import NEVER, Flag
 from netsp.geometry import more_rows
 from netsp.roadmap.tangents import TangentGraph
-
-Ints = npt.NDArray[np.int64]
-Floats = npt.NDArray[np.float64]
-
 
 SAME = 1e4
 """Two arrivals at a directed arc with one word are one path when their lengths agree to this many

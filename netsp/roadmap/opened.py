@@ -16,6 +16,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
+from netsp.arrays import Bools, Floats, Ints
 from netsp.clock import Clock, TimeLimit
 from netsp.errors import InputError, NetspError
 from netsp.hsignature import reduce
@@ -24,7 +25,7 @@ from netsp.result import OPTIMALITY_TOLERANCE, OnProgress, Progress, Result
 from netsp.roadmap.paths import TautPaths
 from netsp.roadmap.taut import MAX_CLASSES, TautLegs, TautRoadmap
 from netsp.solution import Status
-from netsp.travel import Bools, Floats, Ints, TravelGraph
+from netsp.travel import TravelGraph
 
 ENOUGH = 10.0 * OPTIMALITY_TOLERANCE
 """A path is called optimal when its bound is within this share of it."""

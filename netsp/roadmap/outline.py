@@ -20,6 +20,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+from netsp.arrays import Floats, Ints
 from netsp.geometry import (
     TWO_PI,
     circle_circle_angles,
@@ -32,9 +33,6 @@ from netsp.geometry import (
 )
 from netsp.polygons import counterclockwise
 from netsp.problem import Circle, Problem
-
-Floats = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
 
 MARGIN = 1e-10
 EPSILON = 1e-12

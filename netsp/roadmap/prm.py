@@ -16,9 +16,9 @@ from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from numba import njit
 
+from netsp.arrays import Bools, Floats, Ints
 from netsp.clock import NEVER, Clock, Flag, TimeLimit
 from netsp.errors import InfeasibleError, InputError, LimitReachedError
 from netsp.geometry import depth_in_obstacle, segment_blocked
@@ -34,10 +34,6 @@ from netsp.roadmap.taut import TautLegs
 from netsp.roadmap.ways import sub_goals, tabulate
 from netsp.travel import UNTIMED, TravelGraph
 from netsp.ways import Ways
-
-Floats = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
-Bools = npt.NDArray[np.bool_]
 
 SAMPLES = 1000
 """Milestones, as in the paper."""

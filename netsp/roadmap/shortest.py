@@ -8,15 +8,12 @@ from itertools import pairwise
 from typing import NamedTuple, Protocol
 
 import numpy as np
-import numpy.typing as npt
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
+from netsp.arrays import Floats, Ints
 from netsp.roadmap.outline import Outline
 from netsp.roadmap.tangents import ARC_STEP, TangentGraph, build_tangents
-
-Floats = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
 
 
 class ShortestPaths(Protocol):

@@ -25,16 +25,13 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import shapely
 from numba import njit
 
+from netsp.arrays import Floats, Ints
 from netsp.clock import NEVER, Flag
 from netsp.hsignature import Word
 from netsp.problem import Circle, Problem
-
-Floats = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
 
 ROWS = 64
 """Rows of the matrix that one thread takes at a time."""

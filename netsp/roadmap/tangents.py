@@ -15,13 +15,11 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+from netsp.arrays import Floats, Ints
 from netsp.clock import NEVER, Flag
 from netsp.geometry import TWO_PI, more_rows, segment_blocked
 from netsp.roadmap.letters import arc_letters, segment_letters
 from netsp.roadmap.outline import Outline
-
-Floats = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
 
 ARC_STEP = math.radians(3.0)
 """Arcs are drawn as circumscribed chords of at most this turn: 0.023 % longer than the arc."""

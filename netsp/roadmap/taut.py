@@ -15,9 +15,9 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 
 import numpy as np
-import numpy.typing as npt
 from numba import njit
 
+from netsp.arrays import Bools, Floats, Ints
 from netsp.clock import NEVER, Clock, Flag, TimeLimit
 from netsp.errors import InputError, LimitReachedError, NetspError
 from netsp.hsignature import Word, concatenate, invert
@@ -42,10 +42,6 @@ from netsp.roadmap.slits import Slits, build_slits, slit_lengths
 from netsp.roadmap.ways import taut_ways
 from netsp.solution import KeptClasses
 from netsp.travel import UNTIMED, TravelGraph
-
-Floats = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
-Bools = npt.NDArray[np.bool_]
 
 MAX_CLASSES = 20_000
 """Default for the most augmented goals a travel graph may have. All legs of so many would take

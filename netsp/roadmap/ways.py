@@ -13,10 +13,10 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 import shapely
 from numba import njit
 
+from netsp.arrays import Floats, Ints
 from netsp.clock import NEVER, Flag
 from netsp.hsignature import signature
 from netsp.problem import Problem
@@ -24,9 +24,6 @@ from netsp.roadmap.outline import Outline, build_outline
 from netsp.roadmap.shortest import ContactGraph, ShortestPaths
 from netsp.roadmap.tangents import build_tangents
 from netsp.ways import Ways
-
-Floats = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
 
 AROUND = 8
 """Places for sub-goals around an obstacle."""

@@ -7,16 +7,14 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
+from netsp.arrays import Floats
 from netsp.online.field import DistanceField
 from netsp.online.mission import Mission
 from netsp.online.refine import refined
 from netsp.online.sampled import SampledWays
 from netsp.online.tether import GeodesicTether, ReactTether, Tether
 from netsp.online.tree import Grid, ShortestTree, Ways, taut
-
-Floats = npt.NDArray[np.float64]
 
 Tethers = GeodesicTether | ReactTether
 

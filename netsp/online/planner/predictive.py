@@ -13,15 +13,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from netsp.arrays import Floats
 from netsp.online.mission import pushed_out
-from netsp.online.planner.base import (
-    NORMAL,
-    RECOVERY,
-    Floats,
-    Planner,
-    dense,
-    points_along,
-)
+from netsp.online.planner.base import NORMAL, RECOVERY, Planner, dense, points_along
 from netsp.online.tether import GeodesicTether, Tether
 from netsp.online.tree import homotopic, length_of, taut
 

@@ -16,11 +16,12 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.online.field import DistanceField, finite_point
 from netsp.online.tether.pull import drive, follow, pull
 from netsp.online.tether.strand import length_of
-from netsp.online.tether.tether import Floats, Tether, strand_of
+from netsp.online.tether.tether import Tether, strand_of
 
 THINNEST = 1.8
 """In units of delta: no solid thicker than this is ever passed."""

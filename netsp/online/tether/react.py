@@ -22,11 +22,12 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.online.field import DistanceField
 from netsp.online.sampling import distance
 from netsp.online.tether.strand import see
-from netsp.online.tether.tether import Floats, Tether, strand_of
+from netsp.online.tether.tether import Tether, strand_of
 
 READINGS = ("listing", "text")
 

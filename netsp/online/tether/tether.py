@@ -8,9 +8,8 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from netsp.arrays import Floats
 from netsp.online.tether.strand import EXTRA, NX, NZ, PART, REACH0, REACH1, USED, WIDTH
-
-Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -6,13 +6,11 @@ import math
 import time
 
 import numpy as np
-import numpy.typing as npt
 
+from netsp.arrays import Floats
 from netsp.online.vehicle.control import DT, HORIZON, PredictiveControl
 from netsp.online.vehicle.dynamics import step
 from netsp.online.vehicle.kinematic import advance, turned
-
-Floats = npt.NDArray[np.float64]
 
 LEAD = 0.25
 """Metres that the point which the vehicle follows runs ahead of it at most."""

@@ -12,12 +12,10 @@ two and its library crashed beside that of HiGHS.
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 from numba import njit
 
+from netsp.arrays import Floats
 from netsp.online.vehicle.dynamics import MOST, linearised, step
-
-Floats = npt.NDArray[np.float64]
 
 HORIZON, DT = 20, 0.1
 """Steps ahead, and seconds of each."""

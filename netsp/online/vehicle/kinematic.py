@@ -6,9 +6,8 @@ import math
 from typing import Protocol
 
 import numpy as np
-import numpy.typing as npt
 
-Floats = npt.NDArray[np.float64]
+from netsp.arrays import Floats
 
 TURN = math.radians(60.0)
 """Radians per second that a kinematic vehicle turns by at most."""
