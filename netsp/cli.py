@@ -381,7 +381,8 @@ def _roadmap_options(args: argparse.Namespace) -> dict[str, object]:
 
 def _verify(args: argparse.Namespace) -> int:
     if args.measures:
-        from netsp.measuring import describe_path, read_path
+        from netsp.measuring import describe_path
+        from netsp.pathfile import read_path
         from netsp.problem import Problem
 
         path = read_path(args.solution)
@@ -445,7 +446,7 @@ def _plot(args: argparse.Namespace) -> int:
 def _is_scene(path: str) -> bool:
     """A file that describes a scene rather than a problem: by its fields."""
     from netsp.files import read_text
-    from netsp.problem import parse_json_object
+    from netsp.models import parse_json_object
 
     data = parse_json_object(read_text(path), path)
     return "goals" not in data and bool({"solids", "mesh", "cloud", "problem"} & data.keys())

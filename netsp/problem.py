@@ -8,11 +8,10 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -23,83 +22,31 @@ from pydantic import (
     Discriminator,
     Field,
     Tag,
-    ValidationError,
     WithJsonSchema,
     field_validator,
     model_validator,
 )
 
-from netsp.errors import InputError
+from netsp.fields import (
+    _POINT3_SCHEMA,
+    _STRICT,
+    Name,
+    NonNegative,
+    Point2,
+    Point3,
+    Positive,
+    _number,
+)
 from netsp.files import read_text
+from netsp.models import _brief, read_model
 from netsp.polygons import check_polygon, polygon_interior_point, polygon_signed_distance
 
 if TYPE_CHECKING:
     import shapely
 
-SCHEMA_VERSION = 1
-
-Model = TypeVar("Model", bound=BaseModel)
 
 RELATIVE_TOLERANCE = 1e-9
 """Lengths below this fraction of the problem's size count as zero (touching, on a boundary)."""
-
-LARGEST = 1e12
-"""Largest coordinate, radius or length in absolute value."""
-
-
-def _number(value: Any) -> Any:
-    """Numbers only: no strings, no booleans; numpy scalars are welcome."""
-    if isinstance(value, bool | np.bool_) or not isinstance(value, int | float | np.number):
-        raise ValueError(f"expected a number, got {_brief(value)}")
-    try:
-        number = float(value)
-    except OverflowError:
-        number = math.inf
-    if not math.isfinite(number):
-        raise ValueError(f"expected a finite number, got {_brief(value)}")
-    if abs(number) > LARGEST:
-        raise ValueError(f"expected a magnitude of at most {LARGEST:g}, got {_brief(value)}")
-    return number
-
-
-def _name(value: Any) -> Any:
-    """Names are shown in one line."""
-    if isinstance(value, str) and (len(value) > 200 or not value.isprintable()):
-        raise ValueError(
-            f"expected a name of at most 200 printable characters, got {_brief(value)}"
-        )
-    return value
-
-
-def _coordinates(value: Any, sizes: tuple[int, ...]) -> tuple[float, ...]:
-    text = " or ".join(("[x, y]" if k == 2 else "[x, y, z]") for k in sizes)
-    if isinstance(value, np.ndarray):
-        value = value.tolist()
-    if not isinstance(value, Sequence) or isinstance(value, str) or len(value) not in sizes:
-        raise ValueError(f"expected {text}, got {_brief(value)}")
-    return tuple(_number(v) for v in value)
-
-
-def _point3(value: Any) -> tuple[float, ...]:
-    xyz = _coordinates(value, (2, 3))
-    return xyz if len(xyz) == 3 else (*xyz, 0.0)
-
-
-Name = Annotated[str, BeforeValidator(_name)]
-Number = Annotated[float, BeforeValidator(_number)]
-Positive = Annotated[float, Field(gt=0), BeforeValidator(_number)]
-NonNegative = Annotated[float, Field(ge=0), BeforeValidator(_number)]
-Point2 = Annotated[
-    tuple[float, float],
-    BeforeValidator(lambda v: _coordinates(v, (2,))),
-    WithJsonSchema({"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2}),
-]
-_POINT3_SCHEMA = {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 3}
-Point3 = Annotated[
-    tuple[float, float, float], BeforeValidator(_point3), WithJsonSchema(_POINT3_SCHEMA)
-]
-
-_STRICT = ConfigDict(frozen=True, extra="forbid")
 
 
 class Circle(BaseModel):
@@ -417,85 +364,6 @@ class Problem(BaseModel):
             item.pop("name", None)
         text = json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)
         return hashlib.sha256(text.encode()).hexdigest()
-
-
-def read_model(model: type[Model], text: str | bytes, source: str) -> Model:
-    """A model of format version 1 from JSON, or `InputError` in one line."""
-    data = parse_json_object(text, source)
-    version = data.get("schema_version", None)
-    if version != SCHEMA_VERSION or isinstance(version, bool):
-        raise InputError(f"{source}: schema_version: expected {SCHEMA_VERSION}, got {version!r}")
-    try:
-        return model.model_validate(data)
-    except ValidationError as error:
-        raise InputError(f"{source}: {explain(error)}") from None
-
-
-def parse_json_object(text: str | bytes, source: str) -> dict[str, Any]:
-    """A JSON object without repeated keys, or `InputError` in one line."""
-
-    def unique(pairs: Iterable[tuple[str, Any]]) -> dict[str, Any]:
-        out: dict[str, Any] = {}
-        for key, value in pairs:
-            if key in out:
-                raise InputError(f"{source}: field {key!r} is given twice")
-            out[key] = value
-        return out
-
-    try:
-        data = json.loads(text, object_pairs_hook=unique)
-    except json.JSONDecodeError as error:
-        raise InputError(
-            f"{source}: not JSON: {error.msg} at line {error.lineno}, column {error.colno}"
-        ) from None
-    except ValueError:
-        raise InputError(
-            f"{source}: not JSON that netsp reads: a number has too many digits"
-        ) from None
-    except RecursionError:
-        raise InputError(f"{source}: not JSON that netsp reads: nested too deeply") from None
-    if not isinstance(data, dict):
-        raise InputError(f"{source}: expected a JSON object, got {type(data).__name__}")
-    return data
-
-
-def explain(error: ValidationError) -> str:
-    """The first complaint of a validation error in one line: field, complaint, value."""
-    errors = error.errors(include_url=False)
-    first = errors[0]
-    where = ""
-    for k, part in enumerate(first["loc"]):
-        if isinstance(part, int):
-            where += f"[{part}]"
-        elif not (k == 2 and first["loc"][0] == "obstacles"):  # there pydantic tells the kind
-            where += f".{part}" if where else part
-    kind, context = first["type"], first.get("ctx", {})
-    got = f"got {_brief(first['input'])}"
-    if kind == "extra_forbidden":
-        message = "unknown field"
-    elif kind == "missing":
-        message = "missing"
-    elif kind in ("value_error", "obstacle"):
-        message = first["msg"].removeprefix("Value error, ")
-    elif kind == "too_short":
-        message = f"expected at least {context['min_length']}, got {context['actual_length']}"
-    elif kind == "greater_than":
-        message = f"expected a number > {context['gt']:g}, {got}"
-    elif kind == "greater_than_equal":
-        message = f"expected a number >= {context['ge']:g}, {got}"
-    else:
-        message = f"{_decapitalise(first['msg'])}, {got}"
-    more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
-    return f"{where}: {message}{more}" if where else f"{message}{more}"
-
-
-def _decapitalise(text: str) -> str:
-    return text[:1].lower() + text[1:]
-
-
-def _brief(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else text[:57] + "…"
 
 
 def _show(position: Sequence[float]) -> str:

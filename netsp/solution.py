@@ -9,14 +9,9 @@ from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from netsp.fields import Name, NonNegative, Number, Point3
 from netsp.files import read_text, write_text
-from netsp.problem import (
-    Name,
-    NonNegative,
-    Number,
-    Point3,
-    read_model,
-)
+from netsp.models import read_model
 
 
 class Status(StrEnum):

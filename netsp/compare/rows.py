@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any
 
 from netsp.errors import InputError
+from netsp.fields import LARGEST
 from netsp.files import read_bytes, read_gzip
-from netsp.problem import LARGEST
 
 SCHEMA = "netsp-trial/1"
 Row = dict[str, Any]

@@ -14,8 +14,9 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from netsp.errors import InputError
+from netsp.fields import Positive
 from netsp.files import read_text
-from netsp.problem import Positive, explain
+from netsp.models import explain
 from netsp.solvers import PARAMS, ROADMAPS, SOLVERS, check_solver
 from netsp.worlds import FAMILIES
 

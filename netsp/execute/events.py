@@ -9,20 +9,10 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from netsp.errors import InputError
+from netsp.fields import NonNegative, Point2, Point3, Positive
 from netsp.files import read_text
-from netsp.problem import (
-    Circle,
-    GoalLike,
-    NonNegative,
-    Obstacle,
-    Point2,
-    Point3,
-    Polygon,
-    Positive,
-    Problem,
-    explain,
-    read_model,
-)
+from netsp.models import explain, read_model
+from netsp.problem import Circle, GoalLike, Obstacle, Polygon, Problem
 
 _STRICT = ConfigDict(frozen=True, extra="forbid")
 

@@ -15,6 +15,7 @@ from netsp.execute.aside import aside
 from netsp.execute.events import Event, Surprises, changed, index_of
 from netsp.execute.plan import HOME, Leg, legs_of
 from netsp.execute.repair import REPLAN_S, Repair, broken, reachable, repair
+from netsp.fields import Point3
 from netsp.hsignature import Word, signature
 from netsp.judge import verify
 from netsp.online.field import DistanceField
@@ -25,7 +26,7 @@ from netsp.online.tether import GeodesicTether, Tether
 from netsp.online.tether.geodesic import THINNEST
 from netsp.online.vehicle import make_vehicle
 from netsp.online.water import Water
-from netsp.problem import Point3, Problem
+from netsp.problem import Problem
 from netsp.solution import Solution, Status
 
 RESOLUTION = 1e-4

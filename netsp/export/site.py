@@ -18,7 +18,8 @@ from pydantic import ValidationError
 from netsp.errors import InputError
 from netsp.export.projection import Projection
 from netsp.files import read_text
-from netsp.problem import Problem, explain, parse_json_object
+from netsp.models import explain, parse_json_object
+from netsp.problem import Problem
 
 STANDING = {"pile", "platform", "obstruction"}
 

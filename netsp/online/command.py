@@ -14,7 +14,6 @@ import numpy as np
 from netsp.arrays import Floats
 from netsp.errors import EXIT_DEFECT, EXIT_NOT_ALL, InputError
 from netsp.files import read_text, write_text
-from netsp.measuring import read_path
 from netsp.online import flights, pictures
 from netsp.online.field import DistanceField, finite_point
 from netsp.online.mission import Mission
@@ -23,6 +22,7 @@ from netsp.online.scene import Scene
 from netsp.online.simulate import STEP, LogRow, Run, simulate, write_run
 from netsp.online.tether import GeodesicTether, ReactTether, Tether
 from netsp.online.tether.geodesic import THINNEST
+from netsp.pathfile import read_path
 
 MODELS = {"geodesic": GeodesicTether, "react": ReactTether}
 

@@ -10,16 +10,11 @@ import numpy.typing as npt
 from pydantic import BaseModel, ConfigDict, Field
 
 from netsp.errors import InputError
+from netsp.fields import Name, NonNegative, Point3, Positive
 from netsp.files import read_text
+from netsp.models import read_model
 from netsp.online.field import DistanceField
 from netsp.online.scene import Scene
-from netsp.problem import (
-    Name,
-    NonNegative,
-    Point3,
-    Positive,
-    read_model,
-)
 
 _STRICT = ConfigDict(frozen=True, extra="forbid")
 

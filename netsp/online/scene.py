@@ -16,21 +16,12 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from netsp.arrays import Floats
 from netsp.errors import InputError
+from netsp.fields import Name, NonNegative, Number, Point2, Point3, Positive
 from netsp.files import read_text
+from netsp.models import read_model
 from netsp.online import solids as kinds
 from netsp.online.field import DistanceField
-from netsp.problem import (
-    Circle,
-    Name,
-    NonNegative,
-    Number,
-    Point2,
-    Point3,
-    Polygon,
-    Positive,
-    Problem,
-    read_model,
-)
+from netsp.problem import Circle, Polygon, Problem
 
 _STRICT = ConfigDict(frozen=True, extra="forbid")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from netsp.arrays import Floats
-from netsp.problem import Point3
+from netsp.fields import Point3
 
 GUST_S = 5.0
 """Seconds over which a gust is forgotten."""

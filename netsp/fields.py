@@ -1,0 +1,83 @@
+"""Field types of all file formats: checked numbers, points and names, for pydantic models."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import BeforeValidator, ConfigDict, Field, WithJsonSchema
+
+from netsp.models import _brief
+
+LARGEST = 1e12
+"""Largest coordinate, radius or length in absolute value."""
+
+
+def _number(value: Any) -> Any:
+    """Numbers only: no strings, no booleans; numpy scalars are welcome."""
+    if isinstance(value, bool | np.bool_) or not isinstance(value, int | float | np.number):
+        raise ValueError(f"expected a number, got {_brief(value)}")
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number):
+        raise ValueError(f"expected a finite number, got {_brief(value)}")
+    if abs(number) > LARGEST:
+        raise ValueError(f"expected a magnitude of at most {LARGEST:g}, got {_brief(value)}")
+    return number
+
+
+def _name(value: Any) -> Any:
+    """Names are shown in one line."""
+    if isinstance(value, str) and (len(value) > 200 or not value.isprintable()):
+        raise ValueError(
+            f"expected a name of at most 200 printable characters, got {_brief(value)}"
+        )
+    return value
+
+
+def _coordinates(value: Any, sizes: tuple[int, ...]) -> tuple[float, ...]:
+    text = " or ".join(("[x, y]" if k == 2 else "[x, y, z]") for k in sizes)
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
+    if not isinstance(value, Sequence) or isinstance(value, str) or len(value) not in sizes:
+        raise ValueError(f"expected {text}, got {_brief(value)}")
+    return tuple(_number(v) for v in value)
+
+
+def _point3(value: Any) -> tuple[float, ...]:
+    xyz = _coordinates(value, (2, 3))
+    return xyz if len(xyz) == 3 else (*xyz, 0.0)
+
+
+Name = Annotated[str, BeforeValidator(_name)]
+
+
+Number = Annotated[float, BeforeValidator(_number)]
+
+
+Positive = Annotated[float, Field(gt=0), BeforeValidator(_number)]
+
+
+NonNegative = Annotated[float, Field(ge=0), BeforeValidator(_number)]
+
+
+Point2 = Annotated[
+    tuple[float, float],
+    BeforeValidator(lambda v: _coordinates(v, (2,))),
+    WithJsonSchema({"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2}),
+]
+
+
+_POINT3_SCHEMA = {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 3}
+
+
+Point3 = Annotated[
+    tuple[float, float, float], BeforeValidator(_point3), WithJsonSchema(_POINT3_SCHEMA)
+]
+
+
+_STRICT = ConfigDict(frozen=True, extra="forbid")

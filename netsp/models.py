@@ -1,0 +1,95 @@
+"""Models from JSON text: one line of complaint for anything wrong, naming field and value."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ValidationError
+
+from netsp.errors import InputError
+
+SCHEMA_VERSION = 1
+
+
+Model = TypeVar("Model", bound=BaseModel)
+
+
+def read_model(model: type[Model], text: str | bytes, source: str) -> Model:
+    """A model of format version 1 from JSON, or `InputError` in one line."""
+    data = parse_json_object(text, source)
+    version = data.get("schema_version", None)
+    if version != SCHEMA_VERSION or isinstance(version, bool):
+        raise InputError(f"{source}: schema_version: expected {SCHEMA_VERSION}, got {version!r}")
+    try:
+        return model.model_validate(data)
+    except ValidationError as error:
+        raise InputError(f"{source}: {explain(error)}") from None
+
+
+def parse_json_object(text: str | bytes, source: str) -> dict[str, Any]:
+    """A JSON object without repeated keys, or `InputError` in one line."""
+
+    def unique(pairs: Iterable[tuple[str, Any]]) -> dict[str, Any]:
+        out: dict[str, Any] = {}
+        for key, value in pairs:
+            if key in out:
+                raise InputError(f"{source}: field {key!r} is given twice")
+            out[key] = value
+        return out
+
+    try:
+        data = json.loads(text, object_pairs_hook=unique)
+    except json.JSONDecodeError as error:
+        raise InputError(
+            f"{source}: not JSON: {error.msg} at line {error.lineno}, column {error.colno}"
+        ) from None
+    except ValueError:
+        raise InputError(
+            f"{source}: not JSON that netsp reads: a number has too many digits"
+        ) from None
+    except RecursionError:
+        raise InputError(f"{source}: not JSON that netsp reads: nested too deeply") from None
+    if not isinstance(data, dict):
+        raise InputError(f"{source}: expected a JSON object, got {type(data).__name__}")
+    return data
+
+
+def explain(error: ValidationError) -> str:
+    """The first complaint of a validation error in one line: field, complaint, value."""
+    errors = error.errors(include_url=False)
+    first = errors[0]
+    where = ""
+    for k, part in enumerate(first["loc"]):
+        if isinstance(part, int):
+            where += f"[{part}]"
+        elif not (k == 2 and first["loc"][0] == "obstacles"):  # there pydantic tells the kind
+            where += f".{part}" if where else part
+    kind, context = first["type"], first.get("ctx", {})
+    got = f"got {_brief(first['input'])}"
+    if kind == "extra_forbidden":
+        message = "unknown field"
+    elif kind == "missing":
+        message = "missing"
+    elif kind in ("value_error", "obstacle"):
+        message = first["msg"].removeprefix("Value error, ")
+    elif kind == "too_short":
+        message = f"expected at least {context['min_length']}, got {context['actual_length']}"
+    elif kind == "greater_than":
+        message = f"expected a number > {context['gt']:g}, {got}"
+    elif kind == "greater_than_equal":
+        message = f"expected a number >= {context['ge']:g}, {got}"
+    else:
+        message = f"{_decapitalise(first['msg'])}, {got}"
+    more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
+    return f"{where}: {message}{more}" if where else f"{message}{more}"
+
+
+def _decapitalise(text: str) -> str:
+    return text[:1].lower() + text[1:]
+
+
+def _brief(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "…"
