@@ -12,7 +12,7 @@ from table import ROOT, head, heading, row
 
 from netsp import Problem, Solution, solve
 from netsp.execute import Options, Surprises, execute
-from netsp.execute.run import Execution
+from netsp.execute.log import Execution
 from netsp.online.mission import Mission
 from netsp.online.order import reorder
 from netsp.worlds import random_world

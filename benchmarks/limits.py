@@ -17,7 +17,7 @@ from table import head, heading, row
 
 from netsp import Circle, Problem, solve
 from netsp.errors import NetspError
-from netsp.solvers import BLIND, SOLVERS
+from netsp.solvers.solve import BLIND, SOLVERS
 from netsp.worlds import random_world
 
 

@@ -19,8 +19,9 @@ import numpy as np
 from table import head, heading, row
 
 from netsp import Problem, Status, TravelGraph, solve_graph, travel_graph, verify
-from netsp.result import Result
-from netsp.solvers import BLIND, to_solution
+from netsp.solvers.answer import to_solution
+from netsp.solvers.solve import BLIND
+from netsp.travel.result import Result
 from netsp.worlds import random_world
 
 GOALS = (5, 10, 15, 20)

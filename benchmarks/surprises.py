@@ -26,7 +26,8 @@ from table import ROOT, head, heading, row
 from netsp import Circle, Problem, Solution, solve
 from netsp.errors import NetspError
 from netsp.execute import Options, Surprises, execute
-from netsp.execute.run import Execution, suggested_delta
+from netsp.execute.log import Execution
+from netsp.online.tether.resolution import suggested_delta
 from netsp.worlds import random_world
 
 KINDS = (

@@ -22,8 +22,8 @@ from table import ROOT, head, heading, row
 from netsp import Problem
 from netsp.hsignature import signature
 from netsp.online import GeodesicTether, ReactTether, Scene
-from netsp.online.field import DistanceField
-from netsp.online.voxels import of_cloud_file
+from netsp.online.scene.field import DistanceField
+from netsp.online.scene.voxels import of_cloud_file
 from netsp.roadmap.paths import TautPaths
 from netsp.worlds import random_world
 

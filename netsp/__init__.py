@@ -17,10 +17,10 @@ if TYPE_CHECKING:
     from netsp.errors import InfeasibleError, InputError, NetspError, VerificationError
     from netsp.judge import Verification, verify
     from netsp.problem import Circle, Goal, Polygon, Problem, State
-    from netsp.result import Progress, Result
     from netsp.solution import Solution, Status
-    from netsp.solvers import solve, solve_graph, travel_graph
-    from netsp.travel import TravelGraph
+    from netsp.solvers.solve import solve, solve_graph, travel_graph
+    from netsp.travel.graph import TravelGraph
+    from netsp.travel.result import Progress, Result
 
 __version__ = "0.1.0"
 
@@ -32,17 +32,17 @@ _PUBLIC = {
     "NetspError": "errors",
     "Polygon": "problem",
     "Problem": "problem",
-    "Progress": "result",
-    "Result": "result",
+    "Progress": "travel.result",
+    "Result": "travel.result",
     "Solution": "solution",
     "State": "problem",
     "Status": "solution",
-    "TravelGraph": "travel",
+    "TravelGraph": "travel.graph",
     "Verification": "judge",
     "VerificationError": "errors",
-    "solve": "solvers",
-    "solve_graph": "solvers",
-    "travel_graph": "solvers",
+    "solve": "solvers.solve",
+    "solve_graph": "solvers.solve",
+    "travel_graph": "solvers.solve",
     "verify": "judge",
 }
 

@@ -2,6 +2,6 @@
 
 import sys
 
-from netsp.cli import main
+from netsp.command.main import main
 
 sys.exit(main())

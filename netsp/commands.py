@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from netsp.arguments import check_writable, length, natural, positive, seconds
+from netsp.command.types import check_writable, length, natural, positive, seconds
 
 
 def add_online(commands: Any) -> None:
@@ -119,33 +119,33 @@ def add_online(commands: Any) -> None:
 
 
 def _simulate(args: argparse.Namespace) -> int:
-    from netsp.online.command import run_mission
+    from netsp.command.simulate import run_mission
 
     return run_mission(args)
 
 
 def _execute(args: argparse.Namespace) -> int:
-    from netsp.execute.command import run_execute
+    from netsp.command.execute import run_execute
 
     return run_execute(args)
 
 
 def _order(args: argparse.Namespace) -> int:
-    from netsp.online.command import run_order
+    from netsp.command.simulate import run_order
 
     check_writable(args.output, inputs=(args.mission,))
     return run_order(args)
 
 
 def _export(args: argparse.Namespace) -> int:
-    from netsp.export.command import run_export
+    from netsp.command.export import run_export
 
     check_writable(args.output, inputs=(args.solution, args.problem))
     return run_export(args)
 
 
 def _import(args: argparse.Namespace) -> int:
-    from netsp.export.command import run_import
+    from netsp.command.export import run_import
 
     check_writable(args.output, inputs=(args.site,))
     return run_import(args)

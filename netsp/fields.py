@@ -9,33 +9,31 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import BeforeValidator, ConfigDict, Field, WithJsonSchema
 
-from netsp.models import _brief
+from netsp.models import shown
 
 LARGEST = 1e12
 """Largest coordinate, radius or length in absolute value."""
 
 
-def _number(value: Any) -> Any:
+def checked_number(value: Any) -> Any:
     """Numbers only: no strings, no booleans; numpy scalars are welcome."""
     if isinstance(value, bool | np.bool_) or not isinstance(value, int | float | np.number):
-        raise ValueError(f"expected a number, got {_brief(value)}")
+        raise ValueError(f"expected a number, got {shown(value)}")
     try:
         number = float(value)
     except OverflowError:
         number = math.inf
     if not math.isfinite(number):
-        raise ValueError(f"expected a finite number, got {_brief(value)}")
+        raise ValueError(f"expected a finite number, got {shown(value)}")
     if abs(number) > LARGEST:
-        raise ValueError(f"expected a magnitude of at most {LARGEST:g}, got {_brief(value)}")
+        raise ValueError(f"expected a magnitude of at most {LARGEST:g}, got {shown(value)}")
     return number
 
 
 def _name(value: Any) -> Any:
     """Names are shown in one line."""
     if isinstance(value, str) and (len(value) > 200 or not value.isprintable()):
-        raise ValueError(
-            f"expected a name of at most 200 printable characters, got {_brief(value)}"
-        )
+        raise ValueError(f"expected a name of at most 200 printable characters, got {shown(value)}")
     return value
 
 
@@ -44,8 +42,8 @@ def _coordinates(value: Any, sizes: tuple[int, ...]) -> tuple[float, ...]:
     if isinstance(value, np.ndarray):
         value = value.tolist()
     if not isinstance(value, Sequence) or isinstance(value, str) or len(value) not in sizes:
-        raise ValueError(f"expected {text}, got {_brief(value)}")
-    return tuple(_number(v) for v in value)
+        raise ValueError(f"expected {text}, got {shown(value)}")
+    return tuple(checked_number(v) for v in value)
 
 
 def _point3(value: Any) -> tuple[float, ...]:
@@ -56,13 +54,13 @@ def _point3(value: Any) -> tuple[float, ...]:
 Name = Annotated[str, BeforeValidator(_name)]
 
 
-Number = Annotated[float, BeforeValidator(_number)]
+Number = Annotated[float, BeforeValidator(checked_number)]
 
 
-Positive = Annotated[float, Field(gt=0), BeforeValidator(_number)]
+Positive = Annotated[float, Field(gt=0), BeforeValidator(checked_number)]
 
 
-NonNegative = Annotated[float, Field(ge=0), BeforeValidator(_number)]
+NonNegative = Annotated[float, Field(ge=0), BeforeValidator(checked_number)]
 
 
 Point2 = Annotated[
@@ -72,12 +70,12 @@ Point2 = Annotated[
 ]
 
 
-_POINT3_SCHEMA = {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 3}
+POINT3_SCHEMA = {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 3}
 
 
 Point3 = Annotated[
-    tuple[float, float, float], BeforeValidator(_point3), WithJsonSchema(_POINT3_SCHEMA)
+    tuple[float, float, float], BeforeValidator(_point3), WithJsonSchema(POINT3_SCHEMA)
 ]
 
 
-_STRICT = ConfigDict(frozen=True, extra="forbid")
+STRICT = ConfigDict(frozen=True, extra="forbid")

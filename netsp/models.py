@@ -67,7 +67,7 @@ def explain(error: ValidationError) -> str:
         elif not (k == 2 and first["loc"][0] == "obstacles"):  # there pydantic tells the kind
             where += f".{part}" if where else part
     kind, context = first["type"], first.get("ctx", {})
-    got = f"got {_brief(first['input'])}"
+    got = f"got {shown(first['input'])}"
     if kind == "extra_forbidden":
         message = "unknown field"
     elif kind == "missing":
@@ -90,6 +90,6 @@ def _decapitalise(text: str) -> str:
     return text[:1].lower() + text[1:]
 
 
-def _brief(value: Any) -> str:
+def shown(value: Any) -> str:
     text = repr(value)
     return text if len(text) <= 60 else text[:57] + "…"

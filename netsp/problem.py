@@ -28,18 +28,18 @@ from pydantic import (
 )
 
 from netsp.fields import (
-    _POINT3_SCHEMA,
-    _STRICT,
+    POINT3_SCHEMA,
+    STRICT,
     Name,
     NonNegative,
     Point2,
     Point3,
     Positive,
-    _number,
+    checked_number,
 )
 from netsp.files import read_text
-from netsp.models import _brief, read_model
-from netsp.polygons import check_polygon, polygon_interior_point, polygon_signed_distance
+from netsp.geometry.polygons import check_polygon, polygon_interior_point, polygon_signed_distance
+from netsp.models import read_model, shown
 
 if TYPE_CHECKING:
     import shapely
@@ -52,7 +52,7 @@ RELATIVE_TOLERANCE = 1e-9
 class Circle(BaseModel):
     """A vertical cylinder of unlimited height, given by its plan: centre and radius."""
 
-    model_config = _STRICT
+    model_config = STRICT
     center: Point2
     radius: Positive
     name: Name | None = None
@@ -77,7 +77,7 @@ class Circle(BaseModel):
 class Polygon(BaseModel):
     """A vertical prism of unlimited height over a simple polygon, convex or not."""
 
-    model_config = _STRICT
+    model_config = STRICT
     polygon: Annotated[tuple[Point2, ...], Field(min_length=3)]
     name: Name | None = None
 
@@ -127,7 +127,7 @@ Obstacle = Annotated[
 class Goal(BaseModel):
     """A point to inspect."""
 
-    model_config = _STRICT
+    model_config = STRICT
     position: Point3
     name: Name | None = None
 
@@ -142,10 +142,10 @@ GoalLike = Annotated[
     WithJsonSchema(
         {
             "anyOf": [
-                _POINT3_SCHEMA,
+                POINT3_SCHEMA,
                 {
                     "type": "object",
-                    "properties": {"name": {"type": "string"}, "position": _POINT3_SCHEMA},
+                    "properties": {"name": {"type": "string"}, "position": POINT3_SCHEMA},
                     "required": ["position"],
                     "additionalProperties": False,
                 },
@@ -158,7 +158,7 @@ GoalLike = Annotated[
 class State(BaseModel):
     """Where a robot on a tether is: its position, and the word of the taut tether there."""
 
-    model_config = _STRICT
+    model_config = STRICT
     position: Point3
     signature: tuple[int, ...] = ()
 
@@ -226,8 +226,8 @@ class Problem(BaseModel):
         if isinstance(value, np.ndarray):
             value = value.tolist()
         if not isinstance(value, Sequence) or isinstance(value, str) or len(value) != 4:
-            raise ValueError(f"expected [xmin, ymin, xmax, ymax], got {_brief(value)}")
-        box = tuple(_number(v) for v in value)
+            raise ValueError(f"expected [xmin, ymin, xmax, ymax], got {shown(value)}")
+        box = tuple(checked_number(v) for v in value)
         if not (box[0] < box[2] and box[1] < box[3]):
             raise ValueError(f"expected xmin < xmax and ymin < ymax, got {list(box)}")
         return box

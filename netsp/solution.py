@@ -9,7 +9,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from netsp.fields import Name, NonNegative, Number, Point3
+from netsp.fields import STRICT, Name, NonNegative, Number, Point3
 from netsp.files import read_text, write_text
 from netsp.models import read_model
 
@@ -29,9 +29,6 @@ class Status(StrEnum):
     INVALID = "invalid"
 
 
-_STRICT = ConfigDict(frozen=True, extra="forbid")
-
-
 KeptClasses = Literal["all", "non-looping", "shortest"]
 """Which homotopy classes a roadmap held."""
 
@@ -39,7 +36,7 @@ KeptClasses = Literal["all", "non-looping", "shortest"]
 class ProblemReference(BaseModel):
     """Which problem a solution belongs to."""
 
-    model_config = _STRICT
+    model_config = STRICT
     name: Name
     sha256: str
 
@@ -47,7 +44,7 @@ class ProblemReference(BaseModel):
 class Visit(BaseModel):
     """One stop of the tour: the goal (0-based), the word of the tether there, its taut length."""
 
-    model_config = _STRICT
+    model_config = STRICT
     goal: Annotated[int, Field(ge=0)]
     signature: tuple[int, ...]
     tether_length: NonNegative
@@ -56,7 +53,7 @@ class Visit(BaseModel):
 class Timings(BaseModel):
     """Wall-clock seconds by stage."""
 
-    model_config = _STRICT
+    model_config = STRICT
     roadmap_s: float = 0.0
     matrix_s: float = 0.0
     solve_s: float = 0.0

@@ -10,7 +10,7 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from netsp.cli import main
+from netsp.command.main import main
 
 ROOT = Path(__file__).parent.parent
 PROBLEMS = ROOT / "problems"
@@ -169,7 +169,7 @@ def test_ctrl_c_leaves_a_verified_solution(tmp_path):
 
 def test_help_imports_nothing_heavy():
     code = (
-        "import sys, netsp.cli as c\n"
+        "import sys, netsp.command.main as c\n"
         "try: c.main(['--help'])\n"
         "except SystemExit: pass\n"
         "names = {'numpy', 'numba', 'pydantic', 'pulp', 'matplotlib', 'shapely'}\n"

@@ -14,13 +14,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from netsp import InputError, solve
-from netsp.cli import main
+from netsp.command.main import main
 from netsp.compare import pool
 from netsp.compare.rows import RowsFile, combine, read_rows
 from netsp.compare.run import compare
 from netsp.compare.study import Study, shard
 from netsp.compare.trial import MOST_POINTS, thinned, world_of
-from netsp.solvers import PARAMS, SOLVERS
+from netsp.solvers.solve import PARAMS, SOLVERS
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -186,7 +186,7 @@ def test_solvers_that_crash_hang_or_eat_cost_one_row_each(tmp_path, monkeypatch)
     patch = f"""
         import sys
         sys.path.insert(0, {str(ROOT)!r})
-        from netsp.solvers import PARAMS, SOLVERS
+        from netsp.solvers.solve import PARAMS, SOLVERS
         for name in {sorted(names)}:
             SOLVERS[name], PARAMS[name] = f"badsolvers:{{name}}", "badsolvers:Params"
     """

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp import InputError, Problem, Status, TravelGraph, solve, solve_graph, verify
-from netsp.solvers import BLIND, GEOMETRIC, ROADMAPS, SOLVERS, travel_graph
+from netsp.solvers.solve import BLIND, GEOMETRIC, ROADMAPS, SOLVERS, travel_graph
 from tests.brute import brute_tour
 from tests.worlds import random_world
 

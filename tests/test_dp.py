@@ -145,7 +145,7 @@ def test_labels_do_not_depend_on_how_many_share_the_work(monkeypatch):
 def test_dp_proves_the_same_optimum_as_mip_whether_legs_are_measured_or_bounded(seed, monkeypatch):
     problem = random_world(seed, circles=12, goals=7, tether=330.0)
     expected = solve_graph(travel_graph(problem), "mip").length
-    monkeypatch.setattr("netsp.legcosts.MEASURE_AT_ONCE", 20)
+    monkeypatch.setattr("netsp.solving.legcosts.MEASURE_AT_ONCE", 20)
     monkeypatch.setattr(SOLVE, "MEASURE_AT_ONCE", 20)
     result = solve_graph(travel_graph(problem), "dp", params={"search_rounds": 0})
     assert result.status is Status.OPTIMAL

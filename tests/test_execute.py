@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from netsp import Circle, InputError, Problem, Solution, solve
-from netsp.cli import main
+from netsp.command.main import main
 from netsp.execute import Options, Surprises, execute
 from netsp.execute.plan import HOME, legs_of
 from netsp.execute.repair import broken

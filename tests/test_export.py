@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp import Circle, InputError, Polygon, Problem, solve
-from netsp.cli import main
+from netsp.command.main import main
 from netsp.export import Projection, export, waypoints_of
 from netsp.export.site import read_site
 from netsp.hsignature import reduce, signature

@@ -186,13 +186,13 @@ def test_auto_proves_what_it_can():
 
 
 def test_auto_gives_a_tour_and_a_true_bound_where_mip_would_not_fit(monkeypatch):
-    import netsp.auto
+    import netsp.solvers.auto
 
     problem = random_world(1, goals=8, tether=300.0)
     best = solve(problem, "mip")
-    monkeypatch.setattr(netsp.auto, "PROVABLE", 10)
-    monkeypatch.setattr(netsp.auto.exact, "MOST_SUMS", 0.0)
-    monkeypatch.setattr(netsp.auto, "FEW_GOALS", 4)
+    monkeypatch.setattr(netsp.solvers.auto, "PROVABLE", 10)
+    monkeypatch.setattr(netsp.solvers.auto.exact, "MOST_SUMS", 0.0)
+    monkeypatch.setattr(netsp.solvers.auto, "FEW_GOALS", 4)
     solution = solve(problem, "auto", iteration_limit=2_000)
     assert verify(problem, solution)
     assert solution.lower_bound is not None
@@ -203,13 +203,13 @@ def test_auto_gives_a_tour_and_a_true_bound_where_mip_would_not_fit(monkeypatch)
 @pytest.mark.parametrize("kept", [16, 40, 4000])
 def test_few_goals_are_proven_over_the_shortest_classes(monkeypatch, kept):
     """The status claims no more than was looked at, the bound holds for all."""
-    import netsp.auto
+    import netsp.solvers.auto
 
     problem = random_world(1, goals=8, tether=300.0)
     best = solve(problem, "mip")
-    monkeypatch.setattr(netsp.auto, "PROVABLE", 10)
-    monkeypatch.setattr(netsp.auto.exact, "MOST_SUMS", 0.0)
-    monkeypatch.setattr(netsp.auto, "MOST_KEPT", kept)
+    monkeypatch.setattr(netsp.solvers.auto, "PROVABLE", 10)
+    monkeypatch.setattr(netsp.solvers.auto.exact, "MOST_SUMS", 0.0)
+    monkeypatch.setattr(netsp.solvers.auto, "MOST_KEPT", kept)
     solution = solve(problem, "auto")
     assert verify(problem, solution)
     assert solution.lower_bound is not None
@@ -224,7 +224,7 @@ def test_few_goals_are_proven_over_the_shortest_classes(monkeypatch, kept):
 
 @pytest.mark.parametrize("seed", range(6))
 def test_sets_of_goals_and_cutting_planes_agree(seed):
-    from netsp import exact
+    from netsp.solvers import exact
 
     graph = travel_graph(random_world(seed, goals=7, tether=280.0))
     assert exact.fits(graph)
@@ -256,12 +256,12 @@ def test_a_limit_that_ends_in_the_root_leaves_a_true_bound(solver):
 
 
 def test_auto_bounds_large_graphs_without_geometry_too(monkeypatch):
-    import netsp.auto
+    import netsp.solvers.auto
 
     graph = random_graph(4, goals=6)
     best = brute_tour(graph)
-    monkeypatch.setattr(netsp.auto, "PROVABLE", 5)
-    monkeypatch.setattr(netsp.auto.exact, "MOST_SUMS", 0.0)
+    monkeypatch.setattr(netsp.solvers.auto, "PROVABLE", 5)
+    monkeypatch.setattr(netsp.solvers.auto.exact, "MOST_SUMS", 0.0)
     result = solve_graph(graph, "auto", iteration_limit=500)
     assert 0.0 < result.lower_bound <= best * (1 + 1e-9)
     assert result.length >= best * (1 - 1e-9)

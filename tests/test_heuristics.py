@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 
 from netsp import Circle, NetspError, Polygon, Problem, solve_graph
 from netsp.anneal import icra2017, rss2016
-from netsp.chance import seeded, uniform
+from netsp.compiled.chance import seeded, uniform
 from netsp.hsignature import concatenate, entangled, signature
-from netsp.legcosts import MEASURE_AT_ONCE
 from netsp.lns import Instance
-from netsp.solvers import ROADMAPS, travel_graph
+from netsp.solvers.solve import ROADMAPS, travel_graph
+from netsp.solving.legcosts import MEASURE_AT_ONCE
 from netsp.worlds import random_world as papers_world
 from tests.brute import brute_tour
 from tests.test_contract import random_graph

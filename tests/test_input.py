@@ -11,12 +11,12 @@ import pytest
 from matplotlib.figure import Figure
 
 from netsp import Circle, InputError, Problem, Solution, solve, verify
-from netsp.cli import main
+from netsp.command.main import main
 from netsp.errors import brief
 from netsp.execute import Options, Surprises, execute
 from netsp.files import cell, read_gzip, write_text
-from netsp.literal import literal
 from netsp.online.mission import Mission
+from netsp.pictures.literal import literal
 
 ROOT = Path(__file__).parent.parent
 SMALL = str(ROOT / "problems" / "known" / "triangle.json")

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp import Circle, Problem
-from netsp.cli import main
+from netsp.command.main import main
 from netsp.hsignature import concatenate, cyclically_reduced, entangled, invert, reduce
 from netsp.hsignature.measures import measure, self_crossings, winding_numbers
 
@@ -168,7 +168,7 @@ def test_a_tour_out_and_home_past_the_same_side_does_not_cross_itself():
 
 
 def test_a_byte_order_mark_does_not_cost_a_point(tmp_path):
-    from netsp.pathfile import read_path
+    from netsp.files import read_path
 
     (tmp_path / "a.csv").write_text("\ufeff0,0\n1,1\n", encoding="utf-8")
     assert len(read_path(tmp_path / "a.csv")) == 2

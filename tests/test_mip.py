@@ -7,7 +7,6 @@ import psutil
 import pytest
 
 from netsp import travel_graph
-from netsp.legcosts import MEASURE_AT_ONCE
 from netsp.mip import solve
 from netsp.mip.bound import dual_bound, exact_bound, fixing_costs, reduced_costs
 from netsp.mip.cbc_program import CbcRelaxation
@@ -16,6 +15,7 @@ from netsp.mip.program import Cut
 from netsp.mip.subtours import components, fractional_cuts
 from netsp.roadmap.taut import TautRoadmap
 from netsp.solution import Status
+from netsp.solving.legcosts import MEASURE_AT_ONCE
 from netsp.worlds import random_world as far_world
 from tests.brute import brute_tour as brute
 from tests.test_contract import random_graph

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from netsp.cli import main
+from netsp.command.main import main
 from netsp.online import Scene
 from netsp.online.mission import Mission
 from netsp.online.order import reorder, travel_graph

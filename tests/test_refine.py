@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 
 from netsp import InputError
 from netsp.online import Scene
+from netsp.online.paths.refine import REFINEMENTS, clear, refined, smoothed
+from netsp.online.paths.sampled import OMPL_PLANNERS, SampledWays
+from netsp.online.paths.tree import Grid, homotopic, length_of, taut
 from netsp.online.planner import Options, make_planner
-from netsp.online.refine import REFINEMENTS, clear, refined, smoothed
-from netsp.online.sampled import OMPL_PLANNERS, SampledWays
-from netsp.online.tree import Grid, homotopic, length_of, taut
 
 POST = Scene(solids=[{"post": {"center": [0, 0], "radius": 0.5}}], bounds=(-3, -3, -1, 3, 3, 1))
 FIELD = POST.field()

@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import binom
 
-from netsp.cli import main
+from netsp.command.main import main
 from netsp.compare.rows import SCHEMA, read_rows
 from netsp.compare.run import compare
 from netsp.compare.study import Study

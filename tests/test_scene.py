@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp import InputError, Problem
-from netsp.cli import main
+from netsp.command.main import main
 from netsp.online import DistanceField, Scene
-from netsp.online.surfaces import surface_of
-from netsp.online.voxels import of_cloud, of_cloud_file, of_mesh, of_triangles
+from netsp.online.scene.surfaces import surface_of
+from netsp.online.scene.voxels import of_cloud, of_cloud_file, of_mesh, of_triangles
 
 trimesh = pytest.importorskip("trimesh")
 

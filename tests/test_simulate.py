@@ -11,12 +11,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp import InputError
-from netsp.cli import main
+from netsp.command.main import main
 from netsp.online import Scene
-from netsp.online.mission import Mission, pushed_out
+from netsp.online.mission import Mission
+from netsp.online.paths.tree import Grid, ShortestTree, length_of, taut
 from netsp.online.planner import PLANNERS
+from netsp.online.scene.field import pushed_out
 from netsp.online.simulate import simulate
-from netsp.online.tree import Grid, ShortestTree, length_of, taut
 from netsp.online.vehicle.kinematic import advance
 
 MISSIONS = Path(__file__).parent.parent / "missions"

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from netsp import InputError, Problem
 from netsp.hsignature import signature
 from netsp.online import GeodesicTether, ReactTether, Scene
-from netsp.online.field import DistanceField
-from netsp.online.voxels import of_triangles
+from netsp.online.scene.field import DistanceField
+from netsp.online.scene.voxels import of_triangles
 from netsp.roadmap.paths import TautPaths
 from netsp.worlds import random_world
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from netsp.cli import main
+from netsp.command.main import main
 
 PROBLEMS = Path(__file__).parent.parent / "problems"
 BROWSER = shutil.which("chromium") or shutil.which("chromium-browser")

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp import InputError, Problem, solve
-from netsp.cli import main
+from netsp.command.main import main
 from netsp.worlds import FAMILIES, random_world, reachable_world
 
 

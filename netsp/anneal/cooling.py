@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from netsp.run import Run
+from netsp.solving.run import Run
 
 
 @dataclass(frozen=True)

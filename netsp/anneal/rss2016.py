@@ -28,11 +28,12 @@ from numba import njit
 
 from netsp.anneal.cooling import Cooling, Schedule
 from netsp.arrays import Ints
-from netsp.chance import below, metropolis, seeded
 from netsp.clock import TimeLimit
-from netsp.result import OnProgress, Result
-from netsp.run import Run, read_params
-from netsp.travel import TravelGraph
+from netsp.compiled.chance import below, metropolis, seeded
+from netsp.solving.params import read_params
+from netsp.solving.run import Run
+from netsp.travel.graph import TravelGraph
+from netsp.travel.result import OnProgress, Result
 
 PROPOSALS_PER_GOAL = 20_000
 """Default number of proposals, times the number of goals, when nothing is limited."""

@@ -11,16 +11,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, Field, ValidationError, model_validator
 
 from netsp.errors import InputError
-from netsp.fields import Positive
+from netsp.fields import STRICT, Positive
 from netsp.files import read_text
 from netsp.models import explain
-from netsp.solvers import PARAMS, ROADMAPS, SOLVERS, check_solver
+from netsp.solvers.solve import PARAMS, ROADMAPS, SOLVERS, check_solver
 from netsp.worlds import FAMILIES
-
-_STRICT = ConfigDict(frozen=True, extra="forbid")
 
 Whole = Annotated[int, Field(ge=1, le=100_000)]
 Natural = Annotated[int, Field(ge=0)]
@@ -33,7 +31,7 @@ MOST_TRIALS = 500_000
 class Worlds(BaseModel):
     """Random worlds `first` to `first + count - 1` of a family (`netsp.worlds`)."""
 
-    model_config = _STRICT
+    model_config = STRICT
     family: str = "icra2017"
     count: Whole = 10
     first: Natural = 0
@@ -55,7 +53,7 @@ class Worlds(BaseModel):
 class Roadmap(BaseModel):
     """A roadmap by name, with options; `label` tells it apart in the results."""
 
-    model_config = _STRICT
+    model_config = STRICT
     name: str = "taut"
     label: str = ""
     options: dict[str, Any] = {}
@@ -72,7 +70,7 @@ class Roadmap(BaseModel):
 class Solver(BaseModel):
     """A solver by name, with options and limits of its own; `label` tells it apart."""
 
-    model_config = _STRICT
+    model_config = STRICT
     name: str
     label: str = ""
     time_limit: Positive | None = None
@@ -95,7 +93,7 @@ class Study(BaseModel):
     seeds. time_limit : seconds for a solver that has none of its own. memory_limit : GiB for one
     trial beyond what the worker needs to start."""
 
-    model_config = _STRICT
+    model_config = STRICT
     schema_version: Literal[1] = 1
     name: Annotated[str, Field(min_length=1)]
     goals: Annotated[tuple[Whole, ...], Field(min_length=1)]

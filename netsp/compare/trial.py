@@ -13,7 +13,7 @@ from netsp.compare.rows import SCHEMA, Row
 from netsp.compare.study import Trial
 from netsp.errors import InfeasibleError, InputError, NetspError
 from netsp.problem import Goal, Problem
-from netsp.result import Progress
+from netsp.travel.result import Progress
 
 MOST_POINTS = 200
 """Most points of a trial's history of bests that a row keeps."""
@@ -38,7 +38,7 @@ def run(trial: Trial) -> Row:
     Every trial builds its own roadmap and measures its own legs, so its times are what a user would
     see. Other exceptions are the worker's business (`netsp.compare.pool`).
     """
-    from netsp.solvers import solve
+    from netsp.solvers.solve import solve
 
     row: Row = {"status": "error", "message": ""}
     history: list[tuple[float, float | None, float | None]] = []
@@ -116,7 +116,7 @@ def _machine() -> str:
 def check(trial: Trial) -> None:
     """InputError now rather than in every trial: a roadmap's options that are unknown or wrong, by
     building it over a problem of one goal."""
-    from netsp.solvers import build_roadmap
+    from netsp.solvers.solve import build_roadmap
 
     name, options = trial.roadmap["name"], trial.roadmap["options"]
     goal = Goal(position=(1.0, 0.0, 0.0))

@@ -21,11 +21,11 @@ from netsp.arrays import Floats
 from netsp.clock import TimeLimit
 from netsp.dp.walks import Walks
 from netsp.errors import InputError
-from netsp.legcosts import MEASURE_AT_ONCE, LegCosts
-from netsp.lns.incumbent import SearchingRun
-from netsp.result import OnProgress, Result
-from netsp.run import read_params
-from netsp.travel import TravelGraph
+from netsp.solving.legcosts import MEASURE_AT_ONCE, LegCosts
+from netsp.solving.params import read_params
+from netsp.solving.searching import SearchingRun
+from netsp.travel.graph import TravelGraph
+from netsp.travel.result import OnProgress, Result
 
 STEP, SHORTER = 0.5, 0.7
 """First step of the prices as a share of the gap, and its factor after `STALL` passes in vain."""

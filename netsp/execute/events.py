@@ -9,12 +9,10 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from netsp.errors import InputError
-from netsp.fields import NonNegative, Point2, Point3, Positive
+from netsp.fields import STRICT, NonNegative, Point2, Point3, Positive
 from netsp.files import read_text
 from netsp.models import explain, read_model
 from netsp.problem import Circle, GoalLike, Obstacle, Polygon, Problem
-
-_STRICT = ConfigDict(frozen=True, extra="forbid")
 
 Which = Annotated[int, Field(ge=0)] | str
 """An obstacle or goal: its index, or its name."""
@@ -23,7 +21,7 @@ Which = Annotated[int, Field(ge=0)] | str
 class Move(BaseModel):
     """An obstacle is somewhere else from now on."""
 
-    model_config = _STRICT
+    model_config = STRICT
     obstacle: Which
     by: Point2
 
@@ -36,7 +34,7 @@ class Event(BaseModel):
     carried off. tether_length : a new limit.
     """
 
-    model_config = _STRICT
+    model_config = STRICT
 
     time: NonNegative
     appear: Obstacle | None = None

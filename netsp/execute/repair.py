@@ -21,12 +21,13 @@ from netsp.errors import LimitReachedError, NetspError
 from netsp.execute.plan import HOME, Leg, legs_of, length_of
 from netsp.hsignature import concatenate, crossings, signature
 from netsp.problem import Circle, Goal, Problem, State
-from netsp.result import Result
 from netsp.roadmap.opened import FAR, OpenedGraph, opened_graph
 from netsp.roadmap.paths import TautPaths
 from netsp.roadmap.reach import explain_unreached
 from netsp.solution import Status
-from netsp.solvers import solve_graph, to_solution
+from netsp.solvers.answer import to_solution
+from netsp.solvers.solve import solve_graph
+from netsp.travel.result import Result
 
 REPLAN_S = 2.0
 """Seconds that planning the rest of a tour may take; the robot holds its place meanwhile."""

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -13,152 +11,26 @@ from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.execute.aside import aside
 from netsp.execute.events import Event, Surprises, changed, index_of
+from netsp.execute.log import Arrival, Entry, Execution, Options, Row
 from netsp.execute.plan import HOME, Leg, legs_of
-from netsp.execute.repair import REPLAN_S, Repair, broken, reachable, repair
-from netsp.fields import Point3
-from netsp.hsignature import Word, signature
+from netsp.execute.repair import Repair, broken, reachable, repair
+from netsp.hsignature import signature
 from netsp.judge import verify
-from netsp.online.field import DistanceField
-from netsp.online.mission import pushed_out
 from netsp.online.planner.base import dense
-from netsp.online.scene import Scene
+from netsp.online.scene.field import DistanceField, pushed_out
+from netsp.online.scene.scene import scene_of
 from netsp.online.tether import GeodesicTether, Tether
-from netsp.online.tether.geodesic import THINNEST
+from netsp.online.tether.resolution import coarsest_delta, suggested_delta
 from netsp.online.vehicle import make_vehicle
 from netsp.online.water import Water
 from netsp.problem import Problem
 from netsp.solution import Solution, Status
-
-RESOLUTION = 1e-4
-"""The tether model is right to this share of the tether length; less is no exceedance."""
 
 HOLD_STEP = 0.1
 """Seconds between two rows of the log while the robot holds its place."""
 
 PATIENCE = 3.0
 """A leg is given up when it takes this many times as long as it should, and a minute."""
-
-
-@dataclass(frozen=True)
-class Options:
-    """How a tour is carried out.
-
-    speed : of the vehicle, length units per second. vehicle : `netsp.online.vehicle.VEHICLES`.
-    reach : a goal this near counts as visited by a vehicle with dynamics.
-    delta : resolution of the tether; default from the problem. repair : whether plans are mended.
-    planning_limit : seconds that mending a plan may take; the robot holds its place meanwhile.
-    current, gusts, seed : of the water.
-    """
-
-    speed: float = 0.5
-    vehicle: str = "kinematic"
-    reach: float = 0.1
-    delta: float | None = None
-    repair: bool = True
-    planning_limit: float = REPLAN_S
-    current: Point3 = (0.0, 0.0, 0.0)
-    gusts: float = 0.0
-    seed: int = 0
-
-
-@dataclass(frozen=True)
-class Row:
-    """One step: seconds, position, the goal that is next (-1 the base), mode (tour, shorten or
-    hold), taut tether and its limit, and whether the limit was lowered below the tether, which is
-    being shortened."""
-
-    time: float
-    x: float
-    y: float
-    z: float
-    goal: int
-    mode: str
-    tether: float
-    limit: float
-    shortening: bool = False
-
-
-@dataclass(frozen=True)
-class Arrival:
-    """A goal (-1: the base) was reached: the word of the online tether there and the planned one,
-    and both lengths."""
-
-    time: float
-    goal: int
-    word: Word
-    planned: Word
-    tether: float
-    planned_tether: float
-
-    @property
-    def as_planned(self) -> bool:
-        """Whether the tether is in the class that the plan says."""
-        return self.word == self.planned
-
-
-@dataclass(frozen=True)
-class Entry:
-    """Something happened, and what was done about it."""
-
-    time: float
-    event: str
-    done: str
-    reason: str
-    planning_s: float = 0.0
-
-
-@dataclass
-class Execution:
-    """What came of it.
-
-    problem : as it is at the end. rows, arrivals, entries : the logs. tether : at the end.
-    tethers : (time, nodes) of the tether now and then, for pictures. lost : goals left out.
-    """
-
-    problem: Problem
-    solution: Solution
-    options: Options
-    rows: list[Row] = field(default_factory=list)
-    arrivals: list[Arrival] = field(default_factory=list)
-    entries: list[Entry] = field(default_factory=list)
-    lost: dict[int, str] = field(default_factory=dict)
-    cancelled: set[int] = field(default_factory=set)
-    tethers: list[tuple[float, Floats]] = field(default_factory=list)
-    free: bool = False
-    walked: float = 0.0
-    interrupted: bool = False
-    wall_s: float = 0.0
-
-    @property
-    def summary(self) -> dict[str, Any]:
-        """The numbers. exceedance_s : seconds with a tether longer than it is at that time;
-        shortening_s : the same after the limit itself was lowered below it, until it fits."""
-        long = np.array([r.tether > r.limit * (1.0 + RESOLUTION) for r in self.rows], dtype=bool)
-        lowered = np.array([r.shortening for r in self.rows], dtype=bool)
-        over, shortening = long & ~lowered, long & lowered
-        steps = np.diff([r.time for r in self.rows], append=self.rows[-1].time if self.rows else 0)
-        goals = [a for a in self.arrivals if a.goal != HOME]
-        return {
-            "problem": self.problem.name,
-            "status": "interrupted" if self.interrupted else "done",
-            "time_s": self.rows[-1].time if self.rows else 0.0,
-            "path": self.walked,
-            "planned_path": self.solution.length,
-            "visited": len(goals),
-            "as_planned": sum(a.as_planned for a in self.arrivals),
-            "lost": [{"goal": g, "reason": why} for g, why in sorted(self.lost.items())],
-            "cancelled": sorted(self.cancelled),
-            "longest_tether": max((r.tether for r in self.rows), default=0.0),
-            "tether_length": self.problem.tether_length,
-            "exceedance_s": float(np.array(steps)[over].sum()) if self.rows else 0.0,
-            "shortening_s": float(np.array(steps)[shortening].sum()) if self.rows else 0.0,
-            "home": bool(self.arrivals and self.arrivals[-1].goal == HOME),
-            "tether_free": self.free,
-            "defects": sum(e.done == "defect" for e in self.entries),
-            "repairs": sum(e.done in ("local", "replan", "home") for e in self.entries),
-            "planning_worst_s": max((e.planning_s for e in self.entries), default=0.0),
-            "wall_s": self.wall_s,
-        }
 
 
 class _Run:
@@ -466,26 +338,3 @@ def is_free(tether: Tether, delta: float) -> bool:
     """Whether a tether can be taken in: straight to the robot, resting on nothing."""
     straight = float(np.linalg.norm(tether.robot - tether.anchor))
     return len(tether.nodes) == 2 and tether.length - straight <= 1e-6 * delta
-
-
-def scene_of(problem: Problem) -> Scene:
-    """The scene of a problem; where there is no obstacle, with a solid far below the base, because
-    a scene needs one."""
-    if problem.obstacles:
-        return Scene.from_problem(problem)
-    x, y, z = problem.base
-    far = 1e3 * (problem.tether_length + problem.scale)
-    stone = {"sphere": {"center": [x, y, z - far], "radius": problem.tether_length}}
-    return Scene.model_validate({"schema_version": 1, "name": problem.name, "solids": [stone]})
-
-
-def suggested_delta(problem: Problem) -> float:
-    """A resolution for the tether: a three-hundredth of its length, and fine enough for the
-    thinnest obstacle."""
-    return min(problem.tether_length / 300.0, coarsest_delta(problem) / 1.1)
-
-
-def coarsest_delta(problem: Problem) -> float:
-    """The coarsest resolution at which a tether passes through no obstacle."""
-    thickness = [t for _, t in scene_of(problem).field().thickness]
-    return float(min([problem.tether_length / 20.0, *(t / THINNEST for t in thickness)]))

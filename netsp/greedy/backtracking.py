@@ -21,10 +21,11 @@ import numpy as np
 
 from netsp.arrays import Floats, Ints
 from netsp.clock import TimeLimit
-from netsp.legcosts import MEASURE_AT_ONCE
-from netsp.result import OnProgress, Result
-from netsp.run import Run, read_params
-from netsp.travel import TravelGraph
+from netsp.solving.legcosts import MEASURE_AT_ONCE
+from netsp.solving.params import read_params
+from netsp.solving.run import Run
+from netsp.travel.graph import TravelGraph
+from netsp.travel.result import OnProgress, Result
 
 BATCH = 16
 """So many legs are measured at a time when the nearest goal is looked for."""

@@ -16,10 +16,11 @@ import numpy as np
 from netsp.clock import TimeLimit
 from netsp.greedy.backtracking import NoParams
 from netsp.hsignature import Word, concatenate, entangled
-from netsp.result import OnProgress, Result, Trajectory
-from netsp.run import Run, read_params
 from netsp.solution import Status
-from netsp.travel import TravelGraph
+from netsp.solving.params import read_params
+from netsp.solving.run import Run
+from netsp.travel.graph import TravelGraph
+from netsp.travel.result import OnProgress, Result, Trajectory
 
 
 def solve(

@@ -15,7 +15,7 @@ import numpy as np
 import shapely
 
 from netsp.arrays import Floats, Ints
-from netsp.polygons import counterclockwise
+from netsp.geometry.polygons import counterclockwise
 from netsp.problem import Circle, Polygon, Problem
 
 SHARE = 0.2

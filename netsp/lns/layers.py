@@ -9,7 +9,7 @@ import numpy.typing as npt
 from numba import njit
 
 from netsp.arrays import Floats, Ints
-from netsp.travel import TravelGraph
+from netsp.travel.graph import TravelGraph
 
 NEAR = 12
 """A cluster is put back next to one of so many nearest clusters."""

@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from netsp.chance import below, uniform
+from netsp.compiled.chance import below, uniform
 
 LONGEST_STRING = 10
 """Most clusters in one removed stretch."""

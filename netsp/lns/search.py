@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.arrays import Ints
-from netsp.chance import seeded
 from netsp.clock import NEVER, Clock
+from netsp.compiled.chance import seeded
 from netsp.lns.layers import Instance, best_classes
 from netsp.lns.ruin import descend, ruin_and_recreate, two_opt
 

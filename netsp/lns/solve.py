@@ -12,9 +12,10 @@ from netsp.arrays import Ints
 from netsp.clock import TimeLimit
 from netsp.lns.layers import Instance
 from netsp.lns.search import Search
-from netsp.result import OnProgress, Result
-from netsp.run import Run, read_params
-from netsp.travel import TravelGraph, least_tethers
+from netsp.solving.params import read_params
+from netsp.solving.run import Run
+from netsp.travel.graph import TravelGraph, least_tethers
+from netsp.travel.result import OnProgress, Result
 
 ROUNDS_PER_GOAL = 300
 """Default number of rounds, times the number of goals, when nothing is limited."""

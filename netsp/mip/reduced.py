@@ -26,9 +26,10 @@ from netsp.clock import TimeLimit
 from netsp.lns import Instance, best_classes
 from netsp.lns.solve import core_of
 from netsp.mip.solve import MipRun, Params
-from netsp.result import OnProgress, Progress, Result
-from netsp.run import Run, read_params
-from netsp.travel import TravelGraph, least_tethers
+from netsp.solving.params import read_params
+from netsp.solving.run import Run
+from netsp.travel.graph import TravelGraph, least_tethers
+from netsp.travel.result import OnProgress, Progress, Result
 
 MOST_POLISHED = 4000
 """Most classes, those of least tether, among which the last choice is made."""

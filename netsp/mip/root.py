@@ -13,13 +13,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from netsp.arrays import Bools, Floats, Ints
-from netsp.legcosts import LegCosts
-from netsp.lns.incumbent import SearchingRun
 from netsp.mip.blossoms import blossom_cuts
 from netsp.mip.bound import dual_bound, fixing_costs, reduced_costs
 from netsp.mip.program import Cut, Point, Relaxation
 from netsp.mip.subtours import branches, fractional_cuts
-from netsp.run import Stop
+from netsp.solving.legcosts import LegCosts
+from netsp.solving.run import Stop
+from netsp.solving.searching import SearchingRun
 
 NEAREST = 4
 """Legs per vertex in the first LP."""

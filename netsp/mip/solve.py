@@ -15,15 +15,16 @@ import numpy as np
 
 from netsp.clock import TimeLimit
 from netsp.dp.solve import bound_by_walks
-from netsp.legcosts import LegCosts
 from netsp.lns import Search
-from netsp.lns.incumbent import SearchingRun
 from netsp.mip.program import IntegerProgram, Point
 from netsp.mip.root import Root, Warm, tour_legs
 from netsp.mip.subtours import component_cuts, follow, tour_from
-from netsp.result import OnProgress, Result
-from netsp.run import Stop, read_params
-from netsp.travel import TravelGraph
+from netsp.solving.legcosts import LegCosts
+from netsp.solving.params import read_params
+from netsp.solving.run import Stop
+from netsp.solving.searching import SearchingRun
+from netsp.travel.graph import TravelGraph
+from netsp.travel.result import OnProgress, Result
 
 BACKENDS = {
     "highs": ("netsp.mip.highs:HighsRelaxation", "netsp.mip.highs:HighsInteger"),

@@ -15,11 +15,12 @@ from numba import njit
 
 from netsp.arrays import Floats
 from netsp.errors import InputError
-from netsp.online.field import DistanceField
 from netsp.online.mission import Camera
-from netsp.online.sampling import lowest_along
-from netsp.online.scene import HalfSpace, Scene
-from netsp.online.surfaces import drawn_points, extent, mesh_of, surface_of
+from netsp.online.scene.field import DistanceField
+from netsp.online.scene.sampling import lowest_along
+from netsp.online.scene.scene import Scene
+from netsp.online.scene.shapes import HalfSpace
+from netsp.online.scene.surfaces import drawn_points, extent, mesh_of, surface_of
 
 MOST_PATCHES = 200_000
 

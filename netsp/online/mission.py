@@ -6,17 +6,14 @@ from pathlib import Path
 from typing import Annotated, Literal, Self
 
 import numpy as np
-import numpy.typing as npt
 from pydantic import BaseModel, ConfigDict, Field
 
 from netsp.errors import InputError
-from netsp.fields import Name, NonNegative, Point3, Positive
+from netsp.fields import STRICT, Name, NonNegative, Point3, Positive
 from netsp.files import read_text
 from netsp.models import read_model
-from netsp.online.field import DistanceField
-from netsp.online.scene import Scene
-
-_STRICT = ConfigDict(frozen=True, extra="forbid")
+from netsp.online.scene.field import DistanceField, pushed_out
+from netsp.online.scene.scene import Scene
 
 
 class Camera(BaseModel):
@@ -26,7 +23,7 @@ class Camera(BaseModel):
     most. patch : metres; pieces of surface that coverage is counted in.
     """
 
-    model_config = _STRICT
+    model_config = STRICT
 
     range: Positive = 2.0
     field_of_view: Annotated[float, Field(gt=0.0, lt=180.0)] = 70.0
@@ -105,24 +102,3 @@ class Mission(BaseModel):
     def load_scene(self) -> Scene:
         """The scene it takes place in."""
         return Scene.load(self.scene)
-
-
-def pushed_out(
-    field: DistanceField, points: npt.ArrayLike, clearance: float, rounds: int = 20
-) -> npt.NDArray[np.float64]:
-    """Points (n, 3) moved along the distance's gradient until they are at the clearance, as far as
-    that goes; never to where the distance is smaller than it was."""
-    p = np.array(points, dtype=float).reshape(-1, 3)
-    d = field.distance(p)
-    for _ in range(rounds):
-        short = d < clearance - 1e-6
-        if not short.any():
-            break
-        step = np.where(short, clearance - d, 0.0)[:, None]
-        moved = p + step * field.gradient(p)
-        after = field.distance(moved)
-        better = after > d
-        if not (better & short).any():
-            break
-        p[better], d[better] = moved[better], after[better]
-    return p

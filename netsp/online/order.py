@@ -18,14 +18,15 @@ import numpy as np
 from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.lns import Instance, best_classes
-from netsp.online.field import DistanceField
+from netsp.online.log import Run
 from netsp.online.mission import Mission
+from netsp.online.paths.tree import ShortestTree, taut
 from netsp.online.planner.base import points_along
-from netsp.online.simulate import Run, grid_of, simulate
+from netsp.online.scene.field import DistanceField
+from netsp.online.simulate import grid_of, simulate
 from netsp.online.tether import GeodesicTether, Tether
-from netsp.online.tree import ShortestTree, taut
-from netsp.solvers import solve_graph
-from netsp.travel import TravelGraph
+from netsp.solvers.solve import solve_graph
+from netsp.travel.graph import TravelGraph
 
 NEIGHBOURS = 12
 """Waypoints nearest to each that legs are sought to."""

@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import csv
-import io
-import json
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, field
-from pathlib import Path
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -16,14 +12,15 @@ import numpy as np
 from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.online.coverage import Coverage, patches_of
-from netsp.online.field import DistanceField
+from netsp.online.log import LogRow, Run
 from netsp.online.mission import Mission
+from netsp.online.paths.tree import Grid
 from netsp.online.planner import Command, Options, Planner, make_planner
 from netsp.online.planner.base import DONE, Tethers
-from netsp.online.scene import Scene
-from netsp.online.surfaces import extent
+from netsp.online.scene.field import DistanceField
+from netsp.online.scene.scene import Scene
+from netsp.online.scene.surfaces import extent
 from netsp.online.tether import GeodesicTether, ReactTether, Tether
-from netsp.online.tree import Grid
 from netsp.online.vehicle import Vehicle, make_vehicle
 from netsp.online.water import Water
 
@@ -40,38 +37,6 @@ FRAME = 2
 
 STUCK = 600.0
 """Seconds at one waypoint after which it is given up."""
-
-
-@dataclass(frozen=True)
-class LogRow:
-    """One step: seconds, position (m), heading (rad), index of the target, mode, tether (m), share
-    of the surface seen and seen if nothing stood in between, planning (s)."""
-
-    time: float
-    x: float
-    y: float
-    z: float
-    yaw: float
-    target: int
-    mode: str
-    tether: float
-    coverage: float
-    coverage_through: float
-    replan_s: float
-
-
-@dataclass(frozen=True)
-class Run:
-    """What came of a mission.
-
-    log : one row per step. tether : at the end. summary : the numbers (`summarise`).
-    """
-
-    mission: Mission
-    planner: str
-    log: tuple[LogRow, ...]
-    tether: Tether
-    summary: dict[str, Any]
 
 
 def grid_of(mission: Mission, scene: Scene, field: DistanceField) -> Grid:
@@ -295,25 +260,3 @@ def summarise(
         "control_worst_s": max(control, default=0.0),
         "wall_s": wall,
     }
-
-
-def write_run(run: Run, folder: str | Path) -> None:
-    """log.csv, summary.json and mission.json into a folder, which is made."""
-    place = Path(folder)
-    try:
-        place.mkdir(parents=True, exist_ok=True)
-        text = io.StringIO()
-        table = csv.DictWriter(text, fieldnames=list(LogRow.__dataclass_fields__))
-        table.writeheader()
-        table.writerows({k: _short(v) for k, v in asdict(r).items()} for r in run.log)
-        (place / "log.csv").write_text(text.getvalue(), encoding="utf-8")
-        summary = json.dumps(run.summary, indent=1, allow_nan=False)
-        (place / "summary.json").write_text(summary + "\n", encoding="utf-8")
-        mission = json.dumps(run.mission.model_dump(mode="json"), indent=1)
-        (place / "mission.json").write_text(mission + "\n", encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be written: {error.strerror or error}") from None
-
-
-def _short(value: Any) -> Any:
-    return round(value, 5) if isinstance(value, float) else value

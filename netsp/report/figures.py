@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from netsp.compare.rows import Row
-from netsp.literal import literal
+from netsp.pictures.literal import literal
 from netsp.report.stats import Cell, Summary, gap_over_time, over_best, profile, summary
 
 STYLES = ("-", "--", "-.", ":")

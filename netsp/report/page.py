@@ -14,7 +14,7 @@ from netsp.compare.rows import Row, read_rows
 from netsp.errors import InputError
 from netsp.files import cell as plain_cell
 from netsp.files import write_text
-from netsp.literal import literal
+from netsp.pictures.literal import literal
 from netsp.report import figures
 from netsp.report.stats import (
     Cell,

@@ -15,11 +15,12 @@ import numpy.typing as npt
 from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.execute.plan import HOME, legs_of
-from netsp.execute.run import scene_of, suggested_delta
 from netsp.files import read_text, write_text
 from netsp.hsignature.measures import measure
 from netsp.judge import verify
+from netsp.online.scene.scene import scene_of
 from netsp.online.tether import GeodesicTether
+from netsp.online.tether.resolution import suggested_delta
 from netsp.problem import Circle, Problem
 from netsp.report.page import STYLE
 from netsp.solution import Solution

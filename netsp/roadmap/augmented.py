@@ -19,9 +19,10 @@ from numba import njit
 
 from netsp.arrays import Floats, Ints
 from netsp.clock import NEVER, Flag
+from netsp.compiled.growing import longer, more_int_rows
 from netsp.errors import InputError, NetspError
 from netsp.hsignature import Word
-from netsp.roadmap.explore import LETTER, PARENT, Trie, add_child, longer, more_int_rows, trie_child
+from netsp.roadmap.trie import LETTER, PARENT, Trie, add_child, trie_child
 
 if TYPE_CHECKING:
     import networkx

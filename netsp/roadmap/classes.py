@@ -18,9 +18,10 @@ from netsp.arrays import Floats, Ints
 from netsp.clock import Clock
 from netsp.errors import InfeasibleError
 from netsp.hsignature import Word, is_looping, signature
-from netsp.roadmap.explore import NON_LOOPING, Found, Trie, run_explore
+from netsp.roadmap.explore import NON_LOOPING, Found, run_explore
 from netsp.roadmap.paths import TautPaths
 from netsp.roadmap.reach import explain_unreached
+from netsp.roadmap.trie import Trie
 
 STATES_PER_CLASS = 200
 """So many states of the search for every class that may be kept, then the search is given up."""

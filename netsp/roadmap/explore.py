@@ -15,16 +15,17 @@ letters).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from itertools import pairwise
+from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
 
 from netsp.arrays import Floats, Ints
 from netsp.clock import NEVER, Flag
-from netsp.geometry import more_rows
+from netsp.compiled.growing import longer, more_int_rows, more_rows
+from netsp.compiled.slots import rehashed
 from netsp.roadmap.tangents import TangentGraph
+from netsp.roadmap.trie import CORE, LETTER, PARENT, Trie, add_child, trie_child
 
 SAME = 1e4
 """Two arrivals at a directed arc with one word are one path when their lengths agree to this many
@@ -33,88 +34,6 @@ length but rounding; less tolerance would let that go on for ever."""
 
 GIVEN, NON_LOOPING, ALL = range(3)
 """Which words may join the trie: none but those given, those that do not loop, or all."""
-
-PARENT, LETTER, CHILD, SIBLING, CORE = range(5)
-"""Columns of a trie's nodes. SIBLING chains the children of one parent."""
-
-
-@dataclass
-class Trie:
-    """Words as a tree; node 0 is the empty word. Arrays are over-allocated, `size` is the count.
-
-    nodes : (capacity, 5) columns PARENT … CORE. limit : longest path allowed at or below a node.
-    """
-
-    nodes: Ints
-    limit: Floats
-    size: int = 1
-    words: dict[int, tuple[int, ...]] = field(default_factory=dict)
-
-    @classmethod
-    def root(cls, limit: float, capacity: int = 256) -> Trie:
-        """The trie that holds the empty word only."""
-        trie = cls(np.full((capacity, 5), -1, dtype=np.int64), np.zeros(capacity))
-        trie.nodes[0] = (-1, 0, -1, -1, 1)
-        trie.limit[0] = limit
-        return trie
-
-    @classmethod
-    def of_word(cls, word: tuple[int, ...], limit: float) -> Trie:
-        """The trie of one word and its prefixes; node k is the prefix of length k."""
-        trie = cls.root(limit, capacity=max(256, 2 * len(word) + 2))
-        for k, letter in enumerate(word):
-            trie.nodes[k, CHILD] = k + 1
-            trie.nodes[k + 1] = (k, letter, -1, -1, 1)
-            trie.limit[k + 1] = limit
-        trie.size = len(word) + 1
-        return trie
-
-    def word(self, node: int) -> tuple[int, ...]:
-        """The word of a node."""
-        above = [node]
-        while above[-1] and above[-1] not in self.words:
-            above.append(int(self.nodes[above[-1], PARENT]))
-        self.words.setdefault(0, ())
-        for parent, child in pairwise(above[::-1]):
-            self.words[child] = (*self.words[parent], int(self.nodes[child, LETTER]))
-        return self.words[node]
-
-
-@njit(cache=True, nogil=True)
-def trie_child(node, a, trie):
-    """The child of a node along letter a, or -1."""
-    c = trie[node, CHILD]
-    while c >= 0 and trie[c, LETTER] != a:
-        c = trie[c, SIBLING]
-    return c
-
-
-@njit(cache=True, nogil=True)
-def add_child(node, a, core, size, trie):
-    """Make the child of a node along letter a at the row `size`."""
-    trie[size, PARENT], trie[size, LETTER], trie[size, CORE] = node, a, core
-    trie[size, CHILD] = -1
-    trie[size, SIBLING] = trie[node, CHILD]
-    trie[node, CHILD] = size
-
-
-@njit(cache=True, nogil=True)
-def more_int_rows(a):
-    """The same rows with room for twice as many (copied by hand, see `geometry.more_rows`)."""
-    b = np.empty((2 * a.shape[0], a.shape[1]), dtype=np.int64)
-    for i in range(a.shape[0]):
-        for j in range(a.shape[1]):
-            b[i, j] = a[i, j]
-    return b
-
-
-@njit(cache=True, nogil=True)
-def longer(a):
-    """A float array with room for twice as many."""
-    b = np.empty(2 * len(a))
-    for i in range(len(a)):
-        b[i] = a[i]
-    return b
 
 
 @njit(cache=True, nogil=True)
@@ -281,7 +200,7 @@ def explore(
                         seen_length[slot] = mark
                         seen_used += 1
                         if 2 * seen_used > slots:
-                            seen_key, seen_length = _rehashed(seen_key, seen_length)
+                            seen_key, seen_length = rehashed(seen_key, seen_length)
                             slots = len(seen_key)
                         w, size = _walk(
                             w, arrival_row[e, 0], arrival_row[e, 1], ends[f, 0], ends[f, 1],
@@ -311,23 +230,6 @@ def explore(
             slid += gap[e]
             e = following
     return (trie, limit, size), (h_i[:hits], h_f[:hits]), (s_i[:count], s_f[:count]), False
-
-
-@njit(cache=True, nogil=True)
-def _rehashed(key, value):
-    n = 2 * len(key)
-    key2 = np.full(n, -1, dtype=np.int64)
-    value2 = np.empty(n)
-    for i in range(len(key)):
-        if key[i] >= 0:
-            slot = (key[i] * 0x9E3779B1) % n
-            while key2[slot] >= 0:
-                slot += 1
-                if slot == n:
-                    slot = 0
-            key2[slot] = key[i]
-            value2[slot] = value[i]
-    return key2, value2
 
 
 @dataclass(frozen=True)

@@ -21,11 +21,12 @@ from netsp.clock import Clock, TimeLimit
 from netsp.errors import InputError, NetspError
 from netsp.hsignature import reduce
 from netsp.problem import Goal, Problem
-from netsp.result import OPTIMALITY_TOLERANCE, OnProgress, Progress, Result
+from netsp.roadmap.legs import TautLegs
 from netsp.roadmap.paths import TautPaths
-from netsp.roadmap.taut import MAX_CLASSES, TautLegs, TautRoadmap
+from netsp.roadmap.taut import MAX_CLASSES, TautRoadmap
 from netsp.solution import Status
-from netsp.travel import TravelGraph
+from netsp.travel.graph import TravelGraph
+from netsp.travel.result import OPTIMALITY_TOLERANCE, OnProgress, Progress, Result
 
 ENOUGH = 10.0 * OPTIMALITY_TOLERANCE
 """A path is called optimal when its bound is within this share of it."""

@@ -21,17 +21,16 @@ import numpy.typing as npt
 from numba import njit
 
 from netsp.arrays import Floats, Ints
-from netsp.geometry import (
+from netsp.compiled.growing import more_rows, sort_in_place
+from netsp.geometry.kernels import (
     TWO_PI,
     circle_circle_angles,
     circle_line_angles,
     depth_in_obstacle,
-    more_rows,
     point_in_polygon,
     segment_blocked,
-    sort_in_place,
 )
-from netsp.polygons import counterclockwise
+from netsp.geometry.polygons import counterclockwise
 from netsp.problem import Circle, Problem
 
 MARGIN = 1e-10
@@ -44,7 +43,7 @@ no length changes by more."""
 
 @dataclass(frozen=True)
 class Blockers:
-    """Grown obstacles as arrays for the kernels of `netsp.geometry`."""
+    """Grown obstacles as arrays for the kernels of `netsp.geometry.kernels`."""
 
     circles: Floats
     edges: Floats

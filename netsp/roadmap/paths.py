@@ -13,10 +13,11 @@ from netsp.arrays import Floats
 from netsp.errors import InputError, NetspError
 from netsp.hsignature import Word
 from netsp.problem import Problem
-from netsp.roadmap.explore import Trie, run_explore
+from netsp.roadmap.explore import run_explore
 from netsp.roadmap.outline import Outline, build_outline
 from netsp.roadmap.shortest import ContactGraph
 from netsp.roadmap.tangents import ARC_STEP, TangentGraph, build_tangents
+from netsp.roadmap.trie import Trie
 
 FIRST, DEEPEST, LEAST = 1.02, 1.3, 1 / 32
 """A path is sought up to the first multiple of the distance, then up to more, in steps that grow to

@@ -21,19 +21,19 @@ from numba import njit
 from netsp.arrays import Bools, Floats, Ints
 from netsp.clock import NEVER, Clock, Flag, TimeLimit
 from netsp.errors import InfeasibleError, InputError, LimitReachedError
-from netsp.geometry import depth_in_obstacle, segment_blocked
+from netsp.geometry.kernels import depth_in_obstacle, segment_blocked
 from netsp.hsignature import Word
 from netsp.problem import Circle, Problem
 from netsp.roadmap.augmented import AugmentedGraph, augment
+from netsp.roadmap.detours import sub_goals, tabulate
+from netsp.roadmap.legs import TautLegs
 from netsp.roadmap.letters import segment_letters
 from netsp.roadmap.outline import Outline
 from netsp.roadmap.paths import TautPaths
 from netsp.roadmap.reach import explain_unreached
 from netsp.roadmap.shortest import MilestoneGraph
-from netsp.roadmap.taut import TautLegs
-from netsp.roadmap.ways import sub_goals, tabulate
-from netsp.travel import UNTIMED, TravelGraph
-from netsp.ways import Ways
+from netsp.travel.detours import Ways
+from netsp.travel.graph import UNTIMED, TravelGraph
 
 SAMPLES = 1000
 """Milestones, as in the paper."""
@@ -46,7 +46,7 @@ MAX_AUGMENTED = 2_000_000
 
 
 class PrmRoadmap:
-    """PRM* and its homotopy-augmented graph. Satisfies `netsp.travel.Legs`.
+    """PRM* and its homotopy-augmented graph. Satisfies `netsp.travel.graph.Legs`.
 
     Parameters
     ----------

@@ -17,7 +17,8 @@ from numba import njit
 
 from netsp.arrays import Floats, Ints
 from netsp.clock import NEVER, Flag
-from netsp.geometry import TWO_PI, more_rows, segment_blocked
+from netsp.compiled.growing import more_rows
+from netsp.geometry.kernels import TWO_PI, segment_blocked
 from netsp.roadmap.letters import arc_letters, segment_letters
 from netsp.roadmap.outline import Outline
 

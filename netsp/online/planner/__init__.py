@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from netsp.errors import InputError
-from netsp.online.field import DistanceField
 from netsp.online.mission import Mission
+from netsp.online.paths.refine import REFINEMENTS
+from netsp.online.paths.sampled import OMPL_PLANNERS
+from netsp.online.paths.tree import Grid
 from netsp.online.planner.base import Command, Options, Planner, Tethers
 from netsp.online.planner.predictive import PredictivePlanner
 from netsp.online.planner.react import ReactPlanner
-from netsp.online.refine import REFINEMENTS
-from netsp.online.sampled import OMPL_PLANNERS
+from netsp.online.scene.field import DistanceField
 from netsp.online.tether import GeodesicTether
-from netsp.online.tree import Grid
 
 
 def _draft(

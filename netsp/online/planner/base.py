@@ -9,12 +9,12 @@ from itertools import pairwise
 import numpy as np
 
 from netsp.arrays import Floats
-from netsp.online.field import DistanceField
 from netsp.online.mission import Mission
-from netsp.online.refine import refined
-from netsp.online.sampled import SampledWays
+from netsp.online.paths.refine import refined
+from netsp.online.paths.sampled import SampledWays
+from netsp.online.paths.tree import Grid, ShortestTree, Ways, taut
+from netsp.online.scene.field import DistanceField
 from netsp.online.tether import GeodesicTether, ReactTether, Tether
-from netsp.online.tree import Grid, ShortestTree, Ways, taut
 
 Tethers = GeodesicTether | ReactTether
 
@@ -39,8 +39,8 @@ class Command:
 
 @dataclass(frozen=True)
 class Options:
-    """How ways are found. ways : tree, or one of OMPL's planners (`netsp.online.sampled`).
-    refine : none, paper or gradient (`netsp.online.refine`); default paper for the paper's planners
+    """How ways are found. ways : tree, or one of OMPL's planners (`netsp.online.paths.sampled`).
+    refine : none, paper or gradient (`netsp.online.paths.refine`); default paper for the paper's planners
     and none for the others, whose ways keep the clearance from the start. seed : of what is random
     in either."""
 

@@ -14,10 +14,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from netsp.arrays import Floats
-from netsp.online.mission import pushed_out
+from netsp.online.paths.tree import homotopic, length_of, taut
 from netsp.online.planner.base import NORMAL, RECOVERY, Planner, dense, points_along
+from netsp.online.scene.field import pushed_out
 from netsp.online.tether import GeodesicTether, Tether
-from netsp.online.tree import homotopic, length_of, taut
 
 MARGIN = 0.004
 """Share of the tether that is kept in reserve for what the simulation does not know."""

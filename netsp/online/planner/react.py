@@ -20,10 +20,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from netsp.arrays import Floats
-from netsp.online.mission import pushed_out
+from netsp.online.paths.tree import Ways
 from netsp.online.planner.base import NORMAL, RECOVERY, Planner, dense, points_along
+from netsp.online.scene.field import pushed_out
 from netsp.online.tether import Tether
-from netsp.online.tree import Ways
 
 DRAFT_SHARE, DRAFT_GAIN = 0.7, 0.65
 """The draft accepts a pivot whose tether is below 0.7 L_max and below 0.65 of that of the pivot

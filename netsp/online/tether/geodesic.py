@@ -18,13 +18,11 @@ import numpy.typing as npt
 
 from netsp.arrays import Floats
 from netsp.errors import InputError
-from netsp.online.field import DistanceField, finite_point
+from netsp.online.scene.field import DistanceField, finite_point
 from netsp.online.tether.pull import drive, follow, pull
+from netsp.online.tether.resolution import THINNEST
 from netsp.online.tether.strand import length_of
 from netsp.online.tether.tether import Tether, strand_of
-
-THINNEST = 1.8
-"""In units of delta: no solid thicker than this is ever passed."""
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ import math
 import numpy as np
 from numba import njit
 
-from netsp.online.sampling import distance
+from netsp.online.scene.sampling import distance
 from netsp.online.tether.strand import (
     CURVE,
     EX,

@@ -24,8 +24,8 @@ from numba import njit
 
 from netsp.arrays import Floats
 from netsp.errors import InputError
-from netsp.online.field import DistanceField
-from netsp.online.sampling import distance
+from netsp.online.scene.field import DistanceField
+from netsp.online.scene.sampling import distance
 from netsp.online.tether.strand import see
 from netsp.online.tether.tether import Tether, strand_of
 

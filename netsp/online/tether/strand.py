@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numba import njit
 
-from netsp.online.sampling import distance, lowest_along, sample
+from netsp.online.scene.sampling import distance, lowest_along, sample
 
 X, Y, Z = 0, 1, 2
 """Position."""

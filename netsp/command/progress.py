@@ -1,0 +1,134 @@
+"""The progress table and the closing summary that people read."""
+
+from __future__ import annotations
+
+import threading
+import time
+from typing import TextIO
+
+from netsp.problem import Problem
+from netsp.solution import Solution, Status
+from netsp.travel.result import Progress
+
+_HEADER = (
+    f"{'time':>7}  {'stage':<10} {'tour':>12} {'bound':>12} {'gap':>8} {'cuts':>6} {'classes':>8} "
+    f"{'legs':>9} {'iteration':>11}"
+)
+
+PATIENCE = 3.0
+"""Seconds of silence after which the table says what takes so long."""
+
+EVERY = 0.2
+"""Least seconds between two rows that bring nothing but a better bound."""
+
+
+class ProgressTable:
+    """Prints a row for every better tour and every new stage, and now and then for the bound."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self.stream = stream
+        self._header = False
+        self._last: Progress | None = None
+        self._shown = 0.0
+        self._held: Progress | None = None
+        self._patience = threading.Timer(PATIENCE, self._explain)
+        self._patience.daemon = True
+
+    def begin(self, problem: Problem) -> None:
+        """Announce the problem."""
+        self._print(
+            f"{problem.name}: {len(problem.goals)} goals, {len(problem.obstacles)} obstacles, "
+            f"tether {problem.tether_length:g} {problem.units}"
+        )
+        self._patience.start()
+
+    def _explain(self) -> None:
+        self._print("building the roadmap …")
+
+    def __call__(self, row: Progress) -> None:
+        news = (
+            self._last is None
+            or row.stage != self._last.stage
+            or row.incumbent != self._last.incumbent
+        )
+        if news or time.monotonic() - self._shown >= EVERY:
+            self._show(row)
+        else:
+            self._held = row
+
+    def __enter__(self) -> ProgressTable:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._patience.cancel()
+
+    def end(self) -> None:
+        """Print the last row if it was held back."""
+        if self._held is not None:
+            self._show(self._held)
+
+    def _show(self, row: Progress) -> None:
+        self._patience.cancel()
+        if not self._header:
+            self._print(_HEADER)
+            self._header = True
+        tour = "-" if row.incumbent is None else f"{row.incumbent:.6g}"
+        bound = "-" if row.bound is None else f"{row.bound:.6g}"
+        gap = "-" if row.gap is None else f"{100 * row.gap:.3f}%"
+        self._print(
+            f"{row.time:>6.1f}s  {row.stage:<10} {tour:>12} {bound:>12} {gap:>8} "
+            f"{row.cuts or '-':>6} {row.vertices or '-':>8} {row.legs or '-':>9} "
+            f"{row.iteration:>11}"
+        )
+        self._last, self._held, self._shown = row, None, time.monotonic()
+
+    def _print(self, text: str) -> None:
+        print(text, file=self.stream, flush=True)
+
+
+def summary(
+    problem: Problem,
+    solution: Solution,
+    output: str | None = None,
+    picture: str | None = None,
+    trace: str | None = None,
+) -> str:
+    """What was found, in a few lines."""
+    t = solution.timings
+    times = (
+        f"roadmap {t.roadmap_s:.2f} s, legs {t.matrix_s:.2f} s, solver {t.solve_s:.2f} s, "
+        f"total {t.total_s:.2f} s"
+    )
+    if solution.status is Status.INFEASIBLE:
+        return f"there is no tour ({times})"
+    if solution.length is None:
+        return (
+            f"no tour found by {solution.solver} ({times}); give it more time or more iterations, "
+            "or choose another --solver"
+        )
+    if solution.status is Status.OPTIMAL:
+        verdict = "proven optimal"
+    elif solution.status is Status.INVALID:
+        verdict = "INVALID: the solver is blind to the tether"
+    elif solution.lower_bound is None:
+        verdict = "no bound"
+    else:
+        verdict = f"bound {solution.lower_bound:.6g}, gap {100 * (solution.gap or 0.0):.2f} %"
+    names = [problem.goals[v.goal].name or str(v.goal) for v in solution.tour]
+    longest = max((v.tether_length for v in solution.tour), default=0.0)
+    wrapped = ", ".join(problem.obstacle_label(k) for k in solution.entangled)
+    lines = [
+        f"tour     {solution.length:.6f} {problem.units}, {verdict}",
+        f"order    base → {' → '.join(names)} → base",
+        f"tether   longest {longest:.6g} of {problem.tether_length:g} {problem.units}",
+        f"time     {times}",
+    ]
+    if solution.entangled:
+        lines.insert(1, f"wraps    {len(solution.entangled)} obstacles: {wrapped}")
+    if output:
+        lines.append(f"solution {output}")
+    if picture:
+        lines.append(f"picture  {picture}")
+    if trace:
+        lines.append(f"trace    {trace}")
+    return "\n".join(lines)

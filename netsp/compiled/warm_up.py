@@ -1,0 +1,116 @@
+"""Says what is being compiled, and compiles everything ahead.
+
+numba compiles a kernel the first time that it is called on a machine, and keeps the result beside
+the source or in `NUMBA_CACHE_DIR`. Without a word that looks like a program that hangs.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from functools import partial
+from pathlib import Path
+from typing import Any, TextIO
+
+EVERY = 2.0
+"""Seconds between two lines."""
+
+
+@contextmanager
+def told(stream: TextIO) -> Iterator[None]:
+    """While the body runs, lines on a stream that name what is being compiled."""
+    from numba.core import event
+
+    class Listener(event.Listener):  # type: ignore[misc]
+        def __init__(self) -> None:
+            self.last = -EVERY
+
+        def on_start(self, told: Any) -> None:
+            now = time.monotonic()
+            if now - self.last < EVERY:
+                return
+            kernel = told.data["dispatcher"].py_func
+            if kernel.__module__.startswith("netsp."):
+                once = " (once on this machine; `netsp warm-up` does it ahead)"
+                name = kernel.__module__.removeprefix("netsp.")
+                print(
+                    f"compiling {name}.{kernel.__name__} …{once if self.last < 0.0 else ''}",
+                    file=stream, flush=True,
+                )  # fmt: skip
+                self.last = now
+
+        def on_end(self, told: Any) -> None:
+            pass
+
+    listener = Listener()
+    event.register("numba:compile", listener)
+    try:
+        yield
+    finally:
+        event.unregister("numba:compile", listener)
+
+
+def forget() -> None:
+    """Delete what earlier versions of netsp have compiled beside the source: numba cannot read an
+    index that names a module which is no more, and stops with ModuleNotFoundError."""
+    for kept in Path(__file__).resolve().parent.parent.rglob("__pycache__/*.nb[ic]"):
+        with suppress(OSError):  # not ours to write: then it is not ours to read either
+            kept.unlink()
+
+
+def steps() -> Iterator[tuple[str, Callable[[], object]]]:
+    """What to run so that all kernels are compiled, with names."""
+    import numpy as np
+
+    from netsp.errors import InputError, LimitReachedError
+    from netsp.execute import execute
+    from netsp.judge import verify
+    from netsp.online import ReactTether, Scene
+    from netsp.online.mission import Mission
+    from netsp.online.simulate import simulate
+    from netsp.problem import Problem
+    from netsp.solvers.solve import SOLVERS, solve
+    from netsp.worlds import random_world
+
+    problem = random_world(1, goals=9, tether_length=450.0)
+    polygons = random_world(1, family="harbour", goals=4, tether_length=250.0)
+    for solver in SOLVERS:
+        yield f"solver {solver}", partial(solve, problem, solver, time_limit=3.0)
+    fewer = problem.model_copy(update={"goals": problem.goals[:6]})
+    for solver in ("dp", "mip"):
+        yield f"solver {solver}, measured legs", partial(solve, fewer, solver, iteration_limit=4)
+    yield "polygons and the judge", lambda: verify(polygons, solve(polygons))
+
+    def sampled() -> None:
+        # OMPL is an extra, and so few samples may miss a goal
+        with suppress(InputError, LimitReachedError):
+            solve(polygons, roadmap="prm", roadmap_options={"samples": 300}, time_limit=5.0)
+
+    yield "sampled roadmap", sampled
+    square = [(5, 2), (6, 2), (6, 3), (5, 3)]
+    small = Problem.model_validate(
+        {"schema_version": 1, "base": (0, 0), "goals": [(4, 1), (4, -1)], "tether_length": 8,
+         "obstacles": [{"center": (2, 0), "radius": 0.5}, {"polygon": square}]}
+    )  # fmt: skip
+    yield "tours carried out", lambda: execute(small, solve(small))
+    solids = [{"capsule": {"a": (0, 0, -3), "b": (0, 0, 3), "radius": 0.5}},
+              {"box": {"center": (3, 0, 0), "size": (1, 1, 1)}}]  # fmt: skip
+    scene = Scene.model_validate({"schema_version": 1, "name": "warm-up", "solids": solids})
+    angle = np.linspace(np.pi, np.pi + 5.0, 12)
+    ring = np.column_stack([np.cos(angle), np.sin(angle), 0.1 * angle])
+    mission = Mission.model_validate(
+        {"schema_version": 1, "scene": "-", "anchor": (-2, 0, 0), "start": (-1.9, 0, 0),
+         "tether_length": 4.5, "waypoints": ring.tolist(), "camera": {"range": 2.0}, "speed": 0.5}
+    )  # fmt: skip
+    for planner, vehicle in (("predictive", "kinematic"), ("react", "bluerov2")):
+        yield (
+            f"missions, {planner}, {vehicle}",
+            partial(simulate, mission, planner, vehicle=vehicle, scene=scene),
+        )
+
+    def paper() -> None:
+        model = ReactTether(scene.field(), 0.1)
+        model.update(model.start((-2, 0, 0), (-1, 0, 0)), (-1, -1, 0))
+
+    yield "the paper's tether", paper

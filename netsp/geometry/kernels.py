@@ -1,0 +1,141 @@
+"""Planar kernels: distances, containment, crossings. Compiled, cached, no policy.
+
+Obstacles come as *blockers*: circles ``(x, y, R)`` and polygons given by their edges, each grown by
+a margin. Everything is decided by distances, so a polygon and a circle obey one rule.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+TWO_PI = 2.0 * math.pi
+
+
+@njit(cache=True)
+def point_segment_distance(px, py, ax, ay, bx, by):
+    dx, dy = bx - ax, by - ay
+    length2 = dx * dx + dy * dy
+    t = 0.0
+    if length2 > 0.0:
+        t = min(1.0, max(0.0, ((px - ax) * dx + (py - ay) * dy) / length2))
+    return math.hypot(px - ax - t * dx, py - ay - t * dy)
+
+
+@njit(cache=True)
+def segments_cross(ax, ay, bx, by, cx, cy, dx, dy):
+    """Whether two segments properly cross."""
+    d1 = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+    d2 = (bx - ax) * (dy - ay) - (by - ay) * (dx - ax)
+    d3 = (dx - cx) * (ay - cy) - (dy - cy) * (ax - cx)
+    d4 = (dx - cx) * (by - cy) - (dy - cy) * (bx - cx)
+    return (d1 > 0.0) != (d2 > 0.0) and (d3 > 0.0) != (d4 > 0.0)
+
+
+@njit(cache=True)
+def segment_segment_distance(ax, ay, bx, by, cx, cy, dx, dy):
+    if segments_cross(ax, ay, bx, by, cx, cy, dx, dy):
+        return 0.0
+    return min(
+        point_segment_distance(ax, ay, cx, cy, dx, dy),
+        point_segment_distance(bx, by, cx, cy, dx, dy),
+        point_segment_distance(cx, cy, ax, ay, bx, by),
+        point_segment_distance(dx, dy, ax, ay, bx, by),
+    )
+
+
+@njit(cache=True)
+def point_in_polygon(px, py, edges, start, stop):
+    inside = False
+    for e in range(start, stop):
+        ay, by = edges[e, 1], edges[e, 3]
+        if (ay > py) != (by > py):
+            x = edges[e, 0] + (py - ay) / (by - ay) * (edges[e, 2] - edges[e, 0])
+            if px < x:
+                inside = not inside
+    return inside
+
+
+@njit(cache=True)
+def depth_in_obstacle(px, py, o, circles, edges, edge_start, grow):
+    """How deep a point lies inside obstacle `o`; negative outside.
+
+    circles : (n, 3) centre and grown radius, radius negative for a polygon.
+    edges : (k, 4) polygon edges; obstacle o owns edge_start[o]:edge_start[o + 1], grown by grow[o].
+    """
+    if circles[o, 2] >= 0.0:
+        return circles[o, 2] - math.hypot(px - circles[o, 0], py - circles[o, 1])
+    d = np.inf
+    for e in range(edge_start[o], edge_start[o + 1]):
+        d = min(
+            d, point_segment_distance(px, py, edges[e, 0], edges[e, 1], edges[e, 2], edges[e, 3])
+        )
+    if point_in_polygon(px, py, edges, edge_start[o], edge_start[o + 1]):
+        d = -d
+    return grow[o] - d
+
+
+@njit(cache=True)
+def segment_depth_in_obstacle(ax, ay, bx, by, o, circles, edges, edge_start, grow, box, eps):
+    """Whether a segment enters obstacle `o` deeper than eps. `box`: (n, 4) bounding boxes."""
+    if (
+        max(ax, bx) < box[o, 0]
+        or min(ax, bx) > box[o, 2]
+        or max(ay, by) < box[o, 1]
+        or min(ay, by) > box[o, 3]
+    ):
+        return False
+    if circles[o, 2] >= 0.0:
+        d = point_segment_distance(circles[o, 0], circles[o, 1], ax, ay, bx, by)
+        return d < circles[o, 2] - eps
+    for e in range(edge_start[o], edge_start[o + 1]):
+        d = segment_segment_distance(
+            ax, ay, bx, by, edges[e, 0], edges[e, 1], edges[e, 2], edges[e, 3]
+        )
+        if d < grow[o] - eps:
+            return True
+    return point_in_polygon(ax, ay, edges, edge_start[o], edge_start[o + 1])
+
+
+@njit(cache=True)
+def segment_blocked(ax, ay, bx, by, circles, edges, edge_start, grow, box, eps):
+    for o in range(len(circles)):
+        if segment_depth_in_obstacle(ax, ay, bx, by, o, circles, edges, edge_start, grow, box, eps):
+            return True
+    return False
+
+
+@njit(cache=True)
+def circle_line_angles(cx, cy, r, ax, ay, bx, by, out, n):
+    """Append the angles at which a circle meets the line through two points; returns the count."""
+    dx, dy = bx - ax, by - ay
+    length = math.hypot(dx, dy)
+    if length == 0.0:
+        return n
+    nx, ny = dy / length, -dx / length
+    h = (ax - cx) * nx + (ay - cy) * ny
+    if abs(h) < r:
+        mid = math.atan2(ny, nx)
+        half = math.acos(h / r)
+        out[n] = mid - half
+        out[n + 1] = mid + half
+        n += 2
+    return n
+
+
+@njit(cache=True)
+def circle_circle_angles(cx, cy, r, ox, oy, q, out, n):
+    """Append the angles (on the first circle) at which two circles meet; returns the count."""
+    d = math.hypot(ox - cx, oy - cy)
+    if d == 0.0 or r == 0.0:
+        return n
+    c = (d * d + r * r - q * q) / (2.0 * d * r)
+    if -1.0 < c < 1.0:
+        mid = math.atan2(oy - cy, ox - cx)
+        half = math.acos(c)
+        out[n] = mid - half
+        out[n + 1] = mid + half
+        n += 2
+    return n

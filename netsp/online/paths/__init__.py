@@ -1,0 +1,1 @@
+"""Paths about obstacles in space: shortest trees, sampling planners, refinement."""

@@ -1,0 +1,1 @@
+"""Scenes: solids, meshes and clouds as distance fields."""

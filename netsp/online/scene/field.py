@@ -1,0 +1,255 @@
+"""The signed distance field of a scene: distance to the nearest solid, negative inside."""
+
+from __future__ import annotations
+
+import math
+import zipfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from netsp.arrays import Floats
+from netsp.errors import InputError
+from netsp.online.scene.sampling import Field, candidates, lowest_along, of_solids, sample_many
+
+ASK_ALL = 6
+"""So many solids or fewer are all asked at every point."""
+
+CELLS = 40
+"""Cells along the longest side of the coarse grid that tells which solids may be nearest."""
+
+FILE_VERSION = 1
+
+
+def finite_point(value: npt.ArrayLike, name: str) -> tuple[float, float, float]:
+    """Three finite coordinates; InputError, that names them, if they are something else."""
+    try:
+        x, y, z = (float(v) for v in np.asarray(value, dtype=float))
+    except (TypeError, ValueError):
+        raise InputError(f"{name}: expected three finite coordinates, got {value!r}") from None
+    if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(z)):
+        raise InputError(f"{name}: expected three finite coordinates, got {value!r}")
+    return x, y, z
+
+
+@dataclass(frozen=True)
+class VoxelGrid:
+    """Distances at the points of a regular grid, linear in between.
+
+    values : (nx, ny, nz) metres, negative inside. origin : (3,) of the first point. size : metres
+    between points. solid : (2, 3) bounding box of what is solid, well within the grid. notes : what
+    was assumed when it was built.
+    """
+
+    values: npt.NDArray[np.float32]
+    origin: Floats
+    size: float
+    solid: Floats
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class DistanceField:
+    """Distance, gradient and sight in a scene.
+
+    Attributes
+    ----------
+    arrays : what kernels take (`netsp.online.scene.sampling.Field`).
+    voxel : metres, size of a voxel; None when all is exact.
+    notes : what was assumed about meshes and clouds.
+    """
+
+    arrays: Field
+    voxel: float | None = None
+    notes: tuple[str, ...] = ()
+    thickness: tuple[tuple[str, float], ...] = ()
+
+    @classmethod
+    def build(
+        cls,
+        kinds: list[int],
+        rows: list[list[float]],
+        outline: npt.ArrayLike,
+        boxes: Sequence[Floats],
+        grid: VoxelGrid | None,
+        offset: float,
+        thickness: Sequence[tuple[str, float]] = (),
+    ) -> DistanceField:
+        """From encoded solids, their bounding boxes and voxels."""
+        arrays = of_solids(kinds, rows, outline, offset)
+        if len(kinds) > ASK_ALL and boxes:
+            low = np.min([b[0] for b in boxes], axis=0)
+            high = np.max([b[1] for b in boxes], axis=0)
+            room = 0.25 * float((high - low).max()) + 1e-9
+            low, high = low - room, high + room
+            size = float((high - low).max()) / CELLS
+            counts = np.ceil((high - low) / size)
+            near = np.array([*low, size, *counts])
+            cells, items = candidates(arrays, near)
+            arrays = arrays._replace(cells=cells, items=items, near=near)
+        if grid is not None:
+            place = np.array([*grid.origin, grid.size, *grid.solid.ravel()])
+            arrays = arrays._replace(
+                grid=np.ascontiguousarray(grid.values, dtype=np.float32), place=place
+            )
+        return cls(
+            arrays,
+            grid.size if grid is not None else None,
+            grid.notes if grid is not None else (),
+            tuple(thickness),
+        )
+
+    def distance(self, points: npt.ArrayLike) -> Floats:
+        """Distances (...) of points (..., 3), metres; negative inside a solid.
+
+        Exact outside of solids, and trilinear between voxels. Inside overlapping solids it is the
+        distance to the nearest of their surfaces.
+        """
+        p = self._points(points)
+        return np.asarray(sample_many(self.arrays, p.reshape(-1, 3))[:, 0].reshape(p.shape[:-1]))
+
+    def gradient(self, points: npt.ArrayLike) -> Floats:
+        """Unit gradients (..., 3): the way out, or away from the nearest solid."""
+        p = self._points(points)
+        return np.asarray(sample_many(self.arrays, p.reshape(-1, 3))[:, 1:4].reshape(p.shape))
+
+    def nearest(self, points: npt.ArrayLike) -> npt.NDArray[np.int64]:
+        """Index (...) of the nearest solid, -1 for voxels."""
+        p = self._points(points)
+        found = sample_many(self.arrays, p.reshape(-1, 3))[:, 4]
+        return np.asarray(found.astype(np.int64).reshape(p.shape[:-1]))
+
+    def line_of_sight(self, a: npt.ArrayLike, b: npt.ArrayLike, depth: float = 0.0) -> bool:
+        """Whether the segment from a to b is nowhere deeper than `depth` inside a solid, to within
+        a thousandth of its length or of a voxel (sphere tracing)."""
+        p, q = self._points(a), self._points(b)
+        step = max(1e-3 * float(np.linalg.norm(q - p)), 1e-9)
+        if self.voxel is not None:
+            step = min(step, 0.1 * self.voxel)
+        low, _ = lowest_along(self.arrays, *p, *q, max(min(step, depth or step), 1e-9))
+        return bool(low >= -max(depth, 1e-9))
+
+    def free_point(self, value: npt.ArrayLike, name: str, depth: float = 1e-6) -> Floats:
+        """A point (3,) as floats; InputError, that names it, if it is not finite, not three numbers
+        or deeper than `depth` inside a solid."""
+        point = np.array(finite_point(value, name))
+        d = float(sample_many(self.arrays, point[None])[0, 0])
+        if d < -depth:
+            shown = ", ".join(f"{v:g}" for v in point)
+            raise InputError(f"{name}: ({shown}) lies {-d:.3g} inside a solid")
+        return point
+
+    def thinner_than(self, thickness: float) -> tuple[str, ...]:
+        """One line for each part of the scene that is thinner than this."""
+        lines = [
+            f"{name} is {t:.3g} thick, thinner than {thickness:.3g}"
+            for name, t in self.thickness
+            if t + 2.0 * self.arrays.offset < thickness
+        ]
+        share = self._thin_share(thickness) if self.voxel is not None else 0.0
+        if share > 0.005:
+            lines.append(
+                f"{100 * share:.0f} % of the solid voxels belong to parts thinner than "
+                f"{thickness:.3g}"
+            )
+        return tuple(lines)
+
+    def _thin_share(self, thickness: float) -> float:
+        """Share of solid voxels that no ball of this diameter inside the solid covers."""
+        from scipy.ndimage import distance_transform_edt
+
+        grid, size = self.arrays.grid - self.arrays.offset, self._size
+        solid = grid < 0.0
+        if not solid.any():
+            return 0.0
+        deep = grid <= -0.5 * thickness + 0.87 * size
+        if not deep.any():
+            return 1.0
+        far = distance_transform_edt(~deep) * size
+        return float((far[solid] > 0.5 * thickness + 1.74 * size).mean())
+
+    @cached_property
+    def _size(self) -> float:
+        return self.voxel or math.nan
+
+    def grown(self, by: float) -> DistanceField:
+        """The field of the same scene with everything grown by a clearance."""
+        arrays = self.arrays._replace(offset=float(self.arrays.offset) + by)
+        return DistanceField(arrays, self.voxel, self.notes, self.thickness)
+
+    @property
+    def box(self) -> Floats | None:
+        """(2, 3) bounding box of the voxels' solid part; None without voxels."""
+        return self.arrays.place[4:10].reshape(2, 3).copy() if self.voxel is not None else None
+
+    def _points(self, points: npt.ArrayLike) -> Floats:
+        p = np.asarray(points, dtype=float)
+        if p.shape[-1:] != (3,):
+            raise InputError(f"points: expected shape (..., 3), got {p.shape}")
+        if not np.isfinite(p).all():
+            raise InputError("points: expected finite coordinates")
+        return p
+
+    def save(self, path: str | Path) -> None:
+        """Write the field to an .npz file, voxels and solids."""
+        try:
+            np.savez_compressed(
+                path,
+                version=FILE_VERSION,
+                voxel=np.nan if self.voxel is None else self.voxel,
+                notes=np.array(self.notes, dtype=str),
+                parts=np.array([n for n, _ in self.thickness], dtype=str),
+                thickness=np.array([t for _, t in self.thickness]),
+                **dict(self.arrays._asdict().items()),
+            )
+        except OSError as error:
+            raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
+
+    @classmethod
+    def load(cls, path: str | Path) -> DistanceField:
+        """Read what `save` wrote; InputError if it is something else."""
+        try:
+            with open(path, "rb") as file, np.load(file, allow_pickle=False) as data:
+                if int(data["version"]) != FILE_VERSION:
+                    raise InputError(f"{path}: a distance field of another version")
+                arrays = Field(**{k: data[k] for k in Field._fields})
+                arrays = arrays._replace(offset=float(arrays.offset))
+                voxel = float(data["voxel"])
+                return cls(
+                    arrays,
+                    None if math.isnan(voxel) else voxel,
+                    tuple(str(n) for n in data["notes"]),
+                    tuple(
+                        (str(n), float(t))
+                        for n, t in zip(data["parts"], data["thickness"], strict=True)
+                    ),
+                )
+        except OSError as error:
+            raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
+        except (KeyError, ValueError, TypeError, EOFError, zipfile.BadZipFile) as error:
+            raise InputError(f"{path}: not a distance field of netsp: {error}") from None
+
+
+def pushed_out(
+    field: DistanceField, points: npt.ArrayLike, clearance: float, rounds: int = 20
+) -> npt.NDArray[np.float64]:
+    """Points (n, 3) moved along the distance's gradient until they are at the clearance, as far as
+    that goes; never to where the distance is smaller than it was."""
+    p = np.array(points, dtype=float).reshape(-1, 3)
+    d = field.distance(p)
+    for _ in range(rounds):
+        short = d < clearance - 1e-6
+        if not short.any():
+            break
+        step = np.where(short, clearance - d, 0.0)[:, None]
+        moved = p + step * field.gradient(p)
+        after = field.distance(moved)
+        better = after > d
+        if not (better & short).any():
+            break
+        p[better], d[better] = moved[better], after[better]
+    return p

@@ -1,0 +1,237 @@
+"""The scene: what stands in the water. Solids, a mesh, a cloud of points, or an NE-TSP problem.
+
+Validated at the door like a problem; `netsp schema scene` prints the JSON Schema.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Literal, Self
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, model_validator
+
+from netsp.arrays import Floats
+from netsp.errors import InputError
+from netsp.fields import STRICT, Name, NonNegative, Number, Positive
+from netsp.files import read_text
+from netsp.models import read_model
+from netsp.online.scene.field import DistanceField
+from netsp.online.scene.shapes import (
+    Box,
+    Capsule,
+    Cylinder,
+    HalfSpace,
+    Post,
+    Prism,
+    Shape,
+    Sphere,
+    Torus,
+)
+from netsp.problem import Circle, Problem
+
+_KINDS = ("sphere", "capsule", "cylinder", "box", "torus", "post", "prism", "half_space")
+
+
+class Solid(BaseModel):
+    """One solid: exactly one of its shapes, and a name."""
+
+    model_config = STRICT
+    name: Name | None = None
+    sphere: Sphere | None = None
+    capsule: Capsule | None = None
+    cylinder: Cylinder | None = None
+    box: Box | None = None
+    torus: Torus | None = None
+    post: Post | None = None
+    prism: Prism | None = None
+    half_space: HalfSpace | None = None
+
+    @model_validator(mode="after")
+    def _one(self) -> Self:
+        given = [k for k in _KINDS if getattr(self, k) is not None]
+        if len(given) != 1:
+            raise ValueError(f"expected one of {', '.join(_KINDS)}, got {given or 'none'}")
+        return self
+
+    @property
+    def shape(self) -> Shape:
+        """The shape it is."""
+        shapes: list[Shape | None] = [getattr(self, k) for k in _KINDS]
+        return next(s for s in shapes if s is not None)
+
+
+class Source(BaseModel):
+    """A mesh or cloud in a file beside the scene's.
+
+    file : path, relative to the scene file. scale : metres per unit of the file. voxel : metres;
+    size of a voxel, default 1/200 of the longest side.
+    """
+
+    model_config = STRICT
+    file: str
+    scale: Positive = 1.0
+    voxel: Positive | None = None
+
+
+class Scene(BaseModel):
+    """A scene: the union of its solids, its mesh, its cloud and the obstacles of its problem.
+
+    Attributes
+    ----------
+    solids : exact shapes.
+    mesh, cloud : files, turned into voxels (`netsp.online.scene.voxels`).
+    problem : an NE-TSP problem file, whose obstacles, grown by its clearance, stand from the sea
+        floor to the surface.
+    tether_radius : everything is grown by it for the tether.
+    bounds : (xmin, ymin, zmin, xmax, ymax, zmax) that the robot stays in, or None.
+
+    Raises
+    ------
+    InputError : from `load` and `field`, in one line.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", title="netsp scene")
+
+    schema_version: Literal[1] = 1
+    name: Name = "scene"
+    units: Name = "m"
+    solids: tuple[Solid, ...] = ()
+    mesh: Source | None = None
+    cloud: Source | None = None
+    problem: str | None = None
+    tether_radius: NonNegative = 0.0
+    bounds: tuple[Number, Number, Number, Number, Number, Number] | None = None
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if self.bounds is not None and not all(
+            a < b for a, b in zip(self.bounds[:3], self.bounds[3:], strict=True)
+        ):
+            raise ValueError(
+                "bounds: expected (xmin, ymin, zmin, xmax, ymax, zmax) with min < max, got "
+                f"{list(self.bounds)}"
+            )
+        return self
+
+    @classmethod
+    def from_json(cls, text: str | bytes, *, source: str = "scene") -> Self:
+        """Parse and validate; `InputError` with one line for anything wrong."""
+        return read_model(cls, text, source)
+
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """Read a scene file; file names in it become relative to the working directory."""
+        scene = cls.from_json(read_text(path), source=str(path))
+        folder = Path(path).parent
+        changes: dict[str, Any] = {
+            key: given.model_copy(update={"file": str(folder / given.file)})
+            for key in ("mesh", "cloud")
+            if (given := getattr(scene, key)) is not None
+        }
+        if scene.problem is not None:
+            changes["problem"] = str(folder / scene.problem)
+        return scene.model_copy(update=changes)
+
+    @classmethod
+    def from_problem(cls, problem: Problem) -> Self:
+        """The obstacles of an NE-TSP problem as posts and prisms, grown by its clearance: offline
+        and online share one world."""
+        return cls(name=problem.name, units=problem.units, solids=_standing(problem))
+
+    def all_solids(self) -> tuple[Solid, ...]:
+        """The solids with those of the problem."""
+        more = _standing(Problem.load(self.problem)) if self.problem is not None else ()
+        return (*self.solids, *more)
+
+    def field(
+        self,
+        *,
+        voxel: float | None = None,
+        memory_limit: float = 4.0,
+        on_progress: Callable[[str, float], None] | None = None,
+    ) -> DistanceField:
+        """The distance field of the scene.
+
+        Parameters
+        ----------
+        voxel : metres; overrides that of mesh and cloud.
+        memory_limit : GiB; a grid that needs more is refused with a voxel size that does not.
+        on_progress : is told (stage, fraction done) of long builds.
+
+        Raises
+        ------
+        InputError : nothing in the scene, unreadable files, a grid that is too large.
+        """
+        solids = self.all_solids()
+        if not solids and self.mesh is None and self.cloud is None:
+            raise InputError(f"{self.name}: the scene is empty; expected solids, mesh or cloud")
+        kind, rows, outline = encode(solids)
+        grid = None
+        for source, what in ((self.mesh, "mesh"), (self.cloud, "cloud")):
+            if source is None:
+                continue
+            from netsp.online.scene import voxels
+
+            if grid is not None:
+                raise InputError(f"{self.name}: mesh, cloud: expected one of them, got both")
+            read = voxels.of_mesh if what == "mesh" else voxels.of_cloud_file
+            grid = read(
+                source.file,
+                scale=source.scale,
+                voxel=voxel or source.voxel,
+                memory_limit=memory_limit,
+                on_progress=on_progress,
+            )
+        boxes = [b for s in solids if (b := s.shape.box()) is not None]
+        names = [s.name or f"solids[{k}]" for k, s in enumerate(solids)]
+        thickness = [s.shape.thickness() for s in solids]
+        return DistanceField.build(
+            kind,
+            rows,
+            outline,
+            boxes,
+            grid,
+            self.tether_radius,
+            list(zip(names, thickness, strict=True)),
+        )
+
+
+def _standing(problem: Problem) -> tuple[Solid, ...]:
+    out = []
+    for i, o in enumerate(problem.obstacles):
+        name = o.name or f"obstacles[{i}]"
+        if isinstance(o, Circle):
+            post = Post(center=o.center, radius=o.radius + problem.clearance)
+            out.append(Solid(name=name, post=post))
+        else:
+            prism = Prism(polygon=o.polygon, grow=problem.clearance)
+            out.append(Solid(name=name, prism=prism))
+    return tuple(out)
+
+
+def encode(solids: tuple[Solid, ...]) -> tuple[list[int], list[list[float]], Floats]:
+    """Kinds, rows and polygon vertices for `netsp.online.scene.sampling.of_solids`."""
+    kind: list[int] = []
+    rows: list[list[float]] = []
+    outline: list[tuple[float, float]] = []
+    for solid in solids:
+        k, row = solid.shape.row()
+        if isinstance(solid.shape, Prism):
+            row = [len(outline), len(outline) + len(solid.shape.polygon), row[2]]
+            outline += list(solid.shape.polygon)
+        kind.append(k)
+        rows.append(row)
+    return kind, rows, np.array(outline, dtype=float).reshape(-1, 2)
+
+
+def scene_of(problem: Problem) -> Scene:
+    """The scene of a problem; where there is no obstacle, with a solid far below the base, because
+    a scene needs one."""
+    if problem.obstacles:
+        return Scene.from_problem(problem)
+    x, y, z = problem.base
+    far = 1e3 * (problem.tether_length + problem.scale)
+    stone = {"sphere": {"center": [x, y, z - far], "radius": problem.tether_length}}
+    return Scene.model_validate({"schema_version": 1, "name": problem.name, "solids": [stone]})

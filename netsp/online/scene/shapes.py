@@ -1,0 +1,253 @@
+"""Solids of a scene: what a file says, and their rows for the kernels."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Self
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import BaseModel, Field, model_validator
+
+from netsp.arrays import Floats
+from netsp.fields import STRICT, NonNegative, Number, Point2, Point3, Positive
+from netsp.online.scene import solids as kinds
+from netsp.problem import Polygon
+
+Row = tuple[int, list[float]]
+
+
+class Sphere(BaseModel):
+    """A ball."""
+
+    model_config = STRICT
+    center: Point3
+    radius: Positive
+
+    def row(self) -> Row:
+        return kinds.CAPSULE, [*self.center, *self.center, self.radius]
+
+    def thickness(self) -> float:
+        return 2.0 * self.radius
+
+    def box(self) -> Floats:
+        return _around([self.center], self.radius)
+
+
+class Capsule(BaseModel):
+    """All points within a radius of a segment: a pipe or a strut with round ends."""
+
+    model_config = STRICT
+    a: Point3
+    b: Point3
+    radius: Positive
+
+    def row(self) -> Row:
+        return kinds.CAPSULE, [*self.a, *self.b, self.radius]
+
+    def thickness(self) -> float:
+        return 2.0 * self.radius
+
+    def box(self) -> Floats:
+        return _around([self.a, self.b], self.radius)
+
+
+class Cylinder(BaseModel):
+    """A solid cylinder with flat ends: a pipe, a flange."""
+
+    model_config = STRICT
+    a: Point3
+    b: Point3
+    radius: Positive
+
+    @model_validator(mode="after")
+    def _long(self) -> Self:
+        if math.dist(self.a, self.b) < 1e-9:
+            raise ValueError("a and b: expected two different points")
+        return self
+
+    @property
+    def length(self) -> float:
+        return math.dist(self.a, self.b)
+
+    def row(self) -> Row:
+        axis = (np.array(self.b) - np.array(self.a)) / self.length
+        return kinds.CYLINDER, [*self.a, *axis, self.radius, self.length]
+
+    def thickness(self) -> float:
+        return min(2.0 * self.radius, self.length)
+
+    def box(self) -> Floats:
+        axis = (np.array(self.b) - np.array(self.a)) / self.length
+        reach = self.radius * np.sqrt(np.maximum(0.0, 1.0 - axis**2))
+        ends = np.array([self.a, self.b])
+        return np.array([ends.min(0) - reach, ends.max(0) + reach])
+
+
+class Box(BaseModel):
+    """A box of a full size, turned by angles in degrees about x, then y, then z."""
+
+    model_config = STRICT
+    center: Point3
+    size: tuple[Positive, Positive, Positive]
+    rotation: tuple[Number, Number, Number] = (0.0, 0.0, 0.0)
+
+    def axes(self) -> Floats:
+        """Rows: the axes of the box in the world."""
+        from scipy.spatial.transform import Rotation
+
+        return np.asarray(Rotation.from_euler("xyz", self.rotation, degrees=True).as_matrix().T)
+
+    def row(self) -> Row:
+        half = [0.5 * s for s in self.size]
+        return kinds.BOX, [*self.center, *half, *self.axes().ravel()]
+
+    def thickness(self) -> float:
+        return min(self.size)
+
+    def box(self) -> Floats:
+        reach = 0.5 * np.abs(self.axes()).T @ np.array(self.size)
+        return np.array([np.array(self.center) - reach, np.array(self.center) + reach])
+
+
+class Torus(BaseModel):
+    """All points within `minor_radius` of an arc of `major_radius` about an axis, that begins in
+    the direction `start` and turns by `angle` degrees: a ring, or an elbow of a pipe."""
+
+    model_config = STRICT
+    center: Point3
+    axis: Point3 = (0.0, 0.0, 1.0)
+    major_radius: Positive
+    minor_radius: Positive
+    start: Point3 | None = None
+    angle: Annotated[float, Field(gt=0.0, le=360.0)] = 360.0
+
+    @model_validator(mode="after")
+    def _shape(self) -> Self:
+        if math.hypot(*self.axis) < 1e-9:
+            raise ValueError(f"axis: expected a direction, got {list(self.axis)}")
+        if self.minor_radius > self.major_radius:
+            raise ValueError(
+                f"minor_radius: expected at most major_radius {self.major_radius:g}, "
+                f"got {self.minor_radius:g}"
+            )
+        if self.start is not None and not (
+            np.linalg.norm(np.cross(self.start, self.axis))
+            > 1e-6 * math.hypot(*self.start) * math.hypot(*self.axis)
+        ):
+            raise ValueError("start: expected a direction across the axis")
+        if self.start is None and self.angle < 360.0:
+            raise ValueError("start: missing; an angle below 360 needs the direction it begins in")
+        return self
+
+    def frame(self) -> tuple[Floats, Floats, Floats]:
+        """Unit axis, start and their cross product."""
+        axis = np.array(self.axis) / np.linalg.norm(self.axis)
+        start = np.array(self.start if self.start is not None else np.eye(3)[np.abs(axis).argmin()])
+        start = start - (start @ axis) * axis
+        start /= np.linalg.norm(start)
+        return axis, start, np.cross(axis, start)
+
+    def row(self) -> Row:
+        axis, start, _ = self.frame()
+        return kinds.TORUS, [
+            *self.center, *axis, *start, self.major_radius, self.minor_radius,
+            math.radians(self.angle),
+        ]  # fmt: skip
+
+    def thickness(self) -> float:
+        return 2.0 * self.minor_radius
+
+    def centreline(self) -> Floats:
+        """(k, 3) points of the arc."""
+        _, start, across = self.frame()
+        t = np.radians(np.linspace(0.0, self.angle, max(3, int(self.angle / 5.0) + 1)))[:, None]
+        return self.center + self.major_radius * (np.cos(t) * start + np.sin(t) * across)
+
+    def box(self) -> Floats:
+        return _around(self.centreline(), self.minor_radius + 0.002 * self.major_radius)
+
+
+class Post(BaseModel):
+    """A vertical cylinder without ends."""
+
+    model_config = STRICT
+    center: Point2
+    radius: Positive
+
+    def row(self) -> Row:
+        return kinds.POST, [*self.center, self.radius]
+
+    def thickness(self) -> float:
+        return 2.0 * self.radius
+
+    def box(self) -> Floats:
+        return _around([(*self.center, 0.0)], self.radius) * [1.0, 1.0, 0.0]
+
+
+class Prism(BaseModel):
+    """A vertical prism without ends over a simple polygon, grown by `grow`."""
+
+    model_config = STRICT
+    polygon: Annotated[tuple[Point2, ...], Field(min_length=3)]
+    grow: NonNegative = 0.0
+
+    @model_validator(mode="after")
+    def _simple(self) -> Self:
+        Polygon(polygon=self.polygon)
+        return self
+
+    def row(self) -> Row:
+        return kinds.PRISM, [0.0, 0.0, self.grow]
+
+    def thickness(self) -> float:
+        import shapely
+
+        shape = shapely.Polygon(self.polygon)
+        low, high = 0.0, math.sqrt(shape.area)
+        for _ in range(20):
+            # an opening that keeps corners loses area only where the polygon is thin
+            t = 0.5 * (low + high)
+            opened = shape.buffer(-t / 2, join_style="mitre").buffer(t / 2, join_style="mitre")
+            if shape.difference(opened).area < 1e-6 * shape.area:
+                low = t
+            else:
+                high = t
+        return low + 2.0 * self.grow
+
+    def box(self) -> Floats:
+        xy = np.array(self.polygon)
+        flat = np.column_stack([xy, np.zeros(len(xy))])
+        return _around(flat, self.grow) * [1.0, 1.0, 0.0]
+
+
+class HalfSpace(BaseModel):
+    """Everything behind a plane: a sea floor, a wall."""
+
+    model_config = STRICT
+    point: Point3
+    normal: Point3 = (0.0, 0.0, 1.0)
+
+    @model_validator(mode="after")
+    def _direction(self) -> Self:
+        if math.hypot(*self.normal) < 1e-9:
+            raise ValueError(f"normal: expected a direction, got {list(self.normal)}")
+        return self
+
+    def row(self) -> Row:
+        n = np.array(self.normal) / np.linalg.norm(self.normal)
+        return kinds.HALF_SPACE, [*self.point, *n]
+
+    def thickness(self) -> float:
+        return math.inf
+
+    def box(self) -> None:
+        return None
+
+
+def _around(points: npt.ArrayLike, radius: float) -> Floats:
+    p = np.asarray(points, dtype=float)
+    return np.array([p.min(0) - radius, p.max(0) + radius])
+
+
+Shape = Sphere | Capsule | Cylinder | Box | Torus | Post | Prism | HalfSpace

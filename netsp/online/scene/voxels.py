@@ -1,0 +1,387 @@
+"""From a mesh or a cloud of points to a grid of signed distances, true to a fraction of a voxel.
+
+Distances: every grid point near the surface knows its nearest triangle (or point) exactly; sweeps
+in the eight diagonal directions hand it on to the neighbours, that measure for themselves (a
+closest point transform). Signs: a closed mesh winds around its inside, so whatever it winds around
+is solid (overlapping parts unite); an open mesh or a cloud has no inside by itself, so water floods
+the grid from its border, and what it does not reach is solid.
+"""
+
+from __future__ import annotations
+
+import math
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from netsp.arrays import Floats
+from netsp.errors import InputError
+from netsp.files import MOST_BYTES
+from netsp.online.scene.closest import nearest_sites, sweep, windings
+from netsp.online.scene.field import VoxelGrid
+
+Progress = Callable[[str, float], None] | None
+
+DEFAULT_VOXELS = 200
+"""Voxels along the longest side when no size is given."""
+
+BYTES_PER_VOXEL = 28
+"""At the peak of building."""
+
+MARGIN = 8
+"""Voxels between the solid and the border of the grid."""
+
+
+def of_mesh(
+    path: str | Path,
+    *,
+    scale: float = 1.0,
+    voxel: float | None = None,
+    memory_limit: float = 4.0,
+    on_progress: Progress = None,
+) -> VoxelGrid:
+    """The distance grid of a mesh file in any format that trimesh reads (STL, OBJ, PLY, …).
+
+    Raises
+    ------
+    InputError : not readable, no triangles, coordinates that are not finite, a grid too large for
+        `memory_limit` (GiB), or trimesh is not installed.
+    """
+    vertices, faces = read_mesh(path)
+    return of_triangles(
+        vertices * scale, faces, voxel=voxel, memory_limit=memory_limit,
+        on_progress=on_progress, source=str(path),
+    )  # fmt: skip
+
+
+def of_triangles(
+    vertices: npt.ArrayLike,
+    faces: npt.ArrayLike,
+    *,
+    voxel: float | None = None,
+    memory_limit: float = 4.0,
+    on_progress: Progress = None,
+    source: str = "mesh",
+) -> VoxelGrid:
+    """The distance grid of triangles: vertices (n, 3), faces (m, 3)."""
+    v, f = np.asarray(vertices, dtype=float), np.asarray(faces, dtype=np.int64)
+    if f.size == 0:
+        raise InputError(f"{source}: expected a mesh with triangles, got none")
+    if v.ndim != 2 or v.shape[1] != 3 or f.ndim != 2 or f.shape[1] != 3:
+        raise InputError(
+            f"{source}: expected vertices (n, 3) and faces (m, 3), got {v.shape} and {f.shape}"
+        )
+    if f.min() < 0 or f.max() >= len(v):
+        raise InputError(f"{source}: a face has a corner that is none of the {len(v)} vertices")
+    if not np.isfinite(v).all():
+        raise InputError(f"{source}: a vertex is not finite")
+    open_edges, uneven = _edges(f, v)
+    turned = 0
+    if not open_edges:
+        f, turned = _outward(f, v)
+    triangles = v[f]
+    low, high = triangles.min((0, 1)), triangles.max((0, 1))
+    size, origin, counts = _grid(low, high, voxel, memory_limit, source)
+    notes = []
+    sites = np.column_stack([triangles.reshape(-1, 9), np.zeros(len(triangles))])
+    distances, _ = _closest(sites, False, origin, size, counts, on_progress)
+    if open_edges:
+        shell = size
+        notes.append(
+            f"the mesh is open ({open_edges} edges have one triangle only): taken as a shell, "
+            f"{2 * shell:.3g} thick; spaces that water cannot reach count as solid"
+        )
+        values = distances - np.float32(shell)
+    else:
+        around = windings(triangles, origin, size, counts)
+        if uneven:
+            notes.append(
+                f"triangles at {uneven} edges are turned against each other: taken as solid "
+                "wherever the mesh winds at all"
+            )
+        if turned:
+            notes.append(f"{turned} parts are turned inside out or cavities: taken as solid")
+        elif np.abs(around).max(initial=0) > 1:
+            notes.append("parts of the mesh overlap: taken as their union")
+        values = np.where(around != 0, -distances, distances)
+    enclosed = _unreached(values)
+    if enclosed.any():
+        values[enclosed] = -np.abs(values[enclosed])
+        if not open_edges:
+            notes.append("closed cavities count as solid")
+    if not (values < 0.0).any():
+        raise InputError(f"{source}: no solid at voxels of {size:.3g}; expected smaller voxels")
+    grow = size if open_edges else 0.0
+    _tell(on_progress, "distances", 1.0)
+    return VoxelGrid(values, origin, size, np.array([low - grow, high + grow]), tuple(notes))
+
+
+def of_cloud_file(
+    path: str | Path,
+    *,
+    scale: float = 1.0,
+    voxel: float | None = None,
+    memory_limit: float = 4.0,
+    on_progress: Progress = None,
+) -> VoxelGrid:
+    """The distance grid of a cloud file: .npz or .npy (an array (n, 3), in .npz named `points`),
+    .csv, .txt or .xyz (three columns), or .ply. InputError as for `of_mesh`."""
+    return of_cloud(
+        read_cloud(path) * scale, voxel=voxel, memory_limit=memory_limit, on_progress=on_progress,
+        source=str(path),
+    )  # fmt: skip
+
+
+def of_cloud(
+    points: npt.ArrayLike,
+    *,
+    voxel: float | None = None,
+    memory_limit: float = 4.0,
+    on_progress: Progress = None,
+    source: str = "cloud",
+) -> VoxelGrid:
+    """The distance grid of a cloud (n, 3) that lies on the surface of something solid.
+
+    The cloud is closed: balls of radius r about the points, r wide enough to shut the gaps between
+    neighbours, keep the water out; what it does not reach is then eroded by r again. So the surface
+    passes through the points and bridges gaps of up to about 2 r. Where nothing solid would be left
+    (a sheet of points) the points themselves are, one voxel to either side.
+    """
+    p = np.asarray(points, dtype=float)
+    if p.ndim != 2 or p.shape[1] != 3:
+        raise InputError(f"{source}: expected points of three coordinates, got shape {p.shape}")
+    if len(p) < 4:
+        raise InputError(f"{source}: expected at least 4 points, got {len(p)}")
+    if not np.isfinite(p).all():
+        raise InputError(f"{source}: a point is not finite")
+    from scipy.ndimage import minimum_filter
+    from scipy.spatial import cKDTree
+
+    low, high = p.min(0), p.max(0)
+    size, origin, counts = _grid(low, high, voxel, memory_limit, source, extra=_spacing(p))
+    near, _ = cKDTree(p).query(p, k=min(7, len(p)))
+    ball = max(1.5 * size, float(np.quantile(near[:, -1], 0.95)))
+    sites = np.zeros((len(p), 10))
+    sites[:, :3] = p
+    distances, owner = _closest(sites, True, origin, size, counts, on_progress)
+    _tell(on_progress, "flood", 0.5)
+    values = distances - np.float32(ball)
+    filled = _unreached(values) | (values <= 0.0)
+    # the distance to the water's edge: balls about grid points in the water that just touch it
+    edge = ~filled & (values <= 1.8 * size)
+    if not edge.any() or not filled.any():
+        raise InputError(f"{source}: no solid at voxels of {size:.3g}; expected smaller voxels")
+    at = np.argwhere(edge)
+    weighted = np.zeros((len(at), 10))
+    weighted[:, :3] = origin + size * at
+    weighted[:, 9] = values[edge]
+    to_water, _ = _closest(weighted, True, origin, size, counts, None)
+    out = np.where(filled, ball - to_water, distances).astype(np.float32)
+    notes = [f"gaps of up to {2 * ball:.3g} between points are closed"]
+    # points around which nothing is solid
+    cell = np.clip(np.rint((p - origin) / size).astype(int), 0, np.array(counts) - 1)
+    loose = minimum_filter(out, size=5)[tuple(cell.T)] > -size
+    grow = 0.0
+    if loose.any():
+        out = np.where(loose[owner], np.minimum(out, distances - np.float32(size)), out)
+        grow = size
+        if loose.mean() > 0.01:
+            notes.append(
+                f"{100 * loose.mean():.0f} % of the points enclose nothing: taken as a sheet, "
+                f"{2 * size:.3g} thick"
+            )
+    _tell(on_progress, "distances", 1.0)
+    return VoxelGrid(out, origin, size, np.array([low - grow, high + grow]), tuple(notes))
+
+
+def _closest(
+    sites: Floats, points: bool, origin: Floats, size: float, counts: tuple[int, int, int],
+    on_progress: Progress,
+) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.int32]]:  # fmt: skip
+    """Distances of all grid points to the nearest site, and which it is."""
+    _tell(on_progress, "distances", 0.0)
+    distances = np.full(counts, np.float32(np.inf))
+    owner = np.full(counts, -1, dtype=np.int32)
+    nearest_sites(sites, points, origin, size, distances, owner)
+    turns = 8
+    for turn in range(turns):
+        sweep(sites, points, origin, size, distances, owner, turn % 8)
+        _tell(on_progress, "distances", (turn + 1) / (turns + 1))
+    return distances, owner
+
+
+def _unreached(values: npt.NDArray[np.float32]) -> npt.NDArray[np.bool_]:
+    """Grid points outside of the solid that water from the border does not reach."""
+    from scipy.ndimage import label
+
+    water = values > 0.0
+    parts, count = label(water)
+    if count <= 1:
+        return np.zeros(values.shape, dtype=bool)
+    border = np.zeros(count + 1, dtype=bool)
+    for face in (parts[0], parts[-1], parts[:, 0], parts[:, -1], parts[:, :, 0], parts[:, :, -1]):
+        border[np.unique(face)] = True
+    border[0] = True
+    return np.asarray(~border[parts])
+
+
+def _grid(
+    low: Floats, high: Floats, voxel: float | None, memory_limit: float, source: str,
+    extra: float = 0.0,
+) -> tuple[float, Floats, tuple[int, int, int]]:  # fmt: skip
+    """Voxel size, origin and counts; InputError when the grid would be too large."""
+    if voxel is not None and not 0.0 < voxel < math.inf:
+        raise InputError(f"{source}: voxel: expected a positive length, got {voxel!r}")
+    side = float((high - low).max())
+    if side <= 0.0:
+        raise InputError(f"{source}: all points are the same")
+    size = voxel if voxel is not None else side / DEFAULT_VOXELS
+    pad = MARGIN * size + 2.0 * extra
+    shape = np.ceil((high - low + 2.0 * pad) / size) + 1
+    need = float(np.prod(shape)) * BYTES_PER_VOXEL / 2**30
+    if need > memory_limit:
+        better = size * (need / memory_limit) ** (1.0 / 3.0) * 1.02
+        raise InputError(
+            f"{source}: voxels of {size:.3g} need {need:.3g} GiB (a grid of "
+            f"{' x '.join(f'{n:.0f}' for n in shape)}), more than {memory_limit:g}; expected "
+            f"voxels of {better:.2g} or more"
+        )
+    # off by an odd fraction of a voxel: no row of the grid runs along an edge of the mesh
+    origin = low - pad + size * np.array([0.0123457, 0.0271828, 0.0314159])
+    return size, origin, (int(shape[0]), int(shape[1]), int(shape[2]))
+
+
+def _edges(faces: npt.NDArray[np.int64], vertices: Floats) -> tuple[int, int]:
+    """How many edges have one triangle only, and at how many the triangles disagree on the side
+    that is out. Vertices at the same place count as one (STL files repeat them)."""
+    _, same = np.unique(np.round(vertices, 9), axis=0, return_inverse=True)
+    f = same.ravel()[faces]
+    f = f[(f[:, 0] != f[:, 1]) & (f[:, 1] != f[:, 2]) & (f[:, 2] != f[:, 0])]
+    directed = np.concatenate([f[:, [0, 1]], f[:, [1, 2]], f[:, [2, 0]]])
+    turned = directed[:, 0] > directed[:, 1]
+    undirected, index = np.unique(np.sort(directed, axis=1), axis=0, return_inverse=True)
+    uses = np.bincount(index.ravel(), minlength=len(undirected))
+    balance = np.bincount(index.ravel(), np.where(turned, 1, -1), minlength=len(undirected))
+    return int((uses % 2 == 1).sum()), int(((uses % 2 == 0) & (balance != 0)).sum())
+
+
+def _outward(faces: npt.NDArray[np.int64], vertices: Floats) -> tuple[npt.NDArray[np.int64], int]:
+    """The faces with every connected part turned so that its volume is positive, and how many parts
+    were not. So overlapping parts never cancel, and what is in a cavity is solid."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    _, same = np.unique(np.round(vertices, 9), axis=0, return_inverse=True)
+    f = same.ravel()[faces]
+    links = coo_array((np.ones(2 * len(f)), (np.r_[f[:, 0], f[:, 1]], np.r_[f[:, 1], f[:, 2]])))
+    count = int(f.max()) + 1
+    links.resize((count, count))
+    _, part = connected_components(links, directed=False)
+    part = part[f[:, 0]]
+    a, b, c = (vertices[faces[:, k]] - vertices.mean(0) for k in range(3))
+    volume = np.bincount(part, np.einsum("ij,ij->i", a, np.cross(b, c)))
+    wrong = volume[part] < 0.0
+    return np.where(wrong[:, None], faces[:, ::-1], faces), int((volume < 0.0).sum())
+
+
+def _spacing(points: Floats) -> float:
+    """A rough distance between neighbours, for the room around a cloud."""
+    from scipy.spatial import cKDTree
+
+    some = points[:: max(1, len(points) // 2000)]
+    far, _ = cKDTree(points).query(some, k=min(7, len(points)))
+    return float(np.quantile(far[:, -1], 0.95))
+
+
+def read_mesh(path: str | Path) -> tuple[Floats, npt.NDArray[np.int64]]:
+    """Vertices (n, 3) and faces (m, 3) of a mesh file. InputError if there are none."""
+    trimesh = _trimesh()
+    _exists(path)
+    try:
+        mesh = trimesh.load(str(path), force="mesh")
+    except Exception as error:  # whatever its many readers raise
+        raise InputError(f"{path}: cannot be read as a mesh: {_line(error)}") from None
+    faces = getattr(mesh, "faces", None)
+    if faces is None or len(faces) == 0:
+        raise InputError(f"{path}: expected a mesh with triangles, got none")
+    return np.asarray(mesh.vertices, dtype=float), np.asarray(faces, dtype=np.int64)
+
+
+def read_cloud(path: str | Path) -> Floats:
+    """Points (n, 3) of a cloud file. InputError if there are none."""
+    _exists(path)
+    kind = Path(path).suffix.lower()
+    try:
+        if kind == ".npz":
+            with np.load(path, allow_pickle=False) as data:
+                name = "points" if "points" in data else next(iter(data), "")
+                points = np.asarray(data[name], dtype=float)
+        elif kind == ".npy":
+            points = np.asarray(np.load(path, allow_pickle=False), dtype=float)
+        elif kind in (".csv", ".txt", ".xyz"):
+            text = Path(path).read_text(encoding="utf-8").replace(",", " ").splitlines()
+            rows = [line.split()[:3] for line in text if line.strip()]
+            if rows and not _numeric(rows[0]):
+                rows = rows[1:]
+            points = np.array([[float(v) for v in row] for row in rows]).reshape(-1, 3)
+        elif kind == ".ply":
+            points = np.asarray(_trimesh().load(str(path)).vertices, dtype=float)
+        else:
+            raise InputError(
+                f"{path}: expected a cloud in .npz, .npy, .csv, .txt, .xyz or .ply, got {kind!r}"
+            )
+    except InputError:
+        raise
+    except Exception as error:
+        raise InputError(f"{path}: cannot be read as a cloud: {_line(error)}") from None
+    if points.ndim != 2 or points.shape[1] != 3 or len(points) == 0:
+        raise InputError(f"{path}: expected points of three coordinates, got {points.shape}")
+    return points
+
+
+def _numeric(row: list[str]) -> bool:
+    try:
+        [float(v) for v in row]
+    except ValueError:
+        return False
+    return True
+
+
+def _exists(path: str | Path) -> None:
+    if not Path(path).is_file():
+        raise InputError(f"{path}: cannot be read: no such file")
+    size = Path(path).stat().st_size
+    if size > MOST_BYTES:
+        raise InputError(
+            f"{path}: cannot be read: {size / 2**20:.4g} MiB; expected at most "
+            f"{MOST_BYTES / 2**20:g} MiB"
+        )
+    if Path(path).suffix.lower() == ".npz":
+        try:
+            with zipfile.ZipFile(path) as archive:
+                unpacked = sum(part.file_size for part in archive.infolist())
+        except zipfile.BadZipFile:
+            raise InputError(f"{path}: cannot be read: not an npz file") from None
+        if unpacked > 4 * MOST_BYTES:
+            raise InputError(f"{path}: unpacks to more than {4 * MOST_BYTES / 2**20:g} MiB")
+
+
+def _line(error: Exception) -> str:
+    return (str(error) or type(error).__name__).splitlines()[0][:120]
+
+
+def _trimesh() -> Any:
+    try:
+        import trimesh
+    except ImportError:
+        raise InputError("meshes need trimesh: pip install 'netsp[online]'") from None
+    return trimesh
+
+
+def _tell(on_progress: Progress, stage: str, fraction: float) -> None:
+    if on_progress is not None:
+        on_progress(stage, fraction if math.isfinite(fraction) else 0.0)

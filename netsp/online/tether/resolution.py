@@ -1,0 +1,22 @@
+"""How fine a tether must be sampled."""
+
+from __future__ import annotations
+
+from netsp.online.scene.scene import scene_of
+from netsp.problem import Problem
+
+
+def suggested_delta(problem: Problem) -> float:
+    """A resolution for the tether: a three-hundredth of its length, and fine enough for the
+    thinnest obstacle."""
+    return min(problem.tether_length / 300.0, coarsest_delta(problem) / 1.1)
+
+
+def coarsest_delta(problem: Problem) -> float:
+    """The coarsest resolution at which a tether passes through no obstacle."""
+    thickness = [t for _, t in scene_of(problem).field().thickness]
+    return float(min([problem.tether_length / 20.0, *(t / THINNEST for t in thickness)]))
+
+
+THINNEST = 1.8
+"""In units of delta: no solid thicker than this is ever passed."""

@@ -1,0 +1,1 @@
+"""Pictures of problems, scenes, missions and executions."""

@@ -1,0 +1,187 @@
+"""Pictures of missions: what was seen and how long the tether was over time (as in Figs. 4 and 7 of
+Amer et al. 2025), and the ways in space, of one run or of two side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from netsp.arrays import Floats
+from netsp.errors import InputError
+from netsp.online.log import Run
+from netsp.online.scene.scene import Scene
+from netsp.online.scene.surfaces import extent
+from netsp.online.tether import GeodesicTether, Tether
+from netsp.pictures.literal import literal
+from netsp.pictures.scene import (
+    draw_lines,
+    layout,
+    line_trace,
+    mesh_trace,
+    parts_of,
+    plotly_objects,
+    point_trace,
+    shaded,
+)
+
+COLOURS = ("#c2255c", "#1971c2")
+FRAMES = 120
+
+
+def way_of(run: Run) -> Floats:
+    """(n, 3) where the robot was."""
+    return np.array([[r.x, r.y, r.z] for r in run.log])
+
+
+def title_of(run: Run) -> str:
+    """A run in one line."""
+    s = run.summary
+    return (
+        f"{s['planner']}: {s['visited']} of {s['waypoints']} in {s['inspection_s']:.0f} s, "
+        f"tether at most {s['longest_tether_m']:.2f} of {s['tether_length']:g}"
+    )
+
+
+def save_runs(runs: Sequence[Run], scene: Scene, file: str | Path) -> None:
+    """Tether length and coverage over time, and each run in space.
+
+    Raises
+    ------
+    InputError : the file cannot be written.
+    """
+    from matplotlib.figure import Figure
+
+    seen = runs[0].summary["coverage"] is not None
+    figure = Figure(figsize=(13, 5.5 + 2.5 * (len(runs) - 1)), layout="constrained")
+    left, right = figure.subfigures(1, 2, width_ratios=[1.0, 1.1])  # type: ignore[misc]
+    charts = np.atleast_1d(left.subplots(2 if seen else 1, 1, sharex=True))
+    for run, colour in zip(runs, COLOURS, strict=False):
+        t = np.array([r.time for r in run.log])
+        if len(runs) == 1:
+            charts[0].fill_between(
+                t, 0, 1, where=[r.mode == "recovery" for r in run.log], color="#fff3bf",
+                transform=charts[0].get_xaxis_transform(), label="going another way",
+            )  # fmt: skip
+        charts[0].plot(t, [r.tether for r in run.log], color=colour, lw=1.3, label=run.planner)
+        if seen:
+            charts[1].plot(t, [100 * r.coverage for r in run.log], color=colour, lw=1.3)
+            charts[1].plot(
+                t, [100 * r.coverage_through for r in run.log], color=colour, lw=0.9, ls=":"
+            )
+    charts[0].axhline(
+        runs[0].mission.tether_length, color="#495057", lw=1.0, ls="--", label="limit"
+    )
+    charts[0].set(ylabel=f"taut tether ({scene.units})", ylim=(0, None))
+    charts[0].legend(loc="upper left", fontsize=8)
+    if seen:
+        charts[1].set(ylabel="seen (%)", ylim=(0, 100))
+        charts[1].set_title("dotted: if nothing stood in between", fontsize=8)
+    charts[-1].set(xlabel="time (s)")
+    axes = right.subplots(len(runs), 1, subplot_kw={"projection": "3d"}, squeeze=False)[:, 0]
+    for run, ax in zip(runs, axes, strict=True):
+        _in_space(ax, run, scene)
+    figure.suptitle(runs[0].mission.name)
+    try:
+        literal(figure).savefig(file, dpi=120)
+    except OSError as error:
+        raise InputError(f"{file}: cannot be written: {error.strerror or error}") from None
+
+
+def _in_space(ax: Any, run: Run, scene: Scene) -> None:
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+    way = way_of(run)
+    low, high = extent(scene, way, run.tether.nodes)
+    for _, (vertices, faces) in parts_of(scene, low, high):
+        triangles = vertices[faces]
+        ax.add_collection3d(
+            Poly3DCollection(triangles, facecolors=shaded(triangles), alpha=0.35, linewidths=0)
+        )
+    draw_lines(ax, way, run.tether.nodes, (0, 1, 2))
+    ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
+    ax.set_box_aspect(high - low, zoom=1.15)
+    ax.set_title(title_of(run), fontsize=9)
+    ax.legend(loc="upper left", fontsize=7)
+
+
+def tethers_along(run: Run, scene: Scene, moments: npt.NDArray[np.int64]) -> list[Tether]:
+    """The tether at some rows of the log, ascending: the run is driven again."""
+    mission = run.mission
+    model = GeodesicTether(scene.field(), mission.delta)
+    state, way, out, at = model.start(mission.anchor, mission.start), way_of(run), [], 0
+    for row in moments:
+        state = model.drive(state, way[at : int(row) + 1])[0]
+        out.append(state)
+        at = int(row) + 1
+    return out
+
+
+def save_page(runs: Sequence[Run], scene: Scene, file: str | Path) -> None:
+    """A page that needs nothing else: each run in space with a slider for the time.
+
+    Raises
+    ------
+    InputError : plotly is not installed, the file cannot be written.
+    """
+    go = plotly_objects()
+    from plotly.subplots import make_subplots
+
+    figure = make_subplots(
+        rows=1, cols=len(runs), specs=[[{"type": "scene"}] * len(runs)],
+        subplot_titles=[title_of(r) for r in runs], horizontal_spacing=0.01,
+    )  # fmt: skip
+    longest = max(r.log[-1].time for r in runs)
+    times = np.linspace(0.0, longest, FRAMES)
+    changing: list[list[Any]] = [[] for _ in times]
+    numbers: list[int] = []
+    for k, run in enumerate(runs):
+        way = way_of(run)
+        low, high = extent(scene, way, run.tether.nodes)
+        for name, (vertices, faces) in parts_of(scene, low, high):
+            trace = mesh_trace(name, vertices, faces)
+            trace.showlegend = False
+            figure.add_trace(trace, row=1, col=k + 1)
+        figure.add_trace(point_trace("anchor", np.array(run.mission.anchor), "#495057"), 1, k + 1)
+        stamps = np.array([r.time for r in run.log])
+        rows = np.minimum(np.searchsorted(stamps, times), len(stamps) - 1)
+        tethers = tethers_along(run, scene, rows)
+        for f, (row, tether) in enumerate(zip(rows, tethers, strict=True)):
+            thin = way[: row + 1 : max(1, len(way) // 1500)]
+            trio = [
+                line_trace("path", thin, "#74c0fc", 3),
+                line_trace("tether", tether.nodes, COLOURS[0], 6),
+                point_trace("robot", way[row], "#f08c00"),
+            ]
+            if f == 0:
+                for trace in trio:
+                    numbers.append(len(figure.data))
+                    figure.add_trace(trace, row=1, col=k + 1)
+            changing[f] += trio
+    figure.frames = [
+        go.Frame(data=traces, traces=numbers, name=f"{t:.0f}")
+        for t, traces in zip(times, changing, strict=True)
+    ]
+    steps = [
+        {
+            "args": [[f"{t:.0f}"], {"frame": {"duration": 0, "redraw": True}, "mode": "immediate"}],
+            "label": f"{t:.0f}",
+            "method": "animate",
+        }
+        for t in times
+    ]
+    base = layout(runs[0].mission.name, scene.units)
+    scenes = {f"scene{k + 1 if k else ''}": base["scene"] for k in range(len(runs))}
+    figure.update_layout(
+        title=base["title"], margin={"l": 0, "r": 0, "t": 70, "b": 0}, showlegend=False,
+        sliders=[{"steps": steps, "currentvalue": {"prefix": "time (s) "}, "pad": {"t": 20}}],
+        **scenes,
+    )  # fmt: skip
+    try:
+        page = str(figure.to_html(include_plotlyjs=True, full_html=True, auto_play=False))
+        Path(file).write_text(page, encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"{file}: cannot be written: {error.strerror or error}") from None

@@ -1,0 +1,357 @@
+"""Pictures of problems and solutions, as PNG, SVG or PDF."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from netsp.errors import InputError
+from netsp.pictures.literal import literal
+from netsp.problem import Circle, Problem
+from netsp.roadmap.paths import TautPaths
+from netsp.solution import Solution, Status
+from netsp.travel.result import Progress
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+FORMATS = (".png", ".svg", ".pdf")
+
+_OBSTACLE, _WRAPPED, _EDGE, _TOUR, _TETHER, _GOAL, _BASE = (
+    "#9aa5b1",
+    "#f3a6a6",
+    "#52606d",
+    "#0b69a3",
+    "#e8590c",
+    "#ffffff",
+    "#c92a2a",
+)
+
+
+def check_format(path: str | Path) -> None:
+    """InputError unless the file name ends in a format that can be drawn."""
+    if Path(path).suffix.lower() not in FORMATS:
+        raise InputError(
+            f"{path}: cannot draw this format; expected a name ending in {', '.join(FORMATS)}"
+        )
+
+
+def save(problem: Problem, solution: Solution | None, path: str | Path) -> None:
+    """Draw a problem, with a solution if given, to a file; InputError if it cannot be written."""
+    _write(draw(problem, solution), path)
+
+
+def _write(figure: Any, path: str | Path) -> None:
+    check_format(path)
+    try:
+        metadata = {"Date": None} if Path(path).suffix.lower() == ".svg" else None
+        literal(figure).savefig(path, dpi=150, metadata=metadata)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
+
+
+def draw(problem: Problem, solution: Solution | None = None) -> Any:
+    """A matplotlib Figure: the map with the tour on it, and beside it, for each stop of the tour,
+    the taut tether from the base to the robot."""
+    from matplotlib.figure import Figure
+
+    stops = solution.tour if solution is not None else ()
+    panels = len(stops)
+    xmin, ymin, xmax, ymax = _view(problem, solution)
+    aspect = (ymax - ymin) / (xmax - xmin)
+    if panels == 0:
+        figure, ax = _single(problem)
+        _map(ax, problem, solution)
+        return figure
+    small = panels if panels <= 20 else 0
+    columns = int(np.clip(round(np.sqrt(max(small, 1) * aspect * 0.9)), 1, 5)) if small else 0
+    rows = -(-small // columns) if columns else 0
+    height = float(np.clip(8.0 * aspect + 1.2, 4.2, 10.5))
+    wide = height / max(rows, 1) / max(aspect, 0.35) * columns if columns else 0.0
+    wide = float(np.clip(wide, 0.0, 7.0))
+    figure = Figure(figsize=(8.0 + wide, height), layout="constrained")
+    if not columns:
+        _map(figure.subplots(), problem, solution, tethers=True)
+        return figure
+    sides: Any = figure.subfigures(1, 2, width_ratios=[8.0, wide])
+    left, right = sides
+    _map(left.subplots(), problem, solution)
+    axes = np.atleast_1d(right.subplots(rows, columns)).ravel()
+    right.suptitle("the taut tether at each stop", fontsize=9, color=_EDGE)
+    longest = max(problem.tether_length, *(stop.tether_length for stop in stops))
+    paths = TautPaths(problem, 2.0 * longest)
+    for k, ax in enumerate(axes):
+        ax.set_axis_off()
+        if k >= len(stops):
+            continue
+        stop = stops[k]
+        _obstacles(ax, problem, labels=False)
+        tether = paths.tether(stop.goal, stop.signature)
+        ax.plot(tether[:, 0], tether[:, 1], color=_TETHER, lw=1.3)
+        ax.plot(*problem.base[:2], marker="*", ms=8, color=_BASE, mec="none")
+        ax.plot(*problem.points[stop.goal + 1, :2], "o", ms=4, color=_TOUR)
+        ax.set_title(f"{k + 1}: {stop.tether_length:.4g} {problem.units}", fontsize=7, pad=2)
+        _frame(ax, problem, solution)
+    return figure
+
+
+def save_roadmap(problem: Problem, roadmap: str, options: dict[str, Any], path: str | Path) -> None:
+    """Draw a roadmap by name: tangents and arcs of ``taut``, milestones and edges of ``prm``."""
+    from matplotlib.collections import LineCollection
+
+    from netsp.solvers.solve import build_roadmap
+
+    built = build_roadmap(problem, roadmap, **options)
+    figure, ax = _single(problem)
+    _map(ax, problem, None)
+    if roadmap == "prm":
+        m = built.milestones
+        lines = m[built.edges][:, :, :2]
+        ax.plot(m[:, 0], m[:, 1], ".", ms=2, color=_EDGE, zorder=2)
+        counted = f"{len(m)} milestones, {len(built.edges)} edges, {len(built.augmented)} augmented"
+    else:
+        t = built.paths.tangents
+        lines = t.ends.reshape(-1, 2, 2)
+        lines = lines + built.outline.origin
+        for cx, cy, r, a, b in t.arcs + np.append(built.outline.origin, np.zeros(3)):
+            theta = np.linspace(a, b, 60)
+            ax.plot(cx + r * np.cos(theta), cy + r * np.sin(theta), color=_TOUR, lw=0.8, zorder=3)
+        counted = (
+            f"{len(t.arcs)} arcs, {len(lines) // 2} tangents, {len(built.cluster) - 1} classes"
+        )
+    ax.add_collection(LineCollection(list(lines), colors=_TOUR, lw=0.35, alpha=0.35, zorder=2))
+    ax.set_title(f"{problem.name}: {roadmap} roadmap, {counted}", fontsize=10, loc="left")
+    _write(figure, path)
+
+
+def save_trace(rows: Sequence[Progress], title: str, units: str, path: str | Path) -> None:
+    """Draw a solver's way to its answer: lengths and bound against iterations, and below, for
+    solvers that walk through entangled states, the number of entangled obstacles (Fig. 3 of
+    McCammon & Hollinger 2016)."""
+    from matplotlib.figure import Figure
+
+    tangled = any(r.entangled for r in rows)
+    figure = Figure(figsize=(8.0, 6.0 if tangled else 4.2), layout="constrained")
+    axes = figure.subplots(2 if tangled else 1, 1, sharex=True, squeeze=False)[:, 0]
+    top = axes[0]
+    for field, label, style in (
+        ("current", "present state", {"color": _OBSTACLE, "lw": 0.7}),
+        ("incumbent", "best tour", {"color": _TOUR, "lw": 1.6, "drawstyle": "steps-post"}),
+        ("bound", "lower bound", {"color": _TETHER, "lw": 1.2, "drawstyle": "steps-post"}),
+    ):
+        seen = [(r.iteration, getattr(r, field)) for r in rows if getattr(r, field) is not None]
+        if seen:
+            top.plot(*zip(*seen, strict=True), label=label, marker=_mark(seen), **style)
+    top.set_ylabel(f"length ({units})")
+    top.legend(frameon=False, fontsize=8)
+    top.set_title(title, fontsize=10, loc="left")
+    if tangled:
+        seen = [(r.iteration, r.entangled) for r in rows if r.entangled is not None]
+        axes[1].plot(*zip(*seen, strict=True), color=_BASE, lw=0.9, marker=_mark(seen))
+        axes[1].set_ylabel("entangled obstacles")
+        axes[1].set_ylim(bottom=0.0)
+    axes[-1].set_xlabel("iteration")
+    _write(figure, path)
+
+
+def _mark(points: Sequence[object]) -> str | None:
+    """A marker where there is but one point to see."""
+    return "o" if len(points) == 1 else None
+
+
+def save_classes(problem: Problem, goal: int, path: str | Path) -> None:
+    """Draw all taut tethers to one goal (0-based), shortest first, each with its word."""
+    from netsp.roadmap.taut import TautRoadmap
+
+    roadmap = TautRoadmap(problem)
+    rows = np.flatnonzero(roadmap.cluster == goal + 1)
+    shown = rows[:30]
+    xmin, ymin, xmax, ymax = _view(problem, None)
+    aspect = (ymax - ymin) / (xmax - xmin)
+    columns = int(np.clip(round(np.sqrt(len(shown) * aspect * 1.4)), 1, 6))
+    lines = -(-len(shown) // columns)
+    from matplotlib.figure import Figure
+
+    width = 2.6 if columns > 2 else 4.0
+    figure = Figure(
+        figsize=(width * columns, max(width * aspect, 0.8) * lines + 0.35 * lines + 0.6),
+        layout="constrained",
+    )
+    axes = np.atleast_1d(figure.subplots(lines, columns)).ravel()
+    for k, ax in enumerate(axes):
+        ax.set_axis_off()
+        if k >= len(shown):
+            continue
+        v = int(shown[k])
+        _obstacles(ax, problem, labels=len(problem.obstacles) <= 20)
+        tether = roadmap.paths.path(0, goal + 1, roadmap.signatures[v])
+        ax.plot(tether[:, 0], tether[:, 1], color=_TETHER, lw=1.4, zorder=3)
+        ax.plot(*problem.base[:2], marker="*", ms=9, color=_BASE, mec="none", zorder=4)
+        ax.plot(*problem.points[goal + 1, :2], "o", ms=5, color=_TOUR, zorder=4)
+        word = " ".join(f"{a:+d}" for a in roadmap.signatures[v]) or "empty word"
+        ax.set_title(f"{roadmap.tethers[v]:.5g} {problem.units}: {word}", fontsize=7, pad=2)
+        _frame(ax, problem, None)
+    more = f", the {len(shown)} shortest shown" if len(shown) < len(rows) else ""
+    figure.suptitle(
+        f"{problem.name}: {len(rows)} classes reach {problem.goal_label(goal)} within "
+        f"{problem.tether_length:g} {problem.units}{more}",
+        fontsize=10,
+    )
+    _write(figure, path)
+
+
+def _single(problem: Problem) -> tuple[Any, Any]:
+    from matplotlib.figure import Figure
+
+    xmin, ymin, xmax, ymax = _view(problem, None)
+    aspect = (ymax - ymin) / (xmax - xmin)
+    height = float(np.clip(8.0 * aspect + 0.8, 3.5, 11.0))
+    figure = Figure(figsize=(8.0, height), layout="constrained")
+    return figure, figure.subplots()
+
+
+def _map(ax: Axes, problem: Problem, solution: Solution | None, *, tethers: bool = False) -> None:
+    wrapped = solution.entangled if solution else ()
+    _obstacles(ax, problem, labels=len(problem.obstacles) <= 40, wrapped=wrapped)
+    if problem.bounds is not None:
+        xmin, ymin, xmax, ymax = problem.bounds
+        ax.plot([xmin, xmax, xmax, xmin, xmin], [ymin, ymin, ymax, ymax, ymin], color=_EDGE, lw=1)
+    order = {v.goal: k + 1 for k, v in enumerate(solution.tour)} if solution else {}
+    if solution is not None and solution.path:
+        if tethers:
+            longest = max(v.tether_length for v in solution.tour)
+            paths = TautPaths(problem, 2.0 * max(problem.tether_length, longest))
+            for v in solution.tour:
+                line = paths.tether(v.goal, v.signature)
+                ax.plot(line[:, 0], line[:, 1], color=_TETHER, lw=0.7, alpha=0.6, zorder=2)
+        path = np.array(solution.path)
+        ax.plot(path[:, 0], path[:, 1], color=_TOUR, lw=1.8, zorder=3, solid_joinstyle="round")
+        _arrows(ax, path, len(solution.tour) + 1)
+    for k, goal in enumerate(problem.goals):
+        x, y, z = goal.position
+        ax.plot(x, y, "o", ms=13 if order else 9, color=_GOAL, mec=_TOUR, mew=1.4, zorder=5)
+        ax.annotate(str(order.get(k, k)), (x, y), ha="center", va="center", fontsize=7, zorder=6)
+        note = " ".join(t for t in (goal.name or "", f"z {z:g}" if z else "") if t)
+        if note and len(problem.goals) <= 40:
+            ax.annotate(
+                note, (x, y), xytext=(8, -10), textcoords="offset points", fontsize=6, color=_EDGE,
+                zorder=6,
+            )  # fmt: skip
+    ax.plot(
+        *problem.base[:2], marker="*", ms=17, color=_BASE, mec="white", zorder=7, ls="none",
+        label="base",
+    )  # fmt: skip
+    ax.set_title(_title(problem, solution), fontsize=10, loc="left")
+    ax.set_xlabel(f"x [{problem.units}]")
+    ax.set_ylabel(f"y [{problem.units}]")
+    ax.tick_params(labelsize=8)
+    _frame(ax, problem, solution)
+
+
+def _title(problem: Problem, solution: Solution | None) -> str:
+    if solution is None or solution.length is None:
+        return (
+            f"{problem.name}: {len(problem.goals)} goals, {len(problem.obstacles)} obstacles, "
+            f"tether {problem.tether_length:g} {problem.units}"
+        )
+    if solution.status is Status.OPTIMAL:
+        proof = "proven shortest"
+    elif solution.gap is not None:
+        proof = f"at most {100 * solution.gap:.2f} % above the shortest"
+    else:
+        proof = "no bound"
+    longest = max((v.tether_length for v in solution.tour), default=0.0)
+    kind = "non-entangling tour"
+    if solution.status is Status.INVALID:
+        kind, proof = "tour", f"entangles {len(solution.entangled)} obstacles (red)"
+    return (
+        f"{problem.name}: {kind} of {solution.length:.6g} {problem.units}, {proof}\n"
+        f"longest tether {longest:.4g} of {problem.tether_length:g} {problem.units}; "
+        f"numbers give the order of visits"
+    )
+
+
+def _obstacles(ax: Axes, problem: Problem, *, labels: bool, wrapped: tuple[int, ...] = ()) -> None:
+    from matplotlib.patches import Circle as Disk
+    from matplotlib.patches import Polygon as Patch
+
+    for i, o in enumerate(problem.obstacles):
+        style: dict[str, Any] = {"fc": _OBSTACLE, "ec": _EDGE, "lw": 0.6, "zorder": 1}
+        if i in wrapped:
+            style["fc"] = _WRAPPED
+        if isinstance(o, Circle):
+            if problem.clearance:
+                grown = Disk(o.center, o.radius + problem.clearance)
+                grown.set(fc="none", ec=_EDGE, lw=0.5, ls=":", zorder=1)
+                ax.add_patch(grown)
+            ax.add_patch(Disk(o.center, o.radius, **style))
+        else:
+            if problem.clearance:
+                import shapely
+
+                ring = shapely.Polygon(o.polygon).buffer(problem.clearance).exterior
+                ax.plot(*ring.xy, color=_EDGE, lw=0.5, ls=":", zorder=1)
+            ax.add_patch(Patch(o.polygon, closed=True, **style))
+        if labels:
+            x, y = o.representative_point
+            ax.annotate(
+                o.name or str(i + 1), (x, y), ha="center", va="center", fontsize=6, color="#1f2933",
+                zorder=2, clip_on=True,
+            )  # fmt: skip
+
+
+def _arrows(ax: Axes, path: Any, count: int) -> None:
+    """Arrowheads along the path, one or more per leg."""
+    step = np.hypot(*np.diff(path[:, :2], axis=0).T)
+    along = np.concatenate([[0.0], np.cumsum(step)])
+    if along[-1] == 0.0:
+        return
+    places = (np.arange(2 * count) + 0.5) / (2 * count) * along[-1]
+    for s in places:
+        k = int(np.clip(np.searchsorted(along, s) - 1, 0, len(step) - 1))
+        if step[k] == 0.0:
+            continue
+        a = path[k, :2] + (s - along[k]) / step[k] * (path[k + 1, :2] - path[k, :2])
+        d = (path[k + 1, :2] - path[k, :2]) / step[k]
+        tip = a + d * 1e-3 * along[-1]
+        ax.annotate(
+            "", xy=tip, xytext=a, zorder=4,
+            arrowprops={"arrowstyle": "-|>", "color": _TOUR, "lw": 0, "mutation_scale": 13},
+        )  # fmt: skip
+
+
+def _view(problem: Problem, solution: Solution | None) -> tuple[float, float, float, float]:
+    """The box that holds everything of interest, with a margin."""
+    xy = [problem.points[:, :2]]
+    if solution is not None and solution.path:
+        xy.append(np.array(solution.path)[:, :2])
+    if problem.bounds is not None:
+        xy.append(np.array(problem.bounds).reshape(2, 2))
+    for o in problem.obstacles:
+        if isinstance(o, Circle):
+            c, r = np.array(o.center), o.radius
+            xy.append(np.array([c - r, c + r]))
+        else:
+            xy.append(np.array(o.polygon))
+    points = np.vstack(xy)
+    low, high = points.min(axis=0), points.max(axis=0)
+    size = max(float((high - low).max()), 1e-9)
+    low, high = low - 0.05 * size, high + 0.05 * size
+    if any(g.name for g in problem.goals):
+        high[0] += 0.06 * size  # their labels stand to the right of the goals
+    for axis in range(2):
+        lack = 0.25 * size - float((high - low)[axis])
+        if lack > 0:
+            low[axis] -= lack / 2
+            high[axis] += lack / 2
+    return float(low[0]), float(low[1]), float(high[0]), float(high[1])
+
+
+def _frame(ax: Axes, problem: Problem, solution: Solution | None) -> None:
+    xmin, ymin, xmax, ymax = _view(problem, solution)
+    ax.set_xlim(xmin, xmax)
+    ax.set_ylim(ymin, ymax)
+    ax.set_aspect("equal")

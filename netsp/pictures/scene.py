@@ -1,0 +1,216 @@
+"""Pictures of a scene with path and tether: a figure, or a page that can be turned in a browser."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from netsp.arrays import Floats
+from netsp.errors import InputError
+from netsp.online.scene.scene import Scene
+from netsp.online.scene.shapes import HalfSpace
+from netsp.online.scene.surfaces import Triangles, drawn_points, extent, mesh_of, surface_of
+from netsp.online.tether import Tether
+from netsp.pictures.literal import literal
+
+_SOLID, _PATH, _TETHER, _ANCHOR, _ROBOT = "#9aa5b1", "#0b69a3", "#e8590c", "#c92a2a", "#2b8a3e"
+
+STATIC, INTERACTIVE = (".png", ".svg", ".pdf"), ".html"
+
+
+def check_format(path: str | Path) -> None:
+    """InputError unless the file name ends in a format that can be drawn."""
+    if Path(path).suffix.lower() not in (*STATIC, INTERACTIVE):
+        raise InputError(
+            f"{path}: cannot draw this format; expected a name ending in "
+            f"{', '.join(STATIC)} or {INTERACTIVE}"
+        )
+
+
+def save(
+    scene: Scene, file: str | Path, *, path: npt.ArrayLike | None = None,
+    tether: Tether | None = None, title: str | None = None,
+) -> None:  # fmt: skip
+    """Draw a scene, with a path (k, 3) and a tether if given, by the file name's ending: .png, .svg
+    and .pdf a figure, .html a page that needs nothing else.
+
+    Raises
+    ------
+    InputError : another ending, a file that cannot be written, plotly not installed.
+    """
+    check_format(file)
+    way = np.zeros((0, 3)) if path is None else np.asarray(path, dtype=float).reshape(-1, 3)
+    nodes = np.zeros((0, 3)) if tether is None else tether.nodes
+    low, high = extent(scene, way, nodes)
+    parts = parts_of(scene, low, high)
+    title = title or _title(scene, way, tether)
+    try:
+        if Path(file).suffix.lower() == INTERACTIVE:
+            page = _interactive(scene, parts, way, nodes, title)
+            Path(file).write_text(page, encoding="utf-8")
+        else:
+            metadata = {"Date": None} if Path(file).suffix.lower() == ".svg" else None
+            figure = _figure(scene, parts, way, nodes, (low, high), title)
+            literal(figure).savefig(file, dpi=150, metadata=metadata)
+    except OSError as error:
+        raise InputError(f"{file}: cannot be written: {error.strerror or error}") from None
+
+
+def _title(scene: Scene, way: Floats, tether: Tether | None) -> str:
+    words = [scene.name]
+    if len(way):
+        walked = float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum())
+        words.append(f"path {walked:.4g} {scene.units}")
+    if tether is not None:
+        words.append(f"taut tether {tether.length:.4g} {scene.units}")
+    return ", ".join(words)
+
+
+def parts_of(scene: Scene, low: Floats, high: Floats) -> list[tuple[str, Triangles]]:
+    """What is drawn of the scene, by name."""
+    out = []
+    for k, solid in enumerate(scene.all_solids()):
+        if isinstance(solid.shape, HalfSpace) and len(scene.all_solids()) > 1:
+            continue
+        out.append((solid.name or f"solids[{k}]", surface_of(solid.shape, low, high)))
+    if scene.mesh is not None:
+        out.append(("mesh", mesh_of(scene)))
+    return out
+
+
+def _figure(
+    scene: Scene, parts: Sequence[tuple[str, Triangles]], way: Floats, nodes: Floats,
+    box: tuple[Floats, Floats], title: str,
+) -> Any:  # fmt: skip
+    """A view in space, and the plans from above and from two sides."""
+    from matplotlib.collections import PolyCollection
+    from matplotlib.figure import Figure
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+    low, high = box
+    figure = Figure(figsize=(13, 7.5), layout="constrained")
+    halves: Any = figure.subfigures(1, 2, width_ratios=[1.15, 1.0])
+    left, right = halves
+    ax: Any = left.add_subplot(projection="3d")
+    for _, (vertices, faces) in parts:
+        triangles = vertices[faces]
+        ax.add_collection3d(
+            Poly3DCollection(triangles, facecolors=shaded(triangles), alpha=0.35, linewidths=0)
+        )
+    cloud = drawn_points(scene) if scene.cloud is not None else np.zeros((0, 3))
+    if len(cloud):
+        ax.plot(*cloud.T, ".", ms=0.6, color=_SOLID)
+    draw_lines(ax, way, nodes, (0, 1, 2))
+    ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
+    ax.set_box_aspect(high - low)
+    unit = scene.units
+    ax.set(xlabel=f"x ({unit})", ylabel=f"y ({unit})", zlabel=f"z ({unit})")
+    names = ("x", "y", "z")
+    views = ((0, 1, "from above"), (0, 2, "from the south"), (1, 2, "from the east"))
+    for panel, (a, b, name) in zip(right.subplots(3, 1), views, strict=True):
+        for _, (vertices, faces) in parts:
+            flat: Any = vertices[faces][:, :, [a, b]]
+            panel.add_collection(PolyCollection(flat, facecolors="#d0d7de", linewidths=0))
+        if len(cloud):
+            panel.plot(cloud[:, a], cloud[:, b], ".", ms=0.4, color="#d0d7de")
+        draw_lines(panel, way, nodes, (a, b))
+        panel.set(xlim=(low[a], high[a]), ylim=(low[b], high[b]), aspect="equal")
+        panel.set_title(name, fontsize=9)
+        panel.set(xlabel=names[a], ylabel=names[b])
+    figure.suptitle(title)
+    handles, labels = ax.get_legend_handles_labels()
+    if handles:
+        left.legend(handles, labels, loc="lower left", fontsize=8)
+    return figure
+
+
+def shaded(triangles: Floats) -> Floats:
+    """Greys by how much a triangle faces the light."""
+    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    size = np.linalg.norm(normals, axis=1)
+    light = np.array([0.4, -0.5, 0.77])
+    facing = np.abs(normals @ light) / np.where(size > 0.0, size, 1.0)
+    grey = 0.45 + 0.4 * facing
+    return np.column_stack([grey, grey, np.minimum(1.0, grey + 0.04)])
+
+
+def draw_lines(ax: Any, way: Floats, nodes: Floats, axes: tuple[int, ...]) -> None:
+    columns = list(axes)
+    if len(way):
+        ax.plot(*way[:, columns].T, color=_PATH, lw=0.9, alpha=0.8, label="path")
+    if len(nodes):
+        ax.plot(*nodes[:, columns].T, color=_TETHER, lw=1.8, label="tether")
+        ends = (nodes[0], _ANCHOR, "*", "anchor"), (nodes[-1], _ROBOT, "o", "robot")
+        for point, colour, marker, name in ends:
+            ax.plot(*point[columns][:, None], marker, color=colour, ms=8, label=name)
+
+
+def _interactive(
+    scene: Scene, parts: Sequence[tuple[str, Triangles]], way: Floats, nodes: Floats, title: str
+) -> str:
+    go = plotly_objects()
+    figure = go.Figure()
+    for name, (vertices, faces) in parts:
+        figure.add_trace(mesh_trace(name, vertices, faces))
+    if scene.cloud is not None:
+        x, y, z = drawn_points(scene).T
+        marker = {"size": 1.2, "color": _SOLID}
+        figure.add_trace(go.Scatter3d(x=x, y=y, z=z, mode="markers", marker=marker, name="cloud"))
+    if len(way):
+        figure.add_trace(line_trace("path", way, _PATH, 3))
+    if len(nodes):
+        figure.add_trace(line_trace("tether", nodes, _TETHER, 6))
+        for name, point, colour in (("anchor", nodes[0], _ANCHOR), ("robot", nodes[-1], _ROBOT)):
+            figure.add_trace(point_trace(name, point, colour))
+    figure.update_layout(**layout(title, scene.units))
+    return str(figure.to_html(include_plotlyjs=True, full_html=True))
+
+
+def plotly_objects() -> Any:
+    """plotly's graph objects; InputError if plotly is not installed."""
+    try:
+        import plotly.graph_objects as go
+    except ImportError:
+        raise InputError("interactive pages need plotly: pip install 'netsp[online]'") from None
+    return go
+
+
+def mesh_trace(name: str, vertices: Floats, faces: npt.NDArray[np.int64]) -> Any:
+    """A part of the scene on an interactive page."""
+    x, y, z = np.round(vertices, 4).T
+    i, j, k = faces.T
+    return plotly_objects().Mesh3d(
+        x=x, y=y, z=z, i=i, j=j, k=k, color=_SOLID, flatshading=True, name=name, hoverinfo="name",
+        lighting={"ambient": 0.55, "diffuse": 0.7, "specular": 0.1},
+    )  # fmt: skip
+
+
+def line_trace(name: str, points: Floats, colour: str, width: float) -> Any:
+    """A polyline on an interactive page."""
+    x, y, z = np.round(points, 4).T
+    return plotly_objects().Scatter3d(
+        x=x, y=y, z=z, mode="lines", line={"color": colour, "width": width}, name=name
+    )
+
+
+def point_trace(name: str, point: Floats, colour: str) -> Any:
+    """A point on an interactive page."""
+    x, y, z = ([float(v)] for v in point)
+    return plotly_objects().Scatter3d(
+        x=x, y=y, z=z, mode="markers", marker={"size": 5, "color": colour}, name=name
+    )
+
+
+def layout(title: str, units: str) -> dict[str, Any]:
+    """The layout of an interactive page."""
+    axes = {f"{a}axis": {"title": {"text": f"{a} ({units})"}} for a in "xyz"}
+    return {
+        "title": {"text": title},
+        "scene": {"aspectmode": "data", **axes},
+        "margin": {"l": 0, "r": 0, "t": 50, "b": 0},
+        "legend": {"x": 0.01, "y": 0.99},
+    }

@@ -1,0 +1,74 @@
+"""The trie of words that paths write."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import numpy as np
+from numba import njit
+
+from netsp.arrays import Floats, Ints
+
+PARENT, LETTER, CHILD, SIBLING, CORE = range(5)
+"""Columns of a trie's nodes. SIBLING chains the children of one parent."""
+
+
+@dataclass
+class Trie:
+    """Words as a tree; node 0 is the empty word. Arrays are over-allocated, `size` is the count.
+
+    nodes : (capacity, 5) columns PARENT … CORE. limit : longest path allowed at or below a node.
+    """
+
+    nodes: Ints
+    limit: Floats
+    size: int = 1
+    words: dict[int, tuple[int, ...]] = field(default_factory=dict)
+
+    @classmethod
+    def root(cls, limit: float, capacity: int = 256) -> Trie:
+        """The trie that holds the empty word only."""
+        trie = cls(np.full((capacity, 5), -1, dtype=np.int64), np.zeros(capacity))
+        trie.nodes[0] = (-1, 0, -1, -1, 1)
+        trie.limit[0] = limit
+        return trie
+
+    @classmethod
+    def of_word(cls, word: tuple[int, ...], limit: float) -> Trie:
+        """The trie of one word and its prefixes; node k is the prefix of length k."""
+        trie = cls.root(limit, capacity=max(256, 2 * len(word) + 2))
+        for k, letter in enumerate(word):
+            trie.nodes[k, CHILD] = k + 1
+            trie.nodes[k + 1] = (k, letter, -1, -1, 1)
+            trie.limit[k + 1] = limit
+        trie.size = len(word) + 1
+        return trie
+
+    def word(self, node: int) -> tuple[int, ...]:
+        """The word of a node."""
+        above = [node]
+        while above[-1] and above[-1] not in self.words:
+            above.append(int(self.nodes[above[-1], PARENT]))
+        self.words.setdefault(0, ())
+        for parent, child in pairwise(above[::-1]):
+            self.words[child] = (*self.words[parent], int(self.nodes[child, LETTER]))
+        return self.words[node]
+
+
+@njit(cache=True, nogil=True)
+def trie_child(node, a, trie):
+    """The child of a node along letter a, or -1."""
+    c = trie[node, CHILD]
+    while c >= 0 and trie[c, LETTER] != a:
+        c = trie[c, SIBLING]
+    return c
+
+
+@njit(cache=True, nogil=True)
+def add_child(node, a, core, size, trie):
+    """Make the child of a node along letter a at the row `size`."""
+    trie[size, PARENT], trie[size, LETTER], trie[size, CORE] = node, a, core
+    trie[size, CHILD] = -1
+    trie[size, SIBLING] = trie[node, CHILD]
+    trie[node, CHILD] = size

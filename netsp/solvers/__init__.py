@@ -1,0 +1,1 @@
+"""Solvers and roadmaps by name; from a problem to its solution."""

@@ -1,0 +1,94 @@
+"""From the result on a travel graph to the solution of a problem."""
+
+from __future__ import annotations
+
+import functools
+import importlib.metadata
+import platform
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from netsp.hsignature import entangled
+from netsp.problem import Problem
+from netsp.solution import ProblemReference, Solution, Timings, Visit
+from netsp.travel.graph import TravelGraph
+from netsp.travel.result import Result, Trajectory, relative_gap
+
+
+def to_solution(
+    problem: Problem,
+    graph: TravelGraph,
+    result: Result,
+    solver: str,
+    seed: int | None,
+    timings: Timings | None = None,
+) -> Solution:
+    """Write a solver's result as a solution of the problem, its path drawn."""
+    if result.trajectory is not None:
+        visits, path = _blind_visits(problem, result.trajectory), result.trajectory.path
+        wrapped = tuple(k - 1 for k in entangled(result.trajectory.word))
+    else:
+        visits, wrapped = _visits(graph, result.tour or ()), ()
+        walk = result.walk or (*(result.tour or ()), 0)
+        legs = [graph.path(u, v) for u, v in pairwise(walk)]
+        path = np.vstack([legs[0], *(leg[1:] for leg in legs[1:])]) if legs else np.zeros((0, 3))
+    return Solution(
+        problem=ProblemReference(name=problem.name, sha256=problem.sha256),
+        solver=solver,
+        roadmap=graph.roadmap,
+        classes=graph.classes,
+        seed=seed,
+        status=result.status,
+        length=result.length,
+        lower_bound=result.lower_bound,
+        gap=relative_gap(result.length, result.lower_bound),
+        entangled=wrapped,
+        tour=visits,
+        path=tuple((float(x), float(y), float(z)) for x, y, z in path),
+        start_tether=tuple((float(x), float(y), float(z)) for x, y, z in graph.start_tether),
+        timings=timings or Timings(),
+        versions=versions(),
+    )
+
+
+def _visits(graph: TravelGraph, tour: Sequence[int]) -> tuple[Visit, ...]:
+    return tuple(
+        Visit(
+            goal=int(graph.cluster[v]) - 1,
+            signature=graph.signatures[v],
+            tether_length=float(graph.tethers[v]),
+        )
+        for v in tour[1:]
+        if v != graph.start
+    )
+
+
+def _blind_visits(problem: Problem, walked: Trajectory) -> tuple[Visit, ...]:
+    """Stops of a blind baseline, with the taut tether that its way would need."""
+    from netsp.roadmap.paths import TautPaths
+
+    longest = float(np.hypot(*np.diff(walked.path[:, :2], axis=0).T).sum())
+    paths = TautPaths(problem, longest * (1.0 + 1e-6))
+    return tuple(
+        Visit(goal=goal - 1, signature=word, tether_length=paths.length(0, goal, word))
+        for goal, word in zip(walked.order, walked.words, strict=True)
+    )
+
+
+def versions() -> dict[str, str]:
+    """Versions of what computed a solution."""
+    return dict(_versions())
+
+
+@functools.cache
+def _versions() -> dict[str, str]:
+    names = ("netsp", "numpy", "numba", "highspy", "pulp", "ompl")
+    out = {"python": platform.python_version()}
+    for name in names:
+        try:
+            out[name] = importlib.metadata.version(name)
+        except importlib.metadata.PackageNotFoundError:
+            continue
+    return out

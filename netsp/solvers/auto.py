@@ -1,0 +1,151 @@
+"""`auto`: the solver by the size of the problem; always a tour, a bound and a gap.
+
+With up to eight goals or so all sets of goals are gone through (`netsp.solvers.exact`). Up to `PROVABLE`
+vertices it proves: the heuristic finds the tour; for up to `FEW_GOALS` goals walks
+(`netsp.dp`) bound it, which at that size ends with a proof more often than not; cutting planes
+(`netsp.mip`) do the rest, or all of it with more goals, on the vertices that are left. Beyond
+`PROVABLE` the matrices would not fit into a few gigabytes. Few goals are then proven over the
+classes of least tether, which proves the tour for good where it is no longer than twice the tether
+of every other class. With many, `lns` searches among them, and the bound comes from the goals
+alone, as the travelling salesperson's tour over the shortest ways between them in any class. That
+bound is weak, and true.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from netsp.arrays import Floats
+from netsp.clock import Clock, TimeLimit
+from netsp.lns import Instance
+from netsp.lns.solve import solve as search
+from netsp.mip.solve import MipRun
+from netsp.mip.solve import solve as prove
+from netsp.solvers import exact
+from netsp.solving.params import read_params
+from netsp.solving.run import Run
+from netsp.travel.graph import TravelGraph, least_tethers
+from netsp.travel.result import OnProgress, Progress, Result
+
+PROVABLE = 10_000
+"""Most vertices of a travel graph that `mip` is asked to bound: about 4 GiB of matrices."""
+
+MOST_KEPT = 3_000
+"""With more vertices and few goals, about so many, those of least tether, are proven over."""
+
+FEW_GOALS = 24
+"""Most goals for which walks come first: with more, remembering them costs more than cuts do."""
+
+ROUNDS_PER_GOAL = 40
+"""Rounds of ruin and recreate before and after the root, times the number of goals."""
+
+SHARE = 0.6
+"""Part of the time that the search has where it shares it with the bound from the goals."""
+
+
+@dataclass(frozen=True)
+class Params:
+    """backend : of `mip`."""
+
+    backend: str = "highs"
+
+    def __post_init__(self) -> None:
+        from netsp.mip.solve import Params as MipParams
+
+        MipParams(backend=self.backend)
+
+
+def solve(
+    graph: TravelGraph,
+    *,
+    time_limit: TimeLimit = None,
+    iteration_limit: int | None = None,
+    rng: np.random.Generator | None = None,
+    params: Mapping[str, Any] | None = None,
+    warm_start: Sequence[int] | None = None,
+    on_progress: OnProgress | None = None,
+) -> Result:
+    """Solve by size. Iterations are those of the solver chosen."""
+    chosen = read_params(Params, "auto", params)
+    if exact.fits(graph):
+        small = Run(graph, time_limit, iteration_limit, on_progress)
+        with small.until_stopped():
+            small.offer(warm_start)
+            if not small.trivial():
+                exact.solve(small)
+        return small.finish("proven" if small.done else "exact")
+    if len(graph) <= PROVABLE:
+        rounds = max(500, ROUNDS_PER_GOAL * graph.goal_count)
+        run = MipRun(graph, time_limit, iteration_limit, on_progress, rng=rng, search_rounds=rounds)
+        return run.solve(chosen.backend, warm_start, walks=graph.goal_count <= FEW_GOALS)
+    clock = Clock.of(time_limit)
+    if graph.goal_count <= FEW_GOALS and graph.roadmapped:
+        return _over_shortest(
+            graph, clock, iteration_limit, rng, chosen.backend, warm_start, on_progress
+        )
+    found = search(
+        graph,
+        time_limit=Clock(SHARE * clock.left, within=clock) if clock.limit else None,
+        iteration_limit=iteration_limit,
+        rng=rng,
+        warm_start=warm_start,
+        on_progress=on_progress,
+    )
+    if found.length is None:
+        return found
+    length = found.length
+    rows: list[Progress] = list(found.trace)
+
+    def tell(row: Progress) -> None:
+        rows.append(replace(row, stage="goals", incumbent=length))
+        if on_progress:
+            on_progress(rows[-1])
+
+    over_goals = TravelGraph.from_costs(_between_goals(graph), range(graph.goal_count + 1))
+    bound = prove(over_goals, time_limit=clock, rng=rng, on_progress=tell).lower_bound
+    return replace(
+        found,
+        # the ways are shortest up to rounding
+        lower_bound=min(length, (bound or 0.0) * (1.0 - 1e-9)),
+        trace=tuple(rows),
+    )
+
+
+def _over_shortest(
+    graph: TravelGraph, clock: Clock, iteration_limit: int | None,
+    rng: np.random.Generator | None, backend: str, warm_start: Sequence[int] | None,
+    on_progress: OnProgress | None,
+) -> Result:  # fmt: skip
+    """Prove over the classes of least tether; tours by way of the others are bounded by the way
+    there and back."""
+    core = least_tethers(graph.costs_to_base, graph.cluster, MOST_KEPT // graph.goal_count)
+    if warm_start is not None:
+        core = np.union1d(core, np.asarray(warm_start, dtype=np.int64))
+    others = np.ones(len(graph), dtype=bool)
+    others[core] = False
+    place = {int(v): k for k, v in enumerate(core)}
+    warm = None if warm_start is None else [place[int(v)] for v in warm_start]
+    run = MipRun(
+        graph.subgraph(core), clock, iteration_limit, on_progress, rng=rng,
+        search_rounds=max(500, ROUNDS_PER_GOAL * graph.goal_count),
+    )  # fmt: skip
+    found = run.solve(backend, warm, walks=True)
+    if found.tour is None:
+        return found
+    whole = replace(found, tour=tuple(int(core[v]) for v in found.tour))
+    least = float(graph.tethers[others].min(initial=np.inf))
+    return graph.within_kept(whole, graph.least_by_way_of(least))
+
+
+def _between_goals(graph: TravelGraph) -> Floats:
+    """(n + 1, n + 1) no more than any leg between two goals, in any class."""
+    if not graph.geometric:
+        return Instance.of(graph).cluster_costs
+    ways = graph.ways(sub_goals=False)
+    places = range(graph.goal_count + 1)
+    shortest = np.array([[ways.length(a, b) for b in places] for a in places])
+    return np.asarray(np.minimum(shortest, shortest.T))

@@ -1,0 +1,295 @@
+"""Names of roadmaps and solvers, and the one call that takes a problem to a solution."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.metadata
+import inspect
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from netsp.clock import Clock, TimeLimit
+from netsp.errors import InputError
+from netsp.problem import Problem
+from netsp.solution import Solution, Timings
+from netsp.solvers.answer import to_solution
+from netsp.solving.params import read_params
+from netsp.travel.graph import TravelGraph
+from netsp.travel.result import OnProgress, Result
+
+SOLVERS: dict[str, str] = {
+    "auto": "netsp.solvers.auto:solve",
+    "mip": "netsp.mip.solve:solve",
+    "dp": "netsp.dp.solve:solve",
+    "reduced-mip": "netsp.mip.reduced:solve",
+    "lns": "netsp.lns.solve:solve",
+    "anneal": "netsp.anneal.icra2017:solve",
+    "anneal-2016": "netsp.anneal.rss2016:solve",
+    "greedy": "netsp.greedy.backtracking:solve",
+    "greedy-2016": "netsp.greedy.backtracking:solve_2016",
+    "greedy-tsp": "netsp.greedy.blind:solve",
+}
+"""Solver name → where its `solve(graph, …) -> Result` lives."""
+
+PARAMS: dict[str, str] = {
+    "auto": "netsp.solvers.auto:Params",
+    "mip": "netsp.mip.solve:Params",
+    "dp": "netsp.dp.solve:Params",
+    "reduced-mip": "netsp.mip.reduced:ReducedParams",
+    "lns": "netsp.lns.solve:Params",
+    "anneal": "netsp.anneal.icra2017:Params",
+    "anneal-2016": "netsp.anneal.rss2016:Params",
+    "greedy": "netsp.greedy.backtracking:Params",
+    "greedy-2016": "netsp.greedy.backtracking:NoParams",
+    "greedy-tsp": "netsp.greedy.backtracking:NoParams",
+}
+"""Solver name → the dataclass of its options."""
+
+BLIND = frozenset({"greedy-tsp"})
+"""Baselines blind to the tether: their tours may be `invalid`."""
+
+GEOMETRIC = frozenset({"anneal-2016", "greedy-tsp"})
+"""Solvers that need the ways beneath a travel graph, so no graph made from costs will do."""
+
+ROADMAPS: dict[str, str] = {
+    "taut": "netsp.roadmap.taut:TautRoadmap",
+    "prm": "netsp.roadmap.prm:PrmRoadmap",
+}
+"""Roadmap name → class with `travel_graph()`."""
+
+SEEDED_ROADMAPS = frozenset({"prm"})
+
+LARGEST_SEED = 2**62
+
+SPARE = 0.4
+"""Of a time limit, what is kept for drawing the tour when a roadmap was cut short; a second at
+most."""
+
+DEFAULT_SOLVER = "auto"
+DEFAULT_ROADMAP = "taut"
+
+
+def _load(table: Mapping[str, str], kind: str, name: str) -> Any:
+    if not isinstance(name, str) or name not in table:
+        raise InputError(f"{kind}: unknown {name!r}; expected one of {', '.join(table)}")
+    module, attribute = table[name].split(":")
+    return getattr(importlib.import_module(module), attribute)
+
+
+def build_roadmap(problem: Problem, roadmap: str = DEFAULT_ROADMAP, **options: Any) -> Any:
+    """The named roadmap over a problem.
+
+    Raises InputError for an unknown roadmap or option, InfeasibleError if a goal cannot be reached.
+    """
+    if not isinstance(problem, Problem):
+        raise InputError(f"problem: expected a Problem, got {problem!r}")
+    build = _load(ROADMAPS, "roadmap", roadmap)
+    known = {k for k, p in inspect.signature(build).parameters.items() if p.kind == p.KEYWORD_ONLY}
+    unknown = sorted(set(options) - known)
+    if unknown:
+        raise InputError(
+            f"roadmap {roadmap!r}: unknown option {unknown[0]!r}; expected one of "
+            f"{', '.join(sorted(known))}"
+        )
+    return build(problem, **options)
+
+
+def travel_graph(problem: Problem, roadmap: str = DEFAULT_ROADMAP, **options: Any) -> TravelGraph:
+    """The travel graph of a problem by the named roadmap; errors as `build_roadmap`."""
+    if not isinstance(problem, Problem):
+        raise InputError(f"problem: expected a Problem, got {problem!r}")
+    if problem.state is not None:
+        if roadmap != "taut":
+            raise InputError(f"state: needs roadmap 'taut', got {roadmap!r}")
+        from netsp.roadmap.opened import opened_graph
+
+        return opened_graph(problem, **options)
+    graph: TravelGraph = build_roadmap(problem, roadmap, **options).travel_graph()
+    return graph
+
+
+def solve_graph(
+    graph: TravelGraph,
+    solver: str = DEFAULT_SOLVER,
+    *,
+    time_limit: TimeLimit = None,
+    iteration_limit: int | None = None,
+    seed: int = 0,
+    params: Mapping[str, Any] | None = None,
+    warm_start: Sequence[int] | None = None,
+    on_progress: OnProgress | None = None,
+) -> Result:
+    """Run a solver on a travel graph, from a roadmap or from `TravelGraph.from_costs`.
+
+    Parameters
+    ----------
+    time_limit : seconds, or the clock of a run that this one is a part of; the best tour so far is
+        returned when it is up.
+    iteration_limit : of the solver; each says what one is. Under an iteration limit alone, the same
+        seed gives the same answer.
+    seed : of the solver's random generator.
+    params : the solver's options by name.
+    warm_start : a tour to start from, as vertices from 0 on.
+
+    Raises InputError for unknown names, bad limits, a warm start that is no tour of the graph, and
+    for solvers that need geometry (`GEOMETRIC`) on a graph that has none.
+
+    >>> from netsp import TravelGraph, solve_graph
+    >>> costs = [[0, 1, 5, 4], [1, 0, 2, 9], [5, 2, 0, 2], [4, 9, 2, 0]]
+    >>> solve_graph(TravelGraph.from_costs(costs, clusters=[0, 1, 2, 2])).length
+    8.0
+    """
+    run: Callable[..., Result] = _load(SOLVERS, "solver", solver)
+    _check_limits(time_limit, iteration_limit)
+    if not isinstance(graph, TravelGraph):
+        raise InputError(f"graph: expected a TravelGraph, got {graph!r}")
+    tour = None if warm_start is None else _as_tour(warm_start, graph)
+    rng = np.random.default_rng(_seed(seed))
+    clock = Clock.of(time_limit)
+    with graph.on_clock(clock):
+        result = run(
+            graph,
+            time_limit=clock,
+            iteration_limit=iteration_limit,
+            rng=rng,
+            params=params,
+            warm_start=tour,
+            on_progress=graph.telling(on_progress),
+        )
+    return graph.told(result)
+
+
+def solve(
+    problem: Problem,
+    solver: str = DEFAULT_SOLVER,
+    *,
+    roadmap: str = DEFAULT_ROADMAP,
+    roadmap_options: Mapping[str, Any] | None = None,
+    time_limit: float | None = None,
+    iteration_limit: int | None = None,
+    seed: int = 0,
+    params: Mapping[str, Any] | None = None,
+    warm_start: Solution | None = None,
+    on_progress: OnProgress | None = None,
+) -> Solution:
+    """Find the shortest non-entangling tour of a problem.
+
+    Parameters
+    ----------
+    roadmap_options : for ``taut``: ``classes``, ``max_classes``; for ``prm``: ``samples``,
+        ``shortcut``.
+    time_limit : seconds for the whole call; the best tour so far is returned when it is up.
+    iteration_limit : of the solver; each says what one is.
+    seed : feeds the solver's random generator, and the sampling of a roadmap that samples.
+    params : the solver's options by name.
+    warm_start : a solution of the same problem to start from, by whatever solver; where a class of
+        it is not in this roadmap, the best of its order is taken.
+    on_progress : called with a `netsp.travel.result.Progress` now and then.
+
+    Raises
+    ------
+    InputError : unknown names, bad limits, a warm start for another problem.
+    InfeasibleError : some goal is out of the tether's reach; says which and by how much.
+    LimitReachedError : the time was up before the travel graph was complete.
+
+    >>> from netsp import Problem, solve
+    >>> problem = Problem(base=(0, 0), goals=[(3, 4)], obstacles=[], tether_length=6)
+    >>> solve(problem).length
+    10.0
+    """
+    if not isinstance(problem, Problem):
+        raise InputError(f"problem: expected a Problem, got {problem!r}")
+    if warm_start is not None and not isinstance(warm_start, Solution):
+        raise InputError(f"warm_start: expected a Solution, got {warm_start!r}")
+    _seed(seed)
+    _check_limits(time_limit, iteration_limit)
+    if warm_start is not None and warm_start.problem.sha256 != problem.sha256:
+        raise InputError("warm_start: it is the solution of another problem (sha256 differs)")
+    check_solver(solver, params)  # before the long work
+    clock = Clock(time_limit)
+    options: dict[str, Any] = {"time_limit": clock, **(roadmap_options or {})}
+    if roadmap in SEEDED_ROADMAPS:
+        options.setdefault("seed", seed)
+    graph = travel_graph(problem, roadmap, **options)
+    built = clock.elapsed
+    # what is too large for its time takes long to draw, too
+    spare = 0.0 if graph.complete else min(SPARE * (time_limit or 0.0), 1.0)
+    result = solve_graph(
+        graph,
+        solver,
+        time_limit=Clock(clock.left - spare, within=clock) if spare else clock,
+        iteration_limit=iteration_limit,
+        seed=seed,
+        params=params,
+        warm_start=_tour_of(warm_start, graph) if warm_start is not None else None,
+        on_progress=on_progress,
+    )
+    total = clock.elapsed
+    timings = Timings(
+        roadmap_s=round(built, 6),
+        matrix_s=round(graph.legs_s, 6),
+        solve_s=round(max(total - built - graph.legs_s, 0.0), 6),
+        total_s=round(total, 6),
+    )
+    return to_solution(problem, graph, result, solver, seed, timings)
+
+
+def check_solver(solver: str, params: Mapping[str, Any] | None) -> None:
+    """InputError if there is no such solver, or an option of it is unknown or out of range."""
+    _load(SOLVERS, "solver", solver)
+    read_params(_load(PARAMS, "solver", solver), solver, params)
+
+
+def _check_limits(time_limit: TimeLimit, iteration_limit: int | None) -> None:
+    if time_limit is not None and not isinstance(time_limit, Clock):
+        number = isinstance(time_limit, (int, float, np.number)) and time_limit is not True
+        if not (number and time_limit > 0):
+            raise InputError(
+                f"time_limit: expected a positive number of seconds, got {time_limit!r}"
+            )
+    if iteration_limit is not None:
+        whole = isinstance(iteration_limit, (int, np.integer)) and iteration_limit is not True
+        if not (whole and 1 <= iteration_limit < 2**62):
+            raise InputError(
+                f"iteration_limit: expected a whole number from 1 on, got {iteration_limit!r}"
+            )
+
+
+def _seed(seed: int) -> int:
+    whole = isinstance(seed, (int, np.integer)) and seed is not True
+    if not (whole and 0 <= seed <= LARGEST_SEED):
+        raise InputError(f"seed: expected a whole number from 0 to {LARGEST_SEED}, got {seed!r}")
+    return int(seed)
+
+
+def _as_tour(vertices: Sequence[int], graph: TravelGraph) -> tuple[int, ...]:
+    try:
+        given = np.asarray(list(vertices) if not isinstance(vertices, str) else None)
+        tour = tuple(int(v) for v in given) if given.dtype.kind in "iu" else ()
+    except (TypeError, ValueError):
+        tour = ()
+    if not tour or not graph.is_tour(tour):
+        raise InputError(
+            "warm_start: expected vertices from 0 on, one of every cluster, got "
+            f"{str(vertices)[:80]}"
+        )
+    return tour
+
+
+def _tour_of(solution: Solution, graph: TravelGraph) -> list[int] | None:
+    """The vertices of a solution's tour; if a class of it is not in the graph, the best classes for
+    its order; None if it has no tour of all goals."""
+    order = [visit.goal + 1 for visit in solution.tour]
+    if sorted(order) != list(range(1, graph.goal_count + 1)):
+        return None
+    words = [tuple(visit.signature) for visit in solution.tour]
+    there = graph.vertices_of(order, words)
+    if there is None and order:
+        from netsp.lns import Instance, best_classes
+
+        instance = Instance.of(graph)
+        _, tour = best_classes(np.array(order), instance.start, instance.costs)
+        return list(instance.original(tour))
+    return [0, *(there or [])]

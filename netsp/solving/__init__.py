@@ -1,0 +1,1 @@
+"""What every run of a solver shares: limits, incumbent, bound, report, options, leg costs."""

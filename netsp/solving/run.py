@@ -1,0 +1,164 @@
+"""What every solver run shares: the incumbent, the bound, the limits and the report."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from typing import Any
+
+import numpy as np
+
+from netsp.clock import Clock, TimeLimit
+from netsp.errors import LimitReachedError, MemoryLimitError
+from netsp.solution import Status
+from netsp.travel.graph import UNTIMED, TravelGraph, least_tethers
+from netsp.travel.result import OnProgress, Progress, Result, proven
+
+
+class Stop(Exception):
+    """A limit is reached."""
+
+
+class Run:
+    """One run of a solver on a travel graph.
+
+    iterations : how many the solver has done; each solver says what one is. `Stop` and Ctrl-C both
+    end a run with the best tour so far.
+    """
+
+    def __init__(
+        self,
+        graph: TravelGraph,
+        time_limit: TimeLimit = None,
+        iteration_limit: int | None = None,
+        on_progress: OnProgress | None = None,
+    ) -> None:
+        self.graph = graph
+        self.clock = Clock.of(time_limit)
+        self.iterations = 0
+        self.iteration_limit = math.inf if iteration_limit is None else iteration_limit
+        self.on_progress = on_progress
+        self.trace: list[Progress] = []
+        self.tour: tuple[int, ...] | None = None
+        self.walk: tuple[int, ...] | None = None
+        self.length = math.inf
+        self.bound: float | None = None
+        self.infeasible = False
+        self.stopped = False
+
+    def offer(
+        self,
+        tour: Sequence[int] | None,
+        walk: Sequence[int] | None = None,
+        length: float | None = None,
+    ) -> bool:
+        """Take a tour as incumbent if it is one and is shorter; whether it was taken.
+
+        walk : the vertices as they are walked, base to base, when that is not just the tour.
+        length : of the walk, if the caller knows it already.
+        """
+        if tour is None or not self.graph.is_tour(tour):
+            return False
+        if length is None:
+            length = self.graph.walk_length(walk) if walk else self.graph.tour_length(tour)
+        if not length < self.length:
+            return False
+        self.tour, self.length = tuple(int(v) for v in tour), length
+        self.walk = None if walk is None else tuple(int(v) for v in walk)
+        return True
+
+    @contextmanager
+    def until_stopped(self, *, blind: bool = False) -> Iterator[None]:
+        """Run the body until it is done, a limit is reached, also while legs are measured, or
+        Ctrl-C is pressed. Where it has no tour yet by then, it gets the nearest one that there is,
+        unless it is blind: then its own is all that it may show."""
+        try:
+            if not blind and not self.graph.complete and self.clock.limit is not None:
+                # a roadmap that was cut short says that nothing here is quick
+                self.start()
+            yield
+        except MemoryLimitError:
+            raise
+        except (Stop, LimitReachedError, KeyboardInterrupt):
+            self.stopped = True
+            if not blind:
+                self.start()
+
+    def finish(self, stage: str, **more: Any) -> Result:
+        """The last report, which says so if the run was stopped, and the outcome."""
+        with suppress(KeyboardInterrupt):
+            self.report("stopped" if self.stopped else stage, **more)
+        return self.result()
+
+    def trivial(self) -> bool:
+        """Settle problems of no goal or one, where the answer is known."""
+        if self.graph.goal_count > 1:
+            return False
+        if self.graph.goal_count == 0:
+            self.offer([0])
+        else:
+            there = self.graph.members(1)
+            self.offer([0, int(there[np.argmin(self.graph.costs_among([0, *there])[0, 1:])])])
+        self.bound = self.length
+        return True
+
+    def start(self) -> None:
+        """Take a first tour, whatever the time: the goals in the class of least tether, each the
+        nearest to the one before, by the bounds of legs where goals are many."""
+        graph = self.graph
+        if self.tour is not None or not graph.roadmapped:
+            return
+        core = least_tethers(graph.costs_to_base, graph.cluster, 1)
+        if not graph.quick_legs:
+            # out and back to every goal: those legs are the tethers, which are known
+            out = core[1:].tolist()
+            walk = [0, *(w for v in out for w in (v, 0))]
+            self.offer([0, *out], walk=walk, length=2.0 * float(graph.costs_to_base[out].sum()))
+            return
+        with graph.on_clock(None):  # a few legs; without them there would be nothing to show
+            few = len(core) <= UNTIMED
+            near = graph.costs_among(core) if few else graph.lower_bounds(core)
+            tour, left = [0], np.ones(len(core), dtype=bool)
+            left[0] = False
+            while left.any():
+                k = int(np.argmin(np.where(left, near[tour[-1]], np.inf)))
+                tour.append(k)
+                left[k] = False
+            self.offer(core[tour].tolist())
+
+    def raise_bound(self, bound: float) -> None:
+        """Take a lower bound if it is better; never above the incumbent."""
+        self.bound = min(max(self.bound or 0.0, bound), self.length)
+
+    def check(self) -> None:
+        """Raise `Stop` when a limit is reached."""
+        if self.clock.up or self.iterations >= self.iteration_limit:
+            raise Stop
+
+    @property
+    def done(self) -> bool:
+        """Whether the incumbent is proven optimal."""
+        return self.tour is not None and self.bound is not None and proven(self.length, self.bound)
+
+    def report(self, stage: str, **more: Any) -> None:
+        """Add a row to the trace and hand it on; `more` are further fields of `Progress`."""
+        row = Progress(
+            self.clock.elapsed,
+            stage,
+            None if self.tour is None else self.length,
+            self.bound,
+            iteration=self.iterations,
+            **more,
+        )
+        self.trace.append(row)
+        if self.on_progress:
+            self.on_progress(row)
+
+    def result(self) -> Result:
+        """The outcome as it stands."""
+        if self.tour is None:
+            status = Status.INFEASIBLE if self.infeasible else Status.NO_SOLUTION_FOUND
+            return Result(None, None, self.bound or None, status, tuple(self.trace))
+        status = Status.OPTIMAL if self.done else Status.FEASIBLE
+        return Result(self.tour, self.length, self.bound, status, tuple(self.trace), walk=self.walk)

@@ -1,0 +1,166 @@
+"""A run of a solver that proves, with local search for its incumbents.
+
+While legs are only bounded the search sees a core of classes whose legs it has measured; in the end
+it sees all that are left.
+
+With many classes the whole proof is made over the core first (`SearchingRun.core`): its tour
+is as good as always the best of all, and its prices and cuts fit the other classes so well that
+most of them are ruled out when they are first looked at.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any, Self
+
+import numpy as np
+
+from netsp.arrays import Ints
+from netsp.clock import Clock, TimeLimit
+from netsp.errors import LimitReachedError
+from netsp.lns.layers import Instance
+from netsp.lns.search import Search
+from netsp.solving.legcosts import MEASURE_AT_ONCE, LegCosts
+from netsp.solving.run import Run, Stop
+from netsp.travel.graph import TravelGraph, least_tethers
+from netsp.travel.result import OPTIMALITY_TOLERANCE, OnProgress
+
+CORE = 800
+"""About so many vertices, those of least tether, are measured for the heuristic while the other
+legs are only bounded."""
+
+FEW_CLASSES = 3
+"""Classes per goal of the first tour of all."""
+
+MOST_CLASSES = 12
+"""Most classes per goal among them."""
+
+CORE_SHARE = 0.4
+"""Part of the time that is left which the core may take."""
+
+LARGER = 4
+"""The core comes first where there are at least so many times as many vertices in all."""
+
+
+class SearchingRun(Run):
+    """A run with local search.
+
+    search_rounds : rounds of ruin and recreate of one search. outer : for a run over a core, the
+    run over all classes and the core's vertices there: tours are offered to it too, and its report
+    shows them; bounds of the core mean nothing to it.
+    """
+
+    def __init__(
+        self,
+        graph: TravelGraph,
+        time_limit: TimeLimit = None,
+        iteration_limit: int | None = None,
+        on_progress: OnProgress | None = None,
+        *,
+        rng: np.random.Generator | None = None,
+        search_rounds: int = 500,
+    ) -> None:
+        super().__init__(graph, time_limit, iteration_limit, on_progress)
+        self.rng = rng or np.random.default_rng(0)
+        self.search_rounds = search_rounds
+        self.outer: tuple[SearchingRun, Ints] | None = None
+        self.bound = 0.0
+        self._core: tuple[int, Instance] | None = None
+
+    def begin(self) -> None:
+        """A first tour, among few classes, before all legs are bounded: with very many classes that
+        takes long, and whoever stops the run meanwhile wants a tour."""
+        graph = self.graph
+        if self.tour is not None or len(graph) <= MEASURE_AT_ONCE or not graph.roadmapped:
+            return
+        core = least_tethers(graph.costs_to_base, graph.cluster, FEW_CLASSES)
+        search = Search(Instance.among(graph, core), self.rng, clock=self.clock)
+        search.settle()
+        self.take(search)
+        self.report("begun", vertices=len(graph))
+
+    @contextmanager
+    def core(self) -> Iterator[Self | None]:
+        """A run like this one over the classes of least tether, those of the incumbent among them;
+        None where they are too few to be worth it. When its own share of the time is over, the body
+        is left early."""
+        graph = self.graph
+        core = least_tethers(graph.costs_to_base, graph.cluster, self.classes_per_goal)
+        few = len(graph) <= max(MEASURE_AT_ONCE, LARGER * len(core))
+        if few or not graph.roadmapped or self.outer is not None:
+            yield None
+            return
+        core = np.union1d(core, np.array(self.tour or (0,), dtype=np.int64))
+        limit = CORE_SHARE * self.clock.left if self.clock.limit is not None else None
+        inner = type(self)(
+            graph.subgraph(core), Clock(limit, within=self.clock),
+            rng=self.rng, search_rounds=self.search_rounds,
+        )  # fmt: skip
+        inner.iteration_limit = self.iteration_limit - self.iterations
+        inner.outer = self, core
+        if self.tour is not None:
+            inner.offer(np.searchsorted(core, np.array(self.tour)).tolist())
+        try:
+            yield inner
+        except (Stop, LimitReachedError):
+            self.check()
+        finally:
+            self.iterations += inner.iterations
+
+    @property
+    def classes_per_goal(self) -> int:
+        """In the core."""
+        return min(max(3, CORE // (self.graph.goal_count + 1)), MOST_CLASSES)
+
+    def offer(
+        self,
+        tour: Sequence[int] | None,
+        walk: Sequence[int] | None = None,
+        length: float | None = None,
+    ) -> bool:
+        """As `Run.offer`; a tour of the core is offered to the outer run as well."""
+        taken = super().offer(tour, walk, length)
+        if taken and self.outer and self.tour is not None:
+            outer, core = self.outer
+            outer.offer(core[list(self.tour)].tolist(), length=self.length)
+        return taken
+
+    def report(self, stage: str, **more: Any) -> None:
+        """As `Run.report`; work on the core is reported by the outer run."""
+        if self.outer is None:
+            super().report(stage, **more)
+        else:
+            self.outer[0].report("core", **more)
+
+    def instance(self, costs: LegCosts, more: Ints) -> Instance:
+        """What the heuristic searches: everything if it is measured, else the classes of least
+        tether, the incumbent's, and more."""
+        if costs.exact is None:
+            if self._core is None or self._core[0] != len(costs):
+                self._core = len(costs), Instance(costs.cluster, costs.values, costs.vertices)
+            return self._core[1]
+        least = least_tethers(costs.values[0], costs.cluster, self.classes_per_goal)
+        own = np.searchsorted(costs.vertices, np.array(self.tour or (0,)))
+        core = np.unique(np.concatenate([least, own, more]))
+        costs.measure(core)
+        return Instance(costs.cluster[core], costs.values[np.ix_(core, core)], costs.vertices[core])
+
+    def search(self, costs: LegCosts, more: Ints | None = None) -> None:
+        """Local search, then ruin and recreate, from the incumbent if there is one."""
+        instance = self.instance(costs, np.zeros(0, dtype=np.int64) if more is None else more)
+        start = None if self.tour is None else self.graph.cluster[list(self.tour)]
+        search = Search(instance, self.rng, start, self.clock)
+        search.settle()
+        search.run(self.search_rounds, self.clock)
+        self.take(search)
+
+    def take(self, search: Search) -> None:
+        """Offer what a search found; its legs are measured, so its length is known."""
+        length, tour = search.best()
+        self.offer(tour, length=length)
+
+    @property
+    def cutoff(self) -> float:
+        """Tours no shorter than this are of no interest: half the tolerance below the incumbent."""
+        return self.length * (1.0 - 0.5 * OPTIMALITY_TOLERANCE)

@@ -1,0 +1,1 @@
+"""The seam between geometry and optimisation: travel graphs, the detours beneath, results."""

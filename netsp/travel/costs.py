@@ -1,0 +1,95 @@
+"""Travel graphs of given costs: checked, and as the legs of a graph."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
+
+from netsp.arrays import Bools, Floats, Ints
+from netsp.clock import Clock
+from netsp.errors import InputError
+
+
+class CostTable:
+    """Legs given as a matrix."""
+
+    def __init__(self, costs: Floats, cluster: Ints) -> None:
+        self.costs, self.cluster = costs, cluster
+
+    def lengths(
+        self, vertices: Ints, asked: Bools | None = None, clock: Clock | None = None
+    ) -> Floats:
+        return self.costs[np.ix_(vertices, vertices)].copy()
+
+    def to_base(self) -> Floats:
+        return np.asarray(self.costs[0])
+
+    def lower_bounds(
+        self, vertices: Ints, rows: Ints | None = None, clock: Clock | None = None
+    ) -> Floats:
+        return self.lengths(vertices) if rows is None else self.lengths(vertices)[rows]
+
+    def path(self, u: int, v: int) -> Floats:
+        raise InputError(f"no path from vertex {u} to {v}: this travel graph was made from costs")
+
+
+def checked_costs(costs: npt.ArrayLike, clusters: npt.ArrayLike) -> tuple[Floats, Ints]:
+    """The matrix with inf within clusters, and the clusters, or InputError with what is wrong."""
+    try:
+        c = np.array(costs, dtype=float)
+        labels = np.array(clusters, dtype=float)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InputError(f"costs, clusters: expected numbers: {error}") from None
+    if c.ndim != 2 or c.shape[0] != c.shape[1] or len(c) == 0:
+        raise InputError(f"costs: expected a square matrix, got shape {c.shape}")
+    n = len(c)
+    if labels.shape != (n,):
+        raise InputError(f"clusters: expected {n} labels, one per row of costs, got {labels.shape}")
+    good = np.isfinite(labels) & (labels >= 0) & (labels == np.floor(labels))
+    if not good.all():
+        raise InputError(f"clusters: expected whole numbers from 0 on, got {labels[~good][0]:g}")
+    if labels.max() >= n:
+        raise InputError(
+            f"clusters: {n} vertices cannot fill clusters 0 to {labels.max():g}; expected numbers "
+            "without gaps"
+        )
+    cluster = labels.astype(np.int64)
+    if cluster[0] != 0 or (cluster == 0).sum() != 1:
+        raise InputError(
+            "clusters: vertex 0, where the tour starts, must be alone in cluster 0; cluster 0 is "
+            f"{np.flatnonzero(cluster == 0).tolist()}"
+        )
+    missing = sorted(set(range(int(cluster.max()) + 1)) - set(cluster.tolist()))
+    if missing:
+        raise InputError(
+            f"clusters: cluster {missing[0]} has no vertex; expected 0 to {cluster.max()} all used"
+        )
+    c[cluster[:, None] == cluster[None, :]] = np.inf
+    if np.isnan(c).any():
+        u, v = np.argwhere(np.isnan(c))[0]
+        raise InputError(f"costs: costs[{u}][{v}] is not a number")
+    if (c < 0).any():
+        u, v = np.argwhere(c < 0)[0]
+        raise InputError(f"costs: costs[{u}][{v}] is {c[u, v]:g}; expected no negative cost")
+    scale = float(np.max(c[np.isfinite(c)], initial=0.0))
+    if scale > 1e100:
+        raise InputError(f"costs: {scale:g} is too large; expected at most 1e100")
+    with np.errstate(invalid="ignore"):
+        uneven = (c != c.T) & ~(np.abs(c - c.T) <= 1e-9 * scale)
+    if uneven.any():
+        u, v = np.argwhere(uneven)[0]
+        raise InputError(
+            f"costs: expected a symmetric matrix, but costs[{u}][{v}] is {c[u, v]:g} and "
+            f"costs[{v}][{u}] is {c[v, u]:g}"
+        )
+    c = np.minimum(c, c.T)
+    _, part = connected_components(csr_array(np.isfinite(c)), directed=False)
+    joined = set(cluster[part == part[0]].tolist())
+    cut_off = sorted(set(cluster.tolist()) - joined)
+    if cut_off:
+        raise InputError(
+            f"costs: infinite costs cut cluster {cut_off[0]} off from vertex 0, so there is no tour"
+        )
+    return c, cluster

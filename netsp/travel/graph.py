@@ -1,0 +1,343 @@
+"""The travel graph: where geometry ends and optimisation begins.
+
+A vertex is an *augmented goal* (goal, homotopy class of the tether there); the clusters are the
+goals; a tour takes one vertex of each cluster, starting and ending at vertex 0, the base with the
+empty word. Because a leg's cost belongs to one class, every such tour is non-entangling, and every
+non-entangling tour is one of them: NE-TSP is a symmetric generalised TSP on this graph.
+
+Solvers see this class and nothing beneath it.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from netsp.arrays import Bools, Floats, Ints
+from netsp.clock import NEVER, Clock, Flag
+from netsp.errors import InputError
+from netsp.hsignature import Word
+from netsp.travel.costs import CostTable, checked_costs
+from netsp.travel.detours import Ways
+
+if TYPE_CHECKING:
+    from netsp.solution import KeptClasses
+    from netsp.travel.result import OnProgress, Result
+
+
+UNTIMED = 50
+"""Legs among so few vertices, or as many single legs as there are among them, are measured whatever
+the time: the length of a tour, say."""
+
+
+class Legs(Protocol):
+    """What a roadmap offers: lengths of legs between vertices, and their paths."""
+
+    def lengths(
+        self, vertices: Ints, asked: Bools | None = None, clock: Clock | None = None
+    ) -> Floats:
+        """(k, k) symmetric leg lengths among the given vertices; inf within a cluster. Where
+        `asked` (k, k, symmetric) is given and false, anything. LimitReachedError when the clock is
+        up before many are measured."""
+
+    def to_base(self) -> Floats:
+        """(V,) lengths of the legs from the base."""
+
+    def lower_bounds(
+        self, vertices: Ints, rows: Ints | None = None, clock: Clock | None = None
+    ) -> Floats:
+        """(k, k) lower bounds on the leg lengths, much cheaper than the lengths; with `rows`, only
+        those from so many of the vertices (positions among them)."""
+
+    def path(self, u: int, v: int) -> Floats:
+        """(n, 3) polyline of the leg from vertex u to vertex v."""
+
+
+class TravelGraph:
+    """Augmented goals with the costs of the legs between them.
+
+    Attributes
+    ----------
+    cluster : (V,) 0 for the base, k + 1 for goal k.
+    signatures : V words, that of the tether at each vertex.
+    tethers : (V,) taut tether lengths in 3D.
+    roadmap : name of the roadmap it came from.
+    classes : which homotopy classes the roadmap holds (`Solution.classes`), None if unknown.
+    least_left_out : no class left out for want of time or room has a shorter tether; inf if none
+        is left out.
+    legs_s : seconds spent measuring legs so far.
+    start : vertex of the state that tours start from (`netsp.roadmap.opened`), None for the base.
+    start_tether : (n, 3) the tether that is out at the start.
+    """
+
+    start: int | None = None
+    start_tether: Floats = np.zeros((0, 3))
+
+    def __init__(
+        self,
+        cluster: npt.ArrayLike,
+        signatures: Sequence[Word],
+        tethers: npt.ArrayLike,
+        legs: Legs,
+        roadmap: str = "custom",
+        ways: Callable[[bool, Callable[[], None], Flag], Ways] | None = None,
+        classes: KeptClasses | None = None,
+        least_left_out: float = math.inf,
+    ) -> None:
+        self.cluster: Ints = np.asarray(cluster, dtype=np.int64)
+        self.signatures = tuple(signatures)
+        self.tethers: Floats = np.asarray(tethers, dtype=float)
+        self.roadmap = roadmap
+        self.classes = classes
+        self.least_left_out = least_left_out
+        self.legs_s = 0.0
+        self.clock: Clock | None = None
+        self._legs = legs
+        self._costs: Floats | None = None
+        self._make_ways = ways
+        self._ways: dict[bool, Ways] = {}
+        self._place: dict[tuple[int, Word], int] | None = None
+
+    @classmethod
+    def from_costs(cls, costs: npt.ArrayLike, clusters: npt.ArrayLike) -> TravelGraph:
+        """Any symmetric generalised TSP as a travel graph, for the solvers that need no geometry.
+
+        Parameters
+        ----------
+        costs : (V, V) symmetric, not negative; inf where there is no leg. Costs within a cluster
+            are never used.
+        clusters : (V,) cluster of each vertex, numbered 0, 1, … without gaps. Vertex 0 is alone in
+            cluster 0: it is where the tour starts and ends.
+
+        Raises
+        ------
+        InputError : wrong shapes, asymmetric, negative or NaN costs, a missing cluster, or
+            infinities that leave no vertex of some cluster joined to vertex 0.
+
+        >>> costs = [[0, 3, 4], [3, 0, 5], [4, 5, 0]]
+        >>> TravelGraph.from_costs(costs, clusters=[0, 1, 2]).tour_length([0, 1, 2])
+        12.0
+        """
+        table = CostTable(*checked_costs(costs, clusters))
+        cluster = table.cluster
+        return cls(cluster, [()] * len(cluster), np.zeros(len(cluster)), table)
+
+    def __len__(self) -> int:
+        return len(self.cluster)
+
+    @property
+    def goal_count(self) -> int:
+        """Number of goals."""
+        return int(self.cluster.max(initial=0))
+
+    @property
+    def costs(self) -> Floats:
+        """(V, V) leg costs, symmetric; inf on the diagonal and within a cluster. Computed once,
+        when first asked for; read-only."""
+        if self._costs is None:
+            costs = self._measured(np.arange(len(self)))
+            costs.setflags(write=False)
+            self._costs = costs
+        return self._costs
+
+    @property
+    def measured(self) -> bool:
+        """Whether all legs have been measured."""
+        return self._costs is not None
+
+    def costs_among(self, vertices: npt.ArrayLike, asked: Bools | None = None) -> Floats:
+        """(k, k) leg costs among some vertices only, for solvers that eliminate the others first;
+        inf within a cluster. Where `asked` (k, k, symmetric) is given and false, anything."""
+        chosen = np.asarray(vertices, dtype=np.int64)
+        if self._costs is not None:
+            return np.asarray(self._costs[np.ix_(chosen, chosen)])
+        return self._measured(chosen, asked)
+
+    @contextmanager
+    def on_clock(self, clock: Clock | None) -> Iterator[None]:
+        """While a solver runs, its clock ends the measuring of legs, too (LimitReachedError)."""
+        before, self.clock = self.clock, clock
+        try:
+            yield
+        finally:
+            self.clock = before
+
+    def _measured(self, vertices: Ints, asked: Bools | None = None) -> Floats:
+        begin = time.monotonic()
+        try:
+            return self._legs.lengths(vertices, asked, self.clock)
+        finally:
+            self.legs_s += time.monotonic() - begin
+
+    @property
+    def roadmapped(self) -> bool:
+        """Whether every vertex has a leg to every other of another goal, as over a roadmap; costs
+        given as a matrix promise nothing."""
+        return not isinstance(self._legs, CostTable)
+
+    @property
+    def complete(self) -> bool:
+        """Whether no class was left out for want of time or room."""
+        return self.least_left_out == math.inf
+
+    @property
+    def quick_legs(self) -> bool:
+        """Whether a leg by itself is quickly measured."""
+        return bool(getattr(self._legs, "quick", True))
+
+    @property
+    def geometric(self) -> bool:
+        """Whether a problem's geometry lies beneath, so that legs can be walked and retraced."""
+        return self._make_ways is not None
+
+    def ways(self, *, sub_goals: bool, check: Callable[[], None] = lambda: None) -> Ways:
+        """Ways in any class, for solvers blind to the tether, with or without sub-goals beside the
+        obstacles; `check` is called now and then and may raise. InputError if there is no geometry
+        beneath this graph."""
+        if self._make_ways is None:
+            raise InputError(
+                "solver: needs the geometry of a problem, and this travel graph has none"
+            )
+        if sub_goals not in self._ways:
+            stop = NEVER if self.clock is None else self.clock.flag
+            self._ways[sub_goals] = self._make_ways(sub_goals, check, stop)
+        return self._ways[sub_goals]
+
+    def subgraph(self, vertices: npt.ArrayLike) -> TravelGraph:
+        """The travel graph on some of the vertices, the base first; vertex k of it is vertex
+        ``vertices[k]`` of this one."""
+        chosen = np.asarray(vertices, dtype=np.int64)
+        return TravelGraph(
+            self.cluster[chosen],
+            [self.signatures[v] for v in chosen],
+            self.tethers[chosen],
+            _PartOfLegs(self, chosen),
+            self.roadmap,
+        )
+
+    @property
+    def costs_to_base(self) -> Floats:
+        """(V,) costs of the legs from the base, without measuring any other; inf at the base."""
+        out = self._legs.to_base().copy()
+        out[0] = np.inf
+        return out
+
+    def vertices_of(self, order: Sequence[int], words: Sequence[Word]) -> list[int] | None:
+        """The vertices of clusters with given words; None if one of them is not in the graph."""
+        if self._place is None:
+            self._place = {
+                (int(c), w): v
+                for v, (c, w) in enumerate(zip(self.cluster, self.signatures, strict=True))
+            }
+        found = [self._place.get((c, tuple(w)), -1) for c, w in zip(order, words, strict=True)]
+        return None if -1 in found else found
+
+    def lower_bounds(
+        self, vertices: npt.ArrayLike | None = None, rows: npt.ArrayLike | None = None
+    ) -> Floats:
+        """(k, k) lower bounds on the leg costs among some vertices (default all), without computing
+        the legs; inf within a cluster. rows : (r,) positions among the vertices; then (r, k)."""
+        chosen = np.arange(len(self)) if vertices is None else np.asarray(vertices, dtype=np.int64)
+        some = None if rows is None else np.asarray(rows, dtype=np.int64)
+        bounds = self._legs.lower_bounds(chosen, some, self.clock)
+        cluster = self.cluster[chosen]
+        own = cluster if some is None else cluster[some]
+        bounds[own[:, None] == cluster[None, :]] = np.inf
+        return bounds
+
+    def members(self, cluster: int) -> Ints:
+        """Vertices of a cluster."""
+        return np.flatnonzero(self.cluster == cluster)
+
+    def tour_length(self, tour: Sequence[int]) -> float:
+        """Length of the closed tour through the given vertices."""
+        return self.walk_length([*tour, tour[0]]) if len(tour) > 1 else 0.0
+
+    def walk_length(self, walk: Sequence[int]) -> float:
+        """Length of the legs from each vertex to the next."""
+        w = np.asarray(walk, dtype=np.int64)
+        used, at = np.unique(w, return_inverse=True)
+        asked = np.zeros((len(used), len(used)), dtype=bool)
+        asked[at[:-1], at[1:]] = asked[at[1:], at[:-1]] = True
+        among = self.costs_among(used, asked)
+        return float(among[at[:-1], at[1:]].sum())
+
+    def is_tour(self, tour: Sequence[int]) -> bool:
+        """Whether it starts at the base and takes exactly one vertex of every cluster."""
+        t = [int(v) for v in tour]
+        return (
+            bool(t)
+            and t[0] == 0
+            and all(0 <= v < len(self) for v in t)
+            and sorted(self.cluster[t].tolist()) == list(range(self.goal_count + 1))
+        )
+
+    def path(self, u: int, v: int) -> Floats:
+        """(n, 3) polyline of the leg from vertex u to vertex v."""
+        return self._legs.path(u, v)
+
+    def told(self, result: Result) -> Result:
+        """A solver's result as callers are to see it."""
+        return self.within_kept(result, self.least_by_way_of(self.least_left_out))
+
+    def least_by_way_of(self, tether: float) -> float:
+        """No tour by way of a class with so long a tether is shorter: it goes there and back."""
+        return 2.0 * tether
+
+    def within_kept(self, result: Result, otherwise: float) -> Result:
+        """A result over the classes kept as one about all: tours that use a class that was left out
+        are no shorter than `otherwise`."""
+        from netsp.solution import Status
+        from netsp.travel.result import proven
+
+        bound, length = result.lower_bound, result.length
+        if bound is None or otherwise >= bound:
+            return result
+        status = result.status
+        if status is Status.OPTIMAL and length is not None and not proven(length, otherwise):
+            status = Status.OPTIMAL_OF_KEPT
+        return dataclasses.replace(result, lower_bound=otherwise, status=status)
+
+    def telling(self, listener: OnProgress | None) -> OnProgress | None:
+        """A listener to a solver's progress, told what callers are to see."""
+        return listener
+
+
+def least_tethers(tethers: Floats, cluster: Ints, classes: int) -> Ints:
+    """Vertices of the shortest tethers of every cluster, at most so many of each, in order."""
+    order = np.lexsort((tethers, cluster))
+    grouped = cluster[order]
+    rank = np.arange(len(order)) - np.searchsorted(grouped, grouped)
+    return np.asarray(np.sort(order[rank < classes]), dtype=np.int64)
+
+
+class _PartOfLegs:
+    """The legs of another travel graph, among some of its vertices."""
+
+    def __init__(self, graph: TravelGraph, chosen: Ints) -> None:
+        self.graph, self.chosen = graph, chosen
+
+    def lengths(
+        self, vertices: Ints, asked: Bools | None = None, clock: Clock | None = None
+    ) -> Floats:
+        with self.graph.on_clock(clock or self.graph.clock):
+            return self.graph.costs_among(self.chosen[vertices], asked)
+
+    def to_base(self) -> Floats:
+        return np.asarray(self.graph.costs_to_base[self.chosen])
+
+    def lower_bounds(
+        self, vertices: Ints, rows: Ints | None = None, clock: Clock | None = None
+    ) -> Floats:
+        with self.graph.on_clock(clock or self.graph.clock):
+            return self.graph.lower_bounds(self.chosen[vertices], rows)
+
+    def path(self, u: int, v: int) -> Floats:
+        return self.graph.path(int(self.chosen[u]), int(self.chosen[v]))
