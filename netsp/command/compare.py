@@ -1,20 +1,92 @@
-"""`netsp compare` and `netsp combine`: from flags or a study file to rows, with a progress line."""
+"""`netsp compare`: solvers side by side, with a progress line."""
 
 from __future__ import annotations
 
 import argparse
 import sys
 import time
-from typing import Any, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
-from netsp.compare.rows import FAILED, Row, combine
-from netsp.compare.run import Tally, compare
-from netsp.compare.study import Study
-from netsp.errors import InputError
+from netsp.command.types import (
+    length,
+    natural,
+    positive,
+    seconds,
+    shard,
+)
+from netsp.errors import EXIT_INTERRUPTED, InputError
+
+if TYPE_CHECKING:
+    from netsp.compare.rows import Row
+    from netsp.compare.run import Tally
+    from netsp.compare.study import Study
+
+EXAMPLE = "netsp compare studies/table-one.toml -o rows.jsonl --jobs 2"
+
+
+def arguments(p: argparse.ArgumentParser) -> None:
+    """Of the command line."""
+    p.add_argument(
+        "study", metavar="STUDY", nargs="?", help="study file (TOML); or the flags below"
+    )
+    p.add_argument("-o", "--output", required=True, metavar="FILE", help="results (JSON lines)")
+    p.add_argument("--goals", type=positive, nargs="+", metavar="N")
+    p.add_argument("--tethers", type=length, nargs="+", metavar="L")
+    p.add_argument("--solvers", nargs="+", metavar="NAME")
+    p.add_argument("--roadmaps", nargs="+", metavar="NAME", help="default taut")
+    p.add_argument("--worlds", type=positive, metavar="N", help="per cell; default 10")
+    p.add_argument("--family", metavar="NAME", help="of the worlds; default icra2017")
+    p.add_argument(
+        "--seeds", type=natural, nargs="+", metavar="N", help="of the solvers; default 0"
+    )
+    p.add_argument("--time-limit", type=seconds, metavar="S", help="of a trial; default 120")
+    p.add_argument("--memory-limit", type=length, metavar="GIB", help="of a trial; default none")
+    p.add_argument("--jobs", type=positive, default=1, metavar="N", help="processes; default 1")
+    p.add_argument(
+        "--shard", type=shard, default=(1, 1), metavar="I/N", help="only the I-th of N parts"
+    )
+    p.add_argument(
+        "--scheduler", metavar="ADDRESS", help="run on a Dask cluster, tcp://host:port, not here"
+    )
+    p.add_argument("--quiet", action="store_true", help="no progress")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the trials that are not done yet, and return the exit code."""
+    from netsp.compare.run import compare
+
+    study = study_of(args)
+    executor = None
+    if args.scheduler:
+        from netsp.compare.cluster import dask_executor
+
+        executor = dask_executor(args.scheduler)
+    bar = Bar(sys.stderr, args.quiet)
+    try:
+        tally = compare(
+            study, args.output, jobs=args.jobs, part=args.shard, executor=executor, on_row=bar.show
+        )
+    except KeyboardInterrupt:
+        bar.end()
+        print(
+            f"netsp: interrupted; {args.output} holds what is done, the same command goes on",
+            file=sys.stderr,
+        )
+        return EXIT_INTERRUPTED
+    bar.end()
+    if not args.quiet:
+        print(
+            f"{tally.done} trials in {args.output}, {tally.done - tally.begun} of them new, "
+            f"{tally.failed} failed",
+            file=sys.stderr,
+        )
+    return 0
 
 
 def study_of(args: argparse.Namespace) -> Study:
     """The study file, or a study made from the flags."""
+    from netsp.compare.study import Study
+
     flags = {
         "goals": args.goals,
         "tether_lengths": args.tethers,
@@ -40,43 +112,6 @@ def study_of(args: argparse.Namespace) -> Study:
     return Study.checked(data, "compare")
 
 
-def run(args: argparse.Namespace) -> int:
-    """`netsp compare`."""
-    study = study_of(args)
-    executor = None
-    if args.scheduler:
-        from netsp.compare.cluster import dask_executor
-
-        executor = dask_executor(args.scheduler)
-    bar = Bar(sys.stderr, args.quiet)
-    try:
-        tally = compare(
-            study, args.output, jobs=args.jobs, part=args.shard, executor=executor, on_row=bar.show
-        )
-    except KeyboardInterrupt:
-        bar.end()
-        print(
-            f"netsp: interrupted; {args.output} holds what is done, the same command goes on",
-            file=sys.stderr,
-        )
-        return 130
-    bar.end()
-    if not args.quiet:
-        print(
-            f"{tally.done} trials in {args.output}, {tally.done - tally.begun} of them new, "
-            f"{tally.failed} failed",
-            file=sys.stderr,
-        )
-    return 0
-
-
-def run_combine(args: argparse.Namespace) -> int:
-    """`netsp combine`."""
-    count = combine(args.results, args.output)
-    print(f"{count} trials in {args.output}", file=sys.stderr)
-    return 0
-
-
 class Bar:
     """One line that is drawn over, on a terminal; a line now and then elsewhere."""
 
@@ -87,6 +122,8 @@ class Bar:
 
     def show(self, row: Row, tally: Tally) -> None:
         """After a trial."""
+        from netsp.compare.rows import FAILED
+
         if self.quiet:
             return
         if row["status"] in FAILED:

@@ -1,30 +1,64 @@
-"""What `netsp execute` does: runs, shows, writes."""
+"""`netsp execute`: a tour carried out, and repaired on the way."""
 
 from __future__ import annotations
 
 import argparse
-import csv
-import io
 import json
 import sys
-from collections.abc import Callable, Sequence
-from dataclasses import asdict
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
-from netsp.command.simulate import vector
+from netsp.command.types import (
+    length,
+    natural,
+    seconds,
+    vector,
+)
 from netsp.errors import EXIT_DEFECT, EXIT_NOT_ALL, EXIT_NOT_VERIFIED, InputError
-from netsp.execute.events import Surprises
-from netsp.execute.log import Execution, Options, Row
-from netsp.execute.run import execute
-from netsp.files import cell, write_text
-from netsp.pictures.execution import save_execution
-from netsp.problem import Problem
-from netsp.solution import Solution
+
+if TYPE_CHECKING:
+    from netsp.execute.log import Row
+    from netsp.problem import Problem
+
+EXAMPLE = "netsp execute problems/wharf.json solution.json --surprise surprises.json -o run"
 
 
-def run_execute(args: argparse.Namespace) -> int:
-    """`netsp execute PROBLEM SOLUTION`: returns the exit code."""
+def arguments(p: argparse.ArgumentParser) -> None:
+    """Of the command line."""
+    p.add_argument("problem", metavar="PROBLEM", help="problem file (JSON)")
+    p.add_argument("solution", metavar="SOLUTION", help="solution file (JSON)")
+    p.add_argument("--surprise", metavar="FILE", help="what happens on the way (JSON)")
+    p.add_argument("--speed", type=length, default=0.5, metavar="V", help="per second; default 0.5")
+    p.add_argument(
+        "--vehicle", default="kinematic", metavar="NAME", help="kinematic (default) or bluerov2"
+    )
+    p.add_argument("--current", metavar="X,Y,Z", help="current (m/s); default none")
+    p.add_argument("--gusts", type=length, default=0.0, metavar="S", help="on top of it (m/s)")
+    p.add_argument(
+        "--planner", default="repair", metavar="NAME",
+        help="repair (default): mend what breaks; none: go on with the plan",
+    )  # fmt: skip
+    p.add_argument(
+        "--planning-limit", type=seconds, default=2.0, metavar="S",
+        help="for mending a plan, while the robot holds its place; default 2",
+    )  # fmt: skip
+    p.add_argument("--delta", type=length, metavar="D", help="resolution of the tether")
+    p.add_argument("--seed", type=natural, default=0, metavar="N", help="of gusts and solvers")
+    p.add_argument("-o", "--output", metavar="RUN", help="folder for logs, summary and run.png")
+    p.add_argument("--quiet", action="store_true", help="no progress")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Carry the tour out, write what happened, and return the exit code."""
+    from netsp.execute.events import Surprises
+    from netsp.execute.log import Options, describe
+    from netsp.execute.run import execute
+    from netsp.execute.write import make_folder, write_execution
+    from netsp.pictures.execution import save_execution
+    from netsp.problem import Problem
+    from netsp.solution import Solution
+
     problem, solution = Problem.load(args.problem), Solution.load(args.solution)
     surprises = Surprises.load(args.surprise) if args.surprise else None
     if args.planner not in ("repair", "none"):
@@ -72,74 +106,3 @@ def live(problem: Problem) -> Callable[[Row], None]:
             )  # fmt: skip
 
     return on_step
-
-
-def describe(done: Execution) -> str:
-    """A run in a few lines."""
-    s = done.summary
-    planned = s["planned_path"] or 0.0
-    lines = [
-        f"run      {s['problem']}: {s['status']} after {s['time_s']:.1f} s",
-        f"visited  {s['visited']} goals, the tether in the planned class at {s['as_planned']} of "
-        f"{len(done.arrivals)} stops",
-        f"path     {s['path']:.6g} ({100 * (s['path'] / planned - 1):+.2f} % of the plan's)"
-        if planned
-        else f"path     {s['path']:.6g}",
-        f"tether   longest {s['longest_tether']:.6g} of {s['tether_length']:g}, too long for "
-        f"{s['exceedance_s']:.1f} s, "
-        + ("taken in free at the base" if s["tether_free"] and s["home"] else "not taken in free"),
-    ]
-    lines += [
-        f"event    {e.time:.1f} s, {e.event}: {e.done} ({e.reason}; {e.planning_s:.2f} s)"
-        for e in done.entries
-    ]
-    lines += [f"left out {done.problem.goal_label(x['goal'])}: {x['reason']}" for x in s["lost"]]
-    return "\n".join(lines)
-
-
-def write_execution(done: Execution, folder: str | Path) -> None:
-    """log.csv, visits.csv, events.csv, tethers.json, summary.json, and the problem and solution."""
-    place = make_folder(folder)
-    write_text(place / "log.csv", _table([asdict(r) for r in done.rows]))
-    visits = [
-        {**asdict(a), "word": " ".join(map(str, a.word)), "planned": " ".join(map(str, a.planned)),
-         "as_planned": a.as_planned}
-        for a in done.arrivals
-    ]  # fmt: skip
-    write_text(place / "visits.csv", _table(visits))
-    write_text(place / "events.csv", _table([asdict(e) for e in done.entries]))
-    write_text(place / "summary.json", json.dumps(done.summary, indent=1, allow_nan=False) + "\n")
-    frames = [{"time": t, "nodes": [[round(float(v), 4) for v in p] for p in n]}
-              for t, n in done.tethers]  # fmt: skip
-    write_text(place / "tethers.json", json.dumps(frames, allow_nan=False) + "\n")
-    write_text(place / "problem.json", done.problem.to_json())
-    write_text(place / "solution.json", done.solution.to_json())
-
-
-def make_folder(folder: str | Path) -> Path:
-    """The folder, made if need be; InputError if that cannot be done or nothing be written."""
-    place = Path(folder)
-    try:
-        place.mkdir(parents=True, exist_ok=True)
-        probe = place / ".netsp"
-        probe.touch()
-        probe.unlink()
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be written to: {error.strerror or error}") from None
-    return place
-
-
-def _table(rows: Sequence[dict[str, Any]]) -> str:
-    if not rows:
-        return ""
-    text = io.StringIO()
-    table = csv.DictWriter(text, fieldnames=list(rows[0]), lineterminator="\n")
-    table.writeheader()
-    table.writerows(
-        {
-            k: round(v, 6) if isinstance(v, float) else cell(v) if isinstance(v, str) else v
-            for k, v in r.items()
-        }
-        for r in rows
-    )
-    return text.getvalue()

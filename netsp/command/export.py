@@ -1,32 +1,70 @@
-"""What `netsp export` and `netsp import` do."""
+"""`netsp export`: a tour as a mission file of a ground station."""
 
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 
-from netsp.errors import InputError
-from netsp.export.projection import Projection
-from netsp.export.site import read_site
-from netsp.export.waypoints import Waypoint, clearance_of
-from netsp.export.write import (
-    FORMATS,
-    MOST_FENCE_POINTS,
-    SHALLOWEST,
-    Settings,
-    export,
-    fence_points,
-    predicted_s,
+from netsp.command.types import (
+    check_writable,
+    length,
+    margins,
+    natural,
+    positive,
 )
-from netsp.files import write_text
-from netsp.judge import verify
-from netsp.problem import Problem
-from netsp.solution import Solution
+from netsp.errors import InputError
+
+EXAMPLE = (
+    "netsp export solution.json --problem problems/wharf.json --origin 41.18,-8.70 -o wharf.plan"
+)
 
 
-def run_export(args: argparse.Namespace) -> int:
-    """`netsp export SOLUTION`: returns the exit code."""
+def arguments(p: argparse.ArgumentParser) -> None:
+    """Of the command line."""
+    p.add_argument("solution", metavar="SOLUTION", help="solution file (JSON)")
+    p.add_argument("--problem", required=True, metavar="FILE", help="the problem it solves")
+    p.add_argument(
+        "--format", metavar="NAME",
+        help="plan (QGroundControl), wpl (QGC WPL 110), geojson or csv; default by the file's name",
+    )  # fmt: skip
+    p.add_argument(
+        "--origin", metavar="LAT,LON[,HEADING]",
+        help="where the base is, and where the y axis points to (degrees from north)",
+    )  # fmt: skip
+    p.add_argument(
+        "--acceptance", type=length, default=0.0, metavar="R",
+        help="acceptance radius of the vehicle (m): corners may be cut by it",
+    )  # fmt: skip
+    p.add_argument("--hold", type=natural, default=5, metavar="S", help="at goals; default 5")
+    p.add_argument("--speed", type=length, default=0.5, metavar="V", help="m/s; default 0.5")
+    p.add_argument(
+        "--most", type=positive, default=650, metavar="N", help="waypoints at most; default 650"
+    )
+    p.add_argument(
+        "--margin", default="0.3,0.2", metavar="SLACK[,CLEARANCE]",
+        help="warn when less tether is left or lines come nearer to an obstacle; default 0.3,0.2",
+    )  # fmt: skip
+    p.add_argument("-o", "--output", required=True, metavar="FILE")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write the file, warn of what is tight, and return the exit code."""
+    check_writable(args.output, inputs=(args.solution, args.problem))
+    from netsp.export.margins import warnings
+    from netsp.export.projection import Projection
+    from netsp.export.write import (
+        MOST_FENCE_POINTS,
+        SHALLOWEST,
+        Settings,
+        export,
+        fence_points,
+        format_of,
+        predicted_s,
+    )
+    from netsp.judge import verify
+    from netsp.problem import Problem
+    from netsp.solution import Solution
+
     problem, solution = Problem.load(args.problem), Solution.load(args.solution)
     judged = verify(problem, solution)
     if not judged:
@@ -66,83 +104,4 @@ def run_export(args: argparse.Namespace) -> int:
             "netsp: home is taken to be the water surface at the base: do not set it by hand",
             file=sys.stderr,
         )
-    return 0
-
-
-EXTENSIONS = {
-    ".plan": "plan", ".waypoints": "wpl", ".txt": "wpl", ".geojson": "geojson", ".json": "geojson",
-    ".csv": "csv",
-}  # fmt: skip
-"""Which format a file's name asks for."""
-
-
-def format_of(file: str, asked: str | None) -> str:
-    """The format by the file's extension, or that asked for; InputError where they disagree or
-    neither says."""
-    extension = os.path.splitext(file)[1].lower()
-    own = EXTENSIONS.get(extension)
-    if asked is not None and asked not in FORMATS:
-        raise InputError(f"--format: expected {', '.join(FORMATS)}, got {asked!r}")
-    if asked is not None and own is not None and asked != own:
-        raise InputError(f"--format: {asked}, but {file!r} ends like a file of format {own}")
-    if asked is None and own is None:
-        raise InputError(
-            f"-o: expected a file that ends in {', '.join(EXTENSIONS)}, got {file!r}; or say "
-            "--format"
-        )
-    return asked or own or ""
-
-
-def margins(text: str) -> tuple[float, float]:
-    """Least tether slack and clearance, from ``SLACK`` or ``SLACK,CLEARANCE``."""
-    try:
-        numbers = [float(v) for v in text.split(",")]
-    except ValueError:
-        numbers = []
-    if len(numbers) not in (1, 2) or not all(0.0 <= v < float("inf") for v in numbers):
-        raise InputError(f"--margin: expected SLACK or SLACK,CLEARANCE from 0 on, got {text!r}")
-    return numbers[0], numbers[-1] if len(numbers) == 2 else LEAST_CLEARANCE
-
-
-LEAST_SLACK, LEAST_CLEARANCE = 0.3, 0.2
-"""Metres: a vehicle that flew exported missions lost 0.13 m of clearance and took up to 0.16 m more
-tether than planned."""
-
-
-def warnings(
-    problem: Problem, solution: Solution, points: list[Waypoint], slack: float, clearance: float
-) -> list[str]:
-    """What may go wrong because the plan is too tight."""
-    out = []
-    longest = max(solution.tour, key=lambda v: v.tether_length, default=None)
-    if longest is not None and problem.tether_length - longest.tether_length < slack:
-        left = problem.tether_length - longest.tether_length
-        out.append(
-            f"{left:.2f} {problem.units} of tether are left at {problem.goal_label(longest.goal)}; "
-            f"expected {slack:g}: plan with a shorter tether_length, or set --margin"
-        )
-    near = clearance_of(problem, points)
-    if near < clearance:
-        out.append(
-            f"the lines between waypoints come within {near:.2f} {problem.units} of an obstacle; "
-            f"expected {clearance:g}: plan with a larger clearance, or set --margin"
-        )
-    return out
-
-
-def run_import(args: argparse.Namespace) -> int:
-    """`netsp import SITE`: returns the exit code."""
-    projection = Projection.parse(args.base, name="--base") if args.base else None
-    problem = read_site(
-        args.site, projection, tether=args.tether, clearance=args.clearance, radius=args.radius
-    )
-    print(
-        f"{problem.name}: {len(problem.goals)} goals, {len(problem.obstacles)} obstacles, tether "
-        f"{problem.tether_length:g} m",
-        file=sys.stderr,
-    )
-    if args.output is None:
-        sys.stdout.write(problem.to_json())
-    else:
-        write_text(args.output, problem.to_json())
     return 0

@@ -5,8 +5,13 @@ from __future__ import annotations
 import argparse
 import os
 from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 from netsp.errors import InputError
+
+if TYPE_CHECKING:
+    from netsp.problem import Problem
+    from netsp.solution import Solution
 
 
 def _above_zero(what: str) -> Callable[[str], float]:
@@ -67,6 +72,30 @@ def positive(text: str) -> int:
     return value
 
 
+def vector(text: str, name: str) -> tuple[float, float, float]:
+    """Three numbers, separated by commas."""
+    from netsp.online.scene.field import finite_point
+
+    try:
+        x, y, z = (float(v) for v in text.split(","))
+    except ValueError:
+        raise InputError(f"{name}: expected three numbers like 0.1,0,0, got {text!r}") from None
+    return finite_point((x, y, z), name)
+
+
+def margins(text: str) -> tuple[float, float]:
+    """Least tether slack and clearance, from ``SLACK`` or ``SLACK,CLEARANCE``."""
+    from netsp.export.margins import LEAST_CLEARANCE
+
+    try:
+        numbers = [float(v) for v in text.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) not in (1, 2) or not all(0.0 <= v < float("inf") for v in numbers):
+        raise InputError(f"--margin: expected SLACK or SLACK,CLEARANCE from 0 on, got {text!r}")
+    return numbers[0], numbers[-1] if len(numbers) == 2 else LEAST_CLEARANCE
+
+
 def check_writable(*paths: str | None, inputs: Sequence[str | None] = ()) -> None:
     """InputError before the work starts rather than after it; what is read is never written to."""
     read = {os.path.realpath(p) for p in inputs if p is not None}
@@ -87,3 +116,22 @@ def check_writable(*paths: str | None, inputs: Sequence[str | None] = ()) -> Non
             raise InputError(f"{path}: cannot be written: no directory {folder}")
         if not os.access(path if os.path.exists(path) else folder, os.W_OK):
             raise InputError(f"{path}: cannot be written: permission denied")
+
+
+def roadmap_options(args: argparse.Namespace) -> dict[str, object]:
+    """Those options of a roadmap that were given."""
+    options = {
+        "samples": args.samples,
+        "shortcut": args.shortcut or None,
+        "max_classes": args.max_classes,
+        "classes": args.classes_rule,
+    }
+    return {name: value for name, value in options.items() if value is not None}
+
+
+def load_pair(problem: str, solution: str) -> tuple[Problem, Solution]:
+    """A problem file and a solution file."""
+    from netsp.problem import Problem
+    from netsp.solution import Solution
+
+    return Problem.load(problem), Solution.load(solution)

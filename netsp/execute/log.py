@@ -139,3 +139,26 @@ class Execution:
             "planning_worst_s": max((e.planning_s for e in self.entries), default=0.0),
             "wall_s": self.wall_s,
         }
+
+
+def describe(done: Execution) -> str:
+    """A run in a few lines."""
+    s = done.summary
+    planned = s["planned_path"] or 0.0
+    lines = [
+        f"run      {s['problem']}: {s['status']} after {s['time_s']:.1f} s",
+        f"visited  {s['visited']} goals, the tether in the planned class at {s['as_planned']} of "
+        f"{len(done.arrivals)} stops",
+        f"path     {s['path']:.6g} ({100 * (s['path'] / planned - 1):+.2f} % of the plan's)"
+        if planned
+        else f"path     {s['path']:.6g}",
+        f"tether   longest {s['longest_tether']:.6g} of {s['tether_length']:g}, too long for "
+        f"{s['exceedance_s']:.1f} s, "
+        + ("taken in free at the base" if s["tether_free"] and s["home"] else "not taken in free"),
+    ]
+    lines += [
+        f"event    {e.time:.1f} s, {e.event}: {e.done} ({e.reason}; {e.planning_s:.2f} s)"
+        for e in done.entries
+    ]
+    lines += [f"left out {done.problem.goal_label(x['goal'])}: {x['reason']}" for x in s["lost"]]
+    return "\n".join(lines)

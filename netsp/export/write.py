@@ -14,6 +14,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -291,3 +292,27 @@ FORMATS: dict[str, Callable[[Problem, list[Waypoint], Projection | None, Setting
 }
 
 __all__ = ["FORMATS", "Settings", "altitude", "export"]
+
+
+EXTENSIONS = {
+    ".plan": "plan", ".waypoints": "wpl", ".txt": "wpl", ".geojson": "geojson", ".json": "geojson",
+    ".csv": "csv",
+}  # fmt: skip
+"""Which format a file's name asks for."""
+
+
+def format_of(file: str, asked: str | None) -> str:
+    """The format by the file's extension, or that asked for; InputError where they disagree or
+    neither says."""
+    extension = os.path.splitext(file)[1].lower()
+    own = EXTENSIONS.get(extension)
+    if asked is not None and asked not in FORMATS:
+        raise InputError(f"--format: expected {', '.join(FORMATS)}, got {asked!r}")
+    if asked is not None and own is not None and asked != own:
+        raise InputError(f"--format: {asked}, but {file!r} ends like a file of format {own}")
+    if asked is None and own is None:
+        raise InputError(
+            f"-o: expected a file that ends in {', '.join(EXTENSIONS)}, got {file!r}; or say "
+            "--format"
+        )
+    return asked or own or ""

@@ -66,3 +66,36 @@ def write_run(run: Run, folder: str | Path) -> None:
 
 def _short(value: Any) -> Any:
     return round(value, 5) if isinstance(value, float) else value
+
+
+def describe(run: Run, units: str) -> str:
+    """A run in a few lines."""
+    s = run.summary
+    lines = [
+        f"mission  {s['mission']}, planner {s['planner']}: {s['status']}",
+        f"visited  {s['visited']} of {s['waypoints']} waypoints",
+        f"time     {s['inspection_s']:.1f} s, and back along the tether "
+        f"{s['recovery_s']['tether']:.1f} s",
+        f"tether   longest {s['longest_tether_m']:.3f} of {s['tether_length']:g} {units}, "
+        f"too long for {s['exceedance_s']:.1f} s",
+        f"planning {s['replans']} times, median {1e3 * s['replan_median_s']:.1f} ms, worst "
+        f"{1e3 * s['replan_worst_s']:.0f} ms",
+    ]
+    if s["defects"]:
+        lines.append(f"defect   planning failed {s['defects']} times; please report the mission")
+    if s["coverage"] is not None:
+        lines.insert(
+            4,
+            f"seen     {100 * s['coverage']:.1f} % of the surface "
+            f"({100 * s['coverage_through']:.1f} % if nothing stood in between)",
+        )
+    if s["control_worst_s"] > 0.0:
+        lines.append(
+            f"control  median {1e3 * s['control_median_s']:.1f} ms, worst "
+            f"{1e3 * s['control_worst_s']:.0f} ms; "
+            f"{s['inspection_s'] / s['wall_s']:.0f} x real time"
+        )
+    lines += [f"left out {left['waypoint']}: {left['reason']}" for left in s["skipped"][:5]]
+    if len(s["skipped"]) > 5:
+        lines.append(f"         and {len(s['skipped']) - 5} more")
+    return "\n".join(lines)

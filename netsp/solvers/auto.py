@@ -1,7 +1,7 @@
 """`auto`: the solver by the size of the problem; always a tour, a bound and a gap.
 
-With up to eight goals or so all sets of goals are gone through (`netsp.solvers.exact`). Up to `PROVABLE`
-vertices it proves: the heuristic finds the tour; for up to `FEW_GOALS` goals walks
+With up to eight goals or so all sets of goals are gone through (`netsp.solvers.exact`). Up to
+`PROVABLE` vertices it proves: the heuristic finds the tour; for up to `FEW_GOALS` goals walks
 (`netsp.dp`) bound it, which at that size ends with a proof more often than not; cutting planes
 (`netsp.mip`) do the rest, or all of it with more goals, on the vertices that are left. Beyond
 `PROVABLE` the matrices would not fit into a few gigabytes. Few goals are then proven over the

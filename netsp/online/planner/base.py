@@ -39,10 +39,12 @@ class Command:
 
 @dataclass(frozen=True)
 class Options:
-    """How ways are found. ways : tree, or one of OMPL's planners (`netsp.online.paths.sampled`).
-    refine : none, paper or gradient (`netsp.online.paths.refine`); default paper for the paper's planners
-    and none for the others, whose ways keep the clearance from the start. seed : of what is random
-    in either."""
+    """How ways are found.
+
+    ways : tree, or one of OMPL's planners (`netsp.online.paths.sampled`). refine : none, paper or
+    gradient (`netsp.online.paths.refine`); default paper for the paper's planners and none for the
+    others, whose ways keep the clearance from the start. seed : of what is random in either.
+    """
 
     ways: str = "tree"
     refine: str | None = None

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import numpy as np
+
+from netsp.arrays import Floats
+from netsp.online.scene.field import DistanceField
 from netsp.online.scene.scene import scene_of
 from netsp.problem import Problem
 
@@ -20,3 +24,11 @@ def coarsest_delta(problem: Problem) -> float:
 
 THINNEST = 1.8
 """In units of delta: no solid thicker than this is ever passed."""
+
+
+def delta_for_path(field: DistanceField, path: Floats) -> float:
+    """A resolution for a scene: a hundredth of the path's extent, and fine enough for the thinnest
+    solid."""
+    size = float(np.linalg.norm(path.max(0) - path.min(0))) or 1.0
+    thinnest = min((t for _, t in field.thickness), default=np.inf)
+    return float(max(min(size / 100.0, thinnest / (1.05 * THINNEST)), size / 5000.0))

@@ -1,0 +1,23 @@
+"""`netsp combine`: shards of one study joined."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+
+EXAMPLE = "netsp combine part-1.jsonl part-2.jsonl -o rows.jsonl"
+
+
+def arguments(p: argparse.ArgumentParser) -> None:
+    """Of the command line."""
+    p.add_argument("results", metavar="RESULTS", nargs="+")
+    p.add_argument("-o", "--output", required=True, metavar="FILE")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write the rows, and return the exit code."""
+    from netsp.compare.rows import combine
+
+    count = combine(args.results, args.output)
+    print(f"{count} trials in {args.output}", file=sys.stderr)
+    return 0

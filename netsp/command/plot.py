@@ -1,0 +1,108 @@
+"""`netsp plot`: pictures of problems, roadmaps, solutions and scenes."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING
+
+from netsp.command.types import (
+    check_writable,
+    length,
+    load_pair,
+    natural,
+    positive,
+    roadmap_options,
+)
+from netsp.errors import InputError
+
+if TYPE_CHECKING:
+    from netsp.problem import Problem
+
+EXAMPLE = "netsp plot problems/wharf.json solution.json -o wharf.svg"
+
+
+def arguments(p: argparse.ArgumentParser) -> None:
+    """Of the command line."""
+    p.add_argument("problem", metavar="PROBLEM", help="problem or scene file (JSON)")
+    p.add_argument(
+        "solution", metavar="SOLUTION", nargs="?",
+        help="solution; with a scene: a path from the anchor on (CSV x,y,z or JSON), along which "
+        "the tether is laid",
+    )  # fmt: skip
+    p.add_argument(
+        "-o", "--output", required=True, metavar="FILE",
+        help="png, svg or pdf; a scene also html, to be turned in a browser",
+    )  # fmt: skip
+    p.add_argument(
+        "--tether-model", default="geodesic", metavar="NAME",
+        help="scene: geodesic (default) or react",
+    )  # fmt: skip
+    p.add_argument(
+        "--delta", type=length, metavar="L",
+        help="scene: resolution of the tether; default by the scene",
+    )  # fmt: skip
+    p.add_argument("--roadmap", metavar="NAME", help="draw this roadmap: taut or prm")
+    p.add_argument("--samples", type=positive, metavar="N", help="prm: milestones; default 1000")
+    p.add_argument("--seed", type=natural, default=0, metavar="N", help="prm: random seed")
+    p.add_argument(
+        "--classes", metavar="GOAL", help="draw all taut tethers to this goal (number or name)"
+    )
+    p.set_defaults(shortcut=False, max_classes=None, classes_rule=None)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Draw, and return the exit code."""
+    check_writable(args.output, inputs=(args.problem, args.solution))
+    if _is_scene(args.problem):
+        from netsp.command.plot_scene import plot_scene
+
+        return plot_scene(args)
+    from netsp.pictures import problem as plotting
+    from netsp.problem import Problem
+
+    plotting.check_format(args.output)
+    if args.classes is not None:
+        if args.solution or args.roadmap:
+            raise InputError(
+                "--classes: draws a problem alone; leave out the solution and --roadmap"
+            )
+        problem = Problem.load(args.problem)
+        plotting.save_classes(problem, _goal_number(problem, args.classes), args.output)
+    elif args.roadmap:
+        if args.solution:
+            raise InputError("--roadmap: draws a problem alone; leave out the solution")
+        options = roadmap_options(args)
+        if args.roadmap == "prm":
+            options["seed"] = args.seed
+        plotting.save_roadmap(Problem.load(args.problem), args.roadmap, options, args.output)
+    elif args.solution:
+        problem, solution = load_pair(args.problem, args.solution)
+        if solution.problem.sha256 != problem.sha256:
+            raise InputError(
+                f"{args.solution}: is the solution of another problem (sha256 differs)"
+            )
+        plotting.save(problem, solution, args.output)
+    else:
+        plotting.save(Problem.load(args.problem), None, args.output)
+    return 0
+
+
+def _is_scene(path: str) -> bool:
+    """A file that describes a scene rather than a problem: by its fields."""
+    from netsp.files import read_text
+    from netsp.models import parse_json_object
+
+    data = parse_json_object(read_text(path), path)
+    return "goals" not in data and bool({"solids", "mesh", "cloud", "problem"} & data.keys())
+
+
+def _goal_number(problem: Problem, text: str) -> int:
+    names = [g.name for g in problem.goals]
+    if text in names:
+        return names.index(text)
+    if text.isdigit() and int(text) < len(names):
+        return int(text)
+    raise InputError(
+        f"--classes: no goal {text!r}; expected a number from 0 to {len(names) - 1}"
+        + (f" or a name such as {next(n for n in names if n)!r}" if any(names) else "")
+    )

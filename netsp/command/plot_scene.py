@@ -1,0 +1,105 @@
+"""What `netsp plot` does with a scene."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+
+import numpy as np
+
+from netsp.arrays import Floats
+from netsp.errors import InputError
+from netsp.files import read_path
+from netsp.online.scene.field import DistanceField
+from netsp.online.scene.scene import Scene
+from netsp.online.tether import GeodesicTether, ReactTether, Tether
+from netsp.online.tether.resolution import delta_for_path
+from netsp.pictures import scene as pictures
+
+MODELS = {"geodesic": GeodesicTether, "react": ReactTether}
+
+
+def plot_scene(args: argparse.Namespace) -> int:
+    """`netsp plot SCENE [PATH]`: returns the exit code."""
+    pictures.check_format(args.output)
+    scene = Scene.load(args.problem)
+    path, tether = None, None
+    if args.solution is not None:
+        path = points_of(args.solution)
+        field = scene.field(on_progress=tell)
+        for note in field.notes:
+            print(f"netsp: {scene.name}: {note}", file=sys.stderr)
+        check_overlap(scene, field, path, args.solution)
+        delta = args.delta or delta_for_path(field, path)
+        tether = lay(field, path, args.tether_model, delta)
+        print(
+            f"{scene.name}: taut tether {tether.length:.6g} {scene.units} "
+            f"({args.tether_model}, delta {delta:.3g}), {len(tether.contacts)} contacts",
+            file=sys.stderr,
+        )
+    pictures.save(scene, args.output, path=path, tether=tether)
+    return 0
+
+
+def lay(field: DistanceField, path: Floats, model: str, delta: float) -> Tether:
+    """The tether after a robot has gone a path from its anchor, the first point, on."""
+    if model not in MODELS:
+        raise InputError(f"--tether-model: expected {' or '.join(MODELS)}, got {model!r}")
+    chosen = MODELS[model](field, delta)
+    if isinstance(chosen, GeodesicTether) and (thin := chosen.warnings):
+        more = f" (and {len(thin) - 1} more)" if len(thin) > 1 else ""
+        print(
+            f"netsp: {thin[0]}{more}: the tether may slip through; take a smaller --delta",
+            file=sys.stderr,
+        )
+    for k in range(len(path) - 1):
+        if not field.line_of_sight(path[k], path[k + 1], depth=0.25 * delta):
+            raise InputError(
+                f"path[{k}] to path[{k + 1}]: passes through a solid; expected a free path"
+            )
+    tether: Tether = chosen.lay(path)
+    return tether
+
+
+def points_of(file: str) -> Floats:
+    """The points (k, 3) of a path file: CSV x,y,z or a JSON list of points."""
+    path = read_path(file)
+    if path is None:
+        raise InputError(f"{file}: expected a path: CSV x,y,z or a JSON list of points")
+    points = np.asarray(path, dtype=float)
+    if points.shape[1] != 3:
+        raise InputError(f"{file}: expected points x, y, z, got x, y")
+    return points
+
+
+def check_overlap(scene: Scene, field: DistanceField, path: Floats, file: str) -> None:
+    """InputError when a path is so far from the scene that the two cannot be in the same units."""
+    boxes = [b for s in scene.all_solids() if (b := s.shape.box()) is not None]
+    if field.box is not None:
+        boxes.append(field.box)
+    if not boxes:
+        return
+    low, high = np.vstack(boxes).min(0), np.vstack(boxes).max(0)
+    flat = np.array([not (low[a] == high[a] == 0.0) for a in range(3)])  # posts have no height
+    size = float((high - low).max())
+    start, end = path.min(0), path.max(0)
+    apart = np.maximum(np.maximum(low - end, start - high), 0.0)[flat]
+    reach = float(np.linalg.norm(end - start))
+    if np.linalg.norm(apart) > 10.0 * max(size, reach) or (
+        len(path) > 2 and not 1e-3 < (reach + 1e-12) / size < 1e3
+    ):
+        raise InputError(
+            f"{file}: the path spans {_box(start, end)} and the scene {_box(low, high)} "
+            f"{scene.units}; expected the same place and units"
+        )
+
+
+def _box(low: Floats, high: Floats) -> str:
+    return " to ".join("(" + ", ".join(f"{v:.4g}" for v in p) + ")" for p in (low, high))
+
+
+def tell(stage: str, fraction: float) -> None:
+    """Progress of a long build."""
+    if sys.stderr.isatty():
+        end = "\n" if fraction >= 1.0 else ""
+        print(f"\r{stage}: {100 * fraction:.0f} %", end=end, file=sys.stderr, flush=True)

@@ -1,0 +1,144 @@
+"""`netsp solve`: from a problem file to its solution."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import sys
+from typing import TYPE_CHECKING
+
+from netsp.command.types import check_writable, natural, option, positive, roadmap_options, seconds
+from netsp.errors import EXIT_NOT_ALL, EXIT_NOT_VERIFIED, InputError
+
+if TYPE_CHECKING:
+    from netsp.travel.result import Progress
+
+EXAMPLE = "netsp solve problems/wharf.json -o solution.json --plot wharf.png"
+
+
+def arguments(p: argparse.ArgumentParser) -> None:
+    """Of the command line."""
+    p.add_argument("problem", metavar="PROBLEM", help="problem file (JSON)")
+    p.add_argument(
+        "--solver",
+        default="auto",
+        metavar="NAME",
+        help="auto (default), mip, dp, reduced-mip, lns, anneal, anneal-2016, greedy, "
+        "greedy-2016 or greedy-tsp",
+    )
+    p.add_argument(
+        "--option",
+        action="append",
+        default=[],
+        type=option,
+        metavar="NAME=VALUE",
+        help="an option of the solver, as docs/solvers.md lists them; may be repeated",
+    )
+    p.add_argument("--roadmap", default="taut", metavar="NAME", help="taut (default) or prm")
+    p.add_argument(
+        "--classes", metavar="RULE", dest="classes_rule",
+        help="taut: all homotopy classes (default), or non-looping as in the 2017 paper",
+    )  # fmt: skip
+    p.add_argument("--samples", type=positive, metavar="N", help="prm: milestones; default 1000")
+    p.add_argument("--shortcut", action="store_true", help="prm: pull every leg taut in its class")
+    p.add_argument(
+        "--max-classes",
+        type=positive,
+        metavar="N",
+        help="taut: most classes of all goals together",
+    )
+    p.add_argument(
+        "--mip-backend", metavar="NAME", help="highs (default) or cbc, for the solvers built on mip"
+    )
+    p.add_argument("--time-limit", type=seconds, metavar="S", help="seconds; default none")
+    p.add_argument(
+        "--iteration-limit", type=positive, metavar="N", help="of the solver; default none"
+    )
+    p.add_argument("--seed", type=natural, default=0, metavar="N", help="random seed; default 0")
+    p.add_argument("--warm-start", metavar="SOLUTION", help="start from this solution's tour")
+    p.add_argument("-o", "--output", metavar="FILE", help="write the solution here (else stdout)")
+    p.add_argument("--plot", metavar="FILE", help="draw the solution (png, svg or pdf)")
+    p.add_argument(
+        "--plot-trace",
+        metavar="FILE",
+        help="draw length, bound and entanglement against iterations (png, svg or pdf)",
+    )
+    p.add_argument("--quiet", action="store_true", help="no progress, no summary")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Solve, write, and return the exit code."""
+    from netsp.command.progress import ProgressTable, summary
+    from netsp.files import write_text
+    from netsp.problem import Problem
+    from netsp.solution import Solution
+
+    problem = Problem.load(args.problem)
+    warm = Solution.load(args.warm_start) if args.warm_start else None
+    check_writable(args.output, args.plot, args.plot_trace, inputs=(args.problem, args.warm_start))
+    if args.plot or args.plot_trace:
+        from netsp.pictures import problem as plotting
+
+        for picture in filter(None, (args.plot, args.plot_trace)):
+            plotting.check_format(picture)
+    from netsp.solvers.solve import solve
+
+    rows: list[Progress] = []
+
+    table = None if args.quiet else ProgressTable(sys.stderr)
+
+    def listen(row: Progress) -> None:
+        if table:
+            table(row)
+        if args.plot_trace:
+            rows.append(row)
+
+    from netsp.compiled.warm_up import told
+
+    with table or contextlib.nullcontext(), told(sys.stderr) if table else contextlib.nullcontext():
+        if table:
+            table.begin(problem)
+        solution = solve(
+            problem,
+            args.solver,
+            roadmap=args.roadmap,
+            roadmap_options=roadmap_options(args),
+            time_limit=args.time_limit,
+            iteration_limit=args.iteration_limit,
+            seed=args.seed,
+            params=_params(args),
+            warm_start=warm,
+            on_progress=listen,
+        )
+    if args.output:
+        write_text(args.output, solution.to_json())
+    else:
+        sys.stdout.write(solution.to_json())
+        sys.stdout.flush()
+    if args.plot:
+        plotting.save(problem, solution, args.plot)
+    if args.plot_trace:
+        plotting.save_trace(rows, f"{problem.name}: {args.solver}", problem.units, args.plot_trace)
+    if table:
+        table.end()
+        text = summary(problem, solution, args.output, args.plot, args.plot_trace)
+        print(text, file=sys.stderr)
+    return _EXIT.get(solution.status.value, 0)
+
+
+_EXIT = {
+    "infeasible": 3,
+    "no_solution_found": EXIT_NOT_ALL,
+    "invalid": EXIT_NOT_VERIFIED,
+}
+
+
+def _params(args: argparse.Namespace) -> dict[str, str]:
+    params = dict(args.option)
+    if len(params) < len(args.option):
+        raise InputError("--option: the same option is given twice")
+    if args.mip_backend:
+        if "backend" in params:
+            raise InputError("--mip-backend: the backend is given by --option too")
+        params["backend"] = args.mip_backend
+    return params

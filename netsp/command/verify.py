@@ -1,0 +1,52 @@
+"""`netsp verify`: an independent judgement of a solution, or measures of a path."""
+
+from __future__ import annotations
+
+import argparse
+
+from netsp.command.types import load_pair
+from netsp.errors import EXIT_NOT_VERIFIED
+
+EXAMPLE = "netsp verify problems/wharf.json solution.json"
+
+
+def arguments(p: argparse.ArgumentParser) -> None:
+    """Of the command line."""
+    p.add_argument("problem", metavar="PROBLEM")
+    p.add_argument("solution", metavar="SOLUTION")
+    p.add_argument(
+        "--measures",
+        action="store_true",
+        help="print measures of entanglement; instead of a solution, any path will do "
+        "(CSV x,y[,z] or a JSON list of points)",
+    )
+    p.add_argument("--quiet", action="store_true", help="exit code only")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Judge, print, and return the exit code."""
+    if args.measures:
+        from netsp.command.measures import describe_path
+        from netsp.files import read_path
+        from netsp.problem import Problem
+
+        path = read_path(args.solution)
+        if path is not None:
+            text = describe_path(Problem.load(args.problem), path)
+            if not args.quiet:
+                print(text)
+            return 0
+    problem, solution = load_pair(args.problem, args.solution)
+    from netsp.judge import verify
+
+    verdict = verify(problem, solution)
+    if not args.quiet:
+        print(verdict)
+        print("verified" if verdict else "NOT VERIFIED")
+    if args.measures and solution.path and not args.quiet:
+        if solution.problem.sha256 != problem.sha256:
+            return EXIT_NOT_VERIFIED
+        from netsp.command.measures import describe_tethers
+
+        print(f"\n{describe_path(problem, solution.path)}\n\n{describe_tethers(problem, solution)}")
+    return 0 if verdict else EXIT_NOT_VERIFIED

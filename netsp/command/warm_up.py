@@ -1,0 +1,27 @@
+"""`netsp warm-up`: compiles everything ahead."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import sys
+
+EXAMPLE = "netsp warm-up"
+
+
+def arguments(p: argparse.ArgumentParser) -> None:
+    """Of the command line."""
+    p.add_argument("--quiet", action="store_true", help="no progress")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Compile, and return the exit code."""
+    from netsp.compiled.warm_up import forget, steps, told
+
+    forget()
+    with contextlib.nullcontext() if args.quiet else told(sys.stderr):
+        for name, step in steps():
+            if not args.quiet:
+                print(f"warm-up: {name}", file=sys.stderr, flush=True)
+            step()
+    return 0

@@ -1,0 +1,61 @@
+"""`netsp world`: random problems."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+
+from netsp.command.types import check_writable, length, natural, positive
+
+EXAMPLE = "netsp world --goals 30 --tether 350 --seed 7 -o world.json"
+
+
+def arguments(p: argparse.ArgumentParser) -> None:
+    """Of the command line."""
+    p.add_argument(
+        "--family",
+        default="icra2017",
+        metavar="NAME",
+        help="icra2017 (default), rss2016, clustered, array or harbour",
+    )
+    p.add_argument("--seed", type=natural, default=0, metavar="N", help="of all draws; default 0")
+    p.add_argument("--goals", type=positive, metavar="N", help="default 20; rss2016: 5 to 10")
+    p.add_argument("--obstacles", type=natural, metavar="N", help="default 20; rss2016: 5 to 10")
+    p.add_argument("--tether", type=length, default=300.0, metavar="L", help="default 300")
+    p.add_argument("--side", type=length, default=500.0, metavar="L", help="default 500")
+    p.add_argument(
+        "--radii", type=length, nargs=2, default=(10.0, 30.0), metavar="R",
+        help="least and most; default 10 30",
+    )  # fmt: skip
+    p.add_argument("-o", "--output", metavar="FILE", help="write the problem here (else stdout)")
+    p.add_argument("--plot", metavar="FILE", help="draw it (png, svg or pdf)")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Draw a world, write it, and return the exit code."""
+    from netsp.files import write_text
+    from netsp.worlds import reachable_world
+
+    check_writable(args.output, args.plot)
+    if args.plot:
+        from netsp.pictures import problem as plotting
+
+        plotting.check_format(args.plot)
+    problem, in_vain = reachable_world(
+        args.seed,
+        family=args.family,
+        goals=args.goals,
+        obstacles=args.obstacles,
+        tether_length=args.tether,
+        side=args.side,
+        radii=tuple(args.radii),
+    )
+    if in_vain:
+        print(f"netsp: {in_vain} worlds of this seed did not fit and were redrawn", file=sys.stderr)
+    if args.output:
+        write_text(args.output, problem.to_json())
+    else:
+        sys.stdout.write(problem.to_json())
+    if args.plot:
+        plotting.save(problem, None, args.plot)
+    return 0

@@ -1,0 +1,54 @@
+"""The command line explains itself."""
+
+import importlib
+import shlex
+import subprocess
+import sys
+
+import pytest
+
+from netsp.command.main import COMMANDS, _parser, main
+
+MODULES = {name: module for group in COMMANDS.values() for name, (module, _) in group.items()}
+
+
+def test_help_names_every_command_by_what_it_is_for(capsys):
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    text = capsys.readouterr().out
+    for purpose, group in COMMANDS.items():
+        assert f"\n  {purpose}\n" in text
+        assert all(f"    {name} " in text for name in group)
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_the_example_of_every_command_is_one(name, capsys):
+    command = importlib.import_module(f"netsp.command.{MODULES[name]}")
+    words = shlex.split(command.EXAMPLE.split(" > ")[0])
+    assert words[:2] == ["netsp", name]
+    assert _parser(name).parse_args(words[1:]).run is command.run
+    with pytest.raises(SystemExit):
+        main([name, "--help"])
+    assert command.EXAMPLE in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_help_loads_nothing_heavy(name):
+    code = (
+        "import sys\nfrom netsp.command.main import main\n"
+        f"try:\n    main([{name!r}, '--help'])\nexcept SystemExit:\n    pass\n"
+        "print(*sorted({'numpy', 'numba', 'pydantic', 'matplotlib'} & sys.modules.keys()), "
+        "file=sys.stderr)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.stderr.strip() == ""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="needs /dev/full")
+def test_help_to_a_full_disk_fails_in_one_line():
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "netsp", "--help"], stdout=full, stderr=subprocess.PIPE
+        )
+    assert done.returncode == 2
+    assert len(done.stderr.splitlines()) == 1
