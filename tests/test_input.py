@@ -16,7 +16,7 @@ from netsp.errors import brief
 from netsp.execute import Options, Surprises, execute
 from netsp.files import cell, read_gzip, write_text
 from netsp.online.mission import Mission
-from netsp.pictures.literal import literal
+from netsp.pictures.style import literal
 
 ROOT = Path(__file__).parent.parent
 SMALL = str(ROOT / "problems" / "known" / "triangle.json")

@@ -58,9 +58,10 @@ def run(args: argparse.Namespace) -> int:
 
         return plot_scene(args)
     from netsp.pictures import problem as plotting
+    from netsp.pictures import style
     from netsp.problem import Problem
 
-    plotting.check_format(args.output)
+    style.check_format(args.output)
     if args.classes is not None:
         if args.solution or args.roadmap:
             raise InputError(

@@ -15,13 +15,14 @@ from netsp.online.scene.scene import Scene
 from netsp.online.tether import GeodesicTether, ReactTether, Tether
 from netsp.online.tether.resolution import delta_for_path
 from netsp.pictures import scene as pictures
+from netsp.pictures import style
 
 MODELS = {"geodesic": GeodesicTether, "react": ReactTether}
 
 
 def plot_scene(args: argparse.Namespace) -> int:
     """`netsp plot SCENE [PATH]`: returns the exit code."""
-    pictures.check_format(args.output)
+    style.check_format(args.output, pictures.INTERACTIVE)
     scene = Scene.load(args.problem)
     path, tether = None, None
     if args.solution is not None:

@@ -78,9 +78,10 @@ def run(args: argparse.Namespace) -> int:
     check_writable(args.output, args.plot, args.plot_trace, inputs=(args.problem, args.warm_start))
     if args.plot or args.plot_trace:
         from netsp.pictures import problem as plotting
+        from netsp.pictures import style
 
         for picture in filter(None, (args.plot, args.plot_trace)):
-            plotting.check_format(picture)
+            style.check_format(picture)
     from netsp.solvers.solve import solve
 
     rows: list[Progress] = []

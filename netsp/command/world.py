@@ -39,8 +39,9 @@ def run(args: argparse.Namespace) -> int:
     check_writable(args.output, args.plot)
     if args.plot:
         from netsp.pictures import problem as plotting
+        from netsp.pictures import style
 
-        plotting.check_format(args.plot)
+        style.check_format(args.plot)
     problem, in_vain = reachable_world(
         args.seed,
         family=args.family,

@@ -1,65 +1,83 @@
-"""The picture of a run: the map with the plan, the way that was gone, and the tether over time."""
+"""The picture of a tour that was carried out: the map with plan and path, the tether over time."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from netsp.errors import InputError
 from netsp.execute.log import Execution
-from netsp.pictures.literal import literal
+from netsp.pictures import style
 from netsp.problem import Circle
 
 
 def save_execution(done: Execution, file: str | Path) -> None:
     """Draw a run. InputError if the file cannot be written."""
     from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(13, 6), layout="constrained")
+    left, right = figure.subplots(1, 2, width_ratios=[1.0, 1.0])
+    draw_map(done, ax=left)
+    draw_tether(done, ax=right)
+    s = done.summary
+    figure.suptitle(
+        f"{done.problem.name}: {s['visited']} goals in {s['time_s']:.0f} s, path {s['path']:.5g}, "
+        f"tether at most {s['longest_tether']:.5g} of {s['tether_length']:g}"
+    )
+    style.save(figure, file, dpi=120)
+
+
+def draw_map(done: Execution, *, ax: Any = None) -> Any:
+    """Obstacles, plan, path and goals, on axes of the caller or on new ones; returns the axes."""
+    from matplotlib.figure import Figure
     from matplotlib.patches import Circle as Disk
     from matplotlib.patches import Polygon as Face
 
     problem = done.problem
-    figure = Figure(figsize=(13, 6), layout="constrained")
-    ax, right = figure.subplots(1, 2, width_ratios=[1.0, 1.0])
+    if ax is None:
+        ax = Figure(figsize=(7, 6), layout="constrained").subplots()
     for k, o in enumerate(problem.obstacles):
-        label = "obstacle" if k == 0 else None
+        look: dict[str, Any] = {"facecolor": style.OBSTACLE, "edgecolor": style.EDGE,
+                "label": "obstacle" if k == 0 else None}  # fmt: skip
         if isinstance(o, Circle):
-            ax.add_patch(Disk(o.center, o.radius, facecolor="#d0d7de", edgecolor="#868e96",
-                              label=label))  # fmt: skip
+            ax.add_patch(Disk(o.center, o.radius, **look))
         else:
-            ax.add_patch(Face(o.polygon, facecolor="#d0d7de", edgecolor="#868e96", label=label))
+            ax.add_patch(Face(o.polygon, **look))
     plan = np.array(done.solution.path).reshape(-1, 3)
-    way = np.array([[r.x, r.y] for r in done.rows])
-    ax.plot(plan[:, 0], plan[:, 1], color="#adb5bd", lw=1.0, ls="--", label="plan")
-    if len(way):
-        ax.plot(way[:, 0], way[:, 1], color="#1971c2", lw=1.3, label="way that was gone")
+    path = np.array([[r.x, r.y] for r in done.rows])
+    ax.plot(plan[:, 0], plan[:, 1], color=style.PLAN, lw=1.0, ls="--", label="plan")
+    if len(path):
+        ax.plot(path[:, 0], path[:, 1], color=style.PATH, lw=1.3, label="path")
     visited = {a.goal for a in done.arrivals}
     for mark, colour, name, wanted in (
-        ("o", "#2b8a3e", "visited", visited),
-        ("x", "#c92a2a", "left out", set(done.lost)),
-        ("+", "#868e96", "cancelled", done.cancelled),
+        ("o", style.VISITED, "goal visited", visited),
+        ("x", style.LEFT_OUT, "goal left out", set(done.lost)),
+        ("+", style.CANCELLED, "goal cancelled", done.cancelled),
     ):
         places = [g.position for k, g in enumerate(problem.goals) if k in wanted]
         if places:
-            ax.plot(*np.array(places)[:, :2].T, mark, color=colour, ms=6, label=name)
-    ax.plot(*problem.base[:2], "k*", ms=12, label="base")
+            ax.plot(*np.array(places)[:, :2].T, mark, color=colour, ms=7, mew=1.8, label=name)
+    ax.plot(*problem.base[:2], "*", color=style.BASE, mec="white", ms=14, ls="none", label="base")
     ax.set(aspect="equal", xlabel=f"x ({problem.units})", ylabel=f"y ({problem.units})")
     ax.legend(loc="best", fontsize=8)
+    return ax
+
+
+def draw_tether(done: Execution, *, ax: Any = None) -> Any:
+    """Tether length and limit over time with what happened, on axes of the caller or on new ones;
+    returns the axes."""
+    from matplotlib.figure import Figure
+
+    if ax is None:
+        ax = Figure(figsize=(7, 5), layout="constrained").subplots()
     t = [r.time for r in done.rows]
-    right.plot(t, [r.tether for r in done.rows], color="#c2255c", lw=1.2, label="taut tether")
-    right.plot(t, [r.limit for r in done.rows], color="#495057", lw=1.0, ls="--", label="limit")
+    ax.plot(t, [r.tether for r in done.rows], color=style.TETHER, lw=1.2, label="taut tether")
+    ax.plot(t, [r.limit for r in done.rows], color=style.LIMIT, lw=1.0, ls="--", label="limit")
     for e in done.entries:
-        right.axvline(e.time, color="#f08c00", lw=1.0)
-        right.annotate(f"{e.event}: {e.done}", (e.time, 0), xytext=(3, 4), rotation=90,
-                       textcoords="offset points", fontsize=8, color="#e8590c")  # fmt: skip
-    right.set(xlabel="time (s)", ylabel=f"length ({problem.units})", ylim=(0, None))
-    right.legend(loc="upper right", fontsize=8)
-    s = done.summary
-    figure.suptitle(
-        f"{problem.name}: {s['visited']} goals in {s['time_s']:.0f} s, path {s['path']:.5g}, "
-        f"tether at most {s['longest_tether']:.5g} of {s['tether_length']:g}"
-    )
-    try:
-        literal(figure).savefig(file, dpi=120)
-    except OSError as error:
-        raise InputError(f"{file}: cannot be written: {error.strerror or error}") from None
+        ax.axvline(e.time, color=style.EVENT, lw=1.0)
+        ax.annotate(f"{e.event}: {e.done}", (e.time, 0), xytext=(3, 4), rotation=90,
+                    textcoords="offset points", fontsize=8, color=style.EDGE)  # fmt: skip
+    ax.set(xlabel="time (s)", ylabel=f"length ({done.problem.units})", ylim=(0, None))
+    ax.legend(loc="upper right", fontsize=8)
+    return ax

@@ -16,19 +16,17 @@ from netsp.online.log import Run
 from netsp.online.scene.scene import Scene
 from netsp.online.scene.surfaces import extent
 from netsp.online.tether import GeodesicTether, Tether
-from netsp.pictures.literal import literal
+from netsp.pictures import style
 from netsp.pictures.scene import (
-    draw_lines,
+    draw_space,
     layout,
     line_trace,
     mesh_trace,
     parts_of,
     plotly_objects,
     point_trace,
-    shaded,
 )
 
-COLOURS = ("#c2255c", "#1971c2")
 FRAMES = 120
 
 
@@ -59,53 +57,53 @@ def save_runs(runs: Sequence[Run], scene: Scene, file: str | Path) -> None:
     figure = Figure(figsize=(13, 5.5 + 2.5 * (len(runs) - 1)), layout="constrained")
     left, right = figure.subfigures(1, 2, width_ratios=[1.0, 1.1])  # type: ignore[misc]
     charts = np.atleast_1d(left.subplots(2 if seen else 1, 1, sharex=True))
-    for run, colour in zip(runs, COLOURS, strict=False):
-        t = np.array([r.time for r in run.log])
-        if len(runs) == 1:
-            charts[0].fill_between(
-                t, 0, 1, where=[r.mode == "recovery" for r in run.log], color="#fff3bf",
-                transform=charts[0].get_xaxis_transform(), label="going another way",
-            )  # fmt: skip
-        charts[0].plot(t, [r.tether for r in run.log], color=colour, lw=1.3, label=run.planner)
-        if seen:
-            charts[1].plot(t, [100 * r.coverage for r in run.log], color=colour, lw=1.3)
-            charts[1].plot(
-                t, [100 * r.coverage_through for r in run.log], color=colour, lw=0.9, ls=":"
-            )
-    charts[0].axhline(
-        runs[0].mission.tether_length, color="#495057", lw=1.0, ls="--", label="limit"
-    )
-    charts[0].set(ylabel=f"taut tether ({scene.units})", ylim=(0, None))
-    charts[0].legend(loc="upper left", fontsize=8)
+    draw_tether(runs, ax=charts[0], units=scene.units)
     if seen:
-        charts[1].set(ylabel="seen (%)", ylim=(0, 100))
-        charts[1].set_title("dotted: if nothing stood in between", fontsize=8)
-    charts[-1].set(xlabel="time (s)")
+        draw_coverage(runs, ax=charts[1])
+        charts[0].set_xlabel("")
     axes = right.subplots(len(runs), 1, subplot_kw={"projection": "3d"}, squeeze=False)[:, 0]
     for run, ax in zip(runs, axes, strict=True):
-        _in_space(ax, run, scene)
+        draw_space(scene, way_of(run), run.tether.nodes, ax=ax)
+        ax.set_title(title_of(run), fontsize=9)
+        ax.legend(loc="upper left", fontsize=7)
     figure.suptitle(runs[0].mission.name)
-    try:
-        literal(figure).savefig(file, dpi=120)
-    except OSError as error:
-        raise InputError(f"{file}: cannot be written: {error.strerror or error}") from None
+    style.save(figure, file, dpi=120)
 
 
-def _in_space(ax: Any, run: Run, scene: Scene) -> None:
-    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+def draw_tether(runs: Sequence[Run], *, ax: Any = None, units: str = "m") -> Any:
+    """The length of the taut tether over time, on axes of the caller or on new ones; returns the
+    axes. Of one run the times of tether recovery are marked."""
+    from matplotlib.figure import Figure
 
-    way = way_of(run)
-    low, high = extent(scene, way, run.tether.nodes)
-    for _, (vertices, faces) in parts_of(scene, low, high):
-        triangles = vertices[faces]
-        ax.add_collection3d(
-            Poly3DCollection(triangles, facecolors=shaded(triangles), alpha=0.35, linewidths=0)
-        )
-    draw_lines(ax, way, run.tether.nodes, (0, 1, 2))
-    ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-    ax.set_box_aspect(high - low, zoom=1.15)
-    ax.set_title(title_of(run), fontsize=9)
-    ax.legend(loc="upper left", fontsize=7)
+    if ax is None:
+        ax = Figure(figsize=(8, 4), layout="constrained").subplots()
+    for run, colour in zip(runs, style.RUNS, strict=False):
+        t = np.array([r.time for r in run.log])
+        if len(runs) == 1:
+            ax.fill_between(
+                t, 0, 1, where=[r.mode == "recovery" for r in run.log], color=style.RECOVERY,
+                transform=ax.get_xaxis_transform(), label="tether recovery",
+            )  # fmt: skip
+        ax.plot(t, [r.tether for r in run.log], color=colour, lw=1.3, label=run.planner)
+    ax.axhline(runs[0].mission.tether_length, color=style.LIMIT, lw=1.0, ls="--", label="limit")
+    ax.set(xlabel="time (s)", ylabel=f"taut tether ({units})", ylim=(0, None))
+    ax.legend(loc="lower right", fontsize=8)
+    return ax
+
+
+def draw_coverage(runs: Sequence[Run], *, ax: Any = None) -> Any:
+    """What the camera has seen over time, on axes of the caller or on new ones; returns them."""
+    from matplotlib.figure import Figure
+
+    if ax is None:
+        ax = Figure(figsize=(8, 4), layout="constrained").subplots()
+    for run, colour in zip(runs, style.RUNS, strict=False):
+        t = np.array([r.time for r in run.log])
+        ax.plot(t, [100 * r.coverage for r in run.log], color=colour, lw=1.3)
+        ax.plot(t, [100 * r.coverage_through for r in run.log], color=colour, lw=0.9, ls=":")
+    ax.set(xlabel="time (s)", ylabel="seen (%)", ylim=(0, 100))
+    ax.set_title("dotted: without occlusion", fontsize=8)
+    return ax
 
 
 def tethers_along(run: Run, scene: Scene, moments: npt.NDArray[np.int64]) -> list[Tether]:
@@ -145,16 +143,16 @@ def save_page(runs: Sequence[Run], scene: Scene, file: str | Path) -> None:
             trace = mesh_trace(name, vertices, faces)
             trace.showlegend = False
             figure.add_trace(trace, row=1, col=k + 1)
-        figure.add_trace(point_trace("anchor", np.array(run.mission.anchor), "#495057"), 1, k + 1)
+        figure.add_trace(point_trace("anchor", np.array(run.mission.anchor), style.BASE), 1, k + 1)
         stamps = np.array([r.time for r in run.log])
         rows = np.minimum(np.searchsorted(stamps, times), len(stamps) - 1)
         tethers = tethers_along(run, scene, rows)
         for f, (row, tether) in enumerate(zip(rows, tethers, strict=True)):
             thin = way[: row + 1 : max(1, len(way) // 1500)]
             trio = [
-                line_trace("path", thin, "#74c0fc", 3),
-                line_trace("tether", tether.nodes, COLOURS[0], 6),
-                point_trace("robot", way[row], "#f08c00"),
+                line_trace("path", thin, style.PATH, 3),
+                line_trace("tether", tether.nodes, style.TETHER, 6),
+                point_trace("robot", way[row], style.ROBOT),
             ]
             if f == 0:
                 for trace in trio:

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from netsp.errors import InputError
-from netsp.pictures.literal import literal
+from netsp.pictures import style
 from netsp.problem import Circle, Problem
 from netsp.roadmap.paths import TautPaths
 from netsp.solution import Solution, Status
@@ -18,39 +17,10 @@ from netsp.travel.result import Progress
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-FORMATS = (".png", ".svg", ".pdf")
-
-_OBSTACLE, _WRAPPED, _EDGE, _TOUR, _TETHER, _GOAL, _BASE = (
-    "#9aa5b1",
-    "#f3a6a6",
-    "#52606d",
-    "#0b69a3",
-    "#e8590c",
-    "#ffffff",
-    "#c92a2a",
-)
-
-
-def check_format(path: str | Path) -> None:
-    """InputError unless the file name ends in a format that can be drawn."""
-    if Path(path).suffix.lower() not in FORMATS:
-        raise InputError(
-            f"{path}: cannot draw this format; expected a name ending in {', '.join(FORMATS)}"
-        )
-
 
 def save(problem: Problem, solution: Solution | None, path: str | Path) -> None:
     """Draw a problem, with a solution if given, to a file; InputError if it cannot be written."""
-    _write(draw(problem, solution), path)
-
-
-def _write(figure: Any, path: str | Path) -> None:
-    check_format(path)
-    try:
-        metadata = {"Date": None} if Path(path).suffix.lower() == ".svg" else None
-        literal(figure).savefig(path, dpi=150, metadata=metadata)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
+    style.save(draw(problem, solution), path)
 
 
 def draw(problem: Problem, solution: Solution | None = None) -> Any:
@@ -64,7 +34,7 @@ def draw(problem: Problem, solution: Solution | None = None) -> Any:
     aspect = (ymax - ymin) / (xmax - xmin)
     if panels == 0:
         figure, ax = _single(problem)
-        _map(ax, problem, solution)
+        draw_map(problem, solution, ax=ax)
         return figure
     small = panels if panels <= 20 else 0
     columns = int(np.clip(round(np.sqrt(max(small, 1) * aspect * 0.9)), 1, 5)) if small else 0
@@ -74,13 +44,13 @@ def draw(problem: Problem, solution: Solution | None = None) -> Any:
     wide = float(np.clip(wide, 0.0, 7.0))
     figure = Figure(figsize=(8.0 + wide, height), layout="constrained")
     if not columns:
-        _map(figure.subplots(), problem, solution, tethers=True)
+        draw_map(problem, solution, ax=figure.subplots(), tethers=True)
         return figure
     sides: Any = figure.subfigures(1, 2, width_ratios=[8.0, wide])
     left, right = sides
-    _map(left.subplots(), problem, solution)
+    draw_map(problem, solution, ax=left.subplots())
     axes = np.atleast_1d(right.subplots(rows, columns)).ravel()
-    right.suptitle("the taut tether at each stop", fontsize=9, color=_EDGE)
+    right.suptitle("the taut tether at each stop", fontsize=9, color=style.EDGE)
     longest = max(problem.tether_length, *(stop.tether_length for stop in stops))
     paths = TautPaths(problem, 2.0 * longest)
     for k, ax in enumerate(axes):
@@ -90,9 +60,9 @@ def draw(problem: Problem, solution: Solution | None = None) -> Any:
         stop = stops[k]
         _obstacles(ax, problem, labels=False)
         tether = paths.tether(stop.goal, stop.signature)
-        ax.plot(tether[:, 0], tether[:, 1], color=_TETHER, lw=1.3)
-        ax.plot(*problem.base[:2], marker="*", ms=8, color=_BASE, mec="none")
-        ax.plot(*problem.points[stop.goal + 1, :2], "o", ms=4, color=_TOUR)
+        ax.plot(tether[:, 0], tether[:, 1], color=style.TETHER, lw=1.3)
+        ax.plot(*problem.base[:2], marker="*", ms=8, color=style.BASE, mec="none")
+        ax.plot(*problem.points[stop.goal + 1, :2], "o", ms=4, color=style.PATH)
         ax.set_title(f"{k + 1}: {stop.tether_length:.4g} {problem.units}", fontsize=7, pad=2)
         _frame(ax, problem, solution)
     return figure
@@ -106,11 +76,11 @@ def save_roadmap(problem: Problem, roadmap: str, options: dict[str, Any], path: 
 
     built = build_roadmap(problem, roadmap, **options)
     figure, ax = _single(problem)
-    _map(ax, problem, None)
+    draw_map(problem, ax=ax)
     if roadmap == "prm":
         m = built.milestones
         lines = m[built.edges][:, :, :2]
-        ax.plot(m[:, 0], m[:, 1], ".", ms=2, color=_EDGE, zorder=2)
+        ax.plot(m[:, 0], m[:, 1], ".", ms=2, color=style.EDGE, zorder=2)
         counted = f"{len(m)} milestones, {len(built.edges)} edges, {len(built.augmented)} augmented"
     else:
         t = built.paths.tangents
@@ -118,13 +88,15 @@ def save_roadmap(problem: Problem, roadmap: str, options: dict[str, Any], path: 
         lines = lines + built.outline.origin
         for cx, cy, r, a, b in t.arcs + np.append(built.outline.origin, np.zeros(3)):
             theta = np.linspace(a, b, 60)
-            ax.plot(cx + r * np.cos(theta), cy + r * np.sin(theta), color=_TOUR, lw=0.8, zorder=3)
+            ax.plot(
+                cx + r * np.cos(theta), cy + r * np.sin(theta), color=style.PATH, lw=0.8, zorder=3
+            )
         counted = (
             f"{len(t.arcs)} arcs, {len(lines) // 2} tangents, {len(built.cluster) - 1} classes"
         )
-    ax.add_collection(LineCollection(list(lines), colors=_TOUR, lw=0.35, alpha=0.35, zorder=2))
+    ax.add_collection(LineCollection(list(lines), colors=style.PATH, lw=0.35, alpha=0.35, zorder=2))
     ax.set_title(f"{problem.name}: {roadmap} roadmap, {counted}", fontsize=10, loc="left")
-    _write(figure, path)
+    style.save(figure, path)
 
 
 def save_trace(rows: Sequence[Progress], title: str, units: str, path: str | Path) -> None:
@@ -137,24 +109,24 @@ def save_trace(rows: Sequence[Progress], title: str, units: str, path: str | Pat
     figure = Figure(figsize=(8.0, 6.0 if tangled else 4.2), layout="constrained")
     axes = figure.subplots(2 if tangled else 1, 1, sharex=True, squeeze=False)[:, 0]
     top = axes[0]
-    for field, label, style in (
-        ("current", "present state", {"color": _OBSTACLE, "lw": 0.7}),
-        ("incumbent", "best tour", {"color": _TOUR, "lw": 1.6, "drawstyle": "steps-post"}),
-        ("bound", "lower bound", {"color": _TETHER, "lw": 1.2, "drawstyle": "steps-post"}),
+    for field, label, look in (
+        ("current", "present state", {"color": style.OBSTACLE, "lw": 0.7}),
+        ("incumbent", "best tour", {"color": style.PATH, "lw": 1.6, "drawstyle": "steps-post"}),
+        ("bound", "lower bound", {"color": style.TETHER, "lw": 1.2, "drawstyle": "steps-post"}),
     ):
         seen = [(r.iteration, getattr(r, field)) for r in rows if getattr(r, field) is not None]
         if seen:
-            top.plot(*zip(*seen, strict=True), label=label, marker=_mark(seen), **style)
+            top.plot(*zip(*seen, strict=True), label=label, marker=_mark(seen), **look)
     top.set_ylabel(f"length ({units})")
     top.legend(frameon=False, fontsize=8)
     top.set_title(title, fontsize=10, loc="left")
     if tangled:
         seen = [(r.iteration, r.entangled) for r in rows if r.entangled is not None]
-        axes[1].plot(*zip(*seen, strict=True), color=_BASE, lw=0.9, marker=_mark(seen))
+        axes[1].plot(*zip(*seen, strict=True), color=style.BASE, lw=0.9, marker=_mark(seen))
         axes[1].set_ylabel("entangled obstacles")
         axes[1].set_ylim(bottom=0.0)
     axes[-1].set_xlabel("iteration")
-    _write(figure, path)
+    style.save(figure, path)
 
 
 def _mark(points: Sequence[object]) -> str | None:
@@ -188,9 +160,9 @@ def save_classes(problem: Problem, goal: int, path: str | Path) -> None:
         v = int(shown[k])
         _obstacles(ax, problem, labels=len(problem.obstacles) <= 20)
         tether = roadmap.paths.path(0, goal + 1, roadmap.signatures[v])
-        ax.plot(tether[:, 0], tether[:, 1], color=_TETHER, lw=1.4, zorder=3)
-        ax.plot(*problem.base[:2], marker="*", ms=9, color=_BASE, mec="none", zorder=4)
-        ax.plot(*problem.points[goal + 1, :2], "o", ms=5, color=_TOUR, zorder=4)
+        ax.plot(tether[:, 0], tether[:, 1], color=style.TETHER, lw=1.4, zorder=3)
+        ax.plot(*problem.base[:2], marker="*", ms=9, color=style.BASE, mec="none", zorder=4)
+        ax.plot(*problem.points[goal + 1, :2], "o", ms=5, color=style.PATH, zorder=4)
         word = " ".join(f"{a:+d}" for a in roadmap.signatures[v]) or "empty word"
         ax.set_title(f"{roadmap.tethers[v]:.5g} {problem.units}: {word}", fontsize=7, pad=2)
         _frame(ax, problem, None)
@@ -200,7 +172,7 @@ def save_classes(problem: Problem, goal: int, path: str | Path) -> None:
         f"{problem.tether_length:g} {problem.units}{more}",
         fontsize=10,
     )
-    _write(figure, path)
+    style.save(figure, path)
 
 
 def _single(problem: Problem) -> tuple[Any, Any]:
@@ -213,12 +185,21 @@ def _single(problem: Problem) -> tuple[Any, Any]:
     return figure, figure.subplots()
 
 
-def _map(ax: Axes, problem: Problem, solution: Solution | None, *, tethers: bool = False) -> None:
+def draw_map(
+    problem: Problem, solution: Solution | None = None, *, ax: Axes | None = None,
+    tethers: bool = False,
+) -> Axes:  # fmt: skip
+    """The map of a problem, with the path of a solution if given, on axes of the caller or on new
+    ones; returns the axes. tethers : the taut tether at every stop, too."""
+    if ax is None:
+        _, ax = _single(problem)
     wrapped = solution.entangled if solution else ()
     _obstacles(ax, problem, labels=len(problem.obstacles) <= 40, wrapped=wrapped)
     if problem.bounds is not None:
         xmin, ymin, xmax, ymax = problem.bounds
-        ax.plot([xmin, xmax, xmax, xmin, xmin], [ymin, ymin, ymax, ymax, ymin], color=_EDGE, lw=1)
+        ax.plot(
+            [xmin, xmax, xmax, xmin, xmin], [ymin, ymin, ymax, ymax, ymin], color=style.EDGE, lw=1
+        )
     order = {v.goal: k + 1 for k, v in enumerate(solution.tour)} if solution else {}
     if solution is not None and solution.path:
         if tethers:
@@ -226,22 +207,24 @@ def _map(ax: Axes, problem: Problem, solution: Solution | None, *, tethers: bool
             paths = TautPaths(problem, 2.0 * max(problem.tether_length, longest))
             for v in solution.tour:
                 line = paths.tether(v.goal, v.signature)
-                ax.plot(line[:, 0], line[:, 1], color=_TETHER, lw=0.7, alpha=0.6, zorder=2)
+                ax.plot(line[:, 0], line[:, 1], color=style.TETHER, lw=0.7, alpha=0.6, zorder=2)
         path = np.array(solution.path)
-        ax.plot(path[:, 0], path[:, 1], color=_TOUR, lw=1.8, zorder=3, solid_joinstyle="round")
+        ax.plot(path[:, 0], path[:, 1], color=style.PATH, lw=1.8, zorder=3, solid_joinstyle="round")
         _arrows(ax, path, len(solution.tour) + 1)
     for k, goal in enumerate(problem.goals):
         x, y, z = goal.position
-        ax.plot(x, y, "o", ms=13 if order else 9, color=_GOAL, mec=_TOUR, mew=1.4, zorder=5)
+        ax.plot(
+            x, y, "o", ms=13 if order else 9, color=style.GOAL, mec=style.PATH, mew=1.4, zorder=5
+        )
         ax.annotate(str(order.get(k, k)), (x, y), ha="center", va="center", fontsize=7, zorder=6)
         note = " ".join(t for t in (goal.name or "", f"z {z:g}" if z else "") if t)
         if note and len(problem.goals) <= 40:
             ax.annotate(
-                note, (x, y), xytext=(8, -10), textcoords="offset points", fontsize=6, color=_EDGE,
-                zorder=6,
+                note, (x, y), xytext=(8, -10), textcoords="offset points", fontsize=6,
+                color=style.EDGE, zorder=6,
             )  # fmt: skip
     ax.plot(
-        *problem.base[:2], marker="*", ms=17, color=_BASE, mec="white", zorder=7, ls="none",
+        *problem.base[:2], marker="*", ms=17, color=style.BASE, mec="white", zorder=7, ls="none",
         label="base",
     )  # fmt: skip
     ax.set_title(_title(problem, solution), fontsize=10, loc="left")
@@ -249,6 +232,7 @@ def _map(ax: Axes, problem: Problem, solution: Solution | None, *, tethers: bool
     ax.set_ylabel(f"y [{problem.units}]")
     ax.tick_params(labelsize=8)
     _frame(ax, problem, solution)
+    return ax
 
 
 def _title(problem: Problem, solution: Solution | None) -> str:
@@ -279,27 +263,27 @@ def _obstacles(ax: Axes, problem: Problem, *, labels: bool, wrapped: tuple[int, 
     from matplotlib.patches import Polygon as Patch
 
     for i, o in enumerate(problem.obstacles):
-        style: dict[str, Any] = {"fc": _OBSTACLE, "ec": _EDGE, "lw": 0.6, "zorder": 1}
+        look: dict[str, Any] = {"fc": style.OBSTACLE, "ec": style.EDGE, "lw": 0.6, "zorder": 1}
         if i in wrapped:
-            style["fc"] = _WRAPPED
+            look["fc"] = style.WRAPPED
         if isinstance(o, Circle):
             if problem.clearance:
                 grown = Disk(o.center, o.radius + problem.clearance)
-                grown.set(fc="none", ec=_EDGE, lw=0.5, ls=":", zorder=1)
+                grown.set(fc="none", ec=style.EDGE, lw=0.5, ls=":", zorder=1)
                 ax.add_patch(grown)
-            ax.add_patch(Disk(o.center, o.radius, **style))
+            ax.add_patch(Disk(o.center, o.radius, **look))
         else:
             if problem.clearance:
                 import shapely
 
                 ring = shapely.Polygon(o.polygon).buffer(problem.clearance).exterior
-                ax.plot(*ring.xy, color=_EDGE, lw=0.5, ls=":", zorder=1)
-            ax.add_patch(Patch(o.polygon, closed=True, **style))
+                ax.plot(*ring.xy, color=style.EDGE, lw=0.5, ls=":", zorder=1)
+            ax.add_patch(Patch(o.polygon, closed=True, **look))
         if labels:
             x, y = o.representative_point
             ax.annotate(
-                o.name or str(i + 1), (x, y), ha="center", va="center", fontsize=6, color="#1f2933",
-                zorder=2, clip_on=True,
+                o.name or str(i + 1), (x, y), ha="center", va="center", fontsize=6,
+                color=style.BASE, zorder=2, clip_on=True,
             )  # fmt: skip
 
 
@@ -319,7 +303,7 @@ def _arrows(ax: Axes, path: Any, count: int) -> None:
         tip = a + d * 1e-3 * along[-1]
         ax.annotate(
             "", xy=tip, xytext=a, zorder=4,
-            arrowprops={"arrowstyle": "-|>", "color": _TOUR, "lw": 0, "mutation_scale": 13},
+            arrowprops={"arrowstyle": "-|>", "color": style.PATH, "lw": 0, "mutation_scale": 13},
         )  # fmt: skip
 
 

@@ -11,24 +11,14 @@ import numpy.typing as npt
 
 from netsp.arrays import Floats
 from netsp.errors import InputError
+from netsp.files import write_text
 from netsp.online.scene.scene import Scene
 from netsp.online.scene.shapes import HalfSpace
 from netsp.online.scene.surfaces import Triangles, drawn_points, extent, mesh_of, surface_of
 from netsp.online.tether import Tether
-from netsp.pictures.literal import literal
+from netsp.pictures import style
 
-_SOLID, _PATH, _TETHER, _ANCHOR, _ROBOT = "#9aa5b1", "#0b69a3", "#e8590c", "#c92a2a", "#2b8a3e"
-
-STATIC, INTERACTIVE = (".png", ".svg", ".pdf"), ".html"
-
-
-def check_format(path: str | Path) -> None:
-    """InputError unless the file name ends in a format that can be drawn."""
-    if Path(path).suffix.lower() not in (*STATIC, INTERACTIVE):
-        raise InputError(
-            f"{path}: cannot draw this format; expected a name ending in "
-            f"{', '.join(STATIC)} or {INTERACTIVE}"
-        )
+INTERACTIVE = ".html"
 
 
 def save(
@@ -42,22 +32,16 @@ def save(
     ------
     InputError : another ending, a file that cannot be written, plotly not installed.
     """
-    check_format(file)
+    style.check_format(file, INTERACTIVE)
     way = np.zeros((0, 3)) if path is None else np.asarray(path, dtype=float).reshape(-1, 3)
     nodes = np.zeros((0, 3)) if tether is None else tether.nodes
     low, high = extent(scene, way, nodes)
     parts = parts_of(scene, low, high)
     title = title or _title(scene, way, tether)
-    try:
-        if Path(file).suffix.lower() == INTERACTIVE:
-            page = _interactive(scene, parts, way, nodes, title)
-            Path(file).write_text(page, encoding="utf-8")
-        else:
-            metadata = {"Date": None} if Path(file).suffix.lower() == ".svg" else None
-            figure = _figure(scene, parts, way, nodes, (low, high), title)
-            literal(figure).savefig(file, dpi=150, metadata=metadata)
-    except OSError as error:
-        raise InputError(f"{file}: cannot be written: {error.strerror or error}") from None
+    if Path(file).suffix.lower() == INTERACTIVE:
+        write_text(file, _interactive(scene, parts, way, nodes, title))
+    else:
+        style.save(_figure(scene, parts, way, nodes, (low, high), title), file)
 
 
 def _title(scene: Scene, way: Floats, tether: Tether | None) -> str:
@@ -89,24 +73,14 @@ def _figure(
     """A view in space, and the plans from above and from two sides."""
     from matplotlib.collections import PolyCollection
     from matplotlib.figure import Figure
-    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
     low, high = box
     figure = Figure(figsize=(13, 7.5), layout="constrained")
     halves: Any = figure.subfigures(1, 2, width_ratios=[1.15, 1.0])
     left, right = halves
     ax: Any = left.add_subplot(projection="3d")
-    for _, (vertices, faces) in parts:
-        triangles = vertices[faces]
-        ax.add_collection3d(
-            Poly3DCollection(triangles, facecolors=shaded(triangles), alpha=0.35, linewidths=0)
-        )
+    draw_space(scene, way, nodes, ax=ax)
     cloud = drawn_points(scene) if scene.cloud is not None else np.zeros((0, 3))
-    if len(cloud):
-        ax.plot(*cloud.T, ".", ms=0.6, color=_SOLID)
-    draw_lines(ax, way, nodes, (0, 1, 2))
-    ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-    ax.set_box_aspect(high - low)
     unit = scene.units
     ax.set(xlabel=f"x ({unit})", ylabel=f"y ({unit})", zlabel=f"z ({unit})")
     names = ("x", "y", "z")
@@ -114,9 +88,9 @@ def _figure(
     for panel, (a, b, name) in zip(right.subplots(3, 1), views, strict=True):
         for _, (vertices, faces) in parts:
             flat: Any = vertices[faces][:, :, [a, b]]
-            panel.add_collection(PolyCollection(flat, facecolors="#d0d7de", linewidths=0))
+            panel.add_collection(PolyCollection(flat, facecolors=style.OBSTACLE, linewidths=0))
         if len(cloud):
-            panel.plot(cloud[:, a], cloud[:, b], ".", ms=0.4, color="#d0d7de")
+            panel.plot(cloud[:, a], cloud[:, b], ".", ms=0.4, color=style.OBSTACLE)
         draw_lines(panel, way, nodes, (a, b))
         panel.set(xlim=(low[a], high[a]), ylim=(low[b], high[b]), aspect="equal")
         panel.set_title(name, fontsize=9)
@@ -126,6 +100,28 @@ def _figure(
     if handles:
         left.legend(handles, labels, loc="lower left", fontsize=8)
     return figure
+
+
+def draw_space(scene: Scene, way: Floats, nodes: Floats, *, ax: Any = None) -> Any:
+    """Solids, path (k, 3) and tether (n, 3) in space, on 3D axes of the caller or on new ones;
+    returns the axes."""
+    from matplotlib.figure import Figure
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+    if ax is None:
+        ax = Figure(figsize=(8, 7), layout="constrained").add_subplot(projection="3d")
+    low, high = extent(scene, way, nodes)
+    for _, (vertices, faces) in parts_of(scene, low, high):
+        triangles = vertices[faces]
+        ax.add_collection3d(
+            Poly3DCollection(triangles, facecolors=shaded(triangles), alpha=0.35, linewidths=0)
+        )
+    if scene.cloud is not None:
+        ax.plot(*drawn_points(scene).T, ".", ms=0.6, color=style.OBSTACLE)
+    draw_lines(ax, way, nodes, (0, 1, 2))
+    ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
+    ax.set_box_aspect(high - low)
+    return ax
 
 
 def shaded(triangles: Floats) -> Floats:
@@ -141,10 +137,10 @@ def shaded(triangles: Floats) -> Floats:
 def draw_lines(ax: Any, way: Floats, nodes: Floats, axes: tuple[int, ...]) -> None:
     columns = list(axes)
     if len(way):
-        ax.plot(*way[:, columns].T, color=_PATH, lw=0.9, alpha=0.8, label="path")
+        ax.plot(*way[:, columns].T, color=style.PATH, lw=0.9, alpha=0.8, label="path")
     if len(nodes):
-        ax.plot(*nodes[:, columns].T, color=_TETHER, lw=1.8, label="tether")
-        ends = (nodes[0], _ANCHOR, "*", "anchor"), (nodes[-1], _ROBOT, "o", "robot")
+        ax.plot(*nodes[:, columns].T, color=style.TETHER, lw=1.8, label="tether")
+        ends = (nodes[0], style.BASE, "*", "anchor"), (nodes[-1], style.ROBOT, "o", "robot")
         for point, colour, marker, name in ends:
             ax.plot(*point[columns][:, None], marker, color=colour, ms=8, label=name)
 
@@ -158,13 +154,16 @@ def _interactive(
         figure.add_trace(mesh_trace(name, vertices, faces))
     if scene.cloud is not None:
         x, y, z = drawn_points(scene).T
-        marker = {"size": 1.2, "color": _SOLID}
+        marker = {"size": 1.2, "color": style.OBSTACLE}
         figure.add_trace(go.Scatter3d(x=x, y=y, z=z, mode="markers", marker=marker, name="cloud"))
     if len(way):
-        figure.add_trace(line_trace("path", way, _PATH, 3))
+        figure.add_trace(line_trace("path", way, style.PATH, 3))
     if len(nodes):
-        figure.add_trace(line_trace("tether", nodes, _TETHER, 6))
-        for name, point, colour in (("anchor", nodes[0], _ANCHOR), ("robot", nodes[-1], _ROBOT)):
+        figure.add_trace(line_trace("tether", nodes, style.TETHER, 6))
+        for name, point, colour in (
+            ("anchor", nodes[0], style.BASE),
+            ("robot", nodes[-1], style.ROBOT),
+        ):
             figure.add_trace(point_trace(name, point, colour))
     figure.update_layout(**layout(title, scene.units))
     return str(figure.to_html(include_plotlyjs=True, full_html=True))
@@ -184,8 +183,8 @@ def mesh_trace(name: str, vertices: Floats, faces: npt.NDArray[np.int64]) -> Any
     x, y, z = np.round(vertices, 4).T
     i, j, k = faces.T
     return plotly_objects().Mesh3d(
-        x=x, y=y, z=z, i=i, j=j, k=k, color=_SOLID, flatshading=True, name=name, hoverinfo="name",
-        lighting={"ambient": 0.55, "diffuse": 0.7, "specular": 0.1},
+        x=x, y=y, z=z, i=i, j=j, k=k, color=style.OBSTACLE, flatshading=True, name=name,
+        hoverinfo="name", lighting={"ambient": 0.55, "diffuse": 0.7, "specular": 0.1},
     )  # fmt: skip
 
 

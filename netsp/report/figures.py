@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from netsp.compare.rows import Row
-from netsp.pictures.literal import literal
+from netsp.pictures import style
 from netsp.report.stats import Cell, Summary, gap_over_time, over_best, profile, summary
 
-STYLES = ("-", "--", "-.", ":")
+LINES, MARKERS = ("-", "--", "-.", ":"), "os^Dv<>"
 
 
 def _figure(columns: int = 1) -> tuple[Any, Any]:
@@ -29,7 +29,9 @@ def _figure(columns: int = 1) -> tuple[Any, Any]:
 
 
 def _style(k: int) -> dict[str, Any]:
-    return {"color": f"C{k % 10}", "linestyle": STYLES[k // 10 % 4], "marker": "o", "ms": 3.5}
+    colours = len(style.SERIES)
+    look = {"color": style.SERIES[k % colours], "linestyle": LINES[k // colours % len(LINES)]}
+    return {**look, "marker": MARKERS[k % len(MARKERS)], "ms": 4.0}
 
 
 def by_goals(
@@ -132,7 +134,7 @@ def svg(figure: Any) -> str:
     from matplotlib import pyplot as plt
 
     out = io.StringIO()
-    literal(figure).savefig(out, format="svg")
+    style.literal(figure).savefig(out, format="svg")
     plt.close(figure)
     text = out.getvalue()
     return text[text.index("<svg") :]

@@ -14,7 +14,7 @@ from netsp.compare.rows import Row, read_rows
 from netsp.errors import InputError
 from netsp.files import cell as plain_cell
 from netsp.files import write_text
-from netsp.pictures.literal import literal
+from netsp.pictures import style
 from netsp.report import figures
 from netsp.report.stats import (
     Cell,
@@ -72,7 +72,7 @@ def write_report(results: str | Path, output: str | Path, pictures: str | None =
         if figure is None:
             continue
         if pictures:
-            _save(figure, output.with_name(f"{output.stem}-{name}.{pictures}"))
+            style.save(figure, output.with_name(f"{output.stem}-{name}.{pictures}"))
         caption = html.escape(CAPTIONS[name])
         parts.append(f"<figure>{figures.svg(figure)}<figcaption>{caption}</figcaption></figure>")
     parts += [
@@ -88,13 +88,6 @@ def write_report(results: str | Path, output: str | Path, pictures: str | None =
         f"<style>{STYLE}</style></head><body>{''.join(parts)}</body></html>\n",
     )
     return output
-
-
-def _save(figure: Any, path: Path) -> None:
-    try:
-        literal(figure).savefig(path, dpi=150)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror}") from None
 
 
 def _head(rows: list[Row], source: str) -> str:

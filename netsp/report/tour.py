@@ -21,6 +21,7 @@ from netsp.judge import verify
 from netsp.online.scene.scene import scene_of
 from netsp.online.tether import GeodesicTether
 from netsp.online.tether.resolution import suggested_delta
+from netsp.pictures import style
 from netsp.problem import Circle, Problem
 from netsp.report.page import STYLE
 from netsp.solution import Solution
@@ -227,30 +228,31 @@ def _summary(problem: Problem, solution: Solution, run: Path | None) -> str:
 
 def _map(problem: Problem, solution: Solution, view: _View) -> str:
     shapes = []
+    look = f'fill="{style.OBSTACLE}" stroke="{style.EDGE}"'
     for i, o in enumerate(problem.obstacles):
         title = f"<title>{html.escape(problem.obstacle_label(i))}</title>"
         if isinstance(o, Circle):
             x, y = view.point(o.center)
             shapes.append(f'<circle cx="{x}" cy="{y}" r="{o.radius * view.scale:.2f}" '
-                          f'fill="#d0d7de" stroke="#868e96">{title}</circle>')  # fmt: skip
+                          f'{look}>{title}</circle>')  # fmt: skip
         else:
-            shapes.append(f'<polygon points="{view.points(np.array(o.polygon))}" fill="#d0d7de" '
-                          f'stroke="#868e96">{title}</polygon>')  # fmt: skip
+            corners = view.points(np.array(o.polygon))
+            shapes.append(f'<polygon points="{corners}" {look}>{title}</polygon>')
     shapes.append(f'<polyline points="{view.points(np.array(solution.path))}" fill="none" '
-                  'stroke="#868e96" stroke-dasharray="5 4"/>')  # fmt: skip
-    shapes.append('<polyline id="done" fill="none" stroke="#74c0fc" stroke-width="2"/>')
-    shapes.append('<polyline id="tether" fill="none" stroke="#d9480f" stroke-width="3"/>')
+                  f'stroke="{style.PLAN}" stroke-dasharray="5 4"/>')  # fmt: skip
+    shapes.append(f'<polyline id="done" fill="none" stroke="{style.PATH}" stroke-width="2"/>')
+    shapes.append(f'<polyline id="tether" fill="none" stroke="{style.TETHER}" stroke-width="3"/>')
     visit = {v.goal: n + 1 for n, v in enumerate(solution.tour)}
     for k, goal in enumerate(problem.goals):
         x, y = view.point(goal.position)
         label = str(visit.get(k, "–"))
-        shapes.append(f'<circle cx="{x}" cy="{y}" r="5" fill="#2b8a3e"><title>'
+        shapes.append(f'<circle cx="{x}" cy="{y}" r="5" fill="{style.VISITED}"><title>'
                       f"{html.escape(problem.goal_label(k))}</title></circle>"
                       f'<text x="{x + 7}" y="{y - 6}" font-size="12">{label}</text>')  # fmt: skip
     x, y = view.point(problem.base)
-    shapes.append(f'<rect x="{x - 6}" y="{y - 6}" width="12" height="12" fill="#1b2631">'
+    shapes.append(f'<rect x="{x - 6}" y="{y - 6}" width="12" height="12" fill="{style.BASE}">'
                   "<title>base</title></rect>")  # fmt: skip
-    shapes.append('<circle id="robot" r="6" fill="#f08c00" stroke="#1b2631"/>')
+    shapes.append(f'<circle id="robot" r="6" fill="{style.ROBOT}" stroke="{style.BASE}"/>')
     return (f'<svg id="map" viewBox="0 0 {WIDTH:g} {view.height:.1f}" role="img" '
             f'aria-label="map">{"".join(shapes)}</svg>')  # fmt: skip
 
@@ -330,9 +332,10 @@ def _charts(rows: list[dict[str, str]]) -> str:
 
     return (
         '<svg class="chart" viewBox="0 0 900 210" role="img" aria-label="tether over time">'
-        f'<polyline points="{line(limit)}" fill="none" stroke="#495057" stroke-dasharray="5 4"/>'
-        f'<polyline points="{line(length)}" fill="none" stroke="#d9480f" stroke-width="2"/>'
-        '<line x1="50" y1="180" x2="880" y2="180" stroke="#868e96"/>'
+        f'<polyline points="{line(limit)}" fill="none" stroke="{style.LIMIT}" '
+        'stroke-dasharray="5 4"/>'
+        f'<polyline points="{line(length)}" fill="none" stroke="{style.TETHER}" stroke-width="2"/>'
+        f'<line x1="50" y1="180" x2="880" y2="180" stroke="{style.EDGE}"/>'
         f'<text x="50" y="198" font-size="12">0</text><text x="845" y="198" font-size="12">'
         f'{span:.5g} s</text><text x="2" y="20" font-size="12">{top:.4g}</text>'
         '<text x="2" y="180" font-size="12">0</text></svg>'
