@@ -75,12 +75,13 @@ def proof(problem: Problem, limit: float, classes: str = "all") -> Outcome:
 
 
 def proofs(
-    cells: list[tuple[int, float]], worlds: int, limit: float, many: bool, rules: list[str]
-) -> None:
-    """One row a cell and rule of classes."""
+    cells: list[tuple[int, float]], worlds: int, limit: float, many: bool, rules: list[str],
+    table: str,
+) -> None:  # fmt: skip
+    """One row a cell and rule of classes. table : its name among those that are kept."""
     head("goals", "tether", "rule", "classes", "proven", "median s", "worst s", "mean gap %",
          "worst gap %", "verified", "peak GiB",
-         name="frontier-rules" if len(rules) > 1 else "frontier-largest")  # fmt: skip
+         name=table)  # fmt: skip
     for goals, tether in cells:
         for rule in rules:
             found = [proof(world(s, goals, tether, many), limit, rule) for s in range(worlds)]
@@ -177,6 +178,7 @@ def main() -> None:
     parser.add_argument("--rules", action="store_true", help="both rules of classes side by side")
     parser.add_argument("--heuristic", action="store_true")
     parser.add_argument("--peers", action="store_true")
+    parser.add_argument("--table", help="name of the table among those kept")
     parser.add_argument("--plot", help="of --peers, a performance profile")
     args = parser.parse_args()
     heading(f"Frontier ({args.worlds} worlds a cell, limit {args.limit:g} s)")
@@ -191,7 +193,8 @@ def main() -> None:
         if args.cells:
             cells = [(int(c.split(":")[0]), float(c.split(":")[1])) for c in args.cells.split(",")]
         rules = ["non-looping", "all"] if args.rules else ["all"]
-        proofs([(n, float(t)) for n, t in cells], args.worlds, args.limit, args.many, rules)
+        table = args.table or ("frontier-rules" if args.rules else "frontier")
+        proofs([(n, float(t)) for n, t in cells], args.worlds, args.limit, args.many, rules, table)
 
 
 if __name__ == "__main__":

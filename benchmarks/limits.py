@@ -17,7 +17,7 @@ from table import head, heading, row
 
 from netsp import Circle, Problem, solve
 from netsp.errors import NetspError
-from netsp.solvers.solve import BLIND, SOLVERS
+from netsp.solvers.table import SOLVERS
 from netsp.worlds import random_world
 
 
@@ -69,7 +69,7 @@ def worst(limit: float) -> tuple[float, str, int]:
     no tour to show."""
     found = list(runs(limit))
     solver, name, over, _ = max(found, key=lambda r: r[2])
-    blind = {*BLIND, "anneal-2016"}
+    blind = {s.name for s in SOLVERS.values() if s.geometric}
     silent = sum(s not in blind and "feasible" not in r and "optimal" not in r
                  for s, _, _, r in found)  # fmt: skip
     return over, f"{solver}, {name}", silent

@@ -28,7 +28,7 @@ def fly(
     tether_model: str = "geodesic", **how,
 ):  # fmt: skip
     return simulate(
-        mission, planner, vehicle=vehicle, tether_model=tether_model, options=Options(**how),
+        mission, planner, vehicle=vehicle, tether=tether_model, options=Options(**how),
         scene=scene, field=field,
         snap=True, seed=seed,
     ).summary  # fmt: skip

@@ -20,7 +20,7 @@ from table import head, heading, row
 
 from netsp import Problem, Status, TravelGraph, solve_graph, travel_graph, verify
 from netsp.solvers.answer import to_solution
-from netsp.solvers.solve import BLIND
+from netsp.solvers.table import SOLVERS
 from netsp.travel.result import Result
 from netsp.worlds import random_world
 
@@ -134,7 +134,7 @@ def heuristics(goals: int = 20, tether: float = 350.0) -> None:
             if result.trajectory is not None:
                 held.append(len(to_solution(problem, graph, result, solver, 0).entangled))
         note = f" ({none} without a tour)" if none else ""
-        if solver in BLIND:
+        if SOLVERS[solver].blind:
             note = f" (entangles {np.mean(held):.1f} obstacles on average)"
         row(
             name, limit, f"{np.mean(over):.2f}", f"{np.median(over):.2f}", f"{max(over):.2f}",

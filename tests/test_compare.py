@@ -20,7 +20,7 @@ from netsp.compare.rows import RowsFile, combine, read_rows
 from netsp.compare.run import compare
 from netsp.compare.study import Study, shard
 from netsp.compare.trial import MOST_POINTS, thinned, world_of
-from netsp.solvers.solve import PARAMS, SOLVERS
+from netsp.solvers.table import SOLVERS, Solver
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -186,17 +186,16 @@ def test_solvers_that_crash_hang_or_eat_cost_one_row_each(tmp_path, monkeypatch)
     patch = f"""
         import sys
         sys.path.insert(0, {str(ROOT)!r})
-        from netsp.solvers.solve import PARAMS, SOLVERS
+        from netsp.solvers.table import SOLVERS, Solver
         for name in {sorted(names)}:
-            SOLVERS[name], PARAMS[name] = f"badsolvers:{{name}}", "badsolvers:Params"
+            SOLVERS[name] = Solver(name, f"badsolvers:{{name}}")
     """
     (tmp_path / "sitecustomize.py").write_text(textwrap.dedent(patch))
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     monkeypatch.syspath_prepend(str(tmp_path))
     monkeypatch.setattr(pool, "PATIENCE", 8.0)
     for name in names:
-        monkeypatch.setitem(SOLVERS, name, f"badsolvers:{name}")
-        monkeypatch.setitem(PARAMS, name, "badsolvers:Params")
+        monkeypatch.setitem(SOLVERS, name, Solver(name, f"badsolvers:{name}"))
     study = Study.checked(
         {
             "name": "bad", "goals": [2], "tether_lengths": [150], "time_limit": 0.5,

@@ -12,9 +12,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp import InputError, Problem, Status, TravelGraph, solve, solve_graph, verify
-from netsp.solvers.solve import BLIND, GEOMETRIC, ROADMAPS, SOLVERS, travel_graph
+from netsp.solvers.solve import travel_graph
+from netsp.solvers.table import ROADMAPS, SOLVERS
 from tests.brute import brute_tour
 from tests.worlds import random_world
+
+BLIND = {s.name for s in SOLVERS.values() if s.blind}
+GEOMETRIC = {s.name for s in SOLVERS.values() if s.geometric}
 
 SEEING = [s for s in SOLVERS if s not in BLIND]
 ANYWHERE = [s for s in SOLVERS if s not in GEOMETRIC]

@@ -17,6 +17,7 @@ from netsp.mip.solve import MipRun
 from netsp.mip.subtours import branches
 from netsp.roadmap.slits import _taut, build_slits, slit_lengths
 from netsp.roadmap.taut import TautRoadmap
+from netsp.solving.limits import Limits
 from tests.brute import brute_tour
 from tests.test_contract import random_graph
 from tests.worlds import random_world, small_worlds
@@ -145,7 +146,7 @@ def test_nothing_that_is_ruled_out_is_in_the_optimum(seed):
     """Elimination with a weak incumbent keeps an optimal tour."""
     graph = random_graph(seed, goals=6)
     best = brute_tour(graph)
-    run = MipRun(graph, rng=np.random.default_rng(seed), search_rounds=0)
+    run = MipRun(graph, Limits(rng=np.random.default_rng(seed)), search_rounds=0)
     result = run.solve("highs", None)
     assert result.status is Status.OPTIMAL
     assert result.length == pytest.approx(best, rel=1e-6)

@@ -14,7 +14,8 @@ from netsp.anneal import icra2017, rss2016
 from netsp.compiled.chance import seeded, uniform
 from netsp.hsignature import concatenate, entangled, signature
 from netsp.lns import Instance
-from netsp.solvers.solve import ROADMAPS, travel_graph
+from netsp.solvers.solve import travel_graph
+from netsp.solvers.table import ROADMAPS
 from netsp.solving.legcosts import MEASURE_AT_ONCE
 from netsp.worlds import random_world as papers_world
 from tests.brute import brute_tour

@@ -7,19 +7,27 @@ import psutil
 import pytest
 
 from netsp import travel_graph
-from netsp.mip import solve
+from netsp.mip import solve as mip
 from netsp.mip.bound import dual_bound, exact_bound, fixing_costs, reduced_costs
 from netsp.mip.cbc_program import CbcRelaxation
 from netsp.mip.highs import HighsRelaxation
 from netsp.mip.program import Cut
+from netsp.mip.solve import Params
 from netsp.mip.subtours import components, fractional_cuts
 from netsp.roadmap.taut import TautRoadmap
 from netsp.solution import Status
 from netsp.solving.legcosts import MEASURE_AT_ONCE
+from netsp.solving.limits import Limits
 from netsp.worlds import random_world as far_world
 from tests.brute import brute_tour as brute
 from tests.test_contract import random_graph
 from tests.worlds import random_world
+
+
+def solve(graph, params=None, **limits):
+    """`mip` on a graph, with options and limits by name."""
+    return mip(graph, Params(**(params or {})), Limits(**limits))
+
 
 BACKENDS = ["highs", "cbc"]
 
@@ -120,7 +128,7 @@ def test_at_the_time_limit_there_is_a_tour_a_bound_and_no_process_left(backend):
     graph = TautRoadmap(random_world(0, goals=20, tether=350.0)).travel_graph()
     graph.costs  # noqa: B018 - not part of what is timed
     begin = time.monotonic()
-    result = solve(graph, time_limit=0.6, params={"backend": backend, "search_rounds": 2})
+    result = solve(graph, time=0.6, params={"backend": backend, "search_rounds": 2})
     assert time.monotonic() - begin < 0.6 + 2.0
     assert graph.is_tour(result.tour)
     assert 0.0 <= result.lower_bound <= result.length
@@ -144,7 +152,7 @@ def test_ctrl_c_gives_the_best_tour_so_far():
 def test_a_warm_start_is_never_made_worse():
     graph = random_graph(3, goals=6)
     best = solve(graph)
-    again = solve(graph, warm_start=best.tour, time_limit=1e-3)
+    again = solve(graph, warm_start=best.tour, time=1e-3)
     assert again.length <= best.length * (1 + 1e-12)
 
 

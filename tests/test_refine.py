@@ -82,8 +82,8 @@ def test_ways_on_different_sides_of_a_post_are_told_apart():
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (Options(ways="straight"), "--ways: expected tree, rrtstar, bitstar, prmstar"),
-        (Options(refine="polish"), "--refine: expected none, paper, gradient"),
+        (Options(ways="straight"), "ways: expected tree, rrtstar, bitstar, prmstar"),
+        (Options(refine="polish"), "refine: expected none, paper, gradient"),
     ],
 )
 def test_unknown_options_are_named(options, message):

@@ -157,7 +157,7 @@ def test_simulate_writes_log_summary_and_picture(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("args", "change", "message"),
     [
-        (["--planner", "magic"], {}, "--planner: expected predictive"),
+        (["--planner", "magic"], {}, "planner: unknown 'magic'; expected one of predictive"),
         (["--tether", "0.1"], {}, "tether_length: 0.1 is shorter"),
         ([], {"scene": "missing.json"}, "missing.json: cannot be read"),
         ([], {"waypoints": []}, "waypoints"),
@@ -240,11 +240,11 @@ def test_two_planners_are_drawn_side_by_side(tmp_path):
 
 
 def test_planners_may_believe_the_papers_tether_and_the_log_tells_the_truth():
-    run = simulate(mission(ring(2), 5.0), "react", tether_model="react", scene=POST)
+    run = simulate(mission(ring(2), 5.0), "react", tether="react", scene=POST)
     own = simulate(mission(ring(2), 5.0), "react", scene=POST)
     assert run.summary["visited"] == own.summary["visited"]
     assert run.summary["longest_tether_m"] < 6.0
     with pytest.raises(InputError, match="planner 'predictive' needs geodesic, got 'react'"):
-        simulate(mission(ring(2), 5.0), "predictive", tether_model="react", scene=POST)
-    with pytest.raises(InputError, match="--tether-model: expected geodesic or react"):
-        simulate(mission(ring(2), 5.0), "react", tether_model="rope", scene=POST)
+        simulate(mission(ring(2), 5.0), "predictive", tether="react", scene=POST)
+    with pytest.raises(InputError, match="tether: unknown 'rope'; expected one of geodesic, react"):
+        simulate(mission(ring(2), 5.0), "react", tether="rope", scene=POST)

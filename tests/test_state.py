@@ -11,8 +11,10 @@ from hypothesis import strategies as st
 from netsp import Circle, InfeasibleError, InputError, Problem, solve, verify
 from netsp.problem import State
 from netsp.roadmap.opened import opened_graph
-from netsp.solvers.solve import GEOMETRIC, SOLVERS
+from netsp.solvers.table import SOLVERS
 from netsp.worlds import random_world
+
+GEOMETRIC = {s.name for s in SOLVERS.values() if s.geometric}
 
 FEW = {"goals": [(4, 0), (0, 4)], "base": (-3, 0), "obstacles": [Circle(center=(0, 0), radius=1)]}
 

@@ -108,7 +108,9 @@ def test_a_kinematic_vehicle_turns_no_faster_than_it_can():
 
 
 def test_unknown_vehicles_are_named():
-    with pytest.raises(InputError, match="--vehicle: expected kinematic or bluerov2, got 'boat'"):
+    with pytest.raises(
+        InputError, match="vehicle: unknown 'boat'; expected one of kinematic, bluerov2"
+    ):
         make_vehicle("boat", np.zeros(3), 0.3)
 
 

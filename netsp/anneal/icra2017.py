@@ -11,22 +11,19 @@ covering space it cannot: every state is a non-entangling tour, and only its len
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numba import njit
 
 from netsp.anneal.cooling import Cooling, Schedule
-from netsp.clock import TimeLimit
 from netsp.compiled.chance import below, metropolis, seeded
 from netsp.lns.layers import Instance
 from netsp.lns.solve import core_of
-from netsp.solving.params import read_params
+from netsp.solving.limits import Limits
 from netsp.solving.run import Run
 from netsp.travel.graph import TravelGraph
-from netsp.travel.result import OnProgress, Result
+from netsp.travel.result import Result
 
 PROPOSALS_PER_GOAL = 1_000_000
 """Default number of proposals, times the number of goals, when nothing is limited."""
@@ -51,22 +48,13 @@ class Params(Cooling):
             raise ValueError(f"option 'swaps': expected a share from 0 to 1, got {self.swaps}")
 
 
-def solve(
-    graph: TravelGraph,
-    *,
-    time_limit: TimeLimit = None,
-    iteration_limit: int | None = None,
-    rng: np.random.Generator | None = None,
-    params: Mapping[str, Any] | None = None,
-    warm_start: Sequence[int] | None = None,
-    on_progress: OnProgress | None = None,
-) -> Result:
+def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | None = None) -> Result:
     """Anneal from a random tour, or from the warm start. An iteration is one proposal."""
-    chosen = read_params(Params, "anneal", params)
-    rng = rng or np.random.default_rng(0)
-    run = Run(graph, time_limit, iteration_limit, on_progress)
+    chosen, limits = params or Params(), limits or Limits()
+    rng = limits.rng
+    run = Run(graph, limits)
     with run.until_stopped():
-        run.offer(warm_start)
+        run.offer(limits.warm_start)
         if not run.trivial():
             _anneal(run, rng, chosen)
     return run.finish("done", entangled=0)

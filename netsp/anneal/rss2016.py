@@ -19,21 +19,18 @@ Where the paper is silent or assumes too much:
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numba import njit
 
 from netsp.anneal.cooling import Cooling, Schedule
 from netsp.arrays import Ints
-from netsp.clock import TimeLimit
 from netsp.compiled.chance import below, metropolis, seeded
-from netsp.solving.params import read_params
+from netsp.solving.limits import Limits
 from netsp.solving.run import Run
 from netsp.travel.graph import TravelGraph
-from netsp.travel.result import OnProgress, Result
+from netsp.travel.result import Result
 
 PROPOSALS_PER_GOAL = 20_000
 """Default number of proposals, times the number of goals, when nothing is limited."""
@@ -61,27 +58,18 @@ class Params(Cooling):
             raise ValueError(f"option 'swaps': expected a share from 0 to 1, got {self.swaps}")
 
 
-def solve(
-    graph: TravelGraph,
-    *,
-    time_limit: TimeLimit = None,
-    iteration_limit: int | None = None,
-    rng: np.random.Generator | None = None,
-    params: Mapping[str, Any] | None = None,
-    warm_start: Sequence[int] | None = None,
-    on_progress: OnProgress | None = None,
-) -> Result:
+def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | None = None) -> Result:
     """Anneal from a random order, or that of the warm start, all legs direct. An iteration is one
     proposal. The result is `no_solution_found` if no state met was free of entanglement with every
     goal within the tether.
 
     Raises InputError for a graph without geometry beneath it.
     """
-    chosen = read_params(Params, "anneal-2016", params)
-    rng = rng or np.random.default_rng(0)
-    run = Run(graph, time_limit, iteration_limit, on_progress)
+    chosen, limits = params or Params(), limits or Limits()
+    rng = limits.rng
+    run = Run(graph, limits)
     with run.until_stopped(blind=True):
-        run.offer(warm_start)
+        run.offer(limits.warm_start)
         if not run.trivial():
             _anneal(run, rng, chosen)
     return run.finish("done")

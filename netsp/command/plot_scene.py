@@ -12,12 +12,10 @@ from netsp.errors import InputError
 from netsp.files import read_path
 from netsp.online.scene.field import DistanceField
 from netsp.online.scene.scene import Scene
-from netsp.online.tether import GeodesicTether, ReactTether, Tether
+from netsp.online.tether import GeodesicTether, Tether, make_tether
 from netsp.online.tether.resolution import delta_for_path
 from netsp.pictures import scene as pictures
 from netsp.pictures import style
-
-MODELS = {"geodesic": GeodesicTether, "react": ReactTether}
 
 
 def plot_scene(args: argparse.Namespace) -> int:
@@ -44,9 +42,7 @@ def plot_scene(args: argparse.Namespace) -> int:
 
 def lay(field: DistanceField, path: Floats, model: str, delta: float) -> Tether:
     """The tether after a robot has gone a path from its anchor, the first point, on."""
-    if model not in MODELS:
-        raise InputError(f"--tether-model: expected {' or '.join(MODELS)}, got {model!r}")
-    chosen = MODELS[model](field, delta)
+    chosen = make_tether(model, field, delta)
     if isinstance(chosen, GeodesicTether) and (thin := chosen.warnings):
         more = f" (and {len(thin) - 1} more)" if len(thin) > 1 else ""
         print(

@@ -85,7 +85,7 @@ def run(args: argparse.Namespace) -> int:
     runs = []
     for planner in [args.planner, args.compare] if args.compare else [args.planner]:
         run = simulate(
-            mission, planner, vehicle=args.vehicle, tether_model=args.tether_model,
+            mission, planner, vehicle=args.vehicle, tether=args.tether_model,
             options=Options(args.ways, args.refine, args.seed),
             scene=scene, field=field, snap=args.snap, seed=args.seed,
             on_step=None if args.quiet or not sys.stderr.isatty() else live(mission, scene.units),

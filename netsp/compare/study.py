@@ -17,7 +17,8 @@ from netsp.errors import InputError
 from netsp.fields import STRICT, Positive
 from netsp.files import read_text
 from netsp.models import explain
-from netsp.solvers.solve import PARAMS, ROADMAPS, SOLVERS, check_solver
+from netsp.solvers.solve import check_solver
+from netsp.solvers.table import ROADMAPS, SOLVERS
 from netsp.worlds import FAMILIES
 
 Whole = Annotated[int, Field(ge=1, le=100_000)]
@@ -80,7 +81,9 @@ class Solver(BaseModel):
     @model_validator(mode="after")
     def _known(self) -> Self:
         if self.name not in SOLVERS:
-            raise ValueError(f"name: unknown solver {self.name!r}; expected one of {_list(PARAMS)}")
+            raise ValueError(
+                f"name: unknown solver {self.name!r}; expected one of {_list(SOLVERS)}"
+            )
         try:
             check_solver(self.name, self.options)
         except InputError as error:

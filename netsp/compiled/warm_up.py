@@ -70,7 +70,8 @@ def steps() -> Iterator[tuple[str, Callable[[], object]]]:
     from netsp.online.mission import Mission
     from netsp.online.simulate import simulate
     from netsp.problem import Problem
-    from netsp.solvers.solve import SOLVERS, solve
+    from netsp.solvers.solve import solve
+    from netsp.solvers.table import SOLVERS
     from netsp.worlds import random_world
 
     problem = random_world(1, goals=9, tether_length=450.0)

@@ -11,21 +11,18 @@ repeats cheaper. Memory follows it too: where it repeats a goal, that is remembe
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from netsp.arrays import Floats
-from netsp.clock import TimeLimit
 from netsp.dp.walks import Walks
 from netsp.errors import InputError
 from netsp.solving.legcosts import MEASURE_AT_ONCE, LegCosts
-from netsp.solving.params import read_params
+from netsp.solving.limits import Limits
 from netsp.solving.searching import SearchingRun
 from netsp.travel.graph import TravelGraph
-from netsp.travel.result import OnProgress, Result
+from netsp.travel.result import Result
 
 STEP, SHORTER = 0.5, 0.7
 """First step of the prices as a share of the gap, and its factor after `STALL` passes in vain."""
@@ -63,34 +60,22 @@ class Params:
             )
 
 
-def solve(
-    graph: TravelGraph,
-    *,
-    time_limit: TimeLimit = None,
-    iteration_limit: int | None = None,
-    rng: np.random.Generator | None = None,
-    params: Mapping[str, Any] | None = None,
-    warm_start: Sequence[int] | None = None,
-    on_progress: OnProgress | None = None,
-) -> Result:
+def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | None = None) -> Result:
     """Bound and prove by walks, for few goals with many classes; with many goals it stops with the
     gap at which the walks make no more progress.
 
     An iteration is one pass over all layers. params : see `Params`. Raises InputError if the tables
     would not fit into memory.
     """
-    chosen = read_params(Params, "dp", params)
+    chosen, limits = params or Params(), limits or Limits()
     if not fits(graph):
         raise InputError(
             f"solver 'dp': {graph.goal_count} goals with {len(graph)} classes need too much memory;"
             " use 'auto' or 'lns'"
         )
-    run = SearchingRun(
-        graph, time_limit, iteration_limit, on_progress,
-        rng=rng, search_rounds=chosen.search_rounds,
-    )  # fmt: skip
+    run = SearchingRun(graph, limits, search_rounds=chosen.search_rounds)
     with run.until_stopped():
-        run.offer(warm_start)
+        run.offer(limits.warm_start)
         if not run.trivial():
             run.begin()
             costs = LegCosts(graph)

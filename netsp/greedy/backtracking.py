@@ -13,19 +13,16 @@ costs it can run into a dead end, and says that it found nothing. Such a graph h
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from netsp.arrays import Floats, Ints
-from netsp.clock import TimeLimit
 from netsp.solving.legcosts import MEASURE_AT_ONCE
-from netsp.solving.params import read_params
+from netsp.solving.limits import Limits
 from netsp.solving.run import Run
 from netsp.travel.graph import TravelGraph
-from netsp.travel.result import OnProgress, Result
+from netsp.travel.result import Result
 
 BATCH = 16
 """So many legs are measured at a time when the nearest goal is looked for."""
@@ -43,28 +40,14 @@ class Params:
             raise ValueError(f"option 'retrace': expected path or tether, got {self.retrace!r}")
 
 
-@dataclass(frozen=True)
-class NoParams:
-    """This solver takes no options."""
-
-
-def solve(
-    graph: TravelGraph,
-    *,
-    time_limit: TimeLimit = None,
-    iteration_limit: int | None = None,
-    rng: np.random.Generator | None = None,
-    params: Mapping[str, Any] | None = None,
-    warm_start: Sequence[int] | None = None,
-    on_progress: OnProgress | None = None,
-) -> Result:
+def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | None = None) -> Result:
     """`greedy`: to the nearest goal not yet visited, in whatever class is nearest on the covering
     space; home from the last. One iteration builds the whole tour. params : see `Params`."""
-    chosen = read_params(Params, "greedy", params)
-    run = Run(graph, time_limit, iteration_limit, on_progress)
+    chosen, limits = params or Params(), limits or Limits()
+    run = Run(graph, limits)
     stage = "trivial"
     with run.until_stopped():
-        run.offer(warm_start)
+        run.offer(limits.warm_start)
         if not run.trivial():
             stage = _nearest_by_tether(run, retrace=chosen.retrace == "path" and graph.geometric)
     return run.finish(stage)
@@ -111,22 +94,13 @@ def _nearest(
     return nearest
 
 
-def solve_2016(
-    graph: TravelGraph,
-    *,
-    time_limit: TimeLimit = None,
-    iteration_limit: int | None = None,
-    rng: np.random.Generator | None = None,
-    params: Mapping[str, Any] | None = None,
-    warm_start: Sequence[int] | None = None,
-    on_progress: OnProgress | None = None,
-) -> Result:
+def solve_2016(graph: TravelGraph, params: None = None, limits: Limits | None = None) -> Result:
     """`greedy-2016`: out to the goal nearest to the base and back, then the next. No leg between
     goals is ever measured. One iteration builds the whole tour."""
-    read_params(NoParams, "greedy-2016", params)
-    run = Run(graph, time_limit, iteration_limit, on_progress)
+    limits = limits or Limits()
+    run = Run(graph, limits)
     with run.until_stopped():
-        run.offer(warm_start)
+        run.offer(limits.warm_start)
         if not run.trivial():
             run.check()
             _out_and_back(run)

@@ -7,39 +7,26 @@ than there is; then the status is `invalid` and the trajectory tells what was wa
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
-from netsp.clock import TimeLimit
-from netsp.greedy.backtracking import NoParams
 from netsp.hsignature import Word, concatenate, entangled
 from netsp.solution import Status
-from netsp.solving.params import read_params
+from netsp.solving.limits import Limits
 from netsp.solving.run import Run
 from netsp.travel.graph import TravelGraph
-from netsp.travel.result import OnProgress, Result, Trajectory
+from netsp.travel.result import Result, Trajectory
 
 
-def solve(
-    graph: TravelGraph,
-    *,
-    time_limit: TimeLimit = None,
-    iteration_limit: int | None = None,
-    rng: np.random.Generator | None = None,
-    params: Mapping[str, Any] | None = None,
-    warm_start: Sequence[int] | None = None,
-    on_progress: OnProgress | None = None,
-) -> Result:
+def solve(graph: TravelGraph, params: None = None, limits: Limits | None = None) -> Result:
     """`greedy-tsp`. A warm start is not used: a baseline shows what it does by itself. One
     iteration builds the whole tour.
 
     Raises InputError for a graph without geometry beneath it.
     """
-    read_params(NoParams, "greedy-tsp", params)
-    run = Run(graph, time_limit, iteration_limit, on_progress)
+    limits = limits or Limits()
+    run = Run(graph, limits)
     walked: Trajectory | None = None
     with run.until_stopped(blind=True):
         if not run.trivial():

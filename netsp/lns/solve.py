@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from netsp.arrays import Ints
-from netsp.clock import TimeLimit
 from netsp.lns.layers import Instance
 from netsp.lns.search import Search
-from netsp.solving.params import read_params
+from netsp.solving.limits import Limits
 from netsp.solving.run import Run
 from netsp.travel.graph import TravelGraph, least_tethers
-from netsp.travel.result import OnProgress, Result
+from netsp.travel.result import Result
 
 ROUNDS_PER_GOAL = 300
 """Default number of rounds, times the number of goals, when nothing is limited."""
@@ -40,23 +37,14 @@ class Params:
             raise ValueError(f"option 'restarts': expected 1 or more, got {self.restarts}")
 
 
-def solve(
-    graph: TravelGraph,
-    *,
-    time_limit: TimeLimit = None,
-    iteration_limit: int | None = None,
-    rng: np.random.Generator | None = None,
-    params: Mapping[str, Any] | None = None,
-    warm_start: Sequence[int] | None = None,
-    on_progress: OnProgress | None = None,
-) -> Result:
+def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | None = None) -> Result:
     """Search orders of goals. An iteration is one round of ruin and recreate; the search cools over
     the iterations, or over the time if only that is limited. No bound is claimed."""
-    chosen = read_params(Params, "lns", params)
-    rng = rng or np.random.default_rng(0)
-    run = Run(graph, time_limit, iteration_limit, on_progress)
+    chosen, limits = params or Params(), limits or Limits()
+    rng = limits.rng
+    run = Run(graph, limits)
     with run.until_stopped():
-        run.offer(warm_start)
+        run.offer(limits.warm_start)
         if not run.trivial():
             _search(run, rng, chosen)
     return run.finish("done")

@@ -16,20 +16,17 @@ shortest path through layers. ``classes=1 polish=0`` is the paper's.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from netsp.clock import TimeLimit
 from netsp.lns import Instance, best_classes
 from netsp.lns.solve import core_of
 from netsp.mip.solve import MipRun, Params
-from netsp.solving.params import read_params
+from netsp.solving.limits import Limits
 from netsp.solving.run import Run
 from netsp.travel.graph import TravelGraph, least_tethers
-from netsp.travel.result import OnProgress, Progress, Result
+from netsp.travel.result import Progress, Result
 
 MOST_POLISHED = 4000
 """Most classes, those of least tether, among which the last choice is made."""
@@ -53,28 +50,19 @@ class ReducedParams(Params):
 
 
 def solve(
-    graph: TravelGraph,
-    *,
-    time_limit: TimeLimit = None,
-    iteration_limit: int | None = None,
-    rng: np.random.Generator | None = None,
-    params: Mapping[str, Any] | None = None,
-    warm_start: Sequence[int] | None = None,
-    on_progress: OnProgress | None = None,
+    graph: TravelGraph, params: ReducedParams | None = None, limits: Limits | None = None
 ) -> Result:
     """Solve the TSP over the classes of least tether.
 
     The tour is optimal for those classes only, so no bound is claimed for the problem unless they
     are all there are. Iterations as of `netsp.mip.solve`; params : see `ReducedParams`.
     """
-    chosen = read_params(ReducedParams, "reduced-mip", params)
+    chosen, limits = params or ReducedParams(), limits or Limits()
     kept = least_tethers(graph.costs_to_base, graph.cluster, chosen.classes)
     whole = len(kept) == len(graph)
-    part = MipRun(
-        graph.subgraph(kept), time_limit, iteration_limit,
-        rng=rng, search_rounds=chosen.search_rounds,
-    )  # fmt: skip
-    outer = Run(graph, time_limit, iteration_limit, on_progress)
+    inner = replace(limits, warm_start=None, on_progress=None)
+    part = MipRun(graph.subgraph(kept), inner, search_rounds=chosen.search_rounds)
+    outer = Run(graph, limits)
 
     def pass_on(row: Progress) -> None:
         if part.tour is not None:
@@ -86,11 +74,11 @@ def solve(
 
     part.on_progress = pass_on
     with outer.until_stopped():
-        outer.offer(warm_start)
+        outer.offer(limits.warm_start)
         if outer.trivial():
             return outer.finish("trivial")
         place = {int(v): k for k, v in enumerate(kept)}
-        start = [place.get(int(v), -1) for v in warm_start] if warm_start is not None else []
+        start = [place.get(int(v), -1) for v in limits.warm_start or ()]
         result = part.solve(chosen.backend, start if start and -1 not in start else None)
         outer.stopped = part.stopped
         if result.tour is not None:

@@ -7,24 +7,23 @@ integer program that is left is solved, cut at its subtours, and solved again.
 from __future__ import annotations
 
 import importlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from netsp.clock import TimeLimit
 from netsp.dp.solve import bound_by_walks
 from netsp.lns import Search
 from netsp.mip.program import IntegerProgram, Point
 from netsp.mip.root import Root, Warm, tour_legs
 from netsp.mip.subtours import component_cuts, follow, tour_from
 from netsp.solving.legcosts import LegCosts
-from netsp.solving.params import read_params
+from netsp.solving.limits import Limits
 from netsp.solving.run import Stop
 from netsp.solving.searching import SearchingRun
 from netsp.travel.graph import TravelGraph
-from netsp.travel.result import OnProgress, Result
+from netsp.travel.result import Result
 
 BACKENDS = {
     "highs": ("netsp.mip.highs:HighsRelaxation", "netsp.mip.highs:HighsInteger"),
@@ -66,26 +65,14 @@ class Params:
             )
 
 
-def solve(
-    graph: TravelGraph,
-    *,
-    time_limit: TimeLimit = None,
-    iteration_limit: int | None = None,
-    rng: np.random.Generator | None = None,
-    params: Mapping[str, Any] | None = None,
-    warm_start: Sequence[int] | None = None,
-    on_progress: OnProgress | None = None,
-) -> Result:
+def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | None = None) -> Result:
     """Solve the generalised TSP of a travel graph to proven optimality, or as far as time allows.
 
     An iteration is one linear or integer program solved. params : see `Params`.
     """
-    chosen = read_params(Params, "mip", params)
-    run = MipRun(
-        graph, time_limit, iteration_limit, on_progress,
-        rng=rng, search_rounds=chosen.search_rounds,
-    )  # fmt: skip
-    return run.solve(chosen.backend, warm_start)
+    chosen, limits = params or Params(), limits or Limits()
+    run = MipRun(graph, limits, search_rounds=chosen.search_rounds)
+    return run.solve(chosen.backend, limits.warm_start)
 
 
 class MipRun(SearchingRun):

@@ -20,14 +20,9 @@ from netsp.online.planner.base import DONE, Tethers
 from netsp.online.scene.field import DistanceField
 from netsp.online.scene.scene import Scene
 from netsp.online.scene.surfaces import extent
-from netsp.online.tether import GeodesicTether, ReactTether, Tether
+from netsp.online.tether import GeodesicTether, Tether, make_tether
 from netsp.online.vehicle import Vehicle, make_vehicle
 from netsp.online.water import Water
-
-MODELS: dict[str, Callable[[DistanceField, float], Tethers]] = {
-    "geodesic": GeodesicTether,
-    "react": ReactTether,
-}
 
 STEP = 0.1
 """Seconds between two decisions of the planner."""
@@ -136,10 +131,10 @@ def _check_size(mission: Mission) -> None:
 
 def simulate(
     mission: Mission,
-    planner: str = "predictive",
+    planner: str | Callable[..., Planner] = "predictive",
     *,
     vehicle: str = "kinematic",
-    tether_model: str = "geodesic",
+    tether: str | Callable[[DistanceField, float], Any] = "geodesic",
     options: Options | None = None,
     scene: Scene | None = None,
     field: DistanceField | None = None,
@@ -151,8 +146,11 @@ def simulate(
 
     Parameters
     ----------
-    planner : name (`netsp.online.planner.PLANNERS`). options : how it finds ways.
-    tether_model : geodesic or react: what the planner believes; what is logged is the geodesic one.
+    planner : name (`netsp.online.planner.PLANNERS`), or a callable that makes one, such as a class
+        derived from `Planner`. options : how it finds ways.
+    tether : the model that the planner believes: geodesic, react, or a callable that makes a
+        `netsp.online.tether.TetherModel` of a field and a resolution; what is logged is the
+        geodesic one.
     vehicle : name (`netsp.online.vehicle.VEHICLES`). seed : of the gusts.
     scene, field : when they are at hand.
     snap : move waypoints out of solids. on_step : is told every row; a KeyboardInterrupt ends the
@@ -168,16 +166,14 @@ def simulate(
     field = field or scene.field()
     mission = mission.checked_waypoints(field, snap=snap)
     tethers = GeodesicTether(field, mission.delta)
-    tether = tethers.start(mission.anchor, mission.start)
-    if tether.length > mission.tether_length:
+    taut = tethers.start(mission.anchor, mission.start)
+    if taut.length > mission.tether_length:
         raise InputError(
             f"tether_length: {mission.tether_length:g} is shorter than the way from anchor to "
-            f"start, {tether.length:.4g}"
+            f"start, {taut.length:.4g}"
         )
     robot = make_vehicle(vehicle, np.array(mission.start), mission.speed)
-    if tether_model not in MODELS:
-        raise InputError(f"--tether-model: expected {' or '.join(MODELS)}, got {tether_model!r}")
-    believed = None if tether_model == "geodesic" else MODELS[tether_model](field, mission.delta)
+    believed = None if tether == "geodesic" else make_tether(tether, field, mission.delta)
     chosen = make_planner(
         planner, mission, field, believed or tethers, grid_of(mission, scene, field), options
     )
@@ -187,8 +183,8 @@ def simulate(
         patches = patches_of(scene, field, mission.camera.patch, places, mission.inspect)
         coverage = Coverage(patches, field, mission.camera)
     water = Water(mission.current, mission.gusts, seed)
-    chosen.warm_up(robot.position, tether)
-    world = Simulation(mission, field, robot, tethers, tether, water, coverage, believed)
+    chosen.warm_up(robot.position, taut)
+    world = Simulation(mission, field, robot, tethers, taut, water, coverage, believed)
     if believed is not None:
         world.believed = believed.start(mission.anchor, mission.start)
     since, interrupted = (0.0, -1), False
@@ -217,7 +213,13 @@ def simulate(
         interrupted = True
     wall = time.perf_counter() - begin
     summary = summarise(mission, chosen, world, wall, interrupted)
-    return Run(mission, planner, tuple(world.log), world.tether, summary)
+    return Run(
+        mission,
+        planner if isinstance(planner, str) else chosen.name,
+        tuple(world.log),
+        world.tether,
+        summary,
+    )
 
 
 def summarise(

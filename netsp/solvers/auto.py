@@ -13,23 +13,21 @@ bound is weak, and true.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from netsp.arrays import Floats
-from netsp.clock import Clock, TimeLimit
+from netsp.clock import Clock
 from netsp.lns import Instance
 from netsp.lns.solve import solve as search
 from netsp.mip.solve import MipRun
 from netsp.mip.solve import solve as prove
 from netsp.solvers import exact
-from netsp.solving.params import read_params
+from netsp.solving.limits import Limits
 from netsp.solving.run import Run
 from netsp.travel.graph import TravelGraph, least_tethers
-from netsp.travel.result import OnProgress, Progress, Result
+from netsp.travel.result import Progress, Result
 
 PROVABLE = 10_000
 """Most vertices of a travel graph that `mip` is asked to bound: about 4 GiB of matrices."""
@@ -59,42 +57,26 @@ class Params:
         MipParams(backend=self.backend)
 
 
-def solve(
-    graph: TravelGraph,
-    *,
-    time_limit: TimeLimit = None,
-    iteration_limit: int | None = None,
-    rng: np.random.Generator | None = None,
-    params: Mapping[str, Any] | None = None,
-    warm_start: Sequence[int] | None = None,
-    on_progress: OnProgress | None = None,
-) -> Result:
+def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | None = None) -> Result:
     """Solve by size. Iterations are those of the solver chosen."""
-    chosen = read_params(Params, "auto", params)
+    chosen, limits = params or Params(), limits or Limits()
     if exact.fits(graph):
-        small = Run(graph, time_limit, iteration_limit, on_progress)
+        small = Run(graph, limits)
         with small.until_stopped():
-            small.offer(warm_start)
+            small.offer(limits.warm_start)
             if not small.trivial():
                 exact.solve(small)
         return small.finish("proven" if small.done else "exact")
     if len(graph) <= PROVABLE:
         rounds = max(500, ROUNDS_PER_GOAL * graph.goal_count)
-        run = MipRun(graph, time_limit, iteration_limit, on_progress, rng=rng, search_rounds=rounds)
-        return run.solve(chosen.backend, warm_start, walks=graph.goal_count <= FEW_GOALS)
-    clock = Clock.of(time_limit)
+        run = MipRun(graph, limits, search_rounds=rounds)
+        return run.solve(chosen.backend, limits.warm_start, walks=graph.goal_count <= FEW_GOALS)
+    clock = Clock.of(limits.time)
+    limits = replace(limits, time=clock)
     if graph.goal_count <= FEW_GOALS and graph.roadmapped:
-        return _over_shortest(
-            graph, clock, iteration_limit, rng, chosen.backend, warm_start, on_progress
-        )
-    found = search(
-        graph,
-        time_limit=Clock(SHARE * clock.left, within=clock) if clock.limit else None,
-        iteration_limit=iteration_limit,
-        rng=rng,
-        warm_start=warm_start,
-        on_progress=on_progress,
-    )
+        return _over_shortest(graph, limits, chosen.backend)
+    share = Clock(SHARE * clock.left, within=clock) if clock.limit else None
+    found = search(graph, limits=replace(limits, time=share))
     if found.length is None:
         return found
     length = found.length
@@ -102,11 +84,11 @@ def solve(
 
     def tell(row: Progress) -> None:
         rows.append(replace(row, stage="goals", incumbent=length))
-        if on_progress:
-            on_progress(rows[-1])
+        if limits.on_progress:
+            limits.on_progress(rows[-1])
 
     over_goals = TravelGraph.from_costs(_between_goals(graph), range(graph.goal_count + 1))
-    bound = prove(over_goals, time_limit=clock, rng=rng, on_progress=tell).lower_bound
+    bound = prove(over_goals, limits=Limits(clock, rng=limits.rng, on_progress=tell)).lower_bound
     return replace(
         found,
         # the ways are shortest up to rounding
@@ -115,24 +97,20 @@ def solve(
     )
 
 
-def _over_shortest(
-    graph: TravelGraph, clock: Clock, iteration_limit: int | None,
-    rng: np.random.Generator | None, backend: str, warm_start: Sequence[int] | None,
-    on_progress: OnProgress | None,
-) -> Result:  # fmt: skip
+def _over_shortest(graph: TravelGraph, limits: Limits, backend: str) -> Result:
     """Prove over the classes of least tether; tours by way of the others are bounded by the way
     there and back."""
     core = least_tethers(graph.costs_to_base, graph.cluster, MOST_KEPT // graph.goal_count)
-    if warm_start is not None:
-        core = np.union1d(core, np.asarray(warm_start, dtype=np.int64))
+    given = limits.warm_start
+    if given is not None:
+        core = np.union1d(core, np.asarray(given, dtype=np.int64))
     others = np.ones(len(graph), dtype=bool)
     others[core] = False
     place = {int(v): k for k, v in enumerate(core)}
-    warm = None if warm_start is None else [place[int(v)] for v in warm_start]
+    warm = None if given is None else [place[int(v)] for v in given]
     run = MipRun(
-        graph.subgraph(core), clock, iteration_limit, on_progress, rng=rng,
-        search_rounds=max(500, ROUNDS_PER_GOAL * graph.goal_count),
-    )  # fmt: skip
+        graph.subgraph(core), limits, search_rounds=max(500, ROUNDS_PER_GOAL * graph.goal_count)
+    )
     found = run.solve(backend, warm, walks=True)
     if found.tour is None:
         return found

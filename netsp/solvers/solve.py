@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
-import importlib.metadata
 import inspect
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -13,53 +11,18 @@ import numpy as np
 from netsp.clock import Clock, TimeLimit
 from netsp.errors import InputError
 from netsp.problem import Problem
+from netsp.registry import load
 from netsp.solution import Solution, Timings
 from netsp.solvers.answer import to_solution
-from netsp.solving.params import read_params
+from netsp.solvers.custom import call
+from netsp.solvers.table import ROADMAPS, SOLVERS
+from netsp.solving.limits import Limits
+from netsp.solving.params import NoParams, read_params
 from netsp.travel.graph import TravelGraph
 from netsp.travel.result import OnProgress, Result
 
-SOLVERS: dict[str, str] = {
-    "auto": "netsp.solvers.auto:solve",
-    "mip": "netsp.mip.solve:solve",
-    "dp": "netsp.dp.solve:solve",
-    "reduced-mip": "netsp.mip.reduced:solve",
-    "lns": "netsp.lns.solve:solve",
-    "anneal": "netsp.anneal.icra2017:solve",
-    "anneal-2016": "netsp.anneal.rss2016:solve",
-    "greedy": "netsp.greedy.backtracking:solve",
-    "greedy-2016": "netsp.greedy.backtracking:solve_2016",
-    "greedy-tsp": "netsp.greedy.blind:solve",
-}
-"""Solver name → where its `solve(graph, …) -> Result` lives."""
-
-PARAMS: dict[str, str] = {
-    "auto": "netsp.solvers.auto:Params",
-    "mip": "netsp.mip.solve:Params",
-    "dp": "netsp.dp.solve:Params",
-    "reduced-mip": "netsp.mip.reduced:ReducedParams",
-    "lns": "netsp.lns.solve:Params",
-    "anneal": "netsp.anneal.icra2017:Params",
-    "anneal-2016": "netsp.anneal.rss2016:Params",
-    "greedy": "netsp.greedy.backtracking:Params",
-    "greedy-2016": "netsp.greedy.backtracking:NoParams",
-    "greedy-tsp": "netsp.greedy.backtracking:NoParams",
-}
-"""Solver name → the dataclass of its options."""
-
-BLIND = frozenset({"greedy-tsp"})
-"""Baselines blind to the tether: their tours may be `invalid`."""
-
-GEOMETRIC = frozenset({"anneal-2016", "greedy-tsp"})
-"""Solvers that need the ways beneath a travel graph, so no graph made from costs will do."""
-
-ROADMAPS: dict[str, str] = {
-    "taut": "netsp.roadmap.taut:TautRoadmap",
-    "prm": "netsp.roadmap.prm:PrmRoadmap",
-}
-"""Roadmap name → class with `travel_graph()`."""
-
-SEEDED_ROADMAPS = frozenset({"prm"})
+SolverLike = str | Callable[..., Any]
+"""A solver's name, or a callable that takes a travel graph (`netsp.solvers.custom`)."""
 
 LARGEST_SEED = 2**62
 
@@ -71,13 +34,6 @@ DEFAULT_SOLVER = "auto"
 DEFAULT_ROADMAP = "taut"
 
 
-def _load(table: Mapping[str, str], kind: str, name: str) -> Any:
-    if not isinstance(name, str) or name not in table:
-        raise InputError(f"{kind}: unknown {name!r}; expected one of {', '.join(table)}")
-    module, attribute = table[name].split(":")
-    return getattr(importlib.import_module(module), attribute)
-
-
 def build_roadmap(problem: Problem, roadmap: str = DEFAULT_ROADMAP, **options: Any) -> Any:
     """The named roadmap over a problem.
 
@@ -85,7 +41,7 @@ def build_roadmap(problem: Problem, roadmap: str = DEFAULT_ROADMAP, **options: A
     """
     if not isinstance(problem, Problem):
         raise InputError(f"problem: expected a Problem, got {problem!r}")
-    build = _load(ROADMAPS, "roadmap", roadmap)
+    build = load(ROADMAPS.named(roadmap).build)
     known = {k for k, p in inspect.signature(build).parameters.items() if p.kind == p.KEYWORD_ONLY}
     unknown = sorted(set(options) - known)
     if unknown:
@@ -112,7 +68,7 @@ def travel_graph(problem: Problem, roadmap: str = DEFAULT_ROADMAP, **options: An
 
 def solve_graph(
     graph: TravelGraph,
-    solver: str = DEFAULT_SOLVER,
+    solver: SolverLike = DEFAULT_SOLVER,
     *,
     time_limit: TimeLimit = None,
     iteration_limit: int | None = None,
@@ -130,6 +86,8 @@ def solve_graph(
     iteration_limit : of the solver; each says what one is. Under an iteration limit alone, the same
         seed gives the same answer.
     seed : of the solver's random generator.
+    solver : a name, or a callable `f(graph) -> tour`; it may ask for `params`, `limits`, `rng` and
+        more by name (`netsp.solvers.custom.call`).
     params : the solver's options by name.
     warm_start : a tour to start from, as vertices from 0 on.
 
@@ -141,7 +99,7 @@ def solve_graph(
     >>> solve_graph(TravelGraph.from_costs(costs, clusters=[0, 1, 2, 2])).length
     8.0
     """
-    run: Callable[..., Result] = _load(SOLVERS, "solver", solver)
+    check_solver(solver, params)
     _check_limits(time_limit, iteration_limit)
     if not isinstance(graph, TravelGraph):
         raise InputError(f"graph: expected a TravelGraph, got {graph!r}")
@@ -149,21 +107,33 @@ def solve_graph(
     rng = np.random.default_rng(_seed(seed))
     clock = Clock.of(time_limit)
     with graph.on_clock(clock):
-        result = run(
-            graph,
-            time_limit=clock,
-            iteration_limit=iteration_limit,
-            rng=rng,
-            params=params,
-            warm_start=tour,
-            on_progress=graph.telling(on_progress),
-        )
+        limits = Limits(clock, iteration_limit, rng, tour, graph.telling(on_progress))
+        result = _run(graph, solver, params, limits)
     return graph.told(result)
+
+
+def _run(
+    graph: TravelGraph, solver: SolverLike, params: Mapping[str, Any] | None, limits: Limits
+) -> Result:
+    """Call a solver: ours with its options read and checked, others' with what they ask for."""
+    if callable(solver):
+        return call(solver, name_of(solver), graph, params, limits)
+    record = SOLVERS.named(solver)
+    if record.ours:
+        kind = load(record.params) if record.params else NoParams
+        run: Callable[..., Result] = load(record.function)
+        return run(graph, read_params(kind, solver, params), limits)
+    return call(load(record.function), solver, graph, params, limits)
+
+
+def name_of(solver: SolverLike) -> str:
+    """What a solution file calls its solver."""
+    return solver if isinstance(solver, str) else getattr(solver, "__name__", "custom")
 
 
 def solve(
     problem: Problem,
-    solver: str = DEFAULT_SOLVER,
+    solver: SolverLike = DEFAULT_SOLVER,
     *,
     roadmap: str = DEFAULT_ROADMAP,
     roadmap_options: Mapping[str, Any] | None = None,
@@ -178,6 +148,7 @@ def solve(
 
     Parameters
     ----------
+    solver : as of `solve_graph`.
     roadmap_options : for ``taut``: ``classes``, ``max_classes``; for ``prm``: ``samples``,
         ``shortcut``.
     time_limit : seconds for the whole call; the best tour so far is returned when it is up.
@@ -210,7 +181,7 @@ def solve(
     check_solver(solver, params)  # before the long work
     clock = Clock(time_limit)
     options: dict[str, Any] = {"time_limit": clock, **(roadmap_options or {})}
-    if roadmap in SEEDED_ROADMAPS:
+    if ROADMAPS.named(roadmap).seeded:
         options.setdefault("seed", seed)
     graph = travel_graph(problem, roadmap, **options)
     built = clock.elapsed
@@ -233,13 +204,16 @@ def solve(
         solve_s=round(max(total - built - graph.legs_s, 0.0), 6),
         total_s=round(total, 6),
     )
-    return to_solution(problem, graph, result, solver, seed, timings)
+    return to_solution(problem, graph, result, name_of(solver), seed, timings)
 
 
-def check_solver(solver: str, params: Mapping[str, Any] | None) -> None:
+def check_solver(solver: SolverLike, params: Mapping[str, Any] | None) -> None:
     """InputError if there is no such solver, or an option of it is unknown or out of range."""
-    _load(SOLVERS, "solver", solver)
-    read_params(_load(PARAMS, "solver", solver), solver, params)
+    if callable(solver):
+        return
+    record = SOLVERS.named(solver)
+    if record.ours:
+        read_params(load(record.params) if record.params else NoParams, solver, params)
 
 
 def _check_limits(time_limit: TimeLimit, iteration_limit: int | None) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from typing import Any, TypeVar
 
 from netsp.errors import InputError
@@ -46,3 +46,8 @@ def _typed(what: str, value: Any, default: Any) -> Any:
     if not math.isfinite(number):
         raise InputError(f"{what}: expected a finite number, got {value!r}")
     return number
+
+
+@dataclass(frozen=True)
+class NoParams:
+    """This solver takes no options."""

@@ -9,11 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from netsp.clock import Clock, TimeLimit
+from netsp.clock import Clock
 from netsp.errors import LimitReachedError, MemoryLimitError
 from netsp.solution import Status
+from netsp.solving.limits import Limits
 from netsp.travel.graph import UNTIMED, TravelGraph, least_tethers
-from netsp.travel.result import OnProgress, Progress, Result, proven
+from netsp.travel.result import Progress, Result, proven
 
 
 class Stop(Exception):
@@ -27,18 +28,14 @@ class Run:
     end a run with the best tour so far.
     """
 
-    def __init__(
-        self,
-        graph: TravelGraph,
-        time_limit: TimeLimit = None,
-        iteration_limit: int | None = None,
-        on_progress: OnProgress | None = None,
-    ) -> None:
+    def __init__(self, graph: TravelGraph, limits: Limits | None = None) -> None:
+        limits = limits or Limits()
         self.graph = graph
-        self.clock = Clock.of(time_limit)
+        self.clock = Clock.of(limits.time)
         self.iterations = 0
-        self.iteration_limit = math.inf if iteration_limit is None else iteration_limit
-        self.on_progress = on_progress
+        self.iteration_limit = math.inf if limits.iterations is None else limits.iterations
+        self.on_progress = limits.on_progress
+        self.rng = limits.rng
         self.trace: list[Progress] = []
         self.tour: tuple[int, ...] | None = None
         self.walk: tuple[int, ...] | None = None

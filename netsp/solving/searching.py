@@ -17,14 +17,15 @@ from typing import Any, Self
 import numpy as np
 
 from netsp.arrays import Ints
-from netsp.clock import Clock, TimeLimit
+from netsp.clock import Clock
 from netsp.errors import LimitReachedError
 from netsp.lns.layers import Instance
 from netsp.lns.search import Search
 from netsp.solving.legcosts import MEASURE_AT_ONCE, LegCosts
+from netsp.solving.limits import Limits
 from netsp.solving.run import Run, Stop
 from netsp.travel.graph import TravelGraph, least_tethers
-from netsp.travel.result import OPTIMALITY_TOLERANCE, OnProgress
+from netsp.travel.result import OPTIMALITY_TOLERANCE
 
 CORE = 800
 """About so many vertices, those of least tether, are measured for the heuristic while the other
@@ -54,15 +55,11 @@ class SearchingRun(Run):
     def __init__(
         self,
         graph: TravelGraph,
-        time_limit: TimeLimit = None,
-        iteration_limit: int | None = None,
-        on_progress: OnProgress | None = None,
+        limits: Limits | None = None,
         *,
-        rng: np.random.Generator | None = None,
         search_rounds: int = 500,
     ) -> None:
-        super().__init__(graph, time_limit, iteration_limit, on_progress)
-        self.rng = rng or np.random.default_rng(0)
+        super().__init__(graph, limits)
         self.search_rounds = search_rounds
         self.outer: tuple[SearchingRun, Ints] | None = None
         self.bound = 0.0
@@ -94,8 +91,8 @@ class SearchingRun(Run):
         core = np.union1d(core, np.array(self.tour or (0,), dtype=np.int64))
         limit = CORE_SHARE * self.clock.left if self.clock.limit is not None else None
         inner = type(self)(
-            graph.subgraph(core), Clock(limit, within=self.clock),
-            rng=self.rng, search_rounds=self.search_rounds,
+            graph.subgraph(core), Limits(Clock(limit, within=self.clock), rng=self.rng),
+            search_rounds=self.search_rounds,
         )  # fmt: skip
         inner.iteration_limit = self.iteration_limit - self.iterations
         inner.outer = self, core

@@ -14,6 +14,7 @@ from netsp.online.planner.predictive import PredictivePlanner
 from netsp.online.planner.react import ReactPlanner
 from netsp.online.scene.field import DistanceField
 from netsp.online.tether import GeodesicTether
+from netsp.registry import Registry, later
 
 
 def _draft(
@@ -22,31 +23,35 @@ def _draft(
     return ReactPlanner(mission, scene, tethers, grid, options, draft=True)
 
 
-PLANNERS: dict[str, Callable[..., Planner]] = {
-    "predictive": PredictivePlanner,
-    "react": ReactPlanner,
-    "react-draft": _draft,
-    "none": Planner,
-}
+PLANNERS: Registry[Callable[..., Planner]] = Registry(
+    "planner",
+    "netsp.planners",
+    {
+        "predictive": PredictivePlanner,
+        "react": ReactPlanner,
+        "react-draft": _draft,
+        "none": Planner,
+    },
+    later,
+)
+"""Name → what makes a planner of (mission, field, tether model, grid, options)."""
 
 
 def make_planner(
-    name: str, mission: Mission, scene: DistanceField, tethers: Tethers, grid: Grid,
-    options: Options | None = None,
+    name: str | Callable[..., Planner], mission: Mission, scene: DistanceField, tethers: Tethers,
+    grid: Grid, options: Options | None = None,
 ) -> Planner:  # fmt: skip
-    """A planner by name. InputError for a name that is none, of the planner or in its options."""
+    """A planner by name, or made by a callable. InputError for a name that is none, of the planner
+    or in its options."""
     options = options or Options()
-    if name not in PLANNERS:
-        raise InputError(f"--planner: expected {', '.join(PLANNERS)}, got {name!r}")
+    make = name if callable(name) else PLANNERS.named(name)
     if options.ways not in (known := ("tree", *OMPL_PLANNERS)):
-        raise InputError(f"--ways: expected {', '.join(known)}, got {options.ways!r}")
+        raise InputError(f"ways: expected {', '.join(known)}, got {options.ways!r}")
     if options.refine not in (None, *REFINEMENTS):
-        raise InputError(f"--refine: expected {', '.join(REFINEMENTS)}, got {options.refine!r}")
+        raise InputError(f"refine: expected {', '.join(REFINEMENTS)}, got {options.refine!r}")
     if name == "predictive" and not isinstance(tethers, GeodesicTether):
-        raise InputError(
-            f"--tether-model: planner 'predictive' needs geodesic, got {tethers.name!r}"
-        )
-    return PLANNERS[name](mission, scene, tethers, grid, options)
+        raise InputError(f"tether: planner 'predictive' needs geodesic, got {tethers.name!r}")
+    return make(mission, scene, tethers, grid, options)
 
 
 __all__ = ["PLANNERS", "Command", "Options", "Planner", "make_planner"]

@@ -159,7 +159,7 @@ class Planner:
 
     def pulled(self, way: Floats) -> Floats:
         """A way pulled taut in its class, at the clearance."""
-        return taut(self.scene, way, self.mission.clearance, self.tethers.delta)
+        return taut(self.scene, way, self.mission.clearance, self.mission.delta)
 
     def is_free(self, way: Floats) -> bool:
         """Whether a straight way keeps the clearance, or what its ends have of it."""

@@ -102,7 +102,7 @@ class PredictivePlanner(Planner):
         one look closer.
         """
         most = max(limit, tether.length + 1e-6)
-        fine = max(0.5 * self.tethers.delta, 0.02)
+        fine = max(0.5 * self.mission.delta, 0.02)
         points = dense(way, COARSE * fine)
         _, lengths = self.tethers.drive(tether, points)
         if lengths.max(initial=0.0) > most:
@@ -207,4 +207,4 @@ class PredictivePlanner(Planner):
         """Length of the shortest tether from the anchor to a place."""
         tree = self.ways(np.array([self.mission.anchor]))
         way = tree.way(0)
-        return None if way is None else length_of(taut(self.scene, way, 0.0, self.tethers.delta))
+        return None if way is None else length_of(taut(self.scene, way, 0.0, self.mission.delta))

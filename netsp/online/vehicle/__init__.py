@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
-from netsp.errors import InputError
 from netsp.online.vehicle.kinematic import KinematicVehicle, Vehicle
+from netsp.registry import Registry, later
 
 
 def _bluerov2(place: npt.NDArray[np.float64], speed: float) -> Vehicle:
@@ -17,10 +17,13 @@ def _bluerov2(place: npt.NDArray[np.float64], speed: float) -> Vehicle:
     return BlueRov2(place, speed)
 
 
-VEHICLES: dict[str, Callable[[npt.NDArray[np.float64], float], Vehicle]] = {
-    "kinematic": KinematicVehicle,
-    "bluerov2": _bluerov2,
-}
+VEHICLES: Registry[Callable[[npt.NDArray[np.float64], float], Vehicle]] = Registry(
+    "vehicle",
+    "netsp.vehicles",
+    {"kinematic": KinematicVehicle, "bluerov2": _bluerov2},
+    later,
+)
+"""Name → what makes a vehicle of a place (3,) and a speed."""
 
 
 def make_vehicle(name: str, place: npt.NDArray[np.float64], speed: float) -> Vehicle:
@@ -30,9 +33,7 @@ def make_vehicle(name: str, place: npt.NDArray[np.float64], speed: float) -> Veh
     ------
     InputError : a name that is none.
     """
-    if name not in VEHICLES:
-        raise InputError(f"--vehicle: expected {' or '.join(VEHICLES)}, got {name!r}")
-    return VEHICLES[name](place, speed)
+    return VEHICLES.named(name)(place, speed)
 
 
 __all__ = ["VEHICLES", "KinematicVehicle", "Vehicle", "make_vehicle"]

@@ -1,0 +1,1 @@
+"""A solver, a tether model and a planner for netsp by other hands."""

@@ -1,0 +1,87 @@
+"""Named things of one kind, ours and other packages': the doors of netsp.
+
+A package adds to a kind by an entry point in its `pyproject.toml`, and the name then works wherever
+ours do, in study files and on the command line too:
+
+    [project.entry-points."netsp.solvers"]
+    my-solver = "my_package:solve"
+"""
+
+from __future__ import annotations
+
+import importlib
+import importlib.metadata
+from collections.abc import Callable, Iterator, MutableMapping
+from functools import cached_property
+from typing import Any, Generic, TypeVar
+
+from netsp.errors import InputError
+
+R = TypeVar("R")
+
+
+class Registry(MutableMapping[str, R], Generic[R]):
+    """Records by name, ours first, in order.
+
+    kind : what messages call them. group : of the entry points. own : our records. record : makes
+    the record of another package's entry point from its name and ``module:attribute``.
+    """
+
+    def __init__(
+        self, kind: str, group: str, own: dict[str, R], record: Callable[[str, str], R]
+    ) -> None:
+        self.kind, self.group, self._own, self._record = kind, group, own, record
+
+    @cached_property
+    def _offered(self) -> dict[str, R]:
+        """Of other packages; a name of ours cannot be taken."""
+        found = importlib.metadata.entry_points(group=self.group)
+        return {e.name: self._record(e.name, e.value) for e in found if e.name not in self._own}
+
+    def __getitem__(self, name: str) -> R:
+        if name in self._own:
+            return self._own[name]
+        return self._offered[name]
+
+    def __setitem__(self, name: str, record: R) -> None:
+        self._own[name] = record
+
+    def __delitem__(self, name: str) -> None:
+        del self._own[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter({**self._own, **self._offered})
+
+    def __len__(self) -> int:
+        return len({**self._own, **self._offered})
+
+    def named(self, name: object) -> R:
+        """The record of a name; InputError, which tells the choices, for a name that is none."""
+        if not isinstance(name, str) or name not in self:
+            raise InputError(f"{self.kind}: unknown {name!r}; expected one of {', '.join(self)}")
+        return self[name]
+
+
+def later(name: str, where: str) -> Callable[..., Any]:
+    """The record of kinds whose records are callables: loaded when first called."""
+    del name
+    return lambda *args, **more: load(where)(*args, **more)
+
+
+def load(where: str) -> Any:
+    """What ``module:attribute`` names.
+
+    Raises
+    ------
+    InputError : another package's, which cannot be imported.
+    """
+    module, _, attribute = where.partition(":")
+    try:
+        found: Any = importlib.import_module(module)
+        for part in attribute.split("."):
+            found = getattr(found, part)
+    except (ImportError, AttributeError) as error:
+        if module.split(".")[0] == "netsp":
+            raise
+        raise InputError(f"{where}: cannot be loaded: {error}") from None
+    return found

@@ -1,0 +1,82 @@
+"""The solvers and roadmaps there are, one record each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from netsp.registry import Registry
+
+
+@dataclass(frozen=True)
+class Solver:
+    """A solver by name.
+
+    Attributes
+    ----------
+    function : ``module:attribute`` of `(graph, params, limits) -> Result`, or of any callable that
+        `netsp.solvers.custom` can call.
+    params : ``module:attribute`` of the dataclass of its options; None if it takes none.
+    geometric : needs the paths beneath a travel graph, so no graph made from costs will do.
+    blind : a baseline blind to the tether, whose tours may be `invalid`.
+    """
+
+    name: str
+    function: str
+    params: str | None = None
+    geometric: bool = False
+    blind: bool = False
+
+    @property
+    def ours(self) -> bool:
+        """Whether it takes `(graph, params, limits)`."""
+        return self.function.startswith("netsp.")
+
+
+@dataclass(frozen=True)
+class RoadmapKind:
+    """A roadmap by name. build : ``module:attribute`` of a class over a problem with
+    `travel_graph()`. seeded : its samples are drawn with the run's seed."""
+
+    name: str
+    build: str
+    seeded: bool = False
+
+
+SOLVERS: Registry[Solver] = Registry(
+    "solver",
+    "netsp.solvers",
+    {
+        s.name: s
+        for s in (
+            Solver("auto", "netsp.solvers.auto:solve", "netsp.solvers.auto:Params"),
+            Solver("mip", "netsp.mip.solve:solve", "netsp.mip.solve:Params"),
+            Solver("dp", "netsp.dp.solve:solve", "netsp.dp.solve:Params"),
+            Solver("reduced-mip", "netsp.mip.reduced:solve", "netsp.mip.reduced:ReducedParams"),
+            Solver("lns", "netsp.lns.solve:solve", "netsp.lns.solve:Params"),
+            Solver("anneal", "netsp.anneal.icra2017:solve", "netsp.anneal.icra2017:Params"),
+            Solver(
+                "anneal-2016", "netsp.anneal.rss2016:solve", "netsp.anneal.rss2016:Params",
+                geometric=True,
+            ),
+            Solver(
+                "greedy", "netsp.greedy.backtracking:solve", "netsp.greedy.backtracking:Params"
+            ),
+            Solver("greedy-2016", "netsp.greedy.backtracking:solve_2016"),
+            Solver("greedy-tsp", "netsp.greedy.blind:solve", geometric=True, blind=True),
+        )
+    },
+    lambda name, where: Solver(name, where),
+)  # fmt: skip
+
+ROADMAPS: Registry[RoadmapKind] = Registry(
+    "roadmap",
+    "netsp.roadmaps",
+    {
+        r.name: r
+        for r in (
+            RoadmapKind("taut", "netsp.roadmap.taut:TautRoadmap"),
+            RoadmapKind("prm", "netsp.roadmap.prm:PrmRoadmap", seeded=True),
+        )
+    },
+    lambda name, where: RoadmapKind(name, where),
+)

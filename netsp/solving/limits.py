@@ -1,0 +1,31 @@
+"""What a run of a solver is given besides its graph and its options."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from netsp.clock import TimeLimit
+from netsp.travel.result import OnProgress
+
+
+@dataclass(frozen=True)
+class Limits:
+    """How long a solver may work, where it starts, and who listens.
+
+    Attributes
+    ----------
+    time : seconds, or the clock of the run that the work belongs to; None for no limit.
+    iterations : of the solver, which says what one is; None for no limit.
+    rng : of all that is random.
+    warm_start : a tour to start from, as vertices from 0 on.
+    on_progress : called with a `netsp.travel.result.Progress` now and then.
+    """
+
+    time: TimeLimit = None
+    iterations: int | None = None
+    rng: np.random.Generator = field(default_factory=lambda: np.random.default_rng(0))
+    warm_start: Sequence[int] | None = None
+    on_progress: OnProgress | None = None

@@ -1,0 +1,169 @@
+"""Other people's solvers, tether models and planners: by entry points, and as plain callables."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from netsp import InputError, Problem, TravelGraph, solve, solve_graph, verify
+from netsp.online import GeodesicTether, Scene
+from netsp.online.mission import Mission
+from netsp.online.planner import Planner
+from netsp.online.simulate import simulate
+from netsp.registry import Registry
+from netsp.travel.result import Result
+
+ROOT = Path(__file__).resolve().parent.parent
+WHARF = ROOT / "problems" / "wharf.json"
+
+
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory):
+    """The example package as pip would install it: its modules, and its entry points beside them.
+
+    pip itself is not asked: it would need an index for the build's requirements."""
+    import tomllib
+
+    place = tmp_path_factory.mktemp("site")
+    (place / "netsp_plugin").symlink_to(ROOT / "examples" / "plugin" / "netsp_plugin")
+    project = tomllib.loads((ROOT / "examples" / "plugin" / "pyproject.toml").read_text())[
+        "project"
+    ]
+    info = place / f"netsp_plugin-{project['version']}.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text(
+        f"Metadata-Version: 2.1\nName: {project['name']}\nVersion: {project['version']}\n"
+    )
+    groups = [
+        f"[{group}]\n" + "".join(f"{name} = {where}\n" for name, where in names.items())
+        for group, names in project["entry-points"].items()
+    ]
+    (info / "entry_points.txt").write_text("\n".join(groups))
+    return {**os.environ, "PYTHONPATH": str(place)}
+
+
+def netsp(env, *args, cwd):
+    return subprocess.run(
+        [sys.executable, "-m", "netsp", *map(str, args)],
+        env=env, cwd=cwd, capture_output=True, text=True, timeout=300,
+    )  # fmt: skip
+
+
+def test_a_solver_of_another_package_works_on_the_command_line(installed, tmp_path):
+    done = netsp(installed, "solve", WHARF, "--solver", "sweep", "-o", "s.json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    found = json.loads((tmp_path / "s.json").read_text())
+    assert (found["solver"], found["status"]) == ("sweep", "feasible")
+    assert netsp(installed, "verify", WHARF, "s.json", cwd=tmp_path).returncode == 0
+    option = ("--option", "shuffle=1", "--seed", "3", "--quiet")
+    again = netsp(installed, "solve", WHARF, "--solver", "sweep", *option, cwd=tmp_path)
+    assert json.loads(again.stdout)["tour"] != found["tour"]
+
+
+def test_a_solver_of_another_package_works_in_a_study(installed, tmp_path):
+    (tmp_path / "study.toml").write_text(
+        'name = "mine"\ngoals = [4]\ntether_lengths = [250]\n[worlds]\ncount = 2\n'
+        '[[solvers]]\nname = "sweep"\n[[solvers]]\nname = "auto"\n'
+    )
+    done = netsp(installed, "compare", "study.toml", "-o", "r.jsonl", "--quiet", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    rows = [json.loads(line) for line in (tmp_path / "r.jsonl").read_text().splitlines()]
+    assert sorted(r["solver"]["name"] for r in rows) == ["auto", "auto", "sweep", "sweep"]
+    assert {r["status"] for r in rows} == {"optimal", "feasible"}
+
+
+def test_a_tether_model_and_a_planner_of_another_package_fly(installed, tmp_path):
+    basin = ROOT / "missions" / "basin.json"
+    args = ("--planner", "cautious", "--tether-model", "straight", "-o", "run", "--quiet")
+    done = netsp(installed, "simulate", basin, *args, cwd=tmp_path)
+    assert done.returncode == 4, done.stderr  # some waypoints are left out
+    summary = json.loads((tmp_path / "run" / "summary.json").read_text())
+    assert summary["planner"] == "cautious"
+    assert 0 < summary["visited"] < summary["waypoints"]
+    assert "cautious" in summary["skipped"][0]["reason"]
+
+
+def test_a_plain_function_solves(tmp_path):
+    problem = Problem.load(WHARF)
+
+    def first_classes(graph):
+        return [0, *(int(graph.members(c)[0]) for c in range(1, graph.goal_count + 1))]
+
+    solution = solve(problem, solver=first_classes)
+    assert solution.solver == "first_classes"
+    assert verify(problem, solution)
+    assert solution.length >= solve(problem).length
+
+
+def test_a_function_may_claim_a_bound_but_not_more_than_its_tour():
+    graph = TravelGraph.from_costs([[0, 1, 5], [1, 0, 2], [5, 2, 0]], clusters=[0, 1, 2])
+    from netsp import Status
+
+    def boaster(graph, limits, rng):
+        assert limits.rng is rng
+        return Result((0, 1, 2), 1.0, 99.0, Status.OPTIMAL, ())
+
+    found = solve_graph(graph, boaster)
+    assert found.length == 8.0
+    assert found.lower_bound == 8.0
+
+
+@pytest.mark.parametrize("wrong", [[0], [1, 2], "abc", 7, [0, 1, 1], [0, 99, 2]])
+def test_what_is_no_tour_is_refused_in_one_line(wrong):
+    graph = TravelGraph.from_costs([[0, 1, 5], [1, 0, 2], [5, 2, 0]], clusters=[0, 1, 2])
+    with pytest.raises(InputError, match="expected vertices from 0 on"):
+        solve_graph(graph, lambda graph: wrong)
+
+
+def test_a_solver_without_options_refuses_them():
+    graph = TravelGraph.from_costs([[0, 1, 5], [1, 0, 2], [5, 2, 0]], clusters=[0, 1, 2])
+    with pytest.raises(InputError, match="unknown option 'depth'; it takes none"):
+        solve_graph(graph, lambda graph: [0, 1, 2], params={"depth": 3})
+
+
+def test_a_tether_model_and_a_planner_may_be_classes_of_ones_own():
+    seen = []
+
+    class Mine(GeodesicTether):
+        name = "mine"
+
+        def update(self, tether, robot, *more):
+            seen.append(np.asarray(robot))
+            return super().update(tether, robot, *more)
+
+    class Straight(Planner):
+        name = "straight on"
+
+    post = {"capsule": {"a": (0, 0, -3), "b": (0, 0, 3), "radius": 0.5}}
+    scene = Scene.model_validate({"schema_version": 1, "name": "post", "solids": [post]})
+    mission = Mission(
+        scene="-", anchor=(-2, 0, 0), start=(-2, 0.5, 0), tether_length=9.0,
+        waypoints=[(-2, 1, 0), (-2, 2, 0)], speed=0.5,
+    )  # fmt: skip
+    run = simulate(mission, Straight, tether=Mine, scene=scene)
+    assert run.planner == "straight on"
+    assert run.summary["visited"] == 2
+    assert len(seen) > 10
+
+
+def test_a_name_of_ours_cannot_be_taken_and_a_broken_package_costs_one_line(monkeypatch):
+    import importlib.metadata as metadata
+
+    offers = [
+        metadata.EntryPoint("auto", "elsewhere:solve", "netsp.solvers"),
+        metadata.EntryPoint("gone", "not_installed_at_all:solve", "netsp.solvers"),
+    ]
+    monkeypatch.setattr(metadata, "entry_points", lambda group: offers)
+    from netsp.registry import load
+
+    registry = Registry("solver", "netsp.solvers", {"auto": "ours"}, lambda name, where: where)
+    assert registry["auto"] == "ours"
+    assert list(registry) == ["auto", "gone"]
+    with pytest.raises(InputError, match="not_installed_at_all:solve: cannot be loaded"):
+        load(registry["gone"])
+    with pytest.raises(InputError, match="solver: unknown 'x'; expected one of auto, gone"):
+        registry.named("x")
