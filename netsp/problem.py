@@ -27,6 +27,7 @@ from pydantic import (
     model_validator,
 )
 
+from netsp.drawn import Drawn
 from netsp.fields import (
     POINT3_SCHEMA,
     STRICT,
@@ -53,9 +54,9 @@ class Circle(BaseModel):
     """A vertical cylinder of unlimited height, given by its plan: centre and radius."""
 
     model_config = STRICT
-    center: Point2
-    radius: Positive
-    name: Name | None = None
+    center: Annotated[Point2, Field(description="(x, y) of the axis, in the problem's units")]
+    radius: Annotated[Positive, Field(description="of the circle, in the problem's units")]
+    name: Annotated[Name | None, Field(description="shown in pictures and messages")] = None
 
     @property
     def representative_point(self) -> tuple[float, float]:
@@ -78,8 +79,11 @@ class Polygon(BaseModel):
     """A vertical prism of unlimited height over a simple polygon, convex or not."""
 
     model_config = STRICT
-    polygon: Annotated[tuple[Point2, ...], Field(min_length=3)]
-    name: Name | None = None
+    polygon: Annotated[
+        Annotated[tuple[Point2, ...], Field(min_length=3)],
+        Field(description="corners (x, y) in order, not closed, in the problem's units"),
+    ]
+    name: Annotated[Name | None, Field(description="shown in pictures and messages")] = None
 
     @model_validator(mode="after")
     def _simple(self) -> Self:
@@ -128,8 +132,10 @@ class Goal(BaseModel):
     """A point to inspect."""
 
     model_config = STRICT
-    position: Point3
-    name: Name | None = None
+    position: Annotated[
+        Point3, Field(description="(x, y) or (x, y, z) to visit, in the problem's units; z is up")
+    ]
+    name: Annotated[Name | None, Field(description="shown in pictures and messages")] = None
 
 
 def _goal(value: Any) -> Any:
@@ -159,11 +165,17 @@ class State(BaseModel):
     """Where a robot on a tether is: its position, and the word of the taut tether there."""
 
     model_config = STRICT
-    position: Point3
-    signature: tuple[int, ...] = ()
+    position: Annotated[Point3, Field(description="(x, y, z) of the robot, in the problem's units")]
+    signature: Annotated[
+        tuple[int, ...],
+        Field(
+            description="h-signature of its tether: obstacles numbered from 1 in the "
+            "order their rays are crossed, negative from right to left"
+        ),
+    ] = ()
 
 
-class Problem(BaseModel):
+class Problem(Drawn, BaseModel):
     """An instance of the Non-Entangling Travelling Salesperson Problem (McCammon & Hollinger 2017,
     section III).
 
@@ -192,31 +204,55 @@ class Problem(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", title="netsp problem")
 
-    schema_version: Literal[1] = 1
-    name: Name = "problem"
-    base: Point3
-    goals: Annotated[tuple[GoalLike, ...], Field(min_length=1)]
-    obstacles: tuple[Obstacle, ...] = ()
-    tether_length: Positive
-    clearance: NonNegative = 0.0
+    schema_version: Annotated[Literal[1], Field(description="of the file format")] = 1
+    name: Annotated[Name, Field(description="of the problem")] = "problem"
+    base: Annotated[
+        Point3,
+        Field(description="(x, y) or (x, y, z) where the tether is fixed, in the problem's units"),
+    ]
+    goals: Annotated[
+        Annotated[tuple[GoalLike, ...], Field(min_length=1)], Field(description="places to visit")
+    ]
+    obstacles: Annotated[
+        tuple[Obstacle, ...],
+        Field(
+            description="circles and polygons that stand vertically through all "
+            "depths; the tether and the robot keep out"
+        ),
+    ] = ()
+    tether_length: Annotated[
+        Positive, Field(description="most that the tether may be long, in the problem's units")
+    ]
+    clearance: Annotated[
+        NonNegative, Field(description="kept to all obstacles, in the problem's units")
+    ] = 0.0
     bounds: Annotated[
-        tuple[float, float, float, float] | None,
-        WithJsonSchema(
-            {
-                "anyOf": [
-                    {
-                        "type": "array",
-                        "items": {"type": "number"},
-                        "minItems": 4,
-                        "maxItems": 4,
-                    },
-                    {"type": "null"},
-                ]
-            }
+        Annotated[
+            tuple[float, float, float, float] | None,
+            WithJsonSchema(
+                {
+                    "anyOf": [
+                        {
+                            "type": "array",
+                            "items": {"type": "number"},
+                            "minItems": 4,
+                            "maxItems": 4,
+                        },
+                        {"type": "null"},
+                    ]
+                }
+            ),
+        ],
+        Field(
+            description="[xmin, ymin, xmax, ymax] of the workspace, in the problem's "
+            "units; null for none"
         ),
     ] = None
-    units: Name = "m"
-    state: State | None = None
+    units: Annotated[Name, Field(description="name of the unit of length")] = "m"
+    state: Annotated[
+        State | None,
+        Field(description="where the robot is already out, with its tether; null at the base"),
+    ] = None
 
     @field_validator("bounds", mode="before")
     @classmethod
@@ -338,6 +374,19 @@ class Problem(BaseModel):
         return f"obstacles[{i}]" + (f" ({name})" if name else "")
 
     # JSON in and out
+
+    def __repr__(self) -> str:
+        """In a line."""
+        return (
+            f"<Problem {self.name!r}: {len(self.goals)} goals, {len(self.obstacles)} obstacles, "
+            f"tether {self.tether_length:g} {self.units}>"
+        )
+
+    def plot(self, ax: Any = None) -> Any:
+        """The map, on axes of the caller or on new ones; returns the axes."""
+        from netsp.pictures.problem import draw_map
+
+        return draw_map(self, ax=ax)
 
     @classmethod
     def from_json(cls, text: str | bytes, *, source: str = "problem") -> Self:

@@ -5,13 +5,17 @@ from __future__ import annotations
 import json
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from netsp.drawn import Drawn
 from netsp.fields import STRICT, Name, NonNegative, Number, Point3
 from netsp.files import read_text, write_text
 from netsp.models import read_model
+
+if TYPE_CHECKING:
+    from netsp.problem import Problem
 
 
 class Status(StrEnum):
@@ -37,30 +41,36 @@ class ProblemReference(BaseModel):
     """Which problem a solution belongs to."""
 
     model_config = STRICT
-    name: Name
-    sha256: str
+    name: Annotated[Name, Field(description="of the problem")]
+    sha256: Annotated[str, Field(description="of what the answer depends on: all values but names")]
 
 
 class Visit(BaseModel):
     """One stop of the tour: the goal (0-based), the word of the tether there, its taut length."""
 
     model_config = STRICT
-    goal: Annotated[int, Field(ge=0)]
-    signature: tuple[int, ...]
-    tether_length: NonNegative
+    goal: Annotated[
+        Annotated[int, Field(ge=0)], Field(description="index in the problem's goals, from 0")
+    ]
+    signature: Annotated[
+        tuple[int, ...], Field(description="h-signature of the tether at the goal")
+    ]
+    tether_length: Annotated[
+        NonNegative, Field(description="of the taut tether at the goal, in the problem's units")
+    ]
 
 
 class Timings(BaseModel):
     """Wall-clock seconds by stage."""
 
     model_config = STRICT
-    roadmap_s: float = 0.0
-    matrix_s: float = 0.0
-    solve_s: float = 0.0
-    total_s: float = 0.0
+    roadmap_s: Annotated[float, Field(description="seconds to build the roadmap")] = 0.0
+    matrix_s: Annotated[float, Field(description="seconds to measure legs")] = 0.0
+    solve_s: Annotated[float, Field(description="seconds of the solver")] = 0.0
+    total_s: Annotated[float, Field(description="seconds of the whole call")] = 0.0
 
 
-class Solution(BaseModel):
+class Solution(Drawn, BaseModel):
     """A tour with its proof status; `path` is a closed polyline from the base to the base, or from
     the problem's state to the base; `start_tether` is then the taut tether at its start.
 
@@ -74,22 +84,63 @@ class Solution(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", title="netsp solution")
 
-    schema_version: Literal[1] = 1
-    problem: ProblemReference
-    solver: str
-    roadmap: str
-    classes: KeptClasses | None = None
-    seed: int | None = None
-    status: Status
-    length: Number | None
-    lower_bound: Number | None
-    gap: Number | None
-    entangled: tuple[int, ...] = ()
-    tour: tuple[Visit, ...] = ()
-    path: tuple[Point3, ...] = ()
-    start_tether: tuple[Point3, ...] = ()
-    timings: Timings = Timings()
-    versions: dict[str, str] = {}
+    schema_version: Annotated[Literal[1], Field(description="of the file format")] = 1
+    problem: Annotated[ProblemReference, Field(description="which problem is solved")]
+    solver: Annotated[str, Field(description="name of the solver")]
+    roadmap: Annotated[str, Field(description="name of the roadmap")]
+    classes: Annotated[
+        KeptClasses | None, Field(description="which homotopy classes the roadmap held")
+    ] = None
+    seed: Annotated[int | None, Field(description="of all that was random")] = None
+    status: Annotated[Status, Field(description="what is proven")]
+    length: Annotated[
+        Number | None, Field(description="of the tour, in the problem's units; null without a tour")
+    ]
+    lower_bound: Annotated[
+        Number | None,
+        Field(description="no tour is shorter, in the problem's units; null if nothing is known"),
+    ]
+    gap: Annotated[
+        Number | None,
+        Field(description="(length - lower_bound) / length; null if either is missing"),
+    ]
+    entangled: Annotated[
+        tuple[int, ...],
+        Field(
+            description="obstacles, numbered from 1, that the tether is wound about "
+            "at the end; empty for a tour"
+        ),
+    ] = ()
+    tour: Annotated[tuple[Visit, ...], Field(description="goals in the order of their visits")] = ()
+    path: Annotated[
+        tuple[Point3, ...],
+        Field(description="closed polyline from base to base, in the problem's units"),
+    ] = ()
+    start_tether: Annotated[
+        tuple[Point3, ...],
+        Field(
+            description="the tether at the start where the robot was out already, in "
+            "the problem's units"
+        ),
+    ] = ()
+    timings: Annotated[Timings, Field(description="how long it took")] = Timings()
+    versions: Annotated[dict[str, str], Field(description="of netsp and what it used")] = {}
+
+    def __repr__(self) -> str:
+        """In a line."""
+        told = "" if self.length is None else f", length {self.length:.6g}"
+        gap = "" if self.gap is None else f", gap {100 * self.gap:.3g} %"
+        return (
+            f"<Solution of {self.problem.name!r} by {self.solver}: {self.status.value}{told}{gap}, "
+            f"{len(self.tour)} visits>"
+        )
+
+    def plot(self, ax: Any = None, *, problem: Problem | None = None) -> Any:
+        """The path, on axes of the caller or on new ones; returns the axes. problem : the one that
+        is solved, to be drawn beneath."""
+        from netsp.pictures.problem import draw_map, draw_path
+
+        return draw_path(self, ax=ax) if problem is None else draw_map(problem, self, ax=ax)
 
     @classmethod
     def from_json(cls, text: str | bytes, *, source: str = "solution") -> Self:

@@ -3,28 +3,29 @@
 from __future__ import annotations
 
 import argparse
+import json
 
 EXAMPLE = "netsp schema problem > problem.schema.json"
+
+FORMATS = {
+    "problem": "netsp.problem:Problem",
+    "solution": "netsp.solution:Solution",
+    "scene": "netsp.online.scene.scene:Scene",
+    "mission": "netsp.online.mission:Mission",
+    "surprises": "netsp.execute.events:Surprises",
+    "study": "netsp.compare.study:Study",
+}
+"""Format → where its model lives."""
 
 
 def arguments(p: argparse.ArgumentParser) -> None:
     """Of the command line."""
-    p.add_argument("format", choices=("problem", "solution", "scene", "mission", "surprises"))
+    p.add_argument("format", choices=tuple(FORMATS), help="of a file that netsp reads or writes")
 
 
 def run(args: argparse.Namespace) -> int:
     """Print the schema, and return the exit code."""
-    import json
+    from netsp.registry import load
 
-    if args.format == "problem":
-        from netsp.problem import Problem as Model
-    elif args.format == "mission":
-        from netsp.online.mission import Mission as Model  # type: ignore[assignment]
-    elif args.format == "surprises":
-        from netsp.execute.events import Surprises as Model  # type: ignore[assignment]
-    elif args.format == "scene":
-        from netsp.online.scene.scene import Scene as Model  # type: ignore[assignment]
-    else:
-        from netsp.solution import Solution as Model  # type: ignore[assignment]
-    print(json.dumps(Model.model_json_schema(), indent=1))
+    print(json.dumps(load(FORMATS[args.format]).model_json_schema(), indent=1))
     return 0

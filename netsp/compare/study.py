@@ -33,12 +33,16 @@ class Worlds(BaseModel):
     """Random worlds `first` to `first + count - 1` of a family (`netsp.worlds`)."""
 
     model_config = STRICT
-    family: str = "icra2017"
-    count: Whole = 10
-    first: Natural = 0
-    obstacles: Natural | None = None
-    side: Positive = 500.0
-    radii: tuple[Positive, Positive] = (10.0, 30.0)
+    family: Annotated[str, Field(description="of random worlds")] = "icra2017"
+    count: Annotated[Whole, Field(description="worlds per cell")] = 10
+    first: Annotated[Natural, Field(description="seed of the first")] = 0
+    obstacles: Annotated[
+        Natural | None, Field(description="per world; null for the family's own")
+    ] = None
+    side: Annotated[Positive, Field(description="of the square, in units of length")] = 500.0
+    radii: Annotated[
+        tuple[Positive, Positive], Field(description="least and largest radius of obstacles")
+    ] = (10.0, 30.0)
 
     @model_validator(mode="after")
     def _known(self) -> Self:
@@ -55,9 +59,9 @@ class Roadmap(BaseModel):
     """A roadmap by name, with options; `label` tells it apart in the results."""
 
     model_config = STRICT
-    name: str = "taut"
-    label: str = ""
-    options: dict[str, Any] = {}
+    name: Annotated[str, Field(description="taut, prm or one of another package")] = "taut"
+    label: Annotated[str, Field(description="in tables; the name if empty")] = ""
+    options: Annotated[dict[str, Any], Field(description="of the roadmap, by name")] = {}
 
     @model_validator(mode="after")
     def _known(self) -> Self:
@@ -72,11 +76,16 @@ class Solver(BaseModel):
     """A solver by name, with options and limits of its own; `label` tells it apart."""
 
     model_config = STRICT
-    name: str
-    label: str = ""
-    time_limit: Positive | None = None
-    iteration_limit: Annotated[int, Field(ge=1, lt=2**62)] | None = None
-    options: dict[str, Any] = {}
+    name: Annotated[str, Field(description="one of netsp or of another package")]
+    label: Annotated[str, Field(description="in tables; the name if empty")] = ""
+    time_limit: Annotated[Positive | None, Field(description="seconds; null for the study's")] = (
+        None
+    )
+    iteration_limit: Annotated[
+        Annotated[int, Field(ge=1, lt=2**62)] | None,
+        Field(description="of the solver; null for none"),
+    ] = None
+    options: Annotated[dict[str, Any], Field(description="of the solver, by name")] = {}
 
     @model_validator(mode="after")
     def _known(self) -> Self:
@@ -97,16 +106,32 @@ class Study(BaseModel):
     trial beyond what the worker needs to start."""
 
     model_config = STRICT
-    schema_version: Literal[1] = 1
-    name: Annotated[str, Field(min_length=1)]
-    goals: Annotated[tuple[Whole, ...], Field(min_length=1)]
-    tether_lengths: Annotated[tuple[Positive, ...], Field(min_length=1)]
-    worlds: Worlds = Worlds()
-    roadmaps: Annotated[tuple[Roadmap, ...], Field(min_length=1)] = (Roadmap(),)
-    solvers: Annotated[tuple[Solver, ...], Field(min_length=1)]
-    seeds: Annotated[tuple[Natural, ...], Field(min_length=1)] = (0,)
-    time_limit: Positive | None = 120.0
-    memory_limit: Annotated[float, Field(gt=0, le=1e6)] | None = None
+    schema_version: Annotated[Literal[1], Field(description="of the file format")] = 1
+    name: Annotated[Annotated[str, Field(min_length=1)], Field(description="of the study")]
+    goals: Annotated[
+        Annotated[tuple[Whole, ...], Field(min_length=1)], Field(description="numbers of goals")
+    ]
+    tether_lengths: Annotated[
+        Annotated[tuple[Positive, ...], Field(min_length=1)],
+        Field(description="in units of length"),
+    ]
+    worlds: Annotated[Worlds, Field(description="which random worlds")] = Worlds()
+    roadmaps: Annotated[
+        Annotated[tuple[Roadmap, ...], Field(min_length=1)], Field(description="tried each")
+    ] = (Roadmap(),)
+    solvers: Annotated[
+        Annotated[tuple[Solver, ...], Field(min_length=1)], Field(description="tried each")
+    ]
+    seeds: Annotated[
+        Annotated[tuple[Natural, ...], Field(min_length=1)], Field(description="of the solvers")
+    ] = (0,)
+    time_limit: Annotated[
+        Positive | None, Field(description="seconds of a trial; null for none")
+    ] = 120.0
+    memory_limit: Annotated[
+        Annotated[float, Field(gt=0, le=1e6)] | None,
+        Field(description="GiB of a trial; null for none"),
+    ] = None
 
     @model_validator(mode="after")
     def _told_apart(self) -> Self:

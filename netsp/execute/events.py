@@ -22,8 +22,8 @@ class Move(BaseModel):
     """An obstacle is somewhere else from now on."""
 
     model_config = STRICT
-    obstacle: Which
-    by: Point2
+    obstacle: Annotated[Which, Field(description="name or index from 0")]
+    by: Annotated[Point2, Field(description="(x, y) to move it by, in the problem's units")]
 
 
 class Event(BaseModel):
@@ -36,14 +36,25 @@ class Event(BaseModel):
 
     model_config = STRICT
 
-    time: NonNegative
-    appear: Obstacle | None = None
-    vanish: Which | None = None
-    move: Move | None = None
-    add_goal: GoalLike | None = None
-    cancel_goal: Which | None = None
-    push: Point3 | None = None
-    tether_length: Positive | None = None
+    time: Annotated[NonNegative, Field(description="seconds after the start")]
+    appear: Annotated[
+        Obstacle | None, Field(description="an obstacle that is there from now on")
+    ] = None
+    vanish: Annotated[
+        Which | None, Field(description="name or index from 0 of an obstacle that is gone")
+    ] = None
+    move: Annotated[Move | None, Field(description="an obstacle that is elsewhere")] = None
+    add_goal: Annotated[GoalLike | None, Field(description="a goal more")] = None
+    cancel_goal: Annotated[
+        Which | None, Field(description="name or index from 0 of a goal that need not be visited")
+    ] = None
+    push: Annotated[
+        Point3 | None,
+        Field(description="(x, y, z) by which the robot is displaced, in the problem's units"),
+    ] = None
+    tether_length: Annotated[
+        Positive | None, Field(description="of the tether from now on, in the problem's units")
+    ] = None
 
     @model_validator(mode="after")
     def _one(self) -> Self:
@@ -73,8 +84,8 @@ class Surprises(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", title="netsp surprises")
 
-    schema_version: Literal[1] = 1
-    events: tuple[Event, ...]
+    schema_version: Annotated[Literal[1], Field(description="of the file format")] = 1
+    events: Annotated[tuple[Event, ...], Field(description="in any order")]
 
     @classmethod
     def from_json(cls, text: str | bytes, *, source: str = "surprises") -> Self:

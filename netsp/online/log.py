@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from netsp.drawn import Drawn
 from netsp.errors import InputError
 from netsp.online.mission import Mission
 from netsp.online.tether import Tether
@@ -32,8 +33,8 @@ class LogRow:
     replan_s: float
 
 
-@dataclass(frozen=True)
-class Run:
+@dataclass(frozen=True, repr=False)
+class Run(Drawn):
     """What came of a mission.
 
     log : one row per step. tether : at the end. summary : the numbers (`summarise`).
@@ -44,6 +45,21 @@ class Run:
     log: tuple[LogRow, ...]
     tether: Tether
     summary: dict[str, Any]
+
+    def __repr__(self) -> str:
+        """In a line."""
+        s = self.summary
+        return (
+            f"<Run of {s['mission']!r} by {self.planner}: {s['visited']} of {s['waypoints']} "
+            f"waypoints in {s['inspection_s']:.1f} s, tether at most {s['longest_tether_m']:.4g} "
+            f"of {s['tether_length']:g}>"
+        )
+
+    def plot(self, ax: Any = None) -> Any:
+        """Tether length over time, on axes of the caller or on new ones; returns the axes."""
+        from netsp.pictures.mission import draw_tether
+
+        return draw_tether([self], ax=ax)
 
 
 def write_run(run: Run, folder: str | Path) -> None:

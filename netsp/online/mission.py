@@ -25,10 +25,16 @@ class Camera(BaseModel):
 
     model_config = STRICT
 
-    range: Positive = 2.0
-    field_of_view: Annotated[float, Field(gt=0.0, lt=180.0)] = 70.0
-    tilt: Annotated[float, Field(ge=0.0, le=90.0)] = 90.0
-    patch: Positive = 0.1
+    range: Annotated[Positive, Field(description="farthest that is seen, m")] = 2.0
+    field_of_view: Annotated[
+        Annotated[float, Field(gt=0.0, lt=180.0)],
+        Field(description="full angle of the cone, degrees"),
+    ] = 70.0
+    tilt: Annotated[
+        Annotated[float, Field(ge=0.0, le=90.0)],
+        Field(description="steepest angle between line of sight and surface normal, degrees"),
+    ] = 90.0
+    patch: Annotated[Positive, Field(description="edge of the patches that are counted, m")] = 0.1
 
 
 class Mission(BaseModel):
@@ -56,22 +62,34 @@ class Mission(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", title="netsp mission")
 
-    schema_version: Literal[1] = 1
-    name: Name = "mission"
-    scene: str
-    anchor: Point3
-    start: Point3
-    waypoints: Annotated[tuple[Point3, ...], Field(min_length=1)]
-    tether_length: Positive
-    clearance: NonNegative = 0.2
-    reach: Positive = 0.1
-    speed: Positive = 0.3
-    camera: Camera | None = None
-    inspect: Annotated[tuple[Name, ...], Field(min_length=1)] | None = None
-    current: Point3 = (0.0, 0.0, 0.0)
-    gusts: NonNegative = 0.0
-    delta: Positive = 0.1
-    cell: Positive = 0.2
+    schema_version: Annotated[Literal[1], Field(description="of the file format")] = 1
+    name: Annotated[Name, Field(description="of the mission")] = "mission"
+    scene: Annotated[str, Field(description="scene file, relative to this one")]
+    anchor: Annotated[Point3, Field(description="(x, y, z) where the tether is fixed, m")]
+    start: Annotated[
+        Point3, Field(description="(x, y, z) of the robot at first, in sight of the anchor, m")
+    ]
+    waypoints: Annotated[
+        Annotated[tuple[Point3, ...], Field(min_length=1)],
+        Field(description="(x, y, z) to reach in this order, m"),
+    ]
+    tether_length: Annotated[Positive, Field(description="most that the tether may be long, m")]
+    clearance: Annotated[NonNegative, Field(description="that paths keep to all solids, m")] = 0.2
+    reach: Annotated[
+        Positive, Field(description="distance at which a waypoint counts as reached, m")
+    ] = 0.1
+    speed: Annotated[Positive, Field(description="of the robot, m/s")] = 0.3
+    camera: Annotated[Camera | None, Field(description="what it sees with; null for none")] = None
+    inspect: Annotated[
+        Annotated[tuple[Name, ...], Field(min_length=1)] | None,
+        Field(description="names of the solids whose surface counts; null for all"),
+    ] = None
+    current: Annotated[Point3, Field(description="(x, y, z) of the water, m/s")] = (0.0, 0.0, 0.0)
+    gusts: Annotated[
+        NonNegative, Field(description="standard deviation of the current about its mean, m/s")
+    ] = 0.0
+    delta: Annotated[Positive, Field(description="resolution of the tether, m")] = 0.1
+    cell: Annotated[Positive, Field(description="of the grid on which paths are sought, m")] = 0.2
 
     @classmethod
     def from_json(cls, text: str | bytes, *, source: str = "mission") -> Self:

@@ -235,6 +235,22 @@ def draw_map(
     return ax
 
 
+def draw_path(solution: Solution, *, ax: Any = None) -> Any:
+    """The path of a solution without its problem, on axes of the caller or on new ones; returns the
+    axes."""
+    from matplotlib.figure import Figure
+
+    if ax is None:
+        ax = Figure(figsize=(6, 6), layout="constrained").subplots()
+    if solution.path:
+        path = np.array(solution.path)
+        ax.plot(path[:, 0], path[:, 1], color=style.PATH, lw=1.8)
+        _arrows(ax, path, len(solution.tour) + 1)
+        ax.plot(*path[0, :2], "*", color=style.BASE, mec="white", ms=17)
+    ax.set(aspect="equal", xlabel="x", ylabel="y")
+    return ax
+
+
 def _title(problem: Problem, solution: Solution | None) -> str:
     if solution is None or solution.length is None:
         return (

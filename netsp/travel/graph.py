@@ -15,13 +15,14 @@ import math
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from netsp.arrays import Bools, Floats, Ints
 from netsp.clock import NEVER, Clock, Flag
+from netsp.drawn import Drawn
 from netsp.errors import InputError
 from netsp.hsignature import Word
 from netsp.travel.costs import CostTable, checked_costs
@@ -60,7 +61,7 @@ class Legs(Protocol):
         """(n, 3) polyline of the leg from vertex u to vertex v."""
 
 
-class TravelGraph:
+class TravelGraph(Drawn):
     """Augmented goals with the costs of the legs between them.
 
     Attributes
@@ -128,6 +129,20 @@ class TravelGraph:
         table = CostTable(*checked_costs(costs, clusters))
         cluster = table.cluster
         return cls(cluster, [()] * len(cluster), np.zeros(len(cluster)), table)
+
+    def __repr__(self) -> str:
+        """In a line."""
+        return (
+            f"<TravelGraph: {self.goal_count} goals, {len(self) - 1} classes, "
+            f"roadmap {self.roadmap}>"
+        )
+
+    def plot(self, ax: Any = None) -> Any:
+        """Tether lengths of all classes by goal, on axes of the caller or on new ones; returns the
+        axes."""
+        from netsp.pictures.graph import draw_classes
+
+        return draw_classes(self, ax=ax)
 
     def __len__(self) -> int:
         return len(self.cluster)

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from netsp.arrays import Floats
 from netsp.errors import InputError
@@ -38,15 +38,19 @@ class Solid(BaseModel):
     """One solid: exactly one of its shapes, and a name."""
 
     model_config = STRICT
-    name: Name | None = None
-    sphere: Sphere | None = None
-    capsule: Capsule | None = None
-    cylinder: Cylinder | None = None
-    box: Box | None = None
-    torus: Torus | None = None
-    post: Post | None = None
-    prism: Prism | None = None
-    half_space: HalfSpace | None = None
+    name: Annotated[Name | None, Field(description="shown in pictures, reports and `inspect`")] = (
+        None
+    )
+    sphere: Annotated[Sphere | None, Field(description="exactly one of these shapes")] = None
+    capsule: Annotated[Capsule | None, Field(description="a cylinder with rounded ends")] = None
+    cylinder: Annotated[Cylinder | None, Field(description="with flat ends")] = None
+    box: Annotated[Box | None, Field(description="in any position")] = None
+    torus: Annotated[Torus | None, Field(description="a ring, or a bend of a pipe")] = None
+    post: Annotated[Post | None, Field(description="an upright cylinder without ends")] = None
+    prism: Annotated[Prism | None, Field(description="an upright prism without ends")] = None
+    half_space: Annotated[
+        HalfSpace | None, Field(description="everything behind a plane: sea floor, wall")
+    ] = None
 
     @model_validator(mode="after")
     def _one(self) -> Self:
@@ -70,9 +74,13 @@ class Source(BaseModel):
     """
 
     model_config = STRICT
-    file: str
-    scale: Positive = 1.0
-    voxel: Positive | None = None
+    file: Annotated[
+        str, Field(description="mesh (STL, OBJ, PLY) or cloud, relative to the scene file")
+    ]
+    scale: Annotated[Positive, Field(description="factor from the file's units to metres")] = 1.0
+    voxel: Annotated[
+        Positive | None, Field(description="edge of the voxels, m; null for a choice by size")
+    ] = None
 
 
 class Scene(BaseModel):
@@ -94,15 +102,25 @@ class Scene(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", title="netsp scene")
 
-    schema_version: Literal[1] = 1
-    name: Name = "scene"
-    units: Name = "m"
-    solids: tuple[Solid, ...] = ()
-    mesh: Source | None = None
-    cloud: Source | None = None
-    problem: str | None = None
-    tether_radius: NonNegative = 0.0
-    bounds: tuple[Number, Number, Number, Number, Number, Number] | None = None
+    schema_version: Annotated[Literal[1], Field(description="of the file format")] = 1
+    name: Annotated[Name, Field(description="of the scene")] = "scene"
+    units: Annotated[Name, Field(description="name of the unit of length")] = "m"
+    solids: Annotated[tuple[Solid, ...], Field(description="what stands in the water")] = ()
+    mesh: Annotated[Source | None, Field(description="a closed triangle mesh; null for none")] = (
+        None
+    )
+    cloud: Annotated[Source | None, Field(description="points on surfaces; null for none")] = None
+    problem: Annotated[
+        str | None,
+        Field(description="problem file whose obstacles stand upright in the water; null for none"),
+    ] = None
+    tether_radius: Annotated[
+        NonNegative, Field(description="by which all solids are grown for the tether, m")
+    ] = 0.0
+    bounds: Annotated[
+        tuple[Number, Number, Number, Number, Number, Number] | None,
+        Field(description="[xmin, ymin, zmin, xmax, ymax, zmax] of the water, m; null for none"),
+    ] = None
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:

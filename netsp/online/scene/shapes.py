@@ -21,8 +21,8 @@ class Sphere(BaseModel):
     """A ball."""
 
     model_config = STRICT
-    center: Point3
-    radius: Positive
+    center: Annotated[Point3, Field(description="(x, y, z), m")]
+    radius: Annotated[Positive, Field(description="m")]
 
     def row(self) -> Row:
         return kinds.CAPSULE, [*self.center, *self.center, self.radius]
@@ -38,9 +38,9 @@ class Capsule(BaseModel):
     """All points within a radius of a segment: a pipe or a strut with round ends."""
 
     model_config = STRICT
-    a: Point3
-    b: Point3
-    radius: Positive
+    a: Annotated[Point3, Field(description="(x, y, z) of one end of its axis, m")]
+    b: Annotated[Point3, Field(description="(x, y, z) of the other end, m")]
+    radius: Annotated[Positive, Field(description="m")]
 
     def row(self) -> Row:
         return kinds.CAPSULE, [*self.a, *self.b, self.radius]
@@ -56,9 +56,9 @@ class Cylinder(BaseModel):
     """A solid cylinder with flat ends: a pipe, a flange."""
 
     model_config = STRICT
-    a: Point3
-    b: Point3
-    radius: Positive
+    a: Annotated[Point3, Field(description="(x, y, z) of the centre of one face, m")]
+    b: Annotated[Point3, Field(description="(x, y, z) of the centre of the other, m")]
+    radius: Annotated[Positive, Field(description="m")]
 
     @model_validator(mode="after")
     def _long(self) -> Self:
@@ -88,9 +88,13 @@ class Box(BaseModel):
     """A box of a full size, turned by angles in degrees about x, then y, then z."""
 
     model_config = STRICT
-    center: Point3
-    size: tuple[Positive, Positive, Positive]
-    rotation: tuple[Number, Number, Number] = (0.0, 0.0, 0.0)
+    center: Annotated[Point3, Field(description="(x, y, z), m")]
+    size: Annotated[
+        tuple[Positive, Positive, Positive], Field(description="full lengths of its edges, m")
+    ]
+    rotation: Annotated[
+        tuple[Number, Number, Number], Field(description="about x, then y, then z, degrees")
+    ] = (0.0, 0.0, 0.0)
 
     def axes(self) -> Floats:
         """Rows: the axes of the box in the world."""
@@ -115,12 +119,21 @@ class Torus(BaseModel):
     the direction `start` and turns by `angle` degrees: a ring, or an elbow of a pipe."""
 
     model_config = STRICT
-    center: Point3
-    axis: Point3 = (0.0, 0.0, 1.0)
-    major_radius: Positive
-    minor_radius: Positive
-    start: Point3 | None = None
-    angle: Annotated[float, Field(gt=0.0, le=360.0)] = 360.0
+    center: Annotated[Point3, Field(description="(x, y, z), m")]
+    axis: Annotated[Point3, Field(description="direction (x, y, z), of any length")] = (
+        0.0,
+        0.0,
+        1.0,
+    )
+    major_radius: Annotated[Positive, Field(description="of the circle that its tube follows, m")]
+    minor_radius: Annotated[Positive, Field(description="of the tube, m")]
+    start: Annotated[
+        Point3 | None, Field(description="direction (x, y, z) in which an open one begins")
+    ] = None
+    angle: Annotated[
+        Annotated[float, Field(gt=0.0, le=360.0)],
+        Field(description="that it covers, degrees; 360 closes it"),
+    ] = 360.0
 
     @model_validator(mode="after")
     def _shape(self) -> Self:
@@ -172,8 +185,8 @@ class Post(BaseModel):
     """A vertical cylinder without ends."""
 
     model_config = STRICT
-    center: Point2
-    radius: Positive
+    center: Annotated[Point2, Field(description="(x, y) of an upright post through all depths, m")]
+    radius: Annotated[Positive, Field(description="m")]
 
     def row(self) -> Row:
         return kinds.POST, [*self.center, self.radius]
@@ -189,8 +202,13 @@ class Prism(BaseModel):
     """A vertical prism without ends over a simple polygon, grown by `grow`."""
 
     model_config = STRICT
-    polygon: Annotated[tuple[Point2, ...], Field(min_length=3)]
-    grow: NonNegative = 0.0
+    polygon: Annotated[
+        Annotated[tuple[Point2, ...], Field(min_length=3)],
+        Field(description="corners (x, y) of an upright prism through all depths, m"),
+    ]
+    grow: Annotated[
+        NonNegative, Field(description="by which it is grown, with rounded corners, m")
+    ] = 0.0
 
     @model_validator(mode="after")
     def _simple(self) -> Self:
@@ -225,8 +243,12 @@ class HalfSpace(BaseModel):
     """Everything behind a plane: a sea floor, a wall."""
 
     model_config = STRICT
-    point: Point3
-    normal: Point3 = (0.0, 0.0, 1.0)
+    point: Annotated[Point3, Field(description="(x, y, z) on its face, m")]
+    normal: Annotated[Point3, Field(description="direction (x, y, z) out of the solid")] = (
+        0.0,
+        0.0,
+        1.0,
+    )
 
     @model_validator(mode="after")
     def _direction(self) -> Self:
