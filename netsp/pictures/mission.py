@@ -77,7 +77,8 @@ def draw_tether(runs: Sequence[Run], *, ax: Any = None, units: str = "m") -> Any
 
     if ax is None:
         ax = Figure(figsize=(8, 4), layout="constrained").subplots()
-    for run, colour in zip(runs, style.RUNS, strict=False):
+    colours = style.RUNS if len(runs) > 1 else (style.TETHER,)
+    for run, colour in zip(runs, colours, strict=False):
         t = np.array([r.time for r in run.log])
         if len(runs) == 1:
             ax.fill_between(
