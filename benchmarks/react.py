@@ -46,7 +46,7 @@ def kinematic(mission: Mission, scene: Scene, field) -> None:
         ("react, unrefined", {"refine": "none"}),
         ("react, its own tether", {"tether_model": "react"}),
         ("react-draft, its own tether", {"tether_model": "react"}),
-        ("predictive, BIT*", {"ways": "bitstar"}),
+        ("predictive, BIT*", {"paths": "bitstar"}),
     ):
         s = fly(mission, scene, field, name.split(",")[0], "kinematic", **how)
         row(

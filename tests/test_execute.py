@@ -32,9 +32,9 @@ def events(*what):
 def on_the_way(solution, leg, share=0.5):
     """A place on a leg of a solution's path (n: the n-th visit)."""
     legs = legs_of(*solution)
-    way = legs[leg].way
-    s = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(way, axis=0), axis=1))]
-    return [float(np.interp(share * s[-1], s, way[:, k])) for k in range(2)]
+    path = legs[leg].path
+    s = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))]
+    return [float(np.interp(share * s[-1], s, path[:, k])) for k in range(2)]
 
 
 def check(run, goals):
@@ -335,7 +335,7 @@ def test_a_repair_in_the_same_order_starts_at_the_robot(world):
     made = repair(problem, robot, np.array([problem.base, robot]), order, 1e9, "a test")
     assert made.kind == "local"
     assert [leg.goal for leg in made.legs] == [*order, HOME]
-    assert np.allclose(made.legs[0].way[0], robot)
+    assert np.allclose(made.legs[0].path[0], robot)
     assert sum(leg.length for leg in made.legs) == pytest.approx(made.length, rel=1e-3)
     assert made.length == pytest.approx(solution.length, rel=0.02)
 

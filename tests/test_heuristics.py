@@ -119,35 +119,37 @@ def test_the_trace_of_2016_tells_length_and_entanglement():
 @pytest.mark.parametrize("roadmap", ROADMAPS)
 def test_ways_are_free_and_write_the_words_they_say(roadmap):
     p, g = world(), graph(roadmap)
-    ways = g.ways(sub_goals=True)
+    detours = g.detours(sub_goals=True)
     solid = shapely.union_all([o.shape(-1e-3) for o in p.obstacles])
     rng = np.random.default_rng(0)
-    m, places, n = ways.far.shape
+    m, places, n = detours.far.shape
     for _ in range(60):
         a, b = rng.choice(m, 2, replace=False)
         via = int(rng.integers(m, places)) if rng.random() < 0.7 else -1
-        path = ways.path(a, b, via)
+        path = detours.path(a, b, via)
         assert np.allclose(path[[0, -1]], p.points[[a, b]])
         assert not shapely.LineString(path[:, :2]).intersects(solid)
-        assert signature(path, p.representative_points) == ways.word(a, b, via)
+        assert signature(path, p.representative_points) == detours.word(a, b, via)
         drawn = np.linalg.norm(np.diff(path, axis=0), axis=1).sum()
-        assert drawn == pytest.approx(ways.length(a, b, via), rel=1e-3)
+        assert drawn == pytest.approx(detours.length(a, b, via), rel=1e-3)
         if via < 0:
-            assert ways.length(a, b) <= g.costs[g.cluster == a][:, g.cluster == b].min() * 1.000001
+            assert (
+                detours.length(a, b) <= g.costs[g.cluster == a][:, g.cluster == b].min() * 1.000001
+            )
         o = int(rng.integers(n))
-        far = ways.far_side(a, b, via, o)
+        far = detours.far_side(a, b, via, o)
         if far >= 0:
             # the sub-goal lies beyond the obstacle's middle, seen from where the way is nearest
             middle = p.representative_points[o]
             line = shapely.LineString(path[:, :2])
             nearest = np.array(line.interpolate(line.project(shapely.Point(middle))).coords[0])
-            place = ways.path(a, 0 if a else 1, far)
+            place = detours.path(a, 0 if a else 1, far)
             assert (
                 np.linalg.norm(place[:, :2] - middle, axis=1).min() <= p.obstacles[o].radius * 1.2
             )
             if np.hypot(*(nearest - middle)) > p.obstacles[o].radius:
-                turned = ways.word(a, b, far)
-                assert signature(ways.path(a, b, far), p.representative_points) == turned
+                turned = detours.word(a, b, far)
+                assert signature(detours.path(a, b, far), p.representative_points) == turned
 
 
 @settings(max_examples=15, deadline=None)
@@ -157,29 +159,29 @@ def test_entanglement_and_vertices_of_2016_are_those_of_the_words(problem, seed)
         g = travel_graph(problem)
     except NetspError:  # a goal out of reach
         return
-    ways = g.ways(sub_goals=True)
+    detours = g.detours(sub_goals=True)
     rng = np.random.default_rng(seed)
     trie, vertex = rss2016._admissible(g)
-    m, places, n = ways.far.shape
+    m, places, n = detours.far.shape
     goals = m - 1
     for _ in range(20):
         order = np.array([0, *rng.permutation(np.arange(1, m)), 0])
         via = np.where(rng.random(goals + 1) < 0.4, -1, rng.integers(m - 1, places, goals + 1))
         via = np.where(via < m, -1, via)
         legs = [(int(order[k]), int(order[k + 1]), int(via[k])) for k in range(goals + 1)]
-        if any(not math.isfinite(ways.length(*leg)) for leg in legs):
+        if any(not math.isfinite(detours.length(*leg)) for leg in legs):
             continue
         stops = np.zeros(goals + 1, dtype=np.int64)
-        stack = np.zeros((3, 4 * (goals + 1) * len(ways.letters) + 4), dtype=np.int64)
+        stack = np.zeros((3, 4 * (goals + 1) * len(detours.letters) + 4), dtype=np.int64)
         length, held, missed = rss2016.evaluate(
-            order, via, ways.planar, ways.height, ways.letters, ways.row, trie, vertex, stops,
-            stack, np.zeros(n + 1, dtype=np.int64),
+            order, via, detours.planar, detours.height, detours.letters, detours.row, trie, vertex,
+            stops, stack, np.zeros(n + 1, dtype=np.int64),
         )  # fmt: skip
         words = [()]
         for leg in legs:
-            words.append(concatenate(words[-1], ways.word(*leg)))
+            words.append(concatenate(words[-1], detours.word(*leg)))
         found = [g.vertices_of([int(order[k])], [words[k]]) for k in range(1, goals + 1)]
-        assert length == pytest.approx(sum(ways.length(*leg) for leg in legs))
+        assert length == pytest.approx(sum(detours.length(*leg) for leg in legs))
         assert held == len(entangled(words[-1]))
         assert missed == sum(f is None for f in found)
         assert stops[1:].tolist() == [-1 if f is None else f[0] for f in found]
@@ -196,11 +198,11 @@ def test_sub_goals_go_round_polygons_and_stay_within_bounds():
         tether_length=30,
         bounds=(-6, -6, 6, 6.05),
     )
-    ways = travel_graph(p).ways(sub_goals=True)
-    direct = ways.path(0, 1)
-    around = ways.path(0, 1, ways.far_side(0, 1, -1, 0))
+    detours = travel_graph(p).detours(sub_goals=True)
+    direct = detours.path(0, 1)
+    around = detours.path(0, 1, detours.far_side(0, 1, -1, 0))
     assert np.sign(direct[:, 1].sum()) == -np.sign(around[:, 1].sum())
-    assert ways.word(0, 1) != ways.word(0, 1, ways.far_side(0, 1, -1, 0))
+    assert detours.word(0, 1) != detours.word(0, 1, detours.far_side(0, 1, -1, 0))
     assert around[:, 1].max() <= 6.05
 
 
@@ -211,13 +213,13 @@ def test_a_goal_on_a_boundary_does_not_make_a_path_of_thousands_of_points():
         obstacles=[Circle(center=(4, 0), radius=1), Circle(center=(7, 0), radius=1)],
         tether_length=14,
     )
-    ways = travel_graph(p).ways(sub_goals=True)
+    detours = travel_graph(p).detours(sub_goals=True)
     for a in range(5):
         for b in range(5):
             if a != b:
-                path = ways.path(a, b)
+                path = detours.path(a, b)
                 assert len(path) < 500
-                assert signature(path, p.representative_points) == ways.word(a, b)
+                assert signature(path, p.representative_points) == detours.word(a, b)
 
 
 def test_greedy_measures_few_legs_of_a_long_tether_and_goes_the_same_way():

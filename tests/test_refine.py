@@ -1,4 +1,4 @@
-"""Refined ways keep their ends and their freedom; ours never lose clearance."""
+"""Refined paths keep their ends and their freedom; ours never lose clearance."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from netsp import InputError
 from netsp.online import Scene
 from netsp.online.paths.refine import REFINEMENTS, clear, refined, smoothed
-from netsp.online.paths.sampled import OMPL_PLANNERS, SampledWays
+from netsp.online.paths.sampled import OMPL_PLANNERS, SampledPaths
 from netsp.online.paths.tree import Grid, homotopic, length_of, taut
 from netsp.online.planner import Options, make_planner
 
@@ -18,33 +18,33 @@ FIELD = POST.field()
 
 def arc(radius, seed=0, wobble=0.0):
     a = np.linspace(0.0, np.pi, 25)
-    way = radius * np.column_stack([np.cos(a), np.sin(a), 0 * a])
-    way[1:-1] += wobble * np.random.default_rng(seed).normal(size=(23, 3))
-    return way
+    path = radius * np.column_stack([np.cos(a), np.sin(a), 0 * a])
+    path[1:-1] += wobble * np.random.default_rng(seed).normal(size=(23, 3))
+    return path
 
 
 @settings(max_examples=25, deadline=None)
 @given(st.sampled_from(REFINEMENTS), st.floats(0.75, 2.0), st.integers(0, 100))
 def test_ends_stay_and_free_ways_stay_free(name, radius, seed):
-    way = arc(radius, seed, 0.03)
-    better = refined(name, FIELD, way, 0.4, np.random.default_rng(seed))
-    assert np.array_equal(better[[0, -1]], way[[0, -1]])
+    path = arc(radius, seed, 0.03)
+    better = refined(name, FIELD, path, 0.4, np.random.default_rng(seed))
+    assert np.array_equal(better[[0, -1]], path[[0, -1]])
     assert clear(FIELD, better, 0.0)
 
 
 @settings(max_examples=25, deadline=None)
 @given(st.floats(0.7, 1.2), st.integers(0, 100))
 def test_the_gradient_never_makes_clearance_worse(radius, seed):
-    way = arc(radius, seed, 0.05)
-    better = refined("gradient", FIELD, way, 0.4, np.random.default_rng(0))
-    assert (FIELD.distance(better) >= FIELD.distance(way) - 1e-12).all()
+    path = arc(radius, seed, 0.05)
+    better = refined("gradient", FIELD, path, 0.4, np.random.default_rng(0))
+    assert (FIELD.distance(better) >= FIELD.distance(path) - 1e-12).all()
 
 
 def test_the_papers_steps_widen_an_arc_about_a_post_and_are_the_same_for_the_same_seed():
-    way = arc(0.7)
-    a, b = (refined("paper", FIELD, way, 0.3, np.random.default_rng(5)) for _ in range(2))
+    path = arc(0.7)
+    a, b = (refined("paper", FIELD, path, 0.3, np.random.default_rng(5)) for _ in range(2))
     assert np.array_equal(a, b)
-    assert FIELD.distance(a)[8:-8].min() > FIELD.distance(way)[8:-8].min()
+    assert FIELD.distance(a)[8:-8].min() > FIELD.distance(path)[8:-8].min()
 
 
 def test_smoothing_leaves_a_cubic_alone():
@@ -58,19 +58,19 @@ def test_sampled_ways_are_free_repeatable_and_no_shorter_than_the_shortest(name)
     pytest.importorskip("ompl")
     grid = Grid(FIELD, [-3, -3, -1], [3, 3, 1], 0.2, 0.2)
     start, target = np.array([[-1.5, 0.1, 0.0]]), np.array([1.5, 0.0, 0.0])
-    way, again = (SampledWays(name, grid, target, start, 3).way(0) for _ in range(2))
-    assert np.array_equal(way, again)
-    assert np.array_equal(way[[0, -1]], [start[0], target])
-    assert clear(FIELD, way, 0.1)
+    path, again = (SampledPaths(name, grid, target, start, 3).path(0) for _ in range(2))
+    assert np.array_equal(path, again)
+    assert np.array_equal(path[[0, -1]], [start[0], target])
+    assert clear(FIELD, path, 0.1)
     # round a cylinder of radius 0.7: two tangents and an arc
     shortest = 2 * np.sqrt(1.5**2 - 0.7**2) + 0.7 * (np.pi - 2 * np.arccos(0.7 / 1.5))
-    assert shortest - 0.06 <= length_of(way) < 2.5 * shortest
+    assert shortest - 0.06 <= length_of(path) < 2.5 * shortest
 
 
 def test_taut_ways_have_the_closed_form():
-    way = arc(1.5)
+    path = arc(1.5)
     shortest = 2 * np.sqrt(1.5**2 - 0.7**2) + 0.7 * (np.pi - 2 * np.arccos(0.7 / 1.5))
-    assert length_of(taut(FIELD, way, 0.2, 0.05)) == pytest.approx(shortest, rel=5e-3)
+    assert length_of(taut(FIELD, path, 0.2, 0.05)) == pytest.approx(shortest, rel=5e-3)
 
 
 def test_ways_on_different_sides_of_a_post_are_told_apart():
@@ -82,7 +82,7 @@ def test_ways_on_different_sides_of_a_post_are_told_apart():
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (Options(ways="straight"), "ways: expected tree, rrtstar, bitstar, prmstar"),
+        (Options(paths="straight"), "paths: expected tree, rrtstar, bitstar, prmstar"),
         (Options(refine="polish"), "refine: expected none, paper, gradient"),
     ],
 )

@@ -109,15 +109,15 @@ def test_ways_of_the_tree_are_shortest_and_pull_taut_to_the_truth():
     tree = ShortestTree(grid, (2, 0.05, 0), [(-2, 0.05, 0), (2, 1, 0)])
     straight = 0.95
     assert straight <= tree.lengths[1] <= straight + 0.3  # ends lie beside the centres of cells
-    way = taut(field, tree.way(0), 0.0, 0.05)
+    path = taut(field, tree.path(0), 0.0, 0.05)
     exact = 2 * math.sqrt(4 - 0.25) + 0.5 * (math.pi - 2 * math.acos(0.25))
-    assert length_of(way) == pytest.approx(exact, rel=0.02)
-    assert tree.lengths[0] >= length_of(way)
+    assert length_of(path) == pytest.approx(exact, rel=0.02)
+    assert tree.lengths[0] >= length_of(path)
 
 
 def test_advance_passes_corners_and_stops_after_its_step():
-    way = np.array([[1.0, 0, 0], [1.0, 1.0, 0]])
-    stops, passed = advance(np.zeros(3), way, 1.25)
+    path = np.array([[1.0, 0, 0], [1.0, 1.0, 0]])
+    stops, passed = advance(np.zeros(3), path, 1.25)
     assert passed == 1
     assert np.allclose(stops, [[1, 0, 0], [1, 0.25, 0]])
 

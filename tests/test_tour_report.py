@@ -69,7 +69,7 @@ def test_pages_need_nothing_else_and_say_what_matters(pages):
     tour, run = (p.read_text() for p in pages)
     assert "contractible over triangles" in tour
     assert "push" in run
-    assert "taken in free" in run
+    assert "recovered free" in run
 
 
 @pytest.mark.skipif(BROWSER is None, reason="chromium is not installed")

@@ -69,11 +69,11 @@ def test_the_linear_model_predicts_small_changes():
 def test_it_follows_a_circle_to_centimetres_whatever_the_current(water):
     rov = make_vehicle("bluerov2", np.zeros(3), 0.3)
     angle = np.linspace(0, 2 * np.pi, 60)
-    way = np.column_stack([np.cos(angle) - 1, np.sin(angle), 0.1 * angle])
+    path = np.column_stack([np.cos(angle) - 1, np.sin(angle), 0.1 * angle])
     places = []
     for k in range(230):
-        stops, passed = rov.go(way, 0.1, 0.5, np.array(water), k == 0)
-        way = way[min(passed, len(way) - 1) :]
+        stops, passed = rov.go(path, 0.1, 0.5, np.array(water), k == 0)
+        path = path[min(passed, len(path) - 1) :]
         places.append(stops[-1])
     places = np.array(places)
     off = np.hypot(places[:, 0] + 1, places[:, 1]) - 1

@@ -78,7 +78,7 @@ def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | Non
 def _anneal(run: Run, rng: np.random.Generator, chosen: Params) -> None:
     graph = run.graph
     run.check()
-    ways = graph.ways(sub_goals=True, check=run.check)
+    detours = graph.detours(sub_goals=True, check=run.check)
     goals = graph.goal_count
     order = np.zeros(goals + 2, dtype=np.int64)
     if run.tour is not None:
@@ -87,12 +87,19 @@ def _anneal(run: Run, rng: np.random.Generator, chosen: Params) -> None:
         order[1:-1] = rng.permutation(np.arange(1, goals + 1))
     via = np.full(goals + 1, -1, dtype=np.int64)
     trie, vertex = _admissible(graph)
-    tables = (ways.planar, ways.height, ways.letters, ways.row, ways.far, ways.near)
-    longest = (goals + 1) * 2 * int((ways.row[:, 1:] - ways.row[:, :-1]).max(initial=0)) + 1
+    tables = (
+        detours.planar,
+        detours.height,
+        detours.letters,
+        detours.row,
+        detours.far,
+        detours.near,
+    )
+    longest = (goals + 1) * 2 * int((detours.row[:, 1:] - detours.row[:, :-1]).max(initial=0)) + 1
     scratch = np.zeros((3, longest), dtype=np.int64)
     stops = np.zeros(goals + 1, dtype=np.int64)
     best = np.zeros(goals + 1, dtype=np.int64)
-    turns = np.zeros(ways.far.shape[2] + 1, dtype=np.int64)
+    turns = np.zeros(detours.far.shape[2] + 1, dtype=np.int64)
     length, entangled, _ = evaluate(order, via, *tables[:4], trie, vertex, stops, scratch, turns)
     schedule = Schedule(chosen, run, length / (goals + 1), default=PROPOSALS_PER_GOAL * goals)
     chunk = int(max(1, min(CHUNK, run.iteration_limit / REPORTS)))
@@ -132,7 +139,7 @@ def _admissible(graph: TravelGraph) -> tuple[Ints, Ints]:
 
 
 @njit(cache=True)
-def _way_length(a, b, via, planar, height):
+def _detour_length(a, b, via, planar, height):
     p = planar[a, b] if via < 0 else planar[a, via] + planar[b, via]
     return math.hypot(p, height[b] - height[a])
 
@@ -163,7 +170,7 @@ def evaluate(order, via, planar, height, letters, row, trie, vertex, stops, stac
     legs = len(order) - 1
     for k in range(legs):
         a, b, s = order[k], order[k + 1], via[k]
-        length += _way_length(a, b, s, planar, height)
+        length += _detour_length(a, b, s, planar, height)
         if s < 0:
             for i in range(row[a, b], row[a, b + 1]):
                 size = _push(letters[i], size, stack, trie)

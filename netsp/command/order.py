@@ -44,7 +44,7 @@ def run(args: argparse.Namespace) -> int:
         for name, run in (("given", found.before), ("new", found.after)):
             s = run.summary
             print(
-                f"{name:<6} inspection {s['inspection_s']:.1f} s, with the tether taken in "
+                f"{name:<6} inspection {s['inspection_s']:.1f} s, with tether recovery "
                 f"{s['total_s']['tether']:.1f} s, tether at most {s['longest_tether_m']:.2f} of "
                 f"{s['tether_length']:g}, {s['visited']} of {s['waypoints']} visited",
                 file=sys.stderr,

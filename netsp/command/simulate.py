@@ -43,8 +43,8 @@ def arguments(p: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     p.add_argument("--current", metavar="X,Y,Z", help="current (m/s), in place of the mission's")
     p.add_argument(
-        "--ways", default="tree", metavar="NAME",
-        help="how ways are found: tree (default), bitstar, rrtstar or prmstar (OMPL)",
+        "--paths", default="tree", metavar="NAME",
+        help="how paths are found: tree (default), bitstar, rrtstar or prmstar (OMPL)",
     )  # fmt: skip
     p.add_argument(
         "--refine", metavar="NAME", help="none, paper or gradient; default is the planner's own"
@@ -86,7 +86,7 @@ def run(args: argparse.Namespace) -> int:
     for planner in [args.planner, args.compare] if args.compare else [args.planner]:
         run = simulate(
             mission, planner, vehicle=args.vehicle, tether=args.tether_model,
-            options=Options(args.ways, args.refine, args.seed),
+            options=Options(args.paths, args.refine, args.seed),
             scene=scene, field=field, snap=args.snap, seed=args.seed,
             on_step=None if args.quiet or not sys.stderr.isatty() else live(mission, scene.units),
         )  # fmt: skip

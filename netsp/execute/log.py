@@ -152,9 +152,11 @@ def describe(done: Execution) -> str:
         f"path     {s['path']:.6g} ({100 * (s['path'] / planned - 1):+.2f} % of the plan's)"
         if planned
         else f"path     {s['path']:.6g}",
-        f"tether   longest {s['longest_tether']:.6g} of {s['tether_length']:g}, too long for "
+        f"tether   longest {s['longest_tether']:.6g} of {s['tether_length']:g}, over the limit for "
         f"{s['exceedance_s']:.1f} s, "
-        + ("taken in free at the base" if s["tether_free"] and s["home"] else "not taken in free"),
+        + (
+            "recovered free at the base" if s["tether_free"] and s["home"] else "not recovered free"
+        ),
     ]
     lines += [
         f"event    {e.time:.1f} s, {e.event}: {e.done} ({e.reason}; {e.planning_s:.2f} s)"

@@ -25,19 +25,19 @@ class Leg:
     """
 
     goal: int
-    way: Floats
+    path: Floats
     word: Word
     tether: float
 
     @property
     def length(self) -> float:
         """Metres."""
-        return length_of(self.way)
+        return length_of(self.path)
 
 
-def length_of(way: Floats) -> float:
+def length_of(path: Floats) -> float:
     """Length of a polyline."""
-    return float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum())
+    return float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
 
 
 def legs_of(problem: Problem, solution: Solution, numbers: list[int] | None = None) -> list[Leg]:

@@ -1,10 +1,10 @@
 """What is broken of a plan, and how it is mended.
 
 The robot is at a state of the covering space: its position and the word of its tether. What is left
-of the plan is whole if its ways are free, its tethers fit and the tether comes home free; otherwise
-the remaining NE-TSP is solved from that state. First the order of the goals is kept and only their
-classes are chosen afresh (a local repair, exact for that order and quick); the tour is planned anew
-when that promises to save more time than planning takes.
+of the plan is whole if its paths are free, its tethers fit and the tether comes home free;
+otherwise the remaining NE-TSP is solved from that state. First the order of the goals is kept and
+only their classes are chosen afresh (a local repair, exact for that order and quick); the tour is
+planned anew when that promises to save more time than planning takes.
 """
 
 from __future__ import annotations
@@ -53,12 +53,12 @@ class Repair:
 def broken(problem: Problem, tether: Floats, legs: list[Leg]) -> tuple[str | None, list[Leg]]:
     """What is wrong with what is left of a plan, None if nothing is; and the legs with the words
     and tethers that they have among the obstacles that there are now. tether : (k, 3) the taut
-    tether now. The ways of the legs follow on each other, the first starts at the robot."""
+    tether now. The paths of the legs follow on each other, the first starts at the robot."""
     rays = problem.representative_points
     word = signature(tether[:, :2], rays)
     left = [leg.goal for leg in legs if leg.goal != HOME]
     for leg in legs:
-        obstacle = _in_the_way(problem, leg.way)
+        obstacle = _in_the_way(problem, leg.path)
         if obstacle is not None:
             label = problem.obstacle_label(obstacle)
             return f"{label} stands in the way to {_label(problem, leg)}", legs
@@ -66,7 +66,7 @@ def broken(problem: Problem, tether: Floats, legs: list[Leg]) -> tuple[str | Non
     tethers = TautPaths(rest, FAR * max(problem.tether_length, length_of(tether)))
     now: list[Leg] = []
     for k, leg in enumerate(legs):
-        word = concatenate(word, crossings(leg.way[:, :2], rays))
+        word = concatenate(word, crossings(leg.path[:, :2], rays))
         if leg.goal == HOME:
             now.append(leg)
             break
@@ -79,7 +79,7 @@ def broken(problem: Problem, tether: Floats, legs: list[Leg]) -> tuple[str | Non
                 f"the tether is too short at {_label(problem, leg)}: {needs:.6g} of "
                 f"{problem.tether_length:g}"
             ), legs
-        now.append(Leg(leg.goal, leg.way, word, needs))
+        now.append(Leg(leg.goal, leg.path, word, needs))
     return ("the tether would not come home free", legs) if word else (None, now)
 
 
@@ -87,9 +87,9 @@ def _label(problem: Problem, leg: Leg) -> str:
     return "the base" if leg.goal == HOME else problem.goal_label(leg.goal)
 
 
-def _in_the_way(problem: Problem, way: Floats) -> int | None:
+def _in_the_way(problem: Problem, path: Floats) -> int | None:
     """An obstacle, grown by the clearance, that a way enters."""
-    line = shapely.LineString(way[:, :2]) if len(way) > 1 else shapely.Point(way[0, :2])
+    line = shapely.LineString(path[:, :2]) if len(path) > 1 else shapely.Point(path[0, :2])
     place = 1e-6 * problem.scale
     for i, o in enumerate(problem.obstacles):
         if isinstance(o, Circle):

@@ -53,7 +53,7 @@ class _Run:
         self.now, self.mode, self.fresh, self.leg_s = 0.0, "tour", True, 0.0
         self.shorten = False
         self.unreachable: set[int] = set()
-        self.way = self.legs[0].way
+        self.path = self.legs[0].path
 
     def _enter(self, problem: Problem) -> None:
         """The scene of a problem."""
@@ -80,7 +80,7 @@ class _Run:
         """One step along the way; arrives where the leg ends."""
         before = self.vehicle.position
         stops, passed = self.vehicle.go(
-            self.way, self.step, self.vehicle.yaw, self.water(self.now), self.fresh
+            self.path, self.step, self.vehicle.yaw, self.water(self.now), self.fresh
         )
         self.fresh = False
         self.now += self.step
@@ -93,12 +93,12 @@ class _Run:
             self.out.walked += float(np.linalg.norm(stop - before))
             self.tether = self.model.update(self.tether, stop)
             before = stop
-        end = self.way[-1]
-        self.way = self.way[min(passed, len(self.way) - 1) :]
+        end = self.path[-1]
+        self.path = self.path[min(passed, len(self.path) - 1) :]
         near = (
             1e-9 * self.problem.scale if self.options.vehicle == "kinematic" else self.options.reach
         )
-        if len(self.way) == 1 and float(np.linalg.norm(self.vehicle.position - end)) <= near:
+        if len(self.path) == 1 and float(np.linalg.norm(self.vehicle.position - end)) <= near:
             self._arrive()
         elif self.leg_s > 60.0 + PATIENCE * self.legs[0].length / self.options.speed:
             self._lose(self.legs[0].goal, "not reached in time")
@@ -106,7 +106,7 @@ class _Run:
     def _arrive(self) -> None:
         leg = self.legs.pop(0)
         # a vehicle with dynamics stops near the goal: what counts is the class at the goal itself
-        line = np.vstack([self.tether.nodes, leg.way[-1]])
+        line = np.vstack([self.tether.nodes, leg.path[-1]])
         word = signature(line[:, :2], self.problem.representative_points)
         self.out.arrivals.append(
             Arrival(round(self.now, 6), leg.goal, word, leg.word, self.tether.length, leg.tether)
@@ -116,7 +116,7 @@ class _Run:
     def _next(self) -> None:
         self.leg_s = 0.0
         if self.legs:
-            self.way, self.fresh = self.legs[0].way, True
+            self.path, self.fresh = self.legs[0].path, True
 
     def _lose(self, goal: int, why: str) -> None:
         if goal == HOME:
@@ -127,8 +127,8 @@ class _Run:
         if not self.options.repair:
             self.legs.pop(0)
             first = self.legs[0]
-            way = np.vstack([self.vehicle.position, first.way[1:]])
-            self.legs[0] = Leg(first.goal, way, first.word, first.tether)
+            path = np.vstack([self.vehicle.position, first.path[1:]])
+            self.legs[0] = Leg(first.goal, path, first.word, first.tether)
             self._enter_log("lost", "ignored", f"{self.problem.goal_label(goal)} {why}", 0.0)
             self._next()
             return
@@ -170,7 +170,7 @@ class _Run:
             must, legs = broken(self.problem, self.tether.nodes, self._from_here())
             if must is None:
                 self.legs = legs
-                self.way, self.leg_s = self.legs[0].way[1:], 0.0
+                self.path, self.leg_s = self.legs[0].path[1:], 0.0
         if must is None:
             self._enter_log(event.kind, "kept", "nothing that is left of the plan is broken", 0.0)
         elif not self.options.repair:
@@ -197,8 +197,8 @@ class _Run:
 
     def _from_here(self) -> list[Leg]:
         first = self.legs[0]
-        way = np.vstack([self.vehicle.position, self.way])
-        return [Leg(first.goal, way, first.word, first.tether), *self.legs[1:]]
+        path = np.vstack([self.vehicle.position, self.path])
+        return [Leg(first.goal, path, first.word, first.tether), *self.legs[1:]]
 
     def _enter_changed(self, event: Event) -> None:
         """The world after an event: what has come to stand on the tether or the robot has pushed

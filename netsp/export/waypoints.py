@@ -64,13 +64,13 @@ def waypoints_of(problem: Problem, solution: Solution, radius: float = 0.0) -> l
     legs = legs_of(problem, solution)
     solids = [o.shape() for o in problem.obstacles]
     shapely.prepare(solids)
-    points: list[Floats] = [legs[0].way[0]]
+    points: list[Floats] = [legs[0].path[0]]
     kinds: list[Mark] = [(None, (), 0.0)]
     for leg in legs:
-        for point in leg.way[1:-1]:
+        for point in leg.path[1:-1]:
             points.append(point)
             kinds.append((None, (), 0.0))
-        points.append(leg.way[-1])
+        points.append(leg.path[-1])
         kinds.append((leg.goal, leg.word, leg.tether))
     keep = [0]
     for k in range(1, len(points)):
@@ -126,9 +126,9 @@ def _coarsened(
                 break
             corner = _meeting(out[-1], line[k], line[m], line[m + 1]) if m > k else line[k]
             if corner is not None:
-                ways = [shapely.LineString([a[:2], b[:2]])
+                paths = [shapely.LineString([a[:2], b[:2]])
                         for a, b in ((out[-1], corner), (corner, line[m + 1]))]  # fmt: skip
-                if tree is None or not any(len(tree.query(w, "intersects")) for w in ways):
+                if tree is None or not any(len(tree.query(w, "intersects")) for w in paths):
                     best = (m, corner)
             m += 1
         if best is None:

@@ -42,24 +42,24 @@ def solve(graph: TravelGraph, params: None = None, limits: Limits | None = None)
 def _nearest_neighbour(run: Run) -> Trajectory | None:
     """The trajectory, or None if it happens to be a tour of the graph: then that is offered."""
     graph = run.graph
-    ways = graph.ways(sub_goals=False, check=run.check)
+    detours = graph.detours(sub_goals=False, check=run.check)
     order, here = [], 0
     left = set(range(1, graph.goal_count + 1))
     while left:
-        here = min(left, key=lambda b: (ways.length(here, b), b))
+        here = min(left, key=lambda b: (detours.length(here, b), b))
         left.remove(here)
         order.append(here)
     run.iterations = 1
     stops = [0, *order, 0]
     words: list[Word] = [()]
     for a, b in pairwise(stops):
-        words.append(concatenate(words[-1], ways.word(a, b)))
+        words.append(concatenate(words[-1], detours.word(a, b)))
     tour = graph.vertices_of(order, words[1:-1])
     if not words[-1] and tour is not None:
         # it happens to keep all promises; the walk is the same, for its legs are taut
         run.offer([0, *tour])
         return None
-    legs = [ways.path(a, b) for a, b in pairwise(stops)]
+    legs = [detours.path(a, b) for a, b in pairwise(stops)]
     path = np.vstack([legs[0], *(leg[1:] for leg in legs[1:])])
-    length = sum(ways.length(a, b) for a, b in pairwise(stops))
+    length = sum(detours.length(a, b) for a, b in pairwise(stops))
     return Trajectory(tuple(order), tuple(words[1:-1]), words[-1], path, length)

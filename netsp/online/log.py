@@ -93,7 +93,7 @@ def describe(run: Run, units: str) -> str:
         f"time     {s['inspection_s']:.1f} s, and back along the tether "
         f"{s['recovery_s']['tether']:.1f} s",
         f"tether   longest {s['longest_tether_m']:.3f} of {s['tether_length']:g} {units}, "
-        f"too long for {s['exceedance_s']:.1f} s",
+        f"over the limit for {s['exceedance_s']:.1f} s",
         f"planning {s['replans']} times, median {1e3 * s['replan_median_s']:.1f} ms, worst "
         f"{1e3 * s['replan_worst_s']:.0f} ms",
     ]

@@ -53,7 +53,7 @@ class Mission(BaseModel):
         default all.
     current : m/s, a steady current; gusts : m/s, standard deviation of what comes and goes on top.
         A kinematic vehicle feels neither.
-    delta : metres; resolution of the tether. cell : metres; of the grid that ways are sought on.
+    delta : metres; resolution of the tether. cell : metres; of the grid that paths are sought on.
 
     Raises
     ------

@@ -155,10 +155,10 @@ def travel_graph(
     tree = ShortestTree(grid, anchor, points)  # type: ignore[arg-type]
     found = _Classes([], [])
     for n in range(len(points)):
-        way = tree.way(n)
-        if way is None:
+        path = tree.path(n)
+        if path is None:
             continue
-        tether = model.relaxed(way[::-1], 2 * ROUNDS)
+        tether = model.relaxed(path[::-1], 2 * ROUNDS)
         if tether.length <= limit:
             found.point.append(n)
             found.tether.append(tether)
@@ -170,10 +170,10 @@ def travel_graph(
     while v < len(found.point):
         n = found.point[v]
         for m in near[n]:
-            way = np.array([points[n], points[m]])
-            if not _free(field, way, mission.clearance):
+            path = np.array([points[n], points[m]])
+            if not _free(field, path, mission.clearance):
                 continue
-            there, lengths = model.drive(found.tether[v], way[1:])
+            there, lengths = model.drive(found.tether[v], path[1:])
             if lengths.max() > limit:
                 continue
             w = found.find(int(m), there, mission.delta)
@@ -182,7 +182,7 @@ def travel_graph(
                 found.point.append(int(m))
                 found.tether.append(there)
             if w is not None:
-                straight[v, w] = float(np.linalg.norm(way[1] - way[0]))
+                straight[v, w] = float(np.linalg.norm(path[1] - path[0]))
         v += 1
     count = len(found.point)
     reach = np.array([t.length for t in found.tether])
@@ -198,8 +198,8 @@ def travel_graph(
             leg = min(straight.get((v, w), np.inf), straight.get((w, v), np.inf))
             if not np.isfinite(leg):
                 line = np.vstack([found.tether[v].nodes[::-1], found.tether[w].nodes[1:]])
-                way = taut(field, line, mission.clearance, mission.delta)
-                leg = float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum())
+                path = taut(field, line, mission.clearance, mission.delta)
+                leg = float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
             costs[v + 1, w + 1] = costs[w + 1, v + 1] = min(leg, costs[v + 1, w + 1])
     reached = sorted(set(found.point))
     if not reached:
@@ -208,7 +208,7 @@ def travel_graph(
     return TravelGraph.from_costs(costs, cluster), [-1, *found.point], reached
 
 
-def _free(field: DistanceField, way: Floats, clearance: float) -> bool:
+def _free(field: DistanceField, path: Floats, clearance: float) -> bool:
     """Whether a straight way keeps the clearance, or what its ends have of it."""
-    room = max(0.0, min(clearance, float(field.distance(way).min())) - 1e-3)
-    return field.grown(room).line_of_sight(way[0], way[1], depth=1e-3)
+    room = max(0.0, min(clearance, float(field.distance(path).min())) - 1e-3)
+    return field.grown(room).line_of_sight(path[0], path[1], depth=1e-3)

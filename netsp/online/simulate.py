@@ -35,7 +35,7 @@ STUCK = 600.0
 
 
 def grid_of(mission: Mission, scene: Scene, field: DistanceField) -> Grid:
-    """The grid that ways are sought on: the scene's bounds, or all there is and some room."""
+    """The grid that paths are sought on: the scene's bounds, or all there is and some room."""
     if scene.bounds is not None:
         low, high = np.array(scene.bounds[:3]), np.array(scene.bounds[3:])
     else:
@@ -82,13 +82,13 @@ class Simulation:
         self.log.append(row)
         return row
 
-    def go(self, way: Floats, fresh: bool) -> tuple[int, bool]:
+    def go(self, path: Floats, fresh: bool) -> tuple[int, bool]:
         """One step along a way: how much of it is passed, and whether the vehicle could move. One
         that runs into a solid is stopped where it was."""
         robot, yaw = self.vehicle.position, self.vehicle.yaw
         if self.coverage is not None:
             yaw = self.coverage.heading(robot, yaw)
-        stops, passed = self.vehicle.go(way, STEP, yaw, self.water(self.now), fresh)
+        stops, passed = self.vehicle.go(path, STEP, yaw, self.water(self.now), fresh)
         self.now += STEP
         if self.scene.distance(np.array(stops)).min() < -0.2 * self.tethers.delta:
             self.vehicle.stop_at(robot)
@@ -116,10 +116,10 @@ def _check_size(mission: Mission) -> None:
             f"waypoints: one is {far:g} from the anchor; expected at most {FARTHEST:g} times the "
             f"tether_length {mission.tether_length:g}: mixed units?"
         )
-    way = float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
-    if way / (mission.speed * STEP) > MOST_STEPS:
+    path = float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
+    if path / (mission.speed * STEP) > MOST_STEPS:
         raise InputError(
-            f"speed: {mission.speed:g} takes {way / (mission.speed * STEP):.2g} steps of {STEP:g} "
+            f"speed: {mission.speed:g} takes {path / (mission.speed * STEP):.2g} steps of {STEP:g} "
             f"s for the waypoints; expected at most {MOST_STEPS:g}"
         )
     if mission.tether_length / mission.delta > MOST_NODES:
@@ -147,7 +147,7 @@ def simulate(
     Parameters
     ----------
     planner : name (`netsp.online.planner.PLANNERS`), or a callable that makes one, such as a class
-        derived from `Planner`. options : how it finds ways.
+        derived from `Planner`. options : how it finds paths.
     tether : the model that the planner believes: geodesic, react, or a callable that makes a
         `netsp.online.tether.TetherModel` of a field and a resolution; what is logged is the
         geodesic one.
@@ -204,7 +204,7 @@ def simulate(
                 chosen.give_up(f"not reached in {STUCK:g} s")
                 continue
             fresh = before != chosen.index or command.replan_s > 0.0 or not world.now
-            passed, moved = world.go(command.way, fresh)
+            passed, moved = world.go(command.path, fresh)
             if moved:
                 chosen.passed(passed)
             else:

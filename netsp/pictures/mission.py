@@ -1,5 +1,5 @@
 """Pictures of missions: what was seen and how long the tether was over time (as in Figs. 4 and 7 of
-Amer et al. 2025), and the ways in space, of one run or of two side by side."""
+Amer et al. 2025), and the paths in space, of one run or of two side by side."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from netsp.pictures.scene import (
 FRAMES = 120
 
 
-def way_of(run: Run) -> Floats:
+def path_of(run: Run) -> Floats:
     """(n, 3) where the robot was."""
     return np.array([[r.x, r.y, r.z] for r in run.log])
 
@@ -63,7 +63,7 @@ def save_runs(runs: Sequence[Run], scene: Scene, file: str | Path) -> None:
         charts[0].set_xlabel("")
     axes = right.subplots(len(runs), 1, subplot_kw={"projection": "3d"}, squeeze=False)[:, 0]
     for run, ax in zip(runs, axes, strict=True):
-        draw_space(scene, way_of(run), run.tether.nodes, ax=ax)
+        draw_space(scene, path_of(run), run.tether.nodes, ax=ax)
         ax.set_title(title_of(run), fontsize=9)
         ax.legend(loc="upper left", fontsize=7)
     figure.suptitle(runs[0].mission.name)
@@ -111,9 +111,9 @@ def tethers_along(run: Run, scene: Scene, moments: npt.NDArray[np.int64]) -> lis
     """The tether at some rows of the log, ascending: the run is driven again."""
     mission = run.mission
     model = GeodesicTether(scene.field(), mission.delta)
-    state, way, out, at = model.start(mission.anchor, mission.start), way_of(run), [], 0
+    state, path, out, at = model.start(mission.anchor, mission.start), path_of(run), [], 0
     for row in moments:
-        state = model.drive(state, way[at : int(row) + 1])[0]
+        state = model.drive(state, path[at : int(row) + 1])[0]
         out.append(state)
         at = int(row) + 1
     return out
@@ -138,8 +138,8 @@ def save_page(runs: Sequence[Run], scene: Scene, file: str | Path) -> None:
     changing: list[list[Any]] = [[] for _ in times]
     numbers: list[int] = []
     for k, run in enumerate(runs):
-        way = way_of(run)
-        low, high = extent(scene, way, run.tether.nodes)
+        path = path_of(run)
+        low, high = extent(scene, path, run.tether.nodes)
         for name, (vertices, faces) in parts_of(scene, low, high):
             trace = mesh_trace(name, vertices, faces)
             trace.showlegend = False
@@ -149,11 +149,11 @@ def save_page(runs: Sequence[Run], scene: Scene, file: str | Path) -> None:
         rows = np.minimum(np.searchsorted(stamps, times), len(stamps) - 1)
         tethers = tethers_along(run, scene, rows)
         for f, (row, tether) in enumerate(zip(rows, tethers, strict=True)):
-            thin = way[: row + 1 : max(1, len(way) // 1500)]
+            thin = path[: row + 1 : max(1, len(path) // 1500)]
             trio = [
                 line_trace("path", thin, style.PATH, 3),
                 line_trace("tether", tether.nodes, style.TETHER, 6),
-                point_trace("robot", way[row], style.ROBOT),
+                point_trace("robot", path[row], style.ROBOT),
             ]
             if f == 0:
                 for trace in trio:

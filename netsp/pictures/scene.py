@@ -33,21 +33,21 @@ def save(
     InputError : another ending, a file that cannot be written, plotly not installed.
     """
     style.check_format(file, INTERACTIVE)
-    way = np.zeros((0, 3)) if path is None else np.asarray(path, dtype=float).reshape(-1, 3)
+    line = np.zeros((0, 3)) if path is None else np.asarray(path, dtype=float).reshape(-1, 3)
     nodes = np.zeros((0, 3)) if tether is None else tether.nodes
-    low, high = extent(scene, way, nodes)
+    low, high = extent(scene, line, nodes)
     parts = parts_of(scene, low, high)
-    title = title or _title(scene, way, tether)
+    title = title or _title(scene, line, tether)
     if Path(file).suffix.lower() == INTERACTIVE:
-        write_text(file, _interactive(scene, parts, way, nodes, title))
+        write_text(file, _interactive(scene, parts, line, nodes, title))
     else:
-        style.save(_figure(scene, parts, way, nodes, (low, high), title), file)
+        style.save(_figure(scene, parts, line, nodes, (low, high), title), file)
 
 
-def _title(scene: Scene, way: Floats, tether: Tether | None) -> str:
+def _title(scene: Scene, path: Floats, tether: Tether | None) -> str:
     words = [scene.name]
-    if len(way):
-        walked = float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum())
+    if len(path):
+        walked = float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
         words.append(f"path {walked:.4g} {scene.units}")
     if tether is not None:
         words.append(f"taut tether {tether.length:.4g} {scene.units}")
@@ -67,7 +67,7 @@ def parts_of(scene: Scene, low: Floats, high: Floats) -> list[tuple[str, Triangl
 
 
 def _figure(
-    scene: Scene, parts: Sequence[tuple[str, Triangles]], way: Floats, nodes: Floats,
+    scene: Scene, parts: Sequence[tuple[str, Triangles]], path: Floats, nodes: Floats,
     box: tuple[Floats, Floats], title: str,
 ) -> Any:  # fmt: skip
     """A view in space, and the plans from above and from two sides."""
@@ -79,7 +79,7 @@ def _figure(
     halves: Any = figure.subfigures(1, 2, width_ratios=[1.15, 1.0])
     left, right = halves
     ax: Any = left.add_subplot(projection="3d")
-    draw_space(scene, way, nodes, ax=ax)
+    draw_space(scene, path, nodes, ax=ax)
     cloud = drawn_points(scene) if scene.cloud is not None else np.zeros((0, 3))
     unit = scene.units
     ax.set(xlabel=f"x ({unit})", ylabel=f"y ({unit})", zlabel=f"z ({unit})")
@@ -91,7 +91,7 @@ def _figure(
             panel.add_collection(PolyCollection(flat, facecolors=style.OBSTACLE, linewidths=0))
         if len(cloud):
             panel.plot(cloud[:, a], cloud[:, b], ".", ms=0.4, color=style.OBSTACLE)
-        draw_lines(panel, way, nodes, (a, b))
+        draw_lines(panel, path, nodes, (a, b))
         panel.set(xlim=(low[a], high[a]), ylim=(low[b], high[b]), aspect="equal")
         panel.set_title(name, fontsize=9)
         panel.set(xlabel=names[a], ylabel=names[b])
@@ -102,7 +102,7 @@ def _figure(
     return figure
 
 
-def draw_space(scene: Scene, way: Floats, nodes: Floats, *, ax: Any = None) -> Any:
+def draw_space(scene: Scene, path: Floats, nodes: Floats, *, ax: Any = None) -> Any:
     """Solids, path (k, 3) and tether (n, 3) in space, on 3D axes of the caller or on new ones;
     returns the axes."""
     from matplotlib.figure import Figure
@@ -110,7 +110,7 @@ def draw_space(scene: Scene, way: Floats, nodes: Floats, *, ax: Any = None) -> A
 
     if ax is None:
         ax = Figure(figsize=(8, 7), layout="constrained").add_subplot(projection="3d")
-    low, high = extent(scene, way, nodes)
+    low, high = extent(scene, path, nodes)
     for _, (vertices, faces) in parts_of(scene, low, high):
         triangles = vertices[faces]
         ax.add_collection3d(
@@ -118,7 +118,7 @@ def draw_space(scene: Scene, way: Floats, nodes: Floats, *, ax: Any = None) -> A
         )
     if scene.cloud is not None:
         ax.plot(*drawn_points(scene).T, ".", ms=0.6, color=style.OBSTACLE)
-    draw_lines(ax, way, nodes, (0, 1, 2))
+    draw_lines(ax, path, nodes, (0, 1, 2))
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
     ax.set_box_aspect(high - low)
     return ax
@@ -134,10 +134,10 @@ def shaded(triangles: Floats) -> Floats:
     return np.column_stack([grey, grey, np.minimum(1.0, grey + 0.04)])
 
 
-def draw_lines(ax: Any, way: Floats, nodes: Floats, axes: tuple[int, ...]) -> None:
+def draw_lines(ax: Any, path: Floats, nodes: Floats, axes: tuple[int, ...]) -> None:
     columns = list(axes)
-    if len(way):
-        ax.plot(*way[:, columns].T, color=style.PATH, lw=0.9, alpha=0.8, label="path")
+    if len(path):
+        ax.plot(*path[:, columns].T, color=style.PATH, lw=0.9, alpha=0.8, label="path")
     if len(nodes):
         ax.plot(*nodes[:, columns].T, color=style.TETHER, lw=1.8, label="tether")
         ends = (nodes[0], style.BASE, "*", "anchor"), (nodes[-1], style.ROBOT, "o", "robot")
@@ -146,7 +146,7 @@ def draw_lines(ax: Any, way: Floats, nodes: Floats, axes: tuple[int, ...]) -> No
 
 
 def _interactive(
-    scene: Scene, parts: Sequence[tuple[str, Triangles]], way: Floats, nodes: Floats, title: str
+    scene: Scene, parts: Sequence[tuple[str, Triangles]], path: Floats, nodes: Floats, title: str
 ) -> str:
     go = plotly_objects()
     figure = go.Figure()
@@ -156,8 +156,8 @@ def _interactive(
         x, y, z = drawn_points(scene).T
         marker = {"size": 1.2, "color": style.OBSTACLE}
         figure.add_trace(go.Scatter3d(x=x, y=y, z=z, mode="markers", marker=marker, name="cloud"))
-    if len(way):
-        figure.add_trace(line_trace("path", way, style.PATH, 3))
+    if len(path):
+        figure.add_trace(line_trace("path", path, style.PATH, 3))
     if len(nodes):
         figure.add_trace(line_trace("tether", nodes, style.TETHER, 6))
         for name, point, colour in (

@@ -190,7 +190,7 @@ def _frames_of_run(
     rows: list[dict[str, str]], tethers: list[dict[str, Any]]
 ) -> list[dict[str, Any]]:
     times = np.array([float(r["time"]) for r in rows])
-    way = np.array([[float(r[k]) for k in "xyz"] for r in rows])
+    path = np.array([[float(r[k]) for k in "xyz"] for r in rows])
     step = max(1, len(tethers) // FRAMES)
     chosen = tethers[::step] + ([tethers[-1]] if (len(tethers) - 1) % step else [])
     frames = []
@@ -203,7 +203,9 @@ def _frames_of_run(
             f"{frame['time']:.4g} s; tether {float(row['tether']):.4g} of {float(row['limit']):g}; "
             f"next: {'the base' if int(row['goal']) == HOME else 'goal ' + row['goal']}"
         )
-        frames.append({"nodes": nodes, "path": np.vstack([way[:k:thin], nodes[-1:]]), "text": text})
+        frames.append(
+            {"nodes": nodes, "path": np.vstack([path[:k:thin], nodes[-1:]]), "text": text}
+        )
     return frames
 
 
@@ -221,7 +223,7 @@ def _summary(problem: Problem, solution: Solution, run: Path | None) -> str:
             f"Carried out in {s['time_s']:.5g} s over {s['path']:.6g} {units}: "
             f"{s['visited']} goals visited, the tether at most {s['longest_tether']:.5g} long, "
             f"longer than allowed for {s['exceedance_s']:.3g} s, "
-            f"{'taken in free' if s['tether_free'] else 'not taken in free'} at the end."
+            f"{'recovered free' if s['tether_free'] else 'not recovered free'} at the end."
         )
     return "".join(f"<p>{line}</p>" for line in lines)
 

@@ -1,4 +1,4 @@
-"""Tabulates the ways in any class between base, goals and sub-goals beside the obstacles.
+"""Tabulates the detours in any class between base, goals and sub-goals beside the obstacles.
 
 McCammon & Hollinger 2016, section III-B, change the class of a path by planning it again "through
 an additional sub-goal placed on the opposite side of an obstacle", and leave open where exactly.
@@ -23,7 +23,7 @@ from netsp.problem import Problem
 from netsp.roadmap.outline import Outline, build_outline
 from netsp.roadmap.shortest import ContactGraph, ShortestPaths
 from netsp.roadmap.tangents import build_tangents
-from netsp.travel.detours import Ways
+from netsp.travel.detours import Detours
 
 AROUND = 8
 """Places for sub-goals around an obstacle."""
@@ -32,12 +32,12 @@ OFF = 0.05
 """How far off the boundary they lie, as a share of the obstacle's size."""
 
 
-def taut_ways(
+def taut_detours(
     problem: Problem, with_sub_goals: bool, check: Callable[[], None] = lambda: None,
     stop: Flag = NEVER,
-) -> Ways:  # fmt: skip
-    """The ways over tangents and arcs: exact shortest paths. check : may raise to stop; and it does
-    when the flag is set."""
+) -> Detours:  # fmt: skip
+    """The detours over tangents and arcs: exact shortest paths. check : may raise to stop; and it
+    does when the flag is set."""
     places, side = sub_goals(problem, with_sub_goals)
     check()
     outline = build_outline(problem)
@@ -93,8 +93,8 @@ def tabulate(
     places: Floats,
     side: Ints,
     check: Callable[[], None] = lambda: None,
-) -> Ways:
-    """All ways from base and goals to base, goals and sub-goals over a graph of shortest paths.
+) -> Detours:
+    """All detours from base and goals to base, goals and sub-goals over a graph of shortest paths.
 
     terminals : (m + 1 + k,) node of the graph for base, goals and sub-goals. side : (k,) obstacle
     of each sub-goal. check : called for every base or goal; may raise to stop.
@@ -130,7 +130,7 @@ def tabulate(
             xy[-1] = problem.points[p, :2]
         return xy
 
-    return Ways(
+    return Detours(
         planar=planar,
         height=problem.points[:, 2],
         letters=np.array(letters, dtype=np.int64),

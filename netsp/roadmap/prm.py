@@ -32,7 +32,7 @@ from netsp.roadmap.outline import Outline
 from netsp.roadmap.paths import TautPaths
 from netsp.roadmap.reach import explain_unreached
 from netsp.roadmap.shortest import MilestoneGraph
-from netsp.travel.detours import Ways
+from netsp.travel.detours import Detours
 from netsp.travel.graph import UNTIMED, TravelGraph
 
 SAMPLES = 1000
@@ -118,7 +118,7 @@ class PrmRoadmap:
         """The travel graph over this roadmap. Tethers are the taut ones of their classes; that
         they fit was decided by the length along the roadmap, which is no shorter."""
         return TravelGraph(
-            self.cluster, self.signatures, self.tethers, self, roadmap="prm", ways=self._ways,
+            self.cluster, self.signatures, self.tethers, self, roadmap="prm", detours=self._detours,
             classes="non-looping" if self.complete else "shortest",
             least_left_out=math.inf if self.complete else 0.0,
         )  # fmt: skip
@@ -142,8 +142,10 @@ class PrmRoadmap:
             planar[v] = self.paths.planar_length(0, int(self.cluster[v]), self.signatures[v])
         return planar
 
-    def _ways(self, with_sub_goals: bool, check: Callable[[], None], stop: Flag = NEVER) -> Ways:
-        """Ways in any class along the milestones; sub-goals are joined as base and goals are."""
+    def _detours(
+        self, with_sub_goals: bool, check: Callable[[], None], stop: Flag = NEVER
+    ) -> Detours:
+        """Detours in any class along the milestones; sub-goals are joined as base and goals are."""
         del stop  # nothing compiled takes long here
         places, side = sub_goals(self.problem, with_sub_goals)
         outline = self.paths.outline

@@ -17,7 +17,7 @@ from netsp.clock import Clock, TimeLimit
 from netsp.errors import InputError
 from netsp.problem import Problem
 from netsp.roadmap.classes import find_classes
-from netsp.roadmap.detours import taut_ways
+from netsp.roadmap.detours import taut_detours
 from netsp.roadmap.explore import ALL, NON_LOOPING
 from netsp.roadmap.legs import TautLegs
 from netsp.roadmap.paths import TautPaths
@@ -85,7 +85,7 @@ class TautRoadmap:
             self.tethers,
             self.legs,
             roadmap="taut",
-            ways=partial(taut_ways, self.problem),
+            detours=partial(taut_detours, self.problem),
             classes=self.rule if self.complete else "shortest",
             least_left_out=self.least_left_out,
         )

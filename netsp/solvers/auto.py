@@ -7,8 +7,8 @@ With up to eight goals or so all sets of goals are gone through (`netsp.solvers.
 `PROVABLE` the matrices would not fit into a few gigabytes. Few goals are then proven over the
 classes of least tether, which proves the tour for good where it is no longer than twice the tether
 of every other class. With many, `lns` searches among them, and the bound comes from the goals
-alone, as the travelling salesperson's tour over the shortest ways between them in any class. That
-bound is weak, and true.
+alone, as the travelling salesperson's tour over the shortest paths between them in any class.
+That bound is weak, and true.
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | Non
     bound = prove(over_goals, limits=Limits(clock, rng=limits.rng, on_progress=tell)).lower_bound
     return replace(
         found,
-        # the ways are shortest up to rounding
+        # the paths are shortest up to rounding
         lower_bound=min(length, (bound or 0.0) * (1.0 - 1e-9)),
         trace=tuple(rows),
     )
@@ -123,7 +123,7 @@ def _between_goals(graph: TravelGraph) -> Floats:
     """(n + 1, n + 1) no more than any leg between two goals, in any class."""
     if not graph.geometric:
         return Instance.of(graph).cluster_costs
-    ways = graph.ways(sub_goals=False)
+    detours = graph.detours(sub_goals=False)
     places = range(graph.goal_count + 1)
-    shortest = np.array([[ways.length(a, b) for b in places] for a in places])
+    shortest = np.array([[detours.length(a, b) for b in places] for a in places])
     return np.asarray(np.minimum(shortest, shortest.T))

@@ -41,8 +41,8 @@ def solve(run: Run) -> None:
             rest = s & ~(1 << c)
             if s >> c & 1 and rest:
                 inside = np.flatnonzero(np.isfinite(reach[rest]))
-                ways = reach[rest, inside, None] + costs[np.ix_(inside, members[c])]
-                reach[s, members[c]] = ways.min(axis=0, initial=np.inf)
+                detours = reach[rest, inside, None] + costs[np.ix_(inside, members[c])]
+                reach[s, members[c]] = detours.min(axis=0, initial=np.inf)
     run.iterations += 1
     every = 2**n - 1
     home = reach[every] + costs[:, 0]

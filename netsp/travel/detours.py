@@ -1,8 +1,8 @@
-"""Ways between base and goals in any class: what planners need that are blind to the tether.
+"""Detours between base and goals in any class: what planners need that are blind to the tether.
 
 The 2016 workshop paper plans from goal to goal by the shortest path, whatever its homotopy class,
 and changes the class by planning again through a sub-goal on the far side of an obstacle. Those
-ways are tabulated here, so that its solvers, like the others, see no geometry.
+detours are tabulated here, so that its solvers, like the others, see no geometry.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ DIRECT = -1
 
 
 @dataclass(frozen=True)
-class Ways:
+class Detours:
     """Places are the base (0), the goals (1 … m), then sub-goals beside the obstacles.
 
     Attributes

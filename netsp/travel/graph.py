@@ -26,7 +26,7 @@ from netsp.drawn import Drawn
 from netsp.errors import InputError
 from netsp.hsignature import Word
 from netsp.travel.costs import CostTable, checked_costs
-from netsp.travel.detours import Ways
+from netsp.travel.detours import Detours
 
 if TYPE_CHECKING:
     from netsp.solution import KeptClasses
@@ -88,7 +88,7 @@ class TravelGraph(Drawn):
         tethers: npt.ArrayLike,
         legs: Legs,
         roadmap: str = "custom",
-        ways: Callable[[bool, Callable[[], None], Flag], Ways] | None = None,
+        detours: Callable[[bool, Callable[[], None], Flag], Detours] | None = None,
         classes: KeptClasses | None = None,
         least_left_out: float = math.inf,
     ) -> None:
@@ -102,8 +102,8 @@ class TravelGraph(Drawn):
         self.clock: Clock | None = None
         self._legs = legs
         self._costs: Floats | None = None
-        self._make_ways = ways
-        self._ways: dict[bool, Ways] = {}
+        self._make_detours = detours
+        self._detours: dict[bool, Detours] = {}
         self._place: dict[tuple[int, Word], int] | None = None
 
     @classmethod
@@ -210,20 +210,20 @@ class TravelGraph(Drawn):
     @property
     def geometric(self) -> bool:
         """Whether a problem's geometry lies beneath, so that legs can be walked and retraced."""
-        return self._make_ways is not None
+        return self._make_detours is not None
 
-    def ways(self, *, sub_goals: bool, check: Callable[[], None] = lambda: None) -> Ways:
-        """Ways in any class, for solvers blind to the tether, with or without sub-goals beside the
-        obstacles; `check` is called now and then and may raise. InputError if there is no geometry
-        beneath this graph."""
-        if self._make_ways is None:
+    def detours(self, *, sub_goals: bool, check: Callable[[], None] = lambda: None) -> Detours:
+        """Detours in any class, for solvers blind to the tether, with or without sub-goals beside
+        the obstacles; `check` is called now and then and may raise. InputError if there is no
+        geometry beneath this graph."""
+        if self._make_detours is None:
             raise InputError(
                 "solver: needs the geometry of a problem, and this travel graph has none"
             )
-        if sub_goals not in self._ways:
+        if sub_goals not in self._detours:
             stop = NEVER if self.clock is None else self.clock.flag
-            self._ways[sub_goals] = self._make_ways(sub_goals, check, stop)
-        return self._ways[sub_goals]
+            self._detours[sub_goals] = self._make_detours(sub_goals, check, stop)
+        return self._detours[sub_goals]
 
     def subgraph(self, vertices: npt.ArrayLike) -> TravelGraph:
         """The travel graph on some of the vertices, the base first; vertex k of it is vertex

@@ -1,4 +1,4 @@
-"""Ways made safer and smoother before they are followed.
+"""Paths made safer and smoother before they are followed.
 
 `paper`: the three steps of Amer et al. 2025, section V-B, repeated until the way is free.
 `gradient`: ours; it moves points up the distance field only, so no point's clearance gets smaller,
@@ -27,16 +27,16 @@ ROUNDS = 5
 
 
 def refined(
-    name: str, field: DistanceField, way: Floats, clearance: float, rng: np.random.Generator
+    name: str, field: DistanceField, path: Floats, clearance: float, rng: np.random.Generator
 ) -> Floats:
     """A way (k, 3) refined; as it was if what came of it is not free."""
-    if name == "none" or len(way) < 3:
-        return way
-    room = max(0.0, min(clearance, float(field.distance(way[[0, -1]]).min())) - 1e-3)
+    if name == "none" or len(path) < 3:
+        return path
+    room = max(0.0, min(clearance, float(field.distance(path[[0, -1]]).min())) - 1e-3)
     if name == "gradient":
-        better = lifted(field, way, clearance)
-        return better if clear(field, better, min(room, lowest(field, way))) else way
-    best = way
+        better = lifted(field, path, clearance)
+        return better if clear(field, better, min(room, lowest(field, path))) else path
+    best = path
     for _ in range(ROUNDS):
         best = offset(best, clearance)
         best = perturbed(field, best, 0.1 * clearance, rng)
@@ -45,23 +45,23 @@ def refined(
             return best
         # what went into something is brought out again, and the three steps are repeated
         best = lifted(field, best, clearance)
-    return way
+    return path
 
 
-def offset(way: Floats, by: float) -> Floats:
+def offset(path: Floats, by: float) -> Floats:
     """Every point but the ends moved away from the centroid of all."""
-    away = way - way.mean(axis=0)
+    away = path - path.mean(axis=0)
     far = np.linalg.norm(away, axis=1, keepdims=True)
-    out = way + by * away / np.maximum(far, 1e-12)
-    out[[0, -1]] = way[[0, -1]]
+    out = path + by * away / np.maximum(far, 1e-12)
+    out[[0, -1]] = path[[0, -1]]
     return np.asarray(out)
 
 
-def perturbed(field: DistanceField, way: Floats, by: float, rng: np.random.Generator) -> Floats:
+def perturbed(field: DistanceField, path: Floats, by: float, rng: np.random.Generator) -> Floats:
     """Every point but the ends moved in the best of some random directions, if that takes it
     farther from solids."""
-    out = way.copy()
-    inner = len(way) - 2
+    out = path.copy()
+    inner = len(path) - 2
     for _ in range(TRIALS):
         direction = rng.normal(size=(inner, 3))
         tried = out[1:-1] + by * direction / np.linalg.norm(direction, axis=1, keepdims=True)
@@ -70,13 +70,13 @@ def perturbed(field: DistanceField, way: Floats, by: float, rng: np.random.Gener
     return out
 
 
-def smoothed(way: Floats) -> Floats:
+def smoothed(path: Floats) -> Floats:
     """Cubic least-squares fits on overlapping segments, averaged where they overlap."""
-    total, count = np.zeros_like(way), np.zeros((len(way), 1))
+    total, count = np.zeros_like(path), np.zeros((len(path), 1))
     step = SEGMENT - OVERLAP
-    for first in range(0, max(1, len(way) - OVERLAP), step):
-        part = slice(first, min(first + SEGMENT, len(way)))
-        points = way[part]
+    for first in range(0, max(1, len(path) - OVERLAP), step):
+        part = slice(first, min(first + SEGMENT, len(path)))
+        points = path[part]
         if len(points) <= 4:
             total[part] += points
         else:
@@ -88,23 +88,23 @@ def smoothed(way: Floats) -> Floats:
                 total[part] += basis @ np.linalg.lstsq(basis, points, rcond=None)[0]
         count[part] += 1.0
     out = total / count
-    out[[0, -1]] = way[[0, -1]]
+    out[[0, -1]] = path[[0, -1]]
     return np.asarray(out)
 
 
-def lifted(field: DistanceField, way: Floats, clearance: float) -> Floats:
+def lifted(field: DistanceField, path: Floats, clearance: float) -> Floats:
     """Every point but the ends moved up the distance field's gradient to the clearance."""
-    out = way.copy()
-    out[1:-1] = pushed_out(field, way[1:-1], clearance)
+    out = path.copy()
+    out[1:-1] = pushed_out(field, path[1:-1], clearance)
     return out
 
 
-def lowest(field: DistanceField, way: Floats) -> float:
+def lowest(field: DistanceField, path: Floats) -> float:
     """Least distance at the points of a way."""
-    return float(field.distance(way).min())
+    return float(field.distance(path).min())
 
 
-def clear(field: DistanceField, way: Floats, room: float) -> bool:
+def clear(field: DistanceField, path: Floats, room: float) -> bool:
     """Whether the straight lines between the points keep `room` from solids."""
     grown = field.grown(room)
-    return all(grown.line_of_sight(a, b, depth=1e-2 * max(room, 0.1)) for a, b in pairwise(way))
+    return all(grown.line_of_sight(a, b, depth=1e-2 * max(room, 0.1)) for a, b in pairwise(path))

@@ -1,4 +1,4 @@
-"""Short ways by OMPL's planners, as the paper found them; the same interface as our tree.
+"""Short paths by OMPL's planners, as the paper found them; the same interface as our tree.
 
 Sucan, Moll and Kavraki, "The Open Motion Planning Library", IEEE RAM 19(4), 2012.
 """
@@ -22,8 +22,8 @@ ITERATIONS = {"rrtstar": 1000, "bitstar": 3000, "prmstar": 300}
 seed gives the same way."""
 
 
-class SampledWays:
-    """Ways to a target, each planned when it is asked for.
+class SampledPaths:
+    """Paths to a target, each planned when it is asked for.
 
     name : of the planner (`OMPL_PLANNERS`). grid : its box, field and clearance. target : (3,).
     points : (n, 3). seed : of the sampling.
@@ -37,17 +37,17 @@ class SampledWays:
         self, name: str, grid: Grid, target: Floats, points: Floats, seed: int = 0
     ) -> None:
         if name not in OMPL_PLANNERS:
-            raise InputError(f"--ways: expected tree, {', '.join(OMPL_PLANNERS)}, got {name!r}")
+            raise InputError(f"--paths: expected tree, {', '.join(OMPL_PLANNERS)}, got {name!r}")
         self.name, self.grid, self.seed = name, grid, seed
         self.target = np.asarray(target, dtype=float)
         self.points = np.asarray(points, dtype=float).reshape(-1, 3)
-        self._ways: dict[int, Floats | None] = {}
+        self._paths: dict[int, Floats | None] = {}
 
-    def way(self, n: int) -> Floats | None:
+    def path(self, n: int) -> Floats | None:
         """(k, 3) from point n to the target; None if none was found."""
-        if n not in self._ways:
-            self._ways[n] = self._plan(self.points[n])
-        return self._ways[n]
+        if n not in self._paths:
+            self._paths[n] = self._plan(self.points[n])
+        return self._paths[n]
 
     def _plan(self, start: Floats) -> Floats | None:
         ob, og, ou = _ompl()
@@ -85,25 +85,25 @@ class SampledWays:
             return left[0] < 0
 
         if self.name == "prmstar":
-            # its `solve` looks for ways in a thread of its own, which waits for Python's lock
+            # its `solve` looks for paths in a thread of its own, which waits for Python's lock
             grow = getattr(planner, "growRoadmapPtc", planner.growRoadmap)
             grow(ob.PlannerTerminationCondition(
                 lambda: planner.milestoneCount() >= ITERATIONS["prmstar"]
             ))  # fmt: skip
-            way = _through_roadmap(ob, info, planner, np.array([start, self.target]))
+            path = _through_roadmap(ob, info, planner, np.array([start, self.target]))
         else:
             planner.solve(ob.PlannerTerminationCondition(enough))
-            way = None
+            path = None
             if query.hasExactSolution():
                 states = query.getSolutionPath().getStates()
-                way = np.array([[s[0], s[1], s[2]] for s in states])
-        if way is None:
+                path = np.array([[s[0], s[1], s[2]] for s in states])
+        if path is None:
             return None
         free = all(
             lowest_along(field, *a, *b, 0.1 * grid.cell)[0] > -0.25 * grid.cell
-            for a, b in pairwise(way)
+            for a, b in pairwise(path)
         )
-        return way if free else None
+        return path if free else None
 
 
 def _through_roadmap(ob: Any, info: Any, planner: Any, ends: Floats) -> Floats | None:
@@ -130,10 +130,10 @@ def _through_roadmap(ob: Any, info: Any, planner: Any, ends: Floats) -> Floats |
     far, before = dijkstra(graph, directed=False, indices=len(states) + 1, return_predecessors=True)
     if not np.isfinite(far[len(states)]):
         return None
-    way = [len(states)]
-    while way[-1] != len(states) + 1:
-        way.append(int(before[way[-1]]))
-    return np.asarray(points[way])
+    path = [len(states)]
+    while path[-1] != len(states) + 1:
+        path.append(int(before[path[-1]]))
+    return np.asarray(points[path])
 
 
 def _ompl() -> Any:

@@ -1,4 +1,4 @@
-"""Shortest ways to one place from everywhere: a tree on a grid, and its ways pulled taut.
+"""Shortest paths to one place from everywhere: a tree on a grid, and its paths pulled taut.
 
 The tree serves every pivot of a recovery at once. A way along the grid is up to 8 % longer than it
 need be (26 directions); pulled taut as a tether it is the shortest of its class, at the clearance.
@@ -84,21 +84,21 @@ class Grid:
         return None
 
 
-class Ways(Protocol):
-    """Short ways to one target from some points, however they are found."""
+class Paths(Protocol):
+    """Short paths to one target from some points, however they are found."""
 
-    def way(self, n: int) -> Floats | None:
+    def path(self, n: int) -> Floats | None:
         """(k, 3) from point n to the target; None if there is none."""
 
 
 class ShortestTree:
-    """Ways to a target from the points asked about.
+    """Paths to a target from the points asked about.
 
     grid : where. target : (3,). points : (n, 3) from where; the tree grows until it has them all.
 
     Attributes
     ----------
-    lengths : (n,) lengths of the ways along the grid, inf where there is none.
+    lengths : (n,) lengths of the paths along the grid, inf where there is none.
     """
 
     def __init__(self, grid: Grid, target: npt.ArrayLike, points: npt.ArrayLike) -> None:
@@ -123,7 +123,7 @@ class ShortestTree:
                 self.lengths[n] = lengths[k] * grid.cell + ends
                 k += 1
 
-    def way(self, n: int) -> Floats | None:
+    def path(self, n: int) -> Floats | None:
         """(k, 3) from point n to the target along the grid; None if there is none."""
         cell = self._cells[n]
         if cell is None or not np.isfinite(self.lengths[n]):
@@ -186,16 +186,16 @@ def grow(free, root, wanted, toward):
     return found
 
 
-def taut(field: DistanceField, way: Floats, clearance: float, delta: float) -> Floats:
+def taut(field: DistanceField, path: Floats, clearance: float, delta: float) -> Floats:
     """A way (k, 3) pulled taut in its class, no nearer to solids than the clearance, or than it is
     at its ends; densely enough for straight lines between its points to keep to it."""
-    ends = field.distance(way[[0, -1]])
+    ends = field.distance(path[[0, -1]])
     room = max(0.0, min(clearance, float(ends.min()) - 1e-3 * delta))
     grown = field.grown(room)
     # the grown solids are no thinner than twice the room: nothing is lost with a coarser delta
     coarse, fine = (GeodesicTether(grown, max(delta, share * room)) for share in (1.0, 0.5))
     step = max(room, delta)
-    line = way
+    line = path
     for _ in range(2):
         k = 2 + int(length_of(line) / step)
         line = shortcut(grown.arrays, _shares(line, k), 0.1 * step)[::-1]
@@ -204,41 +204,41 @@ def taut(field: DistanceField, way: Floats, clearance: float, delta: float) -> F
 
 
 @njit(cache=True)
-def shortcut(field, way, tolerance):
+def shortcut(field, path, tolerance):
     """A way without the points that can be left out: from each point straight to the last of those
     that it sees without a break. The triangles that are swept are as wide as the way's points are
     apart, so nothing wider is passed over."""
-    out = np.empty_like(way)
-    out[0] = way[0]
+    out = np.empty_like(path)
+    out[0] = path[0]
     count, i = 1, 0
-    while i < len(way) - 1:
+    while i < len(path) - 1:
         j = i + 1
-        while j + 1 < len(way):
+        while j + 1 < len(path):
             low, _ = lowest_along(
-                field, way[i, 0], way[i, 1], way[i, 2],
-                way[j + 1, 0], way[j + 1, 1], way[j + 1, 2], tolerance,
+                field, path[i, 0], path[i, 1], path[i, 2],
+                path[j + 1, 0], path[j + 1, 1], path[j + 1, 2], tolerance,
             )  # fmt: skip
             if low < -tolerance:
                 break
             j += 1
-        out[count] = way[j]
+        out[count] = path[j]
         count += 1
         i = j
     return out[:count].copy()
 
 
 def homotopic(field: DistanceField, a: Floats, b: Floats, step: float) -> bool:
-    """Whether two ways between the same ends certainly are of one class: points at most `step`
+    """Whether two paths between the same ends certainly are of one class: points at most `step`
     apart, at the same share of both ways, all see one another. Nothing wider than `step` can then
-    stand between the ways."""
+    stand between the paths."""
     k = 2 + int(max(length_of(a), length_of(b)) / step)
     return bool(all_see(field.arrays, _shares(a, k), _shares(b, k), 0.1 * step))
 
 
-def _shares(way: Floats, k: int) -> Floats:
-    s = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(way, axis=0), axis=1))]
+def _shares(path: Floats, k: int) -> Floats:
+    s = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))]
     u = np.linspace(0.0, s[-1], k)
-    return np.column_stack([np.interp(u, s, way[:, axis]) for axis in range(3)])
+    return np.column_stack([np.interp(u, s, path[:, axis]) for axis in range(3)])
 
 
 @njit(cache=True)
@@ -252,6 +252,6 @@ def all_see(field, a, b, step):
     return True
 
 
-def length_of(way: Floats) -> float:
+def length_of(path: Floats) -> float:
     """Length of a polyline."""
-    return float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum()) if len(way) > 1 else math.nan
+    return float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum()) if len(path) > 1 else math.nan

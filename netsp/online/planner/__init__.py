@@ -45,8 +45,8 @@ def make_planner(
     or in its options."""
     options = options or Options()
     make = name if callable(name) else PLANNERS.named(name)
-    if options.ways not in (known := ("tree", *OMPL_PLANNERS)):
-        raise InputError(f"ways: expected {', '.join(known)}, got {options.ways!r}")
+    if options.paths not in (known := ("tree", *OMPL_PLANNERS)):
+        raise InputError(f"paths: expected {', '.join(known)}, got {options.paths!r}")
     if options.refine not in (None, *REFINEMENTS):
         raise InputError(f"refine: expected {', '.join(REFINEMENTS)}, got {options.refine!r}")
     if name == "predictive" and not isinstance(tethers, GeodesicTether):

@@ -11,8 +11,8 @@ import numpy as np
 from netsp.arrays import Floats
 from netsp.online.mission import Mission
 from netsp.online.paths.refine import refined
-from netsp.online.paths.sampled import SampledWays
-from netsp.online.paths.tree import Grid, ShortestTree, Ways, taut
+from netsp.online.paths.sampled import SampledPaths
+from netsp.online.paths.tree import Grid, Paths, ShortestTree, taut
 from netsp.online.scene.field import DistanceField
 from netsp.online.tether import GeodesicTether, ReactTether, Tether
 
@@ -32,21 +32,21 @@ class Command:
     done. replan_s : seconds of CPU that planning took in this step.
     """
 
-    way: Floats
+    path: Floats
     mode: str
     replan_s: float = 0.0
 
 
 @dataclass(frozen=True)
 class Options:
-    """How ways are found.
+    """How paths are found.
 
-    ways : tree, or one of OMPL's planners (`netsp.online.paths.sampled`). refine : none, paper or
+    paths : tree, or one of OMPL's planners (`netsp.online.paths.sampled`). refine : none, paper or
     gradient (`netsp.online.paths.refine`); default paper for the paper's planners and none for the
-    others, whose ways keep the clearance from the start. seed : of what is random in either.
+    others, whose paths keep the clearance from the start. seed : of what is random in either.
     """
 
-    ways: str = "tree"
+    paths: str = "tree"
     refine: str | None = None
     seed: int = 0
 
@@ -68,7 +68,7 @@ class Planner:
     options: Options = field(default_factory=Options)
     index: int = 0
     mode: str = NORMAL
-    way: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    path: Floats = field(default_factory=lambda: np.zeros((0, 3)))
     skipped: list[tuple[int, str]] = field(default_factory=list)
     defects: list[str] = field(default_factory=list)
     reached: list[int] = field(default_factory=list)
@@ -104,7 +104,7 @@ class Planner:
         spent = time.process_time() - begin if planned else 0.0
         if self.done:
             return Command(np.array([robot]), DONE, spent)
-        return Command(self.way if len(self.way) else np.array([robot]), self.mode, spent)
+        return Command(self.path if len(self.path) else np.array([robot]), self.mode, spent)
 
     def _hold(self, robot: Floats, error: Exception, spent: float) -> Command:
         """Stay, and try again at the next step; give the waypoint up after a while."""
@@ -117,72 +117,72 @@ class Planner:
     def warm_up(self, robot: Floats, tether: Tether) -> None:
         """Load what is compiled, so that the first plan takes no longer than the others."""
         del tether
-        way = self.ways(robot[None]).way(0)
-        if way is not None:
-            self.pulled(way)
+        path = self.paths(robot[None]).path(0)
+        if path is not None:
+            self.pulled(path)
 
     def plan(self, robot: Floats, tether: Tether) -> bool:
         """Set `way` and `mode`; whether anything had to be thought about. Here: on to the waypoint,
         whatever the tether."""
         del tether
-        return False if len(self.way) else self.go_on(robot)
+        return False if len(self.path) else self.go_on(robot)
 
     def go_on(self, robot: Floats) -> bool:
         """Straight to the waypoint, or the shortest way round what is between; whether that had to
         be sought."""
         straight = np.array([robot, self.target])
         if self.is_free(straight):
-            self.way = straight[1:]
+            self.path = straight[1:]
             return False
-        way = self.ways(robot[None]).way(0)
-        if way is None:
+        path = self.paths(robot[None]).path(0)
+        if path is None:
             self.give_up("no free way to it")
         else:
-            self.way = self.refined(self.pulled(way))[1:]
+            self.path = self.refined(self.pulled(path))[1:]
         return True
 
-    def ways(self, points: Floats) -> Ways:
-        """Short ways to the waypoint from each of some points (n, 3)."""
-        if self.options.ways == "tree":
+    def paths(self, points: Floats) -> Paths:
+        """Short paths to the waypoint from each of some points (n, 3)."""
+        if self.options.paths == "tree":
             return ShortestTree(self.grid, self.target, points)
         seed = 1000 * self.options.seed + self.index
-        return SampledWays(self.options.ways, self.grid, self.target, points, seed)
+        return SampledPaths(self.options.paths, self.grid, self.target, points, seed)
 
-    def refined(self, way: Floats) -> Floats:
+    def refined(self, path: Floats) -> Floats:
         """A way made safer and smoother, as the options have it."""
         name = self.options.refine or self.refine
         if name == "none":
-            return way
+            return path
         rng = np.random.default_rng([self.options.seed, self.index])
-        even = points_along(way, self.mission.cell)
+        even = points_along(path, self.mission.cell)
         return refined(name, self.scene, even, self.mission.clearance, rng)
 
-    def pulled(self, way: Floats) -> Floats:
+    def pulled(self, path: Floats) -> Floats:
         """A way pulled taut in its class, at the clearance."""
-        return taut(self.scene, way, self.mission.clearance, self.mission.delta)
+        return taut(self.scene, path, self.mission.clearance, self.mission.delta)
 
-    def is_free(self, way: Floats) -> bool:
+    def is_free(self, path: Floats) -> bool:
         """Whether a straight way keeps the clearance, or what its ends have of it."""
-        ends = float(self.scene.distance(way).min())
+        ends = float(self.scene.distance(path).min())
         room = min(self.mission.clearance, ends) - 1e-3
-        return self.scene.grown(max(0.0, room)).line_of_sight(way[0], way[1], depth=1e-3)
+        return self.scene.grown(max(0.0, room)).line_of_sight(path[0], path[1], depth=1e-3)
 
     def _advance(self, robot: Floats) -> None:
         """Past the waypoint, when it is reached at the end of the way."""
         reach = self.mission.reach
         if self.done:
             return
-        if len(self.way) <= 1 and np.linalg.norm(self.target - robot) <= reach:
+        if len(self.path) <= 1 and np.linalg.norm(self.target - robot) <= reach:
             self.reached.append(self.index)
             self._next()
 
     def _next(self) -> None:
         self.index += 1
-        self.way, self.mode, self._held = np.zeros((0, 3)), NORMAL, 0
+        self.path, self.mode, self._held = np.zeros((0, 3)), NORMAL, 0
 
     def passed(self, count: int) -> None:
         """The robot has passed so many points of the way; the last one stays the target."""
-        self.way = self.way[min(count, max(0, len(self.way) - 1)) :]
+        self.path = self.path[min(count, max(0, len(self.path) - 1)) :]
 
     def give_up(self, reason: str) -> None:
         """Leave a waypoint out."""
@@ -190,18 +190,18 @@ class Planner:
         self._next()
 
 
-def dense(way: Floats, step: float) -> Floats:
+def dense(path: Floats, step: float) -> Floats:
     """A way (k, 3) with points at most `step` apart, its first left out."""
     out = []
-    for a, b in pairwise(way):
+    for a, b in pairwise(path):
         k = max(1, int(np.ceil(np.linalg.norm(b - a) / step)))
         out.append(a + (b - a) * (np.arange(1, k + 1) / k)[:, None])
     return np.vstack(out) if out else np.zeros((0, 3))
 
 
-def points_along(way: Floats, step: float) -> Floats:
+def points_along(path: Floats, step: float) -> Floats:
     """Points (n, 3) of a polyline every `step`, both ends among them."""
-    s = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(way, axis=0), axis=1))]
+    s = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))]
     n = max(1, int(np.ceil(s[-1] / step)))
     u = np.linspace(0.0, s[-1], n + 1)
-    return np.column_stack([np.interp(u, s, way[:, k]) for k in range(3)])
+    return np.column_stack([np.interp(u, s, path[:, k]) for k in range(3)])

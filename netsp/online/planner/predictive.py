@@ -43,7 +43,7 @@ class PredictivePlanner(Planner):
 
     def plan(self, robot: Floats, tether: Tether) -> bool:
         """One way per waypoint, planned when the robot sets out for it."""
-        if self._planned == self.index and len(self.way) and not self._surprised(tether):
+        if self._planned == self.index and len(self.path) and not self._surprised(tether):
             return False
         self._planned = self.index
         limit = self.mission.tether_length * (1.0 - MARGIN)
@@ -51,10 +51,10 @@ class PredictivePlanner(Planner):
         for end in (target, self._near_enough(robot, target)):
             straight = np.array([robot, end])
             if self.is_free(straight) and self._fits(tether, straight, limit):
-                self.way, self.mode = straight[1:], NORMAL
+                self.path, self.mode = straight[1:], NORMAL
                 return True
-        way = self._shortest_feasible(robot, tether, limit)
-        if way is None:
+        path = self._shortest_feasible(robot, tether, limit)
+        if path is None:
             own = self._own_tether(target)
             self.give_up(
                 "no free way to it" if own is None else
@@ -62,10 +62,10 @@ class PredictivePlanner(Planner):
                 f"{self.mission.tether_length:g}"
             )  # fmt: skip
             return True
-        better = self.refined(way)
-        if better is not way and self._fits(tether, better, limit):
-            way = better
-        self.way, self.mode = way[1:], RECOVERY
+        better = self.refined(path)
+        if better is not path and self._fits(tether, better, limit):
+            path = better
+        self.path, self.mode = path[1:], RECOVERY
         return True
 
     def _surprised(self, tether: Tether) -> bool:
@@ -81,9 +81,9 @@ class PredictivePlanner(Planner):
     def _near_enough(self, robot: Floats, target: Floats) -> Floats:
         """Where on the straight way the waypoint counts as visited: the tether may fit there only.
         A fifth of the reach is left for a vehicle that does not stop on the spot."""
-        way = target - robot
-        far = float(np.linalg.norm(way))
-        return target - way * min(1.0, 0.8 * self.mission.reach / max(far, 1e-12))
+        path = target - robot
+        far = float(np.linalg.norm(path))
+        return target - path * min(1.0, 0.8 * self.mission.reach / max(far, 1e-12))
 
     @property
     def _model(self) -> GeodesicTether:
@@ -94,7 +94,7 @@ class PredictivePlanner(Planner):
         """See `Planner`."""
         self._shortest_feasible(robot, tether, self.mission.tether_length)
 
-    def _fits(self, tether: Tether, way: Floats, limit: float) -> bool:
+    def _fits(self, tether: Tether, path: Floats, limit: float) -> bool:
         """Whether the tether stays within the limit all along a way.
 
         A taut tether gets longer by at most the way its end goes. So between points h apart, with
@@ -103,11 +103,11 @@ class PredictivePlanner(Planner):
         """
         most = max(limit, tether.length + 1e-6)
         fine = max(0.5 * self.mission.delta, 0.02)
-        points = dense(way, COARSE * fine)
+        points = dense(path, COARSE * fine)
         _, lengths = self.tethers.drive(tether, points)
         if lengths.max(initial=0.0) > most:
             return False
-        corners = np.vstack([way[:1], points])
+        corners = np.vstack([path[:1], points])
         steps = np.linalg.norm(np.diff(corners, axis=0), axis=1)
         close = np.r_[tether.length, lengths[:-1]] + lengths + steps > 2.0 * most
         if not close.any():
@@ -137,8 +137,8 @@ class PredictivePlanner(Planner):
         places = np.linspace(0.0, along[-1], len(back))
         back[1:] = pushed_out(self.scene, back[1:], self.mission.clearance)
         pivots = np.unique(np.linspace(0, len(back) - 1, PIVOTS + 1).round().astype(int))
-        tree = self.ways(back[pivots])
-        onward = {int(i): tree.way(n) for n, i in enumerate(pivots)}
+        tree = self.paths(back[pivots])
+        onward = {int(i): tree.path(n) for n, i in enumerate(pivots)}
 
         def taken_back(i: int) -> Floats:
             """The tether when the robot has followed it back to point i."""
@@ -151,15 +151,15 @@ class PredictivePlanner(Planner):
             assert on is not None
             if self._too_long(np.vstack([taken_back(last), on[1:]]), limit):
                 continue
-            way = self.pulled(np.vstack([back[: last + 1], on[1:]]))
-            whole.append((length_of(way), way, first, last))
+            path = self.pulled(np.vstack([back[: last + 1], on[1:]]))
+            whole.append((length_of(path), path, first, last))
         best: Floats | None = None
         least = np.inf
-        for length, way, first, last in sorted(whole, key=lambda w: w[0]):
+        for length, path, first, last in sorted(whole, key=lambda w: w[0]):
             if length >= least:
                 break
-            if self._fits(tether, way, limit):
-                return way if length < least else best
+            if self._fits(tether, path, limit):
+                return path if length < least else best
             # the more of the tether is taken back, the sooner the rest fits
             kept: Floats | None = None
             row = [int(i) for i in pivots if first <= i <= last]
@@ -178,13 +178,13 @@ class PredictivePlanner(Planner):
         return best
 
     def _classes(self, back: Floats, onward: Mapping[int, Floats | None]) -> list[tuple[int, int]]:
-        """Pivots in a row often lead to ways of one class: the first and last of each such row."""
+        """Pivots in a row often lead to paths of one class: the first and last of each such row."""
         out: list[tuple[int, int]] = []
         first: int | None = None
         pivots = list(onward)
         for i, j in zip(pivots, [*pivots[1:], None], strict=True):
-            way, after = onward[i], None if j is None else onward[j]
-            if way is None:
+            path, after = onward[i], None if j is None else onward[j]
+            if path is None:
                 first = None
                 continue
             first = i if first is None else first
@@ -192,7 +192,7 @@ class PredictivePlanner(Planner):
                 j is None
                 or after is None
                 or not homotopic(
-                    self.scene, way, np.vstack([back[i : j + 1], after[1:]]), self.grid.cell
+                    self.scene, path, np.vstack([back[i : j + 1], after[1:]]), self.grid.cell
                 )
             ):
                 out.append((first, i))
@@ -205,6 +205,6 @@ class PredictivePlanner(Planner):
 
     def _own_tether(self, target: Floats) -> float | None:
         """Length of the shortest tether from the anchor to a place."""
-        tree = self.ways(np.array([self.mission.anchor]))
-        way = tree.way(0)
-        return None if way is None else length_of(taut(self.scene, way, 0.0, self.mission.delta))
+        tree = self.paths(np.array([self.mission.anchor]))
+        path = tree.path(0)
+        return None if path is None else length_of(taut(self.scene, path, 0.0, self.mission.delta))

@@ -20,7 +20,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from netsp.arrays import Floats
-from netsp.online.paths.tree import Ways
+from netsp.online.paths.tree import Paths
 from netsp.online.planner.base import NORMAL, RECOVERY, Planner, dense, points_along
 from netsp.online.scene.field import pushed_out
 from netsp.online.tether import Tether
@@ -46,17 +46,17 @@ class ReactPlanner(Planner):
 
     def plan(self, robot: Floats, tether: Tether) -> bool:
         """Algorithm 2."""
-        if self.mode == RECOVERY and len(self.way):
-            at_end = len(self.way) == 1 and np.linalg.norm(self.way[0] - robot) <= 1e-6
+        if self.mode == RECOVERY and len(self.path):
+            at_end = len(self.path) == 1 and np.linalg.norm(self.path[0] - robot) <= 1e-6
             if not at_end:
                 return False
         if self.mode == RECOVERY:
-            self.way, self.mode = self.way[:0], NORMAL
+            self.path, self.mode = self.path[:0], NORMAL
         if tether.length > self.mission.tether_length and self._soft != self.index:
-            self.way = self._search(tether)
+            self.path = self._search(tether)
             self.mode = RECOVERY
             return True
-        return False if len(self.way) else self.go_on(robot)
+        return False if len(self.path) else self.go_on(robot)
 
     def warm_up(self, robot: Floats, tether: Tether) -> None:
         """See `Planner`."""
@@ -68,7 +68,7 @@ class ReactPlanner(Planner):
         """Algorithm 3: pivots backwards along the tether, the first that will do."""
         limit = self.mission.tether_length
         back = points_along(tether.nodes[::-1], max(self.mission.cell, 0.25))
-        tree = self.ways(pushed_out(self.scene, back, 1e-3))
+        tree = self.paths(pushed_out(self.scene, back, 1e-3))
         lengths = [self._augmented(back, tree, n) for n in range(len(back))]
         for n, length in enumerate(lengths):
             if self.draft:
@@ -79,7 +79,7 @@ class ReactPlanner(Planner):
             if not good:
                 continue
             retraced = pushed_out(self.scene, back[: n + 1], self.mission.clearance)
-            onward = tree.way(n)
+            onward = tree.path(n)
             assert onward is not None
             if self.draft:
                 # back to two nodes before the pivot; the rest is left to normal mode
@@ -87,17 +87,17 @@ class ReactPlanner(Planner):
             onward = self.pulled(onward)
             return self.refined(np.vstack([retraced, onward[1:]]))[1:]
         self._soft = self.index
-        onward = tree.way(0)
+        onward = tree.path(0)
         if onward is None:
             return self.target[None]
         return self.refined(self.pulled(onward))[1:]
 
-    def _augmented(self, back: Floats, tree: Ways, n: int) -> float:
+    def _augmented(self, back: Floats, tree: Paths, n: int) -> float:
         """Length of the tether after its part from the anchor to pivot n and the way on from
         there."""
-        onward = tree.way(n)
+        onward = tree.path(n)
         if onward is None:
             return np.inf
-        way = np.vstack([back[:n:-1], onward]) if n + 1 < len(back) else onward
-        start = self.tethers.start(way[0], way[0])
-        return self.tethers.drive(start, dense(way, 0.5 * self.mission.cell))[0].length
+        path = np.vstack([back[:n:-1], onward]) if n + 1 < len(back) else onward
+        start = self.tethers.start(path[0], path[0])
+        return self.tethers.drive(start, dense(path, 0.5 * self.mission.cell))[0].length

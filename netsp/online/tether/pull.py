@@ -41,12 +41,12 @@ from netsp.online.tether.strand import (
     let_go,
     look_along,
     moved,
+    path_out,
     remove,
     rests,
     sweep_is_free,
     take_frame,
     to_surface,
-    way_out,
 )
 
 SLIP, STRIDE = 0.125, 0.2
@@ -83,9 +83,9 @@ def pull_end(field, strand, count, last, x, y, z, delta, spread, flat, rounds, p
     left = 2.0
     residual = 0.0
     ox, oy, oz = strand[end, X], strand[end, Y], strand[end, Z]
-    way = math.sqrt((x - ox) ** 2 + (y - oy) ** 2 + (z - oz) ** 2)
+    path = math.sqrt((x - ox) ** 2 + (y - oy) ** 2 + (z - oz) ** 2)
     # the last round's count grows with the way: a node moves by at most a stride in each
-    last_rounds = rounds + min(2000, int(way / stride))
+    last_rounds = rounds + min(2000, int(path / stride))
     while left > 0.0:
         end = count - 1 if last else 0
         next_to = end - 1 if last else 1
@@ -152,7 +152,7 @@ def repair(field, strand, count, slip):
         if strand[i, USED] > 1.0:
             low, where = look_along(field, strand, i, slip)
             if low < -slip and budget > 0:
-                mx, my, mz = way_out(field, strand, i, where, slip)
+                mx, my, mz = path_out(field, strand, i, where, slip)
                 if nearer(strand, i, mx, my, mz, 0.1 * slip):
                     i += 1  # nothing is gained by a node upon another
                     continue
@@ -215,7 +215,7 @@ def lift(field, strand, count, slip, stride):
         if h <= (0.125 * slip if held else stride):
             count = remove(strand, count, i)
             lifted = max(lifted, h)
-            # short ways are not looked at before the next round: two in a row would add up
+            # short paths are not looked at before the next round: two in a row would add up
             i = max(1, i - 1) if held else i + 1
             continue
         if not held:

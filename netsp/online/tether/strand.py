@@ -251,7 +251,7 @@ def edge_point(ax, ay, az, na, da, bx, by, bz, nb, db, px, py, pz):
 
 
 @njit(cache=True)
-def way_out(field, strand, i, where, slip):
+def path_out(field, strand, i, where, slip):
     """Where a strand that is too deep at fraction `where` of edge i comes to the surface: on the
     sharp edge of the solid if it cuts one off, else straight out."""
     ux = strand[i + 1, X] - strand[i, X]

@@ -51,7 +51,7 @@ class BlueRov2:
         return float(self.state[3])
 
     def go(
-        self, way: Floats, seconds: float, yaw: float, water: Floats, fresh: bool
+        self, path: Floats, seconds: float, yaw: float, water: Floats, fresh: bool
     ) -> tuple[list[Floats], int]:
         """See `netsp.online.vehicle.Vehicle`. Control steps take 0.1 s."""
         stops, behind = [], 0
@@ -61,11 +61,11 @@ class BlueRov2:
             begin = time.perf_counter()
             lead = float(np.linalg.norm(self._carrot - self.position))
             on, passed = advance(
-                self._carrot, way[behind:], min(self.speed * DT, max(0.0, LEAD - lead))
+                self._carrot, path[behind:], min(self.speed * DT, max(0.0, LEAD - lead))
             )
             self._carrot = on[-1]
             behind += passed
-            force = self._control.force(self.state, self._aims(way[behind:], yaw), self._drift)
+            force = self._control.force(self.state, self._aims(path[behind:], yaw), self._drift)
             expected = step(self.state, force, self._drift, DT)
             self.control_s.append(time.perf_counter() - begin)
             for _ in range(FINE):
@@ -80,12 +80,12 @@ class BlueRov2:
         self.state[4:] = 0.0
         self._carrot = np.array(place)
 
-    def _aims(self, way: Floats, yaw: float) -> Floats:
+    def _aims(self, path: Floats, yaw: float) -> Floats:
         """(HORIZON, 8): where the followed point will be, and how fast, with the heading."""
         aims = np.zeros((HORIZON, 8))
         heading = self.state[3] + turned(yaw - self.state[3])
         c, s = math.cos(heading), math.sin(heading)
-        at, rest = self._carrot, way
+        at, rest = self._carrot, path
         for k in range(HORIZON):
             if k > 0:
                 on, passed = advance(at, rest, self.speed * DT)

@@ -112,8 +112,8 @@ def within(hessian, slope, low, high, steps):
             right[a] = -down[free[a]]
             for b in range(count):
                 part[a, b] = hessian[free[a], free[b]]
-        way = np.linalg.solve(part, right)
-        gain = -np.dot(right, way)
+        path = np.linalg.solve(part, right)
+        gain = -np.dot(right, path)
         if -gain <= 1e-12 * (1.0 + abs(value)):
             break
         share = 1.0
@@ -121,7 +121,7 @@ def within(hessian, slope, low, high, steps):
             tried = x.copy()
             for a in range(count):
                 j = free[a]
-                tried[j] = min(max(x[j] + share * way[a], low[j]), high[j])
+                tried[j] = min(max(x[j] + share * path[a], low[j]), high[j])
             new = 0.5 * np.dot(tried, np.dot(hessian, tried)) + np.dot(slope, tried)
             if new <= value - 1e-4 * np.dot(down, x - tried):
                 break

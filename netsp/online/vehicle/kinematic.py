@@ -31,7 +31,7 @@ class Vehicle(Protocol):
         """rad."""
 
     def go(
-        self, way: Floats, seconds: float, yaw: float, water: Floats, fresh: bool
+        self, path: Floats, seconds: float, yaw: float, water: Floats, fresh: bool
     ) -> tuple[list[Floats], int]:
         """Follow a way (k, 3) for some seconds, turning to `yaw`, in moving water (3,) m/s.
 
@@ -54,12 +54,12 @@ class KinematicVehicle:
         self.control_s: list[float] = []
 
     def go(
-        self, way: Floats, seconds: float, yaw: float, water: Floats, fresh: bool
+        self, path: Floats, seconds: float, yaw: float, water: Floats, fresh: bool
     ) -> tuple[list[Floats], int]:
         """See `Vehicle`."""
         del water, fresh
         self.yaw += float(np.clip(turned(yaw - self.yaw), -TURN * seconds, TURN * seconds))
-        stops, passed = advance(self.position, way, self.speed * seconds)
+        stops, passed = advance(self.position, path, self.speed * seconds)
         self.position = stops[-1]
         return stops, passed
 
@@ -73,15 +73,15 @@ def turned(angle: float) -> float:
     return (angle + math.pi) % (2.0 * math.pi) - math.pi
 
 
-def advance(robot: Floats, way: Floats, step: float) -> tuple[list[Floats], int]:
+def advance(robot: Floats, path: Floats, step: float) -> tuple[list[Floats], int]:
     """The corners that a robot passes on its next `step` metres of a way and where it ends, and how
     many points of the way it has passed."""
     stops: list[Floats] = []
     here, left = robot, step
-    for passed, point in enumerate(way):
+    for passed, point in enumerate(path):
         far = float(np.linalg.norm(point - here))
         if far > left:
             return [*stops, here + (point - here) * (left / far)], passed
         here, left = point, left - far
         stops.append(here)
-    return stops or [robot], len(way)
+    return stops or [robot], len(path)
