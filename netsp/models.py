@@ -91,5 +91,6 @@ def _decapitalise(text: str) -> str:
 
 
 def shown(value: Any) -> str:
+    """A value in a message, cut at 60 characters."""
     text = repr(value)
     return text if len(text) <= 60 else text[:57] + "…"

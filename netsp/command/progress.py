@@ -46,6 +46,7 @@ class ProgressTable:
         self._print("building the roadmap …")
 
     def __call__(self, row: Progress) -> None:
+        """Print a row of progress, if it tells anything new."""
         news = (
             self._last is None
             or row.stage != self._last.stage

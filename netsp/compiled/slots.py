@@ -8,6 +8,7 @@ from numba import njit
 
 @njit(cache=True, nogil=True)
 def rehashed(key, value):
+    """The same keys (slots,), -1 where empty, and values (slots,) in twice the slots."""
     n = 2 * len(key)
     key2 = np.full(n, -1, dtype=np.int64)
     value2 = np.empty(n)

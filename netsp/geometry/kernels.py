@@ -16,6 +16,7 @@ TWO_PI = 2.0 * math.pi
 
 @njit(cache=True)
 def point_segment_distance(px, py, ax, ay, bx, by):
+    """Distance from a point to the segment ab."""
     dx, dy = bx - ax, by - ay
     length2 = dx * dx + dy * dy
     t = 0.0
@@ -36,6 +37,7 @@ def segments_cross(ax, ay, bx, by, cx, cy, dx, dy):
 
 @njit(cache=True)
 def segment_segment_distance(ax, ay, bx, by, cx, cy, dx, dy):
+    """Distance between the segments ab and cd; 0 where they cross."""
     if segments_cross(ax, ay, bx, by, cx, cy, dx, dy):
         return 0.0
     return min(
@@ -48,6 +50,7 @@ def segment_segment_distance(ax, ay, bx, by, cx, cy, dx, dy):
 
 @njit(cache=True)
 def point_in_polygon(px, py, edges, start, stop):
+    """Whether a point lies in the polygon of edges (n, 4) start to stop - 1."""
     inside = False
     for e in range(start, stop):
         ay, by = edges[e, 1], edges[e, 3]
@@ -101,6 +104,8 @@ def segment_depth_in_obstacle(ax, ay, bx, by, o, circles, edges, edge_start, gro
 
 @njit(cache=True)
 def segment_blocked(ax, ay, bx, by, circles, edges, edge_start, grow, box, eps):
+    """Whether the segment ab leaves the box, or enters a circle (n, 3) or polygon, all grown, by
+    more than eps."""
     for o in range(len(circles)):
         if segment_depth_in_obstacle(ax, ay, bx, by, o, circles, edges, edge_start, grow, box, eps):
             return True

@@ -135,6 +135,7 @@ def shaded(triangles: Floats) -> Floats:
 
 
 def draw_lines(ax: Any, path: Floats, nodes: Floats, axes: tuple[int, ...]) -> None:
+    """Path and tether with its ends, on two or three of the axes (0, 1, 2) of space."""
     columns = list(axes)
     if len(path):
         ax.plot(*path[:, columns].T, color=style.PATH, lw=0.9, alpha=0.8, label="path")

@@ -21,17 +21,21 @@ class CostTable:
     def lengths(
         self, vertices: Ints, asked: Bools | None = None, clock: Clock | None = None
     ) -> Floats:
+        """As `netsp.travel.graph.Legs.lengths`; nothing has to be measured."""
         return self.costs[np.ix_(vertices, vertices)].copy()
 
     def to_base(self) -> Floats:
+        """(V,) costs from the base."""
         return np.asarray(self.costs[0])
 
     def lower_bounds(
         self, vertices: Ints, rows: Ints | None = None, clock: Clock | None = None
     ) -> Floats:
+        """The costs themselves."""
         return self.lengths(vertices) if rows is None else self.lengths(vertices)[rows]
 
     def path(self, u: int, v: int) -> Floats:
+        """There is none: InputError."""
         raise InputError(f"no path from vertex {u} to {v}: this travel graph was made from costs")
 
 

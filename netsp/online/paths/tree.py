@@ -141,6 +141,7 @@ _LONG = np.sqrt((STEPS**2).sum(1).astype(float))
 
 @njit(cache=True)
 def free_cells(field, low, cell, shape, clearance):
+    """Which cells of a grid have their centre at least the clearance from all solids."""
     out = np.zeros(shape, dtype=np.bool_)
     for i in range(shape[0]):
         for j in range(shape[1]):
@@ -243,6 +244,7 @@ def _shares(path: Floats, k: int) -> Floats:
 
 @njit(cache=True)
 def all_see(field, a, b, step):
+    """Whether the points a[k] and b[k] (n, 3) see one another, all of them, in steps of `step`."""
     for k in range(len(a)):
         low, _ = lowest_along(
             field, a[k, 0], a[k, 1], a[k, 2], b[k, 0], b[k, 1], b[k, 2], step

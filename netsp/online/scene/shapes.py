@@ -25,12 +25,15 @@ class Sphere(BaseModel):
     radius: Annotated[Positive, Field(description="m")]
 
     def row(self) -> Row:
+        """Its kind, and the numbers that the kernels read of it (`netsp.online.scene.solids`)."""
         return kinds.CAPSULE, [*self.center, *self.center, self.radius]
 
     def thickness(self) -> float:
+        """Of its thinnest part (m); inf if nothing of it is thin."""
         return 2.0 * self.radius
 
     def box(self) -> Floats:
+        """(2, 3) least and greatest coordinates (m); 0 and 0 where it has no end."""
         return _around([self.center], self.radius)
 
 
@@ -43,12 +46,15 @@ class Capsule(BaseModel):
     radius: Annotated[Positive, Field(description="m")]
 
     def row(self) -> Row:
+        """Its kind, and the numbers that the kernels read of it (`netsp.online.scene.solids`)."""
         return kinds.CAPSULE, [*self.a, *self.b, self.radius]
 
     def thickness(self) -> float:
+        """Of its thinnest part (m); inf if nothing of it is thin."""
         return 2.0 * self.radius
 
     def box(self) -> Floats:
+        """(2, 3) least and greatest coordinates (m); 0 and 0 where it has no end."""
         return _around([self.a, self.b], self.radius)
 
 
@@ -68,16 +74,20 @@ class Cylinder(BaseModel):
 
     @property
     def length(self) -> float:
+        """Of its axis (m)."""
         return math.dist(self.a, self.b)
 
     def row(self) -> Row:
+        """Its kind, and the numbers that the kernels read of it (`netsp.online.scene.solids`)."""
         axis = (np.array(self.b) - np.array(self.a)) / self.length
         return kinds.CYLINDER, [*self.a, *axis, self.radius, self.length]
 
     def thickness(self) -> float:
+        """Of its thinnest part (m); inf if nothing of it is thin."""
         return min(2.0 * self.radius, self.length)
 
     def box(self) -> Floats:
+        """(2, 3) least and greatest coordinates (m); 0 and 0 where it has no end."""
         axis = (np.array(self.b) - np.array(self.a)) / self.length
         reach = self.radius * np.sqrt(np.maximum(0.0, 1.0 - axis**2))
         ends = np.array([self.a, self.b])
@@ -103,13 +113,16 @@ class Box(BaseModel):
         return np.asarray(Rotation.from_euler("xyz", self.rotation, degrees=True).as_matrix().T)
 
     def row(self) -> Row:
+        """Its kind, and the numbers that the kernels read of it (`netsp.online.scene.solids`)."""
         half = [0.5 * s for s in self.size]
         return kinds.BOX, [*self.center, *half, *self.axes().ravel()]
 
     def thickness(self) -> float:
+        """Of its thinnest part (m); inf if nothing of it is thin."""
         return min(self.size)
 
     def box(self) -> Floats:
+        """(2, 3) least and greatest coordinates (m); 0 and 0 where it has no end."""
         reach = 0.5 * np.abs(self.axes()).T @ np.array(self.size)
         return np.array([np.array(self.center) - reach, np.array(self.center) + reach])
 
@@ -162,6 +175,7 @@ class Torus(BaseModel):
         return axis, start, np.cross(axis, start)
 
     def row(self) -> Row:
+        """Its kind, and the numbers that the kernels read of it (`netsp.online.scene.solids`)."""
         axis, start, _ = self.frame()
         return kinds.TORUS, [
             *self.center, *axis, *start, self.major_radius, self.minor_radius,
@@ -169,6 +183,7 @@ class Torus(BaseModel):
         ]  # fmt: skip
 
     def thickness(self) -> float:
+        """Of its thinnest part (m); inf if nothing of it is thin."""
         return 2.0 * self.minor_radius
 
     def centreline(self) -> Floats:
@@ -178,6 +193,7 @@ class Torus(BaseModel):
         return self.center + self.major_radius * (np.cos(t) * start + np.sin(t) * across)
 
     def box(self) -> Floats:
+        """(2, 3) least and greatest coordinates (m); 0 and 0 where it has no end."""
         return _around(self.centreline(), self.minor_radius + 0.002 * self.major_radius)
 
 
@@ -189,12 +205,15 @@ class Post(BaseModel):
     radius: Annotated[Positive, Field(description="m")]
 
     def row(self) -> Row:
+        """Its kind, and the numbers that the kernels read of it (`netsp.online.scene.solids`)."""
         return kinds.POST, [*self.center, self.radius]
 
     def thickness(self) -> float:
+        """Of its thinnest part (m); inf if nothing of it is thin."""
         return 2.0 * self.radius
 
     def box(self) -> Floats:
+        """(2, 3) least and greatest coordinates (m); 0 and 0 where it has no end."""
         return _around([(*self.center, 0.0)], self.radius) * [1.0, 1.0, 0.0]
 
 
@@ -216,9 +235,11 @@ class Prism(BaseModel):
         return self
 
     def row(self) -> Row:
+        """Its kind, and the numbers that the kernels read of it (`netsp.online.scene.solids`)."""
         return kinds.PRISM, [0.0, 0.0, self.grow]
 
     def thickness(self) -> float:
+        """Of its thinnest part (m); inf if nothing of it is thin."""
         import shapely
 
         shape = shapely.Polygon(self.polygon)
@@ -234,6 +255,7 @@ class Prism(BaseModel):
         return low + 2.0 * self.grow
 
     def box(self) -> Floats:
+        """(2, 3) least and greatest coordinates (m); 0 and 0 where it has no end."""
         xy = np.array(self.polygon)
         flat = np.column_stack([xy, np.zeros(len(xy))])
         return _around(flat, self.grow) * [1.0, 1.0, 0.0]
@@ -257,13 +279,16 @@ class HalfSpace(BaseModel):
         return self
 
     def row(self) -> Row:
+        """Its kind, and the numbers that the kernels read of it (`netsp.online.scene.solids`)."""
         n = np.array(self.normal) / np.linalg.norm(self.normal)
         return kinds.HALF_SPACE, [*self.point, *n]
 
     def thickness(self) -> float:
+        """Of its thinnest part (m); inf if nothing of it is thin."""
         return math.inf
 
     def box(self) -> None:
+        """None: it has no end."""
         return None
 
 
