@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from netsp import Circle, InfeasibleError, InputError, Problem, solve, verify
 from netsp.problem import State
-from netsp.roadmap.opened import opened_graph
+from netsp.roadmap.from_state import graph_from_state
 from netsp.solvers.table import SOLVERS
 from netsp.worlds import random_world
 
@@ -49,7 +49,7 @@ def test_the_rest_of_an_optimal_tour_is_an_optimal_path(seed):
 def test_small_open_problems_agree_with_brute_force(seed, k):
     problem = random_world(goals=4, tether_length=250, seed=seed)
     left, _ = after(problem, solve(problem), k)
-    graph = opened_graph(left)
+    graph = graph_from_state(left)
     legs = graph.within
     classes = [graph.members(c) for c in range(1, len(left.goals) + 1)]
     best = min(

@@ -94,9 +94,12 @@ def run(args: argparse.Namespace) -> int:
         if args.plot_trace:
             rows.append(row)
 
-    from netsp.compiled.warm_up import told
+    from netsp.compiled.warm_up import compile_messages
 
-    with table or contextlib.nullcontext(), told(sys.stderr) if table else contextlib.nullcontext():
+    with (
+        table or contextlib.nullcontext(),
+        compile_messages(sys.stderr) if table else contextlib.nullcontext(),
+    ):
         if table:
             table.begin(problem)
         solution = solve(

@@ -16,10 +16,10 @@ def arguments(p: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Compile, and return the exit code."""
-    from netsp.compiled.warm_up import forget, steps, told
+    from netsp.compiled.warm_up import compile_messages, forget, steps
 
     forget()
-    with contextlib.nullcontext() if args.quiet else told(sys.stderr):
+    with contextlib.nullcontext() if args.quiet else compile_messages(sys.stderr):
         for name, step in steps():
             if not args.quiet:
                 print(f"warm-up: {name}", file=sys.stderr, flush=True)

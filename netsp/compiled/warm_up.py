@@ -18,7 +18,7 @@ EVERY = 2.0
 
 
 @contextmanager
-def told(stream: TextIO) -> Iterator[None]:
+def compile_messages(stream: TextIO) -> Iterator[None]:
     """While the body runs, lines on a stream that name what is being compiled."""
     from numba.core import event
 
@@ -26,11 +26,11 @@ def told(stream: TextIO) -> Iterator[None]:
         def __init__(self) -> None:
             self.last = -EVERY
 
-        def on_start(self, told: Any) -> None:
+        def on_start(self, record: Any) -> None:
             now = time.monotonic()
             if now - self.last < EVERY:
                 return
-            kernel = told.data["dispatcher"].py_func
+            kernel = record.data["dispatcher"].py_func
             if kernel.__module__.startswith("netsp."):
                 once = " (once on this machine; `netsp warm-up` does it ahead)"
                 name = kernel.__module__.removeprefix("netsp.")
@@ -40,7 +40,7 @@ def told(stream: TextIO) -> Iterator[None]:
                 )  # fmt: skip
                 self.last = now
 
-        def on_end(self, told: Any) -> None:
+        def on_end(self, record: Any) -> None:
             pass
 
     listener = Listener()

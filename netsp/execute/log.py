@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from netsp.arrays import Floats
+from netsp.drawn import Drawn
 from netsp.execute.plan import HOME
 from netsp.execute.repair import REPLAN_S
 from netsp.fields import Point3
@@ -88,7 +89,7 @@ class Entry:
 
 
 @dataclass
-class Execution:
+class Execution(Drawn):
     """What came of it.
 
     problem : as it is at the end. rows, arrivals, entries : the logs. tether : at the end.
@@ -108,6 +109,20 @@ class Execution:
     walked: float = 0.0
     interrupted: bool = False
     wall_s: float = 0.0
+
+    def __repr__(self) -> str:
+        """In a line."""
+        s = self.summary
+        return (
+            f"<Execution of {self.problem.name!r}: {s['visited']} goals in {s['time_s']:.1f} s, "
+            f"tether at most {s['longest_tether']:.4g} of {s['tether_length']:g}>"
+        )
+
+    def plot(self, ax: Any = None) -> Any:
+        """The map with plan and path, on axes of the caller or on new ones; returns the axes."""
+        from netsp.pictures.execution import draw_map
+
+        return draw_map(self, ax=ax)
 
     @property
     def summary(self) -> dict[str, Any]:

@@ -21,7 +21,7 @@ from netsp.errors import LimitReachedError, NetspError
 from netsp.execute.plan import HOME, Leg, legs_of, length_of
 from netsp.hsignature import concatenate, crossings, signature
 from netsp.problem import Circle, Goal, Problem, State
-from netsp.roadmap.opened import FAR, OpenedGraph, opened_graph
+from netsp.roadmap.from_state import FAR, GraphFromState, graph_from_state
 from netsp.roadmap.paths import TautPaths
 from netsp.roadmap.reach import explain_unreached
 from netsp.solution import Status
@@ -121,7 +121,7 @@ def repair(
         legs = [_home(problem, state, FAR * max(problem.tether_length, length_of(tether)))]
         return Repair("home", why, legs, tuple(lost), legs[0].length, clock.elapsed)
     rest = _rest(problem, order, state)
-    graph = opened_graph(rest, max_classes=MOST_CLASSES, time_limit=clock)
+    graph = graph_from_state(rest, max_classes=MOST_CLASSES, time_limit=clock)
     with graph.within.on_clock(clock):
         local = _keeping_order(graph, len(order))
     assert local.length is not None
@@ -215,7 +215,7 @@ def _home(problem: Problem, state: State, longest: float) -> Leg:
     return Leg(HOME, np.ascontiguousarray(back), (), 0.0)
 
 
-def _keeping_order(graph: OpenedGraph, goals: int) -> Result:
+def _keeping_order(graph: GraphFromState, goals: int) -> Result:
     """The shortest path through the goals in their order: classes by dynamic programming. When the
     time is up, the other goals are taken in the class of least tether."""
     start = graph.start
@@ -254,7 +254,7 @@ def _keeping_order(graph: OpenedGraph, goals: int) -> Result:
     return Result(full, length, None, Status.FEASIBLE, walk=(*full[1:], 0))
 
 
-def _least(graph: OpenedGraph, goals: int, clock: Clock) -> float:
+def _least(graph: GraphFromState, goals: int, clock: Clock) -> float:
     """A quick lower bound on every path: half the two cheapest legs at each goal, and one at each
     end; 0 if the time does not suffice."""
     vertices = np.arange(len(graph))

@@ -59,9 +59,9 @@ def travel_graph(problem: Problem, roadmap: str = DEFAULT_ROADMAP, **options: An
     if problem.state is not None:
         if roadmap != "taut":
             raise InputError(f"state: needs roadmap 'taut', got {roadmap!r}")
-        from netsp.roadmap.opened import opened_graph
+        from netsp.roadmap.from_state import graph_from_state
 
-        return opened_graph(problem, **options)
+        return graph_from_state(problem, **options)
     graph: TravelGraph = build_roadmap(problem, roadmap, **options).travel_graph()
     return graph
 
@@ -107,9 +107,9 @@ def solve_graph(
     rng = np.random.default_rng(_seed(seed))
     clock = Clock.of(time_limit)
     with graph.on_clock(clock):
-        limits = Limits(clock, iteration_limit, rng, tour, graph.telling(on_progress))
+        limits = Limits(clock, iteration_limit, rng, tour, graph.progress_listener(on_progress))
         result = _run(graph, solver, params, limits)
-    return graph.told(result)
+    return graph.as_asked(result)
 
 
 def _run(

@@ -74,7 +74,8 @@ class TravelGraph(Drawn):
     least_left_out : no class left out for want of time or room has a shorter tether; inf if none
         is left out.
     legs_s : seconds spent measuring legs so far.
-    start : vertex of the state that tours start from (`netsp.roadmap.opened`), None for the base.
+    start : vertex of the state that tours start from (`netsp.roadmap.from_state`), None for the
+        base.
     start_tether : (n, 3) the tether that is out at the start.
     """
 
@@ -298,7 +299,7 @@ class TravelGraph(Drawn):
         """(n, 3) polyline of the leg from vertex u to vertex v."""
         return self._legs.path(u, v)
 
-    def told(self, result: Result) -> Result:
+    def as_asked(self, result: Result) -> Result:
         """A solver's result as callers are to see it."""
         return self.within_kept(result, self.least_by_way_of(self.least_left_out))
 
@@ -320,7 +321,7 @@ class TravelGraph(Drawn):
             status = Status.OPTIMAL_OF_KEPT
         return dataclasses.replace(result, lower_bound=otherwise, status=status)
 
-    def telling(self, listener: OnProgress | None) -> OnProgress | None:
+    def progress_listener(self, listener: OnProgress | None) -> OnProgress | None:
         """A listener to a solver's progress, told what callers are to see."""
         return listener
 

@@ -35,7 +35,7 @@ FAR = 50.0
 """In units of the tether length: the present tether is looked for up to this length."""
 
 
-class OpenedGraph(TravelGraph):
+class GraphFromState(TravelGraph):
     """A travel graph whose tours start at the base, go on to the state for nothing, and from there
     through the goals.
 
@@ -63,7 +63,7 @@ class OpenedGraph(TravelGraph):
             return (0, *reversed(order[1:]))
         return order
 
-    def told(self, result: Result) -> Result:
+    def as_asked(self, result: Result) -> Result:
         """A solver's result on this graph as one about the path from the state."""
         bound = result.lower_bound
         low = None if bound is None else max(0.0, bound - 2.0 * self.surcharge)
@@ -92,7 +92,7 @@ class OpenedGraph(TravelGraph):
         the surcharge counts as in every tour."""
         return tether + 2.0 * self.surcharge
 
-    def telling(self, listener: OnProgress | None) -> OnProgress | None:
+    def progress_listener(self, listener: OnProgress | None) -> OnProgress | None:
         """Tells a listener about the path instead of the tour."""
         if listener is None:
             return None
@@ -148,10 +148,10 @@ class _OpenedLegs:
         return self.within.path(u, v)
 
 
-def opened_graph(
+def graph_from_state(
     problem: Problem, *, classes: str = "all", max_classes: int = MAX_CLASSES,
     time_limit: TimeLimit = None,
-) -> OpenedGraph:  # fmt: skip
+) -> GraphFromState:  # fmt: skip
     """The travel graph of a problem with a state; options as of `TautRoadmap`.
 
     Raises
@@ -193,4 +193,4 @@ def opened_graph(
     start = len(cluster) - 1
     nearest = [part.tethers[part.members(c)].min() for c in range(1, last)]
     some_path = float(part.tethers[start] + 2.0 * sum(nearest))
-    return OpenedGraph(part, start, 0.505 * some_path, start_tether)
+    return GraphFromState(part, start, 0.505 * some_path, start_tether)
