@@ -8,6 +8,7 @@ import numpy as np
 
 from netsp.arrays import Floats
 from netsp.errors import InputError
+from netsp.geometry import polylines
 from netsp.hsignature import Word, signature
 from netsp.problem import Problem
 from netsp.solution import Solution
@@ -32,12 +33,7 @@ class Leg:
     @property
     def length(self) -> float:
         """Metres."""
-        return length_of(self.path)
-
-
-def length_of(path: Floats) -> float:
-    """Length of a polyline."""
-    return float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
+        return polylines.length(self.path)
 
 
 def legs_of(problem: Problem, solution: Solution, numbers: list[int] | None = None) -> list[Leg]:

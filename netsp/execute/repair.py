@@ -18,7 +18,8 @@ import shapely
 from netsp.arrays import Floats
 from netsp.clock import Clock
 from netsp.errors import LimitReachedError, NetspError
-from netsp.execute.plan import HOME, Leg, legs_of, length_of
+from netsp.execute.plan import HOME, Leg, legs_of
+from netsp.geometry import polylines
 from netsp.hsignature import concatenate, crossings, signature
 from netsp.problem import Circle, Goal, Problem, State
 from netsp.roadmap.from_state import FAR, GraphFromState, graph_from_state
@@ -63,7 +64,7 @@ def broken(problem: Problem, tether: Floats, legs: list[Leg]) -> tuple[str | Non
             label = problem.obstacle_label(obstacle)
             return f"{label} stands in the way to {_label(problem, leg)}", legs
     rest = problem.model_copy(update={"goals": tuple(problem.goals[g] for g in left)})
-    tethers = TautPaths(rest, FAR * max(problem.tether_length, length_of(tether)))
+    tethers = TautPaths(rest, FAR * max(problem.tether_length, polylines.length(tether)))
     now: list[Leg] = []
     for k, leg in enumerate(legs):
         word = concatenate(word, crossings(leg.path[:, :2], rays))
@@ -118,7 +119,7 @@ def repair(
     state = State(position=_outside(problem, robot), signature=word)
     order, lost = reachable(problem, left)
     if not order:
-        legs = [_home(problem, state, FAR * max(problem.tether_length, length_of(tether)))]
+        legs = [_home(problem, state, FAR * max(problem.tether_length, polylines.length(tether)))]
         return Repair("home", why, legs, tuple(lost), legs[0].length, clock.elapsed)
     rest = _rest(problem, order, state)
     graph = graph_from_state(rest, max_classes=MOST_CLASSES, time_limit=clock)

@@ -14,9 +14,9 @@ from netsp.execute.events import Event, Surprises, changed, index_of
 from netsp.execute.log import Arrival, Entry, Execution, Options, Row
 from netsp.execute.plan import HOME, Leg, legs_of
 from netsp.execute.repair import Repair, broken, reachable, repair
+from netsp.geometry import polylines
 from netsp.hsignature import signature
 from netsp.judge import verify
-from netsp.online.planner.base import dense
 from netsp.online.scene.field import DistanceField, pushed_out
 from netsp.online.scene.scene import scene_of
 from netsp.online.tether import GeodesicTether, Tether
@@ -221,7 +221,7 @@ class _Run:
         # farther than the tether goes there and back nothing is carried
         far = 2.0 * max(self.problem.tether_length, self.tether.length) + self.delta
         by = by * min(1.0, far / max(float(np.linalg.norm(by)), 1e-300))
-        stops = dense(np.array([start, start + by]), 0.5 * self.delta)
+        stops = polylines.dense(np.array([start, start + by]), 0.5 * self.delta)
         for stop in stops:
             if float(self.scene.distance(stop)) < 0.0:
                 break

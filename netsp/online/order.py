@@ -17,11 +17,11 @@ import numpy as np
 
 from netsp.arrays import Floats
 from netsp.errors import InputError
+from netsp.geometry import polylines
 from netsp.lns import Instance, best_classes
 from netsp.online.log import Run
 from netsp.online.mission import Mission
 from netsp.online.paths.tree import ShortestTree, taut
-from netsp.online.planner.base import points_along
 from netsp.online.scene.field import DistanceField
 from netsp.online.simulate import grid_of, simulate
 from netsp.online.tether import GeodesicTether, Tether
@@ -74,7 +74,7 @@ def alike(a: Tether, b: Tether, delta: float) -> bool:
     """Whether two tethers between the same ends are the same, by length and middle."""
     if abs(a.length - b.length) > delta:
         return False
-    middle = (points_along(t.nodes, 0.51 * t.length + 1e-9)[1] for t in (a, b))
+    middle = (polylines.points_along(t.nodes, 0.51 * t.length + 1e-9)[1] for t in (a, b))
     return bool(np.linalg.norm(next(middle) - next(middle)) < 2.0 * delta)
 
 
@@ -199,7 +199,7 @@ def travel_graph(
             if not np.isfinite(leg):
                 line = np.vstack([found.tether[v].nodes[::-1], found.tether[w].nodes[1:]])
                 path = taut(field, line, mission.clearance, mission.delta)
-                leg = float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
+                leg = polylines.length(path)
             costs[v + 1, w + 1] = costs[w + 1, v + 1] = min(leg, costs[v + 1, w + 1])
     reached = sorted(set(found.point))
     if not reached:

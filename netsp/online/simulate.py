@@ -11,6 +11,7 @@ import numpy as np
 
 from netsp.arrays import Floats
 from netsp.errors import InputError
+from netsp.geometry import polylines
 from netsp.online.coverage import Coverage, patches_of
 from netsp.online.log import LogRow, Run
 from netsp.online.mission import Mission
@@ -116,7 +117,7 @@ def _check_size(mission: Mission) -> None:
             f"waypoints: one is {far:g} from the anchor; expected at most {FARTHEST:g} times the "
             f"tether_length {mission.tether_length:g}: mixed units?"
         )
-    path = float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
+    path = polylines.length(places)
     if path / (mission.speed * STEP) > MOST_STEPS:
         raise InputError(
             f"speed: {mission.speed:g} takes {path / (mission.speed * STEP):.2g} steps of {STEP:g} "
@@ -234,7 +235,7 @@ def summarise(
     lengths = np.array([r.tether for r in log])
     places = np.array([[r.x, r.y, r.z] for r in log])
     planned = [r.replan_s for r in log if r.replan_s > 0.0]
-    walked = float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
+    walked = polylines.length(places)
     inspection = log[-1].time if log else 0.0
     control = world.vehicle.control_s
     by_tether, by_path = tether.length / mission.speed, walked / mission.speed

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.files import write_text
+from netsp.geometry import polylines
 from netsp.online.scene.scene import Scene
 from netsp.online.scene.shapes import HalfSpace
 from netsp.online.scene.surfaces import Triangles, drawn_points, extent, mesh_of, surface_of
@@ -47,7 +48,7 @@ def save(
 def _title(scene: Scene, path: Floats, tether: Tether | None) -> str:
     words = [scene.name]
     if len(path):
-        walked = float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
+        walked = polylines.length(path)
         words.append(f"path {walked:.4g} {scene.units}")
     if tether is not None:
         words.append(f"taut tether {tether.length:.4g} {scene.units}")

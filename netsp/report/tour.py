@@ -16,6 +16,7 @@ from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.execute.plan import HOME, legs_of
 from netsp.files import read_text, write_text
+from netsp.geometry import polylines
 from netsp.hsignature.measures import measure
 from netsp.judge import verify
 from netsp.online.scene.scene import scene_of
@@ -76,7 +77,7 @@ def report_tour(source: str | Path, problem_file: str | Path | None, output: str
         raise InputError(f"{source}: solves another problem than {problem_file} (sha256 differs)")
     if solution.length is None:
         raise InputError(f"{source}: has no tour (status {solution.status.value})")
-    drawn = float(np.linalg.norm(np.diff(np.array(solution.path), axis=0), axis=1).sum())
+    drawn = polylines.length(np.array(solution.path))
     if drawn > 100.0 * (solution.length + problem.scale):
         raise InputError(
             f"{source}: path: is {drawn:.4g} long; expected about length, {solution.length:.4g}"
@@ -165,7 +166,7 @@ def _frames_of_plan(problem: Problem, solution: Solution) -> list[dict[str, Any]
     """The tether at even steps along the tour, by the model that watches it online."""
     model = GeodesicTether(scene_of(problem).field(), suggested_delta(problem))
     path = np.array(solution.path)
-    s = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))]
+    s = polylines.along(path)
     if problem.state is None:
         state = model.start(problem.base, problem.base)
     else:

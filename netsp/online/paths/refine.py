@@ -17,6 +17,7 @@ from itertools import pairwise
 import numpy as np
 
 from netsp.arrays import Floats
+from netsp.geometry import polylines
 from netsp.online.scene.field import DistanceField, pushed_out
 
 REFINEMENTS = ("none", "paper", "gradient")
@@ -80,7 +81,7 @@ def smoothed(path: Floats) -> Floats:
         if len(points) <= 4:
             total[part] += points
         else:
-            u = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))]
+            u = polylines.along(points)
             if u[-1] == 0.0:
                 total[part] += points
             else:

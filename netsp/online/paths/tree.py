@@ -16,6 +16,7 @@ from numba import njit
 
 from netsp.arrays import Floats
 from netsp.errors import InputError
+from netsp.geometry import polylines
 from netsp.online.scene.field import DistanceField
 from netsp.online.scene.sampling import distance, lowest_along
 from netsp.online.tether.geodesic import GeodesicTether
@@ -237,7 +238,7 @@ def homotopic(field: DistanceField, a: Floats, b: Floats, step: float) -> bool:
 
 
 def _shares(path: Floats, k: int) -> Floats:
-    s = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))]
+    s = polylines.along(path)
     u = np.linspace(0.0, s[-1], k)
     return np.column_stack([np.interp(u, s, path[:, axis]) for axis in range(3)])
 
@@ -256,4 +257,4 @@ def all_see(field, a, b, step):
 
 def length_of(path: Floats) -> float:
     """Length of a polyline."""
-    return float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum()) if len(path) > 1 else math.nan
+    return polylines.length(path) if len(path) > 1 else math.nan

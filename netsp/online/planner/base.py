@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, field
-from itertools import pairwise
 
 import numpy as np
 
 from netsp.arrays import Floats
+from netsp.geometry import polylines
 from netsp.online.mission import Mission
 from netsp.online.paths.refine import refined
 from netsp.online.paths.sampled import SampledPaths
@@ -154,7 +154,7 @@ class Planner:
         if name == "none":
             return path
         rng = np.random.default_rng([self.options.seed, self.index])
-        even = points_along(path, self.mission.cell)
+        even = polylines.points_along(path, self.mission.cell)
         return refined(name, self.scene, even, self.mission.clearance, rng)
 
     def pulled(self, path: Floats) -> Floats:
@@ -188,20 +188,3 @@ class Planner:
         """Leave a waypoint out."""
         self.skipped.append((self.index, reason))
         self._next()
-
-
-def dense(path: Floats, step: float) -> Floats:
-    """A way (k, 3) with points at most `step` apart, its first left out."""
-    out = []
-    for a, b in pairwise(path):
-        k = max(1, int(np.ceil(np.linalg.norm(b - a) / step)))
-        out.append(a + (b - a) * (np.arange(1, k + 1) / k)[:, None])
-    return np.vstack(out) if out else np.zeros((0, 3))
-
-
-def points_along(path: Floats, step: float) -> Floats:
-    """Points (n, 3) of a polyline every `step`, both ends among them."""
-    s = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))]
-    n = max(1, int(np.ceil(s[-1] / step)))
-    u = np.linspace(0.0, s[-1], n + 1)
-    return np.column_stack([np.interp(u, s, path[:, k]) for k in range(3)])

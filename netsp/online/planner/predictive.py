@@ -14,8 +14,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from netsp.arrays import Floats
+from netsp.geometry import polylines
 from netsp.online.paths.tree import homotopic, length_of, taut
-from netsp.online.planner.base import NORMAL, RECOVERY, Planner, dense, points_along
+from netsp.online.planner.base import NORMAL, RECOVERY, Planner
 from netsp.online.scene.field import pushed_out
 from netsp.online.tether import GeodesicTether, Tether
 
@@ -103,7 +104,7 @@ class PredictivePlanner(Planner):
         """
         most = max(limit, tether.length + 1e-6)
         fine = max(0.5 * self.mission.delta, 0.02)
-        points = dense(path, COARSE * fine)
+        points = polylines.dense(path, COARSE * fine)
         _, lengths = self.tethers.drive(tether, points)
         if lengths.max(initial=0.0) > most:
             return False
@@ -114,7 +115,7 @@ class PredictivePlanner(Planner):
             return True
         state = tether
         for k, near in enumerate(close[: np.flatnonzero(close)[-1] + 1]):
-            stops = dense(corners[k : k + 2], fine) if near else points[k : k + 1]
+            stops = polylines.dense(corners[k : k + 2], fine) if near else points[k : k + 1]
             state, lengths = self.tethers.drive(state, stops)
             if lengths.max() > most:
                 return False
@@ -132,8 +133,8 @@ class PredictivePlanner(Planner):
         """
         # the tether back from the robot, finely, off the surfaces; some of its points are pivots
         nodes = tether.nodes[::-1]
-        along = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(nodes, axis=0), axis=1))]
-        back = points_along(nodes, self.mission.cell)
+        along = polylines.along(nodes)
+        back = polylines.points_along(nodes, self.mission.cell)
         places = np.linspace(0.0, along[-1], len(back))
         back[1:] = pushed_out(self.scene, back[1:], self.mission.clearance)
         pivots = np.unique(np.linspace(0, len(back) - 1, PIVOTS + 1).round().astype(int))

@@ -20,8 +20,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from netsp.arrays import Floats
+from netsp.geometry import polylines
 from netsp.online.paths.tree import Paths
-from netsp.online.planner.base import NORMAL, RECOVERY, Planner, dense, points_along
+from netsp.online.planner.base import NORMAL, RECOVERY, Planner
 from netsp.online.scene.field import pushed_out
 from netsp.online.tether import Tether
 
@@ -67,7 +68,7 @@ class ReactPlanner(Planner):
     def _search(self, tether: Tether) -> Floats:
         """Algorithm 3: pivots backwards along the tether, the first that will do."""
         limit = self.mission.tether_length
-        back = points_along(tether.nodes[::-1], max(self.mission.cell, 0.25))
+        back = polylines.points_along(tether.nodes[::-1], max(self.mission.cell, 0.25))
         tree = self.paths(pushed_out(self.scene, back, 1e-3))
         lengths = [self._augmented(back, tree, n) for n in range(len(back))]
         for n, length in enumerate(lengths):
@@ -100,4 +101,4 @@ class ReactPlanner(Planner):
             return np.inf
         path = np.vstack([back[:n:-1], onward]) if n + 1 < len(back) else onward
         start = self.tethers.start(path[0], path[0])
-        return self.tethers.drive(start, dense(path, 0.5 * self.mission.cell))[0].length
+        return self.tethers.drive(start, polylines.dense(path, 0.5 * self.mission.cell))[0].length

@@ -24,6 +24,7 @@ from numba import njit
 
 from netsp.arrays import Floats
 from netsp.errors import InputError
+from netsp.geometry import polylines
 from netsp.online.scene.field import DistanceField
 from netsp.online.scene.sampling import distance
 from netsp.online.tether.strand import see
@@ -101,7 +102,7 @@ class ReactTether:
 
 
 def _tether(nodes: Floats) -> Tether:
-    return Tether(strand_of(nodes), float(np.linalg.norm(np.diff(nodes, axis=0), axis=1).sum()))
+    return Tether(strand_of(nodes), polylines.length(nodes))
 
 
 @njit(cache=True)

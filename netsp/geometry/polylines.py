@@ -1,0 +1,37 @@
+"""Polylines, as arrays (k, d) of points in plane or space."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from netsp.arrays import Floats
+
+
+def length(path: Floats) -> float:
+    """Length of a polyline; 0 of fewer than two points."""
+    return float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
+
+
+def along(path: Floats) -> Floats:
+    """(k,) length of a polyline up to each of its points."""
+    steps: Floats = np.linalg.norm(np.diff(path, axis=0), axis=1)
+    return np.concatenate([[0.0], np.cumsum(steps)])
+
+
+def dense(path: Floats, step: float) -> Floats:
+    """Points (n, d) of a polyline at most `step` apart, all of its own among them but the first."""
+    out = []
+    for a, b in pairwise(path):
+        k = max(1, int(np.ceil(np.linalg.norm(b - a) / step)))
+        out.append(a + (b - a) * (np.arange(1, k + 1) / k)[:, None])
+    return np.vstack(out) if out else np.zeros((0, path.shape[1]))
+
+
+def points_along(path: Floats, step: float) -> Floats:
+    """Points (n, d) of a polyline every `step` or less, both ends among them."""
+    s = along(path)
+    n = max(1, int(np.ceil(s[-1] / step)))
+    u = np.linspace(0.0, s[-1], n + 1)
+    return np.column_stack([np.interp(u, s, path[:, k]) for k in range(path.shape[1])])
