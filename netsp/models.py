@@ -82,7 +82,11 @@ def explain(error: ValidationError) -> str:
         message = f"expected a number >= {context['ge']:g}, {got}"
     else:
         message = f"{_decapitalise(first['msg'])}, {got}"
-    more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
+    extra = [e["loc"][-1] for e in errors if e["type"] == "extra_forbidden"]
+    others = len(errors) - 1
+    if kind == "missing" and extra:  # as like as not the same field, misspelt
+        message, others = f"{message}; unknown field {shown(extra[0])}", others - 1
+    more = f" (and {others} more)" if others else ""
     return f"{where}: {message}{more}" if where else f"{message}{more}"
 
 

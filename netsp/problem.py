@@ -382,6 +382,8 @@ class Problem(Drawn, BaseModel):
             f"tether {self.tether_length:g} {self.units}>"
         )
 
+    __str__ = __repr__
+
     def plot(self, ax: Any = None) -> Any:
         """The map, on axes of the caller or on new ones; returns the axes."""
         from netsp.pictures.problem import draw_map

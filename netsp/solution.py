@@ -135,6 +135,8 @@ class Solution(Drawn, BaseModel):
             f"{len(self.tour)} visits>"
         )
 
+    __str__ = __repr__
+
     def plot(self, ax: Any = None, *, problem: Problem | None = None) -> Any:
         """The path, on axes of the caller or on new ones; returns the axes. problem : the one that
         is solved, to be drawn beneath."""

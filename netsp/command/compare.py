@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from netsp.compare.run import Tally
     from netsp.compare.study import Study
 
-EXAMPLE = "netsp compare studies/table-one.toml -o rows.jsonl --jobs 2"
+EXAMPLE = "netsp compare examples/study.toml -o rows.jsonl --jobs 2"
 
 
 def arguments(p: argparse.ArgumentParser) -> None:
@@ -30,9 +30,9 @@ def arguments(p: argparse.ArgumentParser) -> None:
         "study", metavar="STUDY", nargs="?", help="study file (TOML); or the flags below"
     )
     p.add_argument("-o", "--output", required=True, metavar="FILE", help="results (JSON lines)")
-    p.add_argument("--goals", type=positive, nargs="+", metavar="N")
-    p.add_argument("--tethers", type=length, nargs="+", metavar="L")
-    p.add_argument("--solvers", nargs="+", metavar="NAME")
+    p.add_argument("--goals", type=positive, nargs="+", metavar="N", help="numbers of goals")
+    p.add_argument("--tethers", type=length, nargs="+", metavar="L", help="tether lengths")
+    p.add_argument("--solvers", nargs="+", metavar="NAME", help="solvers to compare")
     p.add_argument("--roadmaps", nargs="+", metavar="NAME", help="default taut")
     p.add_argument("--worlds", type=positive, metavar="N", help="per cell; default 10")
     p.add_argument("--family", metavar="NAME", help="of the worlds; default icra2017")

@@ -21,7 +21,9 @@ if TYPE_CHECKING:
     from netsp.execute.log import Row
     from netsp.problem import Problem
 
-EXAMPLE = "netsp execute problems/wharf.json solution.json --surprise surprises.json -o run"
+EXAMPLE = (
+    "netsp execute problems/wharf.json solution.json --surprise examples/surprises.json -o run"
+)
 
 
 def arguments(p: argparse.ArgumentParser) -> None:
@@ -34,7 +36,9 @@ def arguments(p: argparse.ArgumentParser) -> None:
         "--vehicle", default="kinematic", metavar="NAME", help="kinematic (default) or bluerov2"
     )
     p.add_argument("--current", metavar="X,Y,Z", help="current (m/s); default none")
-    p.add_argument("--gusts", type=length, default=0.0, metavar="S", help="on top of it (m/s)")
+    p.add_argument(
+        "--gusts", type=length, default=0.0, metavar="S", help="gusts added to the current (m/s)"
+    )
     p.add_argument(
         "--planner", default="repair", metavar="NAME",
         help="repair (default): mend what breaks; none: go on with the plan",

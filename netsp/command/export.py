@@ -81,7 +81,8 @@ def run(args: argparse.Namespace) -> int:
     goals = sum(p.goal is not None and p.goal >= 0 for p in points)
     seconds = predicted_s(points, settings)
     print(
-        f"{args.output}: {len(points)} waypoints, {goals} of them goals, of the plan's class; "
+        f"{args.output}: {len(points)} waypoints, {goals} of them goals, "
+        "all in the class of the plan; "
         f"about {seconds:.0f} s at {settings.speed:g} {problem.units}/s, stops included",
         file=sys.stderr,
     )
@@ -97,7 +98,8 @@ def run(args: argparse.Namespace) -> int:
         shallow = sum(p.position[2] > -SHALLOWEST for p in points)
         if shallow:
             print(
-                f"netsp: {shallow} waypoints lie above {SHALLOWEST} m of depth and were put there",
+                f"netsp: {shallow} waypoints were shallower than {SHALLOWEST} m and were lowered "
+                "to it",
                 file=sys.stderr,
             )
         print(

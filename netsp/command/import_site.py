@@ -10,7 +10,7 @@ from netsp.command.types import (
     length,
 )
 
-EXAMPLE = "netsp import site.geojson -o problem.json"
+EXAMPLE = "netsp import examples/site.geojson -o problem.json"
 
 
 def arguments(p: argparse.ArgumentParser) -> None:

@@ -116,7 +116,7 @@ COMMANDS = {
     },
     "hand over": {
         "export": ("export", "write a tour as a mission file of a ground station"),
-        "import": ("import_site", "make a problem of a map (GeoJSON)"),
+        "import": ("import_site", "make a problem from a map (GeoJSON)"),
     },
     "compare": {
         "compare": ("compare", "solvers side by side over random worlds, resumable"),
@@ -166,7 +166,7 @@ def _parser(wanted: str | None) -> argparse.ArgumentParser:
 
 
 EPILOG = (
-    "netsp COMMAND --help tells the rest, with an example. Exit codes: 0 done, 1 a defect of",
+    "netsp COMMAND --help gives the details, with an example. Exit codes: 0 done, 1 a defect of",
     "netsp, 2 bad input, 3 proven infeasible, 4 no solution within the limit or goals left out,",
     "5 verification failed, 130 interrupted with nothing to show.",
 )

@@ -108,7 +108,13 @@ def summary(
             "or choose another --solver"
         )
     if solution.status is Status.OPTIMAL:
-        verdict = "proven optimal"
+        exact = solution.roadmap == "taut"
+        verdict = "proven optimal" if exact else f"optimal over this {solution.roadmap} roadmap"
+    elif solution.status is Status.OPTIMAL_OF_KEPT:
+        verdict = (
+            f"optimal among the classes kept; bound over all {solution.lower_bound:.6g}, "
+            f"gap {100 * (solution.gap or 0.0):.2f} %"
+        )
     elif solution.status is Status.INVALID:
         verdict = "INVALID: the solver is blind to the tether"
     elif solution.lower_bound is None:

@@ -32,16 +32,18 @@ def arguments(p: argparse.ArgumentParser) -> None:
         "--planner", default="predictive", metavar="NAME",
         help="predictive (default), react, react-draft or none",
     )  # fmt: skip
-    p.add_argument("--tether", type=length, metavar="L", help="tether length, in place of its own")
+    p.add_argument(
+        "--tether", type=length, metavar="L", help="tether length, instead of the mission's"
+    )
     p.add_argument(
         "--vehicle", default="kinematic", metavar="NAME",
         help="kinematic (default) or bluerov2 (with its dynamics and controller)",
     )  # fmt: skip
     p.add_argument(
         "--tether-model", default="geodesic", metavar="NAME",
-        help="that the planner believes: geodesic (default) or react",
+        help="used by the planner: geodesic (default) or react",
     )  # fmt: skip
-    p.add_argument("--current", metavar="X,Y,Z", help="current (m/s), in place of the mission's")
+    p.add_argument("--current", metavar="X,Y,Z", help="current (m/s), instead of the mission's")
     p.add_argument(
         "--paths", default="tree", metavar="NAME",
         help="how paths are found: tree (default), bitstar, rrtstar or prmstar (OMPL)",

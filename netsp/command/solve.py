@@ -45,7 +45,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
         "--max-classes",
         type=positive,
         metavar="N",
-        help="taut: most classes of all goals together",
+        help="taut: upper limit on the classes of all goals together",
     )
     p.add_argument(
         "--mip-backend", metavar="NAME", help="highs (default) or cbc, for the solvers built on mip"

@@ -12,8 +12,8 @@ EXAMPLE = "netsp verify problems/wharf.json solution.json"
 
 def arguments(p: argparse.ArgumentParser) -> None:
     """Of the command line."""
-    p.add_argument("problem", metavar="PROBLEM")
-    p.add_argument("solution", metavar="SOLUTION")
+    p.add_argument("problem", metavar="PROBLEM", help="problem file (JSON)")
+    p.add_argument("solution", metavar="SOLUTION", help="solution file (JSON)")
     p.add_argument(
         "--measures",
         action="store_true",

@@ -25,7 +25,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument("--side", type=length, default=500.0, metavar="L", help="default 500")
     p.add_argument(
         "--radii", type=length, nargs=2, default=(10.0, 30.0), metavar="R",
-        help="least and most; default 10 30",
+        help="smallest and largest radius; default 10 30",
     )  # fmt: skip
     p.add_argument("-o", "--output", metavar="FILE", help="write the problem here (else stdout)")
     p.add_argument("--plot", metavar="FILE", help="draw it (png, svg or pdf)")

@@ -129,7 +129,7 @@ def repair(
     # with a short time left a new plan has less of it to pay for itself
     replan_s = max(clock.left, 0.0)
     chosen, kind = local, "local"
-    reason = f"{why}; in the same order {local.length:.6g}"
+    reason = f"{why}; in the same order {local.length:.4g} to go"
     saving = (local.length - _least(graph, len(order), clock)) / speed
     if saving > replan_s > 0.0:
         found = solve_graph(graph, "auto", time_limit=clock, seed=seed, warm_start=local.tour)
@@ -137,9 +137,9 @@ def repair(
             chosen, kind = found, "replan"
             reason += f", in a new one {found.length:.6g}"
         else:
-            reason += ", no new one is enough shorter"
+            reason += ", a new order would not save enough"
     else:
-        reason += f", a new one saves {saving:.2g} s at most"
+        reason += f", a new order saves {max(saving, 0.0):.1f} s at most"
     solution = to_solution(rest, graph, chosen, "auto", seed)
     legs = legs_of(rest, solution, order)
     return Repair(kind, reason, legs, tuple(lost), float(chosen.length or 0.0), clock.elapsed)

@@ -258,7 +258,8 @@ def _title(problem: Problem, solution: Solution | None) -> str:
             f"tether {problem.tether_length:g} {problem.units}"
         )
     if solution.status is Status.OPTIMAL:
-        proof = "proven shortest"
+        exact = solution.roadmap == "taut"
+        proof = "proven shortest" if exact else f"shortest over its {solution.roadmap} roadmap"
     elif solution.gap is not None:
         proof = f"at most {100 * solution.gap:.2f} % above the shortest"
     else:
@@ -266,7 +267,7 @@ def _title(problem: Problem, solution: Solution | None) -> str:
     longest = max((v.tether_length for v in solution.tour), default=0.0)
     kind = "non-entangling tour"
     if solution.status is Status.INVALID:
-        kind, proof = "tour", f"entangles {len(solution.entangled)} obstacles (red)"
+        kind, proof = "tour", f"entangles {len(solution.entangled)} obstacles (purple)"
     return (
         f"{problem.name}: {kind} of {solution.length:.6g} {problem.units}, {proof}\n"
         f"longest tether {longest:.4g} of {problem.tether_length:g} {problem.units}; "

@@ -59,7 +59,7 @@ class PredictivePlanner(Planner):
             own = self._own_tether(target)
             self.give_up(
                 "no free way to it" if own is None else
-                f"no way on which the tether fits: its shortest tether is {own:.3g} of "
+                f"out of reach: its shortest tether is {own:.3g} of "
                 f"{self.mission.tether_length:g}"
             )  # fmt: skip
             return True
