@@ -11,7 +11,7 @@ import json
 from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -202,6 +202,8 @@ class Problem(Drawn, BaseModel):
     (4.0, 0.0, 0.0)
     """
 
+    picture: ClassVar[str] = "netsp.pictures.problem:draw_map"
+
     model_config = ConfigDict(frozen=True, extra="forbid", title="netsp problem")
 
     schema_version: Annotated[Literal[1], Field(description="of the file format")] = 1
@@ -383,12 +385,6 @@ class Problem(Drawn, BaseModel):
         )
 
     __str__ = __repr__
-
-    def plot(self, ax: Any = None) -> Any:
-        """The map, on axes of the caller or on new ones; returns the axes."""
-        from netsp.pictures.problem import draw_map
-
-        return draw_map(self, ax=ax)
 
     @classmethod
     def from_json(cls, text: str | bytes, *, source: str = "problem") -> Self:

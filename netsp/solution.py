@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -13,9 +13,6 @@ from netsp.drawn import Drawn
 from netsp.fields import STRICT, Name, NonNegative, Number, Point3
 from netsp.files import read_text, write_text
 from netsp.models import read_model
-
-if TYPE_CHECKING:
-    from netsp.problem import Problem
 
 
 class Status(StrEnum):
@@ -82,6 +79,8 @@ class Solution(Drawn, BaseModel):
     tour has any.
     """
 
+    picture: ClassVar[str] = "netsp.pictures.problem:draw_solution"
+
     model_config = ConfigDict(frozen=True, extra="forbid", title="netsp solution")
 
     schema_version: Annotated[Literal[1], Field(description="of the file format")] = 1
@@ -136,13 +135,6 @@ class Solution(Drawn, BaseModel):
         )
 
     __str__ = __repr__
-
-    def plot(self, ax: Any = None, *, problem: Problem | None = None) -> Any:
-        """The path, on axes of the caller or on new ones; returns the axes. problem : the one that
-        is solved, to be drawn beneath."""
-        from netsp.pictures.problem import draw_map, draw_path
-
-        return draw_path(self, ax=ax) if problem is None else draw_map(problem, self, ax=ax)
 
     @classmethod
     def from_json(cls, text: str | bytes, *, source: str = "solution") -> Self:

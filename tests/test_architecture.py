@@ -13,8 +13,6 @@ MODULES = {
     ".".join(p.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): p
     for p in (ROOT / "netsp").rglob("*.py")
 }
-DOORS = {"plot", "_repr_html_"}
-"""Methods that may import a picture from above."""
 
 
 def layers():
@@ -37,23 +35,19 @@ def layer_of(module):
 
 
 def imports(path):
-    """(module of netsp, whether it is imported when the file is loaded, the function around it)."""
+    """(module of netsp, whether it is imported when the file is loaded)."""
     found = []
 
-    def visit(node, at_load, function):
+    def visit(node, at_load):
         for child in ast.iter_child_nodes(node):
-            now, inside = at_load, function
-            if isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef):
-                now, inside = False, child.name
-            if isinstance(child, ast.If) and "TYPE_CHECKING" in ast.dump(child.test):
-                now = False
+            now = at_load and not isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef)
             if isinstance(child, ast.ImportFrom) and (child.module or "").startswith("netsp"):
                 for alias in child.names:
                     whole = f"{child.module}.{alias.name}"
-                    found.append((whole if whole in MODULES else child.module, now, inside))
-            visit(child, now, inside)
+                    found.append((whole if whole in MODULES else child.module, now))
+            visit(child, now)
 
-    visit(ast.parse(path.read_text()), True, None)
+    visit(ast.parse(path.read_text()), True)
     return found
 
 
@@ -74,21 +68,19 @@ def test_every_file_that_the_page_names_exists():
 
 @pytest.mark.parametrize("module", sorted(set(MODULES) - {"netsp"}))
 def test_imports_go_down(module):
-    for other, _, function in imports(MODULES[module]):
-        if other == "netsp" or (function in DOORS and other.startswith("netsp.pictures")):
+    for other, _ in imports(MODULES[module]):
+        if other == "netsp":
             continue
         assert layer_of(other) <= layer_of(module), f"{module} imports {other}"
 
 
 def test_nothing_is_imported_in_a_circle():
-    graph = {
-        m: {o for o, at_load, _ in imports(p) if at_load and o != m} for m, p in MODULES.items()
-    }
+    graph = {m: {o for o, at_load in imports(p) if at_load and o != m} for m, p in MODULES.items()}
     list(graphlib.TopologicalSorter(graph).static_order())
 
 
 def test_the_judge_sees_no_roadmap_and_no_solver():
     for module, path in MODULES.items():
         if module.startswith("netsp.judge"):
-            seen = {o.split(".")[1] for o, _, _ in imports(path)}
+            seen = {o.split(".")[1] for o, _ in imports(path)}
             assert not seen & {"roadmap", "solving", "solvers", "mip", "dp", "lns", "anneal"}

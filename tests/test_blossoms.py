@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 from netsp.mip.blossoms import best_teeth, blossom_cuts
 from netsp.mip.bound import dual_bound, exact_bound, reduced_costs
 from netsp.mip.cbc_program import CbcInteger, CbcRelaxation
+from netsp.mip.cuts import Cut, cut_coefficients
 from netsp.mip.highs import HighsInteger, HighsRelaxation
-from netsp.mip.program import Cut, cut_coefficients, duals_of_relaxation
+from netsp.mip.program import duals_of_relaxation
 from tests.brute import brute_tour
 from tests.test_contract import random_graph
 

@@ -10,7 +10,7 @@ from netsp.clock import NEVER, Clock
 from netsp.errors import LimitReachedError, MemoryLimitError
 from netsp.memory import ask, available
 from netsp.mip.cutpool import IDLE, CutPool
-from netsp.mip.program import Cut
+from netsp.mip.cuts import Cut
 from netsp.worlds import random_world
 
 

@@ -10,8 +10,8 @@ from netsp import travel_graph
 from netsp.mip import solve as mip
 from netsp.mip.bound import dual_bound, exact_bound, fixing_costs, reduced_costs
 from netsp.mip.cbc_program import CbcRelaxation
+from netsp.mip.cuts import Cut
 from netsp.mip.highs import HighsRelaxation
-from netsp.mip.program import Cut
 from netsp.mip.solve import Params
 from netsp.mip.subtours import components, fractional_cuts
 from netsp.roadmap.taut import TautRoadmap

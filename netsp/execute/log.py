@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -96,6 +96,8 @@ class Execution(Drawn):
     tethers : (time, nodes) of the tether now and then, for pictures. lost : goals left out.
     """
 
+    picture: ClassVar[str] = "netsp.pictures.execution:draw_map"
+
     problem: Problem
     solution: Solution
     options: Options
@@ -117,12 +119,6 @@ class Execution(Drawn):
             f"<Execution of {self.problem.name!r}: {s['visited']} goals in {s['time_s']:.1f} s, "
             f"tether at most {s['longest_tether']:.4g} of {s['tether_length']:g}>"
         )
-
-    def plot(self, ax: Any = None) -> Any:
-        """The map with plan and path, on axes of the caller or on new ones; returns the axes."""
-        from netsp.pictures.execution import draw_map
-
-        return draw_map(self, ax=ax)
 
     @property
     def summary(self) -> dict[str, Any]:

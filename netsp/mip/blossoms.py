@@ -17,7 +17,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from netsp.arrays import Bools, Floats, Ints
-from netsp.mip.program import Cut
+from netsp.mip.cuts import Cut
 
 VIOLATION = 0.02
 """Least violation worth a cut."""

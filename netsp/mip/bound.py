@@ -22,7 +22,8 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.arrays import Floats
-from netsp.mip.program import Cut, Duals
+from netsp.mip.cuts import Cut
+from netsp.mip.program import Duals
 
 ROUNDING = 1e-12
 """Relative rounding allowed for: some thousand additions at 1.1e-16 each, with room to spare."""

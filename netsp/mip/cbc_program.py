@@ -10,15 +10,8 @@ import pulp
 from netsp.arrays import Bools, Floats, Ints
 from netsp.mip.cbc import run_cbc
 from netsp.mip.cutpool import CutPool
-from netsp.mip.program import (
-    Cut,
-    IntegerOutcome,
-    Point,
-    cut_coefficients,
-    duals_of_relaxation,
-    restricted,
-    scale_of,
-)
+from netsp.mip.cuts import Cut, cut_coefficients
+from netsp.mip.program import IntegerOutcome, Point, duals_of_relaxation, restricted, scale_of
 
 
 def _row(

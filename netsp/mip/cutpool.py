@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from netsp.arrays import Bools, Floats, Ints
-from netsp.mip.program import Cut
+from netsp.mip.cuts import Cut
 
 IDLE, SLACK = 16, 2
 """A cut leaves the LP after so many rounds in a row without a price, rounds in which it was slack

@@ -12,15 +12,8 @@ import numpy as np
 
 from netsp.arrays import Bools, Floats, Ints
 from netsp.mip.cutpool import CutPool
-from netsp.mip.program import (
-    Cut,
-    IntegerOutcome,
-    Point,
-    cut_coefficients,
-    duals_of_relaxation,
-    restricted,
-    scale_of,
-)
+from netsp.mip.cuts import Cut, cut_coefficients
+from netsp.mip.program import IntegerOutcome, Point, duals_of_relaxation, restricted, scale_of
 
 _SETTLED = (
     highspy.HighsModelStatus.kOptimal,

@@ -15,7 +15,8 @@ import numpy as np
 from netsp.arrays import Bools, Floats, Ints
 from netsp.mip.blossoms import blossom_cuts
 from netsp.mip.bound import dual_bound, fixing_costs, reduced_costs
-from netsp.mip.program import Cut, Point, Relaxation
+from netsp.mip.cuts import Cut
+from netsp.mip.program import Point, Relaxation
 from netsp.mip.subtours import branches, fractional_cuts
 from netsp.solving.legcosts import LegCosts
 from netsp.solving.run import Stop

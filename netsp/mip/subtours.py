@@ -16,8 +16,8 @@ from scipy.sparse.csgraph import connected_components
 
 from netsp.arrays import Bools, Floats, Ints
 from netsp.hsignature import Word
+from netsp.mip.cuts import Cut
 from netsp.mip.flows import min_cuts
-from netsp.mip.program import Cut
 
 VIOLATION = 1e-4
 """Least violation worth a cut."""

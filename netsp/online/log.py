@@ -7,7 +7,7 @@ import io
 import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from netsp.drawn import Drawn
 from netsp.errors import InputError
@@ -40,6 +40,8 @@ class Run(Drawn):
     log : one row per step. tether : at the end. summary : the numbers (`summarise`).
     """
 
+    picture: ClassVar[str] = "netsp.pictures.mission:draw_run"
+
     mission: Mission
     planner: str
     log: tuple[LogRow, ...]
@@ -54,12 +56,6 @@ class Run(Drawn):
             f"waypoints in {s['inspection_s']:.1f} s, tether at most {s['longest_tether_m']:.4g} "
             f"of {s['tether_length']:g}>"
         )
-
-    def plot(self, ax: Any = None) -> Any:
-        """Tether length over time, on axes of the caller or on new ones; returns the axes."""
-        from netsp.pictures.mission import draw_tether
-
-        return draw_tether([self], ax=ax)
 
 
 def write_run(run: Run, folder: str | Path) -> None:

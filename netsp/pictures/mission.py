@@ -92,6 +92,11 @@ def draw_tether(runs: Sequence[Run], *, ax: Any = None, units: str = "m") -> Any
     return ax
 
 
+def draw_run(run: Run, *, ax: Any = None) -> Any:
+    """The length of the taut tether of one run over time; see `draw_tether`."""
+    return draw_tether([run], ax=ax)
+
+
 def draw_coverage(runs: Sequence[Run], *, ax: Any = None) -> Any:
     """What the camera has seen over time, on axes of the caller or on new ones; returns them."""
     from matplotlib.figure import Figure

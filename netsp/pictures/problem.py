@@ -251,6 +251,17 @@ def draw_path(solution: Solution, *, ax: Any = None) -> Any:
     return ax
 
 
+def draw_solution(
+    solution: Solution, *, ax: Axes | None = None, problem: Problem | None = None
+) -> Axes:
+    """A solution's path, over its problem if that is given, on axes of the caller or on new ones;
+    returns the axes."""
+    if problem is not None:
+        return draw_map(problem, solution, ax=ax)
+    path: Axes = draw_path(solution, ax=ax)
+    return path
+
+
 def _title(problem: Problem, solution: Solution | None) -> str:
     if solution is None or solution.length is None:
         return (

@@ -15,7 +15,7 @@ import math
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, ClassVar, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -79,6 +79,8 @@ class TravelGraph(Drawn):
     start_tether : (n, 3) the tether that is out at the start.
     """
 
+    picture: ClassVar[str] = "netsp.pictures.graph:draw_classes"
+
     start: int | None = None
     start_tether: Floats = np.zeros((0, 3))
 
@@ -137,13 +139,6 @@ class TravelGraph(Drawn):
             f"<TravelGraph: {self.goal_count} goals, {len(self) - 1} classes, "
             f"roadmap {self.roadmap}>"
         )
-
-    def plot(self, ax: Any = None) -> Any:
-        """Tether lengths of all classes by goal, on axes of the caller or on new ones; returns the
-        axes."""
-        from netsp.pictures.graph import draw_classes
-
-        return draw_classes(self, ax=ax)
 
     def __len__(self) -> int:
         return len(self.cluster)
