@@ -94,7 +94,7 @@ def run(args: argparse.Namespace) -> int:
         if args.plot_trace:
             rows.append(row)
 
-    from netsp.compiled.warm_up import compile_messages
+    from netsp.command.compiling import compile_messages
 
     with (
         table or contextlib.nullcontext(),

@@ -16,7 +16,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Compile, and return the exit code."""
-    from netsp.compiled.warm_up import compile_messages, forget, steps
+    from netsp.command.compiling import compile_messages, forget, steps
 
     forget()
     with contextlib.nullcontext() if args.quiet else compile_messages(sys.stderr):

@@ -1,1 +1,1 @@
-"""What compiled loops need: random numbers, arrays that grow, hash slots; compiling ahead."""
+"""What compiled loops need: random numbers, arrays that grow, hash slots."""
