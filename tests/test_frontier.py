@@ -266,3 +266,50 @@ def test_auto_bounds_large_graphs_without_geometry_too(monkeypatch):
     result = solve_graph(graph, "auto", iteration_limit=500)
     assert 0.0 < result.lower_bound <= best * (1 + 1e-9)
     assert result.length >= best * (1 - 1e-9)
+
+
+def core_first(monkeypatch, problem, share=0.4, **limits):
+    """A proof over the core, then over all, of a world so small that the core would not be worth
+    it."""
+    import netsp.solving.legcosts
+    import netsp.solving.searching as searching
+
+    for module in (searching, netsp.solving.legcosts):
+        monkeypatch.setattr(module, "MEASURE_AT_ONCE", 0)
+    monkeypatch.setattr(searching, "LARGER", 1)
+    monkeypatch.setattr(searching, "MOST_CLASSES", 3)
+    monkeypatch.setattr(searching, "CORE", 1)
+    monkeypatch.setattr(searching, "CORE_SHARE", share)
+    run = solve_graph(travel_graph(problem), "mip", seed=0, **limits)
+    monkeypatch.undo()
+    return run
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_proof_over_the_core_first_ends_at_the_same_optimum(monkeypatch, seed):
+    problem = random_world(seed, goals=7, tether=300.0)
+    best = solve(problem, "mip", seed=0).length
+    run = core_first(monkeypatch, problem)
+    assert any(row.stage == "core" for row in run.trace)
+    assert run.status is Status.OPTIMAL
+    assert run.length == pytest.approx(best, rel=1e-6)
+    assert all((row.bound or 0.0) <= best * (1 + 1e-6) for row in run.trace)
+
+
+@pytest.mark.parametrize("iterations", [1, 3, 6, 12, 25])
+def test_a_core_that_is_cut_short_claims_nothing(monkeypatch, iterations):
+    problem = random_world(1, goals=7, tether=300.0)
+    best = solve(problem, "mip", seed=0).length
+    run = core_first(monkeypatch, problem, iteration_limit=iterations)
+    assert (run.lower_bound or 0.0) <= best * (1 + 1e-6)
+    assert run.status is not Status.INFEASIBLE
+    if run.length is not None:
+        assert run.length >= best * (1 - 1e-6)
+
+
+def test_a_core_whose_time_is_over_hands_over_to_the_proof_over_all(monkeypatch):
+    problem = random_world(1, goals=7, tether=300.0)
+    best = solve(problem, "mip", seed=0).length
+    run = core_first(monkeypatch, problem, share=1e-4, time_limit=100.0)
+    assert run.status is Status.OPTIMAL
+    assert run.length == pytest.approx(best, rel=1e-6)

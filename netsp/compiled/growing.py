@@ -31,7 +31,7 @@ def sort_in_place(a, n):
 
 @njit(cache=True, nogil=True)
 def more_int_rows(a):
-    """The same rows with room for twice as many (copied by hand, see `geometry.more_rows`)."""
+    """The same rows with room for twice as many (copied by hand, see `more_rows`)."""
     b = np.empty((2 * a.shape[0], a.shape[1]), dtype=np.int64)
     for i in range(a.shape[0]):
         for j in range(a.shape[1]):

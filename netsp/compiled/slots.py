@@ -1,4 +1,4 @@
-"""Hash slots of compiled loops: keys of several numbers in open addressing."""
+"""Hash tables of compiled loops: open addressing in arrays."""
 
 from __future__ import annotations
 

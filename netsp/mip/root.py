@@ -89,7 +89,9 @@ class Root:
         graph = costs.graph
         self.branch = branches([graph.signatures[v] for v in costs.vertices])
         self.dead: Bools = ~np.isfinite(costs.values)
-        warm = warm if warm and np.isin(warm.vertices, costs.vertices).all() else None
+        # without an incumbent, a program with some of the legs may be infeasible when a tour exists
+        usable = run.tour is not None and warm and np.isin(warm.vertices, costs.vertices).all()
+        warm = warm if usable else None
         legs = self._first_legs() if warm is None else self._warm_legs(warm)
         self.lp = relaxation(costs.cluster, legs, costs.values[legs[:, 0], legs[:, 1]])
         if warm is not None:

@@ -88,12 +88,12 @@ class MipRun(SearchingRun):
             self.offer(warm_start)
             if not self.trivial():
                 self.begin()
-                warm = None
+                warm: Warm | None = None
                 if not walks:
                     with self.core() as core:
                         if core is not None:
                             core.prove(backend)
-                            warm = core.program()
+                    warm = core.program() if core is not None else None
                 self.prove(backend, walks=walks, warm=warm)
         return self.finish("proven" if self.done else "open")
 
@@ -112,7 +112,8 @@ class MipRun(SearchingRun):
             self.cut(costs, backend, warm)
 
     def program(self) -> Warm | None:
-        """The program of the root of a run over a core, by vertices of the outer run."""
+        """The program of the root of a run over a core, by vertices of the outer run; also of one
+        whose share of the time was over."""
         if self.root is None or self.outer is None:
             return None
         core = self.outer[1][self.root.costs.vertices]

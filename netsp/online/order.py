@@ -209,6 +209,6 @@ def travel_graph(
 
 
 def _free(field: DistanceField, path: Floats, clearance: float) -> bool:
-    """Whether a straight way keeps the clearance, or what its ends have of it."""
+    """Whether a straight path keeps the clearance, or what its ends have of it."""
     room = max(0.0, min(clearance, float(field.distance(path).min())) - 1e-3)
     return field.grown(room).line_of_sight(path[0], path[1], depth=1e-3)

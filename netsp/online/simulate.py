@@ -84,7 +84,7 @@ class Simulation:
         return row
 
     def go(self, path: Floats, fresh: bool) -> tuple[int, bool]:
-        """One step along a way: how much of it is passed, and whether the vehicle could move. One
+        """One step along a path: how much of it is passed, and whether the vehicle could move. One
         that runs into a solid is stopped where it was."""
         robot, yaw = self.vehicle.position, self.vehicle.yaw
         if self.coverage is not None:
@@ -160,7 +160,7 @@ def simulate(
     Raises
     ------
     InputError : before the first step: unknown names, waypoints inside solids, anchor and start
-        not in sight of one another, a tether that is shorter than the way between them.
+        not in sight of one another, a tether that is shorter than the path between them.
     """
     _check_size(mission)
     scene = scene or mission.load_scene()
@@ -170,7 +170,7 @@ def simulate(
     taut = tethers.start(mission.anchor, mission.start)
     if taut.length > mission.tether_length:
         raise InputError(
-            f"tether_length: {mission.tether_length:g} is shorter than the way from anchor to "
+            f"tether_length: {mission.tether_length:g} is shorter than the path from anchor to "
             f"start, {taut.length:.4g}"
         )
     robot = make_vehicle(vehicle, np.array(mission.start), mission.speed)
@@ -209,7 +209,7 @@ def simulate(
             if moved:
                 chosen.passed(passed)
             else:
-                chosen.give_up("the way to it leads through a solid")
+                chosen.give_up("the path to it leads through a solid")
     except KeyboardInterrupt:
         interrupted = True
     wall = time.perf_counter() - begin

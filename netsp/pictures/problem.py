@@ -100,7 +100,7 @@ def save_roadmap(problem: Problem, roadmap: str, options: dict[str, Any], path: 
 
 
 def save_trace(rows: Sequence[Progress], title: str, units: str, path: str | Path) -> None:
-    """Draw a solver's way to its answer: lengths and bound against iterations, and below, for
+    """Draw how a solver came to its answer: lengths and bound against iterations, and below, for
     solvers that walk through entangled states, the number of entangled obstacles (Fig. 3 of
     McCammon & Hollinger 2016)."""
     from matplotlib.figure import Figure

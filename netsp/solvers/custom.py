@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Mapping
+from inspect import Parameter
+from types import MappingProxyType
 from typing import Any
 
 from netsp.errors import InputError
@@ -12,6 +14,8 @@ from netsp.solving.limits import Limits
 from netsp.solving.run import Run
 from netsp.travel.graph import TravelGraph
 from netsp.travel.result import Result
+
+VARIADIC = (Parameter.VAR_POSITIONAL, Parameter.VAR_KEYWORD)
 
 
 def call(
@@ -22,19 +26,26 @@ def call(
     `limits`, or a field of `limits` such as `rng`.
 
     It returns a `Result`, or a tour as vertices from 0 on (then no bound is claimed), or None if it
-    found none. Its claims are not trusted: a tour is checked against the graph, and its length is
-    measured here.
+    found none. A tour is checked against the graph, and its length is measured here. A bound cannot
+    be checked: it is taken at its word, but never above the tour's length.
 
     Raises
     ------
-    InputError : options for a solver that takes none; something returned that is neither.
+    InputError : options for a solver that takes none; an argument asked for that there is not;
+        something returned that is neither.
     """
     fields = {"params": dict(params or {}), "limits": limits}
     fields |= {k: getattr(limits, k) for k in ("time", "iterations", "rng", "warm_start")}
     try:
-        asked = set(inspect.signature(solver).parameters)
+        asked = inspect.signature(solver).parameters
     except (TypeError, ValueError):  # compiled, and does not say what it takes
-        asked = set()
+        asked = MappingProxyType({})
+    for k in [*asked][1:]:
+        optional = asked[k].default is not Parameter.empty or asked[k].kind in VARIADIC
+        if k not in fields and not optional:
+            raise InputError(
+                f"solver {name!r}: asks for {k!r}; expected the graph, then {', '.join(fields)}"
+            )
     if params and "params" not in asked:
         raise InputError(f"solver {name!r}: unknown option {next(iter(params))!r}; it takes none")
     found = solver(graph, **{k: v for k, v in fields.items() if k in asked})

@@ -92,7 +92,7 @@ def solve_graph(
     warm_start : a tour to start from, as vertices from 0 on.
 
     Raises InputError for unknown names, bad limits, a warm start that is no tour of the graph, and
-    for solvers that need geometry (`GEOMETRIC`) on a graph that has none.
+    for solvers that need geometry (`geometric` in `netsp.solvers.table`) on a graph that has none.
 
     >>> from netsp import TravelGraph, solve_graph
     >>> costs = [[0, 1, 5, 4], [1, 0, 2, 9], [5, 2, 0, 2], [4, 9, 2, 0]]

@@ -3,9 +3,8 @@
 While legs are only bounded the search sees a core of classes whose legs it has measured; in the end
 it sees all that are left.
 
-With many classes the whole proof is made over the core first (`SearchingRun.core`): its tour
-is as good as always the best of all, and its prices and cuts fit the other classes so well that
-most of them are ruled out when they are first looked at.
+With very many classes the proof is made over the core first (`SearchingRun.core`): its tour is
+often the best of all, and the program over all classes begins with its legs and cuts.
 """
 
 from __future__ import annotations
@@ -41,7 +40,8 @@ CORE_SHARE = 0.4
 """Part of the time that is left which the core may take."""
 
 LARGER = 4
-"""The core comes first where there are at least so many times as many vertices in all."""
+"""The core comes first where there are more than so many times as many vertices in all: below that
+it costs more than it saves, and shows no bound meanwhile."""
 
 
 class SearchingRun(Run):

@@ -1,12 +1,12 @@
 """Paths made safer and smoother before they are followed.
 
-`paper`: the three steps of Amer et al. 2025, section V-B, repeated until the way is free.
+`paper`: the three steps of Amer et al. 2025, section V-B, repeated until the path is free.
 `gradient`: ours; it moves points up the distance field only, so no point's clearance gets smaller,
 and keeps the ends where they are.
 
 What the paper does not say: how long its segments are (here 10 points, 5 in common), how far points
 are moved (0.1 of the clearance), and that moving points away from the path's centroid pushes those
-between centroid and structure *into* the structure. The ends are kept, or the way would not lead
+between centroid and structure *into* the structure. The ends are kept, or the path would not lead
 from the robot to the waypoint.
 """
 
@@ -30,7 +30,7 @@ ROUNDS = 5
 def refined(
     name: str, field: DistanceField, path: Floats, clearance: float, rng: np.random.Generator
 ) -> Floats:
-    """A way (k, 3) refined; as it was if what came of it is not free."""
+    """A path (k, 3) refined; as it was if what came of it is not free."""
     if name == "none" or len(path) < 3:
         return path
     room = max(0.0, min(clearance, float(field.distance(path[[0, -1]]).min())) - 1e-3)
@@ -101,7 +101,7 @@ def lifted(field: DistanceField, path: Floats, clearance: float) -> Floats:
 
 
 def lowest(field: DistanceField, path: Floats) -> float:
-    """Least distance at the points of a way."""
+    """Least distance at the points of a path."""
     return float(field.distance(path).min())
 
 

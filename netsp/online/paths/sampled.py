@@ -19,7 +19,7 @@ OMPL_PLANNERS = {"rrtstar": "RRTstar", "bitstar": "BITstar", "prmstar": "PRMstar
 
 ITERATIONS = {"rrtstar": 1000, "bitstar": 3000, "prmstar": 300}
 """How often a planner is let go on, for PRM* its milestones: a count, not a time, so that the same
-seed gives the same way."""
+seed gives the same path."""
 
 
 class SampledPaths:
@@ -54,7 +54,7 @@ class SampledPaths:
         ou.noOutputHandler()
         ou.RNG.setSeed(self.seed + 1)
         grid = self.grid
-        # where the ends are nearer to solids than the clearance, the way may be as near
+        # where the ends are nearer to solids than the clearance, the path may be as near
         ends = grid.field.distance(np.array([start, self.target]))
         room = max(0.0, min(grid.clearance, float(ends.min()) - 1e-3 * grid.cell))
         field = grid.field.grown(room).arrays
@@ -107,7 +107,7 @@ class SampledPaths:
 
 
 def _through_roadmap(ob: Any, info: Any, planner: Any, ends: Floats) -> Floats | None:
-    """The shortest way over a PRM*'s milestones between two places, joined to the nearest."""
+    """The shortest path over a PRM*'s milestones between two places, joined to the nearest."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import dijkstra
 

@@ -1,6 +1,6 @@
 """Shortest paths to one place from everywhere: a tree on a grid, and its paths pulled taut.
 
-The tree serves every pivot of a recovery at once. A way along the grid is up to 8 % longer than it
+The tree serves every pivot of a recovery at once. A path along the grid is up to 8 % longer than it
 need be (26 directions); pulled taut as a tether it is the shortest of its class, at the clearance.
 """
 
@@ -26,7 +26,7 @@ MOST_CELLS = 20_000_000
 
 
 ROUNDS = 60
-"""A way need not be taut to the last millimetre."""
+"""A path need not be taut to the last millimetre."""
 
 
 class Grid:
@@ -189,7 +189,7 @@ def grow(free, root, wanted, toward):
 
 
 def taut(field: DistanceField, path: Floats, clearance: float, delta: float) -> Floats:
-    """A way (k, 3) pulled taut in its class, no nearer to solids than the clearance, or than it is
+    """A path (k, 3) pulled taut in its class, no nearer to solids than the clearance, or than it is
     at its ends; densely enough for straight lines between its points to keep to it."""
     ends = field.distance(path[[0, -1]])
     room = max(0.0, min(clearance, float(ends.min()) - 1e-3 * delta))
@@ -207,8 +207,8 @@ def taut(field: DistanceField, path: Floats, clearance: float, delta: float) -> 
 
 @njit(cache=True)
 def shortcut(field, path, tolerance):
-    """A way without the points that can be left out: from each point straight to the last of those
-    that it sees without a break. The triangles that are swept are as wide as the way's points are
+    """A path without the points that can be left out: from each point straight to the last of those
+    that it sees without a break. The triangles that are swept are as wide as the path's points are
     apart, so nothing wider is passed over."""
     out = np.empty_like(path)
     out[0] = path[0]

@@ -1,4 +1,4 @@
-"""What all planners share: waypoints, where they are in them, and a way to follow."""
+"""What all planners share: waypoints, where they are in them, and a path to follow."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ NORMAL, RECOVERY, HOLD, DONE = "normal", "recovery", "hold", "done"
 class Command:
     """Where to go now.
 
-    way : (k, 3) points to pass in this order, the first one next. mode : normal, recovery, hold or
+    path : (k, 3) points to pass in this order, the first one next. mode : normal, recovery, hold or
     done. replan_s : seconds of CPU that planning took in this step.
     """
 
@@ -128,7 +128,7 @@ class Planner:
         return False if len(self.path) else self.go_on(robot)
 
     def go_on(self, robot: Floats) -> bool:
-        """Straight to the waypoint, or the shortest way round what is between; whether that had to
+        """Straight to the waypoint, or the shortest path round what is between; whether that had to
         be sought."""
         straight = np.array([robot, self.target])
         if self.is_free(straight):
@@ -136,7 +136,7 @@ class Planner:
             return False
         path = self.paths(robot[None]).path(0)
         if path is None:
-            self.give_up("no free way to it")
+            self.give_up("no free path to it")
         else:
             self.path = self.refined(self.pulled(path))[1:]
         return True
@@ -149,7 +149,7 @@ class Planner:
         return SampledPaths(self.options.paths, self.grid, self.target, points, seed)
 
     def refined(self, path: Floats) -> Floats:
-        """A way made safer and smoother, as the options have it."""
+        """A path made safer and smoother, as the options have it."""
         name = self.options.refine or self.refine
         if name == "none":
             return path
@@ -158,17 +158,17 @@ class Planner:
         return refined(name, self.scene, even, self.mission.clearance, rng)
 
     def pulled(self, path: Floats) -> Floats:
-        """A way pulled taut in its class, at the clearance."""
+        """A path pulled taut in its class, at the clearance."""
         return taut(self.scene, path, self.mission.clearance, self.mission.delta)
 
     def is_free(self, path: Floats) -> bool:
-        """Whether a straight way keeps the clearance, or what its ends have of it."""
+        """Whether a straight path keeps the clearance, or what its ends have of it."""
         ends = float(self.scene.distance(path).min())
         room = min(self.mission.clearance, ends) - 1e-3
         return self.scene.grown(max(0.0, room)).line_of_sight(path[0], path[1], depth=1e-3)
 
     def _advance(self, robot: Floats) -> None:
-        """Past the waypoint, when it is reached at the end of the way."""
+        """Past the waypoint, when it is reached at the end of the path."""
         reach = self.mission.reach
         if self.done:
             return
@@ -181,7 +181,7 @@ class Planner:
         self.path, self.mode, self._held = np.zeros((0, 3)), NORMAL, 0
 
     def passed(self, count: int) -> None:
-        """The robot has passed so many points of the way; the last one stays the target."""
+        """The robot has passed so many points of the path; the last one stays the target."""
         self.path = self.path[min(count, max(0, len(self.path) - 1)) :]
 
     def give_up(self, reason: str) -> None:

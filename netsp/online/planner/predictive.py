@@ -1,8 +1,8 @@
-"""`predictive`: simulates the tether along the coming way before the robot moves.
+"""`predictive`: simulates the tether along the coming path before the robot moves.
 
-So the limit is never exceeded on the way that was planned. A waypoint is given up only when no way
+So the limit is never exceeded on the path that was planned. A waypoint is given up only when no way
 to it is found on which the tether fits; since going all the way back along the tether and then the
-shortest way is among those that are tried, that does not happen to a waypoint whose own shortest
+shortest path is among those that are tried, that does not happen to a waypoint whose own shortest
 tether fits (but for the clearance that the robot keeps, and the margin).
 """
 
@@ -58,7 +58,7 @@ class PredictivePlanner(Planner):
         if path is None:
             own = self._own_tether(target)
             self.give_up(
-                "no free way to it" if own is None else
+                "no free path to it" if own is None else
                 f"out of reach: its shortest tether is {own:.3g} of "
                 f"{self.mission.tether_length:g}"
             )  # fmt: skip
@@ -80,7 +80,7 @@ class PredictivePlanner(Planner):
         return True
 
     def _near_enough(self, robot: Floats, target: Floats) -> Floats:
-        """Where on the straight way the waypoint counts as visited: the tether may fit there only.
+        """Where on the straight path the waypoint counts as visited: the tether may fit there only.
         A fifth of the reach is left for a vehicle that does not stop on the spot."""
         path = target - robot
         far = float(np.linalg.norm(path))
@@ -96,7 +96,7 @@ class PredictivePlanner(Planner):
         self._shortest_feasible(robot, tether, self.mission.tether_length)
 
     def _fits(self, tether: Tether, path: Floats, limit: float) -> bool:
-        """Whether the tether stays within the limit all along a way.
+        """Whether the tether stays within the limit all along a path.
 
         A taut tether gets longer by at most the way its end goes. So between points h apart, with
         lengths a and b, it is at most (a + b + h) / 2 long, and only where that is too much need
@@ -122,12 +122,12 @@ class PredictivePlanner(Planner):
         return True
 
     def _shortest_feasible(self, robot: Floats, tether: Tether, limit: float) -> Floats | None:
-        """The shortest way on which the tether fits: on from the robot, or back along the tether to
-        a pivot and on from there. One tree serves all pivots.
+        """The shortest path on which the tether fits: on from the robot, or back along the tether
+        to a pivot and on from there. One tree serves all pivots.
 
         What a pivot decides is the class of the tether at the target, and with it its length there.
         Pivots in a row that lead to one class are taken together; classes that are too long need no
-        more. For the others the way is pulled taut as a whole, the part back along the tether too:
+        more. For the others the path is pulled taut as a whole, the part back along the tether too:
         there is none shorter in its class. Where the tether is too long on that way, as much of the
         part back along the tether as need be is left as it is.
         """

@@ -7,7 +7,7 @@ Where the paper would not run as it stands:
   followed and ended at.
 - Its trigger is L > L_max, so the limit is exceeded before anything happens. Kept: this is the
   paper's planner.
-- Algorithm 3 looks at the tether at the end of a recovery path, not at its longest on the way, and
+- Algorithm 3 looks at the tether at the end of a recovery path, not at its longest on the path, and
   takes the first pivot that will do, not the cheapest. Kept.
 - After a recovery path that was the fallback (the limit as a soft one) the tether is still too
   long, and the trigger would fire at every step; it fires again for the next waypoint.
@@ -94,7 +94,7 @@ class ReactPlanner(Planner):
         return self.refined(self.pulled(onward))[1:]
 
     def _augmented(self, back: Floats, tree: Paths, n: int) -> float:
-        """Length of the tether after its part from the anchor to pivot n and the way on from
+        """Length of the tether after its part from the anchor to pivot n and the path on from
         there."""
         onward = tree.path(n)
         if onward is None:

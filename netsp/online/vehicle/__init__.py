@@ -1,4 +1,4 @@
-"""Vehicles by name: what carries out a planner's way in a simulation."""
+"""Vehicles by name: what carries out a planner's path in a simulation."""
 
 from __future__ import annotations
 

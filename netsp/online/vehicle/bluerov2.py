@@ -1,4 +1,4 @@
-"""A BlueROV2 that follows a way by model-predictive control."""
+"""A BlueROV2 that follows a path by model-predictive control."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ TURN = math.radians(60.0)
 
 
 class Vehicle(Protocol):
-    """A robot that can be told a way.
+    """A robot that can be told a path.
 
     position : (3,) m. yaw : rad, in which horizontal direction it looks. control_s : seconds of
     computing that each control step took.
@@ -33,11 +33,11 @@ class Vehicle(Protocol):
     def go(
         self, path: Floats, seconds: float, yaw: float, water: Floats, fresh: bool
     ) -> tuple[list[Floats], int]:
-        """Follow a way (k, 3) for some seconds, turning to `yaw`, in moving water (3,) m/s.
+        """Follow a path (k, 3) for some seconds, turning to `yaw`, in moving water (3,) m/s.
 
-        fresh : the way does not continue the one before. Returns the points that the vehicle passed
-        on straight lines, the last one its new position, and how many points of the way are behind
-        it.
+        fresh : the path does not continue the one before. Returns the points that the vehicle
+        passed on straight lines, the last one its new position, and how many points of the path are
+        behind it.
         """
 
     def stop_at(self, place: Floats) -> None:
@@ -45,7 +45,7 @@ class Vehicle(Protocol):
 
 
 class KinematicVehicle:
-    """Goes along the way at its speed, whatever the water does."""
+    """Goes along the path at its speed, whatever the water does."""
 
     def __init__(self, place: Floats, speed: float) -> None:
         self.position: Floats = np.array(place, dtype=float)
@@ -74,8 +74,8 @@ def turned(angle: float) -> float:
 
 
 def advance(robot: Floats, path: Floats, step: float) -> tuple[list[Floats], int]:
-    """The corners that a robot passes on its next `step` metres of a way and where it ends, and how
-    many points of the way it has passed."""
+    """The corners that a robot passes on its next `step` metres of a path, where it ends, and how
+    many points of the path it has passed."""
     stops: list[Floats] = []
     here, left = robot, step
     for passed, point in enumerate(path):
