@@ -101,7 +101,7 @@ def heuristic(worlds: int) -> None:
     """`lns` after a stated time over the best known: the proven optimum, or the best of `auto` in
     150 s and of `lns` itself."""
     head("goals", "tether", "worlds", "lns s", "mean % over best known", "worst %",
-         "best known is proven")  # fmt: skip
+         "best known is proven", name="lns-over-best")  # fmt: skip
     for goals, tether, limit in ((20, 350, 1.0), (60, 300, 10.0), (200, 300, 60.0)):
         over, proven = [], 0
         worlds = min(worlds, 5) if goals == 200 else worlds
@@ -128,7 +128,7 @@ def peers(worlds: int, limit: float, plot: str | None) -> None:
     """The same travel graphs handed to others; seconds beside ours. Best known is the least of all
     lengths found."""
     head("goals", "tether", "solver", "proven", "median s", "mean gap %", "mean % over best known",
-         "no tour")  # fmt: skip
+         "no tour", name="peers")  # fmt: skip
     trials: dict[str, list[dict]] = {name: [] for name in EXACT}
     for goals, tether in ((10, 300), (20, 300), (20, 350), (40, 300)):
         graphs = [travel_graph(world(s, goals, tether, many=False)) for s in range(worlds)]

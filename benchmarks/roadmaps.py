@@ -1,7 +1,7 @@
 """Times both roadmaps and draws the convergence of PRM* towards the exact optimum.
 
 python benchmarks/roadmaps.py                 the tables
-python benchmarks/roadmaps.py --convergence   also docs/prm-convergence.png and its table
+python benchmarks/roadmaps.py --convergence   docs/prm-convergence.png and its table
 """
 
 from __future__ import annotations
@@ -126,7 +126,8 @@ def convergence(worlds: int = 3, seeds: int = 3) -> None:
                         continue
                     into[n].append((found.length or 0.0) / exact)
     print()
-    head("samples", "median ratio", "min", "max", "pulled taut: median", "max", "no tour")
+    head("samples", "median ratio", "min", "max", "pulled taut: median", "max", "no tour",
+         name="prm-convergence")  # fmt: skip
     for n in counts:
         r, s = ratios[n], shortcut[n]
         row(
@@ -158,14 +159,15 @@ def main() -> None:
     parser.add_argument("--convergence", action="store_true")
     args = parser.parse_args()
     heading("Roadmaps")
-    head("what", "median s", "min", "max", "runs", "note")
+    if args.convergence:
+        convergence()
+        return
+    head("what", "median s", "min", "max", "runs", "note", name="roadmap-speed")
     taut(350.0)
     taut(500.0)
     many()
     prm()
     first_run()
-    if args.convergence:
-        convergence()
 
 
 if __name__ == "__main__":

@@ -23,7 +23,7 @@ if KEEP:
 _kept: dict[str, Any] = {}
 
 
-def _source() -> dict[str, str]:
+def source() -> dict[str, str]:
     """Date, commit and machine."""
     commit = subprocess.run(
         ["git", "rev-parse", "--short", "HEAD"], cwd=ROOT, capture_output=True, text=True
@@ -38,18 +38,19 @@ def _source() -> dict[str, str]:
 
 def heading(title: str) -> None:
     """Title, date, commit and machine, as markdown."""
-    s = _source()
+    s = source()
     print(f"## {title}\n")
     print(f"{s['date']}, commit {s['commit']}, {s['machine']}\n")
 
 
-def head(*columns: str, name: str | None = None) -> None:
-    """First two lines of a markdown table. name : under which its rows are kept."""
+def head(*columns: str, name: str | None = None, **origin: str) -> None:
+    """First two lines of a markdown table. name : under which its rows are kept. origin : date,
+    commit or machine of rows that were measured before."""
     print("| " + " | ".join(columns) + " |")
     print("|" + "---|" * len(columns), flush=True)
     _kept.clear()
     if name is not None and KEEP:
-        _kept.update({"name": name, "columns": list(columns), "rows": [], **_source()})
+        _kept.update({"name": name, "columns": list(columns), "rows": [], **source(), **origin})
 
 
 def row(*cells: object) -> None:

@@ -123,7 +123,8 @@ def closed_cases() -> list[tuple[str, dict, np.ndarray, float]]:
 def closed_forms() -> None:
     """Both models against them."""
     print("### Closed forms (delta 0.1; steps of 3 cm)\n")
-    head("what", "model", "nodes", "error %", "back m", "median us", "worst us")
+    head("what", "model", "nodes", "error %", "back m", "median us", "worst us",
+         name="tether-closed")  # fmt: skip
     for name, solid, path, truth in closed_cases():
         for label, model in models(Scene(solids=[solid]).field(), 0.1):
             tether, _, times, back = driven(model, path)
@@ -169,7 +170,7 @@ def prisms(worlds: int) -> None:
     """The offline geometry as truth: length and word at every 20th of 400 updates."""
     print(f"### Vertical prisms, {worlds} worlds a family, 400 updates of up to 9 (delta 2)\n")
     head("worlds", "model", "worst error %", "mean |error| %", "wrong classes", "worst back",
-         "median us", "worst us")  # fmt: skip
+         "median us", "worst us", name="tether-prisms")  # fmt: skip
     for family in ("icra2017", "harbour"):
         found: dict[str, list[list[float]]] = {}
         for seed in range(worlds):
@@ -231,7 +232,8 @@ def tour(field: DistanceField, file: str, scale: float) -> None:
     """A tether dragged along the waypoints of a file (CSV, x,y,z first), at two resolutions."""
     points = np.loadtxt(file, delimiter=",", skiprows=1)[:, :3] * scale
     way = dense(points)
-    head("delta", "final m", "longest m", "back m", "median us", "99 % us", "differs by > 1 %")
+    head("delta", "final m", "longest m", "back m", "median us", "99 % us", "differs by > 1 %",
+         name="tether-tour")  # fmt: skip
     before = None
     for delta in (0.1, 0.05, 0.025):
         tether, lengths, times, back = driven(GeodesicTether(field, delta), way)
@@ -249,7 +251,8 @@ def tour(field: DistanceField, file: str, scale: float) -> None:
 def drives(count: int) -> None:
     """Poles of radius delta, steps of up to 10 delta, 20 steps out and back."""
     print("### Thin poles: radius 0.1, delta 0.1, steps of 0.2 to 1 m\n")
-    head("drives", "updates", "tunnelled", "worst difference on the way back", "us per update")
+    head("drives", "updates", "tunnelled", "worst difference on the way back", "us per update",
+         name="tether-drives")  # fmt: skip
     tunnelled, worst, spent = 0, 0.0, 0.0
     field, model = None, None
     for seed in range(count):
@@ -289,13 +292,13 @@ def main() -> None:
     prisms(args.worlds)
     print("### Finer and finer (steps of 3 cm; the jacket 10 cm)\n")
     head("scene", "model", "delta", "nodes", "length m", "back m", "median us", "99 % us",
-         "worst us")  # fmt: skip
+         "worst us", name="tether-finer")  # fmt: skip
     finer("pipes", Scene.load(SCENES / "pipes.json"), round_the_pipes, [0.1, 0.05, 0.025])
     finer("jacket", Scene.load(SCENES / "oc4-jacket.json"), lattice, [0.4, 0.2, 0.05])
     print()
     if args.cloud:
         print("### A cloud of points\n")
-        head("voxel", "grid", "build s", "notes")
+        head("voxel", "grid", "build s", "notes", name="tether-cloud")
         for voxel in (0.1, 0.05):
             begin = time.perf_counter()
             grid = of_cloud_file(args.cloud, scale=args.scale, voxel=voxel)

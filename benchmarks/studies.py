@@ -1,0 +1,179 @@
+"""The tables of docs/reproduction.md from the rows of the papers' studies.
+
+    python benchmarks/studies.py [--keep]
+    python benchmarks/studies.py --take STUDY ROWS     ROWS (JSONL) become studies/results/STUDY
+
+`netsp compare studies/STUDY.toml -o ROWS` makes the rows. They are kept gzipped, their histories
+thinned, and `commits.json` says of which commit they are.
+"""
+
+from __future__ import annotations
+
+import gzip
+import json
+import statistics
+import sys
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from table import ROOT, head, row, source
+
+KEPT = ROOT / "studies" / "results"
+POINTS = 12
+"""Of a history, first and last among them."""
+
+Row = dict[str, Any]
+
+TABLE_ONE = (
+    ("0.16", 10), ("0.66", 10), ("2.43", 10), ("8.47", 10),
+    ("0.65", 10), ("12.73", 10), ("47.86", 7), ("74.73", 8),
+    ("8.07", 8), ("4.69", 2), ("186.48", 3), ("115.28", 3),
+    ("16.20", 9), ("40.08", 2), ("0.80", 1), ("65.57", 1),
+)  # fmt: skip
+"""McCammon & Hollinger 2017, Table I, by goals, then tether: median seconds, worlds of ten proven."""
+
+FIG_FIVE = {
+    "mip": "0, up to 12,000 s",
+    "reduced-mip (paper)": "within 5 % on average",
+    "anneal": "worse than MIP, and worse than greedy in the largest worlds",
+    "greedy": "worse than the MIPs",
+}
+"""What the paper says of its Fig. 5."""
+
+
+def take(study: str, rows: Path) -> None:
+    """Keep the rows of a run of a study."""
+    with gzip.GzipFile(KEPT / f"{study}.jsonl.gz", "wb", mtime=0) as out:
+        for line in rows.read_text(encoding="utf-8").splitlines():
+            trial = json.loads(line)
+            history = trial.get("history") or []
+            if len(history) > POINTS:
+                chosen = np.unique(np.linspace(0, len(history) - 1, POINTS).astype(int))
+                trial["history"] = [history[k] for k in chosen]
+            out.write(json.dumps(trial, separators=(",", ":")).encode() + b"\n")
+    commits = KEPT / "commits.json"
+    known = json.loads(commits.read_text(encoding="utf-8"))
+    known[study] = source()["commit"]
+    commits.write_text(json.dumps(known, indent=1, sort_keys=True) + "\n", encoding="utf-8")
+
+
+def load(study: str) -> tuple[list[Row], dict[str, str]]:
+    """Kept rows, and where they come from."""
+    with gzip.open(KEPT / f"{study}.jsonl.gz", "rt", encoding="utf-8") as file:
+        rows = [json.loads(line) for line in file]
+    last = max(rows, key=lambda r: r["finished"])
+    commit = json.loads((KEPT / "commits.json").read_text(encoding="utf-8"))[study]
+    python = next(r["versions"]["python"] for r in rows if "versions" in r)
+    machine = f"{last['machine'].split(', ')[-1]}, Python {python}"
+    return rows, {"date": last["finished"][:10], "commit": commit, "machine": machine}
+
+
+def chosen(
+    rows: Iterable[Row], solver: str, roadmap: str | None = None, **world: float
+) -> list[Row]:
+    """The rows of a solver, a roadmap and a cell."""
+    return [
+        r for r in rows
+        if r["solver"]["label"] == solver and roadmap in (None, r["roadmap"]["label"])
+        and all(r["world"][k] == v for k, v in world.items())
+    ]  # fmt: skip
+
+
+def over(rows: list[Row], solver: str, **world: float) -> list[float]:
+    """Per cent above the proven optimum of the same world, where there is a tour."""
+    best = {
+        r["problem_sha256"]: r["length"] for r in chosen(rows, "auto", **world) if "length" in r
+    }
+    found = [r for r in chosen(rows, solver, **world) if r.get("length")]
+    return [100.0 * (r["length"] / best[r["problem_sha256"]] - 1.0) for r in found]
+
+
+def middle(values: list[float]) -> str:
+    """Median, and mean in brackets; nothing is printed as minus zero."""
+    return f"{statistics.median(values) + 1e-9:.1f} ({np.mean(values) + 1e-9:.1f})"
+
+
+def table_one() -> None:
+    """Seconds to the proven optimum."""
+    rows, origin = load("icra2017-table1")
+    kinds = [(s, r) for r in ("prm", "taut") for s in ("auto", "mip, cbc")]
+    names = {"auto": "`auto`", "mip, cbc": "`mip` with CBC", "prm": "PRM*", "taut": "exact"}
+    columns = [f"{names[s]}, {names[r]}" for s, r in kinds]
+    head("goals", "tether", "paper", *columns, name="icra2017-table1", **origin)
+    paper = iter(TABLE_ONE)
+    for goals in (5, 10, 15, 20):
+        for tether in (200, 250, 300, 350):
+            seconds, proven = next(paper)
+            cells = []
+            for solver, roadmap in kinds:
+                trials = chosen(rows, solver, roadmap, goals=goals, tether_length=tether)
+                done = [r["total_s"] for r in trials if r["status"] == "optimal"]
+                cells.append(f"{statistics.median(done):.2f} ({len(done)})")
+            row(goals, tether, f"{seconds} ({proven})", *cells)
+
+
+def fig_five() -> None:
+    """Per cent over the optimum, and seconds."""
+    rows, origin = load("icra2017-fig5")
+    tethers = (200, 250, 300)
+    head("method", *(f"tether {t}" for t in tethers), "the paper says",
+         name="icra2017-fig5", **origin)  # fmt: skip
+    for solver in ("mip", "reduced-mip", "reduced-mip (paper)", "anneal", "lns", "greedy"):
+        cells = [middle(over(rows, solver, goals=20, tether_length=t)) for t in tethers]
+        row(solver, *cells, FIG_FIVE.get(solver, ""))
+    for solver in ("mip", "greedy"):
+        cells = []
+        for t in tethers:
+            done = [r for r in chosen(rows, solver, goals=20, tether_length=t) if r.get("length")]
+            cells.append(f"{statistics.median(r['matrix_s'] + r['solve_s'] for r in done):.2f}")
+        row(f"seconds of {solver}, with all legs", *cells,
+            "2 min limit, up to 12,000 s" if solver == "mip" else "")  # fmt: skip
+
+
+def fig_three() -> None:
+    """Annealing for 200,000 iterations."""
+    rows, origin = load("rss2016-fig3")
+    head("goals", "solver", "runs", "% over the optimum: median (mean)", "entangled",
+         name="rss2016-fig3", **origin)  # fmt: skip
+    for goals in (5, 10):
+        for solver in ("anneal-2016", "anneal"):
+            trials = chosen(rows, solver, goals=goals)
+            row(goals, solver, len(trials), middle(over(rows, solver, goals=goals)),
+                sum(bool(r.get("entangled")) for r in trials))  # fmt: skip
+
+
+def fig_four() -> None:
+    """Against the blind and the backtracking baseline."""
+    rows, origin = load("rss2016-fig4")
+    head("goals", "`anneal-2016` % over the optimum, mean", "without a tour", "`greedy-tsp`",
+         "entangled by it, mean", "its tours that entangle", "`greedy-2016`",
+         name="rss2016-fig4", **origin)  # fmt: skip
+    for goals in range(5, 11):
+
+        def mean(solver: str, goals: int = goals) -> str:
+            return f"{np.mean(over(rows, solver, goals=goals)):.1f}"
+
+        blind = [r["entangled"] for r in chosen(rows, "greedy-tsp", goals=goals)]
+        annealed = chosen(rows, "anneal-2016", goals=goals)
+        row(goals, mean("anneal-2016"), sum(not r.get("length") for r in annealed),
+            mean("greedy-tsp"), f"{np.mean(blind):.1f}",
+            f"{sum(b > 0 for b in blind)} of {len(blind)}", mean("greedy-2016"))  # fmt: skip
+
+
+TABLES: tuple[Callable[[], None], ...] = (table_one, fig_five, fig_three, fig_four)
+
+
+def main() -> None:
+    """Take rows, or print all tables."""
+    if sys.argv[1:2] == ["--take"]:
+        take(sys.argv[2], Path(sys.argv[3]))
+        return
+    for table in TABLES:
+        table()
+        print()
+
+
+if __name__ == "__main__":
+    main()
