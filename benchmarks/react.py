@@ -72,14 +72,17 @@ def kinematic(mission: Mission, scene: Scene, field, variants) -> None:
         )  # fmt: skip
 
 
+def in_current(mission: Mission, scene: Scene, field, planner: str, seeds: int):
+    """Summaries of the BlueROV2 in a current with gusts, one a seed."""
+    stormy = mission.model_copy(update={"current": CURRENT, "gusts": GUSTS})
+    return [fly(stormy, scene, field, planner, "bluerov2", seed) for seed in range(seeds)]
+
+
 def dynamic(mission: Mission, scene: Scene, field, seeds: int) -> None:
     """One row a planner, over some seeds of gusts: median, worst."""
-    stormy = mission.model_copy(update={"current": CURRENT, "gusts": GUSTS})
     for planner in ("none", "react", "predictive"):
-        rows = [
-            fly(stormy, scene, field, planner, "bluerov2", seed)
-            for seed in range(seeds if planner == "predictive" else min(seeds, 3))
-        ]
+        count = seeds if planner == "predictive" else min(seeds, 3)
+        rows = in_current(mission, scene, field, planner, count)
 
         def of(name: str, rows=rows):
             return np.array([s[name] for s in rows])
@@ -97,8 +100,8 @@ def dynamic(mission: Mission, scene: Scene, field, seeds: int) -> None:
         )  # fmt: skip
 
 
-def external(cloud: str, tour: str, scale: float) -> None:
-    """A tour of others about a cloud of points, beside what the paper measured on its own."""
+def external_mission(cloud: str, tour: str, scale: float) -> tuple[Mission, Scene]:
+    """A tour of others about a cloud of points."""
     points = np.loadtxt(tour, delimiter=",", skiprows=1)[:, :3] * scale
     scene = Scene(name="cloud", cloud={"file": cloud, "scale": scale, "voxel": 0.05})
     mission = Mission(
@@ -106,6 +109,11 @@ def external(cloud: str, tour: str, scale: float) -> None:
         start=tuple(points[0] + [0.0, 0.0, 1e-3]), waypoints=[tuple(p) for p in points],
         tether_length=10.0, clearance=0.2, speed=0.313, camera=Camera(range=2.0),
     )  # fmt: skip
+    return mission, scene
+
+
+def external(mission: Mission, scene: Scene) -> None:
+    """Beside what the paper measured on its own."""
     head(*COLUMNS, name="react-external")
     for cells in PAPER:
         row("its own, 10 m", *cells)
@@ -142,7 +150,7 @@ def main() -> None:
             dynamic(mission, scene, field, args.seeds)
         print()
     if args.cloud:
-        external(args.cloud, args.tour, args.scale)
+        external(*external_mission(args.cloud, args.tour, args.scale))
 
 
 if __name__ == "__main__":

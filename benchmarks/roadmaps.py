@@ -101,35 +101,48 @@ def first_run() -> None:
         times_row("taut, first run ever, compilation included", [time.perf_counter() - begin])
 
 
-def convergence(worlds: int = 3, seeds: int = 3) -> None:
-    """PRM* optimum over exact optimum against the number of samples."""
-    from matplotlib.figure import Figure
+Ratios = dict[int, list[float]]
 
-    from netsp import InfeasibleError, solve
+
+def ratios(counts: list[int], worlds: int, seeds: int) -> tuple[Ratios, Ratios, dict[int, int]]:
+    """PRM* optimum over the exact one by the number of samples: along the roadmap, with the legs
+    pulled taut, and how often there was no tour."""
+    from netsp import solve
+    from netsp.errors import LimitReachedError
     from tests.worlds import random_world
 
-    counts = [250, 500, 1000, 2000, 4000, 8000, 16000]
-    ratios: dict[int, list[float]] = {n: [] for n in counts}
-    shortcut: dict[int, list[float]] = {n: [] for n in counts}
+    along: Ratios = {n: [] for n in counts}
+    shortcut: Ratios = {n: [] for n in counts}
     lost = dict.fromkeys(counts, 0)
     for w in range(worlds):
         problem = random_world(w, goals=10, tether=300.0)
         exact = solve(problem).length or 0.0
         for n in counts:
             for seed in range(seeds):
-                for pulled, into in ((False, ratios), (True, shortcut)):
+                for pulled, into in ((False, along), (True, shortcut)):
                     options = {"samples": n, "shortcut": pulled}
                     try:
                         found = solve(problem, roadmap="prm", roadmap_options=options, seed=seed)
-                    except InfeasibleError:
+                    except LimitReachedError:
                         lost[n] += 1
                         continue
                     into[n].append((found.length or 0.0) / exact)
+    return along, shortcut, lost
+
+
+def convergence(worlds: int = 3, seeds: int = 3) -> None:
+    """As a table and a picture."""
+    from matplotlib.figure import Figure
+
+    from netsp.pictures.style import EDGE, PATH, TETHER
+
+    counts = [250, 500, 1000, 2000, 4000, 8000, 16000]
+    along, shortcut, lost = ratios(counts, worlds, seeds)
     print()
     head("samples", "median ratio", "min", "max", "pulled taut: median", "max", "no tour",
          name="prm-convergence")  # fmt: skip
     for n in counts:
-        r, s = ratios[n], shortcut[n]
+        r, s = along[n], shortcut[n]
         row(
             n, f"{np.median(r):.5f}", f"{min(r):.5f}", f"{max(r):.5f}", f"{np.median(s):.6f}",
             f"{max(s):.5f}", lost[n],
@@ -137,12 +150,12 @@ def convergence(worlds: int = 3, seeds: int = 3) -> None:
     figure = Figure(figsize=(6.5, 4.0), layout="constrained")
     ax = figure.subplots()
     for n in counts:
-        ax.plot([n] * len(ratios[n]), 100 * (np.array(ratios[n]) - 1), ".", color="#0b69a3", ms=5)
-    medians = [100 * (np.median(ratios[n]) - 1) for n in counts]
+        ax.plot([n] * len(along[n]), 100 * (np.array(along[n]) - 1), ".", color=PATH, ms=5)
+    medians = [100 * (np.median(along[n]) - 1) for n in counts]
     pulled_medians = [100 * (np.median(shortcut[n]) - 1) for n in counts]
-    ax.plot(counts, medians, color="#0b69a3", label="along the roadmap (median)")
-    ax.plot(counts, pulled_medians, "--", color="#e8590c", label="legs pulled taut (median)")
-    ax.axhline(0.0, color="#52606d", lw=0.8)
+    ax.plot(counts, medians, color=PATH, label="along the roadmap (median)")
+    ax.plot(counts, pulled_medians, "--", color=TETHER, label="legs pulled taut (median)")
+    ax.axhline(0.0, color=EDGE, lw=0.8)
     ax.set_xscale("log")
     ax.set_xticks(counts, [str(n) for n in counts])
     ax.minorticks_off()

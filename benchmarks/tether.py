@@ -248,11 +248,9 @@ def tour(field: DistanceField, file: str, scale: float) -> None:
     print()
 
 
-def drives(count: int) -> None:
-    """Poles of radius delta, steps of up to 10 delta, 20 steps out and back."""
-    print("### Thin poles: radius 0.1, delta 0.1, steps of 0.2 to 1 m\n")
-    head("drives", "updates", "tunnelled", "worst difference on the way back", "us per update",
-         name="tether-drives")  # fmt: skip
+def driven_past_poles(count: int) -> tuple[int, float, float]:
+    """Poles of radius delta, steps of up to 10 delta, 20 steps out and back: how many drives went
+    through a pole, the worst difference on the way back (of the length, or of 10 m), seconds."""
     tunnelled, worst, spent = 0, 0.0, 0.0
     field, model = None, None
     for seed in range(count):
@@ -271,6 +269,15 @@ def drives(count: int) -> None:
         walked = np.vstack([start, path])[:, :2]
         tunnelled += signature(tether.nodes[:, :2], poles) != signature(walked, poles)
         worst = max(worst, float((np.abs(back[::-1] - out) / np.maximum(out, 10.0)).max()))
+    return tunnelled, worst, spent
+
+
+def drives(count: int) -> None:
+    """As a table."""
+    print("### Thin poles: radius 0.1, delta 0.1, steps of 0.2 to 1 m\n")
+    head("drives", "updates", "tunnelled", "worst difference on the way back", "us per update",
+         name="tether-drives")  # fmt: skip
+    tunnelled, worst, spent = driven_past_poles(count)
     row(count, 40 * count, tunnelled, f"{100 * worst:.3f} % (or of 10 m)",
         f"{1e6 * spent / (40 * count):.0f}")  # fmt: skip
     print()

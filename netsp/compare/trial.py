@@ -11,8 +11,15 @@ from typing import Any
 
 from netsp.compare.rows import SCHEMA, Row
 from netsp.compare.study import Trial
-from netsp.errors import InfeasibleError, InputError, NetspError
+from netsp.errors import (
+    InfeasibleError,
+    InputError,
+    LimitReachedError,
+    MemoryLimitError,
+    NetspError,
+)
 from netsp.problem import Goal, Problem
+from netsp.solution import Status
 from netsp.travel.result import Progress
 
 MOST_POINTS = 200
@@ -65,6 +72,10 @@ def run(trial: Trial) -> Row:
         )
     except InfeasibleError as error:
         row |= {"status": "infeasible", "message": str(error)}
+    except MemoryLimitError as error:
+        row["message"] = str(error)
+    except LimitReachedError as error:  # also: a sampled roadmap that does not reach a goal
+        row |= {"status": Status.NO_SOLUTION_FOUND.value, "message": str(error)}
     except NetspError as error:
         row["message"] = str(error)
     else:

@@ -1,0 +1,235 @@
+"""Claims about proofs, bounds, heuristics, roadmaps, the judge and limits."""
+
+from __future__ import annotations
+
+import functools
+import statistics
+import time
+from collections.abc import Callable, Iterator
+
+import numpy as np
+from table import ROOT
+
+from claims.claim import ALLOWANCE, Claim, published
+
+
+def proofs(
+    cells: list[tuple[int, float]], worlds: int, limit: float, *, many: bool = False
+) -> tuple[str, bool]:
+    """Worlds proven optimal and verified, of all."""
+    import frontier
+
+    proven = verified = count = 0
+    for goals, tether in cells:
+        for seed in range(worlds):
+            outcome = frontier.proof(frontier.world(seed, goals, tether, many=many), limit)
+            count += 1
+            proven += outcome.proven
+            verified += outcome.verified
+    return f"{proven} proven, {verified} verified of {count}", proven == verified == count
+
+
+def bounds() -> tuple[str, bool]:
+    """Runs stopped early, whose bound must not exceed the optimum."""
+    from netsp import solve_graph, travel_graph
+    from netsp.worlds import random_world
+
+    worst, runs = -np.inf, 0
+    for seed in range(10):
+        graph = travel_graph(random_world(seed, goals=12, tether_length=320.0))
+        best = solve_graph(graph, "mip").length or np.nan
+        for solver, limit in (("mip", 2), ("mip", 10), ("dp", 2), ("dp", 6), ("auto", 4)):
+            bound = solve_graph(graph, solver, iteration_limit=limit).lower_bound or 0.0
+            worst = max(worst, bound / best - 1.0)
+            runs += 1
+    return f"{worst:.1e} at most in {runs} runs", worst <= 1e-9
+
+
+def heuristic(name: str, most: float, **limits: float) -> Callable[[], tuple[str, bool]]:
+    """Mean per cent of a heuristic above the proven optimum, 20 goals, tether 350."""
+
+    def measure() -> tuple[str, bool]:
+        from solvers import over_optimum
+
+        over = over_optimum(name, range(6), **limits)
+        return f"{np.mean(over):.2f} %", float(np.mean(over)) <= most
+
+    return measure
+
+
+def judged() -> tuple[str, bool]:
+    """False tours accepted, and right ones refused, over hostile worlds."""
+    import judge
+
+    right, false, refused, accepted = judge.count(100)
+    held = not refused and not accepted
+    return f"{len(accepted)} of {false} accepted, {len(refused)} of {right} refused", held
+
+
+def repeatable() -> tuple[str, bool]:
+    """Pairs of runs in new processes, with other hash seeds and numbers of threads, to the byte."""
+    import repeat
+
+    same, pairs = repeat.pairs(20)
+    return f"{same} of {pairs}", same == pairs
+
+
+def overrun() -> tuple[str, bool]:
+    """Seconds beyond a limit of one, over solvers, on two large problems."""
+    import limits
+
+    worst, where, silent = limits.worst(1.0)
+    return f"{worst:.2f} s ({where}); {silent} without a tour", worst <= 1.0
+
+
+def wharf() -> tuple[str, bool]:
+    """The README's problem: proven, of the stated length, with the stated longest tether."""
+    from netsp import Problem, Status, solve, verify
+
+    problem = Problem.load(ROOT / "problems" / "wharf.json")
+    solution = solve(problem)
+    longest = max(v.tether_length for v in solution.tour)
+    held = solution.status is Status.OPTIMAL and bool(verify(problem, solution))
+    held &= abs((solution.length or 0.0) - 51.964548) < 1e-5 and abs(longest - 19.1393) < 1e-4
+    return f"{solution.length:.6f}, longest tether {longest:.4f}, {solution.status.value}", held
+
+
+def deterministic() -> tuple[str, bool]:
+    """Heuristics that have no limit of time, over the same ten worlds, against the published table:
+    mean per cent over the optimum."""
+    from solvers import over_optimum
+
+    cases = {
+        "reduced-mip": ("reduced-mip", {}),
+        "reduced-mip, classes=1 polish=0 (the paper's)":
+            ("reduced-mip", {"params": {"classes": 1, "polish": 0}}),
+        "greedy": ("greedy", {}),
+        "greedy, retrace=tether": ("greedy", {"params": {"retrace": "tether"}}),
+        "greedy-2016": ("greedy-2016", {}),
+    }  # fmt: skip
+    table = {r["solver"]: float(r["mean %"]) for r in published("heuristics")}
+    off = {
+        name: float(np.mean(over_optimum(solver, range(10), **how))) - table[name]
+        for name, (solver, how) in cases.items()
+    }
+    name = max(off, key=lambda k: abs(off[k]))
+    return f"{off[name]:+.2f} points ({name})", abs(off[name]) <= 0.1
+
+
+def convergence() -> tuple[str, bool]:
+    """The optimum over PRM* against the exact one, by samples, as published."""
+    import roadmaps
+
+    table = {int(r["samples"]): r for r in published("prm-convergence")}
+    found, pulled, _ = roadmaps.ratios([1000, 4000], worlds=2, seeds=2)
+    held = all(max(found[n]) <= float(table[n]["max"]) * 1.005 for n in found)
+    held &= min(map(min, found.values())) >= 1.0 - 1e-9
+    held &= max(map(max, pulled.values())) <= 1.01
+    shown = ", ".join(f"{n}: {np.median(r):.4f}" for n, r in found.items())
+    return f"{shown}; pulled taut {max(map(max, pulled.values())):.4f}", held
+
+
+def studies_again() -> tuple[str, bool]:
+    """Trials of the papers' studies that depend on no clock, run again: the published rows."""
+    import studies
+
+    same, differs = studies.again(worlds=2)
+    return f"{same} of {same + len(differs)}" + (f": {differs[0]}" if differs else ""), not differs
+
+
+def gap_after(goals: int, tether: float, limit: float, most: float) -> tuple[str, bool]:
+    """Gap in per cent of one world, after a limit."""
+    import frontier
+
+    outcome = frontier.proof(frontier.world(0, goals, tether, many=False), limit)
+    return f"{outcome.gap:.2f} %", outcome.verified and outcome.gap <= most
+
+
+def raw_model() -> tuple[str, bool]:
+    """How many times faster a proof is than CBC on the raw model, which both are given ten seconds
+    a world for; where CBC has none it counts with its ten seconds."""
+    import frontier
+    import peers
+
+    from netsp import travel_graph
+
+    ratios = []
+    for seed in range(3):
+        graph = travel_graph(frontier.world(seed, 20, 300.0, many=False))
+        graph.costs  # noqa: B018
+        spent = []
+        for run in (peers.ours("auto"), peers.raw("cbc")):
+            begin = time.perf_counter()
+            run(graph, 10.0)
+            spent.append(time.perf_counter() - begin)
+        ratios.append(spent[1] / spent[0])
+    return f"{min(ratios):.0f} to {max(ratios):.0f} times", min(ratios) >= 5.0
+
+
+def seconds_of(goals: int, tether: float, worlds: int, published_s: float) -> Claim:
+    """CPU seconds from problem to proof: the median of some worlds."""
+
+    def measure() -> tuple[str, bool]:
+        import frontier
+
+        spent = []
+        for seed in range(worlds):
+            begin = time.process_time()
+            frontier.proof(frontier.world(seed, goals, tether, many=False), 120.0)
+            spent.append(time.process_time() - begin)
+        middle = statistics.median(spent)
+        return f"{middle:.2f} s CPU", middle <= ALLOWANCE * published_s
+
+    name = f"proof of {goals} goals, tether {tether:g}"
+    return Claim(name, f"{published_s:g} s CPU (x {ALLOWANCE:g})", measure, timed=True)
+
+
+def proposals() -> tuple[str, bool]:
+    """Proposals of annealing a second of CPU, over the published rate."""
+    from solvers import run, world
+
+    rate = float(published("proposals")[0]["median"].replace(",", ""))
+    problem, graph, _ = world(0, 20, 350.0)
+    run(problem, graph, "anneal", iteration_limit=100)
+    begin = time.process_time()
+    run(problem, graph, "anneal", iteration_limit=5_000_000)
+    ratio = 5e6 / (time.process_time() - begin) / rate
+    return f"{ratio:.2f} of the published", ratio >= 1.0 / ALLOWANCE
+
+
+def claims() -> Iterator[Claim]:
+    """All of these."""
+    cells = [(n, t) for n in (5, 10, 15, 20) for t in (200, 250, 300, 350)]
+    long = [(20, 500), (40, 300), (60, 300)]
+    yield seconds_of(20, 350.0, 5, 1.0)
+    yield seconds_of(100, 300.0, 3, 60.0)
+    yield Claim("proposals of anneal", "as published (/ 3)", proposals, timed=True)
+    yield Claim("beyond a time limit of 1 s, every solver", "1 s", overrun, timed=True)
+    yield Claim("the README's wharf", "51.964548, tether 19.1393, proven", wharf)
+    yield Claim(
+        "Table I: proven and verified", "80 of 80 worlds", functools.partial(proofs, cells, 5, 60.0)
+    )
+    yield Claim(
+        "frontier: 20/500, 40/300, 60/300", "9 of 9 worlds",
+        functools.partial(proofs, long, 3, 120.0),
+    )  # fmt: skip
+    yield Claim(
+        "frontier, 50 circles: 60/300", "2 of 2 worlds",
+        functools.partial(proofs, [(60, 300)], 2, 200.0, many=True),
+    )  # fmt: skip
+    yield Claim(
+        "largest: 200 goals, tether 300, after 60 s", "gap 1 %",
+        functools.partial(gap_after, 200, 300.0, 60.0, 1.0),
+    )  # fmt: skip
+    yield Claim("20/300 over CBC on the raw model", "5 times faster", raw_model)
+    yield Claim("bounds above the optimum", "none", bounds)
+    yield Claim("lns over the optimum, 1 s", "0.01 %", heuristic("lns", 0.01, time_limit=1.0))
+    yield Claim(
+        "anneal over the optimum, 20 M proposals", "3 %",
+        heuristic("anneal", 3.0, iteration_limit=20_000_000),
+    )  # fmt: skip
+    yield Claim("heuristics without a clock", "as published", deterministic)
+    yield Claim("PRM* over the exact optimum", "as published", convergence)
+    yield Claim("the papers' studies, trials without a clock", "as published", studies_again)
+    yield Claim("false tours accepted, right ones refused", "none", judged)
+    yield Claim("same seed, same bytes", "all pairs", repeatable)

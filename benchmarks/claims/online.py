@@ -1,0 +1,182 @@
+"""Claims about tethers, missions, orders and tours carried out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from table import ROOT
+
+from claims.claim import ABSENT, ALLOWANCE, DATA, Claim
+
+
+def closed_forms() -> tuple[str, bool]:
+    import tether
+
+    errors, backs = [], []
+    for _, solid, path, truth in tether.closed_cases():
+        from netsp.online import GeodesicTether, Scene
+
+        found, _, _, back = tether.driven(GeodesicTether(Scene(solids=[solid]).field(), 0.1), path)
+        errors.append(abs(found.length / truth - 1.0))
+        backs.append(back)
+    return (
+        f"{100 * max(errors):.4f} %, {max(backs):.4f} m left on the way back",
+        max(errors) <= 1e-4 and max(backs) <= 1e-3,
+    )
+
+
+def prisms() -> tuple[str, bool]:
+    import tether
+
+    worst, wrong, count, back = 0.0, 0, 0, 0.0
+    for family in ("icra2017", "harbour"):
+        for seed in range(3):
+            errors, bad, left, _ = tether.prism_world(family, seed)
+            worst, wrong = max(worst, float(np.abs(errors).max())), wrong + bad
+            count, back = count + len(errors), max(back, left)
+    return f"{worst:.4f} %, {wrong} of {count} wrong, {back:.4f} left", worst <= 0.01 and not wrong
+
+
+def mission(name: str, replan_s: float) -> Iterator[Claim]:
+    """Claims about one shipped mission, flown once."""
+    flown: list[dict[str, float]] = []
+
+    def fly() -> dict[str, float]:
+        import react
+
+        from netsp.online.mission import Mission
+
+        there = Mission.load(ROOT / "missions" / f"{name}.json")
+        scene = there.load_scene()
+        flown.append(react.fly(there, scene, scene.field(), "predictive", "kinematic"))
+        return flown[-1]
+
+    def safe() -> tuple[str, bool]:
+        s = fly()
+        shown = f"{s['exceedance_s']:.1f} s, {s['visited']} of {s['waypoints']}"
+        return shown, s["exceedance_s"] == 0.0 and s["visited"] == s["waypoints"]
+
+    def replan() -> tuple[str, bool]:
+        s = flown.pop() if flown else fly()
+        worst = s["replan_worst_s"]
+        return f"{1e3 * worst:.0f} ms CPU", worst <= ALLOWANCE * replan_s
+
+    yield Claim(f"{name}: over the limit; waypoints visited", "0.0 s; all", safe, timed=True)
+    yield Claim(
+        f"{name}: worst replan",
+        f"{1e3 * replan_s:.0f} ms CPU (x {ALLOWANCE:g})",
+        replan,
+        timed=True,
+    )
+
+
+def flights() -> tuple[str, bool]:
+    """Predicted over flown times of recorded flights of exported missions."""
+    import flown
+
+    if not (DATA / "ardusub").is_dir():
+        return ABSENT, True
+    ratios = flown.ratios(DATA / "ardusub")
+    return f"{min(ratios):.2f} to {max(ratios):.2f}", 0.9 <= min(ratios) <= max(ratios) <= 1.1
+
+
+def drives() -> tuple[str, bool]:
+    """Thin poles, long steps: how many drives go through a pole."""
+    import tether
+
+    tunnelled, worst, _ = tether.driven_past_poles(400)
+    return f"{tunnelled} of 400, {100 * worst:.3f} % on the way back", not tunnelled
+
+
+def update() -> tuple[str, bool]:
+    """Microseconds of CPU of an update of the tether: the median in its worst case of those with a
+    closed form."""
+    import tether
+
+    from netsp.online import GeodesicTether, Scene
+
+    medians = []
+    for _, solid, path, _ in tether.closed_cases():
+        model = GeodesicTether(Scene(solids=[solid]).field(), 0.1)
+        medians.append(float(np.median(tether.driven(model, path)[2])))
+    return f"{max(medians):.0f} us", max(medians) <= ALLOWANCE * 100.0
+
+
+def windy(names: tuple[str, ...] = ("basin", "pipes")) -> tuple[str, bool]:
+    """`predictive` with the BlueROV2 in a current with gusts."""
+    import react
+
+    from netsp.online.mission import Mission
+
+    over, visited, count = 0.0, 0, 0
+    for name in names:
+        mission = Mission.load(ROOT / "missions" / f"{name}.json")
+        scene = mission.load_scene()
+        for s in react.in_current(mission, scene, scene.field(), "predictive", 1):
+            over = max(over, s["exceedance_s"])
+            visited, count = visited + s["visited"], count + s["waypoints"]
+    return f"{over:.1f} s, {visited} of {count}", over == 0.0 and visited == count
+
+
+def external() -> tuple[str, bool]:
+    """The tour of others about a cloud of points."""
+    import react
+
+    folder = DATA / "fc_planner_pipe"
+    if not folder.is_dir():
+        return ABSENT, True
+    mission, scene = react.external_mission(
+        str(folder / "cloud.npz"), str(folder / "waypoints.csv"), 0.1
+    )
+    s = react.fly(mission, scene, scene.field(), "predictive", "kinematic")
+    shown = f"{s['exceedance_s']:.1f} s, {s['visited']} of {s['waypoints']}"
+    return shown, s["exceedance_s"] == 0.0 and s["visited"] == s["waypoints"]
+
+
+def ordered() -> tuple[str, bool]:
+    """Per cent of its time that our order saves on the basin mission, flown."""
+    import execute
+
+    found = execute.saved("basin")
+    given, ours = (r.summary["total_s"]["tether"] for r in (found.before, found.after))
+    saved = 100.0 * (1.0 - ours / given)
+    return f"{saved:.1f} %", saved >= 25.0 and found.after.summary["exceedance_s"] == 0.0
+
+
+def carried_out(kind: str, runs: int = 20) -> Claim:
+    """Tours carried out with a surprise of a kind, over worlds of all kinds."""
+
+    def measure() -> tuple[str, bool]:
+        import surprises
+
+        found: list[list[str]] = []
+        for seed in range(5 * runs // 4):
+            flown = surprises.run(seed, kind)
+            if flown is not None:
+                found.append(flown[1])
+            if len(found) == runs:
+                break
+        good = sum(not faults for faults in found)
+        first = next((f[0] for f in found if f), "")
+        return f"{good} of {len(found)} {first}".strip(), good == len(found) >= min(runs, 10)
+
+    return Claim(f"execute, surprise: {kind}", "all good", measure)
+
+
+def claims() -> Iterator[Claim]:
+    """All of these."""
+    import surprises
+
+    for name, worst in (("basin", 0.15), ("pipes", 0.3), ("jacket", 1.4)):
+        yield from mission(name, worst)
+    yield Claim("tether: one update", f"0.1 ms (x {ALLOWANCE:g})", update, timed=True)
+    yield Claim("tether: closed forms; way back", "0.01 %; 1 mm", closed_forms)
+    yield Claim("tether: prisms; classes", "0.01 %; none wrong", prisms)
+    yield Claim("tether: drives past thin poles", "none through one", drives)
+    yield Claim("BlueROV2 in a current: over the limit; visited", "0.0 s; all", windy)
+    yield Claim("external tour: over the limit; visited", "0.0 s; all", external)
+    yield Claim("order: saved on the basin mission", "25 %", ordered)
+    yield Claim("predicted times of recorded flights", "within 10 %", flights)
+    for kind in surprises.KINDS:
+        yield carried_out(kind)
