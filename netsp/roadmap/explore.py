@@ -71,7 +71,7 @@ def _walk(node, lo, hi, x, y, letters, trie, limit, size, rule, pending, margin)
     """The trie node after the letters lo … hi on the way to a bend at (x, y), made where it may
     exist; -1 if no wanted word can follow. Returns node, size."""
     for k in range(lo, hi):
-        a = letters[k]
+        a = np.int64(letters[k])
         if node > 0 and trie[node, LETTER] == -a:
             node = trie[node, PARENT]
             continue

@@ -239,7 +239,8 @@ def _wanted(
     trie = np.full((256, 5), -1, dtype=np.int64)
     limit = np.zeros(256)
     trie[0, LETTER], trie[0, CORE] = 0, 1
-    size = 1
+    zero, one = np.int64(0), np.int64(1)  # no literals: callees are compiled once
+    size = one
     head = np.full((256, 1), -1, dtype=np.int64)
     entry = np.empty((1024, 2), dtype=np.int64)
     entries = 0
@@ -265,7 +266,7 @@ def _wanted(
                 else:
                     t = parent[t]
             bound = planar[u] + planar[v] - 2.0 * length[s] + margin
-            node = 0
+            node = zero
             limit[0] = max(limit[0], bound)
             while size + nu + nv >= len(trie):
                 trie = more_int_rows(trie)
@@ -279,7 +280,7 @@ def _wanted(
                 c = trie_child(node, x, trie)
                 if c < 0:
                     c = size
-                    add_child(node, x, 1, c, trie)
+                    add_child(node, x, one, c, trie)
                     limit[c] = bound
                     head[c, 0] = -1
                     size += 1

@@ -230,14 +230,15 @@ def _covered(x, y, circles, edges, edge_start, grow, box, bounds, eps):
 def _visible_arcs(disks, circles, edges, edge_start, grow, box, bounds, eps):
     """The parts of each disk's cone that no other obstacle covers and that lie within bounds."""
     arcs = np.empty((16, 6))  # the sixth column tells a whole circle
-    count = 0
+    zero = np.int64(0)  # no literal: numba would compile every callee for it once more
+    count = zero
     room = 2 * len(circles) + 6 * len(edges) + 16
     cuts = np.empty(room)
     inside = np.empty(room + 2)
     for k in range(len(disks)):
         cx, cy, r = disks[k, 0], disks[k, 1], disks[k, 2]
         start, end = disks[k, 3], disks[k, 4]
-        n = 0
+        n = zero
         for o in range(len(circles)):
             if box[o, 0] > cx + r or box[o, 2] < cx - r or box[o, 1] > cy + r or box[o, 3] < cy - r:
                 continue

@@ -331,7 +331,7 @@ def _write_letters(arcs, full, start, target, key, arrival_key, ends, angle, ray
     arrival_row = np.zeros((e_count, 2), dtype=np.int64)
     gap_row = np.zeros((e_count, 2), dtype=np.int64)
     pool = np.empty(1024 + 8 * e_count, dtype=np.int32)
-    n = 0
+    n = np.int64(0)  # no literal: callees are compiled once
     room = 16 * (len(rays) + 1)
     for node in range(len(start) - 1):
         for e in range(start[node], start[node + 1]):
