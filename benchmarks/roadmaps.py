@@ -177,7 +177,7 @@ def main() -> None:
         return
     head("what", "median s", "min", "max", "runs", "note", name="roadmap-speed")
     taut(350.0)
-    taut(500.0)
+    taut(500.0, worlds=3)
     many()
     prm()
     first_run()

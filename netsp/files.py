@@ -9,6 +9,8 @@ import re
 import stat
 import tempfile
 import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -104,6 +106,43 @@ def write_text(path: str | Path, text: str) -> None:
     except OSError as error:
         Path(name).unlink(missing_ok=True)
         raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
+
+
+def folder_made(folder: str | Path) -> Path:
+    """The folder, made if need be.
+
+    Raises
+    ------
+    InputError : it cannot be made, or nothing can be written there.
+    """
+    place = Path(folder)
+    if place.exists() and not place.is_dir():
+        raise InputError(f"{folder}: expected a folder, and it is a file")
+    try:
+        place.mkdir(parents=True, exist_ok=True)
+        probe = place / ".netsp"
+        probe.touch()
+        probe.unlink()
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be written to: {error.strerror or error}") from None
+    return place
+
+
+@contextmanager
+def output_folder(folder: str | Path | None) -> Iterator[None]:
+    """A folder to write to, tried before long work begins; taken away again if it was made here and
+    the work ends in an error."""
+    if folder is None:
+        yield
+        return
+    there = Path(folder).exists()
+    place = folder_made(folder)
+    try:
+        yield
+    except BaseException:
+        if not there and not any(place.iterdir()):
+            place.rmdir()
+        raise
 
 
 def cell(text: str | None) -> str:

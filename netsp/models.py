@@ -13,12 +13,22 @@ from netsp.errors import InputError
 SCHEMA_VERSION = 1
 
 
+MARKS = {
+    "problem": {"base", "tether_length"},
+    "solution": {"tour", "lower_bound"},
+    "mission": {"anchor", "waypoints"},
+    "surprise file": {"events"},
+    "scene": {"solids"},
+}
+"""What a file of each kind has and no other."""
+
 Model = TypeVar("Model", bound=BaseModel)
 
 
 def read_model(model: type[Model], text: str | bytes, source: str) -> Model:
     """A model of format version 1 from JSON, or `InputError` in one line."""
     data = parse_json_object(text, source)
+    _check_kind(model, data, source)
     version = data.get("schema_version", None)
     if version != SCHEMA_VERSION or isinstance(version, bool):
         raise InputError(f"{source}: schema_version: expected {SCHEMA_VERSION}, got {version!r}")
@@ -26,6 +36,14 @@ def read_model(model: type[Model], text: str | bytes, source: str) -> Model:
         return model.model_validate(data)
     except ValidationError as error:
         raise InputError(f"{source}: {explain(error)}") from None
+
+
+def _check_kind(model: type[BaseModel], data: dict[str, Any], source: str) -> None:
+    """InputError when a file is plainly of another kind than was asked for."""
+    kind = next((k for k, marks in MARKS.items() if marks <= data.keys()), None)
+    own = next((k for k, marks in MARKS.items() if marks <= model.model_fields.keys()), None)
+    if kind and own and kind != own:
+        raise InputError(f"{source}: this is a {kind}; expected a {own}")
 
 
 def parse_json_object(text: str | bytes, source: str) -> dict[str, Any]:

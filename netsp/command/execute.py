@@ -58,7 +58,8 @@ def run(args: argparse.Namespace) -> int:
     from netsp.execute.events import Surprises
     from netsp.execute.log import Options, describe
     from netsp.execute.run import execute
-    from netsp.execute.write import make_folder, write_execution
+    from netsp.execute.write import write_execution
+    from netsp.files import output_folder
     from netsp.pictures.execution import save_execution
     from netsp.problem import Problem
     from netsp.solution import Solution
@@ -67,17 +68,15 @@ def run(args: argparse.Namespace) -> int:
     surprises = Surprises.load(args.surprise) if args.surprise else None
     if args.planner not in ("repair", "none"):
         raise InputError(f"--planner: expected repair or none, got {args.planner!r}")
-    if args.output is not None:
-        make_folder(args.output)
     options = Options(
         speed=args.speed, vehicle=args.vehicle, delta=args.delta, repair=args.planner == "repair",
         current=vector(args.current, "--current") if args.current else (0.0, 0.0, 0.0),
         gusts=args.gusts, seed=args.seed, planning_limit=args.planning_limit,
     )  # fmt: skip
     show = not args.quiet and sys.stderr.isatty()
-    done = execute(
-        problem, solution, options, surprises=surprises, on_step=live(problem) if show else None
-    )
+    on_step = live(problem) if show else None
+    with output_folder(args.output):
+        done = execute(problem, solution, options, surprises=surprises, on_step=on_step)
     if show:
         print(file=sys.stderr)
     if args.output is not None:

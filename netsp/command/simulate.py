@@ -66,6 +66,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Fly the mission, write what happened, and return the exit code."""
     from netsp.command.plot_scene import tell
+    from netsp.files import output_folder
     from netsp.online.log import describe, write_run
     from netsp.online.mission import Mission
     from netsp.online.planner import PLANNERS, Options
@@ -78,28 +79,28 @@ def run(args: argparse.Namespace) -> int:
     if args.current is not None:
         changes["current"] = vector(args.current, "--current")
     mission = mission.model_copy(update=changes)
-    if args.output is not None and Path(args.output).exists() and not Path(args.output).is_dir():
-        raise InputError(f"{args.output}: expected a folder, and it is a file")
-    scene = mission.load_scene()
-    field = scene.field(on_progress=tell)
     if args.compare is not None and args.compare not in PLANNERS:
         raise InputError(f"--compare: expected {', '.join(PLANNERS)}, got {args.compare!r}")
+    show = not args.quiet and sys.stderr.isatty()
     runs = []
-    for planner in [args.planner, args.compare] if args.compare else [args.planner]:
-        run = simulate(
-            mission, planner, vehicle=args.vehicle, tether=args.tether_model,
-            options=Options(args.paths, args.refine, args.seed),
-            scene=scene, field=field, snap=args.snap, seed=args.seed,
-            on_step=None if args.quiet or not sys.stderr.isatty() else live(mission, scene.units),
-        )  # fmt: skip
-        runs.append(run)
-        if not args.quiet:
-            print(
-                ("\r\n" if sys.stderr.isatty() else "") + describe(run, scene.units),
-                file=sys.stderr,
-            )
-        if run.summary["status"] == "interrupted":
-            break
+    with output_folder(args.output):
+        scene = mission.load_scene()
+        field = scene.field(on_progress=tell)
+        for planner in [args.planner, args.compare] if args.compare else [args.planner]:
+            run = simulate(
+                mission, planner, vehicle=args.vehicle, tether=args.tether_model,
+                options=Options(args.paths, args.refine, args.seed),
+                scene=scene, field=field, snap=args.snap, seed=args.seed,
+                on_step=live(mission, scene.units) if show else None,
+            )  # fmt: skip
+            runs.append(run)
+            if not args.quiet:
+                print(
+                    ("\r\n" if sys.stderr.isatty() else "") + describe(run, scene.units),
+                    file=sys.stderr,
+                )
+            if run.summary["status"] == "interrupted":
+                break
     if args.output is None:
         print(json.dumps(runs[0].summary, indent=1, allow_nan=False))
     else:

@@ -10,14 +10,13 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from netsp.errors import InputError
 from netsp.execute.log import Execution
-from netsp.files import cell, write_text
+from netsp.files import cell, folder_made, write_text
 
 
 def write_execution(done: Execution, folder: str | Path) -> None:
     """log.csv, visits.csv, events.csv, tethers.json, summary.json, and the problem and solution."""
-    place = make_folder(folder)
+    place = folder_made(folder)
     write_text(place / "log.csv", _table([asdict(r) for r in done.rows]))
     visits = [
         {**asdict(a), "word": " ".join(map(str, a.word)), "planned": " ".join(map(str, a.planned)),
@@ -32,19 +31,6 @@ def write_execution(done: Execution, folder: str | Path) -> None:
     write_text(place / "tethers.json", json.dumps(frames, allow_nan=False) + "\n")
     write_text(place / "problem.json", done.problem.to_json())
     write_text(place / "solution.json", done.solution.to_json())
-
-
-def make_folder(folder: str | Path) -> Path:
-    """The folder, made if need be; InputError if that cannot be done or nothing be written."""
-    place = Path(folder)
-    try:
-        place.mkdir(parents=True, exist_ok=True)
-        probe = place / ".netsp"
-        probe.touch()
-        probe.unlink()
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be written to: {error.strerror or error}") from None
-    return place
 
 
 def _table(rows: Sequence[dict[str, Any]]) -> str:
