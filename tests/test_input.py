@@ -288,3 +288,52 @@ def test_missions_read_from_text_keep_to_their_types():
     with pytest.raises(InputError, match="waypoints"):
         Mission.from_json('{"schema_version": 1, "scene": "s", "anchor": [0, 0, 0], '
                           '"start": [0, 0, 0], "waypoints": [], "tether_length": 5}')  # fmt: skip
+
+
+def kinds(folder: Path) -> dict[str, str]:
+    """A file of every kind that netsp reads as JSON."""
+    tour = folder / "tour.json"
+    tour.write_text(solve(Problem.load(SMALL)).to_json())
+    return {
+        "problem": SMALL,
+        "solution": str(tour),
+        "mission": str(ROOT / "missions" / "basin.json"),
+        "scene": str(ROOT / "scenes" / "pipes.json"),
+        "surprise file": str(ROOT / "examples" / "surprises.json"),
+    }
+
+
+def test_a_file_of_another_kind_is_called_what_it_is(tmp_path, capsys):
+    files = kinds(tmp_path)
+    wanted = {
+        "problem": ["solve", "FILE"],
+        "solution": ["verify", SMALL, "FILE"],
+        "mission": ["simulate", "FILE"],
+        "surprise file": ["execute", SMALL, files["solution"], "--surprise", "FILE"],
+    }
+    for kind, command in wanted.items():
+        for other, file in files.items():
+            if other == kind:
+                continue
+            assert main([file if word == "FILE" else word for word in command]) == 2
+            assert f"this is a {other}; expected a {kind}" in one_line(capsys)
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["execute", SMALL, "TOUR", "--vehicle", "x"],
+        ["execute", SMALL, str(WHARF)],
+        ["simulate", str(ROOT / "missions" / "basin.json"), "--planner", "x"],
+        ["simulate", SMALL],
+    ],
+)
+def test_a_run_that_cannot_begin_leaves_no_folder(command, tmp_path, capsys):
+    tour = kinds(tmp_path)["solution"]
+    run = tmp_path / "run"
+    assert main([tour if word == "TOUR" else word for word in command] + ["-o", str(run)]) == 2
+    one_line(capsys)
+    assert not run.exists()
+    run.mkdir()
+    assert main([tour if word == "TOUR" else word for word in command] + ["-o", str(run)]) == 2
+    assert run.exists()

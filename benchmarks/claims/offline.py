@@ -201,6 +201,7 @@ def claims() -> Iterator[Claim]:
     """All of these."""
     cells = [(n, t) for n in (5, 10, 15, 20) for t in (200, 250, 300, 350)]
     long = [(20, 500), (40, 300), (60, 300)]
+    yield seconds_of(15, 200.0, 5, 0.2)
     yield seconds_of(20, 350.0, 5, 1.0)
     yield seconds_of(100, 300.0, 3, 60.0)
     yield Claim("proposals of anneal", "as published (/ 3)", proposals, timed=True)
