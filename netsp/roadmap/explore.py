@@ -16,8 +16,10 @@ letters).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 from numba import njit
 
 from netsp.arrays import Floats, Ints
@@ -32,18 +34,76 @@ SAME = 1e4
 margins (1e-6 of the size). Where outlines touch from inside, hopping between them and back takes no
 length but rounding; less tolerance would let that go on for ever."""
 
+Letters = npt.NDArray[np.int32]
+
 GIVEN, NON_LOOPING, ALL = range(3)
 """Which words may join the trie: none but those given, those that do not loop, or all."""
 
 
+class Net(NamedTuple):
+    """The arrays of a `TangentGraph` that the kernel walks. arc_nodes : how many nodes are directed
+    arcs; points follow. longest : most letters that one step can write."""
+
+    start: Ints
+    target: Ints
+    length: Floats
+    ends: Floats
+    first: Ints
+    turn: Floats
+    gap: Floats
+    segment_row: Ints
+    arrival_row: Ints
+    gap_row: Ints
+    radius: Floats
+    arc_nodes: int
+    longest: int
+
+
+class Words(NamedTuple):
+    """How words grow: the letters that rows point into, the boxes in which letters may be pending
+    (with the margin of positions), which new words join the core, and within which two lengths of
+    one arrival are the same."""
+
+    letters: Letters
+    pending: Floats
+    rule: int
+    same: float
+
+
+class Ask(NamedTuple):
+    """What is sought.
+
+    keep : whether to keep the search tree, so that paths can
+    be written out. cap : most departures to look at. rest : per tangent, the least length from its
+    end to where the search is going (0 where it goes everywhere). aim : the one point asked for, -1
+    for all. within : per point, the longest path that is reported. most : so many reports end the
+    search.
+    """
+
+    keep: bool
+    cap: int
+    rest: Floats
+    aim: int
+    within: Floats
+    most: int
+
+
+NODE, NEXT, WORD, BEFORE, TAKEN = range(5)
+"""Columns of a state, which is an arrival: node, first departure there, word, the state before and
+the departure taken from it."""
+
+TURN, REACHED, SLID = range(3)
+"""Its angle to the first departure, length at arrival, angle slid before the departure taken."""
+
+
 @njit(cache=True, nogil=True)
-def _may_wait(node, x, y, trie, pending, margin):
+def _may_wait(node, x, y, trie, pending):
     """Whether the letters that lead out of the core can all still be cancelled from a bend at
     (x, y)."""
     v = node
     while trie[v, CORE] == 0:
         a = trie[v, LETTER]
-        if not _in_box(a, x, y, pending, margin):
+        if not _in_box(a, x, y, pending):
             return False
         u = trie[v, PARENT]
         while trie[u, CORE] == 0:
@@ -55,19 +115,33 @@ def _may_wait(node, x, y, trie, pending, margin):
 
 
 @njit(cache=True, nogil=True)
-def _in_box(a, x, y, pending, margin):
+def _in_box(a, x, y, pending):
     side = 0 if a > 0 else 1
     i = abs(a) - 1
     return (
-        x >= pending[side, i, 0] - margin
-        and y >= pending[side, i, 1] - margin
-        and x <= pending[side, i, 2] + margin
-        and y <= pending[side, i, 3] + margin
+        x >= pending[side, i, 0]
+        and y >= pending[side, i, 1]
+        and x <= pending[side, i, 2]
+        and y <= pending[side, i, 3]
     )
 
 
 @njit(cache=True, nogil=True)
-def _walk(node, lo, hi, x, y, letters, trie, limit, size, rule, pending, margin):
+def _joins(node, a, rule, trie):
+    """Whether the word of a node with one letter more is one of those that are sought."""
+    if rule == GIVEN or trie[node, CORE] == 0:
+        return False
+    if rule == NON_LOOPING:
+        v = node
+        while v > 0:
+            if trie[v, LETTER] == a:
+                return False
+            v = trie[v, PARENT]
+    return True
+
+
+@njit(cache=True, nogil=True)
+def _walk(node, lo, hi, x, y, letters, pending, rule, trie, limit, size):
     """The trie node after the letters lo … hi on the way to a bend at (x, y), made where it may
     exist; -1 if no wanted word can follow. Returns node, size."""
     for k in range(lo, hi):
@@ -77,14 +151,7 @@ def _walk(node, lo, hi, x, y, letters, trie, limit, size, rule, pending, margin)
             continue
         c = trie_child(node, a, trie)
         if c < 0:
-            joins = rule != GIVEN and trie[node, CORE] == 1
-            if joins and rule == NON_LOOPING:
-                v = node
-                while v > 0:
-                    if trie[v, LETTER] == a:
-                        joins = False
-                        break
-                    v = trie[v, PARENT]
+            joins = _joins(node, a, rule, trie)
             if not joins and pending[0 if a > 0 else 1, abs(a) - 1, 0] == np.inf:
                 return -1, size
             c = size
@@ -92,144 +159,141 @@ def _walk(node, lo, hi, x, y, letters, trie, limit, size, rule, pending, margin)
             limit[c] = limit[node]
             size += 1
         node = c
-    if trie[node, CORE] == 0 and not _may_wait(node, x, y, trie, pending, margin):
+    if trie[node, CORE] == 0 and not _may_wait(node, x, y, trie, pending):
         return -1, size
     return node, size
 
 
 @njit(cache=True, nogil=True)
-def explore(
-    source, start, target, length, ends, first, turn, gap, letters, segment_row, arrival_row,
-    gap_row, radius, arc_nodes, pending, margin, longest, trie, limit, size, rule, keep, cap,
-    rest, aim, within, most, stop,
-):  # fmt: skip
-    """All taut paths from node `source` whose words stay in (or pend from) the core.
+def _arrives_anew(code, mark, same, key, length):
+    """Whether no arrival with this code (word and directed arc) had this length; it is noted.
+    Collinear tangents give one path several spellings."""
+    slots = len(key)
+    slot = (code * 0x9E3779B1) % slots
+    while key[slot] >= 0:
+        if key[slot] == code and abs(length[slot] - mark) <= same:
+            return False
+        slot += 1
+        if slot == slots:
+            slot = 0
+    key[slot] = code
+    length[slot] = mark
+    return True
 
-    longest : most letters that one step can write. rule : which new words join the core. keep :
-    whether to keep the search tree, so that paths can be written out. cap : most departures to
-    look at.
-    rest : per tangent, the least length from its end to where the search is going (0 where it goes
-    everywhere). aim : the one point asked for, -1 for all. within : per point, the longest path
-    that is reported; most : so many reports end the search. stop : ends it when its first number is
-    not 0.
+
+@njit(cache=True, nogil=True)
+def explore(net, words, ask, source, trie, limit, size, stop):
+    """All taut paths from node `source` whose words stay in (or pend from) the core of the trie,
+    which has `size` nodes, each with the limit of its paths. stop : ends it when its first number
+    is not 0.
 
     Returns trie, limit, size; per hit (goal point, trie node, state, departure) and (length, angle
-    slid before the departure); the tree as (parent state, departure) and angle slid; whether the
-    cap stopped the search.
+    slid before the departure); the tree as rows of states (`NODE` …, `TURN` …); whether the cap
+    stopped the search.
     """
-    # a state is an arrival: node, first departure, word there, parent state, departure taken;
-    # angle to the first departure, length at arrival, angle slid before the departure taken
-    s_i = np.empty((1024, 5), dtype=np.int64)
-    s_f = np.empty((1024, 3))
+    # taken out once: to take an array out of a tuple costs a count of its references
+    start, target, length, ends = net.start, net.target, net.length, net.ends
+    first, turn, gap, radius = net.first, net.turn, net.gap, net.radius
+    segment_row, arrival_row, gap_row = net.segment_row, net.arrival_row, net.gap_row
+    arc_nodes, rest, within = net.arc_nodes, ask.rest, ask.within
+    letters, pending, rule = words.letters, words.pending, words.rule
+    state = np.empty((1024, 5), dtype=np.int64)
+    real = np.empty((1024, 3))
     stack = np.empty((1024, 1), dtype=np.int64)
-    h_i = np.empty((256, 4), dtype=np.int64)
-    h_f = np.empty((256, 2))
+    hit = np.empty((256, 4), dtype=np.int64)
+    hit_real = np.empty((256, 2))
     hits = 0
-    # arrivals seen, by (word, directed arc): collinear tangents give one path several spellings
-    slots = 4096
-    seen_key = np.full(slots, -1, dtype=np.int64)
-    seen_length = np.empty(slots)
-    seen_used = 0
-    nodes = len(radius)
+    seen_key = np.full(4096, -1, dtype=np.int64)
+    seen_length = np.empty(4096)
+    seen = 0
 
-    s_i[0, 0], s_i[0, 1], s_i[0, 2], s_i[0, 3], s_i[0, 4] = source, start[source], 0, -1, -1
-    s_f[0, 0], s_f[0, 1], s_f[0, 2] = 0.0, 0.0, 0.0
+    state[0, NODE], state[0, NEXT], state[0, WORD] = source, start[source], 0
+    state[0, BEFORE], state[0, TAKEN] = -1, -1
+    real[0, TURN], real[0, REACHED], real[0, SLID] = 0.0, 0.0, 0.0
     stack[0, 0] = 0
     top, count, visited = 1, 1, 0
     while top > 0:
         top -= 1
-        sid = stack[top, 0]
-        node, e, t = s_i[sid, 0], s_i[sid, 1], s_i[sid, 2]
-        slid, so_far = s_f[sid, 0], s_f[sid, 1]
-        if not keep:
+        own = stack[top, 0]
+        node, e, word = state[own, NODE], state[own, NEXT], state[own, WORD]
+        slid, so_far = real[own, TURN], real[own, REACHED]
+        if not ask.keep:
             count = top
-        if start[node] == start[node + 1]:
+        begin, end = start[node], start[node + 1]
+        if begin == end:
             continue
-        r = radius[node]
         while True:
             visited += 1
-            if visited > cap or hits >= most or stop[0] != 0:
+            if visited > ask.cap or hits >= ask.most or stop[0] != 0:
                 # the state that is being looked at counts as kept
-                hit, tree = (h_i[:hits], h_f[:hits]), (s_i[: count + 1], s_f[: count + 1])
-                return (trie, limit, size), hit, tree, True
-            here = so_far + r * slid
-            if here > limit[t]:
+                tree = state[: count + 1], real[: count + 1]
+                return (trie, limit, size), (hit[:hits], hit_real[:hits]), tree, True
+            here = so_far + radius[node] * slid
+            if here > limit[word]:
                 break
-            if size + longest >= len(trie):
+            if size + net.longest >= len(trie):
                 trie = more_int_rows(trie)
                 limit = longer(limit)
             reached = here + length[e]
+            least = reached + rest[e]
             w = -1
-            if reached + rest[e] <= limit[0]:  # no word may be longer
-                x, y = ends[e, 2], ends[e, 3]
+            if least <= limit[0]:  # no word may be longer
                 w, size = _walk(
-                    t, segment_row[e, 0], segment_row[e, 1], x, y, letters, trie, limit, size,
-                    rule, pending, margin,
+                    word, segment_row[e, 0], segment_row[e, 1], ends[e, 2], ends[e, 3],
+                    letters, pending, rule, trie, limit, size,
                 )  # fmt: skip
+            if w >= 0 and least > limit[w]:
+                w = -1
             goal = target[e]
-            if w >= 0 and reached + rest[e] <= limit[w]:
-                if goal >= arc_nodes:
-                    point = goal - arc_nodes
-                    asked = (aim < 0 or point == aim) and reached <= within[point]
-                    if trie[w, CORE] == 1 and asked:
-                        if hits == len(h_i):
-                            h_i = more_int_rows(h_i)
-                            h_f = more_rows(h_f)
-                        h_i[hits, 0], h_i[hits, 1] = point, w
-                        h_i[hits, 2], h_i[hits, 3] = sid, e
-                        h_f[hits, 0], h_f[hits, 1] = reached, slid
-                        hits += 1
-                elif first[e] >= 0:
-                    f = first[e]
-                    mark = reached + radius[goal] * turn[e]
-                    code = w * nodes + goal
-                    slot = (code * 0x9E3779B1) % slots
-                    fresh = True
-                    while seen_key[slot] >= 0:
-                        if (
-                            seen_key[slot] == code
-                            and abs(seen_length[slot] - mark) <= SAME * margin
-                        ):
-                            fresh = False
-                            break
-                        slot += 1
-                        if slot == slots:
-                            slot = 0
-                    if fresh:
-                        seen_key[slot] = code
-                        seen_length[slot] = mark
-                        seen_used += 1
-                        if 2 * seen_used > slots:
-                            seen_key, seen_length = rehashed(seen_key, seen_length)
-                            slots = len(seen_key)
-                        w, size = _walk(
-                            w, arrival_row[e, 0], arrival_row[e, 1], ends[f, 0], ends[f, 1],
-                            letters, trie, limit, size, rule, pending, margin,
-                        )  # fmt: skip
-                        if w >= 0:
-                            if count == len(s_i) or top == len(stack):
-                                s_i = more_int_rows(s_i)
-                                s_f = more_rows(s_f)
-                                stack = more_int_rows(stack)
-                            s_i[count, 0], s_i[count, 1], s_i[count, 2] = goal, f, w
-                            s_i[count, 3], s_i[count, 4] = sid, e
-                            s_f[count, 0], s_f[count, 1] = max(turn[e], 0.0), reached
-                            s_f[count, 2] = slid
-                            stack[top, 0] = count
-                            top += 1
-                            count += 1
+            if w >= 0 and goal >= arc_nodes:
+                point = goal - arc_nodes
+                asked = (ask.aim < 0 or point == ask.aim) and reached <= within[point]
+                if trie[w, CORE] == 1 and asked:
+                    if hits == len(hit):
+                        hit = more_int_rows(hit)
+                        hit_real = more_rows(hit_real)
+                    hit[hits, 0], hit[hits, 1], hit[hits, 2], hit[hits, 3] = point, w, own, e
+                    hit_real[hits, 0], hit_real[hits, 1] = reached, slid
+                    hits += 1
+            elif w >= 0 and first[e] >= 0:
+                f = first[e]
+                mark = reached + radius[goal] * turn[e]
+                code = w * len(radius) + goal
+                if _arrives_anew(code, mark, words.same, seen_key, seen_length):
+                    seen += 1
+                    if 2 * seen > len(seen_key):
+                        seen_key, seen_length = rehashed(seen_key, seen_length)
+                    w, size = _walk(
+                        w, arrival_row[e, 0], arrival_row[e, 1], ends[f, 0], ends[f, 1],
+                        letters, pending, rule, trie, limit, size,
+                    )  # fmt: skip
+                else:
+                    w = -1
+                if w >= 0:
+                    if count == len(state) or top == len(stack):
+                        state = more_int_rows(state)
+                        real = more_rows(real)
+                        stack = more_int_rows(stack)
+                    state[count, NODE], state[count, NEXT] = goal, f
+                    state[count, WORD], state[count, BEFORE] = w, own
+                    state[count, TAKEN] = e
+                    real[count, TURN], real[count, REACHED] = max(turn[e], 0.0), reached
+                    real[count, SLID] = slid
+                    stack[top, 0] = count
+                    top += 1
+                    count += 1
             if gap[e] < 0.0:
                 break
-            following = e + 1 if e + 1 < start[node + 1] else start[node]
-            t, size = _walk(
-                t, gap_row[e, 0], gap_row[e, 1], ends[following, 0], ends[following, 1], letters,
-                trie, limit, size, rule, pending, margin,
-            )  # fmt: skip
-            if t < 0:
-                break
             slid += gap[e]
+            following = e + 1 if e + 1 < end else begin
+            word, size = _walk(
+                word, gap_row[e, 0], gap_row[e, 1], ends[following, 0], ends[following, 1],
+                letters, pending, rule, trie, limit, size,
+            )  # fmt: skip
+            if word < 0:
+                break
             e = following
-    return (trie, limit, size), (h_i[:hits], h_f[:hits]), (s_i[:count], s_f[:count]), False
+    return (trie, limit, size), (hit[:hits], hit_real[:hits]), (state[:count], real[:count]), False
 
 
 @dataclass(frozen=True)
@@ -252,9 +316,9 @@ class Found:
         """(departure, angle slid before it) along the path of a hit, from the source on."""
         out = [(int(self.departure[hit]), float(self.slid[hit]))]
         s = int(self.state[hit])
-        while self.tree[s, 3] >= 0:
-            out.append((int(self.tree[s, 4]), float(self.tree_slid[s])))
-            s = int(self.tree[s, 3])
+        while self.tree[s, BEFORE] >= 0:
+            out.append((int(self.tree[s, TAKEN]), float(self.tree_slid[s])))
+            s = int(self.tree[s, BEFORE])
         return out[::-1]
 
 
@@ -280,16 +344,21 @@ def run_explore(
     """
     no_limit = np.iinfo(np.int64).max
     aim, rest = toward or (-1, np.zeros(len(graph.target)))
-    if within is None:
-        within = np.full(len(graph.points), np.inf)
-    (trie.nodes, trie.limit, trie.size), (h_i, h_f), (s_i, s_f), capped = explore(
-        graph.point_node(source), graph.start, graph.target, graph.length, graph.ends,
-        graph.first, graph.turn, graph.gap, graph.letters, graph.segment_row, graph.arrival_row,
-        graph.gap_row, graph.radius, 2 * len(graph.arcs), graph.pending, margin,
-        graph.longest_step, trie.nodes, trie.limit, trie.size, rule, keep,
-        no_limit if cap is None else cap, rest, aim, within, no_limit if most is None else most,
-        stop,
+    net = Net(
+        graph.start, graph.target, graph.length, graph.ends, graph.first, graph.turn, graph.gap,
+        graph.segment_row, graph.arrival_row, graph.gap_row, graph.radius, 2 * len(graph.arcs),
+        graph.longest_step,
     )  # fmt: skip
+    wide = graph.pending + margin * np.array([-1.0, -1.0, 1.0, 1.0])
+    words = Words(graph.letters, wide, rule, SAME * margin)
+    ask = Ask(
+        keep, no_limit if cap is None else cap, rest, aim,
+        np.full(len(graph.points), np.inf) if within is None else within,
+        no_limit if most is None else most,
+    )  # fmt: skip
+    (trie.nodes, trie.limit, trie.size), (h_i, h_f), (s_i, s_f), capped = explore(
+        net, words, ask, graph.point_node(source), trie.nodes, trie.limit, trie.size, stop
+    )
     return Found(
         h_i[:, 0],
         h_i[:, 1],
@@ -298,7 +367,7 @@ def run_explore(
         h_i[:, 3],
         h_f[:, 1],
         s_i,
-        s_f[:, 1],
-        s_f[:, 2],
+        s_f[:, REACHED],
+        s_f[:, SLID],
         capped,
     )
