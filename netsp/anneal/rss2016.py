@@ -20,12 +20,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
 from netsp.anneal.cooling import Cooling, Schedule
-from netsp.arrays import Ints
+from netsp.arrays import Floats, Ints
 from netsp.compiled.chance import below, metropolis, seeded
 from netsp.solving.limits import Limits
 from netsp.solving.run import Run
@@ -58,6 +59,33 @@ class Params(Cooling):
             raise ValueError(f"option 'swaps': expected a share from 0 to 1, got {self.swaps}")
 
 
+class Table(NamedTuple):
+    """What does not change: `netsp.travel.detours.Detours` (planar, height, letters, row, far,
+    near), and `_admissible` words (trie, vertex)."""
+
+    planar: Floats
+    height: Floats
+    letters: Ints
+    row: Ints
+    far: Ints
+    near: Floats
+    trie: Ints
+    vertex: Ints
+
+
+class State(NamedTuple):
+    """What a proposal changes: order of the clusters (legs + 1,); via, the point by way of which
+    each leg goes, or -1 (legs,); the vertices at its stops (legs,), and those of the best valid
+    state; room for words: stack (3, letters), turns (obstacles + 1,)."""
+
+    order: Ints
+    via: Ints
+    stops: Ints
+    stack: Ints
+    turns: Ints
+    best: Ints
+
+
 def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | None = None) -> Result:
     """Anneal from a random order, or that of the warm start, all legs direct. An iteration is one
     proposal. The result is `no_solution_found` if no state met was free of entanglement with every
@@ -87,20 +115,19 @@ def _anneal(run: Run, rng: np.random.Generator, chosen: Params) -> None:
         order[1:-1] = rng.permutation(np.arange(1, goals + 1))
     via = np.full(goals + 1, -1, dtype=np.int64)
     trie, vertex = _admissible(graph)
-    tables = (
-        detours.planar,
-        detours.height,
-        detours.letters,
-        detours.row,
-        detours.far,
-        detours.near,
-    )
+    table = Table(
+        detours.planar, detours.height, detours.letters, detours.row, detours.far, detours.near,
+        trie, vertex,
+    )  # fmt: skip
     longest = (goals + 1) * 2 * int((detours.row[:, 1:] - detours.row[:, :-1]).max(initial=0)) + 1
-    scratch = np.zeros((3, longest), dtype=np.int64)
-    stops = np.zeros(goals + 1, dtype=np.int64)
-    best = np.zeros(goals + 1, dtype=np.int64)
-    turns = np.zeros(detours.far.shape[2] + 1, dtype=np.int64)
-    length, entangled, _ = evaluate(order, via, *tables[:4], trie, vertex, stops, scratch, turns)
+    state = State(
+        order, via,
+        stops=np.zeros(goals + 1, dtype=np.int64),
+        stack=np.zeros((3, longest), dtype=np.int64),
+        turns=np.zeros(detours.far.shape[2] + 1, dtype=np.int64),
+        best=np.zeros(goals + 1, dtype=np.int64),
+    )  # fmt: skip
+    length, entangled, _ = evaluate(state, table)
     schedule = Schedule(chosen, run, length / (goals + 1), default=PROPOSALS_PER_GOAL * goals)
     chunk = int(max(1, min(CHUNK, run.iteration_limit / REPORTS)))
     chance = seeded(rng)
@@ -111,12 +138,11 @@ def _anneal(run: Run, rng: np.random.Generator, chosen: Params) -> None:
         count = schedule.chunk(chunk)
         before = best_length
         length, entangled, best_length = anneal(
-            order, via, best, best_length, count, schedule.temperature, chosen.k, chosen.swaps,
-            *tables, trie, vertex, stops, scratch, turns, chance,
-        )  # fmt: skip
+            state, best_length, count, schedule.temperature, chosen.k, chosen.swaps, table, chance
+        )
         run.iterations += count
         if best_length < before:
-            run.offer(best.tolist())
+            run.offer(state.best.tolist())
         run.report("anneal", current=length, entangled=int(entangled))
 
 
@@ -160,9 +186,12 @@ def _push(letter, size, stack, trie):
 
 
 @njit(cache=True)
-def evaluate(order, via, planar, height, letters, row, trie, vertex, stops, stack, turns):
-    """Length, entangled obstacles, and goals in a class the tether does not admit; `stops` takes
-    the vertices."""
+def evaluate(state, table):
+    """Length, entangled obstacles, and goals in a class the tether does not admit; `state.stops`
+    takes the vertices."""
+    order, via, stops, stack, turns = state.order, state.via, state.stops, state.stack, state.turns
+    planar, height, letters, row = table.planar, table.height, table.letters, table.row
+    trie, vertex = table.trie, table.vertex
     length = 0.0
     size = 0
     missed = 0
@@ -215,17 +244,14 @@ def evaluate(order, via, planar, height, letters, row, trie, vertex, stops, stac
 
 
 @njit(cache=True)
-def anneal(
-    order, via, best, best_length, count, theta, k, swaps,
-    planar, height, letters, row, far, near, trie, vertex, stops, stack, turns, chance,
-):  # fmt: skip
+def anneal(state, best_length, count, theta, k, swaps, table, chance):
     """Make `count` proposals at temperature θ, in place; returns length and entanglement of the
-    present state and the length of the best valid one, whose vertices are in `best`."""
+    present state and the length of the best valid one, whose vertices are in `state.best`."""
+    order, via, stops, best = state.order, state.via, state.stops, state.best
+    planar, far, near = table.planar, table.far, table.near
     legs = len(order) - 1
     obstacles = far.shape[2]
-    length, entangled, missed = evaluate(
-        order, via, planar, height, letters, row, trie, vertex, stops, stack, turns
-    )
+    length, entangled, missed = evaluate(state, table)
     cost = k * (entangled + missed + 1) * length
     kept = np.empty(4, dtype=np.int64)
     for _ in range(count):
@@ -254,9 +280,7 @@ def anneal(
             via[leg] = turned
         else:
             continue
-        new_length, new_entangled, new_missed = evaluate(
-            order, via, planar, height, letters, row, trie, vertex, stops, stack, turns
-        )
+        new_length, new_entangled, new_missed = evaluate(state, table)
         new_cost = k * (new_entangled + new_missed + 1) * new_length
         if metropolis(new_cost - cost, theta, chance):
             length, entangled, missed, cost = new_length, new_entangled, new_missed, new_cost

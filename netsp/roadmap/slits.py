@@ -22,7 +22,7 @@ import math
 import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -37,8 +37,7 @@ ROWS = 64
 """Rows of the matrix that one thread takes at a time."""
 
 
-@dataclass(frozen=True)
-class Slits:
+class Slits(NamedTuple):
     """Vertical chords of the obstacles, coordinates relative to the base.
 
     rank : (n,) place of each obstacle's line from left to right, ties by number. x, bottom, top :
@@ -53,6 +52,16 @@ class Slits:
     def cell(self, x: float) -> int:
         """The strip a point lies in: how many lines are at or left of it."""
         return int(np.searchsorted(self.x, x, side="right"))
+
+
+class Ends(NamedTuple):
+    """Where legs end: place (V, 2) and strip (V,) of every vertex, and its word as a row of
+    `letters` from row[v] to row[v + 1]."""
+
+    place: Floats
+    cell: Ints
+    letters: Ints
+    row: Ints
 
 
 def build_slits(problem: Problem) -> Slits:
@@ -97,10 +106,8 @@ def slit_lengths(
     whole = rows is None
     asked: Ints = np.arange(n) if rows is None else rows
     out = np.zeros((len(asked), n))
-    args = (
-        asked, whole, places, cell, cluster, letters, row, slits.rank, slits.x, slits.bottom,
-        slits.top, out, stop,
-    )  # fmt: skip
+    ends = Ends(places[cluster], cell[cluster], letters, row)
+    args = (asked, whole, cluster, ends, slits, out, stop)
     blocks = [(k, min(k + ROWS, len(asked))) for k in range(0, len(asked), ROWS)]
     if len(blocks) < 4:
         _rows(0, len(asked), *args)
@@ -111,16 +118,13 @@ def slit_lengths(
 
 
 @njit(cache=True, nogil=True)
-def _rows(
-    first, last, asked, whole, places, cell, cluster, letters, row, rank, x, bottom, top, out, stop
-):
+def _rows(first, last, asked, whole, cluster, ends, slits, out, stop):
     """Fill rows first … last - 1, which are those of the vertices `asked`; of the whole matrix only
     what is beyond the diagonal, and the columns with the same numbers."""
     longest = 0
     for v in range(len(cluster)):
-        longest = max(longest, row[v + 1] - row[v])
-    size = (2 * longest + 2) * (len(x) + 2) + 2
-    gate = np.empty((size, 3))
+        longest = max(longest, ends.row[v + 1] - ends.row[v])
+    gate = np.empty(((2 * longest + 2) * (len(slits.x) + 2) + 2, 3))
     for k in range(first, last):
         if stop[0] != 0:
             return
@@ -128,44 +132,36 @@ def _rows(
         for v in range(u + 1 if whole else 0, len(cluster)):
             if cluster[u] == cluster[v]:
                 continue
-            d = _length(
-                places[cluster[u], 0], places[cluster[u], 1], cell[cluster[u]], row[u], row[u + 1],
-                places[cluster[v], 0], places[cluster[v], 1], cell[cluster[v]], row[v], row[v + 1],
-                letters, rank, x, bottom, top, gate,
-            )  # fmt: skip
-            out[k, v] = d
+            out[k, v] = _length(u, v, ends, slits, gate)
             if whole:
-                out[v, k] = d
+                out[v, k] = out[k, v]
 
 
 @njit(cache=True, nogil=True)
-def _length(
-    ax, ay, a_cell, a_row, a_end, bx, by, b_cell, b_row, b_end, letters, rank, x, bottom, top, gate
-):  # fmt: skip
-    """Length of the path from a to b of the word inverse(word of a) times (word of b)."""
+def _length(u, v, ends, slits, gate):
+    """Length of the path from u to v of the word inverse(word of u) times (word of v)."""
+    letters, row = ends.letters, ends.row
+    rank, x, bottom, top = slits.rank, slits.x, slits.bottom, slits.top
+    a, a_end, b, b_end = row[u], row[u + 1], row[v], row[v + 1]
     shared = 0
-    while (
-        a_row + shared < a_end
-        and b_row + shared < b_end
-        and letters[a_row + shared] == letters[b_row + shared]
-    ):
+    while a + shared < a_end and b + shared < b_end and letters[a + shared] == letters[b + shared]:
         shared += 1
-    back = a_end - a_row - shared
-    count = back + b_end - b_row - shared
-    at, s, before = a_cell, 0.0, ax
+    back = a_end - a - shared
+    count = back + b_end - b - shared
+    at, s, before = ends.cell[u], 0.0, ends.place[u, 0]
     k = 0
     for i in range(count + 1):
         letter = 0
         if i < back:
             letter = -letters[a_end - 1 - i]
         elif i < count:
-            letter = letters[b_row + shared + i - back]
+            letter = letters[b + shared + i - back]
         if letter > 0:
             target = rank[letter - 1]
         elif letter < 0:
             target = rank[-letter - 1] + 1
         else:
-            target = b_cell
+            target = ends.cell[v]
         while at != target:
             line = at if target > at else at - 1
             s += abs(x[line] - before)
@@ -180,9 +176,9 @@ def _length(
             gate[k, 0], gate[k, 1], gate[k, 2] = s, top[line], np.inf
             k += 1
             at += 1 if letter > 0 else -1
-    s += abs(bx - before)
-    gate[k, 0], gate[k, 1], gate[k, 2] = s, by, by
-    return _taut(ay, gate, k + 1)
+    s += abs(ends.place[v, 0] - before)
+    gate[k, 0], gate[k, 1], gate[k, 2] = s, ends.place[v, 1], ends.place[v, 1]
+    return _taut(ends.place[u, 1], gate, k + 1)
 
 
 @njit(cache=True, nogil=True)
