@@ -173,10 +173,13 @@ def test_entanglement_and_vertices_of_2016_are_those_of_the_words(problem, seed)
             continue
         stops = np.zeros(goals + 1, dtype=np.int64)
         stack = np.zeros((3, 4 * (goals + 1) * len(detours.letters) + 4), dtype=np.int64)
-        length, held, missed = rss2016.evaluate(
-            order, via, detours.planar, detours.height, detours.letters, detours.row, trie, vertex,
-            stops, stack, np.zeros(n + 1, dtype=np.int64),
+        table = rss2016.Table(
+            detours.planar, detours.height, detours.letters, detours.row, detours.far,
+            detours.near, trie, vertex,
         )  # fmt: skip
+        turns = np.zeros(n + 1, dtype=np.int64)
+        state = rss2016.State(order, via, stops, stack, turns, np.zeros_like(stops))
+        length, held, missed = rss2016.evaluate(state, table)
         words = [()]
         for leg in legs:
             words.append(concatenate(words[-1], detours.word(*leg)))

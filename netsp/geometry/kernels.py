@@ -7,11 +7,30 @@ a margin. Everything is decided by distances, so a polygon and a circle obey one
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
+from netsp.arrays import Floats, Ints
+
 TWO_PI = 2.0 * math.pi
+
+
+class Blockers(NamedTuple):
+    """Grown obstacles.
+
+    circles : (n, 3) centre and grown radius, radius negative for a polygon. edges : (k, 4) polygon
+    edges; obstacle o owns edge_start[o]:edge_start[o + 1], grown by grow[o]. box : (n, 4) bounding
+    boxes. eps : what goes no deeper touches.
+    """
+
+    circles: Floats
+    edges: Floats
+    edge_start: Ints
+    grow: Floats
+    box: Floats
+    eps: float
 
 
 @njit(cache=True)
@@ -62,12 +81,9 @@ def point_in_polygon(px, py, edges, start, stop):
 
 
 @njit(cache=True)
-def depth_in_obstacle(px, py, o, circles, edges, edge_start, grow):
-    """How deep a point lies inside obstacle `o`; negative outside.
-
-    circles : (n, 3) centre and grown radius, radius negative for a polygon.
-    edges : (k, 4) polygon edges; obstacle o owns edge_start[o]:edge_start[o + 1], grown by grow[o].
-    """
+def depth_in_obstacle(px, py, o, blockers):
+    """How deep a point lies inside obstacle `o`; negative outside."""
+    circles, edges, edge_start = blockers.circles, blockers.edges, blockers.edge_start
     if circles[o, 2] >= 0.0:
         return circles[o, 2] - math.hypot(px - circles[o, 0], py - circles[o, 1])
     d = np.inf
@@ -77,37 +93,34 @@ def depth_in_obstacle(px, py, o, circles, edges, edge_start, grow):
         )
     if point_in_polygon(px, py, edges, edge_start[o], edge_start[o + 1]):
         d = -d
-    return grow[o] - d
+    return blockers.grow[o] - d
 
 
 @njit(cache=True)
-def segment_depth_in_obstacle(ax, ay, bx, by, o, circles, edges, edge_start, grow, box, eps):
-    """Whether a segment enters obstacle `o` deeper than eps. `box`: (n, 4) bounding boxes."""
-    if (
-        max(ax, bx) < box[o, 0]
-        or min(ax, bx) > box[o, 2]
-        or max(ay, by) < box[o, 1]
-        or min(ay, by) > box[o, 3]
-    ):
-        return False
+def enters_obstacle(ax, ay, bx, by, o, blockers):
+    """Whether a segment enters obstacle `o` deeper than eps."""
+    circles, edges, edge_start = blockers.circles, blockers.edges, blockers.edge_start
     if circles[o, 2] >= 0.0:
         d = point_segment_distance(circles[o, 0], circles[o, 1], ax, ay, bx, by)
-        return d < circles[o, 2] - eps
+        return d < circles[o, 2] - blockers.eps
     for e in range(edge_start[o], edge_start[o + 1]):
         d = segment_segment_distance(
             ax, ay, bx, by, edges[e, 0], edges[e, 1], edges[e, 2], edges[e, 3]
         )
-        if d < grow[o] - eps:
+        if d < blockers.grow[o] - blockers.eps:
             return True
     return point_in_polygon(ax, ay, edges, edge_start[o], edge_start[o + 1])
 
 
 @njit(cache=True)
-def segment_blocked(ax, ay, bx, by, circles, edges, edge_start, grow, box, eps):
-    """Whether the segment ab leaves the box, or enters a circle (n, 3) or polygon, all grown, by
-    more than eps."""
-    for o in range(len(circles)):
-        if segment_depth_in_obstacle(ax, ay, bx, by, o, circles, edges, edge_start, grow, box, eps):
+def segment_blocked(ax, ay, bx, by, blockers):
+    """Whether the segment ab enters any of the blockers by more than eps."""
+    box = blockers.box
+    left, right, low, high = min(ax, bx), max(ax, bx), min(ay, by), max(ay, by)
+    for o in range(len(box)):
+        if right < box[o, 0] or left > box[o, 2] or high < box[o, 1] or low > box[o, 3]:
+            continue
+        if enters_obstacle(ax, ay, bx, by, o, blockers):
             return True
     return False
 

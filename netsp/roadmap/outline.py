@@ -15,15 +15,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from netsp.arrays import Floats, Ints
+from netsp.arrays import Floats
 from netsp.compiled.growing import more_rows, sort_in_place
 from netsp.geometry.kernels import (
     TWO_PI,
+    Blockers,
     circle_circle_angles,
     circle_line_angles,
     depth_in_obstacle,
@@ -41,44 +43,19 @@ tangents are well conditioned even at the tiny arcs of a polygon without clearan
 no length changes by more."""
 
 
-@dataclass(frozen=True)
-class Blockers:
-    """Grown obstacles as arrays for the kernels of `netsp.geometry.kernels`."""
+@njit(cache=True)
+def depths(x, y, blockers):
+    """(n,) depth of a point in each grown obstacle, negative outside."""
+    out = np.empty(len(blockers.grow))
+    for o in range(len(out)):
+        out[o] = depth_in_obstacle(x, y, o, blockers)
+    return out
 
-    circles: Floats
-    edges: Floats
-    edge_start: Ints
-    grow: Floats
-    box: Floats
-    eps: float
 
-    def segment_blocked(self, a: npt.ArrayLike, b: npt.ArrayLike) -> bool:
-        """Whether the open segment enters a grown obstacle."""
-        (ax, ay), (bx, by) = np.asarray(a, dtype=float)[:2], np.asarray(b, dtype=float)[:2]
-        return bool(
-            segment_blocked(
-                ax,
-                ay,
-                bx,
-                by,
-                self.circles,
-                self.edges,
-                self.edge_start,
-                self.grow,
-                self.box,
-                self.eps,
-            )
-        )
-
-    def depth(self, point: npt.ArrayLike) -> Floats:
-        """(n,) depth of a point in each grown obstacle, negative outside."""
-        x, y = np.asarray(point, dtype=float)[:2]
-        return np.array(
-            [
-                depth_in_obstacle(x, y, o, self.circles, self.edges, self.edge_start, self.grow)
-                for o in range(len(self.circles))
-            ]
-        )
+def is_free(points: Floats, blockers: Blockers) -> bool:
+    """Whether a polyline (k, 2 or 3) enters no grown obstacle."""
+    xy = np.asarray(points, dtype=float)[:, :2]
+    return not any(segment_blocked(*p, *q, blockers) for p, q in pairwise(xy))
 
 
 @dataclass(frozen=True)
@@ -115,16 +92,7 @@ def build_outline(problem: Problem) -> Outline:
     blockers, disks = _grow(problem, origin, problem.clearance + margin, eps)
     bounds = np.array(problem.bounds if problem.bounds else (-np.inf, -np.inf, np.inf, np.inf))
     bounds = bounds - np.tile(origin, 2)
-    rows = _visible_arcs(
-        disks,
-        blockers.circles,
-        blockers.edges,
-        blockers.edge_start,
-        blockers.grow,
-        blockers.box,
-        bounds,
-        eps,
-    )
+    rows = _visible_arcs(disks, blockers, bounds)
     places = problem.points[:, :2] - origin
     points = np.array([_push_out(p, blockers, STAND_OFF * scale) for p in places])
     rays = problem.representative_points - origin
@@ -180,7 +148,7 @@ def _push_out(point: Floats, blockers: Blockers, distance: float) -> Floats:
     """Move a point that lies on a grown boundary, or nearly, to a distance from it."""
     p = np.array(point, dtype=float)
     for _ in range(32):
-        depth = blockers.depth(p)
+        depth = depths(p[0], p[1], blockers)
         if len(depth) == 0 or depth.max() <= -0.5 * distance:
             break
         o = int(np.argmax(depth))
@@ -213,22 +181,25 @@ def _push_out_of_polygon(p: Floats, o: int, blockers: Blockers, stand_off: float
 
 
 @njit(cache=True)
-def _covered(x, y, circles, edges, edge_start, grow, box, bounds, eps):
+def _covered(x, y, blockers, bounds):
+    box, eps = blockers.box, blockers.eps
     if x < bounds[0] - eps or x > bounds[2] + eps or y < bounds[1] - eps or y > bounds[3] + eps:
         return True
-    for o in range(len(circles)):
+    for o in range(len(box)):
         if (
             box[o, 0] <= x <= box[o, 2]
             and box[o, 1] <= y <= box[o, 3]
-            and depth_in_obstacle(x, y, o, circles, edges, edge_start, grow) > eps
+            and depth_in_obstacle(x, y, o, blockers) > eps
         ):
             return True
     return False
 
 
 @njit(cache=True)
-def _visible_arcs(disks, circles, edges, edge_start, grow, box, bounds, eps):
+def _visible_arcs(disks, blockers, bounds):
     """The parts of each disk's cone that no other obstacle covers and that lie within bounds."""
+    circles, edges, edge_start = blockers.circles, blockers.edges, blockers.edge_start
+    grow, box, eps = blockers.grow, blockers.box, blockers.eps
     arcs = np.empty((16, 6))  # the sixth column tells a whole circle
     zero = np.int64(0)  # no literal: numba would compile every callee for it once more
     count = zero
@@ -278,15 +249,7 @@ def _visible_arcs(disks, circles, edges, edge_start, grow, box, bounds, eps):
         for i in range(m - 1):
             mid = 0.5 * (inside[i] + inside[i + 1])
             hidden = inside[i + 1] <= inside[i] or _covered(
-                cx + r * math.cos(mid),
-                cy + r * math.sin(mid),
-                circles,
-                edges,
-                edge_start,
-                grow,
-                box,
-                bounds,
-                eps,
+                cx + r * math.cos(mid), cy + r * math.sin(mid), blockers, bounds
             )
             if inside[i + 1] <= inside[i]:
                 continue

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
 
@@ -14,7 +13,7 @@ from netsp.errors import InputError, NetspError
 from netsp.hsignature import Word
 from netsp.problem import Problem
 from netsp.roadmap.explore import run_explore
-from netsp.roadmap.outline import Outline, build_outline
+from netsp.roadmap.outline import Outline, build_outline, is_free
 from netsp.roadmap.shortest import ContactGraph
 from netsp.roadmap.tangents import ARC_STEP, TangentGraph, build_tangents
 from netsp.roadmap.trie import Trie
@@ -120,7 +119,7 @@ class TautPaths:
         step = ARC_STEP
         for _ in range(12):
             xy = self._draw(a, b, pieces, step)
-            if not any(self.outline.blockers.segment_blocked(p, q) for p, q in pairwise(xy)):
+            if is_free(xy, self.outline.blockers):
                 break
             step /= 2.0
         return xy

@@ -303,11 +303,10 @@ def _sample(
         bounds.setHigh(k, float(high[k]))
     space.setBounds(bounds)
     info = ob.SpaceInformation(space)
-    b = outline.blockers
-    arrays = (b.circles, b.edges, b.edge_start, b.grow, b.box)
+    blockers = outline.blockers
 
     def is_valid(state: Any) -> bool:
-        return bool(_point_free(state[0], state[1], *arrays))
+        return bool(_point_free(state[0], state[1], blockers))
 
     info.setStateValidityChecker(is_valid)
     info.setStateValidityCheckingResolution(0.99)  # ends only: `_exactly_free` checks the rest
@@ -350,32 +349,30 @@ def _join(milestones: Floats, fixed: int) -> Ints:
 
 def _exactly_free(edges: Ints, milestones: Floats, outline: Outline) -> Ints:
     """The edges whose segment enters no grown obstacle."""
-    b = outline.blockers
-    free = _free_edges(edges, milestones, b.circles, b.edges, b.edge_start, b.grow, b.box, b.eps)
-    return np.asarray(edges[free])
+    return np.asarray(edges[_free_edges(edges, milestones, outline.blockers)])
 
 
 @njit(cache=True)
-def _point_free(x, y, circles, edges, edge_start, grow, box):
-    for o in range(len(circles)):
+def _point_free(x, y, blockers):
+    box = blockers.box
+    for o in range(len(box)):
         if (
             box[o, 0] <= x <= box[o, 2]
             and box[o, 1] <= y <= box[o, 3]
-            and depth_in_obstacle(x, y, o, circles, edges, edge_start, grow) > 0.0
+            and depth_in_obstacle(x, y, o, blockers) > 0.0
         ):
             return False
     return True
 
 
 @njit(cache=True)
-def _free_edges(pairs, points, circles, edges, edge_start, grow, box, eps):
+def _free_edges(pairs, points, blockers):
     out = np.empty(len(pairs), dtype=np.bool_)
     for k in range(len(pairs)):
         a, b = pairs[k, 0], pairs[k, 1]
         out[k] = not segment_blocked(
-            points[a, 0], points[a, 1], points[b, 0], points[b, 1],
-            circles, edges, edge_start, grow, box, eps,
-        )  # fmt: skip
+            points[a, 0], points[a, 1], points[b, 0], points[b, 1], blockers
+        )
     return out
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from itertools import pairwise
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -12,7 +11,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from netsp.arrays import Floats, Ints
-from netsp.roadmap.outline import Outline
+from netsp.roadmap.outline import Outline, is_free
 from netsp.roadmap.tangents import ARC_STEP, TangentGraph, build_tangents
 
 
@@ -106,8 +105,7 @@ class ContactGraph:
         step = ARC_STEP
         for _ in range(12):
             xy = self._polyline(nodes, step)
-            blockers = self.outline.blockers
-            if not any(blockers.segment_blocked(p, q) for p, q in pairwise(xy)):
+            if is_free(xy, self.outline.blockers):
                 break
             step /= 2.0
         # drawn from where points on a boundary stand off; their places decide sides of rays

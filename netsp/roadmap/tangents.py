@@ -89,7 +89,6 @@ def build_tangents(outline: Outline, reach: float, stop: Flag = NEVER) -> Tangen
     Nothing farther from the base than the tether is ever touched: a leg between two admissible
     goals stays in the ball of that radius, which is convex in the covering space.
     """
-    b = outline.blockers
     base = outline.points[0]
     if np.isfinite(reach):
         near = np.hypot(*(outline.arcs[:, :2] - base).T) - outline.arcs[:, 2] <= reach
@@ -99,20 +98,7 @@ def build_tangents(outline: Outline, reach: float, stop: Flag = NEVER) -> Tangen
     place = np.zeros((len(arcs) + len(outline.points), 5))
     place[: len(arcs)] = arcs
     place[len(arcs) :, :2] = outline.points
-    rows = _tangents(
-        place,
-        len(arcs),
-        full,
-        base,
-        reach,
-        b.circles,
-        b.edges,
-        b.edge_start,
-        b.grow,
-        b.box,
-        b.eps,
-        stop,
-    )
+    rows = _tangents(place, len(arcs), full, base, reach, outline.blockers, stop)
     source, target = rows[:, 0].astype(np.int64), rows[:, 1].astype(np.int64)
     key, arrival_key, length = rows[:, 2], rows[:, 3], rows[:, 4]
     ends, angle = np.ascontiguousarray(rows[:, 5:9]), np.ascontiguousarray(rows[:, 9:])
@@ -251,9 +237,10 @@ def _key(theta, sense, start, end, full):
 
 
 @njit(cache=True)
-def _tangents(place, a_count, full, base, reach, circles, edges, edge_start, grow, box, eps, stop):
+def _tangents(place, a_count, full, base, reach, blockers, stop):
     """All free directed segments between arcs and points, unsorted: rows of source, target, key,
     arrival key, length, ends (4), angles (2). place : arcs, then points as arcs of radius 0."""
+    eps = blockers.eps
     out = np.empty((256, 11))
     n = 0
     total = len(place)
@@ -300,7 +287,7 @@ def _tangents(place, a_count, full, base, reach, circles, edges, edge_start, gro
                         or math.hypot(bx - base[0], by - base[1]) > reach
                     ):
                         continue
-                    if segment_blocked(ax, ay, bx, by, circles, edges, edge_start, grow, box, eps):
+                    if segment_blocked(ax, ay, bx, by, blockers):
                         continue
                     node_i = 2 * i + ti if i < a_count else a_count + i
                     node_j = 2 * j + tj if j < a_count else a_count + j
