@@ -6,6 +6,7 @@ import math
 import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -25,6 +26,20 @@ from netsp.travel.graph import UNTIMED
 
 BLOCK = 256
 """Rows of a matrix that are worked on at a time, so that what is in between stays small."""
+
+
+class Tethers(NamedTuple):
+    """Vertices for the kernel: words as rows of `letters` from row[v] to row[v + 1], cluster,
+    planar tether length, last bend; and of the bends (`TetherTree`) parent, depth and length."""
+
+    letters: Ints
+    row: Ints
+    cluster: Ints
+    planar: Floats
+    last: Ints
+    parent: Ints
+    depth: Ints
+    length: Floats
 
 
 class TautLegs:
@@ -74,7 +89,10 @@ class TautLegs:
         flat = [np.array(self.signatures[v], dtype=np.int64) for v in vertices]
         row = np.concatenate([[0], np.cumsum([len(w) for w in flat])]).astype(np.int64)
         letters = np.concatenate(flat).astype(np.int64) if row[-1] else np.zeros(0, np.int64)
-        planar, last = self.planar[vertices], self._tree.last[vertices]
+        tethers = Tethers(
+            letters, row, cluster, self.planar[vertices], self._tree.last[vertices],
+            self._tree.parent, self._tree.depth, self._tree.length,
+        )  # fmt: skip
         if asked is None:
             asked = np.ones(out.shape, dtype=bool)
         goals = np.unique(cluster)
@@ -85,11 +103,9 @@ class TautLegs:
             if len(there) == 0 or stop[0]:
                 return
             if g == 0:
-                block = np.broadcast_to(planar[there], (len(here), len(there)))
+                block = np.broadcast_to(tethers.planar[there], (len(here), len(there)))
             else:
-                block = self._legs_from(
-                    g, here, there, asked, letters, row, planar, cluster, last, stop
-                )
+                block = self._legs_from(g, here, there, asked, tethers, stop)
             block = np.hypot(block, (self._z[g] - self._z[cluster[there]])[None, :])
             out[np.ix_(here, there)] = block
             out[np.ix_(there, here)] = block.T
@@ -104,33 +120,11 @@ class TautLegs:
         return out
 
     def _legs_from(
-        self,
-        g: int,
-        here: Ints,
-        there: Ints,
-        asked: Bools,
-        letters: Ints,
-        row: Ints,
-        planar: Floats,
-        cluster: Ints,
-        last: Ints,
-        stop: Flag,
+        self, g: int, here: Ints, there: Ints, asked: Bools, tethers: Tethers, stop: Flag
     ) -> Floats:
         """(len(here), len(there)) planar lengths of all legs from the classes of goal g."""
         nodes, limit, size, head, entry_goal, entry_next, pair = _wanted(
-            here,
-            there,
-            asked,
-            letters,
-            row,
-            planar,
-            cluster,
-            last,
-            self._tree.parent,
-            self._tree.depth,
-            self._tree.length,
-            self.paths.margin,
-            self.paths.tangents.pending,
+            here, there, asked, tethers, self.paths.margin, self.paths.tangents.pending
         )
         hits = run_explore(
             self.paths.tangents,
@@ -149,7 +143,7 @@ class TautLegs:
             u, w = np.argwhere(pair == k)[0]
             raise NetspError(
                 f"internal: no taut leg found between goal {g - 1} and goal "
-                f"{cluster[there[w]] - 1} for word "
+                f"{tethers.cluster[there[w]] - 1} for word "
                 f"{self.relative_word(int(here[u]), int(there[w]))}; please report the problem file"
             )
         return np.where(pair >= 0, np.append(found, np.inf)[pair], np.inf)
@@ -229,13 +223,44 @@ class TautLegs:
 
 
 @njit(cache=True, nogil=True)
-def _wanted(
-    here, there, asked, letters, row, planar, cluster, last, parent, depth, length, margin, pending
-):  # fmt: skip
+def _together(u, v, last, parent, depth):
+    """The last bend that the tethers of two vertices share."""
+    s, t = last[u], last[v]
+    while s != t:
+        if depth[s] >= depth[t]:
+            s = parent[s]
+        else:
+            t = parent[t]
+    return s
+
+
+@njit(cache=True, nogil=True)
+def _shared(u, v, letters, row):
+    """How many letters two words begin with in common."""
+    n = min(row[u + 1] - row[u], row[v + 1] - row[v])
+    for k in range(n):
+        if letters[row[u] + k] != letters[row[v] + k]:
+            return k
+    return n
+
+
+@njit(cache=True, nogil=True)
+def _entry(goal, node, head, entry):
+    """The entry of a goal in a node's list, -1 if there is none."""
+    e = head[node, 0]
+    while e >= 0 and entry[e, 0] != goal:
+        e = entry[e, 1]
+    return e
+
+
+@njit(cache=True, nogil=True)
+def _wanted(here, there, asked, tethers, margin, pending):
     """The trie of all relative words between two lists of vertices.
 
     Returns the trie, per node the head of a list of (goal, entry), and the entry of each pair.
     """
+    letters, row, cluster, planar = tethers.letters, tethers.row, tethers.cluster, tethers.planar
+    last, parent, depth, length = tethers.last, tethers.parent, tethers.depth, tethers.length
     trie = np.full((256, 5), -1, dtype=np.int64)
     limit = np.zeros(256)
     trie[0, LETTER], trie[0, CORE] = 0, 1
@@ -243,40 +268,30 @@ def _wanted(
     size = one
     head = np.full((256, 1), -1, dtype=np.int64)
     entry = np.empty((1024, 2), dtype=np.int64)
-    entries = 0
-    pair = np.empty((len(here), len(there)), dtype=np.int64)
+    entries = zero
+    pair = np.full((len(here), len(there)), -1, dtype=np.int64)
     for a in range(len(here)):
         u = here[a]
         for b in range(len(there)):
             v = there[b]
             if not asked[u, v]:
-                pair[a, b] = -1
                 continue
-            nu, nv = row[u + 1] - row[u], row[v + 1] - row[v]
-            shared = 0
-            while (
-                shared < nu and shared < nv and letters[row[u] + shared] == letters[row[v] + shared]
-            ):
-                shared += 1
-            # the two tethers run together up to where they part, and a leg need not go back so far
-            s, t = last[u], last[v]
-            while s != t:
-                if depth[s] >= depth[t]:
-                    s = parent[s]
-                else:
-                    t = parent[t]
-            bound = planar[u] + planar[v] - 2.0 * length[s] + margin
-            node = zero
-            limit[0] = max(limit[0], bound)
-            while size + nu + nv >= len(trie):
+            # the tethers run together up to where they part, and a leg need not go back so far
+            part = length[_together(u, v, last, parent, depth)]
+            bound = planar[u] + planar[v] - 2.0 * part + margin
+            shared = _shared(u, v, letters, row)
+            back, on = row[u + 1] - row[u] - shared, row[v + 1] - row[v] - shared
+            while size + back + on >= len(trie):
                 trie = more_int_rows(trie)
                 limit = longer(limit)
                 head = more_int_rows(head)
-            for k in range(nu + nv - 2 * shared):
-                if k < nu - shared:
+            node = zero
+            limit[0] = max(limit[0], bound)
+            for k in range(back + on):
+                if k < back:
                     x = -letters[row[u + 1] - 1 - k]
                 else:
-                    x = letters[row[v] + shared + k - (nu - shared)]
+                    x = letters[row[v] + shared + k - back]
                 c = trie_child(node, x, trie)
                 if c < 0:
                     c = size
@@ -287,16 +302,13 @@ def _wanted(
                 elif limit[c] < bound:
                     limit[c] = bound
                 node = c
-            goal = cluster[v]
-            e = head[node, 0]
-            while e >= 0 and entry[e, 0] != goal:
-                e = entry[e, 1]
+            e = _entry(cluster[v], node, head, entry)
             if e < 0:
                 if entries == len(entry):
                     entry = more_int_rows(entry)
                 e = entries
                 entries += 1
-                entry[e, 0], entry[e, 1] = goal, head[node, 0]
+                entry[e, 0], entry[e, 1] = cluster[v], head[node, 0]
                 head[node, 0] = e
             pair[a, b] = e
     # a path may stand on a longer word whose last letters it will still cancel
