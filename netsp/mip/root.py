@@ -8,7 +8,7 @@ What is ruled out is forgotten, so the rounds get cheaper as the proof gets clos
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -39,9 +39,50 @@ MIX = 0.6
 SHRINK = 0.85
 """Vertices are forgotten when no more than this share of them is left."""
 
-PATIENCE, WORTH = 15, 0.02
+LEAN = 0.3
+"""Dead legs leave the LP when they are more than this share of it."""
+
+PATIENCE, MEASURED_PATIENCE, WORTH = 15, 60, 0.02
 """On bounds of legs, the root ends when so many looks at the prices closed less than this share of
-the gap; on lengths it has four times the patience, for nothing but branching comes after it."""
+the gap; on measured legs it has more patience, for nothing but branching comes after it."""
+
+HARDLY, RISEN = 0.002, 1e-6
+"""A look that brings a smaller share of legs than the first is idle, unless it closes the gap; the
+bound has risen if by more than the second share."""
+
+TINY = 1e-9
+"""Relative: reduced costs and visits smaller than this are rounding."""
+
+
+@dataclass
+class Pace:
+    """When to look at the prices of all legs, and when to give up.
+
+    rounds : of the LP since the last look. every : so many make the next one due. gaps : after
+    every look.
+    """
+
+    rounds: int = 0
+    every: int = PRICE_EVERY
+    gaps: list[float] = field(default_factory=list)
+
+    @property
+    def look_is_due(self) -> bool:
+        """At first, and whenever enough rounds have passed."""
+        return self.rounds % self.every == 0
+
+    def looked(self, *, idle: bool) -> None:
+        """Looks that bring nothing become seldom."""
+        self.rounds = 1
+        self.every = min(2 * self.every, PRICE_SELDOM) if idle else PRICE_EVERY
+
+    def stalled(self, gap: float, patience: int) -> bool:
+        """Whether the last so many looks closed hardly anything of the gap."""
+        self.gaps.append(gap)
+        if len(self.gaps) <= patience:
+            return False
+        before = self.gaps[-1 - patience]
+        return before - gap < WORTH * before
 
 
 @dataclass(frozen=True)
@@ -111,57 +152,56 @@ class Root:
     def solve(self) -> None:
         """Rounds of LP, pricing, elimination and separation, until there is nothing to add or
         progress stalls."""
-        run = self.run
-        gaps: list[float] = []
-        since, every = 0, PRICE_EVERY
+        run, pace = self.run, Pace()
         while not run.done:
-            run.check()
-            point = self.lp.solve(run.clock.left)
-            run.iterations += 1
-            if point is None:
-                # without an incumbent all legs are in the program from the start
-                run.infeasible = self.lp.infeasible and run.tour is None
-                raise Stop
-            self.point = point
-            priced = False
-            cuts: list[Cut] = []
-            if since % every:
+            point = self._relaxed()
+            if not pace.look_is_due:
+                pace.rounds += 1
                 cuts = self._separate(point)
-            since += 1
-            if cuts:
-                self._purge(point, False)
-                self.lp.add_cuts(cuts)
-                continue
-            since = 1
-            before, legs = run.bound or 0.0, len(self.lp.legs)
-            priced = self._price(point)
-            brought = len(self.lp.legs) - legs if self.point is not None else legs
-            idle = brought < 0.002 * legs and (
-                (run.bound or 0.0) - before < WORTH * (run.length - before)
-            )
-            every = min(2 * every, PRICE_SELDOM) if idle else PRICE_EVERY
-            risen = (run.bound or 0.0) > before + 1e-6 * abs(before)
-            if self.point is None:  # vertices were forgotten; the LP must be solved anew
-                run.report("root", **self.size())
-                continue
-            self.offer(self, point)
+                if cuts:
+                    self._purge(point, risen=False)
+                    self.lp.add_cuts(cuts)
+                    continue
+            priced, risen = self._look(point, pace)
+            if self.point is not None:
+                self.offer(self, point)
             run.report("root", **self.size())
             if run.done:
                 return
-            if self._missing_tour_legs():
-                continue  # a new incumbent came with legs the LP has not seen
+            if self.point is None or self._missing_tour_legs():
+                continue  # vertices were forgotten, or a new incumbent came with legs of its own
             cuts = self._separate(point)
-            if not priced and not cuts:
+            patience = PATIENCE if self.costs.exact is not None else MEASURED_PATIENCE
+            stalled = pace.stalled(run.length - (run.bound or 0.0), patience)
+            if not priced and (stalled or not cuts):
                 return
-            gaps.append(run.length - (run.bound or 0.0))
-            patience = 4 * PATIENCE if self.costs.exact is None else PATIENCE
-            slow = len(gaps) > patience and (
-                gaps[-1 - patience] - gaps[-1] < WORTH * gaps[-1 - patience]
-            )
-            if slow and not priced:
-                return
-            self._purge(point, risen)
+            self._purge(point, risen=risen)
             self.lp.add_cuts(cuts)
+
+    def _relaxed(self) -> Point:
+        """The next point of the LP; Stop when there is none."""
+        run = self.run
+        run.check()
+        point = self.lp.solve(run.clock.left)
+        run.iterations += 1
+        if point is None:
+            # without an incumbent all legs are in the program from the start
+            run.infeasible = self.lp.infeasible and run.tour is None
+            raise Stop
+        self.point = point
+        return point
+
+    def _look(self, point: Point, pace: Pace) -> tuple[bool, bool]:
+        """Look at the prices of all legs; whether any came into the LP, and whether the bound has
+        risen."""
+        run = self.run
+        before, legs = run.bound or 0.0, len(self.lp.legs)
+        priced = self._price(point)
+        risen = (run.bound or 0.0) - before
+        # where vertices were forgotten the legs are counted anew
+        brought = len(self.lp.legs) - legs if self.point is not None else legs
+        pace.looked(idle=brought < HARDLY * legs and risen < WORTH * (run.length - before))
+        return priced, risen > RISEN * abs(before)
 
     def measure(self) -> None:
         """Measure all legs that are not ruled out."""
@@ -231,7 +271,7 @@ class Root:
         candidate[np.tril_indices(len(candidate))] = np.inf
         candidate[self.lp.legs[:, 0], self.lp.legs[:, 1]] = np.inf
         scale = run.length if run.tour is not None else float(self.costs.values[0, 1:].max())
-        new = self._most_negative(candidate, 1e-9 * scale)
+        new = self._most_negative(candidate, TINY * scale)
         if len(new):
             self.lp.add_legs(new, self.costs.values[new[:, 0], new[:, 1]])
         self._forget()
@@ -271,7 +311,7 @@ class Root:
         legs = self.lp.legs
         keep = ~self.dead[legs[:, 0], legs[:, 1]]
         keep |= np.isin(self._keys(legs), self._keys(tour_legs(tour)))
-        if (~keep).sum() > 0.3 * len(keep):
+        if (~keep).sum() > LEAN * len(keep):
             self.lp.keep_legs(keep)
         alive = ~self.dead.all(axis=1) | in_tour
         alive[0] = True
@@ -289,7 +329,7 @@ class Root:
         cluster = self.costs.cluster
         tour = tour_legs(self.tour())
         # visited by the point or by the incumbent
-        visited = np.union1d(np.flatnonzero(point.x > 1e-9), self.tour())
+        visited = np.union1d(np.flatnonzero(point.x > TINY), self.tour())
         near = visited[np.argmin(self.costs.values[:, visited], axis=1)]
         near[visited] = visited
         if len(tour):
@@ -303,7 +343,7 @@ class Root:
         cuts = fractional_cuts(point.x, point.legs, point.y, cluster, self.branch, near)
         return cuts or blossom_cuts(point.legs, point.y, cluster)
 
-    def _purge(self, point: Point, risen: bool) -> None:
+    def _purge(self, point: Point, *, risen: bool) -> None:
         """Count how long cuts have done nothing, and take the idle ones out of the LP, but only
         when the bound has risen: on a plateau they would only come back."""
         assert point.slack is not None
