@@ -11,7 +11,7 @@ import numpy as np
 from table import ROOT, head, heading, row
 
 from netsp import Problem, Solution, solve
-from netsp.execute import Options, Surprises, execute
+from netsp.execute import ExecutionOptions, Surprises, execute
 from netsp.execute.log import Execution
 from netsp.online.mission import Mission
 from netsp.online.order import Ordered, reorder
@@ -102,9 +102,11 @@ def main() -> None:
     for seed in range(args.worlds):
         problem = random_world(goals=args.goals, tether_length=args.tether, seed=seed)
         solution = solve(problem)
-        plain.append(execute(problem, solution, Options(speed=SPEED)))
+        plain.append(execute(problem, solution, ExecutionOptions(speed=SPEED)))
         events = surprise(problem, solution, seed)
-        surprised.append(execute(problem, solution, Options(speed=SPEED), surprises=events))
+        surprised.append(
+            execute(problem, solution, ExecutionOptions(speed=SPEED), surprises=events)
+        )
     head(
         "worlds", "all good", "never over the limit", "words as planned", "home and free",
         "path over plan % (median; worst)", "goals left out", "done about it",

@@ -15,7 +15,7 @@ from table import head, heading, row
 
 from netsp.online import Scene
 from netsp.online.mission import Camera, Mission
-from netsp.online.planner import Options
+from netsp.online.planner import PlannerOptions
 from netsp.online.simulate import simulate
 
 HERE = Path(__file__).parent.parent / "missions"
@@ -28,7 +28,7 @@ def fly(
     tether_model: str = "geodesic", **how,
 ):  # fmt: skip
     return simulate(
-        mission, planner, vehicle=vehicle, tether=tether_model, options=Options(**how),
+        mission, planner, vehicle=vehicle, tether=tether_model, options=PlannerOptions(**how),
         scene=scene, field=field,
         snap=True, seed=seed,
     ).summary  # fmt: skip

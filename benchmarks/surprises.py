@@ -25,7 +25,7 @@ from table import ROOT, head, heading, row
 
 from netsp import Circle, Problem, Solution, solve
 from netsp.errors import NetspError
-from netsp.execute import Options, Surprises, execute
+from netsp.execute import ExecutionOptions, Surprises, execute
 from netsp.execute.log import Execution
 from netsp.online.tether.resolution import suggested_delta
 from netsp.worlds import random_world
@@ -208,7 +208,7 @@ def run(index: int, kind: str, **options: float) -> tuple[Execution, list[str]] 
     events = surprise(problem, solution, kind, index)
     if events is None or solution.length is None:
         return None
-    how = replace(Options(speed=speed_of(solution)), **options)
+    how = replace(ExecutionOptions(speed=speed_of(solution)), **options)
     done = execute(problem, solution, how, surprises=events)
     return done, faults(done)
 

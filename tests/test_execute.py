@@ -10,13 +10,13 @@ import pytest
 
 from netsp import Circle, InputError, Problem, Solution, solve
 from netsp.command.main import main
-from netsp.execute import Options, Surprises, execute
+from netsp.execute import ExecutionOptions, Surprises, execute
 from netsp.execute.plan import HOME, legs_of
 from netsp.execute.repair import broken
 from netsp.worlds import random_world
 
 PROBLEMS = Path(__file__).parent.parent / "problems"
-FAST = Options(speed=1.0)
+FAST = ExecutionOptions(speed=1.0)
 
 
 @pytest.fixture(scope="module")
@@ -93,7 +93,9 @@ def test_an_obstacle_within_the_loop_would_be_wrapped_and_is_not():
     run = execute(problem, solution, FAST, surprises=events(inside))
     check(run, 2)
     assert "would not come home free" in run.entries[0].reason
-    blind = execute(problem, solution, Options(speed=1.0, repair=False), surprises=events(inside))
+    blind = execute(
+        problem, solution, ExecutionOptions(speed=1.0, repair=False), surprises=events(inside)
+    )
     assert not blind.summary["tether_free"]
 
 
@@ -179,7 +181,7 @@ def test_a_dynamic_vehicle_in_a_current_carries_it_out_too():
     problem = Problem.load(PROBLEMS / "wharf.json")
     run = execute(
         problem, solve(problem),
-        Options(vehicle="bluerov2", speed=0.4, current=(0.05, 0.03, 0.0), gusts=0.02),
+        ExecutionOptions(vehicle="bluerov2", speed=0.4, current=(0.05, 0.03, 0.0), gusts=0.02),
     )  # fmt: skip
     s = run.summary
     assert s["visited"] == len(problem.goals)
@@ -302,12 +304,16 @@ def test_a_push_ends_where_the_tether_holds():
 
 def test_without_repair_nothing_is_mended_and_nothing_forgotten():
     what = [{"time": 1.0, "add_goal": [5, 5]}, {"time": 2.0, "cancel_goal": 0}]
-    run = execute(CORNER, solve(CORNER), Options(speed=1.0, repair=False), surprises=events(*what))
+    run = execute(
+        CORNER, solve(CORNER), ExecutionOptions(speed=1.0, repair=False), surprises=events(*what)
+    )
     assert run.summary["visited"] == 2
     assert not run.cancelled
     assert "not mended" in run.lost[2]
     wall = {"time": 1.0, "appear": {"polygon": [[10, -40], [12, -40], [12, 40], [10, 40]]}}
-    run = execute(CORNER, solve(CORNER), Options(speed=1.0, repair=False), surprises=events(wall))
+    run = execute(
+        CORNER, solve(CORNER), ExecutionOptions(speed=1.0, repair=False), surprises=events(wall)
+    )
     assert set(run.lost) == {0, 1}
     assert {e.done for e in run.entries} == {"ignored"}
 
@@ -322,7 +328,7 @@ def test_events_after_the_end_are_said_to_be():
 def test_a_resolution_that_obstacles_slip_through_is_refused():
     problem = Problem.load(PROBLEMS / "wharf.json")
     with pytest.raises(InputError, match=r"delta: expected at most 0\.6667"):
-        execute(problem, solve(problem), Options(delta=1000.0))
+        execute(problem, solve(problem), ExecutionOptions(delta=1000.0))
 
 
 def test_a_repair_in_the_same_order_starts_at_the_robot(world):
@@ -367,7 +373,9 @@ def test_a_defect_is_no_reason_it_is_counted_and_told_by_the_exit_code(
 def test_planning_takes_its_time_and_the_robot_holds_its_place(world):
     problem, solution = world
     push = events({"time": 30.0, "push": [4.0, 4.0, 0.0]})
-    run = execute(problem, solution, Options(speed=1.0, planning_limit=1.5), surprises=push)
+    run = execute(
+        problem, solution, ExecutionOptions(speed=1.0, planning_limit=1.5), surprises=push
+    )
     check(run, 8)
     held = [r for r in run.rows if r.mode == "hold"]
     assert held[-1].time - held[0].time == pytest.approx(1.5, abs=0.2)

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from netsp import Circle, InputError, Problem, Solution, solve, verify
 from netsp.command.main import main
 from netsp.errors import brief
-from netsp.execute import Options, Surprises, execute
+from netsp.execute import ExecutionOptions, Surprises, execute
 from netsp.files import cell, read_gzip, write_text
 from netsp.online.mission import Mission
 from netsp.pictures.style import literal
@@ -205,7 +205,7 @@ def test_missions_of_absurd_size_are_refused(change, tmp_path, capsys):
 def test_pushes_and_moves_of_any_length_end(event):
     problem = nasty("pile")
     events = Surprises.model_validate({"schema_version": 1, "events": [{"time": 3, **event}]})
-    run = execute(problem, solve(problem), Options(speed=0.5), surprises=events)
+    run = execute(problem, solve(problem), ExecutionOptions(speed=0.5), surprises=events)
     assert run.summary["home"]
     assert run.summary["tether_free"]
     assert run.summary["exceedance_s"] == 0.0

@@ -10,7 +10,7 @@ import pytest
 from netsp.command.main import main
 from netsp.online import Scene
 from netsp.online.mission import Mission
-from netsp.online.order import reorder, travel_graph
+from netsp.online.order import reorder, waypoint_graph
 from netsp.online.simulate import grid_of, simulate
 
 MISSIONS = Path(__file__).parent.parent / "missions"
@@ -52,7 +52,7 @@ def test_legs_never_cost_more_than_by_the_anchor_and_never_less_than_straight(ri
     mission = Mission.load(rings)
     scene = mission.load_scene()
     field = scene.field()
-    graph, points, reached = travel_graph(mission, field, grid_of(mission, scene, field))
+    graph, points, reached = waypoint_graph(mission, field, grid_of(mission, scene, field))
     costs, home = graph.costs, graph.costs_to_base
     places = np.array([mission.anchor, *mission.waypoints])
     assert len(reached) == 36

@@ -6,11 +6,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp import InputError
+from netsp.geometry import polylines
 from netsp.online import Scene
 from netsp.online.paths.refine import REFINEMENTS, clear, refined, smoothed
 from netsp.online.paths.sampled import OMPL_PLANNERS, SampledPaths
-from netsp.online.paths.tree import Grid, homotopic, length_of, taut
-from netsp.online.planner import Options, make_planner
+from netsp.online.paths.tree import Grid, homotopic, taut
+from netsp.online.planner import PlannerOptions, make_planner
 
 POST = Scene(solids=[{"post": {"center": [0, 0], "radius": 0.5}}], bounds=(-3, -3, -1, 3, 3, 1))
 FIELD = POST.field()
@@ -64,13 +65,13 @@ def test_sampled_ways_are_free_repeatable_and_no_shorter_than_the_shortest(name)
     assert clear(FIELD, path, 0.1)
     # round a cylinder of radius 0.7: two tangents and an arc
     shortest = 2 * np.sqrt(1.5**2 - 0.7**2) + 0.7 * (np.pi - 2 * np.arccos(0.7 / 1.5))
-    assert shortest - 0.06 <= length_of(path) < 2.5 * shortest
+    assert shortest - 0.06 <= polylines.length(path) < 2.5 * shortest
 
 
 def test_taut_ways_have_the_closed_form():
     path = arc(1.5)
     shortest = 2 * np.sqrt(1.5**2 - 0.7**2) + 0.7 * (np.pi - 2 * np.arccos(0.7 / 1.5))
-    assert length_of(taut(FIELD, path, 0.2, 0.05)) == pytest.approx(shortest, rel=5e-3)
+    assert polylines.length(taut(FIELD, path, 0.2, 0.05)) == pytest.approx(shortest, rel=5e-3)
 
 
 def test_ways_on_different_sides_of_a_post_are_told_apart():
@@ -82,8 +83,8 @@ def test_ways_on_different_sides_of_a_post_are_told_apart():
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (Options(paths="straight"), "paths: expected tree, rrtstar, bitstar, prmstar"),
-        (Options(refine="polish"), "refine: expected none, paper, gradient"),
+        (PlannerOptions(paths="straight"), "paths: expected tree, rrtstar, bitstar, prmstar"),
+        (PlannerOptions(refine="polish"), "refine: expected none, paper, gradient"),
     ],
 )
 def test_unknown_options_are_named(options, message):

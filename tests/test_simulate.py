@@ -12,9 +12,10 @@ from hypothesis import strategies as st
 
 from netsp import InputError
 from netsp.command.main import main
+from netsp.geometry import polylines
 from netsp.online import Scene
 from netsp.online.mission import Mission
-from netsp.online.paths.tree import Grid, ShortestTree, length_of, taut
+from netsp.online.paths.tree import Grid, ShortestTree, taut
 from netsp.online.planner import PLANNERS
 from netsp.online.scene.field import pushed_out
 from netsp.online.simulate import simulate
@@ -111,8 +112,8 @@ def test_ways_of_the_tree_are_shortest_and_pull_taut_to_the_truth():
     assert straight <= tree.lengths[1] <= straight + 0.3  # ends lie beside the centres of cells
     path = taut(field, tree.path(0), 0.0, 0.05)
     exact = 2 * math.sqrt(4 - 0.25) + 0.5 * (math.pi - 2 * math.acos(0.25))
-    assert length_of(path) == pytest.approx(exact, rel=0.02)
-    assert tree.lengths[0] >= length_of(path)
+    assert polylines.length(path) == pytest.approx(exact, rel=0.02)
+    assert tree.lengths[0] >= polylines.length(path)
 
 
 def test_advance_passes_corners_and_stops_after_its_step():

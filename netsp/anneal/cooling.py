@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from netsp.solving.run import Run
+from netsp.solving.run import SolverRun
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Schedule:
     comes first does the same seed give the same answer.
     """
 
-    def __init__(self, cooling: Cooling, run: Run, leg: float, default: int) -> None:
+    def __init__(self, cooling: Cooling, run: SolverRun, leg: float, default: int) -> None:
         self.cooling, self.run = cooling, run
         self.unit = max(leg, 1e-300)
         if run.clock.limit is None and run.iteration_limit == float("inf"):

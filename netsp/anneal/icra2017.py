@@ -21,7 +21,7 @@ from netsp.compiled.chance import below, metropolis, seeded
 from netsp.lns.layers import Instance
 from netsp.lns.solve import core_of
 from netsp.solving.limits import Limits
-from netsp.solving.run import Run
+from netsp.solving.run import SolverRun
 from netsp.travel.graph import TravelGraph
 from netsp.travel.result import Result
 
@@ -52,7 +52,7 @@ def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | Non
     """Anneal from a random tour, or from the warm start. An iteration is one proposal."""
     chosen, limits = params or Params(), limits or Limits()
     rng = limits.rng
-    run = Run(graph, limits)
+    run = SolverRun(graph, limits)
     with run.until_stopped():
         run.offer(limits.warm_start)
         if not run.trivial():
@@ -60,7 +60,7 @@ def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | Non
     return run.finish("done", entangled=0)
 
 
-def _anneal(run: Run, rng: np.random.Generator, chosen: Params) -> None:
+def _anneal(run: SolverRun, rng: np.random.Generator, chosen: Params) -> None:
     warm = run.tour is not None
     run.check()
     graph = run.graph

@@ -29,7 +29,7 @@ from netsp.anneal.cooling import Cooling, Schedule
 from netsp.arrays import Floats, Ints
 from netsp.compiled.chance import below, metropolis, seeded
 from netsp.solving.limits import Limits
-from netsp.solving.run import Run
+from netsp.solving.run import SolverRun
 from netsp.travel.graph import TravelGraph
 from netsp.travel.result import Result
 
@@ -95,7 +95,7 @@ def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | Non
     """
     chosen, limits = params or Params(), limits or Limits()
     rng = limits.rng
-    run = Run(graph, limits)
+    run = SolverRun(graph, limits)
     with run.until_stopped(blind=True):
         run.offer(limits.warm_start)
         if not run.trivial():
@@ -103,7 +103,7 @@ def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | Non
     return run.finish("done")
 
 
-def _anneal(run: Run, rng: np.random.Generator, chosen: Params) -> None:
+def _anneal(run: SolverRun, rng: np.random.Generator, chosen: Params) -> None:
     graph = run.graph
     run.check()
     detours = graph.detours(sub_goals=True, check=run.check)

@@ -17,7 +17,7 @@ from netsp.command.types import (
 from netsp.errors import EXIT_INTERRUPTED, InputError
 
 if TYPE_CHECKING:
-    from netsp.compare.rows import Row
+    from netsp.compare.rows import TrialRow
     from netsp.compare.run import Tally
     from netsp.compare.study import Study
 
@@ -120,7 +120,7 @@ class Bar:
         self.begin = self.shown = time.monotonic()
         self.live = stream.isatty()
 
-    def show(self, row: Row, tally: Tally) -> None:
+    def show(self, row: TrialRow, tally: Tally) -> None:
         """After a trial."""
         from netsp.compare.rows import FAILED
 
@@ -128,7 +128,7 @@ class Bar:
             return
         if row["status"] in FAILED:
             self._clear()
-            print(f"{describe(row)}: {row['status']}: {row['message']}", file=self.stream)
+            print(f"{describe_row(row)}: {row['status']}: {row['message']}", file=self.stream)
         now = time.monotonic()
         if now - self.shown < (0.1 if self.live else 10.0) and tally.done < tally.total:
             return
@@ -137,7 +137,7 @@ class Bar:
         left = (now - self.begin) / fresh * (tally.total - tally.done)
         text = (
             f"{tally.done}/{tally.total} trials, {tally.failed} failed, {_span(left)} left, "
-            f"last {describe(row)}"
+            f"last {describe_row(row)}"
         )
         self._clear()
         print(text[:118], end="" if self.live else "\n", file=self.stream, flush=True)
@@ -152,7 +152,7 @@ class Bar:
             print("\r\x1b[K", end="", file=self.stream)
 
 
-def describe(row: Row) -> str:
+def describe_row(row: TrialRow) -> str:
     """A trial in a few words."""
     world = row["world"]
     return (

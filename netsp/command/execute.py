@@ -18,7 +18,7 @@ from netsp.command.types import (
 from netsp.errors import EXIT_DEFECT, EXIT_NOT_ALL, EXIT_NOT_VERIFIED, InputError
 
 if TYPE_CHECKING:
-    from netsp.execute.log import Row
+    from netsp.execute.log import ExecutionRow
     from netsp.problem import Problem
 
 EXAMPLE = (
@@ -56,7 +56,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Carry the tour out, write what happened, and return the exit code."""
     from netsp.execute.events import Surprises
-    from netsp.execute.log import Options, describe
+    from netsp.execute.log import ExecutionOptions, describe_execution
     from netsp.execute.run import execute
     from netsp.execute.write import write_execution
     from netsp.files import output_folder
@@ -68,13 +68,13 @@ def run(args: argparse.Namespace) -> int:
     surprises = Surprises.load(args.surprise) if args.surprise else None
     if args.planner not in ("repair", "none"):
         raise InputError(f"--planner: expected repair or none, got {args.planner!r}")
-    options = Options(
+    options = ExecutionOptions(
         speed=args.speed, vehicle=args.vehicle, delta=args.delta, repair=args.planner == "repair",
         current=vector(args.current, "--current") if args.current else (0.0, 0.0, 0.0),
         gusts=args.gusts, seed=args.seed, planning_limit=args.planning_limit,
     )  # fmt: skip
     show = not args.quiet and sys.stderr.isatty()
-    on_step = live(problem) if show else None
+    on_step = show_execution(problem) if show else None
     with output_folder(args.output):
         done = execute(problem, solution, options, surprises=surprises, on_step=on_step)
     if show:
@@ -85,7 +85,7 @@ def run(args: argparse.Namespace) -> int:
     else:
         print(json.dumps(done.summary, indent=1, allow_nan=False))
     if not args.quiet:
-        print(describe(done), file=sys.stderr)
+        print(describe_execution(done), file=sys.stderr)
     s = done.summary
     if s["defects"]:
         return EXIT_DEFECT
@@ -94,11 +94,11 @@ def run(args: argparse.Namespace) -> int:
     return EXIT_NOT_ALL if s["lost"] or s["status"] != "done" else 0
 
 
-def live(problem: Problem) -> Callable[[Row], None]:
+def show_execution(problem: Problem) -> Callable[[ExecutionRow], None]:
     """Shows how a run goes, in one line."""
     count = [0]
 
-    def on_step(row: Row) -> None:
+    def on_step(row: ExecutionRow) -> None:
         count[0] += 1
         if count[0] % 20 == 1:
             name = "base" if row.goal < 0 else f"goal {row.goal}"

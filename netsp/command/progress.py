@@ -15,7 +15,7 @@ _HEADER = (
     f"{'legs':>9} {'iteration':>11}"
 )
 
-PATIENCE = 3.0
+QUIET_S = 3.0
 """Seconds of silence after which the table says what takes so long."""
 
 EVERY = 0.2
@@ -31,7 +31,7 @@ class ProgressTable:
         self._last: Progress | None = None
         self._shown = 0.0
         self._held: Progress | None = None
-        self._patience = threading.Timer(PATIENCE, self._explain)
+        self._patience = threading.Timer(QUIET_S, self._explain)
         self._patience.daemon = True
 
     def begin(self, problem: Problem) -> None:

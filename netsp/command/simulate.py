@@ -67,9 +67,9 @@ def run(args: argparse.Namespace) -> int:
     """Fly the mission, write what happened, and return the exit code."""
     from netsp.command.plot_scene import tell
     from netsp.files import output_folder
-    from netsp.online.log import describe, write_run
+    from netsp.online.log import describe_run, write_run
     from netsp.online.mission import Mission
-    from netsp.online.planner import PLANNERS, Options
+    from netsp.online.planner import PLANNERS, PlannerOptions
     from netsp.online.simulate import simulate
 
     mission = Mission.load(args.mission)
@@ -89,14 +89,14 @@ def run(args: argparse.Namespace) -> int:
         for planner in [args.planner, args.compare] if args.compare else [args.planner]:
             run = simulate(
                 mission, planner, vehicle=args.vehicle, tether=args.tether_model,
-                options=Options(args.paths, args.refine, args.seed),
+                options=PlannerOptions(args.paths, args.refine, args.seed),
                 scene=scene, field=field, snap=args.snap, seed=args.seed,
-                on_step=live(mission, scene.units) if show else None,
+                on_step=show_mission(mission, scene.units) if show else None,
             )  # fmt: skip
             runs.append(run)
             if not args.quiet:
                 print(
-                    ("\r\n" if sys.stderr.isatty() else "") + describe(run, scene.units),
+                    ("\r\n" if sys.stderr.isatty() else "") + describe_run(run, scene.units),
                     file=sys.stderr,
                 )
             if run.summary["status"] == "interrupted":
@@ -126,7 +126,7 @@ def draw_runs(runs: list[Run], scene: Scene, folder: Path) -> None:
     flights.save_page(runs, scene, folder / "run.html")
 
 
-def live(mission: Mission, units: str) -> Callable[[LogRow, Planner], None]:
+def show_mission(mission: Mission, units: str) -> Callable[[LogRow, Planner], None]:
     """Shows how a mission goes, in one line."""
     from netsp.online.simulate import STEP
 

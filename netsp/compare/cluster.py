@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
-from netsp.compare.pool import PATIENCE, crashed
-from netsp.compare.rows import Row
+from netsp.compare.pool import GRACE_S, crashed
+from netsp.compare.rows import TrialRow
 from netsp.compare.run import Executor
 from netsp.compare.study import Trial
 from netsp.errors import InputError
@@ -44,7 +44,7 @@ def dask_executor(address: str) -> Executor:
             "tcp://host:port of a running `dask scheduler`"
         ) from None
 
-    def execute(trials: list[Trial]) -> Iterator[tuple[Trial, Row]]:
+    def execute(trials: list[Trial]) -> Iterator[tuple[Trial, TrialRow]]:
         try:
             yield from _execute(client, trials)
         finally:
@@ -53,7 +53,7 @@ def dask_executor(address: str) -> Executor:
     return execute
 
 
-def _execute(client: Client, trials: list[Trial]) -> Iterator[tuple[Trial, Row]]:
+def _execute(client: Client, trials: list[Trial]) -> Iterator[tuple[Trial, TrialRow]]:
     from distributed import as_completed
 
     queue = iter(trials)
@@ -73,7 +73,7 @@ def _execute(client: Client, trials: list[Trial]) -> Iterator[tuple[Trial, Row]]
     for future in pending:
         trial = running.pop(future.key.removeprefix("netsp-"))
         if future.status == "finished":
-            outcome: Row = future.result()
+            outcome: TrialRow = future.result()
         else:
             error = future.exception()
             lost = type(error).__name__ == "KilledWorker"
@@ -87,13 +87,13 @@ def _execute(client: Client, trials: list[Trial]) -> Iterator[tuple[Trial, Row]]
         yield trial, outcome
 
 
-def guarded(trial: Trial) -> Row:
+def guarded(trial: Trial) -> TrialRow:
     """Run a trial on a worker; an exception becomes its row, and so does silence."""
     import threading
 
     from netsp.compare.trial import run
 
-    outcome: list[Row] = []
+    outcome: list[TrialRow] = []
 
     def body() -> None:
         try:
@@ -106,7 +106,7 @@ def guarded(trial: Trial) -> Row:
     thread = threading.Thread(target=body, daemon=True)
     thread.start()
     limit = trial.solver["time_limit"]
-    thread.join(None if limit is None else 2.0 * limit + PATIENCE)
+    thread.join(None if limit is None else 2.0 * limit + GRACE_S)
     if not outcome:
         return {"status": "timeout", "message": "the solver did not come back"}
     return outcome[0]

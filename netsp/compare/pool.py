@@ -17,10 +17,10 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from typing import Any
 
-from netsp.compare.rows import LOST, Row
+from netsp.compare.rows import LOST, TrialRow
 from netsp.compare.study import Trial
 
-PATIENCE = 60.0
+GRACE_S = 60.0
 """Seconds beyond its time limit, twice over, after which a trial counts as hung: roadmaps are built
 and kernels compiled in that time too."""
 
@@ -33,7 +33,7 @@ class _Worker:
     deadline: float = float("inf")
 
 
-def run_all(trials: list[Trial], jobs: int) -> Iterator[tuple[Trial, Row]]:
+def run_all(trials: list[Trial], jobs: int) -> Iterator[tuple[Trial, TrialRow]]:
     """Run trials in so many processes, and yield each with its outcome as it finishes.
 
     Closing the iterator kills the workers.
@@ -53,7 +53,7 @@ def run_all(trials: list[Trial], jobs: int) -> Iterator[tuple[Trial, Row]]:
             for k, worker in enumerate(workers):
                 if worker.trial is None:
                     continue
-                outcome: Row | None = None
+                outcome: TrialRow | None = None
                 if worker.pipe in ready:
                     try:
                         outcome = worker.pipe.recv()
@@ -89,7 +89,7 @@ def _feed(worker: _Worker, queue: list[Trial]) -> None:
         worker.trial = queue.pop()
         limit = worker.trial.solver["time_limit"]
         if limit is not None:
-            worker.deadline = time.monotonic() + 2.0 * limit + PATIENCE
+            worker.deadline = time.monotonic() + 2.0 * limit + GRACE_S
         with contextlib.suppress(OSError):  # a worker that is dead already is found by its pipe
             worker.pipe.send(worker.trial)
 
@@ -100,7 +100,7 @@ def _stop(worker: _Worker) -> None:
     worker.process.join()
 
 
-def _lost(code: int | None) -> Row:
+def _lost(code: int | None) -> TrialRow:
     if code is not None and code < 0:
         name = signal.Signals(-code).name
         return {"status": "killed" if code == -9 else "crashed", "message": f"by {name}"}
@@ -130,7 +130,7 @@ def _work(pipe: Connection) -> None:
         pipe.send(outcome)
 
 
-def crashed(error: Exception) -> Row:
+def crashed(error: Exception) -> TrialRow:
     """The outcome of a trial that raised what it should not."""
     at = traceback.extract_tb(error.__traceback__)[-1]
     where = f"{os.path.basename(at.filename)}:{at.lineno}"

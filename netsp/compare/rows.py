@@ -20,7 +20,7 @@ from netsp.fields import LARGEST
 from netsp.files import read_bytes, read_gzip
 
 SCHEMA = "netsp-trial/1"
-Row = dict[str, Any]
+TrialRow = dict[str, Any]
 
 LOST = frozenset({"crashed", "killed", "timeout", "out_of_memory"})
 """Statuses of trials that took their worker with them, or may have."""
@@ -35,7 +35,7 @@ _TEXTS = ("study", "study_name", "trial", "status", "message", "finished", "mach
 _TABLES = ("world", "roadmap", "solver")
 
 
-def read_rows(path: str | Path) -> list[Row]:
+def read_rows(path: str | Path) -> list[TrialRow]:
     """All rows of a results file, gzipped if its name ends in .gz; a torn last line is left out.
     InputError if it is not one."""
     data = read_gzip(path) if Path(path).suffix == ".gz" else read_bytes(path)
@@ -55,7 +55,7 @@ def read_rows(path: str | Path) -> list[Row]:
     return rows
 
 
-def _parsed(line: bytes) -> Row | None:
+def _parsed(line: bytes) -> TrialRow | None:
     """A line as a row; None if it is none."""
     try:
         row = json.loads(line, parse_constant=_no_constant)
@@ -141,7 +141,7 @@ class RowsFile:
         whole = self.path.read_bytes()
         os.ftruncate(self._fd, whole.rfind(b"\n") + 1)
 
-    def append(self, row: Row) -> None:
+    def append(self, row: TrialRow) -> None:
         """Write a row, to the disk; InputError if it cannot be, and then nothing of it is there."""
         data = (json.dumps(row, allow_nan=False) + "\n").encode()
         end = os.fstat(self._fd).st_size
@@ -166,7 +166,7 @@ class RowsFile:
         self.close()
 
 
-def check_study(rows: Iterable[Row], study: str, source: str) -> None:
+def check_study(rows: Iterable[TrialRow], study: str, source: str) -> None:
     """InputError if a row belongs to another study (by its sha256)."""
     for number, row in enumerate(rows, start=1):
         if row["study"] != study:
@@ -182,7 +182,7 @@ def combine(sources: list[str], target: str) -> int:
     Raises InputError if the sources hold no trial or rows of several studies, and if the target
     exists and is anything but results of the same study.
     """
-    found: list[Row] = []
+    found: list[TrialRow] = []
     for source in sources:
         rows = read_rows(source)
         check_study(rows, (found or rows)[0]["study"] if found or rows else "", source)

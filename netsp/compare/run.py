@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Protocol
 
 from netsp.compare.pool import run_all
-from netsp.compare.rows import FAILED, Row, RowsFile
+from netsp.compare.rows import FAILED, RowsFile, TrialRow
 from netsp.compare.study import Study, Trial, shard
 from netsp.compare.trial import check, full_row
 
@@ -17,7 +17,7 @@ from netsp.compare.trial import check, full_row
 class Executor(Protocol):
     """Where trials are run."""
 
-    def __call__(self, trials: list[Trial]) -> Iterator[tuple[Trial, Row]]:
+    def __call__(self, trials: list[Trial]) -> Iterator[tuple[Trial, TrialRow]]:
         """Each trial with its outcome, as they finish."""
 
 
@@ -38,7 +38,7 @@ def compare(
     jobs: int = 1,
     part: tuple[int, int] = (1, 1),
     executor: Executor | None = None,
-    on_row: Callable[[Row, Tally], None] | None = None,
+    on_row: Callable[[TrialRow, Tally], None] | None = None,
 ) -> Tally:
     """Run the trials of a study that the results file does not hold yet, and append their rows.
 

@@ -9,7 +9,7 @@ import platform
 import time
 from typing import Any
 
-from netsp.compare.rows import SCHEMA, Row
+from netsp.compare.rows import SCHEMA, TrialRow
 from netsp.compare.study import Trial
 from netsp.errors import (
     InfeasibleError,
@@ -39,7 +39,7 @@ def world_of(trial: Trial) -> tuple[Problem, int]:
     return _world(tuple(sorted(recipe.items())))
 
 
-def run(trial: Trial) -> Row:
+def run(trial: Trial) -> TrialRow:
     """Run a trial; whatever netsp complains of becomes the row's status `error` and its message.
 
     Every trial builds its own roadmap and measures its own legs, so its times are what a user would
@@ -47,7 +47,7 @@ def run(trial: Trial) -> Row:
     """
     from netsp.solvers.solve import solve
 
-    row: Row = {"status": "error", "message": ""}
+    row: TrialRow = {"status": "error", "message": ""}
     history: list[tuple[float, float | None, float | None]] = []
 
     def listen(p: Progress) -> None:
@@ -102,7 +102,7 @@ def thinned(history: list[Any]) -> list[Any]:
     return [history[k * (n - 1) // (MOST_POINTS - 1)] for k in range(MOST_POINTS)]
 
 
-def full_row(trial: Trial, outcome: Row, study: str, study_name: str) -> Row:
+def full_row(trial: Trial, outcome: TrialRow, study: str, study_name: str) -> TrialRow:
     """The immutable row: what was tried, what came of it, where and when."""
     return {
         "schema": SCHEMA,

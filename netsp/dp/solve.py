@@ -35,7 +35,7 @@ DEFLECTION = 0.5
 MOST_LABELS = 2_000_000
 """With more labels in a pass the memory is not widened."""
 
-PATIENCE, WORTH = 12, 0.03
+SLOW_PASSES, WORTH = 12, 0.03
 """Passes after which something must have come of them: this share of the gap closed, or of the
 states dead."""
 
@@ -181,9 +181,9 @@ def _measure(run: SearchingRun, walks: Walks, costs: LegCosts) -> None:
 
 
 def _stalls(history: list[tuple[float, int]], length: float) -> bool:
-    """Whether the last `PATIENCE` passes closed little of the gap and killed few states."""
-    if len(history) <= PATIENCE:
+    """Whether the last `SLOW_PASSES` passes closed little of the gap and killed few states."""
+    if len(history) <= SLOW_PASSES:
         return False
-    (bound_then, states_then), (bound, states) = history[-1 - PATIENCE], history[-1]
+    (bound_then, states_then), (bound, states) = history[-1 - SLOW_PASSES], history[-1]
     closed = bound - bound_then > WORTH * (length - bound_then if length < np.inf else abs(bound))
     return not closed and states > (1.0 - WORTH) * states_then

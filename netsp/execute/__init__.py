@@ -2,7 +2,7 @@
 as it was planned for."""
 
 from netsp.execute.events import Event, Surprises
-from netsp.execute.log import Execution, Options
+from netsp.execute.log import Execution, ExecutionOptions
 from netsp.execute.run import execute
 
-__all__ = ["Event", "Execution", "Options", "Surprises", "execute"]
+__all__ = ["Event", "Execution", "ExecutionOptions", "Surprises", "execute"]

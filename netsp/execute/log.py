@@ -21,7 +21,7 @@ RESOLUTION = 1e-4
 
 
 @dataclass(frozen=True)
-class Options:
+class ExecutionOptions:
     """How a tour is carried out.
 
     speed : of the vehicle, length units per second. vehicle : `netsp.online.vehicle.VEHICLES`.
@@ -43,7 +43,7 @@ class Options:
 
 
 @dataclass(frozen=True)
-class Row:
+class ExecutionRow:
     """One step: seconds, position, the goal that is next (-1 the base), mode (tour, shorten or
     hold), taut tether and its limit, and whether the limit was lowered below the tether, which is
     being shortened."""
@@ -100,8 +100,8 @@ class Execution(Drawn):
 
     problem: Problem
     solution: Solution
-    options: Options
-    rows: list[Row] = field(default_factory=list)
+    options: ExecutionOptions
+    rows: list[ExecutionRow] = field(default_factory=list)
     arrivals: list[Arrival] = field(default_factory=list)
     entries: list[Entry] = field(default_factory=list)
     lost: dict[int, str] = field(default_factory=dict)
@@ -152,7 +152,7 @@ class Execution(Drawn):
         }
 
 
-def describe(done: Execution) -> str:
+def describe_execution(done: Execution) -> str:
     """A run in a few lines."""
     s = done.summary
     planned = s["planned_path"] or 0.0

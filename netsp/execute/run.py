@@ -11,7 +11,7 @@ from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.execute.aside import aside
 from netsp.execute.events import Event, Surprises, changed, index_of
-from netsp.execute.log import Arrival, Entry, Execution, Options, Row
+from netsp.execute.log import Arrival, Entry, Execution, ExecutionOptions, ExecutionRow
 from netsp.execute.plan import HOME, Leg, legs_of
 from netsp.execute.repair import Repair, broken, reachable, repair
 from netsp.geometry import polylines
@@ -29,14 +29,14 @@ from netsp.solution import Solution, Status
 HOLD_STEP = 0.1
 """Seconds between two rows of the log while the robot holds its place."""
 
-PATIENCE = 3.0
+LEG_ALLOWANCE = 3.0
 """A leg is given up when it takes this many times as long as it should, and a minute."""
 
 
 class _Run:
     """A run in progress."""
 
-    def __init__(self, problem: Problem, solution: Solution, options: Options) -> None:
+    def __init__(self, problem: Problem, solution: Solution, options: ExecutionOptions) -> None:
         self.out = Execution(problem, solution, options)
         self.problem, self.options = problem, options
         self.legs: list[Leg] = legs_of(problem, solution)
@@ -63,14 +63,16 @@ class _Run:
 
     # a step
 
-    def note(self) -> Row:
+    def note(self) -> ExecutionRow:
         x, y, z = (float(v) for v in self.vehicle.position)
         goal = self.legs[0].goal if self.legs else HOME
         limit = self.problem.tether_length
         if self.shorten and self.tether.length <= limit:
             self.shorten = False
         mode = self.mode if self.mode == "hold" or not self.shorten else "shorten"
-        row = Row(round(self.now, 6), x, y, z, goal, mode, self.tether.length, limit, self.shorten)
+        row = ExecutionRow(
+            round(self.now, 6), x, y, z, goal, mode, self.tether.length, limit, self.shorten
+        )
         if len(self.out.rows) % 10 == 0:
             self.out.tethers.append((row.time, self.tether.nodes.copy()))
         self.out.rows.append(row)
@@ -100,7 +102,7 @@ class _Run:
         )
         if len(self.path) == 1 and float(np.linalg.norm(self.vehicle.position - end)) <= near:
             self._arrive()
-        elif self.leg_s > 60.0 + PATIENCE * self.legs[0].length / self.options.speed:
+        elif self.leg_s > 60.0 + LEG_ALLOWANCE * self.legs[0].length / self.options.speed:
             self._lose(self.legs[0].goal, "not reached in time")
 
     def _arrive(self) -> None:
@@ -274,10 +276,10 @@ class _Run:
 def execute(
     problem: Problem,
     solution: Solution,
-    options: Options | None = None,
+    options: ExecutionOptions | None = None,
     *,
     surprises: Surprises | None = None,
-    on_step: Callable[[Row], None] | None = None,
+    on_step: Callable[[ExecutionRow], None] | None = None,
 ) -> Execution:
     """Carry out a solution in the scene of its problem, whose obstacles stand from the sea floor to
     the surface, on a tether that is anchored at the base.
@@ -290,7 +292,7 @@ def execute(
     InputError : the solution does not belong to the problem, fails its checks or is a baseline's
         that entangles; bad options or surprises.
     """
-    options = options or Options()
+    options = options or ExecutionOptions()
     surprises = surprises or Surprises(events=())
     if not (np.isfinite(options.planning_limit) and options.planning_limit > 0.0):
         raise InputError(

@@ -20,7 +20,7 @@ import numpy as np
 from netsp.arrays import Floats, Ints
 from netsp.solving.legcosts import MEASURE_AT_ONCE
 from netsp.solving.limits import Limits
-from netsp.solving.run import Run
+from netsp.solving.run import SolverRun
 from netsp.travel.graph import TravelGraph
 from netsp.travel.result import Result
 
@@ -44,7 +44,7 @@ def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | Non
     """`greedy`: to the nearest goal not yet visited, in whatever class is nearest on the covering
     space; home from the last. One iteration builds the whole tour. params : see `Params`."""
     chosen, limits = params or Params(), limits or Limits()
-    run = Run(graph, limits)
+    run = SolverRun(graph, limits)
     stage = "trivial"
     with run.until_stopped():
         run.offer(limits.warm_start)
@@ -53,7 +53,7 @@ def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | Non
     return run.finish(stage)
 
 
-def _nearest_by_tether(run: Run, *, retrace: bool) -> str:
+def _nearest_by_tether(run: SolverRun, *, retrace: bool) -> str:
     graph = run.graph
     tour = [0]
     left = graph.cluster != 0
@@ -98,7 +98,7 @@ def solve_2016(graph: TravelGraph, params: None = None, limits: Limits | None = 
     """`greedy-2016`: out to the goal nearest to the base and back, then the next. No leg between
     goals is ever measured. One iteration builds the whole tour."""
     limits = limits or Limits()
-    run = Run(graph, limits)
+    run = SolverRun(graph, limits)
     with run.until_stopped():
         run.offer(limits.warm_start)
         if not run.trivial():
@@ -107,7 +107,7 @@ def solve_2016(graph: TravelGraph, params: None = None, limits: Limits | None = 
     return run.finish("greedy")
 
 
-def _out_and_back(run: Run) -> None:
+def _out_and_back(run: SolverRun) -> None:
     graph = run.graph
     out = graph.costs_to_base
     nearest = []

@@ -14,7 +14,7 @@ import numpy as np
 from netsp.hsignature import Word, concatenate, entangled
 from netsp.solution import Status
 from netsp.solving.limits import Limits
-from netsp.solving.run import Run
+from netsp.solving.run import SolverRun
 from netsp.travel.graph import TravelGraph
 from netsp.travel.result import Result, Trajectory
 
@@ -26,7 +26,7 @@ def solve(graph: TravelGraph, params: None = None, limits: Limits | None = None)
     Raises InputError for a graph without geometry beneath it.
     """
     limits = limits or Limits()
-    run = Run(graph, limits)
+    run = SolverRun(graph, limits)
     walked: Trajectory | None = None
     with run.until_stopped(blind=True):
         if not run.trivial():
@@ -39,7 +39,7 @@ def solve(graph: TravelGraph, params: None = None, limits: Limits | None = None)
     return Result(None, walked.length, None, Status.INVALID, seen.trace, trajectory=walked)
 
 
-def _nearest_neighbour(run: Run) -> Trajectory | None:
+def _nearest_neighbour(run: SolverRun) -> Trajectory | None:
     """The trajectory, or None if it happens to be a tour of the graph: then that is offered."""
     graph = run.graph
     detours = graph.detours(sub_goals=False, check=run.check)

@@ -10,7 +10,7 @@ from netsp.arrays import Ints
 from netsp.lns.layers import Instance
 from netsp.lns.search import Search
 from netsp.solving.limits import Limits
-from netsp.solving.run import Run
+from netsp.solving.run import SolverRun
 from netsp.travel.graph import TravelGraph, least_tethers
 from netsp.travel.result import Result
 
@@ -42,7 +42,7 @@ def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | Non
     the iterations, or over the time if only that is limited. No bound is claimed."""
     chosen, limits = params or Params(), limits or Limits()
     rng = limits.rng
-    run = Run(graph, limits)
+    run = SolverRun(graph, limits)
     with run.until_stopped():
         run.offer(limits.warm_start)
         if not run.trivial():
@@ -50,7 +50,7 @@ def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | Non
     return run.finish("done")
 
 
-def _search(run: Run, rng: np.random.Generator, chosen: Params) -> None:
+def _search(run: SolverRun, rng: np.random.Generator, chosen: Params) -> None:
     graph = run.graph
     run.check()
     core = core_of(run, chosen.classes)
@@ -82,7 +82,7 @@ def _search(run: Run, rng: np.random.Generator, chosen: Params) -> None:
         search.run(np.inf if by_clock else rounds, run.clock, progress if by_clock else None, tell)
 
 
-def core_of(run: Run, classes: int = 0, vertices: int = MOST_VERTICES) -> Ints:
+def core_of(run: SolverRun, classes: int = 0, vertices: int = MOST_VERTICES) -> Ints:
     """The classes of least tether that a search looks at, and those of the incumbent: so many of
     every goal, by default (0) as many as make so many vertices in all."""
     graph = run.graph
@@ -91,7 +91,7 @@ def core_of(run: Run, classes: int = 0, vertices: int = MOST_VERTICES) -> Ints:
     return np.union1d(core, run.tour) if run.tour is not None else core
 
 
-def _take(run: Run, search: Search) -> None:
+def _take(run: SolverRun, search: Search) -> None:
     length, tour = search.best()
     run.offer(tour, length=length)
 

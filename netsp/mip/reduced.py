@@ -24,7 +24,7 @@ from netsp.lns import Instance, best_classes
 from netsp.lns.solve import core_of
 from netsp.mip.solve import MipRun, Params
 from netsp.solving.limits import Limits
-from netsp.solving.run import Run
+from netsp.solving.run import SolverRun
 from netsp.travel.graph import TravelGraph, least_tethers
 from netsp.travel.result import Progress, Result
 
@@ -62,7 +62,7 @@ def solve(
     whole = len(kept) == len(graph)
     inner = replace(limits, warm_start=None, on_progress=None)
     part = MipRun(graph.subgraph(kept), inner, search_rounds=chosen.search_rounds)
-    outer = Run(graph, limits)
+    outer = SolverRun(graph, limits)
 
     def pass_on(row: Progress) -> None:
         if part.tour is not None:

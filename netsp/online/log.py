@@ -80,7 +80,7 @@ def _short(value: Any) -> Any:
     return round(value, 5) if isinstance(value, float) else value
 
 
-def describe(run: Run, units: str) -> str:
+def describe_run(run: Run, units: str) -> str:
     """A run in a few lines."""
     s = run.summary
     lines = [

@@ -100,7 +100,7 @@ def reorder(
     before = simulate(mission, scene=scene, field=field)
     _not_interrupted(before)
     tell("tethers and legs")
-    graph, points, start = travel_graph(mission, field, scene_grid=grid_of(mission, scene, field))
+    graph, points, start = waypoint_graph(mission, field, scene_grid=grid_of(mission, scene, field))
     given = [start.index(n) + 1 for n in range(len(mission.waypoints)) if n in start]
     tell("order")
     instance = Instance.of(graph)
@@ -143,7 +143,7 @@ def _better(run: Run, than: Run) -> bool:
     )
 
 
-def travel_graph(
+def waypoint_graph(
     mission: Mission, field: DistanceField, scene_grid: object
 ) -> tuple[TravelGraph, list[int], list[int]]:
     """Classes and legs of a mission: the graph, the waypoint of each vertex (-1: the anchor), and

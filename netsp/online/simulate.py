@@ -16,7 +16,7 @@ from netsp.online.coverage import Coverage, patches_of
 from netsp.online.log import LogRow, Run
 from netsp.online.mission import Mission
 from netsp.online.paths.tree import Grid
-from netsp.online.planner import Command, Options, Planner, make_planner
+from netsp.online.planner import Command, Planner, PlannerOptions, make_planner
 from netsp.online.planner.base import DONE, Tethers
 from netsp.online.scene.field import DistanceField
 from netsp.online.scene.scene import Scene
@@ -136,7 +136,7 @@ def simulate(
     *,
     vehicle: str = "kinematic",
     tether: str | Callable[[DistanceField, float], Any] = "geodesic",
-    options: Options | None = None,
+    options: PlannerOptions | None = None,
     scene: Scene | None = None,
     field: DistanceField | None = None,
     snap: bool = False,

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from netsp.compare.rows import Row
+from netsp.compare.rows import TrialRow
 from netsp.pictures import style
 from netsp.report.stats import Cell, Summary, gap_over_time, over_best, profile, summary
 
@@ -35,7 +35,11 @@ def _style(k: int) -> dict[str, Any]:
 
 
 def by_goals(
-    cells: dict[Cell, list[Row]], value: Callable[[Row], float | None], label: str, *, log: bool
+    cells: dict[Cell, list[TrialRow]],
+    value: Callable[[TrialRow], float | None],
+    label: str,
+    *,
+    log: bool,
 ) -> Any:
     """One panel for each tether length: the median of a number against goals, with intervals."""
     tethers = sorted({c.tether for c in cells})
@@ -65,17 +69,17 @@ def by_goals(
     return figure
 
 
-def lengths(cells: dict[Cell, list[Row]], best: dict[str, float]) -> Any:
+def lengths(cells: dict[Cell, list[TrialRow]], best: dict[str, float]) -> Any:
     """Per cent over the best known, as Fig. 5a to c."""
     return by_goals(cells, lambda r: over_best(r, best), "% over the best known", log=False)
 
 
-def times(cells: dict[Cell, list[Row]]) -> Any:
+def times(cells: dict[Cell, list[TrialRow]]) -> Any:
     """Seconds, roadmap and legs included, as Fig. 5d to f."""
     return by_goals(cells, lambda r: r["total_s"] if r.get("length") else None, "seconds", log=True)
 
 
-def entanglements(cells: dict[Cell, list[Row]]) -> Any | None:
+def entanglements(cells: dict[Cell, list[TrialRow]]) -> Any | None:
     """Obstacles entangled by baselines that are blind to the tether; None without any."""
     blind = {c: rows for c, rows in cells.items() if any(r["status"] == "invalid" for r in rows)}
     if not blind:
@@ -83,7 +87,7 @@ def entanglements(cells: dict[Cell, list[Row]]) -> Any | None:
     return by_goals(blind, lambda r: r.get("entangled"), "obstacles entangled", log=False)
 
 
-def performance(by_method: dict[str, list[Row]]) -> Any | None:
+def performance(by_method: dict[str, list[TrialRow]]) -> Any | None:
     """Share of problems proven within a multiple of the fastest time; None if nothing is proven."""
     ratios = profile(by_method)
     if not ratios:
@@ -106,7 +110,7 @@ def performance(by_method: dict[str, list[Row]]) -> Any | None:
     return figure
 
 
-def anytime(by_method: dict[str, list[Row]], best: dict[str, float]) -> Any | None:
+def anytime(by_method: dict[str, list[TrialRow]], best: dict[str, float]) -> Any | None:
     """Median per cent over the best known against time; None without histories."""
     last = max((r.get("total_s", 0.0) for rows in by_method.values() for r in rows), default=0.0)
     at = np.geomspace(1e-3, max(last, 1e-2), 120)

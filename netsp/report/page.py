@@ -10,7 +10,7 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-from netsp.compare.rows import Row, read_rows
+from netsp.compare.rows import TrialRow, read_rows
 from netsp.errors import InputError
 from netsp.files import cell as plain_cell
 from netsp.files import write_text
@@ -90,7 +90,7 @@ def write_report(results: str | Path, output: str | Path, pictures: str | None =
     return output
 
 
-def _head(rows: list[Row], source: str) -> str:
+def _head(rows: list[TrialRow], source: str) -> str:
     statuses = ", ".join(f"{n} {s}" for s, n in Counter(r["status"] for r in rows).most_common())
     redrawn = len({str(r["world"]) for r in rows if r.get("redrawn")})
     versions = {str(sorted(r.get("versions", {}).items())) for r in rows if r.get("versions")}
@@ -115,7 +115,7 @@ def _table(head: list[str], body: list[list[Any]]) -> str:
     return f"<table><thead><tr>{top}</tr></thead><tbody>{lines}</tbody></table>"
 
 
-def _cells_table(by_cell: dict[Cell, list[Row]], best: dict[str, float]) -> str:
+def _cells_table(by_cell: dict[Cell, list[TrialRow]], best: dict[str, float]) -> str:
     body = []
     for cell, rows in sorted(by_cell.items(), key=lambda c: (c[0].goals, c[0].tether)):
         over = summary([v for r in rows if (v := over_best(r, best)) is not None])
@@ -139,7 +139,7 @@ def _cells_table(by_cell: dict[Cell, list[Row]], best: dict[str, float]) -> str:
     return "<h2>All cells</h2>" + _table(head, body)
 
 
-def _proofs_table(by_cell: dict[Cell, list[Row]]) -> str:
+def _proofs_table(by_cell: dict[Cell, list[TrialRow]]) -> str:
     """Table I: mean seconds of the trials proven, and how many of how many."""
     out = []
     for method in dict.fromkeys(c.method for c in by_cell):
@@ -166,7 +166,7 @@ def _proofs_table(by_cell: dict[Cell, list[Row]]) -> str:
     return f'<h2>Proofs</h2><p class="note">{note}</p>' + "".join(out)
 
 
-def _failures_table(rows: list[Row]) -> str:
+def _failures_table(rows: list[TrialRow]) -> str:
     failed = failures(rows)
     if not failed:
         return "<h2>Failures</h2><p>None.</p>"
@@ -180,7 +180,7 @@ def _failures_table(rows: list[Row]) -> str:
     return f"<h2>Failures ({len(failed)})</h2>" + _table(head, body)
 
 
-def _rows_link(rows: list[Row], best: dict[str, float]) -> str:
+def _rows_link(rows: list[TrialRow], best: dict[str, float]) -> str:
     """Every row as CSV within the page."""
     out = io.StringIO()
     names = ["status", "length", "lower_bound", "gap", "entangled", "roadmap_s", "matrix_s",

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.stats import binom
 
 from netsp.arrays import Floats
-from netsp.compare.rows import FAILED, Row
+from netsp.compare.rows import FAILED, TrialRow
 
 CONFIDENCE = 0.95
 """Of the intervals about medians."""
@@ -36,20 +36,20 @@ class Summary:
     count: int
 
 
-def methods(rows: Iterable[Row]) -> dict[str, list[Row]]:
+def methods(rows: Iterable[TrialRow]) -> dict[str, list[TrialRow]]:
     """Rows by method: the solver's label, and the roadmap's where there are several."""
     rows = list(rows)
     several = len({r["roadmap"]["label"] for r in rows}) > 1
-    out: dict[str, list[Row]] = defaultdict(list)
+    out: dict[str, list[TrialRow]] = defaultdict(list)
     for row in rows:
         name = row["solver"]["label"]
         out[f"{name}, {row['roadmap']['label']}" if several else name].append(row)
     return {name: out[name] for name in sorted(out)}
 
 
-def cells(by_method: dict[str, list[Row]]) -> dict[Cell, list[Row]]:
+def cells(by_method: dict[str, list[TrialRow]]) -> dict[Cell, list[TrialRow]]:
     """Rows by method, goals and tether length."""
-    out: dict[Cell, list[Row]] = defaultdict(list)
+    out: dict[Cell, list[TrialRow]] = defaultdict(list)
     for method, rows in by_method.items():
         for row in rows:
             world = row["world"]
@@ -57,7 +57,7 @@ def cells(by_method: dict[str, list[Row]]) -> dict[Cell, list[Row]]:
     return dict(out)
 
 
-def best_lengths(rows: Iterable[Row]) -> dict[str, float]:
+def best_lengths(rows: Iterable[TrialRow]) -> dict[str, float]:
     """Shortest tour known of each problem, by its sha256; tours that entangle do not count."""
     out: dict[str, float] = {}
     for row in rows:
@@ -67,7 +67,7 @@ def best_lengths(rows: Iterable[Row]) -> dict[str, float]:
     return out
 
 
-def over_best(row: Row, best: dict[str, float]) -> float | None:
+def over_best(row: TrialRow, best: dict[str, float]) -> float | None:
     """Per cent by which a row's tour is longer than the best of its problem."""
     key = row.get("problem_sha256")
     if row.get("length") is None or key not in best:
@@ -87,12 +87,12 @@ def summary(values: Sequence[float]) -> Summary | None:
     return Summary(float(np.median(x)), float(x[k]), float(x[n - 1 - k]), float(x.mean()), n)
 
 
-def failures(rows: Iterable[Row]) -> list[Row]:
+def failures(rows: Iterable[TrialRow]) -> list[TrialRow]:
     """Rows that came to nothing."""
     return [r for r in rows if r["status"] in FAILED or r["status"] == "no_solution_found"]
 
 
-def profile(by_method: dict[str, list[Row]]) -> dict[str, Floats]:
+def profile(by_method: dict[str, list[TrialRow]]) -> dict[str, Floats]:
     """For each method the sorted ratios of its time to proof to the fastest's, over the problems
     that any of them proved (Dolan & Moré 2002); inf where it proved nothing. Methods that prove
     nothing at all are left out."""
@@ -111,7 +111,7 @@ def profile(by_method: dict[str, list[Row]]) -> dict[str, Floats]:
     }
 
 
-def gap_over_time(rows: Iterable[Row], best: dict[str, float], times: Floats) -> Floats | None:
+def gap_over_time(rows: Iterable[TrialRow], best: dict[str, float], times: Floats) -> Floats | None:
     """Median per cent over the best known at given times, of anytime solvers; inf before the first
     tour. None if no row has a history."""
     curves = []

@@ -25,7 +25,7 @@ from netsp.mip.solve import MipRun
 from netsp.mip.solve import solve as prove
 from netsp.solvers import exact
 from netsp.solving.limits import Limits
-from netsp.solving.run import Run
+from netsp.solving.run import SolverRun
 from netsp.travel.graph import TravelGraph, least_tethers
 from netsp.travel.result import Progress, Result
 
@@ -61,7 +61,7 @@ def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | Non
     """Solve by size. Iterations are those of the solver chosen."""
     chosen, limits = params or Params(), limits or Limits()
     if exact.fits(graph):
-        small = Run(graph, limits)
+        small = SolverRun(graph, limits)
         with small.until_stopped():
             small.offer(limits.warm_start)
             if not small.trivial():

@@ -11,7 +11,7 @@ from typing import Any
 from netsp.errors import InputError
 from netsp.solution import Status
 from netsp.solving.limits import Limits
-from netsp.solving.run import Run
+from netsp.solving.run import SolverRun
 from netsp.travel.graph import TravelGraph
 from netsp.travel.result import Result
 
@@ -51,7 +51,7 @@ def call(
     found = solver(graph, **{k: v for k, v in fields.items() if k in asked})
     claimed = found if isinstance(found, Result) else None
     tour = claimed.tour if claimed else found
-    run = Run(graph, limits)
+    run = SolverRun(graph, limits)
     if tour is not None:
         try:
             taken = run.offer([int(v) for v in tour])

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from netsp.arrays import Floats
-from netsp.solving.run import Run
+from netsp.solving.run import SolverRun
 from netsp.travel.graph import TravelGraph
 
 MOST_SUMS = 5e7
@@ -29,7 +29,7 @@ def fits(graph: TravelGraph) -> bool:
     return v <= MOST_VERTICES and 2.0**n * (v * v + SUMS_PER_CALL * n) <= MOST_SUMS
 
 
-def solve(run: Run) -> None:
+def solve(run: SolverRun) -> None:
     """Prove the shortest tour of a run's graph; the run's limits stop it. One iteration is all."""
     graph = run.graph
     costs, n = graph.costs, graph.goal_count

@@ -21,7 +21,7 @@ class Stop(Exception):
     """A limit is reached."""
 
 
-class Run:
+class SolverRun:
     """One run of a solver on a travel graph.
 
     iterations : how many the solver has done; each solver says what one is. `Stop` and Ctrl-C both
@@ -67,7 +67,7 @@ class Run:
 
     @contextmanager
     def until_stopped(self, *, blind: bool = False) -> Iterator[None]:
-        """Run the body until it is done, a limit is reached, also while legs are measured, or
+        """SolverRun the body until it is done, a limit is reached, also while legs are measured, or
         Ctrl-C is pressed. Where it has no tour yet by then, it gets the nearest one that there is,
         unless it is blind: then its own is all that it may show."""
         try:

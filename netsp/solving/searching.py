@@ -22,7 +22,7 @@ from netsp.lns.layers import Instance
 from netsp.lns.search import Search
 from netsp.solving.legcosts import MEASURE_AT_ONCE, LegCosts
 from netsp.solving.limits import Limits
-from netsp.solving.run import Run, Stop
+from netsp.solving.run import SolverRun, Stop
 from netsp.travel.graph import TravelGraph, least_tethers
 from netsp.travel.result import OPTIMALITY_TOLERANCE
 
@@ -44,7 +44,7 @@ LARGER = 4
 it costs more than it saves, and shows no bound meanwhile."""
 
 
-class SearchingRun(Run):
+class SearchingRun(SolverRun):
     """A run with local search.
 
     search_rounds : rounds of ruin and recreate of one search. outer : for a run over a core, the
@@ -116,7 +116,7 @@ class SearchingRun(Run):
         walk: Sequence[int] | None = None,
         length: float | None = None,
     ) -> bool:
-        """As `Run.offer`; a tour of the core is offered to the outer run as well."""
+        """As `SolverRun.offer`; a tour of the core is offered to the outer run as well."""
         taken = super().offer(tour, walk, length)
         if taken and self.outer and self.tour is not None:
             outer, core = self.outer
@@ -124,7 +124,7 @@ class SearchingRun(Run):
         return taken
 
     def report(self, stage: str, **more: Any) -> None:
-        """As `Run.report`; work on the core is reported by the outer run."""
+        """As `SolverRun.report`; work on the core is reported by the outer run."""
         if self.outer is None:
             super().report(stage, **more)
         else:

@@ -7,7 +7,6 @@ need be (26 directions); pulled taut as a tether it is the shortest of its class
 from __future__ import annotations
 
 import heapq
-import math
 from typing import Protocol
 
 import numpy as np
@@ -199,7 +198,7 @@ def taut(field: DistanceField, path: Floats, clearance: float, delta: float) -> 
     step = max(room, delta)
     line = path
     for _ in range(2):
-        k = 2 + int(length_of(line) / step)
+        k = 2 + int(polylines.length(line) / step)
         line = shortcut(grown.arrays, _shares(line, k), 0.1 * step)[::-1]
     nodes = fine.relaxed(coarse.relaxed(line, ROUNDS).nodes, ROUNDS).nodes
     return nodes[np.r_[True, np.linalg.norm(np.diff(nodes, axis=0), axis=1) > 1e-9]]
@@ -233,7 +232,7 @@ def homotopic(field: DistanceField, a: Floats, b: Floats, step: float) -> bool:
     """Whether two paths between the same ends certainly are of one class: points at most `step`
     apart, at the same share of both ways, all see one another. Nothing wider than `step` can then
     stand between the paths."""
-    k = 2 + int(max(length_of(a), length_of(b)) / step)
+    k = 2 + int(max(polylines.length(a), polylines.length(b)) / step)
     return bool(all_see(field.arrays, _shares(a, k), _shares(b, k), 0.1 * step))
 
 
@@ -253,8 +252,3 @@ def all_see(field, a, b, step):
         if low < 0.0:
             return False
     return True
-
-
-def length_of(path: Floats) -> float:
-    """Length of a polyline."""
-    return polylines.length(path) if len(path) > 1 else math.nan

@@ -9,7 +9,7 @@ from netsp.online.mission import Mission
 from netsp.online.paths.refine import REFINEMENTS
 from netsp.online.paths.sampled import OMPL_PLANNERS
 from netsp.online.paths.tree import Grid
-from netsp.online.planner.base import Command, Options, Planner, Tethers
+from netsp.online.planner.base import Command, Planner, PlannerOptions, Tethers
 from netsp.online.planner.predictive import PredictivePlanner
 from netsp.online.planner.react import ReactPlanner
 from netsp.online.scene.field import DistanceField
@@ -18,7 +18,7 @@ from netsp.registry import Registry, later
 
 
 def _draft(
-    mission: Mission, scene: DistanceField, tethers: Tethers, grid: Grid, options: Options
+    mission: Mission, scene: DistanceField, tethers: Tethers, grid: Grid, options: PlannerOptions
 ) -> Planner:
     return ReactPlanner(mission, scene, tethers, grid, options, draft=True)
 
@@ -39,11 +39,11 @@ PLANNERS: Registry[Callable[..., Planner]] = Registry(
 
 def make_planner(
     name: str | Callable[..., Planner], mission: Mission, scene: DistanceField, tethers: Tethers,
-    grid: Grid, options: Options | None = None,
+    grid: Grid, options: PlannerOptions | None = None,
 ) -> Planner:  # fmt: skip
     """A planner by name, or made by a callable. InputError for a name that is none, of the planner
     or in its options."""
-    options = options or Options()
+    options = options or PlannerOptions()
     make = name if callable(name) else PLANNERS.named(name)
     if options.paths not in (known := ("tree", *OMPL_PLANNERS)):
         raise InputError(f"paths: expected {', '.join(known)}, got {options.paths!r}")
@@ -54,4 +54,4 @@ def make_planner(
     return make(mission, scene, tethers, grid, options)
 
 
-__all__ = ["PLANNERS", "Command", "Options", "Planner", "make_planner"]
+__all__ = ["PLANNERS", "Command", "Planner", "PlannerOptions", "make_planner"]

@@ -38,7 +38,7 @@ class Command:
 
 
 @dataclass(frozen=True)
-class Options:
+class PlannerOptions:
     """How paths are found.
 
     paths : tree, or one of OMPL's planners (`netsp.online.paths.sampled`). refine : none, paper or
@@ -65,7 +65,7 @@ class Planner:
     scene: DistanceField
     tethers: Tethers
     grid: Grid
-    options: Options = field(default_factory=Options)
+    options: PlannerOptions = field(default_factory=PlannerOptions)
     index: int = 0
     mode: str = NORMAL
     path: Floats = field(default_factory=lambda: np.zeros((0, 3)))

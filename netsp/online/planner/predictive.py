@@ -15,7 +15,7 @@ import numpy as np
 
 from netsp.arrays import Floats
 from netsp.geometry import polylines
-from netsp.online.paths.tree import homotopic, length_of, taut
+from netsp.online.paths.tree import homotopic, taut
 from netsp.online.planner.base import NORMAL, RECOVERY, Planner
 from netsp.online.scene.field import pushed_out
 from netsp.online.tether import GeodesicTether, Tether
@@ -153,7 +153,7 @@ class PredictivePlanner(Planner):
             if self._too_long(np.vstack([taken_back(last), on[1:]]), limit):
                 continue
             path = self.pulled(np.vstack([back[: last + 1], on[1:]]))
-            whole.append((length_of(path), path, first, last))
+            whole.append((polylines.length(path), path, first, last))
         best: Floats | None = None
         least = np.inf
         for length, path, first, last in sorted(whole, key=lambda w: w[0]):
@@ -174,8 +174,12 @@ class PredictivePlanner(Planner):
                     row = [j for j in row if j < i]
                 else:
                     row = [j for j in row if j > i]
-            if kept is not None and length_of(kept) < least and self._fits(tether, kept, limit):
-                best, least = kept, length_of(kept)
+            if (
+                kept is not None
+                and polylines.length(kept) < least
+                and self._fits(tether, kept, limit)
+            ):
+                best, least = kept, polylines.length(kept)
         return best
 
     def _classes(self, back: Floats, onward: Mapping[int, Floats | None]) -> list[tuple[int, int]]:
@@ -208,4 +212,8 @@ class PredictivePlanner(Planner):
         """Length of the shortest tether from the anchor to a place."""
         tree = self.paths(np.array([self.mission.anchor]))
         path = tree.path(0)
-        return None if path is None else length_of(taut(self.scene, path, 0.0, self.mission.delta))
+        return (
+            None
+            if path is None
+            else polylines.length(taut(self.scene, path, 0.0, self.mission.delta))
+        )

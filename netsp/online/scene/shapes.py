@@ -14,7 +14,7 @@ from netsp.fields import STRICT, NonNegative, Number, Point2, Point3, Positive
 from netsp.online.scene import solids as kinds
 from netsp.problem import Polygon
 
-Row = tuple[int, list[float]]
+SolidRow = tuple[int, list[float]]
 
 
 class Sphere(BaseModel):
@@ -24,7 +24,7 @@ class Sphere(BaseModel):
     center: Annotated[Point3, Field(description="(x, y, z), m")]
     radius: Annotated[Positive, Field(description="m")]
 
-    def row(self) -> Row:
+    def row(self) -> SolidRow:
         """Its kind, and the numbers that the kernels read of it (`netsp.online.scene.solids`)."""
         return kinds.CAPSULE, [*self.center, *self.center, self.radius]
 
@@ -45,7 +45,7 @@ class Capsule(BaseModel):
     b: Annotated[Point3, Field(description="(x, y, z) of the other end, m")]
     radius: Annotated[Positive, Field(description="m")]
 
-    def row(self) -> Row:
+    def row(self) -> SolidRow:
         """Its kind, and the numbers that the kernels read of it (`netsp.online.scene.solids`)."""
         return kinds.CAPSULE, [*self.a, *self.b, self.radius]
 
@@ -77,7 +77,7 @@ class Cylinder(BaseModel):
         """Of its axis (m)."""
         return math.dist(self.a, self.b)
 
-    def row(self) -> Row:
+    def row(self) -> SolidRow:
         """Its kind, and the numbers that the kernels read of it (`netsp.online.scene.solids`)."""
         axis = (np.array(self.b) - np.array(self.a)) / self.length
         return kinds.CYLINDER, [*self.a, *axis, self.radius, self.length]
@@ -112,7 +112,7 @@ class Box(BaseModel):
 
         return np.asarray(Rotation.from_euler("xyz", self.rotation, degrees=True).as_matrix().T)
 
-    def row(self) -> Row:
+    def row(self) -> SolidRow:
         """Its kind, and the numbers that the kernels read of it (`netsp.online.scene.solids`)."""
         half = [0.5 * s for s in self.size]
         return kinds.BOX, [*self.center, *half, *self.axes().ravel()]
@@ -174,7 +174,7 @@ class Torus(BaseModel):
         start /= np.linalg.norm(start)
         return axis, start, np.cross(axis, start)
 
-    def row(self) -> Row:
+    def row(self) -> SolidRow:
         """Its kind, and the numbers that the kernels read of it (`netsp.online.scene.solids`)."""
         axis, start, _ = self.frame()
         return kinds.TORUS, [
@@ -204,7 +204,7 @@ class Post(BaseModel):
     center: Annotated[Point2, Field(description="(x, y) of an upright post through all depths, m")]
     radius: Annotated[Positive, Field(description="m")]
 
-    def row(self) -> Row:
+    def row(self) -> SolidRow:
         """Its kind, and the numbers that the kernels read of it (`netsp.online.scene.solids`)."""
         return kinds.POST, [*self.center, self.radius]
 
@@ -234,7 +234,7 @@ class Prism(BaseModel):
         Polygon(polygon=self.polygon)
         return self
 
-    def row(self) -> Row:
+    def row(self) -> SolidRow:
         """Its kind, and the numbers that the kernels read of it (`netsp.online.scene.solids`)."""
         return kinds.PRISM, [0.0, 0.0, self.grow]
 
@@ -278,7 +278,7 @@ class HalfSpace(BaseModel):
             raise ValueError(f"normal: expected a direction, got {list(self.normal)}")
         return self
 
-    def row(self) -> Row:
+    def row(self) -> SolidRow:
         """Its kind, and the numbers that the kernels read of it (`netsp.online.scene.solids`)."""
         n = np.array(self.normal) / np.linalg.norm(self.normal)
         return kinds.HALF_SPACE, [*self.point, *n]

@@ -21,7 +21,7 @@ from netsp.errors import InputError
 from netsp.online.scene.field import DistanceField, finite_point
 from netsp.online.tether.pull import drive, follow, pull
 from netsp.online.tether.resolution import THINNEST
-from netsp.online.tether.strand import length_of
+from netsp.online.tether.strand import strand_length
 from netsp.online.tether.tether import Tether, strand_of
 
 
@@ -157,7 +157,7 @@ class GeodesicTether:
 
 
 def _state(strand: Floats, count: int, residual: float) -> Tether:
-    return Tether(strand[:count].copy(), float(length_of(strand, count)), float(residual))
+    return Tether(strand[:count].copy(), float(strand_length(strand, count)), float(residual))
 
 
 def _show(point: Floats) -> str:

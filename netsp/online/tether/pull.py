@@ -37,13 +37,13 @@ from netsp.online.tether.strand import (
     Z,
     gap,
     insert,
-    length_of,
     let_go,
     look_along,
     moved,
     path_out,
     remove,
     rests,
+    strand_length,
     sweep_is_free,
     take_frame,
     to_surface,
@@ -130,11 +130,11 @@ def pull(field, strand, count, delta, spread, flat, rounds, precision):
         before = count
         count, lifted = lift(field, strand, count, slip, stride)
         changed = changed or lifted > 0.0 or count != before
-        was = length_of(strand, count)
+        was = strand_length(strand, count)
         ahead, gain = slide(field, strand, count, stride, precision, damping, gain)
         most = max(most, ahead)
         # shorter steps where the full one overshoots
-        longer = length_of(strand, count) > was + 1e-3 * precision
+        longer = strand_length(strand, count) > was + 1e-3 * precision
         damping = max(0.1, 0.5 * damping) if longer else min(1.0, 1.5 * damping)
         if not changed and most <= precision:
             break
@@ -340,7 +340,7 @@ def follow(field, strand, last, x, y, z, delta, spread, flat, rounds, precision)
     strand, count, residual = pull_end(
         field, strand.copy(), len(strand), last, x, y, z, delta, spread, flat, rounds, precision
     )
-    return strand[:count].copy(), residual, length_of(strand, count), depth
+    return strand[:count].copy(), residual, strand_length(strand, count), depth
 
 
 @njit(cache=True)
@@ -353,5 +353,5 @@ def drive(field, strand, count, path, delta, spread, flat, rounds, precision):
             field, strand, count, True, path[k, 0], path[k, 1], path[k, 2],
             delta, spread, flat, rounds, precision,
         )  # fmt: skip
-        lengths[k] = length_of(strand, count)
+        lengths[k] = strand_length(strand, count)
     return strand, count, residual, lengths

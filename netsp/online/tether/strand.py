@@ -98,7 +98,7 @@ def gap(strand, i, j):
 
 
 @njit(cache=True)
-def length_of(strand, count):
+def strand_length(strand, count):
     """Arc-corrected length of a strand."""
     total = 0.0
     for i in range(count - 1):
