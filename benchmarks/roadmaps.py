@@ -139,8 +139,8 @@ def convergence(worlds: int = 3, seeds: int = 3) -> None:
     counts = [250, 500, 1000, 2000, 4000, 8000, 16000]
     along, shortcut, lost = ratios(counts, worlds, seeds)
     print()
-    head("samples", "median ratio", "min", "max", "pulled taut: median", "max", "no tour",
-         name="prm-convergence")  # fmt: skip
+    head("samples", "median ratio", "min", "max", "pulled taut: median",
+         "pulled taut: max", "no tour", name="prm-convergence")  # fmt: skip
     for n in counts:
         r, s = along[n], shortcut[n]
         row(

@@ -13,8 +13,10 @@ from typing import Any
 
 import numpy as np
 
+from netsp.clock import Clock
 from netsp.dp.solve import bound_by_walks
 from netsp.lns import Search
+from netsp.mip.overgoals import bound_over_goals
 from netsp.mip.program import IntegerProgram, Point
 from netsp.mip.root import Root, Warm, tour_legs
 from netsp.mip.subtours import component_cuts, follow, tour_from
@@ -37,6 +39,9 @@ DEFAULT_BACKEND = "highs"
 SECONDS_PER_LEG = 3e-4
 """With less time than this left for every leg the integer program is not begun: its presolve alone
 would take that long, and cannot be stopped."""
+
+GOALS_SHARE = 0.1
+"""Part of the time that is left which the bound from the goals alone may take."""
 
 SEARCH_AGAIN = 0.5
 """Share of the last gap at which the classes that the LP visits are searched once more."""
@@ -92,6 +97,7 @@ class MipRun(SearchingRun):
                 if not walks:
                     with self.core() as core:
                         if core is not None:
+                            self.bound_by_goals(backend)
                             core.prove(backend)
                     warm = core.program() if core is not None else None
                 self.prove(backend, walks=walks, warm=warm)
@@ -110,6 +116,19 @@ class MipRun(SearchingRun):
             bound_by_walks(self, costs)
         if not (self.done or self.infeasible):
             self.cut(costs, backend, warm)
+
+    def bound_by_goals(self, backend: str) -> None:
+        """A first bound for who stops the run before the proof over all classes has one."""
+
+        def prove(graph: TravelGraph, limits: Limits) -> Result:
+            return MipRun(graph, limits).solve(backend, None)
+
+        share = (
+            Clock(GOALS_SHARE * self.clock.left, within=self.clock) if self.clock.limit else None
+        )
+        limits = Limits(share or self.clock, rng=self.rng)
+        self.raise_bound(bound_over_goals(self.graph, prove, limits))
+        self.report("goals", vertices=len(self.graph))
 
     def program(self) -> Warm | None:
         """The program of the root of a run over a core, by vertices of the outer run; also of one

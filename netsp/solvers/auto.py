@@ -17,10 +17,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from netsp.arrays import Floats
 from netsp.clock import Clock
-from netsp.lns import Instance
 from netsp.lns.solve import solve as search
+from netsp.mip.overgoals import bound_over_goals
 from netsp.mip.solve import MipRun
 from netsp.mip.solve import solve as prove
 from netsp.solvers import exact
@@ -87,12 +86,14 @@ def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | Non
         if limits.on_progress:
             limits.on_progress(rows[-1])
 
-    over_goals = TravelGraph.from_costs(_between_goals(graph), range(graph.goal_count + 1))
-    bound = prove(over_goals, limits=Limits(clock, rng=limits.rng, on_progress=tell)).lower_bound
+    bound = bound_over_goals(
+        graph,
+        lambda g, limits: prove(g, limits=limits),
+        Limits(clock, rng=limits.rng, on_progress=tell),
+    )
     return replace(
         found,
-        # the paths are shortest up to rounding
-        lower_bound=min(length, (bound or 0.0) * (1.0 - 1e-9)),
+        lower_bound=min(length, bound),
         trace=tuple(rows),
     )
 
@@ -117,13 +118,3 @@ def _over_shortest(graph: TravelGraph, limits: Limits, backend: str) -> Result:
     whole = replace(found, tour=tuple(int(core[v]) for v in found.tour))
     least = float(graph.tethers[others].min(initial=np.inf))
     return graph.within_kept(whole, graph.least_by_way_of(least))
-
-
-def _between_goals(graph: TravelGraph) -> Floats:
-    """(n + 1, n + 1) no more than any leg between two goals, in any class."""
-    if not graph.geometric:
-        return Instance.of(graph).cluster_costs
-    detours = graph.detours(sub_goals=False)
-    places = range(graph.goal_count + 1)
-    shortest = np.array([[detours.length(a, b) for b in places] for a in places])
-    return np.asarray(np.minimum(shortest, shortest.T))
