@@ -315,3 +315,27 @@ def test_a_core_whose_time_is_over_hands_over_to_the_proof_over_all(monkeypatch)
     run = core_first(monkeypatch, problem, share=1e-4, time_limit=100.0)
     assert run.status is Status.OPTIMAL
     assert run.length == pytest.approx(best, rel=1e-6)
+
+
+@settings(max_examples=30, deadline=None)
+@given(small_worlds(), st.sampled_from(["taut", "prm"]))
+def test_no_leg_is_shorter_than_the_way_between_its_goals_in_any_class(problem, roadmap):
+    options = {"samples": 100, "seed": 0} if roadmap == "prm" else {}
+    try:
+        graph = travel_graph(problem, roadmap, **options)
+    except NetspError:  # a goal out of reach
+        return
+    least = graph.between_goals()
+    for a, b in itertools.combinations(range(graph.goal_count + 1), 2):
+        legs = graph.costs[np.ix_(graph.members(a), graph.members(b))]
+        assert least[a, b] <= legs.min() * (1 + 1e-9)
+        straight = math.dist(problem.points[a], problem.points[b])
+        assert least[a, b] >= straight * (1 - 1e-6)
+
+
+def test_what_was_not_looked_at_in_time_bounds_nothing():
+    graph = travel_graph(random_world(0, goals=20, tether=300.0))
+    looked = iter([False, True])
+    part, whole = graph.between_goals(lambda: next(looked)), graph.between_goals()
+    assert (part <= whole).all()
+    assert 0 < (part == 0.0).sum() < part.size

@@ -4,11 +4,9 @@ them in any class. It is weak, true, and had in a second where there are thousan
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
-import numpy as np
-
-from netsp.arrays import Floats
-from netsp.lns import Instance
+from netsp.clock import Clock
 from netsp.solving.limits import Limits
 from netsp.travel.graph import TravelGraph
 from netsp.travel.result import Result
@@ -24,15 +22,7 @@ def bound_over_goals(graph: TravelGraph, prove: Prove, limits: Limits) -> float:
 
     prove : a solver that bounds.
     """
-    over = TravelGraph.from_costs(between_goals(graph), range(graph.goal_count + 1))
-    return (prove(over, limits).lower_bound or 0.0) * (1.0 - ROUNDING)
-
-
-def between_goals(graph: TravelGraph) -> Floats:
-    """(n + 1, n + 1) no more than any leg between two goals, in any class."""
-    if not graph.geometric:
-        return Instance.of(graph).cluster_costs
-    detours = graph.detours(sub_goals=False)
-    places = range(graph.goal_count + 1)
-    shortest = np.array([[detours.length(a, b) for b in places] for a in places])
-    return np.asarray(np.minimum(shortest, shortest.T))
+    clock = Clock.of(limits.time)
+    least = graph.between_goals(lambda: clock.up)
+    over = TravelGraph.from_costs(least, range(graph.goal_count + 1))
+    return (prove(over, replace(limits, time=clock)).lower_bound or 0.0) * (1.0 - ROUNDING)

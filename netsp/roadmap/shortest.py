@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -13,6 +13,9 @@ from scipy.sparse.csgraph import dijkstra
 from netsp.arrays import Floats, Ints
 from netsp.roadmap.outline import Outline, is_free
 from netsp.roadmap.tangents import ARC_STEP, TangentGraph, build_tangents
+
+AT_ONCE = 16
+"""Sources of shortest paths between two looks at the clock."""
 
 
 class ShortestPaths(Protocol):
@@ -82,6 +85,18 @@ class ContactGraph:
         rows = np.arange(self.points) if sources is None else np.asarray(sources)
         found = dijkstra(self._graph, directed=False, indices=rows)
         return np.asarray(found[:, : self.points])
+
+    def between(self, height: Floats, up: Callable[[], bool]) -> Floats:
+        """(points, points) no more than the 3D length of any path between two points, in any
+        class; 0 for those that were not looked at when the time was up. height : (points,)."""
+        planar = np.zeros((self.points, self.points))
+        for first in range(0, self.points, AT_ONCE):
+            if up():
+                break
+            rows = range(first, min(first + AT_ONCE, self.points))
+            planar[rows] = self.lengths(rows)
+        planar[~np.isfinite(planar)] = 0.0
+        return np.hypot(np.maximum(planar, planar.T), np.subtract.outer(height, height))
 
     def rest(self, goal: int) -> Rest:
         """What is left to a point from the base and from the end of every tangent."""

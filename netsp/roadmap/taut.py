@@ -86,6 +86,7 @@ class TautRoadmap:
             self.legs,
             roadmap="taut",
             detours=partial(taut_detours, self.problem),
+            between=lambda up: self.paths.contacts.between(self.problem.points[:, 2], up),
             classes=self.rule if self.complete else "shortest",
             least_left_out=self.least_left_out,
         )

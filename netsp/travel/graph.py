@@ -92,6 +92,7 @@ class TravelGraph(Drawn):
         legs: Legs,
         roadmap: str = "custom",
         detours: Callable[[bool, Callable[[], None], Flag], Detours] | None = None,
+        between: Callable[[Callable[[], bool]], Floats] | None = None,
         classes: KeptClasses | None = None,
         least_left_out: float = math.inf,
     ) -> None:
@@ -105,7 +106,7 @@ class TravelGraph(Drawn):
         self.clock: Clock | None = None
         self._legs = legs
         self._costs: Floats | None = None
-        self._make_detours = detours
+        self._make_detours, self._between = detours, between
         self._detours: dict[bool, Detours] = {}
         self._place: dict[tuple[int, Word], int] | None = None
 
@@ -220,6 +221,20 @@ class TravelGraph(Drawn):
             stop = NEVER if self.clock is None else self.clock.flag
             self._detours[sub_goals] = self._make_detours(sub_goals, check, stop)
         return self._detours[sub_goals]
+
+    def between_goals(self, up: Callable[[], bool] = lambda: False) -> Floats:
+        """(n + 1, n + 1) no more than any leg between two goals, or base and goal, in any class;
+        what was not looked at when the time was up, or cannot be, is 0."""
+        if self._between is not None:
+            return self._between(up)
+        out = np.zeros((self.goal_count + 1, self.goal_count + 1))
+        if self.roadmapped:
+            return out
+        for a in range(len(out)):
+            for b in range(a):
+                legs = self.costs[np.ix_(self.members(a), self.members(b))]
+                out[a, b] = out[b, a] = legs.min()
+        return out
 
     def subgraph(self, vertices: npt.ArrayLike) -> TravelGraph:
         """The travel graph on some of the vertices, the base first; vertex k of it is vertex
