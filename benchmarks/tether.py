@@ -166,7 +166,7 @@ def prism_world(
     return errors, wrong, tether.length, times[2:]
 
 
-def prisms(worlds: int) -> None:
+def prisms(worlds: int, *, paper: bool) -> None:
     """The offline geometry as truth: length and word at every 20th of 400 updates."""
     print(f"### Vertical prisms, {worlds} worlds a family, 400 updates of up to 9 (delta 2)\n")
     head("worlds", "model", "worst error %", "mean |error| %", "wrong classes", "worst back",
@@ -174,7 +174,7 @@ def prisms(worlds: int) -> None:
     for family in ("icra2017", "harbour"):
         found: dict[str, list[list[float]]] = {}
         for seed in range(worlds):
-            for k in range(3 if seed == 0 else 1):  # the paper's is slow
+            for k in range(3 if seed == 0 and paper else 1):
                 label = models(Scene(solids=[BALL]).field(), 2.0)[k][0]
                 row_ = prism_world(family, seed, lambda f, k=k: models(f, 2.0)[k][1])
                 found.setdefault(label, []).append(list(row_))
@@ -212,7 +212,9 @@ def lattice() -> np.ndarray:
     return dense([*out, (14, 0.5, -14), (0, 0.7, -14), (-14, 0.9, -14)], 0.1)
 
 
-def finer(name: str, scene: Scene, path: Callable[[], np.ndarray], deltas: list[float]) -> None:
+def finer(
+    name: str, scene: Scene, path: Callable[[], np.ndarray], deltas: list[float], *, paper: bool
+) -> None:
     """A scene at several resolutions; the last is the reference."""
     field, way = scene.field(), path()
     lengths = {}
@@ -221,7 +223,7 @@ def finer(name: str, scene: Scene, path: Callable[[], np.ndarray], deltas: list[
         row(name, "geodesic", delta, len(tether.nodes), f"{tether.length:.4f}", f"{back:.4f}",
             f"{np.median(times):.0f}", f"{np.quantile(times, 0.99):.0f}",
             f"{times.max():.0f}")  # fmt: skip
-    for label, model in models(field, deltas[0])[1:]:
+    for label, model in models(field, deltas[0])[1:] if paper else []:
         tether, _, times, back = driven(model, way[::4])
         row(name, label, deltas[0], len(tether.nodes), f"{tether.length:.4f}", f"{back:.4f}",
             f"{np.median(times):.0f}", f"{np.quantile(times, 0.99):.0f}",
@@ -287,6 +289,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--worlds", type=int, default=10)
     parser.add_argument("--drives", type=int, default=0)
+    parser.add_argument(
+        "--no-paper", dest="paper", action="store_false",
+        help="neither the paper's model, which is slow, nor the closed forms",
+    )  # fmt: skip
     parser.add_argument("--cloud")
     parser.add_argument("--tour", help="with --cloud: waypoints (CSV) to drag a tether along")
     parser.add_argument("--scale", type=float, default=0.1)
@@ -295,13 +301,21 @@ def main() -> None:
     if args.drives:
         drives(args.drives)
         return
-    closed_forms()
-    prisms(args.worlds)
+    if args.paper:
+        closed_forms()
+    prisms(args.worlds, paper=args.paper)
     print("### Finer and finer (steps of 3 cm; the jacket 10 cm)\n")
     head("scene", "model", "delta", "nodes", "length m", "back m", "median us", "99 % us",
          "worst us", name="tether-finer")  # fmt: skip
-    finer("pipes", Scene.load(SCENES / "pipes.json"), round_the_pipes, [0.1, 0.05, 0.025])
-    finer("jacket", Scene.load(SCENES / "oc4-jacket.json"), lattice, [0.4, 0.2, 0.05])
+    finer("pipes", Scene.load(SCENES / "pipes.json"), round_the_pipes, [0.1, 0.05, 0.025],
+          paper=args.paper)  # fmt: skip
+    finer(
+        "jacket",
+        Scene.load(SCENES / "oc4-jacket.json"),
+        lattice,
+        [0.4, 0.2, 0.05],
+        paper=args.paper,
+    )
     print()
     if args.cloud:
         print("### A cloud of points\n")
