@@ -100,9 +100,11 @@ def dynamic(mission: Mission, scene: Scene, field, seeds: int) -> None:
         )  # fmt: skip
 
 
-def external_mission(cloud: str, tour: str, scale: float) -> tuple[Mission, Scene]:
-    """A tour of others about a cloud of points."""
-    points = np.loadtxt(tour, delimiter=",", skiprows=1)[:, :3] * scale
+def external_mission(
+    cloud: str, tour: str, scale: float, first: int | None = None
+) -> tuple[Mission, Scene]:
+    """A tour of others about a cloud of points. first : only so many of its waypoints."""
+    points = np.loadtxt(tour, delimiter=",", skiprows=1)[:first, :3] * scale
     scene = Scene(name="cloud", cloud={"file": cloud, "scale": scale, "voxel": 0.05})
     mission = Mission(
         scene="-", name="external tour", anchor=tuple(points[0]),

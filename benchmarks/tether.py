@@ -169,7 +169,7 @@ def prism_world(
 def prisms(worlds: int, *, paper: bool) -> None:
     """The offline geometry as truth: length and word at every 20th of 400 updates."""
     print(f"### Vertical prisms, {worlds} worlds a family, 400 updates of up to 9 (delta 2)\n")
-    head("worlds", "model", "worst error %", "mean |error| %", "wrong classes", "worst back",
+    head("worlds", "model", "worst error %", "mean absolute error %", "wrong classes", "worst back",
          "median us", "worst us", name="tether-prisms")  # fmt: skip
     for family in ("icra2017", "harbour"):
         found: dict[str, list[list[float]]] = {}

@@ -120,14 +120,14 @@ def windy(names: tuple[str, ...] = ("basin", "pipes")) -> tuple[str, bool]:
 
 
 def external() -> tuple[str, bool]:
-    """The tour of others about a cloud of points."""
+    """The beginning of the tour of others about a cloud of points; the whole takes minutes."""
     import react
 
     folder = DATA / "fc_planner_pipe"
     if not folder.is_dir():
         return ABSENT, True
     mission, scene = react.external_mission(
-        str(folder / "cloud.npz"), str(folder / "waypoints.csv"), 0.1
+        str(folder / "cloud.npz"), str(folder / "waypoints.csv"), 0.1, first=30
     )
     s = react.fly(mission, scene, scene.field(), "predictive", "kinematic")
     shown = f"{s['exceedance_s']:.1f} s, {s['visited']} of {s['waypoints']}"
@@ -175,7 +175,7 @@ def claims() -> Iterator[Claim]:
     yield Claim("tether: prisms; classes", "0.01 %; none wrong", prisms)
     yield Claim("tether: drives past thin poles", "none through one", drives)
     yield Claim("BlueROV2 in a current: over the limit; visited", "0.0 s; all", windy)
-    yield Claim("external tour: over the limit; visited", "0.0 s; all", external)
+    yield Claim("external tour, 30 waypoints: over the limit; visited", "0.0 s; all", external)
     yield Claim("order: saved on the basin mission", "25 %", ordered)
     yield Claim("predicted times of recorded flights", "within 10 %", flights)
     for kind in surprises.KINDS:
