@@ -150,9 +150,15 @@ def test_ctrl_c_leaves_a_verified_solution(tmp_path):
     problem.write_text(random_world(2, goals=70, tether=420.0).to_json())
     out = tmp_path / "s.json"
     command = [sys.executable, "-m", "netsp", "solve", str(problem), "-o", str(out)]
+
+    def heard() -> None:
+        """A shell that puts the tests in the background has them ignore Ctrl-C."""
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
     with subprocess.Popen(
-        [*command, "--mip-backend", "cbc"], stderr=subprocess.PIPE, text=True, cwd=ROOT
-    ) as process:
+        [*command, "--mip-backend", "cbc"], stderr=subprocess.PIPE, text=True, cwd=ROOT,
+        preexec_fn=heard,
+    ) as process:  # fmt: skip
         for line in process.stderr:
             if " root " in line or " core " in line:  # with many classes the core comes first
                 break
