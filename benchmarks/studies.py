@@ -94,9 +94,9 @@ CLOCKED = ("lns", "anneal")
 """Whose tours of Fig. 5 depend on how fast the machine is."""
 
 
-def again(worlds: int) -> tuple[int, list[str]]:
-    """Run the trials of the first worlds once more, but for those that a clock ends: how many are
-    as kept, and those that are not."""
+def again(worlds: int, most_goals: int) -> tuple[int, list[str]]:
+    """Run the trials of the first worlds with so few goals once more, but for those that a clock
+    ends: how many are as kept, and those that are not."""
     from netsp.compare.study import Trial
     from netsp.compare.trial import run
 
@@ -104,7 +104,8 @@ def again(worlds: int) -> tuple[int, list[str]]:
     for study in ("icra2017-table1", "icra2017-fig5", "rss2016-fig3", "rss2016-fig4"):
         for r in load(study)[0]:
             clocked = r["solver"]["label"] in CLOCKED and r["solver"]["iteration_limit"] is None
-            if r["world"]["seed"] >= worlds or clocked:
+            beyond = r["world"]["seed"] >= worlds or r["world"]["goals"] > most_goals
+            if beyond or clocked:
                 continue
             found = run(Trial(r["world"], r["roadmap"], r["solver"], r["seed"]))
             kept, now = r.get("length"), found.get("length")
