@@ -103,7 +103,7 @@ def update() -> tuple[str, bool]:
     return f"{max(medians):.0f} us", max(medians) <= ALLOWANCE * 100.0
 
 
-def windy(names: tuple[str, ...] = ("basin", "pipes")) -> tuple[str, bool]:
+def windy(names: tuple[str, ...] = ("basin",)) -> tuple[str, bool]:
     """`predictive` with the BlueROV2 in a current with gusts."""
     import react
 
