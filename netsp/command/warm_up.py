@@ -17,9 +17,11 @@ def arguments(p: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Compile, and return the exit code."""
     from netsp.command.compiling import compile_messages, forget, steps
+    from netsp.compiled.tiers import everything_compiled
 
     forget()
-    with contextlib.nullcontext() if args.quiet else compile_messages(sys.stderr):
+    messages = contextlib.nullcontext() if args.quiet else compile_messages(sys.stderr)
+    with messages, everything_compiled():
         for name, step in steps():
             if not args.quiet:
                 print(f"warm-up: {name}", file=sys.stderr, flush=True)

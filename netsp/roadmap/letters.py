@@ -56,7 +56,7 @@ def arc_letters(cx, cy, r, ax, bx, start, turn, rays, order, out, n):
             x = rays[i, 0]
             if (x0 >= x) == (x1 >= x):
                 continue
-            root = math.sqrt(max(r * r - (x - cx) ** 2, 0.0))
+            root = math.sqrt(max(r * r - (x - cx) * (x - cx), 0.0))
             height = cy + root if upper else cy - root
             if height > rays[i, 1]:
                 out[n] = i + 1 if rightward else -(i + 1)

@@ -23,6 +23,7 @@ from numba import njit
 
 from netsp.arrays import Floats
 from netsp.compiled.growing import more_rows, sort_in_place
+from netsp.compiled.tiers import choose
 from netsp.geometry.kernels import (
     TWO_PI,
     Blockers,
@@ -55,7 +56,8 @@ def depths(x, y, blockers):
 def is_free(points: Floats, blockers: Blockers) -> bool:
     """Whether a polyline (k, 2 or 3) enters no grown obstacle."""
     xy = np.asarray(points, dtype=float)[:, :2]
-    return not any(segment_blocked(*p, *q, blockers) for p, q in pairwise(xy))
+    blocked = choose(segment_blocked, len(xy) * (len(blockers.box) + len(blockers.edges)))
+    return not any(blocked(*p, *q, blockers) for p, q in pairwise(xy))
 
 
 @dataclass(frozen=True)
@@ -92,7 +94,8 @@ def build_outline(problem: Problem) -> Outline:
     blockers, disks = _grow(problem, origin, problem.clearance + margin, eps)
     bounds = np.array(problem.bounds if problem.bounds else (-np.inf, -np.inf, np.inf, np.inf))
     bounds = bounds - np.tile(origin, 2)
-    rows = _visible_arcs(disks, blockers, bounds)
+    parts = len(blockers.box) + len(blockers.edges)
+    rows = choose(_visible_arcs, 4 * len(disks) * parts)(disks, blockers, bounds)
     places = problem.points[:, :2] - origin
     points = np.array([_push_out(p, blockers, STAND_OFF * scale) for p in places])
     rays = problem.representative_points - origin
@@ -148,7 +151,8 @@ def _push_out(point: Floats, blockers: Blockers, distance: float) -> Floats:
     """Move a point that lies on a grown boundary, or nearly, to a distance from it."""
     p = np.array(point, dtype=float)
     for _ in range(32):
-        depth = depths(p[0], p[1], blockers)
+        parts = len(blockers.box) + len(blockers.edges)
+        depth = choose(depths, parts)(p[0], p[1], blockers)
         if len(depth) == 0 or depth.max() <= -0.5 * distance:
             break
         o = int(np.argmax(depth))
@@ -173,7 +177,7 @@ def _push_out_of_polygon(p: Floats, o: int, blockers: Blockers, stand_off: float
     if distance <= 1e-6 * stand_off:
         unit = np.array([d[k, 1], -d[k, 0]]) / np.hypot(*d[k])
     else:
-        inside = point_in_polygon(
+        inside = choose(point_in_polygon, len(e))(
             p[0], p[1], blockers.edges, blockers.edge_start[o], blockers.edge_start[o + 1]
         )
         unit = away[k] / distance * (-1.0 if inside else 1.0)

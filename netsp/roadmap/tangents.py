@@ -18,6 +18,7 @@ from numba import njit
 from netsp.arrays import Floats, Ints
 from netsp.clock import NEVER, Flag
 from netsp.compiled.growing import more_rows
+from netsp.compiled.tiers import choose
 from netsp.geometry.kernels import TWO_PI, segment_blocked
 from netsp.roadmap.letters import arc_letters, segment_letters
 from netsp.roadmap.outline import Outline
@@ -98,7 +99,8 @@ def build_tangents(outline: Outline, reach: float, stop: Flag = NEVER) -> Tangen
     place = np.zeros((len(arcs) + len(outline.points), 5))
     place[: len(arcs)] = arcs
     place[len(arcs) :, :2] = outline.points
-    rows = _tangents(place, len(arcs), full, base, reach, outline.blockers, stop)
+    steps = 2 * len(place) ** 2 * (1 + len(outline.blockers.box))
+    rows = choose(_tangents, steps)(place, len(arcs), full, base, reach, outline.blockers, stop)
     source, target = rows[:, 0].astype(np.int64), rows[:, 1].astype(np.int64)
     key, arrival_key, length = rows[:, 2], rows[:, 3], rows[:, 4]
     ends, angle = np.ascontiguousarray(rows[:, 5:9]), np.ascontiguousarray(rows[:, 9:])
@@ -115,7 +117,8 @@ def build_tangents(outline: Outline, reach: float, stop: Flag = NEVER) -> Tangen
         at_point = node >= 2 * len(arcs)
         ends[at_point, column : column + 2] = outline.places[node[at_point] - 2 * len(arcs)]
     _merge_contacts(source, target, length, ends, angle, len(arcs))
-    first, turn, gap, letters, segment_row, arrival_row, gap_row = _write_letters(
+    write_letters = choose(_write_letters, 3 * len(target) * (4 + len(outline.rays)))
+    first, turn, gap, letters, segment_row, arrival_row, gap_row = write_letters(
         arcs,
         full,
         start,
