@@ -30,7 +30,12 @@ NEVER: Flag = np.zeros(1, dtype=np.int64)
 class Clock:
     """Time since the start, and how much of a limit is left.
 
-    limit : seconds from now, None for no limit. within : a clock that this one may not outlast.
+    Parameters
+    ----------
+    limit
+        Seconds from now, None for no limit.
+    within
+        A clock that this one may not outlast.
     """
 
     def __init__(self, limit: float | None = None, *, within: Clock | None = None) -> None:

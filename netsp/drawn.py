@@ -21,7 +21,10 @@ class Drawn:
     def plot(self, ax: Any = None, **more: Any) -> Any:
         """Draw on axes (Matplotlib's) of the caller, or on new ones; returns the axes.
 
-        more : what the picture takes besides; of a solution its `problem`, to be drawn beneath.
+        Parameters
+        ----------
+        more
+            What the picture takes besides; of a solution its `problem`, to be drawn beneath.
         """
         return load(self.picture)(self, ax=ax, **more)
 

@@ -18,8 +18,19 @@ _WORD = re.compile(rf"[^\s/'\"]{{{2 * LONGEST_QUOTE},}}")
 
 
 def brief(message: str) -> str:
-    """A message in one line, its quoted values and endless words cut short; what cannot be printed
-    is escaped."""
+    """A message in one line, quoted values and endless words cut short, what cannot be printed
+    escaped.
+
+    Parameters
+    ----------
+    message : str
+        The message.
+
+    Returns
+    -------
+    str
+        One line.
+    """
 
     def cut(found: re.Match[str]) -> str:
         return f"{found[1]}{found[2][: LONGEST_QUOTE - 1]}…{found[1]}"

@@ -113,7 +113,8 @@ def folder_made(folder: str | Path) -> Path:
 
     Raises
     ------
-    InputError : it cannot be made, or nothing can be written there.
+    InputError
+        It cannot be made, or nothing can be written there.
     """
     place = Path(folder)
     if place.exists() and not place.is_dir():

@@ -45,7 +45,12 @@ def available() -> float:
 def ask(size: float, what: str, advice: str) -> None:
     """MemoryLimitError, in one line, if `size` bytes are more than can be had.
 
-    what : that is to be made, for the message. advice : what to lower.
+    Parameters
+    ----------
+    what
+        That is to be made, for the message.
+    advice
+        What to lower.
     """
     if size < SMALL:
         return

@@ -64,12 +64,34 @@ class Circle(BaseModel):
         return self.center
 
     def signed_distance(self, xy: npt.ArrayLike) -> npt.NDArray[np.float64]:
-        """Distance of points (..., 2) to the outline, negative inside."""
+        """Distance of points to the outline, negative inside.
+
+        Parameters
+        ----------
+        xy : array_like, shape (..., 2)
+            Points, in the problem's units.
+
+        Returns
+        -------
+        ndarray, shape (...)
+            Distances, in the problem's units.
+        """
         d = np.asarray(xy, dtype=float) - self.center
         return np.asarray(np.hypot(d[..., 0], d[..., 1]) - self.radius)
 
     def shape(self, grow: float = 0.0) -> shapely.Polygon:
-        """The plan grown by a clearance, as an inscribed Shapely polygon of 256 sides."""
+        """The plan grown by a clearance.
+
+        Parameters
+        ----------
+        grow : float
+            Clearance, in the problem's units.
+
+        Returns
+        -------
+        shapely.Polygon
+            Inscribed polygon of 256 sides.
+        """
         import shapely
 
         return shapely.Point(self.center).buffer(self.radius + grow, quad_segs=64)
@@ -97,11 +119,33 @@ class Polygon(BaseModel):
         return polygon_interior_point(self.polygon)
 
     def signed_distance(self, xy: npt.ArrayLike) -> npt.NDArray[np.float64]:
-        """Distance of points (..., 2) to the outline, negative inside."""
+        """Distance of points to the outline, negative inside.
+
+        Parameters
+        ----------
+        xy : array_like, shape (..., 2)
+            Points, in the problem's units.
+
+        Returns
+        -------
+        ndarray, shape (...)
+            Distances, in the problem's units.
+        """
         return polygon_signed_distance(self.polygon, xy)
 
     def shape(self, grow: float = 0.0) -> shapely.Polygon:
-        """The plan grown by a clearance, as a Shapely polygon."""
+        """The plan grown by a clearance.
+
+        Parameters
+        ----------
+        grow : float
+            Clearance, in the problem's units.
+
+        Returns
+        -------
+        shapely.Polygon
+            The polygon itself without a clearance, else with rounded corners.
+        """
         import shapely
 
         shape = shapely.Polygon(self.polygon)
@@ -176,26 +220,40 @@ class State(BaseModel):
 
 
 class Problem(Drawn, BaseModel):
-    """An instance of the Non-Entangling Travelling Salesperson Problem (McCammon & Hollinger 2017,
-    section III).
+    """An instance of the Non-Entangling Travelling Salesperson Problem.
+
+    Source: McCammon & Hollinger 2017, section III.
 
     Attributes
     ----------
-    base : where the tether is anchored and the tour starts and ends; (x, y, z), z up.
-    goals : points to visit; a bare ``[x, y]`` or ``[x, y, z]`` is accepted.
-    obstacles : vertical projections of circles or simple polygons.
-    tether_length : longest taut tether, measured in 3D from the base.
-    clearance : every obstacle is inflated by this (the vehicle's radius).
-    bounds : ``(xmin, ymin, xmax, ymax)`` box that robot and tether stay in, or None.
-    state : where the tour starts; None at the base with no tether out. Otherwise the shortest way
-        from there through all goals back to the base is sought, that takes the tether back whole.
-        The tether may be longer than `tether_length` at the start only.
+    base : (x, y) or (x, y, z)
+        Where the tether is anchored and the tour starts and ends; z is up.
+    goals : tuple of Goal
+        Points to visit; a bare ``[x, y]`` or ``[x, y, z]`` is accepted.
+    obstacles : tuple of Circle or Polygon
+        Vertical projections of circles or simple polygons.
+    tether_length : float
+        Longest taut tether, measured in 3D from the base.
+    clearance : float
+        Every obstacle is inflated by this (the vehicle's radius).
+    bounds : (xmin, ymin, xmax, ymax) or None
+        Box that robot and tether stay in.
+    state : State or None
+        Where the tour starts; None at the base with no tether out. Otherwise the shortest path from
+        there through all goals back to the base is sought, with the whole tether recovered. The
+        tether may be longer than `tether_length` at the start only.
+    units : str
+        Name of the unit of length.
 
     Raises
     ------
-    pydantic.ValidationError : when constructed from values that break the format.
-    InputError : the same, in one line, from `load` and `from_json`.
+    pydantic.ValidationError
+        Constructed from values that break the format.
+    InputError
+        The same, in one line, from `load` and `from_json`.
 
+    Examples
+    --------
     >>> problem = Problem(base=(0, 0), goals=[(4, 0)], tether_length=5,
     ...                   obstacles=[Circle(center=(2, 0), radius=1)])
     >>> problem.goals[0].position
@@ -366,12 +424,34 @@ class Problem(Drawn, BaseModel):
         return np.array([self.base, *(g.position for g in self.goals)], dtype=float)
 
     def goal_label(self, k: int) -> str:
-        """How messages name goal k (0-based)."""
+        """How messages name a goal.
+
+        Parameters
+        ----------
+        k : int
+            Index of the goal, from 0.
+
+        Returns
+        -------
+        str
+            ``goals[k]``, and its name if it has one.
+        """
         name = self.goals[k].name
         return f"goals[{k}]" + (f" ({name})" if name else "")
 
     def obstacle_label(self, i: int) -> str:
-        """How messages name obstacle i (0-based)."""
+        """How messages name an obstacle.
+
+        Parameters
+        ----------
+        i : int
+            Index of the obstacle, from 0.
+
+        Returns
+        -------
+        str
+            ``obstacles[i]``, and its name if it has one.
+        """
         name = self.obstacles[i].name
         return f"obstacles[{i}]" + (f" ({name})" if name else "")
 
@@ -388,16 +468,56 @@ class Problem(Drawn, BaseModel):
 
     @classmethod
     def from_json(cls, text: str | bytes, *, source: str = "problem") -> Self:
-        """Parse and validate; `InputError` with one line for anything wrong."""
+        """Parse and validate the text of a problem file.
+
+        Parameters
+        ----------
+        text : str or bytes
+            JSON of format version 1.
+        source : str
+            What messages call it.
+
+        Returns
+        -------
+        Problem
+            The problem.
+
+        Raises
+        ------
+        InputError
+            Anything wrong, in one line.
+        """
         return read_model(cls, text, source)
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
-        """Read a problem file; `InputError` if it cannot be read or is not valid."""
+        """Read a problem file.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file.
+
+        Returns
+        -------
+        Problem
+            The problem.
+
+        Raises
+        ------
+        InputError
+            The file cannot be read or is not valid, in one line.
+        """
         return cls.from_json(read_text(path), source=str(path))
 
     def to_json(self) -> str:
-        """The problem as version-1 JSON, in a form that reads back equal."""
+        """The problem as JSON of format version 1, in a form that reads back equal.
+
+        Returns
+        -------
+        str
+            Text of a problem file.
+        """
         data = self.model_dump(mode="json", exclude_none=True)
         return json.dumps(data, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
 

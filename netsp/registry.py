@@ -23,8 +23,16 @@ R = TypeVar("R")
 class Registry(MutableMapping[str, R], Generic[R]):
     """Records by name, ours first, in order.
 
-    kind : what messages call them. group : of the entry points. own : our records. record : makes
-    the record of another package's entry point from its name and ``module:attribute``.
+    Parameters
+    ----------
+    kind : str
+        What messages call them.
+    group : str
+        Name of the entry points of other packages.
+    own : dict
+        Our records by name.
+    record : callable
+        Makes the record of another package's entry point from its name and ``module:attribute``.
     """
 
     def __init__(
@@ -56,14 +64,43 @@ class Registry(MutableMapping[str, R], Generic[R]):
         return len({**self._own, **self._offered})
 
     def named(self, name: object) -> R:
-        """The record of a name; InputError, which tells the choices, for a name that is none."""
+        """The record of a name.
+
+        Parameters
+        ----------
+        name : object
+            The name.
+
+        Returns
+        -------
+        object
+            The record.
+
+        Raises
+        ------
+        InputError
+            No record has that name; tells the choices.
+        """
         if not isinstance(name, str) or name not in self:
             raise InputError(f"{self.kind}: unknown {name!r}; expected one of {', '.join(self)}")
         return self[name]
 
 
 def later(name: str, where: str) -> Callable[..., Any]:
-    """The record of kinds whose records are callables: loaded when first called."""
+    """The record of kinds whose records are callables: loaded when first called.
+
+    Parameters
+    ----------
+    name : str
+        The name.
+    where : str
+        ``module:attribute``.
+
+    Returns
+    -------
+    callable
+        Calls what is there.
+    """
     del name
     return lambda *args, **more: load(where)(*args, **more)
 
@@ -71,9 +108,20 @@ def later(name: str, where: str) -> Callable[..., Any]:
 def load(where: str) -> Any:
     """What ``module:attribute`` names.
 
+    Parameters
+    ----------
+    where : str
+        ``module:attribute``.
+
+    Returns
+    -------
+    Any
+        The attribute.
+
     Raises
     ------
-    InputError : another package's, which cannot be imported.
+    InputError
+        It belongs to another package and cannot be imported.
     """
     module, _, attribute = where.partition(":")
     try:

@@ -68,15 +68,24 @@ class Timings(BaseModel):
 
 
 class Solution(Drawn, BaseModel):
-    """A tour with its proof status; `path` is a closed polyline from the base to the base, or from
-    the problem's state to the base; `start_tether` is then the taut tether at its start.
+    """A tour with its proof status.
 
-    Lengths are in the problem's units. `lower_bound` is a proven bound on every admissible tour,
-    `gap` is (length - lower_bound) / length. `classes` says which homotopy classes the roadmap
-    held: `all`, `non-looping`, or `shortest`, the shortest of every goal. Without a tour, `length`
-    and `gap` are None.
-    `entangled` lists the obstacles (0-based) that the path is wrapped around; only an `invalid`
-    tour has any.
+    Lengths are in the problem's units. Without a tour, `length` and `gap` are None.
+
+    Attributes
+    ----------
+    path : tuple of (x, y, z)
+        Closed polyline from the base to the base, or from the problem's state to the base.
+    start_tether : tuple of (x, y, z)
+        The taut tether at the start of a tour from a state.
+    lower_bound : float or None
+        Proven bound on every admissible tour.
+    gap : float or None
+        (length - lower_bound) / length.
+    classes : {"all", "non-looping", "shortest"} or None
+        Which homotopy classes the roadmap held; `shortest` is the shortest of every goal.
+    entangled : tuple of int
+        Obstacles (from 0) that the path is wrapped around; only an `invalid` tour has any.
     """
 
     picture: ClassVar[str] = "netsp.pictures.problem:draw_solution"
@@ -106,8 +115,8 @@ class Solution(Drawn, BaseModel):
     entangled: Annotated[
         tuple[int, ...],
         Field(
-            description="obstacles, numbered from 1, that the tether is wound about "
-            "at the end; empty for a tour"
+            description="obstacles, numbered from 0, that the path is wrapped around; "
+            "empty but for an `invalid` tour"
         ),
     ] = ()
     tour: Annotated[tuple[Visit, ...], Field(description="goals in the order of their visits")] = ()
@@ -138,16 +147,56 @@ class Solution(Drawn, BaseModel):
 
     @classmethod
     def from_json(cls, text: str | bytes, *, source: str = "solution") -> Self:
-        """Parse and validate; `InputError` with one line for anything wrong."""
+        """Parse and validate the text of a solution file.
+
+        Parameters
+        ----------
+        text : str or bytes
+            JSON of format version 1.
+        source : str
+            What messages call it.
+
+        Returns
+        -------
+        Solution
+            The solution.
+
+        Raises
+        ------
+        InputError
+            Anything wrong, in one line.
+        """
         return read_model(cls, text, source)
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
-        """Read a solution file; `InputError` if it cannot be read or is not valid."""
+        """Read a solution file.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file.
+
+        Returns
+        -------
+        Solution
+            The solution.
+
+        Raises
+        ------
+        InputError
+            The file cannot be read or is not valid, in one line.
+        """
         return cls.from_json(read_text(path), source=str(path))
 
     def to_json(self) -> str:
-        """The solution as version-1 JSON."""
+        """The solution as JSON of format version 1.
+
+        Returns
+        -------
+        str
+            Text of a solution file.
+        """
         data = self.model_dump(mode="json")
         path = data.pop("path")
         if not self.start_tether:
@@ -159,5 +208,16 @@ class Solution(Drawn, BaseModel):
         return f'{text[:-2]},\n "path": [\n{rows}\n ]\n}}\n'
 
     def save(self, path: str | Path) -> None:
-        """Write the solution file whole or not at all; `InputError` if it cannot be written."""
+        """Write the solution file, whole or not at all.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file; one that is there is replaced.
+
+        Raises
+        ------
+        InputError
+            The file cannot be written.
+        """
         write_text(path, self.to_json())

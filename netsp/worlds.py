@@ -41,8 +41,26 @@ class DoesNotFitError(InputError):
 def icra2017(
     draw: random.Random, count: int, side: float, radii: tuple[float, float]
 ) -> list[Obstacle]:
-    """Disjoint circles anywhere, radii uniform between two limits (McCammon & Hollinger 2017,
-    section V-A; the paper gives no radii)."""
+    """Disjoint circles anywhere, radii uniform between two limits.
+
+    Source: McCammon & Hollinger 2017, section V-A; the paper gives no radii.
+
+    Parameters
+    ----------
+    draw : random.Random
+        Of all that is random.
+    count : int
+        Number of obstacles.
+    side : float
+        Side of the square.
+    radii : tuple of float
+        Least and greatest radius.
+
+    Returns
+    -------
+    list of Obstacle
+        The obstacles.
+    """
 
     def candidates() -> Iterator[tuple[float, float, float]]:
         while True:
@@ -55,7 +73,24 @@ def icra2017(
 def clustered(
     draw: random.Random, count: int, side: float, radii: tuple[float, float]
 ) -> list[Obstacle]:
-    """Circles around three to five centres, dense within and open water between."""
+    """Circles around three to five centres, dense within and open water between.
+
+    Parameters
+    ----------
+    draw : random.Random
+        Of all that is random.
+    count : int
+        Number of obstacles.
+    side : float
+        Side of the square.
+    radii : tuple of float
+        Least and greatest radius.
+
+    Returns
+    -------
+    list of Obstacle
+        The obstacles.
+    """
     centers = [
         (side * (0.15 + 0.7 * draw.random()), side * (0.15 + 0.7 * draw.random()))
         for _ in range(3 + int(3 * draw.random()))
@@ -77,8 +112,26 @@ def clustered(
 def array(
     draw: random.Random, count: int, side: float, radii: tuple[float, float]
 ) -> list[Obstacle]:
-    """Circles of one radius in staggered rows, as wave-energy converters are laid out (Beels et al.
-    2010, the layouts of the 2016 paper), each a little off its place."""
+    """Circles of one radius in staggered rows, each a little off its place.
+
+    So are wave-energy converters laid out (Beels et al. 2010, the layouts of the 2016 paper).
+
+    Parameters
+    ----------
+    draw : random.Random
+        Of all that is random.
+    count : int
+        Number of obstacles.
+    side : float
+        Side of the square.
+    radii : tuple of float
+        Least and greatest radius.
+
+    Returns
+    -------
+    list of Obstacle
+        The obstacles.
+    """
     radius = radii[0] + draw.random() * (radii[1] - radii[0])
     rows = max(1, math.isqrt(count))
     columns = -(-count // rows)
@@ -102,8 +155,24 @@ def array(
 def harbour(
     draw: random.Random, count: int, side: float, radii: tuple[float, float]
 ) -> list[Obstacle]:
-    """Polygons: piers from the southern edge, and barges at any angle in the basin; a radius is
-    half the width of a barge."""
+    """Polygons: piers from the southern edge, and barges at any angle in the basin.
+
+    Parameters
+    ----------
+    draw : random.Random
+        Of all that is random.
+    count : int
+        Number of obstacles.
+    side : float
+        Side of the square.
+    radii : tuple of float
+        Least and greatest half-width of a barge.
+
+    Returns
+    -------
+    list of Obstacle
+        The obstacles.
+    """
     piers = min(max(1, count // 4), 6)
     out: list[Obstacle] = []
     for k in range(min(piers, count)):
@@ -155,13 +224,34 @@ def random_world(
 
     Parameters
     ----------
-    seed : of all draws. attempt : another world of the same seed, for when one does not fit.
-    family : one of `FAMILIES`.
-    goals, obstacles : how many; by default 20, in `rss2016` 5 to 10.
-    side : of the square. radii : limits of the radius.
+    seed : int
+        Of all draws.
+    family : str
+        One of `FAMILIES`.
+    goals : int, optional
+        How many; by default 20, in `rss2016` 5 to 10.
+    obstacles : int, optional
+        How many; by default 20, in `rss2016` 5 to 10.
+    tether_length : float
+        Length of the tether.
+    side : float
+        Side of the square.
+    radii : tuple of float
+        Least and greatest radius of the obstacles.
+    attempt : int
+        Another world of the same seed, for when one does not fit.
 
-    Raises InputError for an unknown family, numbers out of range, and if the obstacles, the base or
-    the goals do not fit.
+    Returns
+    -------
+    Problem
+        The world.
+
+    Raises
+    ------
+    InputError
+        An unknown family, numbers out of range.
+    DoesNotFitError
+        The obstacles, the base or the goals do not fit.
     """
     _check(family, goals, obstacles, tether_length, side, radii)
     # text is hashed by Python into a seed of its own, the same in every version
@@ -209,9 +299,26 @@ def random_world(
 
 
 def reachable_world(seed: int, **recipe: object) -> tuple[Problem, int]:
-    """The first world of a seed that fits, and how many were drawn in vain before it.
+    """The first world of a seed that fits.
 
-    Raises the last world's InputError after `ATTEMPTS`, and at once when no draw can mend it.
+    Parameters
+    ----------
+    seed : int
+        Of all draws.
+    **recipe : object
+        As of `random_world`.
+
+    Returns
+    -------
+    world : Problem
+        The world.
+    drawn : int
+        How many were drawn in vain before it.
+
+    Raises
+    ------
+    InputError
+        None of `ATTEMPTS` worlds fits, or no draw can mend it.
     """
     for attempt in range(ATTEMPTS):
         try:

@@ -13,7 +13,13 @@ from netsp.solving.run import SolverRun
 
 @dataclass(frozen=True)
 class Cooling:
-    """hot, cold : first and last temperature, in mean legs of the start state."""
+    """Temperatures.
+
+    Attributes
+    ----------
+    hot, cold
+        First and last temperature, in mean legs of the start state.
+    """
 
     hot: float = 1.0
     cold: float = 1e-3

@@ -37,8 +37,13 @@ CHUNK = 100_000
 
 @dataclass(frozen=True)
 class Params(Cooling):
-    """hot, cold : see `Cooling`. swaps : share of proposals that swap goals; the others change a
-    class."""
+    """Options of the solver, besides those of `Cooling`.
+
+    Attributes
+    ----------
+    swaps
+        Share of proposals that swap goals; the others change a class.
+    """
 
     swaps: float = 0.5
 
@@ -49,7 +54,24 @@ class Params(Cooling):
 
 
 def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | None = None) -> Result:
-    """Anneal from a random tour, or from the warm start. An iteration is one proposal."""
+    """Simulated annealing of the 2017 paper, from a random tour or from the warm start.
+
+    An iteration is one proposal. Source: McCammon & Hollinger 2017, section IV-D.
+
+    Parameters
+    ----------
+    graph : TravelGraph
+        What to solve.
+    params : Params, optional
+        Temperatures, and the share of swaps.
+    limits : Limits, optional
+        Time, iterations, random generator, warm start, listener.
+
+    Returns
+    -------
+    Result
+        The best tour met; no bound.
+    """
     chosen, limits = params or Params(), limits or Limits()
     rng = limits.rng
     run = SolverRun(graph, limits)

@@ -45,8 +45,15 @@ CHUNK = 2_000
 
 @dataclass(frozen=True)
 class Params(Cooling):
-    """hot, cold : see `Cooling`. k : the paper's factor; the larger, the sooner entanglements go.
-    swaps : share of proposals that swap goals; the others invert a path."""
+    """Options of the solver, besides those of `Cooling`.
+
+    Attributes
+    ----------
+    k
+        The paper's factor; the larger, the sooner entanglements go.
+    swaps
+        Share of proposals that swap goals; the others invert a path.
+    """
 
     k: float = 1.0
     swaps: float = 0.5
@@ -87,11 +94,30 @@ class State(NamedTuple):
 
 
 def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | None = None) -> Result:
-    """Anneal from a random order, or that of the warm start, all legs direct. An iteration is one
-    proposal. The result is `no_solution_found` if no state met was free of entanglement with every
-    goal within the tether.
+    """Simulated annealing of the 2016 paper, from a random order or that of the warm start, all
+    legs direct.
 
-    Raises InputError for a graph without geometry beneath it.
+    An iteration is one proposal. Source: McCammon & Hollinger 2016, section III.
+
+    Parameters
+    ----------
+    graph : TravelGraph
+        What to solve.
+    params : Params, optional
+        Temperatures, shares of the proposals, penalties.
+    limits : Limits, optional
+        Time, iterations, random generator, warm start, listener.
+
+    Returns
+    -------
+    Result
+        The best tour met; `no_solution_found` if no state met was free of entanglement with every
+        goal within the tether.
+
+    Raises
+    ------
+    InputError
+        There is no geometry beneath the graph.
     """
     chosen, limits = params or Params(), limits or Limits()
     rng = limits.rng

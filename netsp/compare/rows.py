@@ -114,8 +114,15 @@ def _no_constant(name: str) -> None:
 class RowsFile:
     """A results file of one study, open for appending; nobody else may have it open.
 
-    done : ids of the trials that are in it. Raises InputError if the file holds anything but rows
-    of this study.
+    Attributes
+    ----------
+    done
+        Ids of the trials that are in it.
+
+    Raises
+    ------
+    InputError
+        The file holds anything but rows of this study.
     """
 
     def __init__(self, path: str | Path, study: str) -> None:

@@ -44,8 +44,12 @@ def compare(
 
     Parameters
     ----------
-    jobs : processes on this machine, unless an executor is given. part : (i, n), the i-th of n
-        shards. on_row : called with every new row.
+    jobs
+        Processes on this machine, unless an executor is given.
+    part
+        (i, n), the i-th of n shards.
+    on_row
+        Called with every new row.
 
     Raises InputError if the file holds anything but rows of this study, or options of a roadmap do
     not exist. A trial that fails has a row and is not run again.

@@ -102,8 +102,15 @@ class Solver(BaseModel):
 
 class Study(BaseModel):
     """Everything tried with everything: goals x tether lengths x worlds x roadmaps x solvers x
-    seeds. time_limit : seconds for a solver that has none of its own. memory_limit : GiB for one
-    trial beyond what the worker needs to start."""
+    seeds.
+
+    Attributes
+    ----------
+    time_limit
+        Seconds for a solver that has none of its own.
+    memory_limit
+        GiB for one trial beyond what the worker needs to start.
+    """
 
     model_config = STRICT
     schema_version: Annotated[Literal[1], Field(description="of the file format")] = 1
@@ -201,8 +208,16 @@ class Study(BaseModel):
 class Trial:
     """One solver on one world, as plain data that a worker anywhere can run.
 
-    world : arguments of `netsp.worlds.reachable_world`. roadmap : name, label, options. solver :
-    name, label, options, limits. seed : of the solver, and of a roadmap that samples.
+    Attributes
+    ----------
+    world
+        Arguments of `netsp.worlds.reachable_world`.
+    roadmap
+        Name, label, options.
+    solver
+        Name, label, options, limits.
+    seed
+        Of the solver, and of a roadmap that samples.
     """
 
     world: dict[str, Any]

@@ -26,7 +26,10 @@ _left: dict[Any, int] = {}
 def choose(kernel: Any, steps: int) -> Callable[..., Any]:
     """The kernel, or the interpreted one if the work is small and the kernel not loaded.
 
-    steps : most steps of its innermost loop.
+    Parameters
+    ----------
+    steps
+        Most steps of its innermost loop.
     """
     left = _left.get(kernel, ALLOWANCE)
     if steps > left or not _is_compiled(kernel) or kernel.signatures:

@@ -22,9 +22,15 @@ LOW = (1 << CHUNK) - 1
 def completions(costs, goal, start, prices, alive, least, onward, stop):
     """Walks without memory but that of the goal before last: bounds on how labels are completed.
 
-    least : (n + 1, V) cost of the best k visits ending at v. onward : (n + 1, n + 1, V) cost of the
-    best k visits of which the last is to goal h, and of the leg from there to vertex v, whose goal
-    is not that of the visit before. stop : of a clock; the tables are unfinished when it is set.
+    Parameters
+    ----------
+    least
+        (n + 1, V) cost of the best k visits ending at v.
+    onward
+        (n + 1, n + 1, V) cost of the best k visits of which the last is to goal h, and of the leg
+        from there to vertex v, whose goal is not that of the visit before.
+    stop
+        Of a clock; the tables are unfinished when it is set.
     """
     count = len(goal)
     n = len(start) - 2
@@ -86,10 +92,17 @@ def extend(
 ):
     """Labels of the next layer at goals first to last - 1, from those of this layer.
 
-    pointer, cost, memory : labels of vertex v are pointer[v] to pointer[v + 1] - 1, cheapest first.
-    onward : (n + 1, V) of the visits still to make. limit : (V,) most that a label may cost before
-    the price is taken off. A label is kept if none costs less and remembers no more.
-    stop : of a clock; labels are missing when it is set.
+    Parameters
+    ----------
+    pointer, cost, memory
+        Labels of vertex v are pointer[v] to pointer[v + 1] - 1, cheapest first.
+    onward
+        (n + 1, V) of the visits still to make.
+    limit
+        (V,) most that a label may cost before the price is taken off. A label is kept if none costs
+        less and remembers no more.
+    stop
+        Of a clock; labels are missing when it is set.
     """
     n = len(start) - 2
     room, used_up = 1024, 0

@@ -26,8 +26,12 @@ MOST = 3 * CHUNK
 class Memory:
     """For every goal the goals it remembers; bit k of a memory at goal g stands for the k-th.
 
-    near : (n + 1, k) clusters, nearest first, of every cluster. size : so many nearest goals are
-    remembered at first, the goal itself being one (bit 0).
+    Parameters
+    ----------
+    near
+        (n + 1, k) clusters, nearest first, of every cluster.
+    size
+        So many nearest goals are remembered at first, the goal itself being one (bit 0).
     """
 
     def __init__(self, near: Ints, size: int) -> None:

@@ -48,8 +48,13 @@ MOST_CELLS = 100_000_000
 
 @dataclass(frozen=True)
 class Params:
-    """search_rounds : rounds of ruin and recreate at the start, and again when all legs are
-    measured."""
+    """Options of the solver.
+
+    Attributes
+    ----------
+    search_rounds
+        Rounds of ruin and recreate at the start, and again when all legs are measured.
+    """
 
     search_rounds: int = 500
 
@@ -61,11 +66,29 @@ class Params:
 
 
 def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | None = None) -> Result:
-    """Bound and prove by walks, for few goals with many classes; with many goals it stops with the
-    gap at which the walks make no more progress.
+    """Bound and prove by walks, for few goals with many classes.
 
-    An iteration is one pass over all layers. params : see `Params`. Raises InputError if the tables
-    would not fit into memory.
+    With many goals it stops with the gap at which the walks make no more progress. An iteration is
+    one pass over all layers.
+
+    Parameters
+    ----------
+    graph : TravelGraph
+        What to solve.
+    params : Params, optional
+        See `Params`.
+    limits : Limits, optional
+        Time, iterations, random generator, warm start, listener.
+
+    Returns
+    -------
+    Result
+        The best tour, and what is proven of it.
+
+    Raises
+    ------
+    InputError
+        The tables would not fit into memory.
     """
     chosen, limits = params or Params(), limits or Limits()
     if not fits(graph):

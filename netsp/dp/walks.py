@@ -40,8 +40,17 @@ Labels = tuple[Ints, Floats, npt.NDArray[np.int32]]
 
 @dataclass(frozen=True)
 class Walk:
-    """The cheapest walk. bound : on every tour shorter than the cutoff. rows : of the vertices
-    visited, in order, without the base. labels : how many there were."""
+    """The cheapest walk.
+
+    Attributes
+    ----------
+    bound
+        On every tour shorter than the cutoff.
+    rows
+        Of the vertices visited, in order, without the base.
+    labels
+        How many there were.
+    """
 
     bound: float
     rows: Ints
@@ -51,9 +60,17 @@ class Walk:
 class Walks:
     """The relaxation over some vertices.
 
-    cluster : (V,). values : (V, V) symmetric costs of legs, inf where there is none. alive :
-    (n + 1, V) whether a better tour may make its k-th visit there, with vertices taken in `order`,
-    which groups them by goal. stop : of the clock; `check` must then raise.
+    Parameters
+    ----------
+    cluster
+        (V,).
+    values
+        (V, V) symmetric costs of legs, inf where there is none.
+    alive
+        (n + 1, V) whether a better tour may make its k-th visit there, with vertices taken in
+        `order`, which groups them by goal.
+    stop
+        Of the clock; `check` must then raise.
     """
 
     def __init__(self, cluster: Ints, values: Floats, stop: Flag = NEVER) -> None:
@@ -96,7 +113,10 @@ class Walks:
         """The cheapest walk below the cutoff, and death to states that none goes through; None if
         there is no walk. `check` is called after every layer and may raise.
 
-        prices : (n + 1,) of a visit to each goal.
+        Parameters
+        ----------
+        prices
+            (n + 1,) of a visit to each goal.
         """
         n, goal, start = self.n, self.goal, self.start
         cut = cutoff - float(prices[1:].sum()) + self.rounding(prices)

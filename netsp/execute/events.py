@@ -27,11 +27,26 @@ class Move(BaseModel):
 
 
 class Event(BaseModel):
-    """Something that happens `time` seconds after the start; one of the fields says what.
+    """Something that happens at a time after the start; one of the other fields says what.
 
-    appear : an obstacle that is not on the map. vanish : one that is not there after all. move :
-    one that is elsewhere. add_goal, cancel_goal : the task changes. push : metres that the robot is
-    carried off. tether_length : a new limit.
+    Attributes
+    ----------
+    time : float
+        Seconds since the start.
+    appear : Circle, Polygon or None
+        An obstacle that is not on the map.
+    vanish : int, str or None
+        An obstacle that is not there after all.
+    move : Move or None
+        An obstacle that is elsewhere.
+    add_goal : Goal or None
+        A goal more.
+    cancel_goal : int, str or None
+        A goal less.
+    push : (x, y, z) or None
+        How far the robot is carried off, in the problem's units.
+    tether_length : float or None
+        A new limit.
     """
 
     model_config = STRICT
@@ -89,17 +104,62 @@ class Surprises(BaseModel):
 
     @classmethod
     def from_json(cls, text: str | bytes, *, source: str = "surprises") -> Self:
-        """Parse and validate; `InputError` with one line for anything wrong."""
+        """Parse and validate the text of a surprise file.
+
+        Parameters
+        ----------
+        text : str or bytes
+            JSON of format version 1.
+        source : str
+            What messages call it.
+
+        Returns
+        -------
+        Surprises
+            The events.
+
+        Raises
+        ------
+        InputError
+            Anything wrong, in one line.
+        """
         return read_model(cls, text, source)
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
-        """Read a surprise file."""
+        """Read a surprise file.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file.
+
+        Returns
+        -------
+        Surprises
+            The events.
+
+        Raises
+        ------
+        InputError
+            The file cannot be read or is not valid, in one line.
+        """
         return cls.from_json(read_text(path), source=str(path))
 
     def check(self, problem: Problem) -> None:
-        """InputError for an obstacle or goal that does not exist when the event comes, or an
-        obstacle that would stand on the base or move onto it."""
+        """Refuse events that a problem cannot have.
+
+        Parameters
+        ----------
+        problem : Problem
+            What is carried out.
+
+        Raises
+        ------
+        InputError
+            An obstacle or goal that does not exist when the event comes, or an obstacle that would
+            stand on the base or move onto it.
+        """
         for k, event in sorted(enumerate(self.events), key=lambda e: e[1].time):
             try:
                 problem = changed(problem, event)
@@ -113,7 +173,8 @@ def changed(problem: Problem, event: Event) -> Problem:
 
     Raises
     ------
-    InputError : it names something that is not there, or puts an obstacle onto the base.
+    InputError
+        It names something that is not there, or puts an obstacle onto the base.
     """
     obstacles, goals = list(problem.obstacles), list(problem.goals)
     update: dict[str, object] = {}

@@ -24,11 +24,26 @@ RESOLUTION = 1e-4
 class ExecutionOptions:
     """How a tour is carried out.
 
-    speed : of the vehicle, length units per second. vehicle : `netsp.online.vehicle.VEHICLES`.
-    reach : a goal this near counts as visited by a vehicle with dynamics.
-    delta : resolution of the tether; default from the problem. repair : whether plans are mended.
-    planning_limit : seconds that mending a plan may take; the robot holds its place meanwhile.
-    current, gusts, seed : of the water.
+    Parameters
+    ----------
+    speed : float
+        Of the vehicle, length units per second.
+    vehicle : str
+        One of `netsp.online.vehicle.VEHICLES`.
+    reach : float
+        A goal this near counts as visited by a vehicle with dynamics.
+    delta : float, optional
+        Resolution of the tether; by default from the problem.
+    repair : bool
+        Whether plans are repaired.
+    planning_limit : float
+        Seconds that a repair may take; the robot holds its place meanwhile.
+    current : tuple of float
+        Velocity of the water, (x, y, z).
+    gusts : float
+        Standard deviation of what comes and goes on top.
+    seed : int
+        Of the gusts and of the solver.
     """
 
     speed: float = 0.5
@@ -44,9 +59,29 @@ class ExecutionOptions:
 
 @dataclass(frozen=True)
 class ExecutionRow:
-    """One step: seconds, position, the goal that is next (-1 the base), mode (tour, shorten or
-    hold), taut tether and its limit, and whether the limit was lowered below the tether, which is
-    being shortened."""
+    """One step.
+
+    Parameters
+    ----------
+    time : float
+        Seconds since the start.
+    x : float
+        Position.
+    y : float
+        Position.
+    z : float
+        Position, up.
+    goal : int
+        The goal that is next, -1 for the base.
+    mode : {"tour", "shorten", "hold"}
+        What the robot is doing.
+    tether : float
+        Length of the taut tether.
+    limit : float
+        Length that it may have.
+    shortening : bool
+        Whether the limit was lowered below the tether, which is being shortened.
+    """
 
     time: float
     x: float
@@ -61,8 +96,23 @@ class ExecutionRow:
 
 @dataclass(frozen=True)
 class Arrival:
-    """A goal (-1: the base) was reached: the word of the online tether there and the planned one,
-    and both lengths."""
+    """A goal, or the base, was reached.
+
+    Parameters
+    ----------
+    time : float
+        Seconds since the start.
+    goal : int
+        The goal, -1 for the base.
+    word : Word
+        Of the online tether there.
+    planned : Word
+        Of the planned one.
+    tether : float
+        Length of the online tether.
+    planned_tether : float
+        Length of the planned one.
+    """
 
     time: float
     goal: int
@@ -79,7 +129,21 @@ class Arrival:
 
 @dataclass(frozen=True)
 class Entry:
-    """Something happened, and what was done about it."""
+    """Something happened, and what was done about it.
+
+    Parameters
+    ----------
+    time : float
+        Seconds since the start.
+    event : str
+        What happened.
+    done : str
+        What was done.
+    reason : str
+        Why.
+    planning_s : float
+        Seconds of planning.
+    """
 
     time: float
     event: str
@@ -90,10 +154,36 @@ class Entry:
 
 @dataclass
 class Execution(Drawn):
-    """What came of it.
+    """What came of carrying a tour out.
 
-    problem : as it is at the end. rows, arrivals, entries : the logs. tether : at the end.
-    tethers : (time, nodes) of the tether now and then, for pictures. lost : goals left out.
+    Parameters
+    ----------
+    problem : Problem
+        As it is at the end.
+    solution : Solution
+        The plan at the start.
+    options : ExecutionOptions
+        How it was carried out.
+    rows : list of ExecutionRow
+        One per step.
+    arrivals : list of Arrival
+        Goals reached.
+    entries : list of Entry
+        What happened, and what was done about it.
+    lost : dict
+        Goals left out, with the reason.
+    cancelled : set of int
+        Goals that were cancelled.
+    tethers : list of (float, ndarray)
+        Time and nodes of the tether now and then, for pictures.
+    free : bool
+        Whether the tether is free at the end.
+    walked : float
+        Length of the path travelled.
+    interrupted : bool
+        Whether it was stopped.
+    wall_s : float
+        Seconds that the run took.
     """
 
     picture: ClassVar[str] = "netsp.pictures.execution:draw_map"
@@ -153,7 +243,18 @@ class Execution(Drawn):
 
 
 def describe_execution(done: Execution) -> str:
-    """A run in a few lines."""
+    """A run in a few lines.
+
+    Parameters
+    ----------
+    done : Execution
+        The run.
+
+    Returns
+    -------
+    str
+        The lines.
+    """
     s = done.summary
     planned = s["planned_path"] or 0.0
     lines = [

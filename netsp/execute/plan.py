@@ -19,10 +19,18 @@ HOME = -1
 
 @dataclass(frozen=True)
 class Leg:
-    """The way to one goal.
+    """The path to one goal.
 
-    goal : its number in the problem that is carried out, HOME for the base. way : (k, 3), the first
-    point where the leg before ends. word : of the tether there. tether : its length there.
+    Attributes
+    ----------
+    goal
+        Its number in the problem that is carried out, HOME for the base.
+    path
+        (k, 3), the first point where the leg before ends.
+    word
+        Of the tether there.
+    tether
+        Its length there.
     """
 
     goal: int
@@ -37,11 +45,17 @@ class Leg:
 
 
 def legs_of(problem: Problem, solution: Solution, numbers: list[int] | None = None) -> list[Leg]:
-    """A solution's path cut at its goals. numbers : of the problem's goals in a larger problem.
+    """A solution's path cut at its goals.
+
+    Parameters
+    ----------
+    numbers
+        Of the problem's goals in a larger problem.
 
     Raises
     ------
-    InputError : the path does not come by a goal in its turn.
+    InputError
+        The path does not come by a goal in its turn.
     """
     path = np.array(solution.path)
     rays = problem.representative_points

@@ -39,9 +39,21 @@ MOST_CLASSES = 4_000
 
 @dataclass(frozen=True)
 class Repair:
-    """A new plan. kind : kept, local, replan or home. reason : for the log. lost : goals that
-    cannot be reached any more, with the reason. length : metres to go. planning_s : what it
-    took."""
+    """A new plan.
+
+    Attributes
+    ----------
+    kind
+        Kept, local, replan or home.
+    reason
+        For the log.
+    lost
+        Goals that cannot be reached any more, with the reason.
+    length
+        Metres to go.
+    planning_s
+        What it took.
+    """
 
     kind: str
     reason: str
@@ -53,8 +65,14 @@ class Repair:
 
 def broken(problem: Problem, tether: Floats, legs: list[Leg]) -> tuple[str | None, list[Leg]]:
     """What is wrong with what is left of a plan, None if nothing is; and the legs with the words
-    and tethers that they have among the obstacles that there are now. tether : (k, 3) the taut
-    tether now. The paths of the legs follow on each other, the first starts at the robot."""
+    and tethers that they have among the obstacles that there are now.
+
+    Parameters
+    ----------
+    tether
+        (k, 3) the taut tether now. The paths of the legs follow on each other, the first starts at
+        the robot.
+    """
     rays = problem.representative_points
     word = signature(tether[:, :2], rays)
     left = [leg.goal for leg in legs if leg.goal != HOME]
@@ -112,7 +130,10 @@ def repair(
     """A plan from the present state through the goals `left` (numbers in the problem, in their
     order) and home. Goals that cannot be reached are left out, with the reason.
 
-    limit : seconds that all of it may take.
+    Parameters
+    ----------
+    limit
+        Seconds that all of it may take.
     """
     clock = Clock(limit)
     word = signature(tether[:, :2], problem.representative_points)

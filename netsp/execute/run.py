@@ -281,16 +281,34 @@ def execute(
     surprises: Surprises | None = None,
     on_step: Callable[[ExecutionRow], None] | None = None,
 ) -> Execution:
-    """Carry out a solution in the scene of its problem, whose obstacles stand from the sea floor to
-    the surface, on a tether that is anchored at the base.
+    """Carry out a solution in the scene of its problem.
 
-    surprises : what happens on the way. on_step : is told every row; a KeyboardInterrupt ends the
-    run, and what was done till then is returned.
+    The obstacles stand from the sea floor to the surface, the tether is anchored at the base.
+
+    Parameters
+    ----------
+    problem : Problem
+        What was solved.
+    solution : Solution
+        The plan.
+    options : ExecutionOptions, optional
+        How it is carried out.
+    surprises : Surprises, optional
+        What happens on the way.
+    on_step : callable, optional
+        Called with every row; a KeyboardInterrupt ends the run, and what was done till then is
+        returned.
+
+    Returns
+    -------
+    Execution
+        What came of it.
 
     Raises
     ------
-    InputError : the solution does not belong to the problem, fails its checks or is a baseline's
-        that entangles; bad options or surprises.
+    InputError
+        The solution does not belong to the problem, fails its checks or is a baseline's that
+        entangles; bad options or surprises.
     """
     options = options or ExecutionOptions()
     surprises = surprises or Surprises(events=())

@@ -20,12 +20,23 @@ from netsp.errors import InputError
 class Projection:
     """Metres in a problem's plane to degrees and back.
 
-    latitude, longitude : of the base. heading : degrees clockwise from true north that the
-    problem's y axis points to. base : (2,) the base in the problem's plane.
+    Parameters
+    ----------
+    latitude : float
+        Of the base, degrees.
+    longitude : float
+        Of the base, degrees.
+    heading : float
+        Degrees clockwise from true north that the problem's y axis points to.
+    base : tuple of float
+        (x, y) of the base in the problem's plane, metres.
+    name : str
+        What messages call the origin.
 
     Raises
     ------
-    InputError : an origin outside the range, or pyproj is not installed.
+    InputError
+        An origin outside the range, or pyproj is not installed.
     """
 
     def __init__(
@@ -45,7 +56,27 @@ class Projection:
     def parse(
         cls, text: str, base: tuple[float, float] = (0.0, 0.0), name: str = "--origin"
     ) -> Projection:
-        """From ``lat,lon`` or ``lat,lon,heading``."""
+        """A projection from ``lat,lon`` or ``lat,lon,heading``.
+
+        Parameters
+        ----------
+        text : str
+            Degrees, separated by commas.
+        base : tuple of float
+            (x, y) of the base in the problem's plane, metres.
+        name : str
+            What messages call the origin.
+
+        Returns
+        -------
+        Projection
+            The projection.
+
+        Raises
+        ------
+        InputError
+            Something else than two or three numbers, or out of range.
+        """
         try:
             numbers = [float(v) for v in text.split(",")]
         except ValueError:
@@ -68,7 +99,18 @@ class Projection:
         return Transformer.from_crs("EPSG:4326", local, always_xy=True)
 
     def to_earth(self, xy: npt.ArrayLike) -> Floats:
-        """(n, 2) latitude and longitude of points (n, 2)."""
+        """Latitudes and longitudes of points.
+
+        Parameters
+        ----------
+        xy : array_like, shape (n, 2)
+            Points in the problem's plane, metres.
+
+        Returns
+        -------
+        ndarray, shape (n, 2)
+            Latitude and longitude, degrees.
+        """
         d = np.asarray(xy, dtype=float).reshape(-1, 2) - self.base
         c, s = math.cos(math.radians(self.heading)), math.sin(math.radians(self.heading))
         east, north = c * d[:, 0] + s * d[:, 1], -s * d[:, 0] + c * d[:, 1]
@@ -76,7 +118,18 @@ class Projection:
         return np.column_stack([latitude, longitude])
 
     def to_plane(self, latlon: npt.ArrayLike) -> Floats:
-        """(n, 2) points of latitudes and longitudes (n, 2)."""
+        """Points of latitudes and longitudes.
+
+        Parameters
+        ----------
+        latlon : array_like, shape (n, 2)
+            Latitude and longitude, degrees.
+
+        Returns
+        -------
+        ndarray, shape (n, 2)
+            Points in the problem's plane, metres.
+        """
         p = np.asarray(latlon, dtype=float).reshape(-1, 2)
         east, north = self._transform.transform(p[:, 1], p[:, 0])
         c, s = math.cos(math.radians(self.heading)), math.sin(math.radians(self.heading))

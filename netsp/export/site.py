@@ -35,8 +35,9 @@ def read_site(
 
     Raises
     ------
-    InputError : not GeoJSON, no base, no tether length, no goal, obstacles without radius, or
-        what `Problem` refuses.
+    InputError
+        Not GeoJSON, no base, no tether length, no goal, obstacles without radius, or what
+        `Problem` refuses.
     """
     data = parse_json_object(read_text(file), str(file))
     features = data.get("features")

@@ -36,11 +36,22 @@ OUTWARD = (1.0, 2.0, 4.0)
 
 @dataclass(frozen=True)
 class Waypoint:
-    """A place to pass, z up.
+    """A place to pass.
 
-    goal : the goal that is visited here, HOME (-1) for the base at the end, None for a bend and
-    for the start. word, tether : of the taut tether at a goal. heading : degrees clockwise from
-    north, None where it does not matter.
+    Parameters
+    ----------
+    position : tuple of float
+        (x, y, z), z up, in the problem's units.
+    goal : int or None
+        The goal visited here, HOME (-1) for the base at the end; None for a bend and for the start.
+    word : Word
+        Of the taut tether at a goal.
+    tether : float
+        Length of the taut tether at a goal, in the problem's units.
+    start : bool
+        Whether it is the start.
+    heading : float, optional
+        Degrees clockwise from north; None where it does not matter.
     """
 
     position: tuple[float, float, float]
@@ -54,12 +65,25 @@ class Waypoint:
 def waypoints_of(problem: Problem, solution: Solution, radius: float = 0.0) -> list[Waypoint]:
     """The waypoints of a solution, without the start.
 
-    radius : acceptance radius of the vehicle.
+    Parameters
+    ----------
+    problem : Problem
+        What was solved.
+    solution : Solution
+        Its solution.
+    radius : float
+        Acceptance radius of the vehicle, in the problem's units.
+
+    Returns
+    -------
+    list of Waypoint
+        In the order in which they are passed.
 
     Raises
     ------
-    InputError : with this radius corners could be cut through an obstacle, or the class of the
-        straight lines is not the plan's.
+    InputError
+        With this radius corners could be cut through an obstacle, or the class of the straight
+        lines is not the plan's.
     """
     legs = legs_of(problem, solution)
     solids = [o.shape() for o in problem.obstacles]

@@ -54,8 +54,19 @@ ARDUPILOT, SUBMARINE = 3, 12
 
 @dataclass(frozen=True)
 class Settings:
-    """hold : whole seconds at goals. bend : at bends and at the start, at least 1. speed : m/s;
-    None leaves it to the vehicle. most : waypoints."""
+    """What a mission file is to say.
+
+    Attributes
+    ----------
+    hold
+        Whole seconds at goals.
+    bend
+        At bends and at the start, at least 1.
+    speed
+        m/s; None leaves it to the vehicle.
+    most
+        Waypoints.
+    """
 
     hold: int = 5
     bend: int = 1
@@ -68,15 +79,35 @@ def export(
     projection: Projection | None = None, *, acceptance: float = 0.0,
     settings: Settings | None = None,
 ) -> list[Waypoint]:  # fmt: skip
-    """Write a solution as a mission file; returns its waypoints, the start first.
+    """Write a solution as a mission file.
 
-    kind : one of `FORMATS`. projection : needed by all but csv. acceptance : the vehicle's
-    acceptance radius (m).
+    Parameters
+    ----------
+    problem : Problem
+        What was solved.
+    solution : Solution
+        Its solution.
+    file : str or Path
+        The file.
+    kind : str
+        One of `FORMATS`.
+    projection : Projection, optional
+        From the plane to degrees; needed by all but csv.
+    acceptance : float
+        The vehicle's acceptance radius, metres.
+    settings : Settings, optional
+        Speed, dwell and more of the format.
+
+    Returns
+    -------
+    list of Waypoint
+        The waypoints written, the start first.
 
     Raises
     ------
-    InputError : an unknown kind, no projection, more waypoints than the format allows, waypoints
-        that would not be of the plan's class.
+    InputError
+        An unknown kind, no projection, more waypoints than the format allows, waypoints that would
+        not be of the plan's class.
     """
     if kind not in FORMATS:
         raise InputError(f"--format: expected {', '.join(FORMATS)}, got {kind!r}")

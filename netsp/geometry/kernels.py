@@ -20,9 +20,16 @@ TWO_PI = 2.0 * math.pi
 class Blockers(NamedTuple):
     """Grown obstacles.
 
-    circles : (n, 3) centre and grown radius, radius negative for a polygon. edges : (k, 4) polygon
-    edges; obstacle o owns edge_start[o]:edge_start[o + 1], grown by grow[o]. box : (n, 4) bounding
-    boxes. eps : what goes no deeper touches.
+    Attributes
+    ----------
+    circles
+        (n, 3) centre and grown radius, radius negative for a polygon.
+    edges
+        (k, 4) polygon edges; obstacle o owns edge_start[o]:edge_start[o + 1], grown by grow[o].
+    box
+        (n, 4) bounding boxes.
+    eps
+        What goes no deeper touches.
     """
 
     circles: Floats

@@ -30,8 +30,14 @@ BATCH = 16
 
 @dataclass(frozen=True)
 class Params:
-    """retrace : ``path``, home along the own path as in the paper, or ``tether``, home along the
-    taut tether from the last goal, which is never longer."""
+    """Options of the solver.
+
+    Attributes
+    ----------
+    retrace
+        ``path``, home along the own path as in the paper, or ``tether``, home along the taut tether
+        from the last goal, which is never longer.
+    """
 
     retrace: str = "path"
 
@@ -42,7 +48,24 @@ class Params:
 
 def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | None = None) -> Result:
     """`greedy`: to the nearest goal not yet visited, in whatever class is nearest on the covering
-    space; home from the last. One iteration builds the whole tour. params : see `Params`."""
+    space; home from the last.
+
+    One iteration builds the whole tour.
+
+    Parameters
+    ----------
+    graph : TravelGraph
+        What to solve.
+    params : Params, optional
+        See `Params`.
+    limits : Limits, optional
+        Time, iterations, random generator, warm start, listener.
+
+    Returns
+    -------
+    Result
+        The tour; no bound.
+    """
     chosen, limits = params or Params(), limits or Limits()
     run = SolverRun(graph, limits)
     stage = "trivial"
@@ -95,8 +118,25 @@ def _nearest(
 
 
 def solve_2016(graph: TravelGraph, params: None = None, limits: Limits | None = None) -> Result:
-    """`greedy-2016`: out to the goal nearest to the base and back, then the next. No leg between
-    goals is ever measured. One iteration builds the whole tour."""
+    """`greedy-2016`: out to the goal nearest to the base and back, then the next.
+
+    No leg between goals is ever measured. One iteration builds the whole tour. Source: McCammon &
+    Hollinger 2016, section IV.
+
+    Parameters
+    ----------
+    graph : TravelGraph
+        What to solve.
+    params : None
+        It has no options.
+    limits : Limits, optional
+        Time, iterations, random generator, warm start, listener.
+
+    Returns
+    -------
+    Result
+        The tour; no bound.
+    """
     limits = limits or Limits()
     run = SolverRun(graph, limits)
     with run.until_stopped():

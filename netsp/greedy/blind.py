@@ -20,10 +20,29 @@ from netsp.travel.result import Result, Trajectory
 
 
 def solve(graph: TravelGraph, params: None = None, limits: Limits | None = None) -> Result:
-    """`greedy-tsp`. A warm start is not used: a baseline shows what it does by itself. One
-    iteration builds the whole tour.
+    """`greedy-tsp`: to the nearest goal not yet visited, blind to the tether.
 
-    Raises InputError for a graph without geometry beneath it.
+    A warm start is not used: a baseline shows what it does by itself. One iteration builds the
+    whole tour. Source: McCammon & Hollinger 2016, section IV.
+
+    Parameters
+    ----------
+    graph : TravelGraph
+        What to solve.
+    params : None
+        It has no options.
+    limits : Limits, optional
+        Time, iterations, random generator, warm start, listener.
+
+    Returns
+    -------
+    Result
+        The tour, or status `invalid` with what was walked.
+
+    Raises
+    ------
+    InputError
+        There is no geometry beneath the graph.
     """
     limits = limits or Limits()
     run = SolverRun(graph, limits)

@@ -53,9 +53,14 @@ VISIBILITY_POINTS = 120
 class Measures:
     """Of one path; obstacles by their 0-based index.
 
-    signature : reduced word. closed : whether the path ends where it starts; entangled and winding
-    are None if not. convex_hull, linear_homotopy, local_visibility : obstacles that break the
-    definition of that name; none if it holds.
+    Attributes
+    ----------
+    signature
+        Reduced word.
+    closed
+        Whether the path ends where it starts; entangled and winding are None if not.
+    convex_hull, linear_homotopy, local_visibility
+        Obstacles that break the definition of that name; none if it holds.
     """
 
     signature: Word

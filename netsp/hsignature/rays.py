@@ -29,9 +29,17 @@ def crossings(
 
     Parameters
     ----------
-    path : (k, 2) or (k, 3) polyline; only x and y count.
-    points : (n, 2) representative points of the obstacles.
-    closed : whether the last vertex is joined to the first.
+    path : array_like, shape (k, 2) or (k, 3)
+        Polyline; only x and y count.
+    points : array_like, shape (n, 2)
+        Representative points of the obstacles.
+    closed : bool
+        Whether the last vertex is joined to the first.
+
+    Returns
+    -------
+    tuple of int
+        Obstacle i gives i + 1 from left to right, -(i + 1) from right to left.
     """
     xy = np.asarray(path, dtype=float)
     rays = np.asarray(points, dtype=float).reshape(-1, 2)
@@ -72,8 +80,24 @@ def signature(path: npt.ArrayLike, points: npt.ArrayLike, *, closed: bool = Fals
     """The h-signature of a polyline: its ray crossings, reduced.
 
     The path must not meet a representative point; netsp's paths keep clear of the obstacles that
-    contain them. Shapes as in `crossings`.
+    contain them.
 
+    Parameters
+    ----------
+    path : array_like, shape (k, 2) or (k, 3)
+        Polyline; only x and y count.
+    points : array_like, shape (n, 2)
+        Representative points of the obstacles.
+    closed : bool
+        Whether the last vertex is joined to the first.
+
+    Returns
+    -------
+    Word
+        The reduced word.
+
+    Examples
+    --------
     >>> signature([(-1, 1), (1, 1)], [(0, 0)])
     (1,)
     >>> signature([(-1, 1), (1, 1), (1, -1), (-1, -1)], [(0, 0)], closed=True)

@@ -19,6 +19,18 @@ EMPTY: Word = ()
 def reduce(letters: Iterable[int]) -> Word:
     """Cancel adjacent inverses until none is left.
 
+    Parameters
+    ----------
+    letters : iterable of int
+        Letters: obstacle i + 1, negative from right to left.
+
+    Returns
+    -------
+    Word
+        The reduced word.
+
+    Examples
+    --------
     >>> reduce([2, -2, 2, 1, 3])
     (2, 1, 3)
     """
@@ -34,6 +46,18 @@ def reduce(letters: Iterable[int]) -> Word:
 def concatenate(*words: Iterable[int]) -> Word:
     """The reduced word of one path followed by the next.
 
+    Parameters
+    ----------
+    *words : iterable of int
+        Words, in the order of the paths.
+
+    Returns
+    -------
+    Word
+        The reduced word.
+
+    Examples
+    --------
     >>> concatenate((1, 2), (-2, 3))
     (1, 3)
     """
@@ -43,6 +67,18 @@ def concatenate(*words: Iterable[int]) -> Word:
 def invert(word: Iterable[int]) -> Word:
     """The word of the path walked backwards.
 
+    Parameters
+    ----------
+    word : iterable of int
+        A word.
+
+    Returns
+    -------
+    Word
+        Its letters in reverse, each negated.
+
+    Examples
+    --------
     >>> invert((1, -2))
     (2, -1)
     """
@@ -50,18 +86,42 @@ def invert(word: Iterable[int]) -> Word:
 
 
 def is_looping(word: Word) -> bool:
-    """Whether a signed letter occurs twice in a reduced word: the tether passes the same gap twice
-    in the same sense, so it is wound around something. ``(1, -2, -1)`` does not loop, ``(1, 2, 1)``
-    does. This is the non-looping constraint of McCammon & Hollinger 2017, section IV-A, in the form
-    of the authors' later code.
+    """Whether a signed letter occurs twice in a reduced word.
+
+    The tether then passes the same gap twice in the same sense, so it is wound around something.
+    ``(1, -2, -1)`` does not loop, ``(1, 2, 1)`` does. This is the non-looping constraint of
+    McCammon & Hollinger 2017, section IV-A, in the form of the authors' later code.
+
+    Parameters
+    ----------
+    word : Word
+        A reduced word.
+
+    Returns
+    -------
+    bool
+        Whether it loops.
     """
     return len(set(word)) < len(word)
 
 
 def cyclically_reduced(word: Iterable[int]) -> Word:
-    """The reduced word without the letters that cancel between its end and its beginning: the class
-    of a loop that may slide off its base.
+    """The reduced word without the letters that cancel between its end and its beginning.
 
+    This is the class of a loop that may slide off its base.
+
+    Parameters
+    ----------
+    word : iterable of int
+        A word, reduced or not.
+
+    Returns
+    -------
+    Word
+        The word of the free loop.
+
+    Examples
+    --------
     >>> cyclically_reduced((1, 2, -1))
     (2,)
     """
@@ -73,15 +133,28 @@ def cyclically_reduced(word: Iterable[int]) -> Word:
 
 
 def entangled(word: Iterable[int]) -> tuple[int, ...]:
-    """Numbers (from 1) of the obstacles that a closed path of this word is wrapped around: those it
-    winds around and, if the word would not cancel without them, those of what is left of it. Empty
-    exactly when the word is.
+    """Obstacles that a closed path of this word is wrapped around.
+
+    These are the obstacles it winds around and, if the word would not cancel without them, those of
+    what is left of it. There are none exactly when the word is empty.
 
     McCammon & Hollinger 2016, section II-A, speak of the obstacles in the interior of the loop.
     Letters alone do not tell: in ``(1, 2, -1)`` the path only crosses the ray of obstacle 1 on its
     way to obstacle 2 and back. Nor do windings: ``(1, 2, -1, -2)`` encloses nothing and is
     entangled with both.
 
+    Parameters
+    ----------
+    word : iterable of int
+        Word of a closed path.
+
+    Returns
+    -------
+    tuple of int
+        Numbers of the obstacles, from 1, in order.
+
+    Examples
+    --------
     >>> entangled((1, 2, -1))
     (2,)
     >>> entangled((1, 2, -1, -2))

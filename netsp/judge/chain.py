@@ -23,8 +23,15 @@ ROUNDS = 60
 
 @dataclass(frozen=True)
 class Contact:
-    """A disk that a path bends around. sense : 1 with the disk on the left, -1 on the right. turn :
-    about how far the path turns there, radians."""
+    """A disk that a path bends around.
+
+    Attributes
+    ----------
+    sense
+        1 with the disk on the left, -1 on the right.
+    turn
+        About how far the path turns there, radians.
+    """
 
     x: float
     y: float
@@ -60,7 +67,13 @@ def exact_length(
     a: Floats, b: Floats, contacts: list[Contact], disks: Floats, slack: float
 ) -> float | None:
     """Length of the taut path from a to b by way of contacts, among disks (d, 3); None if no
-    consistent set of contacts is found. slack : depth in a disk that counts as none."""
+    consistent set of contacts is found.
+
+    Parameters
+    ----------
+    slack
+        Depth in a disk that counts as none.
+    """
     chain = list(contacts)
     for _ in range(ROUNDS):
         nodes = [(a[0], a[1], 0.0, 0), *((c.x, c.y, c.radius, c.sense) for c in chain)]

@@ -33,7 +33,17 @@ geometry stands off from what it touches by some 1e-8 of the problem's size."""
 
 @dataclass(frozen=True)
 class Check:
-    """One question and its answer."""
+    """One question and its answer.
+
+    Parameters
+    ----------
+    name : str
+        The question.
+    passed : bool
+        Whether it holds.
+    detail : str
+        What was found.
+    """
 
     name: str
     passed: bool
@@ -42,7 +52,13 @@ class Check:
 
 @dataclass(frozen=True)
 class Verification:
-    """All checks, in order; truthy when every one passed."""
+    """All checks of a solution; truthy when every one passed.
+
+    Parameters
+    ----------
+    checks : tuple of Check
+        In order.
+    """
 
     checks: tuple[Check, ...]
 
@@ -69,6 +85,23 @@ def verify(problem: Problem, solution: Solution) -> Verification:
     every goal is the stated one and its whole word is empty; that the tether, pulled taut again by
     another method, fits the tether length and has the stated length; and that length, bound, gap
     and status are consistent.
+
+    Parameters
+    ----------
+    problem : Problem
+        What was to be solved.
+    solution : Solution
+        What is judged.
+
+    Returns
+    -------
+    Verification
+        All checks, in order.
+
+    Raises
+    ------
+    InputError
+        The solution names obstacles or goals that the problem does not have.
     """
     for name, value, kind in (("problem", problem, Problem), ("solution", solution, Solution)):
         if not isinstance(value, kind):

@@ -37,9 +37,15 @@ PHASE = 0.2371
 class Inset:
     """One obstacle, smaller by the tolerance, relative to an origin.
 
-    shape : what a path must not enter (of a circle, an inscribed polygon). ring : (k, 2) its
-    corners, each of which stands on the disk `owner` (k,) of `disks` (d, 3), x, y, radius: the
-    disks that a taut path may bend around. depth : how far a path may reach into the obstacle.
+    Attributes
+    ----------
+    shape
+        What a path must not enter (of a circle, an inscribed polygon).
+    ring
+        (k, 2) its corners, each of which stands on the disk `owner` (k,) of `disks` (d, 3), x, y,
+        radius: the disks that a taut path may bend around.
+    depth
+        How far a path may reach into the obstacle.
     """
 
     shape: shapely.Polygon

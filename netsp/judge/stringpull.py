@@ -39,7 +39,12 @@ class Pulled:
 class StringPuller:
     """Triangulated free space of a problem's plan.
 
-    reach : how far from base, goals and obstacles a path may go. place : the judge's tolerance.
+    Parameters
+    ----------
+    reach
+        How far from base, goals and obstacles a path may go.
+    place
+        The judge's tolerance.
     """
 
     def __init__(self, problem: Problem, reach: float, place: float | None = None) -> None:

@@ -21,8 +21,14 @@ RANKED = 60
 class Instance:
     """Vertices grouped by cluster: members of cluster c are order[start[c]:start[c + 1]].
 
-    cluster : (V,). costs : (V, V) leg costs; where there is no leg (inf), a cost that no tour of
-    legs alone can reach is put. labels : (V,) what the vertices are called outside.
+    Parameters
+    ----------
+    cluster : ndarray of int, shape (V,)
+        Cluster of each vertex.
+    costs : ndarray, shape (V, V)
+        Leg costs; where there is no leg (inf), a cost that no tour of legs alone can reach is put.
+    labels : ndarray of int, shape (V,), optional
+        What the vertices are called outside.
     """
 
     def __init__(self, cluster: Ints, costs: Floats, labels: Ints | None = None) -> None:
@@ -41,12 +47,36 @@ class Instance:
 
     @classmethod
     def of(cls, graph: TravelGraph) -> Instance:
-        """All of a travel graph."""
+        """All of a travel graph.
+
+        Parameters
+        ----------
+        graph : TravelGraph
+            The graph; its legs are measured.
+
+        Returns
+        -------
+        Instance
+            All its vertices.
+        """
         return cls(graph.cluster, graph.costs)
 
     @classmethod
     def among(cls, graph: TravelGraph, core: Ints) -> Instance:
-        """Some vertices of a travel graph, all if they are as many."""
+        """Some vertices of a travel graph.
+
+        Parameters
+        ----------
+        graph : TravelGraph
+            The graph; the legs among these vertices are measured.
+        core : ndarray of int
+            The vertices, the base first.
+
+        Returns
+        -------
+        Instance
+            These vertices.
+        """
         if len(core) == len(graph):
             return cls.of(graph)
         return cls(graph.cluster[core], graph.costs_among(core), core)
@@ -73,7 +103,18 @@ class Instance:
         return np.asarray(out | out.T)
 
     def original(self, tour: npt.ArrayLike) -> tuple[int, ...]:
-        """Labels of the vertices at positions in `order`."""
+        """Labels of the vertices at positions in `order`.
+
+        Parameters
+        ----------
+        tour : array_like of int
+            Positions.
+
+        Returns
+        -------
+        tuple of int
+            Labels.
+        """
         return tuple(int(v) for v in self.labels[np.asarray(tour, dtype=np.int64)])
 
 

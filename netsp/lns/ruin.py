@@ -213,8 +213,14 @@ def ruin_and_recreate(
     """Make `count` rounds at temperature θ, in place; returns the lengths of the present order and
     of the best, which is kept in `best`.
 
-    nearest : (m + 1, m + 1) least legs between clusters. near : which clusters are near which.
-    rank : (m + 1, k) the nearest clusters of each, nearest first.
+    Parameters
+    ----------
+    nearest
+        (m + 1, m + 1) least legs between clusters.
+    near
+        Which clusters are near which.
+    rank
+        (m + 1, k) the nearest clusters of each, nearest first.
     """
     n = len(order)
     largest = 0

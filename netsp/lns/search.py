@@ -31,8 +31,30 @@ def local_search(
     clock: Clock,
     start_order: npt.ArrayLike | None = None,
 ) -> tuple[float, tuple[int, ...]]:
-    """Best (length, vertices of the travel graph) after `rounds` of ruin and recreate or when the
-    clock runs out. Deterministic by `rng` as long as the clock does not."""
+    """The best tour after rounds of ruin and recreate, or when the clock runs out.
+
+    Deterministic by `rng` as long as the clock does not run out.
+
+    Parameters
+    ----------
+    instance : Instance
+        What is searched.
+    rng : numpy.random.Generator
+        Of all that is random.
+    rounds : int
+        Rounds of ruin and recreate.
+    clock : Clock
+        Ends it.
+    start_order : array_like of int, optional
+        Clusters in the order to start from; by default a random one.
+
+    Returns
+    -------
+    length : float
+        Its length.
+    tour : tuple of int
+        Its vertices in the travel graph.
+    """
     search = Search(instance, rng, start_order, clock)
     search.settle()
     search.run(rounds, clock)
@@ -40,7 +62,19 @@ def local_search(
 
 
 class Search:
-    """A search in progress: the present order and the best."""
+    """A search in progress: the present order and the best.
+
+    Parameters
+    ----------
+    instance : Instance
+        What is searched.
+    rng : numpy.random.Generator
+        Of all that is random.
+    start_order : array_like of int, optional
+        Clusters in the order to start from; by default a random one.
+    clock : Clock, optional
+        Ends it.
+    """
 
     def __init__(
         self,
@@ -98,8 +132,19 @@ class Search:
         progress: Callable[[], float] | None = None,
         tell: Callable[[int], None] | None = None,
     ) -> None:
-        """Ruin and recreate, cooling from `HOT` to `COLD` over the rounds, or over what `progress`
-        says (0 to 1); `tell` hears after every chunk how many rounds it had."""
+        """Ruin and recreate, cooling from `HOT` to `COLD`.
+
+        Parameters
+        ----------
+        rounds : float
+            Rounds of ruin and recreate; inf for as long as the clock allows.
+        clock : Clock
+            Ends it.
+        progress : callable, optional
+            How far the cooling is, from 0 to 1; by default by the rounds.
+        tell : callable, optional
+            Called after every chunk with the number of rounds it had.
+        """
         i = self.instance
         n = len(self.order)
         done, chunk = 0, 1
@@ -122,7 +167,15 @@ class Search:
                 tell(count)
 
     def best(self) -> tuple[float, tuple[int, ...]]:
-        """Length and vertices of the best tour; inf if it would need a leg that there is not."""
+        """The best tour so far.
+
+        Returns
+        -------
+        length : float
+            Its length; inf if it would need a leg that there is not.
+        tour : tuple of int
+            Its vertices.
+        """
         i = self.instance
         length, tour = best_classes(self.best_order[1:], i.start, i.costs)
         return float(length) if length < i.penalty else float("inf"), i.original(tour)

@@ -23,9 +23,15 @@ MOST_VERTICES = 1000
 
 @dataclass(frozen=True)
 class Params:
-    """classes : most classes per goal, those of least tether; 0 for as many as make
-    `MOST_VERTICES` in all. restarts : searches that share the iterations or the time, each from the
-    best so far."""
+    """Options of the solver.
+
+    Attributes
+    ----------
+    classes
+        Most classes per goal, those of least tether; 0 for as many as make `MOST_VERTICES` in all.
+    restarts
+        Searches that share the iterations or the time, each from the best so far.
+    """
 
     classes: int = 0
     restarts: int = 3

@@ -30,9 +30,16 @@ GRACE = 1.0
 class CbcOutcome:
     """What CBC said.
 
-    status : 'optimal', 'infeasible' or 'stopped'. objective : of the solution, or None.
-    bound : CBC's best bound of a stopped integer run, or None.
-    values, duals : by variable and constraint name; duals of an LP only.
+    Attributes
+    ----------
+    status
+        'optimal', 'infeasible' or 'stopped'.
+    objective
+        Of the solution, or None.
+    bound
+        CBC's best bound of a stopped integer run, or None.
+    values, duals
+        By variable and constraint name; duals of an LP only.
     """
 
     status: str

@@ -23,7 +23,13 @@ MOST_KEPT = 0.9
 
 
 class CutPool:
-    """Cuts in the order of their rows. idle : (k,) rounds that each has done nothing."""
+    """Cuts in the order of their rows.
+
+    Attributes
+    ----------
+    idle
+        (k,) rounds that each has done nothing.
+    """
 
     def __init__(self) -> None:
         self.cuts: list[Cut] = []

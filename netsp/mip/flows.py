@@ -11,12 +11,20 @@ TINY = 1e-11
 
 @njit(cache=True, nogil=True)
 def min_cuts(n, tail, head, capacity, x, cluster, sink, wanted, enough):
-    """For every wanted cluster C the vertex set S of least ``capacity(δ(S)) + 2 x(C \\ S)`` without
+    r"""For every wanted cluster C the vertex set S of least ``capacity(δ(S)) + 2 x(C \ S)`` without
     the sink, if that is below `enough`.
 
-    n : vertices. tail, head, capacity : undirected edges. x : (n,) visits. Returns (k, n) flags of
-    the sets found, the cluster and the value of each. A source joined to each v of C by capacity
-    2 x_v makes it one maximum flow; it ends as soon as the flow is enough.
+    Returns (k, n) flags of the sets found, the cluster and the value of each. A source joined to
+    each v of C by capacity 2 x_v makes it one maximum flow; it ends as soon as the flow is enough.
+
+    Parameters
+    ----------
+    n
+        Vertices.
+    tail, head, capacity
+        Undirected edges.
+    x
+        (n,) visits.
     """
     edges = len(tail)
     arcs = 2 * edges + 2 * n

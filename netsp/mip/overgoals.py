@@ -20,7 +20,10 @@ Prove = Callable[[TravelGraph, Limits], Result]
 def bound_over_goals(graph: TravelGraph, prove: Prove, limits: Limits) -> float:
     """No tour of the graph is shorter; 0 if the limits leave nothing.
 
-    prove : a solver that bounds.
+    Parameters
+    ----------
+    prove
+        A solver that bounds.
     """
     clock = Clock.of(limits.time)
     least = graph.between_goals(lambda: clock.up)

@@ -90,9 +90,16 @@ class Point:
 class IntegerOutcome:
     """What an integer run gave.
 
-    point : the best integer solution of the program, or None (it may hold subtours).
-    bound : a bound on every solution of the program, or None.
-    finished : whether the program was solved to the end. infeasible : it has no solution.
+    Attributes
+    ----------
+    point
+        The best integer solution of the program, or None (it may hold subtours).
+    bound
+        A bound on every solution of the program, or None.
+    finished
+        Whether the program was solved to the end.
+    infeasible
+        It has no solution.
     """
 
     point: Point | None
@@ -104,8 +111,14 @@ class IntegerOutcome:
 class Relaxation(Protocol):
     """The linear relaxation over a changing set of legs and cuts.
 
-    legs : (k, 2) legs u < v in the program. pool : its cuts. infeasible : whether the
-    last solve found that there is no solution.
+    Attributes
+    ----------
+    legs
+        (k, 2) legs u < v in the program.
+    pool
+        Its cuts.
+    infeasible
+        Whether the last solve found that there is no solution.
     """
 
     legs: Ints

@@ -34,9 +34,15 @@ MOST_POLISHED = 4000
 
 @dataclass(frozen=True)
 class ReducedParams(Params):
-    """backend, search_rounds : as of `mip`. classes : how many classes per goal, those of least
-    tether. polish : 1 to choose the classes of the order found exactly, 0 to leave it, as in the
-    paper."""
+    """Options of the solver, besides those of `mip`.
+
+    Attributes
+    ----------
+    classes
+        How many classes per goal, those of least tether.
+    polish
+        1 to choose the classes of the order found exactly, 0 to leave it, as in the paper.
+    """
 
     classes: int = 3
     polish: int = 1

@@ -58,8 +58,14 @@ TINY = 1e-9
 class Pace:
     """When to look at the prices of all legs, and when to give up.
 
-    rounds : of the LP since the last look. every : so many make the next one due. gaps : after
-    every look.
+    Attributes
+    ----------
+    rounds
+        Of the LP since the last look.
+    every
+        So many make the next one due.
+    gaps
+        After every look.
     """
 
     rounds: int = 0
@@ -114,8 +120,16 @@ class Warm:
 class Root:
     """The relaxation over what is left of a travel graph.
 
-    costs : of the legs among the vertices left. lp : the relaxation. bound, rise : the best bound
-    with how much it rises at least when a leg is used. dead : legs in no better tour.
+    Attributes
+    ----------
+    costs
+        Of the legs among the vertices left.
+    lp
+        The relaxation.
+    bound, rise
+        The best bound, and how much it rises at least when a leg is used.
+    dead
+        Legs in no better tour.
     """
 
     def __init__(

@@ -53,8 +53,15 @@ that rules legs out, else the run ends."""
 
 @dataclass(frozen=True)
 class Params:
-    """backend : one of `BACKENDS`. search_rounds : rounds of ruin and recreate at the start, and
-    again after the root."""
+    """Options of the solver.
+
+    Attributes
+    ----------
+    backend
+        One of `BACKENDS`.
+    search_rounds
+        Rounds of ruin and recreate at the start, and again after the root.
+    """
 
     backend: str = DEFAULT_BACKEND
     search_rounds: int = 500
@@ -73,7 +80,22 @@ class Params:
 def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | None = None) -> Result:
     """Solve the generalised TSP of a travel graph to proven optimality, or as far as time allows.
 
-    An iteration is one linear or integer program solved. params : see `Params`.
+    An iteration is one linear or integer program solved. Source: McCammon & Hollinger 2017, section
+    IV-B, for the program; the elimination by reduced costs is our own (docs/solvers.md).
+
+    Parameters
+    ----------
+    graph : TravelGraph
+        What to solve.
+    params : Params, optional
+        See `Params`.
+    limits : Limits, optional
+        Time, iterations, random generator, warm start, listener.
+
+    Returns
+    -------
+    Result
+        The best tour, and what is proven of it.
     """
     chosen, limits = params or Params(), limits or Limits()
     run = MipRun(graph, limits, search_rounds=chosen.search_rounds)
@@ -81,7 +103,13 @@ def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | Non
 
 
 class MipRun(SearchingRun):
-    """State of one solve. root : once there is one."""
+    """State of one solve.
+
+    Attributes
+    ----------
+    root
+        Once there is one.
+    """
 
     root: Root | None = None
 
@@ -106,7 +134,10 @@ class MipRun(SearchingRun):
     def prove(self, backend: str, *, walks: bool = False, warm: Warm | None = None) -> None:
         """Heuristic, walks if wanted, cutting planes, until it is proven.
 
-        warm : what a proof over a core of the classes has left; it has searched already.
+        Parameters
+        ----------
+        warm
+            What a proof over a core of the classes has left; it has searched already.
         """
         costs = LegCosts(self.graph)
         if warm is None:

@@ -51,9 +51,12 @@ def component_cuts(
 ) -> list[Cut]:
     """One cut for each component of the support that the base is not in.
 
-    near : (V,) the visited vertex nearest to each, itself if it is visited. Vertices that are not
-    visited then go with it: they carry no flow, so the cut is as violated, and the same subtour in
-    a neighbouring class, which the next LP would pay for instead, is cut with it.
+    Parameters
+    ----------
+    near
+        (V,) the visited vertex nearest to each, itself if it is visited. Vertices that are not
+        visited then go with it: they carry no flow, so the cut is as violated, and the same subtour
+        in a neighbouring class, which the next LP would pay for instead, is cut with it.
     """
     count, label = components(x, legs, y)
     cuts = []

@@ -27,7 +27,15 @@ MOST_PATCHES = 200_000
 
 @dataclass(frozen=True)
 class Patches:
-    """A surface in pieces. centres, normals : (n, 3), normals outward. areas : (n,)."""
+    """A surface in pieces.
+
+    Attributes
+    ----------
+    centres, normals
+        (n, 3), normals outward.
+    areas
+        (n,).
+    """
 
     centres: Floats
     normals: Floats
@@ -44,7 +52,8 @@ def patches_of(
 
     Raises
     ------
-    InputError : `inspect` names no solid, or nothing is left to be seen.
+    InputError
+        `inspect` names no solid, or nothing is left to be seen.
     """
     low, high = extent(scene, places)
     solids = scene.all_solids()
@@ -108,8 +117,10 @@ class Coverage:
 
     Attributes
     ----------
-    seen, seen_through : (n,) with and without regard to what stands in between.
-    share, share_through : of the area, the second as the paper counts.
+    seen, seen_through
+        (n,) with and without regard to what stands in between.
+    share, share_through
+        Of the area, the second as the paper counts.
     """
 
     def __init__(self, patches: Patches, field: DistanceField, camera: Camera) -> None:
@@ -165,9 +176,15 @@ def nearest(centres, eye):
 def mark(
     field, centres, normals, shares, seen, seen_through, eye, yaw, pitch, half, reach, off
 ):  # fmt: skip
-    """Mark the patches that are in view, no farther than `reach`. half : tangent of half the field
-    of view, which is a square pyramid. Returns the shares that were new, with and without regard
-    to what stands in between."""
+    """Mark the patches that are in view, no farther than `reach`.
+
+    Returns the shares that were new, with and without regard to what stands in between.
+
+    Parameters
+    ----------
+    half
+        Tangent of half the field of view, which is a square pyramid.
+    """
     new, new_through = 0.0, 0.0
     cy, sy, cp, sp = math.cos(yaw), math.sin(yaw), math.cos(pitch), math.sin(pitch)
     for i in range(len(centres)):

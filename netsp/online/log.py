@@ -17,8 +17,33 @@ from netsp.online.tether import Tether
 
 @dataclass(frozen=True)
 class LogRow:
-    """One step: seconds, position (m), heading (rad), index of the target, mode, tether (m), share
-    of the surface seen and seen if nothing stood in between, planning (s)."""
+    """One step of a run.
+
+    Parameters
+    ----------
+    time : float
+        Seconds since the start.
+    x : float
+        Position, metres.
+    y : float
+        Position, metres.
+    z : float
+        Position, metres, up.
+    yaw : float
+        Heading, radians.
+    target : int
+        The waypoint that is next.
+    mode : str
+        As of `netsp.online.planner.Command`.
+    tether : float
+        Length of the taut tether, metres.
+    coverage : float
+        Share of the surface seen.
+    coverage_through : float
+        The same as if nothing stood in between.
+    replan_s : float
+        Seconds of CPU that planning took.
+    """
 
     time: float
     x: float
@@ -37,7 +62,18 @@ class LogRow:
 class Run(Drawn):
     """What came of a mission.
 
-    log : one row per step. tether : at the end. summary : the numbers (`summarise`).
+    Parameters
+    ----------
+    mission : Mission
+        What was flown.
+    planner : str
+        Name of the planner.
+    log : tuple of LogRow
+        One row per step.
+    tether : Tether
+        At the end.
+    summary : dict
+        The numbers (`netsp.online.simulate.summarise`).
     """
 
     picture: ClassVar[str] = "netsp.pictures.mission:draw_run"
@@ -59,7 +95,20 @@ class Run(Drawn):
 
 
 def write_run(run: Run, folder: str | Path) -> None:
-    """log.csv, summary.json and mission.json into a folder, which is made."""
+    """Write log.csv, summary.json and mission.json into a folder, which is made.
+
+    Parameters
+    ----------
+    run : Run
+        The run.
+    folder : str or Path
+        The folder.
+
+    Raises
+    ------
+    InputError
+        It cannot be written.
+    """
     place = Path(folder)
     try:
         place.mkdir(parents=True, exist_ok=True)
@@ -81,7 +130,20 @@ def _short(value: Any) -> Any:
 
 
 def describe_run(run: Run, units: str) -> str:
-    """A run in a few lines."""
+    """A run in a few lines.
+
+    Parameters
+    ----------
+    run : Run
+        The run.
+    units : str
+        Name of the unit of length.
+
+    Returns
+    -------
+    str
+        The lines.
+    """
     s = run.summary
     lines = [
         f"mission  {s['mission']}, planner {s['planner']}: {s['status']}",

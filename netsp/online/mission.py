@@ -19,8 +19,16 @@ from netsp.online.scene.scene import Scene
 class Camera(BaseModel):
     """What the robot sees with.
 
-    range : metres. field_of_view : degrees, both ways. tilt : degrees that it turns up or down at
-    most. patch : metres; pieces of surface that coverage is counted in.
+    Attributes
+    ----------
+    range : float
+        Metres.
+    field_of_view : float
+        Degrees, both ways.
+    tilt : float
+        Degrees that it turns up or down at most.
+    patch : float
+        Metres; pieces of surface that coverage is counted in.
     """
 
     model_config = STRICT
@@ -42,22 +50,39 @@ class Mission(BaseModel):
 
     Attributes
     ----------
-    scene : scene file, relative to the mission file.
-    anchor : where the tether is fixed; start : where the robot is at first, in sight of it.
-    waypoints : to be visited in this order.
-    tether_length : metres of taut tether that must never be exceeded.
-    clearance : metres that the robot keeps from solids, where it can.
-    reach : metres; a waypoint this near counts as visited.
-    speed : metres per second.
-    camera : what coverage is counted for; none without. inspect : names of the solids to be seen,
-        default all.
-    current : m/s, a steady current; gusts : m/s, standard deviation of what comes and goes on top.
-        A kinematic vehicle feels neither.
-    delta : metres; resolution of the tether. cell : metres; of the grid that paths are sought on.
+    scene : str
+        Scene file, relative to the mission file.
+    anchor : (x, y, z)
+        Where the tether is fixed, metres.
+    start : (x, y, z)
+        Where the robot is at first, in sight of the anchor, metres.
+    waypoints : tuple of (x, y, z)
+        To be visited in this order, metres.
+    tether_length : float
+        Metres of taut tether that must never be exceeded.
+    clearance : float
+        Metres that the robot keeps from solids, where it can.
+    reach : float
+        Metres; a waypoint this near counts as visited.
+    speed : float
+        Metres per second.
+    camera : Camera or None
+        What coverage is counted for; none without.
+    inspect : tuple of str or None
+        Names of the solids to be seen, by default all.
+    current : (x, y, z)
+        A steady current, m/s; a kinematic vehicle does not feel it.
+    gusts : float
+        Standard deviation of what comes and goes on top, m/s.
+    delta : float
+        Resolution of the tether, metres.
+    cell : float
+        Of the grid that paths are sought on, metres.
 
     Raises
     ------
-    InputError : from `load`, in one line.
+    InputError
+        From `load`, in one line.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", title="netsp mission")
@@ -93,18 +118,69 @@ class Mission(BaseModel):
 
     @classmethod
     def from_json(cls, text: str | bytes, *, source: str = "mission") -> Self:
-        """Parse and validate; `InputError` with one line for anything wrong."""
+        """Parse and validate the text of a mission file.
+
+        Parameters
+        ----------
+        text : str or bytes
+            JSON of format version 1.
+        source : str
+            What messages call it.
+
+        Returns
+        -------
+        Mission
+            The mission.
+
+        Raises
+        ------
+        InputError
+            Anything wrong, in one line.
+        """
         return read_model(cls, text, source)
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
-        """Read a mission file; the scene's name becomes relative to the working directory."""
+        """Read a mission file; the scene's name becomes relative to the working directory.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file.
+
+        Returns
+        -------
+        Mission
+            The mission.
+
+        Raises
+        ------
+        InputError
+            The file cannot be read or is not valid, in one line.
+        """
         mission = cls.from_json(read_text(path), source=str(path))
         return mission.model_copy(update={"scene": str(Path(path).parent / mission.scene)})
 
     def checked_waypoints(self, field: DistanceField, *, snap: bool = False) -> Self:
-        """The mission with every waypoint outside of solids: those inside are moved out to the
-        clearance with `snap`, else refused with their numbers (InputError)."""
+        """The mission with every waypoint outside of solids.
+
+        Parameters
+        ----------
+        field : DistanceField
+            The scene.
+        snap : bool
+            Move waypoints inside solids out to the clearance.
+
+        Returns
+        -------
+        Mission
+            The mission, with waypoints moved where needed.
+
+        Raises
+        ------
+        InputError
+            Waypoints inside solids, with their numbers, without `snap`.
+        """
         points = np.array(self.waypoints)
         inside = np.flatnonzero(field.distance(points) < 0.0)
         if not len(inside):
@@ -118,5 +194,16 @@ class Mission(BaseModel):
         return self.model_copy(update={"waypoints": tuple(map(tuple, points.tolist()))})
 
     def load_scene(self) -> Scene:
-        """The scene it takes place in."""
+        """The scene it takes place in.
+
+        Returns
+        -------
+        Scene
+            The scene.
+
+        Raises
+        ------
+        InputError
+            The file cannot be read or is not valid, in one line.
+        """
         return Scene.load(self.scene)

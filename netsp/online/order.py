@@ -45,8 +45,16 @@ SHARE = 0.99
 class Ordered:
     """A mission in another order.
 
-    mission : the waypoints reordered. order : old numbers in the new order. before, after : both
-    flown by `predictive`; after is before when no better order was found.
+    Parameters
+    ----------
+    mission : Mission
+        With its waypoints reordered.
+    order : tuple of int
+        Old numbers in the new order.
+    before : Run
+        The given order, flown by `predictive`.
+    after : Run
+        The new order; the same as `before` when no better one was found.
     """
 
     mission: Mission
@@ -71,7 +79,22 @@ class _Classes:
 
 
 def alike(a: Tether, b: Tether, delta: float) -> bool:
-    """Whether two tethers between the same ends are the same, by length and middle."""
+    """Whether two tethers between the same ends are the same, by length and middle.
+
+    Parameters
+    ----------
+    a : Tether
+        One tether.
+    b : Tether
+        The other.
+    delta : float
+        Resolution of both, metres.
+
+    Returns
+    -------
+    bool
+        Whether they are.
+    """
     if abs(a.length - b.length) > delta:
         return False
     middle = (polylines.points_along(t.nodes, 0.51 * t.length + 1e-9)[1] for t in (a, b))
@@ -82,15 +105,32 @@ def reorder(
     mission: Mission, *, time_limit: float = 20.0, seed: int = 0,
     on_progress: Callable[[str], None] | None = None,
 ) -> Ordered:  # fmt: skip
-    """Find an order of a mission's waypoints with less total time (inspection, and taking the
-    tether in afterwards) in which the tether stays within its limit.
+    """Find an order of a mission's waypoints with less total time in which the tether fits.
 
-    The new order is flown by `predictive` before it is believed; the given one is kept unless the
-    new one visits as many waypoints, never exceeds the tether and takes less time.
+    Total time is that of the inspection and of tether recovery afterwards. The new order is flown
+    by `predictive` before it is believed; the given one is kept unless the new one visits as many
+    waypoints, never exceeds the tether and takes less time.
+
+    Parameters
+    ----------
+    mission : Mission
+        The mission.
+    time_limit : float
+        Seconds of the solver.
+    seed : int
+        Of the solver.
+    on_progress : callable, optional
+        Called with a line of text now and then.
+
+    Returns
+    -------
+    Ordered
+        Both orders and their runs.
 
     Raises
     ------
-    InputError : as `simulate`.
+    InputError
+        As of `simulate`.
     """
     tell = on_progress or (lambda _: None)
     scene = mission.load_scene()
@@ -146,8 +186,28 @@ def _better(run: Run, than: Run) -> bool:
 def waypoint_graph(
     mission: Mission, field: DistanceField, scene_grid: object
 ) -> tuple[TravelGraph, list[int], list[int]]:
-    """Classes and legs of a mission: the graph, the waypoint of each vertex (-1: the anchor), and
-    the waypoints in the order of the clusters. Waypoints that no tether reaches are left out."""
+    """Classes and legs of a mission.
+
+    Waypoints that no tether reaches are left out.
+
+    Parameters
+    ----------
+    mission : Mission
+        The mission.
+    field : DistanceField
+        Its scene.
+    scene_grid : Grid
+        The grid that paths are sought on.
+
+    Returns
+    -------
+    graph : TravelGraph
+        Classes of the waypoints, and legs.
+    at : list of int
+        The waypoint of each vertex, -1 for the anchor.
+    clusters : list of int
+        The waypoints in the order of the clusters.
+    """
     grid = scene_grid
     model = GeodesicTether(field, mission.delta)
     anchor, limit = np.array(mission.anchor), SHARE * mission.tether_length

@@ -36,7 +36,27 @@ STUCK = 600.0
 
 
 def grid_of(mission: Mission, scene: Scene, field: DistanceField) -> Grid:
-    """The grid that paths are sought on: the scene's bounds, or all there is and some room."""
+    """The grid that paths are sought on: the scene's bounds, or all there is and some room.
+
+    Parameters
+    ----------
+    mission : Mission
+        Its cell, waypoints and clearance count.
+    scene : Scene
+        Its bounds count.
+    field : DistanceField
+        The scene's field.
+
+    Returns
+    -------
+    Grid
+        The grid.
+
+    Raises
+    ------
+    InputError
+        It would take too much memory; says which cell would not.
+    """
     if scene.bounds is not None:
         low, high = np.array(scene.bounds[:3]), np.array(scene.bounds[3:])
     else:
@@ -51,10 +71,30 @@ def grid_of(mission: Mission, scene: Scene, field: DistanceField) -> Grid:
 class Simulation:
     """A robot on a tether in a scene, moved on step by step.
 
-    Attributes
+    Parameters
     ----------
-    tether : the taut one, by the geodesic model. model, believed : another model that the planner
-    believes in, and its tether. now : seconds. log : what has been.
+    mission : Mission
+        What is flown.
+    scene : DistanceField
+        The map.
+    vehicle : Vehicle
+        The robot.
+    tethers : GeodesicTether
+        The model of the taut tether.
+    tether : Tether
+        The taut tether, by the geodesic model.
+    water : callable
+        Velocity of the water (3,), m/s, at a time in seconds.
+    coverage : Coverage, optional
+        What the camera has seen.
+    model : TetherModel, optional
+        Another model, that the planner believes in.
+    believed : Tether, optional
+        Its tether.
+    now : float
+        Seconds since the start.
+    log : list of LogRow
+        One row per step.
     """
 
     mission: Mission
@@ -70,7 +110,20 @@ class Simulation:
     log: list[LogRow] = field(default_factory=list)
 
     def note(self, planner: Planner, command: Command) -> LogRow:
-        """Write down where things are."""
+        """Write down where things are.
+
+        Parameters
+        ----------
+        planner : Planner
+            Its waypoint and mode are logged.
+        command : Command
+            What it asked for.
+
+        Returns
+        -------
+        LogRow
+            The row.
+        """
         x, y, z = (float(v) for v in self.vehicle.position)
         seen = self.coverage
         if seen is not None and len(self.log) % FRAME == 0:
@@ -84,8 +137,22 @@ class Simulation:
         return row
 
     def go(self, path: Floats, fresh: bool) -> tuple[int, bool]:
-        """One step along a path: how much of it is passed, and whether the vehicle could move. One
-        that runs into a solid is stopped where it was."""
+        """Take one step along a path; a vehicle that runs into a solid is stopped where it was.
+
+        Parameters
+        ----------
+        path : ndarray, shape (k, 3)
+            Points to pass, metres.
+        fresh : bool
+            Whether the path does not continue the one before.
+
+        Returns
+        -------
+        count : int
+            How many points of the path are behind the robot.
+        moved : bool
+            Whether the vehicle could move.
+        """
         robot, yaw = self.vehicle.position, self.vehicle.yaw
         if self.coverage is not None:
             yaw = self.coverage.heading(robot, yaw)
@@ -147,20 +214,41 @@ def simulate(
 
     Parameters
     ----------
-    planner : name (`netsp.online.planner.PLANNERS`), or a callable that makes one, such as a class
-        derived from `Planner`. options : how it finds paths.
-    tether : the model that the planner believes: geodesic, react, or a callable that makes a
+    mission : Mission
+        What is flown.
+    planner : str or callable
+        A name (`netsp.online.planner.PLANNERS`), or a callable that makes one, such as a class
+        derived from `Planner`.
+    vehicle : str
+        A name (`netsp.online.vehicle.VEHICLES`).
+    tether : str or callable
+        The model that the planner believes: `geodesic`, `react`, or a callable that makes a
         `netsp.online.tether.TetherModel` of a field and a resolution; what is logged is the
         geodesic one.
-    vehicle : name (`netsp.online.vehicle.VEHICLES`). seed : of the gusts.
-    scene, field : when they are at hand.
-    snap : move waypoints out of solids. on_step : is told every row; a KeyboardInterrupt ends the
-    run, and what was done till then is returned.
+    options : PlannerOptions, optional
+        How the planner finds paths.
+    scene : Scene, optional
+        When it is at hand.
+    field : DistanceField, optional
+        When it is at hand.
+    snap : bool
+        Move waypoints out of solids.
+    seed : int
+        Of the gusts.
+    on_step : callable, optional
+        Called with every row and the planner; a KeyboardInterrupt ends the run, and what was done
+        till then is returned.
+
+    Returns
+    -------
+    Run
+        What came of it.
 
     Raises
     ------
-    InputError : before the first step: unknown names, waypoints inside solids, anchor and start
-        not in sight of one another, a tether that is shorter than the path between them.
+    InputError
+        Before the first step: unknown names, waypoints inside solids, anchor and start not in sight
+        of one another, a tether that is shorter than the path between them.
     """
     _check_size(mission)
     scene = scene or mission.load_scene()
@@ -228,8 +316,27 @@ def summarise(
 ) -> dict[str, Any]:
     """The numbers of a run, as the papers give them.
 
-    exceedance_s : seconds with a tether longer than it is. recovery_s : seconds to come back to the
-    anchor afterwards, by retracing the tether, or the whole path (the paper does not say which).
+    `exceedance_s` is the time with the tether over the limit. `recovery_s` is the time to come back
+    to the anchor afterwards, by retracing the tether, or the whole path (the paper does not say
+    which).
+
+    Parameters
+    ----------
+    mission : Mission
+        What was flown.
+    planner : Planner
+        As it is at the end.
+    world : Simulation
+        As it is at the end.
+    wall : float
+        Seconds that the run took.
+    interrupted : bool
+        Whether it was stopped.
+
+    Returns
+    -------
+    dict
+        The numbers by name.
     """
     log, tether = world.log, world.tether
     lengths = np.array([r.tether for r in log])

@@ -17,7 +17,12 @@ INTERVAL = 0.1
 class Water:
     """Velocity over time; gusts are an Ornstein-Uhlenbeck process, the same for the same seed.
 
-    current : (3,) m/s. gusts : m/s, standard deviation along each axis.
+    Parameters
+    ----------
+    current
+        (3,) m/s.
+    gusts
+        m/s, standard deviation along each axis.
     """
 
     def __init__(self, current: Point3, gusts: float, seed: int) -> None:

@@ -49,7 +49,8 @@ def save_runs(runs: Sequence[Run], scene: Scene, file: str | Path) -> None:
 
     Raises
     ------
-    InputError : the file cannot be written.
+    InputError
+        The file cannot be written.
     """
     from matplotlib.figure import Figure
 
@@ -129,7 +130,8 @@ def save_page(runs: Sequence[Run], scene: Scene, file: str | Path) -> None:
 
     Raises
     ------
-    InputError : plotly is not installed, the file cannot be written.
+    InputError
+        Plotly is not installed, the file cannot be written.
     """
     go = plotly_objects()
     from plotly.subplots import make_subplots

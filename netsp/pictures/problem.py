@@ -190,7 +190,13 @@ def draw_map(
     tethers: bool = False,
 ) -> Axes:  # fmt: skip
     """The map of a problem, with the path of a solution if given, on axes of the caller or on new
-    ones; returns the axes. tethers : the taut tether at every stop, too."""
+    ones; returns the axes.
+
+    Parameters
+    ----------
+    tethers
+        The taut tether at every stop, too.
+    """
     if ax is None:
         _, ax = _single(problem)
     wrapped = solution.entangled if solution else ()

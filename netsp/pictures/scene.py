@@ -31,7 +31,8 @@ def save(
 
     Raises
     ------
-    InputError : another ending, a file that cannot be written, plotly not installed.
+    InputError
+        Another ending, a file that cannot be written, plotly not installed.
     """
     style.check_format(file, INTERACTIVE)
     line = np.zeros((0, 3)) if path is None else np.asarray(path, dtype=float).reshape(-1, 3)

@@ -40,7 +40,13 @@ FORMATS = (".png", ".svg", ".pdf")
 
 
 def check_format(path: str | Path, *more: str) -> None:
-    """InputError unless a file name ends in a format that can be drawn. more : further endings."""
+    """InputError unless a file name ends in a format that can be drawn.
+
+    Parameters
+    ----------
+    more
+        Further endings.
+    """
     if Path(path).suffix.lower() not in (*FORMATS, *more):
         names = ", ".join((*FORMATS, *more))
         raise InputError(f"{path}: cannot draw this format; expected a name ending in {names}")
@@ -51,7 +57,8 @@ def save(figure: Any, path: str | Path, dpi: int = 150) -> None:
 
     Raises
     ------
-    InputError : another ending, a file that cannot be written.
+    InputError
+        Another ending, a file that cannot be written.
     """
     check_format(path)
     try:

@@ -60,7 +60,8 @@ def report_tour(source: str | Path, problem_file: str | Path | None, output: str
 
     Raises
     ------
-    InputError : files that cannot be read, or do not belong together.
+    InputError
+        Files that cannot be read, or do not belong together.
     """
     place = Path(source)
     run = place if place.is_dir() else None
@@ -99,7 +100,13 @@ def page(
     problem: Problem, solution: Solution, rows: list[dict[str, str]],
     tethers: list[dict[str, Any]] | None, run: Path | None,
 ) -> str:  # fmt: skip
-    """The page as HTML. rows, tethers : of a run, else empty."""
+    """The page as HTML.
+
+    Parameters
+    ----------
+    rows, tethers
+        Of a run, else empty.
+    """
     frames = _frames_of_run(rows, tethers) if tethers else _frames_of_plan(problem, solution)
     view = _View(problem, np.vstack([f["nodes"] for f in frames]))
     title = f"{problem.name}: {'a run' if run else 'a tour'}"

@@ -32,10 +32,16 @@ if TYPE_CHECKING:
 class AugmentedGraph:
     """Vertices (milestone, word) with the edges between them; vertex 0 is (base, empty word).
 
-    milestone, node, length : (n,) milestone, word (as a trie node), shortest length from the base.
-    complete : whether nothing was left out for want of time.
-    start, target, cost : compressed rows of the edges, both ways.
-    points : (milestones, 3).
+    Attributes
+    ----------
+    milestone, node, length
+        (n,) milestone, word (as a trie node), shortest length from the base.
+    complete
+        Whether nothing was left out for want of time.
+    start, target, cost
+        Compressed rows of the edges, both ways.
+    points
+        (milestones, 3).
     """
 
     points: Floats
@@ -66,7 +72,12 @@ class AugmentedGraph:
         self, sources: Ints, targets: Ints, check: Callable[[], None] = lambda: None
     ) -> Floats:
         """(sources, targets) shortest lengths within the graph, by Dijkstra; inf if not joined.
-        check : called now and then; may raise to stop."""
+
+        Parameters
+        ----------
+        check
+            Called now and then; may raise to stop.
+        """
         from scipy.sparse.csgraph import dijkstra
 
         out = np.empty((len(sources), len(targets)))
@@ -140,9 +151,18 @@ def augment(
 ) -> AugmentedGraph:
     """Augment a roadmap from milestone 0, the base.
 
-    points : (n, 3); edges : (k, 2); letters : the edges' ray crossings, and row starts into them.
-    cap : most vertices; more is an InputError. stop : of a clock; the vertices nearest to the base
-    are there when it is set.
+    Parameters
+    ----------
+    points
+        (n, 3) milestones.
+    edges
+        (k, 2) pairs of milestones.
+    letters
+        The edges' ray crossings, and row starts into them.
+    cap
+        Most vertices; more is an InputError.
+    stop
+        Of a clock; the vertices nearest to the base are there when it is set.
     """
     n = len(points)
     cost = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)

@@ -41,8 +41,12 @@ SHARE = 0.3
 class TetherTree:
     """Tethers as paths in a tree of bends, rooted at the base.
 
-    last : (V,) last bend of each vertex's tether. parent, length : (bends,) the bend before (-1 at
-    the root), and the length of tether up to the bend.
+    Attributes
+    ----------
+    last
+        (V,) last bend of each vertex's tether.
+    parent, length
+        (bends,) the bend before (-1 at the root), and the length of tether up to the bend.
     """
 
     last: Ints
@@ -87,8 +91,12 @@ class _GrowingTree:
 class Classes:
     """Augmented goals, base first: cluster (V,), word and planar tether length of each.
 
-    tree : where the tethers part. least_left_out : no class that is not here has a
-    shorter tether (in space); inf if all are here.
+    Attributes
+    ----------
+    tree
+        Where the tethers part.
+    least_left_out
+        No class that is not here has a shorter tether (in space); inf if all are here.
     """
 
     cluster: Ints

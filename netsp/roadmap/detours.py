@@ -36,8 +36,13 @@ def taut_detours(
     problem: Problem, with_sub_goals: bool, check: Callable[[], None] = lambda: None,
     stop: Flag = NEVER,
 ) -> Detours:  # fmt: skip
-    """The detours over tangents and arcs: exact shortest paths. check : may raise to stop; and it
-    does when the flag is set."""
+    """The detours over tangents and arcs: exact shortest paths.
+
+    Parameters
+    ----------
+    check
+        May raise to stop; and it does when the flag is set.
+    """
     places, side = sub_goals(problem, with_sub_goals)
     check()
     outline = build_outline(problem)
@@ -96,8 +101,14 @@ def tabulate(
 ) -> Detours:
     """All detours from base and goals to base, goals and sub-goals over a graph of shortest paths.
 
-    terminals : (m + 1 + k,) node of the graph for base, goals and sub-goals. side : (k,) obstacle
-    of each sub-goal. check : called for every base or goal; may raise to stop.
+    Parameters
+    ----------
+    terminals
+        (m + 1 + k,) node of the graph for base, goals and sub-goals.
+    side
+        (k,) obstacle of each sub-goal.
+    check
+        Called for every base or goal; may raise to stop.
     """
     fixed = len(problem.points)
     count = len(terminals)

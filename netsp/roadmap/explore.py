@@ -41,8 +41,15 @@ GIVEN, NON_LOOPING, ALL = range(3)
 
 
 class Net(NamedTuple):
-    """The arrays of a `TangentGraph` that the kernel walks. arc_nodes : how many nodes are directed
-    arcs; points follow. longest : most letters that one step can write."""
+    """The arrays of a `TangentGraph` that the kernel walks.
+
+    Attributes
+    ----------
+    arc_nodes
+        How many nodes are directed arcs; points follow.
+    longest
+        Most letters that one step can write.
+    """
 
     start: Ints
     target: Ints
@@ -73,11 +80,21 @@ class Words(NamedTuple):
 class Ask(NamedTuple):
     """What is sought.
 
-    keep : whether to keep the search tree, so that paths can
-    be written out. cap : most departures to look at. rest : per tangent, the least length from its
-    end to where the search is going (0 where it goes everywhere). aim : the one point asked for, -1
-    for all. within : per point, the longest path that is reported. most : so many reports end the
-    search.
+    Attributes
+    ----------
+    keep
+        Whether to keep the search tree, so that paths can be written out.
+    cap
+        Most departures to look at.
+    rest
+        Per tangent, the least length from its end to where the search is going (0 where it goes
+        everywhere).
+    aim
+        The one point asked for, -1 for all.
+    within
+        Per point, the longest path that is reported.
+    most
+        So many reports end the search.
     """
 
     keep: bool
@@ -184,12 +201,16 @@ def _arrives_anew(code, mark, same, key, length):
 @njit(cache=True, nogil=True)
 def explore(net, words, ask, source, trie, limit, size, stop):
     """All taut paths from node `source` whose words stay in (or pend from) the core of the trie,
-    which has `size` nodes, each with the limit of its paths. stop : ends it when its first number
-    is not 0.
+    which has `size` nodes, each with the limit of its paths.
 
     Returns trie, limit, size; per hit (goal point, trie node, state, departure) and (length, angle
     slid before the departure); the tree as rows of states (`NODE` …, `TURN` …); whether the cap
     stopped the search.
+
+    Parameters
+    ----------
+    stop
+        Ends it when its first number is not 0.
     """
     # taken out once: to take an array out of a tuple costs a count of its references
     start, target, length, ends = net.start, net.target, net.length, net.ends
@@ -338,9 +359,17 @@ def run_explore(
 ) -> Found:
     """Run the kernel from point `source`; updates the trie.
 
-    toward : a point, and per tangent the least length from its end to that point: only paths to it
-    are sought. within : (points,) longest path to each that counts. most : hits, about. stop : of a
-    clock.
+    Parameters
+    ----------
+    toward
+        A point, and per tangent the least length from its end to that point: only paths to it are
+        sought.
+    within
+        (points,) longest path to each that counts.
+    most
+        Hits, about.
+    stop
+        Of a clock.
     """
     no_limit = np.iinfo(np.int64).max
     aim, rest = toward or (-1, np.zeros(len(graph.target)))

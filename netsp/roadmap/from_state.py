@@ -41,8 +41,14 @@ class GraphFromState(TravelGraph):
 
     Attributes
     ----------
-    start : vertex of the state. surcharge : see above. within : the legs as they are.
-    start_tether : (n, 3) the taut tether at the start.
+    start
+        Vertex of the state.
+    surcharge
+        See above.
+    within
+        The legs as they are.
+    start_tether
+        (n, 3) the taut tether at the start.
     """
 
     def __init__(
@@ -156,8 +162,10 @@ def graph_from_state(
 
     Raises
     ------
-    InfeasibleError : a goal that no tether within the limit reaches.
-    InputError : no taut tether to the state has its word, or what `TautRoadmap` raises.
+    InfeasibleError
+        A goal that no tether within the limit reaches.
+    InputError
+        No taut tether to the state has its word, or what `TautRoadmap` raises.
     """
     state = problem.state
     assert state is not None

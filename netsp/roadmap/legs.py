@@ -45,8 +45,12 @@ class Tethers(NamedTuple):
 class TautLegs:
     """Exact legs between given augmented goals. Satisfies `netsp.travel.graph.Legs`.
 
-    cluster, signatures, planar : goal (0 is the base), word and planar taut tether length of each
-    vertex. tree : where their tethers part, if known.
+    Parameters
+    ----------
+    cluster, signatures, planar
+        Goal (0 is the base), word and planar taut tether length of each vertex.
+    tree
+        Where their tethers part, if known.
     """
 
     def __init__(
@@ -156,8 +160,14 @@ class TautLegs:
         self, vertices: Ints, rows: Ints | None = None, clock: Clock | None = None
     ) -> Floats:
         """(k, k) lower bounds on leg lengths: a leg is no shorter than its class among slits
-        (`netsp.roadmap.slits`), nor than the difference of its two tethers (triangle inequality on
-        the cover). rows : (r,) positions among the vertices; then (r, k)."""
+        (`netsp.roadmap.slits`), nor than the difference of its two tethers (triangle inequality
+        on the cover).
+
+        Parameters
+        ----------
+        rows
+            (r,) positions among the vertices; then (r, k).
+        """
         vertices = np.asarray(vertices, dtype=np.int64)
         if self._slits is None:
             self._slits = build_slits(self.paths.problem)

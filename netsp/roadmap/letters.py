@@ -32,7 +32,10 @@ def segment_letters(ax, ay, bx, by, rays, order, out, n):
 def arc_letters(cx, cy, r, ax, bx, start, turn, rays, order, out, n):
     """Append the letters of an arc from angle `start` through the signed angle `turn`.
 
-    ax, bx : stored x of the two ends. The arc is split at the quadrants into pieces monotone in x.
+    Parameters
+    ----------
+    ax, bx
+        Stored x of the two ends. The arc is split at the quadrants into pieces monotone in x.
     """
     k = len(order)
     quarter = 0.5 * math.pi

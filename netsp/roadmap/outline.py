@@ -66,14 +66,22 @@ class Outline:
 
     Attributes
     ----------
-    blockers : what a segment must not enter.
-    arcs : (a, 5) centre x, y, radius, start angle, end angle (counter-clockwise, end > start).
-    full : (a,) whether the arc is a whole circle.
-    origin : (2,) the base, which all coordinates here are relative to.
-    places : (1 + m, 2) base and goals. points : the same, but those nearer to a grown boundary than
-        `STAND_OFF` moved to that distance.
-    rays : (n, 2) representative points.
-    margin : the extra growth of all obstacles.
+    blockers
+        What a segment must not enter.
+    arcs
+        (a, 5) centre x, y, radius, start angle, end angle (counter-clockwise, end > start).
+    full
+        (a,) whether the arc is a whole circle.
+    origin
+        (2,) the base, which all coordinates here are relative to.
+    places
+        (1 + m, 2) base and goals.
+    points
+        The same, but those nearer to a grown boundary than `STAND_OFF` moved to that distance.
+    rays
+        (n, 2) representative points.
+    margin
+        The extra growth of all obstacles.
     """
 
     blockers: Blockers

@@ -29,8 +29,11 @@ MOST_KNOWN = 5000
 class TautPaths:
     """Taut paths between the base (point 0) and the goals (points 1 …) of a problem.
 
-    longest : limit on their planar length; by default that of a leg between two admissible classes,
-    and then only what the tether can touch is looked at.
+    Parameters
+    ----------
+    longest
+        Limit on their planar length; by default that of a leg between two admissible classes, and
+        then only what the tether can touch is looked at.
     """
 
     def __init__(self, problem: Problem, longest: float | None = None) -> None:
@@ -54,13 +57,23 @@ class TautPaths:
         return math.hypot(self.planar_length(a, b, word), float(self._z[b] - self._z[a]))
 
     def planar_length(self, a: int, b: int, word: Word, longest: float | None = None) -> float:
-        """Length in the plan of the taut path of a word from point a to point b. longest : that it
-        is known not to exceed."""
+        """Length in the plan of the taut path of a word from point a to point b.
+
+        Parameters
+        ----------
+        longest
+            That it is known not to exceed.
+        """
         return self._pieces(a, b, word, longest)[0]
 
     def path(self, a: int, b: int, word: Word, longest: float | None = None) -> Floats:
         """(n, 3) polyline of the taut path of a word from point a to point b (0 is the base).
-        longest : a planar length that it is known not to exceed."""
+
+        Parameters
+        ----------
+        longest
+            A planar length that it is known not to exceed.
+        """
         _, pieces = self._pieces(a, b, word, longest)
         xy = self._polyline(a, b, pieces)
         steps = np.hypot(*np.diff(xy, axis=0).T)

@@ -50,20 +50,32 @@ class PrmRoadmap:
 
     Parameters
     ----------
-    samples : milestones to sample. seed : of the sampling; same seed, same roadmap.
-    shortcut : pull every leg taut within its class, so that only the set of classes is sampled.
+    samples
+        Milestones to sample.
+    seed
+        Of the sampling; same seed, same roadmap.
+    shortcut
+        Pull every leg taut within its class, so that only the set of classes is sampled.
 
     Attributes
     ----------
-    milestones : (n, 3) base, goals, then samples. edges : (k, 2) pairs of milestones.
-    augmented : the graph over (milestone, word). complete : whether the time sufficed for all the
-    samples and all of that graph.
+    milestones
+        (n, 3) base, goals, then samples.
+    edges
+        (k, 2) pairs of milestones.
+    augmented
+        The graph over (milestone, word).
+    complete
+        Whether the time sufficed for all the samples and all of that graph.
 
     Raises
     ------
-    InputError : bad options, OMPL not installed, or too many augmented vertices.
-    InfeasibleError : a goal that no tether within the limit reaches, which is proven exactly.
-    LimitReachedError : a goal that this roadmap does not reach, though a tether would.
+    InputError
+        Bad options, OMPL not installed, or too many augmented vertices.
+    InfeasibleError
+        A goal that no tether within the limit reaches, which is proven exactly.
+    LimitReachedError
+        A goal that this roadmap does not reach, though a tether would.
     """
 
     def __init__(

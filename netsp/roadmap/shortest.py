@@ -29,8 +29,15 @@ class ShortestPaths(Protocol):
 
 
 class Rest(NamedTuple):
-    """Shortest lengths to a point. source : from the base. to_end : (e,) from the end of every
-    tangent."""
+    """Shortest lengths to a point.
+
+    Attributes
+    ----------
+    source
+        From the base.
+    to_end
+        (e,) from the end of every tangent.
+    """
 
     source: float
     to_end: Floats
@@ -87,8 +94,14 @@ class ContactGraph:
         return np.asarray(found[:, : self.points])
 
     def between(self, height: Floats, up: Callable[[], bool]) -> Floats:
-        """(points, points) no more than the 3D length of any path between two points, in any
-        class; 0 for those that were not looked at when the time was up. height : (points,)."""
+        """(points, points) no more than the 3D length of any path between two points, in any class;
+        0 for those that were not looked at when the time was up.
+
+        Parameters
+        ----------
+        height
+            (points,).
+        """
         planar = np.zeros((self.points, self.points))
         for first in range(0, self.points, AT_ONCE):
             if up():

@@ -40,8 +40,12 @@ ROWS = 64
 class Slits(NamedTuple):
     """Vertical chords of the obstacles, coordinates relative to the base.
 
-    rank : (n,) place of each obstacle's line from left to right, ties by number. x, bottom, top :
-    (n,) by rank.
+    Attributes
+    ----------
+    rank
+        (n,) place of each obstacle's line from left to right, ties by number.
+    x, bottom, top
+        (n,) by rank.
     """
 
     rank: Ints
@@ -95,8 +99,16 @@ def slit_lengths(
 ) -> Floats:  # fmt: skip
     """(V, V) planar lengths among slits of the legs between vertices; 0 within a cluster.
 
-    places : (m + 1, 2) base and goals. cluster, signatures : of the vertices. rows : (r,) only the
-    legs from so many of the vertices, then (r, V). stop : of a clock; unfinished when it is set.
+    Parameters
+    ----------
+    places
+        (m + 1, 2) base and goals.
+    cluster, signatures
+        Of the vertices.
+    rows
+        (r,) only the legs from so many of the vertices, then (r, V).
+    stop
+        Of a clock; unfinished when it is set.
     """
     n = len(cluster)
     flat = [np.array(w, dtype=np.int64) for w in signatures]

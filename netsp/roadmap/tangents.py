@@ -38,19 +38,31 @@ class TangentGraph:
 
     Attributes
     ----------
-    start : (nodes + 1,) row starts into the departures below.
-    target : (e,) node arrived at.
-    length : (e,) length of the segment.
-    ends : (e, 4) x, y of departure and arrival.
-    angle : (e, 2) contact angle at departure and arrival (0 at points).
-    first : (e,) first departure of the target at or after the arrival; -1 if there is none.
-    turn : (e,) angle from the arrival to that departure.
-    gap : (e,) angle from this departure to the next of its node; negative at the end of an arc.
-    letters, segment_row, arrival_row, gap_row : words of the segment, of the arc from arrival to
-        `first`, and of the arc to the next departure, as rows into `letters`.
-    radius : (nodes,) radius of the arc (0 at points).
-    rays : (n, 2) representative points.
-    pending : (2, n, 4) boxes of `_pending_boxes`.
+    start
+        (nodes + 1,) row starts into the departures below.
+    target
+        (e,) node arrived at.
+    length
+        (e,) length of the segment.
+    ends
+        (e, 4) x, y of departure and arrival.
+    angle
+        (e, 2) contact angle at departure and arrival (0 at points).
+    first
+        (e,) first departure of the target at or after the arrival; -1 if there is none.
+    turn
+        (e,) angle from the arrival to that departure.
+    gap
+        (e,) angle from this departure to the next of its node; negative at the end of an arc.
+    letters, segment_row, arrival_row, gap_row
+        Words of the segment, of the arc from arrival to `first`, and of the arc to the next
+        departure, as rows into `letters`.
+    radius
+        (nodes,) radius of the arc (0 at points).
+    rays
+        (n, 2) representative points.
+    pending
+        (2, n, 4) boxes of `_pending_boxes`.
     """
 
     arcs: Floats
@@ -242,7 +254,13 @@ def _key(theta, sense, start, end, full):
 @njit(cache=True)
 def _tangents(place, a_count, full, base, reach, blockers, stop):
     """All free directed segments between arcs and points, unsorted: rows of source, target, key,
-    arrival key, length, ends (4), angles (2). place : arcs, then points as arcs of radius 0."""
+    arrival key, length, ends (4), angles (2).
+
+    Parameters
+    ----------
+    place
+        Arcs, then points as arcs of radius 0.
+    """
     eps = blockers.eps
     out = np.empty((256, 11))
     n = 0

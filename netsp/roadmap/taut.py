@@ -43,13 +43,17 @@ class TautRoadmap:
 
     Attributes
     ----------
-    complete : whether every class is here.
-    least_left_out : no class that is not here has a shorter tether; inf if it is complete.
+    complete
+        Whether every class is here.
+    least_left_out
+        No class that is not here has a shorter tether; inf if it is complete.
 
     Raises
     ------
-    InfeasibleError : a goal that no taut tether reaches; names it and the tether that would do.
-    InputError : an unknown rule, a bad number of classes.
+    InfeasibleError
+        A goal that no taut tether reaches; names it and the tether that would do.
+    InputError
+        An unknown rule, a bad number of classes.
     """
 
     def __init__(

@@ -18,7 +18,12 @@ PARENT, LETTER, CHILD, SIBLING, CORE = range(5)
 class Trie:
     """Words as a tree; node 0 is the empty word. Arrays are over-allocated, `size` is the count.
 
-    nodes : (capacity, 5) columns PARENT … CORE. limit : longest path allowed at or below a node.
+    Attributes
+    ----------
+    nodes
+        (capacity, 5) columns PARENT … CORE.
+    limit
+        Longest path allowed at or below a node.
     """
 
     nodes: Ints

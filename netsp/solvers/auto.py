@@ -46,7 +46,13 @@ SHARE = 0.6
 
 @dataclass(frozen=True)
 class Params:
-    """backend : of `mip`."""
+    """Options of the solver.
+
+    Attributes
+    ----------
+    backend
+        Of `mip`.
+    """
 
     backend: str = "highs"
 

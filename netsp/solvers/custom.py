@@ -31,8 +31,9 @@ def call(
 
     Raises
     ------
-    InputError : options for a solver that takes none; an argument asked for that there is not;
-        something returned that is neither.
+    InputError
+        Options for a solver that takes none; an argument asked for that there is not; something
+        returned that is neither.
     """
     fields = {"params": dict(params or {}), "limits": limits}
     fields |= {k: getattr(limits, k) for k in ("time", "iterations", "rng", "warm_start")}

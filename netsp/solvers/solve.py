@@ -53,7 +53,29 @@ def build_roadmap(problem: Problem, roadmap: str = DEFAULT_ROADMAP, **options: A
 
 
 def travel_graph(problem: Problem, roadmap: str = DEFAULT_ROADMAP, **options: Any) -> TravelGraph:
-    """The travel graph of a problem by the named roadmap; errors as `build_roadmap`."""
+    """The travel graph of a problem by the named roadmap.
+
+    Parameters
+    ----------
+    problem : Problem
+        What to build it for.
+    roadmap : str
+        Name of the roadmap.
+    **options : Any
+        As `roadmap_options` of `solve`.
+
+    Returns
+    -------
+    TravelGraph
+        Augmented goals with the costs of the legs between them.
+
+    Raises
+    ------
+    InputError
+        Unknown names, bad options.
+    InfeasibleError
+        Some goal is out of the tether's reach.
+    """
     if not isinstance(problem, Problem):
         raise InputError(f"problem: expected a Problem, got {problem!r}")
     if problem.state is not None:
@@ -81,19 +103,39 @@ def solve_graph(
 
     Parameters
     ----------
-    time_limit : seconds, or the clock of a run that this one is a part of; the best tour so far is
-        returned when it is up.
-    iteration_limit : of the solver; each says what one is. Under an iteration limit alone, the same
+    graph : TravelGraph
+        From a roadmap or from `TravelGraph.from_costs`.
+    solver : str or callable
+        A name, or a callable `f(graph) -> tour`; it may ask for `params`, `limits`, `rng` and more
+        by name (`netsp.solvers.custom.call`).
+    time_limit : float or Clock, optional
+        Seconds, or the clock of a run that this one is a part of; the best tour so far is returned
+        when it is up.
+    iteration_limit : int, optional
+        Iterations of the solver; each says what one is. Under an iteration limit alone, the same
         seed gives the same answer.
-    seed : of the solver's random generator.
-    solver : a name, or a callable `f(graph) -> tour`; it may ask for `params`, `limits`, `rng` and
-        more by name (`netsp.solvers.custom.call`).
-    params : the solver's options by name.
-    warm_start : a tour to start from, as vertices from 0 on.
+    seed : int
+        Feeds the solver's random generator.
+    params : mapping, optional
+        The solver's options by name.
+    warm_start : sequence of int, optional
+        A tour to start from, as vertices from 0 on.
+    on_progress : callable, optional
+        Called with a `netsp.travel.result.Progress` now and then.
 
-    Raises InputError for unknown names, bad limits, a warm start that is no tour of the graph, and
-    for solvers that need geometry (`geometric` in `netsp.solvers.table`) on a graph that has none.
+    Returns
+    -------
+    Result
+        The best tour found, and what is proven of it.
 
+    Raises
+    ------
+    InputError
+        Unknown names, bad limits, a warm start that is no tour of the graph, and a solver that
+        needs geometry (`geometric` in `netsp.solvers.table`) on a graph that has none.
+
+    Examples
+    --------
     >>> from netsp import TravelGraph, solve_graph
     >>> costs = [[0, 1, 5, 4], [1, 0, 2, 9], [5, 2, 0, 2], [4, 9, 2, 0]]
     >>> solve_graph(TravelGraph.from_costs(costs, clusters=[0, 1, 2, 2])).length
@@ -148,23 +190,44 @@ def solve(
 
     Parameters
     ----------
-    solver : as of `solve_graph`.
-    roadmap_options : for ``taut``: ``classes``, ``max_classes``; for ``prm``: ``samples``,
-        ``shortcut``.
-    time_limit : seconds for the whole call; the best tour so far is returned when it is up.
-    iteration_limit : of the solver; each says what one is.
-    seed : feeds the solver's random generator, and the sampling of a roadmap that samples.
-    params : the solver's options by name.
-    warm_start : a solution of the same problem to start from, by whatever solver; where a class of
-        it is not in this roadmap, the best of its order is taken.
-    on_progress : called with a `netsp.travel.result.Progress` now and then.
+    problem : Problem
+        What to solve.
+    solver : str or callable
+        As of `solve_graph`.
+    roadmap : str
+        Name of the roadmap: `taut` (exact), `prm`, or another package's.
+    roadmap_options : mapping, optional
+        For ``taut``: ``classes``, ``max_classes``; for ``prm``: ``samples``, ``shortcut``.
+    time_limit : float, optional
+        Seconds for the whole call; the best tour so far is returned when it is up.
+    iteration_limit : int, optional
+        Iterations of the solver; each says what one is.
+    seed : int
+        Feeds the solver's random generator, and the sampling of a roadmap that samples.
+    params : mapping, optional
+        The solver's options by name.
+    warm_start : Solution, optional
+        A solution of the same problem to start from, by whatever solver; where a class of it is not
+        in this roadmap, the best of its order is taken.
+    on_progress : callable, optional
+        Called with a `netsp.travel.result.Progress` now and then.
+
+    Returns
+    -------
+    Solution
+        The best tour found, and what is proven of it.
 
     Raises
     ------
-    InputError : unknown names, bad limits, a warm start for another problem.
-    InfeasibleError : some goal is out of the tether's reach; says which and by how much.
-    LimitReachedError : the time was up before the travel graph was complete.
+    InputError
+        Unknown names, bad limits, a warm start for another problem.
+    InfeasibleError
+        Some goal is out of the tether's reach; says which and by how much.
+    LimitReachedError
+        The time was up before the travel graph was complete.
 
+    Examples
+    --------
     >>> from netsp import Problem, solve
     >>> problem = Problem(base=(0, 0), goals=[(3, 4)], obstacles=[], tether_length=6)
     >>> solve(problem).length

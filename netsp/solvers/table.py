@@ -11,13 +11,19 @@ from netsp.registry import Registry
 class Solver:
     """A solver by name.
 
-    Attributes
+    Parameters
     ----------
-    function : ``module:attribute`` of `(graph, params, limits) -> Result`, or of any callable that
+    name : str
+        What it is called on the command line, in files and in messages.
+    function : str
+        ``module:attribute`` of `(graph, params, limits) -> Result`, or of any callable that
         `netsp.solvers.custom` can call.
-    params : ``module:attribute`` of the dataclass of its options; None if it takes none.
-    geometric : needs the paths beneath a travel graph, so no graph made from costs will do.
-    blind : a baseline blind to the tether, whose tours may be `invalid`.
+    params : str, optional
+        ``module:attribute`` of the dataclass of its options; None if it takes none.
+    geometric : bool
+        Needs the paths beneath a travel graph, so no graph made from costs will do.
+    blind : bool
+        A baseline blind to the tether, whose tours may be `invalid`.
     """
 
     name: str
@@ -34,8 +40,17 @@ class Solver:
 
 @dataclass(frozen=True)
 class RoadmapKind:
-    """A roadmap by name. build : ``module:attribute`` of a class over a problem with
-    `travel_graph()`. seeded : its samples are drawn with the run's seed."""
+    """A roadmap by name.
+
+    Parameters
+    ----------
+    name : str
+        What it is called on the command line, in files and in messages.
+    build : str
+        ``module:attribute`` of a class over a problem with `travel_graph()`.
+    seeded : bool
+        Its samples are drawn with the run's seed.
+    """
 
     name: str
     build: str

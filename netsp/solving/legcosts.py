@@ -24,8 +24,16 @@ BYTES_PER_LEG = 50.0
 class LegCosts:
     """Costs among some vertices of a travel graph.
 
-    vertices : (k,) of the graph. cluster : (k,). values : (k, k) lengths or lower bounds, inf
-    within a cluster. exact : (k, k) which are lengths; None when all are.
+    Parameters
+    ----------
+    vertices
+        (k,) of the graph.
+    cluster
+        (k,).
+    values
+        (k, k) lengths or lower bounds, inf within a cluster.
+    exact
+        (k, k) which are lengths; None when all are.
     """
 
     def __init__(self, graph: TravelGraph) -> None:

@@ -15,13 +15,18 @@ from netsp.travel.result import OnProgress
 class Limits:
     """How long a solver may work, where it starts, and who listens.
 
-    Attributes
+    Parameters
     ----------
-    time : seconds, or the clock of the run that the work belongs to; None for no limit.
-    iterations : of the solver, which says what one is; None for no limit.
-    rng : of all that is random.
-    warm_start : a tour to start from, as vertices from 0 on.
-    on_progress : called with a `netsp.travel.result.Progress` now and then.
+    time : float or Clock, optional
+        Seconds, or the clock of the run that the work belongs to; None for no limit.
+    iterations : int, optional
+        Iterations of the solver, which says what one is; None for no limit.
+    rng : numpy.random.Generator
+        Of all that is random.
+    warm_start : sequence of int, optional
+        A tour to start from, as vertices from 0 on.
+    on_progress : callable, optional
+        Called with a `netsp.travel.result.Progress` now and then.
     """
 
     time: TimeLimit = None

@@ -24,8 +24,12 @@ class Stop(Exception):
 class SolverRun:
     """One run of a solver on a travel graph.
 
-    iterations : how many the solver has done; each solver says what one is. `Stop` and Ctrl-C both
-    end a run with the best tour so far.
+    `Stop` and Ctrl-C both end it with the best tour so far.
+
+    Attributes
+    ----------
+    iterations
+        How many the solver has done; each solver says what one is.
     """
 
     def __init__(self, graph: TravelGraph, limits: Limits | None = None) -> None:
@@ -52,8 +56,12 @@ class SolverRun:
     ) -> bool:
         """Take a tour as incumbent if it is one and is shorter; whether it was taken.
 
-        walk : the vertices as they are walked, base to base, when that is not just the tour.
-        length : of the walk, if the caller knows it already.
+        Parameters
+        ----------
+        walk
+            The vertices as they are walked, base to base, when that is not just the tour.
+        length
+            Of the walk, if the caller knows it already.
         """
         if tour is None or not self.graph.is_tour(tour):
             return False

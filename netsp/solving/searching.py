@@ -47,9 +47,13 @@ it costs more than it saves, and shows no bound meanwhile."""
 class SearchingRun(SolverRun):
     """A run with local search.
 
-    search_rounds : rounds of ruin and recreate of one search. outer : for a run over a core, the
-    run over all classes and the core's vertices there: tours are offered to it too, and its report
-    shows them; bounds of the core mean nothing to it.
+    Parameters
+    ----------
+    search_rounds
+        Rounds of ruin and recreate of one search.
+    outer
+        For a run over a core, the run over all classes and the core's vertices there: tours are
+        offered to it too, and its report shows them; bounds of the core mean nothing to it.
     """
 
     def __init__(

@@ -25,14 +25,20 @@ class Detours:
 
     Attributes
     ----------
-    planar : (m + 1, P) planar length of the shortest way from base or goal to every place.
-    height : (m + 1,) z of base and goals. Sub-goals have none: depth changes evenly along a way.
-    letters, row : word of the way from a to p is ``letters[row[a, p] : row[a, p + 1]]``; row is
-        (m + 1, P + 1).
-    far : (m + 1, P, n) for the way from a to p and each obstacle, the sub-goal on the far side of
+    planar
+        (m + 1, P) planar length of the shortest way from base or goal to every place.
+    height
+        (m + 1,) z of base and goals. Sub-goals have none: depth changes evenly along a way.
+    letters, row
+        Word of the way from a to p is ``letters[row[a, p] : row[a, p + 1]]``; row is (m + 1, P
+        + 1).
+    far
+        (m + 1, P, n) for the way from a to p and each obstacle, the sub-goal on the far side of
         the obstacle; -1 if the obstacle has none in free space.
-    near : (m + 1, P, n) distance of the way from the middle of the obstacle.
-    draw : gives the (k, 2) polyline of the way from a to p.
+    near
+        (m + 1, P, n) distance of the way from the middle of the obstacle.
+    draw
+        Gives the (k, 2) polyline of the way from a to p.
     """
 
     planar: Floats

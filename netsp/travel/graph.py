@@ -64,19 +64,35 @@ class Legs(Protocol):
 class TravelGraph(Drawn):
     """Augmented goals with the costs of the legs between them.
 
+    Parameters
+    ----------
+    cluster : array_like of int, shape (V,)
+        0 for the base, k + 1 for goal k.
+    signatures : sequence of Word
+        The word of the tether at each vertex.
+    tethers : array_like, shape (V,)
+        Lengths of the taut tethers, in 3D.
+    legs : Legs
+        Lengths and paths of the legs.
+    roadmap : str
+        Name of the roadmap it came from.
+    detours : callable, optional
+        Makes detours in any class; None without geometry.
+    between : callable, optional
+        Makes the bounds of `between_goals`.
+    classes : {"all", "non-looping", "shortest"}, optional
+        Which homotopy classes the roadmap holds.
+    least_left_out : float
+        No class left out for want of time or room has a shorter tether; inf if none is left out.
+
     Attributes
     ----------
-    cluster : (V,) 0 for the base, k + 1 for goal k.
-    signatures : V words, that of the tether at each vertex.
-    tethers : (V,) taut tether lengths in 3D.
-    roadmap : name of the roadmap it came from.
-    classes : which homotopy classes the roadmap holds (`Solution.classes`), None if unknown.
-    least_left_out : no class left out for want of time or room has a shorter tether; inf if none
-        is left out.
-    legs_s : seconds spent measuring legs so far.
-    start : vertex of the state that tours start from (`netsp.roadmap.from_state`), None for the
-        base.
-    start_tether : (n, 3) the tether that is out at the start.
+    legs_s : float
+        Seconds spent measuring legs so far.
+    start : int or None
+        Vertex of the state that tours start from (`netsp.roadmap.from_state`); None for the base.
+    start_tether : ndarray, shape (n, 3)
+        The tether that is out at the start.
     """
 
     picture: ClassVar[str] = "netsp.pictures.graph:draw_classes"
@@ -116,16 +132,26 @@ class TravelGraph(Drawn):
 
         Parameters
         ----------
-        costs : (V, V) symmetric, not negative; inf where there is no leg. Costs within a cluster
-            are never used.
-        clusters : (V,) cluster of each vertex, numbered 0, 1, … without gaps. Vertex 0 is alone in
-            cluster 0: it is where the tour starts and ends.
+        costs : array_like, shape (V, V)
+            Symmetric, not negative; inf where there is no leg. Costs within a cluster are never
+            used.
+        clusters : array_like of int, shape (V,)
+            Cluster of each vertex, numbered 0, 1, … without gaps. Vertex 0 is alone in cluster 0:
+            it is where the tour starts and ends.
+
+        Returns
+        -------
+        TravelGraph
+            A graph without geometry beneath it.
 
         Raises
         ------
-        InputError : wrong shapes, asymmetric, negative or NaN costs, a missing cluster, or
-            infinities that leave no vertex of some cluster joined to vertex 0.
+        InputError
+            Wrong shapes, asymmetric, negative or NaN costs, a missing cluster, or infinities that
+            leave no vertex of some cluster joined to vertex 0.
 
+        Examples
+        --------
         >>> costs = [[0, 3, 4], [3, 0, 5], [4, 5, 0]]
         >>> TravelGraph.from_costs(costs, clusters=[0, 1, 2]).tour_length([0, 1, 2])
         12.0
@@ -165,8 +191,25 @@ class TravelGraph(Drawn):
         return self._costs is not None
 
     def costs_among(self, vertices: npt.ArrayLike, asked: Bools | None = None) -> Floats:
-        """(k, k) leg costs among some vertices only, for solvers that eliminate the others first;
-        inf within a cluster. Where `asked` (k, k, symmetric) is given and false, anything."""
+        """Leg costs among some vertices only, for solvers that eliminate the others first.
+
+        Parameters
+        ----------
+        vertices : array_like of int, shape (k,)
+            The vertices.
+        asked : ndarray of bool, shape (k, k), optional
+            Symmetric; where it is false, the cost may be anything.
+
+        Returns
+        -------
+        ndarray, shape (k, k)
+            Costs; inf within a cluster.
+
+        Raises
+        ------
+        LimitReachedError
+            The clock was up before they were measured.
+        """
         chosen = np.asarray(vertices, dtype=np.int64)
         if self._costs is not None:
             return np.asarray(self._costs[np.ix_(chosen, chosen)])
@@ -174,7 +217,18 @@ class TravelGraph(Drawn):
 
     @contextmanager
     def on_clock(self, clock: Clock | None) -> Iterator[None]:
-        """While a solver runs, its clock ends the measuring of legs, too (LimitReachedError)."""
+        """While a solver runs, its clock ends the measuring of legs, too.
+
+        Parameters
+        ----------
+        clock : Clock, optional
+            The clock; None for no limit.
+
+        Yields
+        ------
+        None
+            The context in which `LimitReachedError` may be raised.
+        """
         before, self.clock = self.clock, clock
         try:
             yield
@@ -210,9 +264,25 @@ class TravelGraph(Drawn):
         return self._make_detours is not None
 
     def detours(self, *, sub_goals: bool, check: Callable[[], None] = lambda: None) -> Detours:
-        """Detours in any class, for solvers blind to the tether, with or without sub-goals beside
-        the obstacles; `check` is called now and then and may raise. InputError if there is no
-        geometry beneath this graph."""
+        """Detours in any class, for solvers blind to the tether.
+
+        Parameters
+        ----------
+        sub_goals : bool
+            Whether there are sub-goals beside the obstacles.
+        check : callable
+            Called now and then; may raise to stop.
+
+        Returns
+        -------
+        Detours
+            The detours, made once.
+
+        Raises
+        ------
+        InputError
+            There is no geometry beneath this graph.
+        """
         if self._make_detours is None:
             raise InputError(
                 "solver: needs the geometry of a problem, and this travel graph has none"
@@ -223,8 +293,19 @@ class TravelGraph(Drawn):
         return self._detours[sub_goals]
 
     def between_goals(self, up: Callable[[], bool] = lambda: False) -> Floats:
-        """(n + 1, n + 1) no more than any leg between two goals, or base and goal, in any class;
-        what was not looked at when the time was up, or cannot be, is 0."""
+        """Lower bounds on the legs between goals, in any class.
+
+        Parameters
+        ----------
+        up : callable
+            Whether the time is up.
+
+        Returns
+        -------
+        ndarray, shape (n + 1, n + 1)
+            No more than any leg between two goals, or base and goal; 0 where nothing is known, or
+            the time was up.
+        """
         if self._between is not None:
             return self._between(up)
         out = np.zeros((self.goal_count + 1, self.goal_count + 1))
@@ -237,8 +318,18 @@ class TravelGraph(Drawn):
         return out
 
     def subgraph(self, vertices: npt.ArrayLike) -> TravelGraph:
-        """The travel graph on some of the vertices, the base first; vertex k of it is vertex
-        ``vertices[k]`` of this one."""
+        """The travel graph on some of the vertices.
+
+        Parameters
+        ----------
+        vertices : array_like of int, shape (k,)
+            The vertices, the base first.
+
+        Returns
+        -------
+        TravelGraph
+            Its vertex k is vertex ``vertices[k]`` of this one.
+        """
         chosen = np.asarray(vertices, dtype=np.int64)
         return TravelGraph(
             self.cluster[chosen],
@@ -256,7 +347,20 @@ class TravelGraph(Drawn):
         return out
 
     def vertices_of(self, order: Sequence[int], words: Sequence[Word]) -> list[int] | None:
-        """The vertices of clusters with given words; None if one of them is not in the graph."""
+        """The vertices of clusters with given words.
+
+        Parameters
+        ----------
+        order : sequence of int
+            Clusters.
+        words : sequence of Word
+            The word of the tether at each.
+
+        Returns
+        -------
+        list of int or None
+            The vertices; None if one of them is not in the graph.
+        """
         if self._place is None:
             self._place = {
                 (int(c), w): v
@@ -268,8 +372,25 @@ class TravelGraph(Drawn):
     def lower_bounds(
         self, vertices: npt.ArrayLike | None = None, rows: npt.ArrayLike | None = None
     ) -> Floats:
-        """(k, k) lower bounds on the leg costs among some vertices (default all), without computing
-        the legs; inf within a cluster. rows : (r,) positions among the vertices; then (r, k)."""
+        """Lower bounds on the leg costs among some vertices, without measuring the legs.
+
+        Parameters
+        ----------
+        vertices : array_like of int, shape (k,), optional
+            The vertices, by default all.
+        rows : array_like of int, shape (r,), optional
+            Positions among the vertices; only legs from these are bounded.
+
+        Returns
+        -------
+        ndarray, shape (k, k) or (r, k)
+            Bounds; inf within a cluster.
+
+        Raises
+        ------
+        LimitReachedError
+            The clock was up before they were computed.
+        """
         chosen = np.arange(len(self)) if vertices is None else np.asarray(vertices, dtype=np.int64)
         some = None if rows is None else np.asarray(rows, dtype=np.int64)
         bounds = self._legs.lower_bounds(chosen, some, self.clock)
@@ -279,15 +400,48 @@ class TravelGraph(Drawn):
         return bounds
 
     def members(self, cluster: int) -> Ints:
-        """Vertices of a cluster."""
+        """Vertices of a cluster.
+
+        Parameters
+        ----------
+        cluster : int
+            0 for the base, k + 1 for goal k.
+
+        Returns
+        -------
+        ndarray of int
+            The vertices, in order.
+        """
         return np.flatnonzero(self.cluster == cluster)
 
     def tour_length(self, tour: Sequence[int]) -> float:
-        """Length of the closed tour through the given vertices."""
+        """Length of the closed tour through the given vertices.
+
+        Parameters
+        ----------
+        tour : sequence of int
+            Vertices, the first not repeated at the end.
+
+        Returns
+        -------
+        float
+            Length, in the problem's units; 0 for fewer than two vertices.
+        """
         return self.walk_length([*tour, tour[0]]) if len(tour) > 1 else 0.0
 
     def walk_length(self, walk: Sequence[int]) -> float:
-        """Length of the legs from each vertex to the next."""
+        """Length of the legs from each vertex to the next.
+
+        Parameters
+        ----------
+        walk : sequence of int
+            Vertices.
+
+        Returns
+        -------
+        float
+            Length, in the problem's units.
+        """
         w = np.asarray(walk, dtype=np.int64)
         used, at = np.unique(w, return_inverse=True)
         asked = np.zeros((len(used), len(used)), dtype=bool)
@@ -296,7 +450,18 @@ class TravelGraph(Drawn):
         return float(among[at[:-1], at[1:]].sum())
 
     def is_tour(self, tour: Sequence[int]) -> bool:
-        """Whether it starts at the base and takes exactly one vertex of every cluster."""
+        """Whether vertices are a tour: from the base, and exactly one of every cluster.
+
+        Parameters
+        ----------
+        tour : sequence of int
+            Vertices, the base not repeated at the end.
+
+        Returns
+        -------
+        bool
+            True for a tour.
+        """
         t = [int(v) for v in tour]
         return (
             bool(t)
@@ -306,20 +471,67 @@ class TravelGraph(Drawn):
         )
 
     def path(self, u: int, v: int) -> Floats:
-        """(n, 3) polyline of the leg from vertex u to vertex v."""
+        """The leg from one vertex to another.
+
+        Parameters
+        ----------
+        u : int
+            Vertex that it starts at.
+        v : int
+            Vertex that it ends at.
+
+        Returns
+        -------
+        ndarray, shape (n, 3)
+            Polyline.
+        """
         return self._legs.path(u, v)
 
     def as_asked(self, result: Result) -> Result:
-        """A solver's result as callers are to see it."""
+        """A solver's result as callers are to see it.
+
+        Parameters
+        ----------
+        result : Result
+            Of the solver.
+
+        Returns
+        -------
+        Result
+            The same, with a bound that holds for the classes that were left out, too.
+        """
         return self.within_kept(result, self.least_by_way_of(self.least_left_out))
 
     def least_by_way_of(self, tether: float) -> float:
-        """No tour by way of a class with so long a tether is shorter: it goes there and back."""
+        """No tour by way of a class with so long a tether is shorter: it goes there and back.
+
+        Parameters
+        ----------
+        tether : float
+            Length of a taut tether.
+
+        Returns
+        -------
+        float
+            The bound.
+        """
         return 2.0 * tether
 
     def within_kept(self, result: Result, otherwise: float) -> Result:
-        """A result over the classes kept as one about all: tours that use a class that was left out
-        are no shorter than `otherwise`."""
+        """A result over the classes kept as one about all classes.
+
+        Parameters
+        ----------
+        result : Result
+            Over the classes kept.
+        otherwise : float
+            No tour that uses a class left out is shorter.
+
+        Returns
+        -------
+        Result
+            The same tour, with the bound and the status that hold for all classes.
+        """
         from netsp.solution import Status
         from netsp.travel.result import proven
 
@@ -332,7 +544,18 @@ class TravelGraph(Drawn):
         return dataclasses.replace(result, lower_bound=otherwise, status=status)
 
     def progress_listener(self, listener: OnProgress | None) -> OnProgress | None:
-        """A listener to a solver's progress, told what callers are to see."""
+        """A listener to a solver's progress that is told what callers are to see.
+
+        Parameters
+        ----------
+        listener : callable, optional
+            Takes a `Progress`.
+
+        Returns
+        -------
+        callable or None
+            What the solver is to call.
+        """
         return listener
 
 

@@ -16,12 +16,30 @@ computed in floating point from dual values; their rounding is orders of magnitu
 
 @dataclass(frozen=True)
 class Progress:
-    """One row of the progress table. Lengths in problem units, time in seconds since the start of
-    the solver; None where nothing is known yet.
+    """One row of the progress table.
 
-    cuts, legs, vertices : in the program, and left after elimination. iteration : of the solver;
-    each says what one is. current, entangled : of solvers that walk from
-    state to state, the length of the present one and how many obstacles it entangles.
+    Parameters
+    ----------
+    time : float
+        Seconds since the start of the solver.
+    stage : str
+        What the solver is doing.
+    incumbent : float, optional
+        Length of the best tour, in the problem's units; None while there is none.
+    bound : float, optional
+        Proven bound on every tour; None while nothing is known.
+    cuts : int
+        Cuts in the program.
+    legs : int
+        Legs left after elimination.
+    vertices : int
+        Vertices left after elimination.
+    iteration : int
+        Iterations of the solver; each says what one is.
+    current : float, optional
+        Length of the present state, of solvers that walk from state to state.
+    entangled : int, optional
+        Obstacles that the present state entangles.
     """
 
     time: float
@@ -48,9 +66,18 @@ OnProgress = Callable[[Progress], None]
 class Trajectory:
     """What a baseline blind to the tether walked: a closed path, whatever it entangles.
 
-    order : goals (clusters) in the order visited. words : at each of them, the word of the way
-    from the base. word : of the whole. path : (n, 3) closed polyline, circumscribed to arcs, and
-    length : of the arcs themselves.
+    Parameters
+    ----------
+    order : tuple of int
+        Goals (clusters) in the order visited.
+    words : tuple of Word
+        At each of them, the word of the path from the base.
+    word : Word
+        Of the whole path.
+    path : ndarray, shape (n, 3)
+        Closed polyline, circumscribed to arcs.
+    length : float
+        Length of the arcs themselves, in the problem's units.
     """
 
     order: tuple[int, ...]
@@ -64,12 +91,23 @@ class Trajectory:
 class Result:
     """Outcome of a solver on a travel graph.
 
-    tour : vertices from the base on (the base is not repeated at the end), or None.
-    length, lower_bound : of the closed tour; a proven bound on every tour, or None.
-    trace : the progress rows, in order.
-    walk : vertices as they are walked, base to base, where that is longer than the tour because
-        the solver retraces its steps; `length` is then that of the walk.
-    trajectory : of a blind baseline with status `invalid`; `tour` is then None.
+    Parameters
+    ----------
+    tour : tuple of int, optional
+        Vertices from the base on (the base is not repeated at the end); None without a tour.
+    length : float, optional
+        Length of the closed tour.
+    lower_bound : float, optional
+        Proven bound on every tour.
+    status : Status
+        What is proven.
+    trace : tuple of Progress
+        The progress rows, in order.
+    walk : tuple of int, optional
+        Vertices as they are walked, base to base, where that is longer than the tour because the
+        solver retraces its steps; `length` is then that of the walk.
+    trajectory : Trajectory, optional
+        Of a blind baseline with status `invalid`; `tour` is then None.
     """
 
     tour: tuple[int, ...] | None
@@ -82,12 +120,38 @@ class Result:
 
 
 def relative_gap(length: float | None, bound: float | None) -> float | None:
-    """(length - bound) / length, at least 0; None if either is unknown."""
+    """(length - bound) / length, at least 0.
+
+    Parameters
+    ----------
+    length : float, optional
+        Length of a tour.
+    bound : float, optional
+        Proven bound on every tour.
+
+    Returns
+    -------
+    float or None
+        The gap; None if either is unknown.
+    """
     if length is None or bound is None:
         return None
     return max(0.0, (length - bound) / length) if length > 0.0 else 0.0
 
 
 def proven(length: float, bound: float) -> bool:
-    """Whether the bound proves the length optimal."""
+    """Whether a bound proves a length optimal.
+
+    Parameters
+    ----------
+    length : float
+        Length of a tour.
+    bound : float
+        Proven bound on every tour.
+
+    Returns
+    -------
+    bool
+        True if they differ by no more than rounding.
+    """
     return length - bound <= OPTIMALITY_TOLERANCE * max(length, 1e-300)

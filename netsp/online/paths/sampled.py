@@ -25,12 +25,23 @@ seed gives the same path."""
 class SampledPaths:
     """Paths to a target, each planned when it is asked for.
 
-    name : of the planner (`OMPL_PLANNERS`). grid : its box, field and clearance. target : (3,).
-    points : (n, 3). seed : of the sampling.
+    Parameters
+    ----------
+    name
+        Of the planner (`OMPL_PLANNERS`).
+    grid
+        Its box, field and clearance count.
+    target
+        (3,) where the paths end.
+    points
+        (n, 3) where they start.
+    seed
+        Of the sampling.
 
     Raises
     ------
-    InputError : an unknown name, or OMPL is not installed.
+    InputError
+        An unknown name, or OMPL is not installed.
     """
 
     def __init__(

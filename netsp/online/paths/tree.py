@@ -31,12 +31,21 @@ ROUNDS = 60
 class Grid:
     """Free cells of a box in a scene.
 
-    field : the scene. low, high : (3,) corners of the box. cell : metres. clearance : a cell is
-    free when its centre is at least this far from every solid.
+    Parameters
+    ----------
+    field
+        The scene.
+    low, high
+        (3,) corners of the box.
+    cell
+        Metres.
+    clearance
+        A cell is free when its centre is at least this far from every solid, metres.
 
     Raises
     ------
-    InputError : a box without size, or more than 20 million cells.
+    InputError
+        A box without size, or more than 20 million cells.
     """
 
     def __init__(
@@ -94,11 +103,19 @@ class Paths(Protocol):
 class ShortestTree:
     """Paths to a target from the points asked about.
 
-    grid : where. target : (3,). points : (n, 3) from where; the tree grows until it has them all.
+    Parameters
+    ----------
+    grid
+        Where they run.
+    target
+        (3,) where they end.
+    points
+        (n, 3) where they start; the tree grows until it has them all.
 
     Attributes
     ----------
-    lengths : (n,) lengths of the paths along the grid, inf where there is none.
+    lengths
+        (n,) lengths of the paths along the grid, inf where there is none.
     """
 
     def __init__(self, grid: Grid, target: npt.ArrayLike, points: npt.ArrayLike) -> None:

@@ -41,8 +41,33 @@ def make_planner(
     name: str | Callable[..., Planner], mission: Mission, scene: DistanceField, tethers: Tethers,
     grid: Grid, options: PlannerOptions | None = None,
 ) -> Planner:  # fmt: skip
-    """A planner by name, or made by a callable. InputError for a name that is none, of the planner
-    or in its options."""
+    """A planner by name, or made by a callable.
+
+    Parameters
+    ----------
+    name : str or callable
+        One of `PLANNERS`, or a callable such as a class derived from `Planner`.
+    mission : Mission
+        What is flown.
+    scene : DistanceField
+        The map.
+    tethers : TetherModel
+        The tether model that the planner believes.
+    grid : Grid
+        The grid that paths are sought on.
+    options : PlannerOptions, optional
+        How paths are found.
+
+    Returns
+    -------
+    Planner
+        The planner.
+
+    Raises
+    ------
+    InputError
+        No planner, or none of the options, has that name.
+    """
     options = options or PlannerOptions()
     make = name if callable(name) else PLANNERS.named(name)
     if options.paths not in (known := ("tree", *OMPL_PLANNERS)):

@@ -28,8 +28,14 @@ NORMAL, RECOVERY, HOLD, DONE = "normal", "recovery", "hold", "done"
 class Command:
     """Where to go now.
 
-    path : (k, 3) points to pass in this order, the first one next. mode : normal, recovery, hold or
-    done. replan_s : seconds of CPU that planning took in this step.
+    Parameters
+    ----------
+    path : ndarray, shape (k, 3)
+        Points to pass in this order, the first one next; metres.
+    mode : {"normal", "recovery", "hold", "done"}
+        What the robot is doing.
+    replan_s : float
+        Seconds of CPU that planning took in this step.
     """
 
     path: Floats
@@ -41,9 +47,15 @@ class Command:
 class PlannerOptions:
     """How paths are found.
 
-    paths : tree, or one of OMPL's planners (`netsp.online.paths.sampled`). refine : none, paper or
-    gradient (`netsp.online.paths.refine`); default paper for the paper's planners and none for the
-    others, whose paths keep the clearance from the start. seed : of what is random in either.
+    Parameters
+    ----------
+    paths : str
+        ``tree``, or one of OMPL's planners (`netsp.online.paths.sampled`).
+    refine : {"none", "paper", "gradient"}, optional
+        See `netsp.online.paths.refine`; by default `paper` for the paper's planners and `none` for
+        the others, whose paths keep the clearance from the start.
+    seed : int
+        Of what is random in either.
     """
 
     paths: str = "tree"
@@ -53,12 +65,32 @@ class PlannerOptions:
 
 @dataclass
 class Planner:
-    """Follows the waypoints of a mission.
+    """Follows the waypoints of a mission. Planners are derived from it.
 
-    Attributes
+    Parameters
     ----------
-    index : the waypoint that is next. skipped : waypoints given up, with the reason. defects :
-    what went wrong in planning that never should, one text each time.
+    mission : Mission
+        What is flown.
+    scene : DistanceField
+        The map.
+    tethers : TetherModel
+        The tether model that the planner believes.
+    grid : Grid
+        The grid that paths are sought on.
+    options : PlannerOptions
+        How paths are found.
+    index : int
+        The waypoint that is next.
+    mode : str
+        As of `Command`.
+    path : ndarray, shape (k, 3)
+        The path that is followed.
+    skipped : list of (int, str)
+        Waypoints given up, with the reason.
+    defects : list of str
+        What went wrong in planning that never should, one text each time.
+    reached : list of int
+        Waypoints visited.
     """
 
     mission: Mission
@@ -88,8 +120,23 @@ class Planner:
         return self.index >= len(self.mission.waypoints)
 
     def step(self, robot: Floats, tether: Tether) -> Command:
-        """What to do now. Never raises: what cannot be planned is held or given up, with the
-        reason."""
+        """What to do now.
+
+        Never raises: where no plan is found the robot holds its place or gives the waypoint up,
+        with the reason.
+
+        Parameters
+        ----------
+        robot : ndarray, shape (3,)
+            Position of the robot, metres.
+        tether : Tether
+            The tether as the model has it.
+
+        Returns
+        -------
+        Command
+            Where to go.
+        """
         self._advance(robot)
         if self.done:
             return Command(np.array([robot]), DONE)
@@ -115,21 +162,51 @@ class Planner:
         return Command(np.array([robot]), HOLD, spent)
 
     def warm_up(self, robot: Floats, tether: Tether) -> None:
-        """Load what is compiled, so that the first plan takes no longer than the others."""
+        """Load what is compiled, so that the first plan takes no longer than the others.
+
+        Parameters
+        ----------
+        robot : ndarray, shape (3,)
+            Position of the robot, metres.
+        tether : Tether
+            The tether as the model has it.
+        """
         del tether
         path = self.paths(robot[None]).path(0)
         if path is not None:
             self.pulled(path)
 
     def plan(self, robot: Floats, tether: Tether) -> bool:
-        """Set `way` and `mode`; whether anything had to be thought about. Here: on to the waypoint,
-        whatever the tether."""
+        """Set `path` and `mode`; here, on to the waypoint whatever the tether.
+
+        Parameters
+        ----------
+        robot : ndarray, shape (3,)
+            Position of the robot, metres.
+        tether : Tether
+            The tether as the model has it.
+
+        Returns
+        -------
+        bool
+            Whether anything had to be planned.
+        """
         del tether
         return False if len(self.path) else self.go_on(robot)
 
     def go_on(self, robot: Floats) -> bool:
-        """Straight to the waypoint, or the shortest path round what is between; whether that had to
-        be sought."""
+        """Go straight to the waypoint, or along the shortest path round what is between.
+
+        Parameters
+        ----------
+        robot : ndarray, shape (3,)
+            Position of the robot, metres.
+
+        Returns
+        -------
+        bool
+            Whether a path had to be sought.
+        """
         straight = np.array([robot, self.target])
         if self.is_free(straight):
             self.path = straight[1:]
@@ -142,14 +219,36 @@ class Planner:
         return True
 
     def paths(self, points: Floats) -> Paths:
-        """Short paths to the waypoint from each of some points (n, 3)."""
+        """Short paths to the waypoint.
+
+        Parameters
+        ----------
+        points : ndarray, shape (n, 3)
+            Where they start, metres.
+
+        Returns
+        -------
+        Paths
+            A path from each of them.
+        """
         if self.options.paths == "tree":
             return ShortestTree(self.grid, self.target, points)
         seed = 1000 * self.options.seed + self.index
         return SampledPaths(self.options.paths, self.grid, self.target, points, seed)
 
     def refined(self, path: Floats) -> Floats:
-        """A path made safer and smoother, as the options have it."""
+        """A path made safer and smoother, as the options have it.
+
+        Parameters
+        ----------
+        path : ndarray, shape (k, 3)
+            The path, metres.
+
+        Returns
+        -------
+        ndarray, shape (m, 3)
+            The refined path, metres.
+        """
         name = self.options.refine or self.refine
         if name == "none":
             return path
@@ -158,11 +257,33 @@ class Planner:
         return refined(name, self.scene, even, self.mission.clearance, rng)
 
     def pulled(self, path: Floats) -> Floats:
-        """A path pulled taut in its class, at the clearance."""
+        """A path pulled taut in its class, at the clearance.
+
+        Parameters
+        ----------
+        path : ndarray, shape (k, 3)
+            The path, metres.
+
+        Returns
+        -------
+        ndarray, shape (m, 3)
+            The taut path, metres.
+        """
         return taut(self.scene, path, self.mission.clearance, self.mission.delta)
 
     def is_free(self, path: Floats) -> bool:
-        """Whether a straight path keeps the clearance, or what its ends have of it."""
+        """Whether a path keeps the clearance, or what its ends have of it.
+
+        Parameters
+        ----------
+        path : ndarray, shape (k, 3)
+            The path, metres.
+
+        Returns
+        -------
+        bool
+            Whether it does.
+        """
         ends = float(self.scene.distance(path).min())
         room = min(self.mission.clearance, ends) - 1e-3
         return self.scene.grown(max(0.0, room)).line_of_sight(path[0], path[1], depth=1e-3)
@@ -181,10 +302,22 @@ class Planner:
         self.path, self.mode, self._held = np.zeros((0, 3)), NORMAL, 0
 
     def passed(self, count: int) -> None:
-        """The robot has passed so many points of the path; the last one stays the target."""
+        """The robot has passed points of the path; the last one stays the target.
+
+        Parameters
+        ----------
+        count : int
+            How many.
+        """
         self.path = self.path[min(count, max(0, len(self.path) - 1)) :]
 
     def give_up(self, reason: str) -> None:
-        """Leave a waypoint out."""
+        """Leave the waypoint that is next out.
+
+        Parameters
+        ----------
+        reason : str
+            Why; it is logged.
+        """
         self.skipped.append((self.index, reason))
         self._next()

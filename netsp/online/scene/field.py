@@ -40,9 +40,18 @@ def finite_point(value: npt.ArrayLike, name: str) -> tuple[float, float, float]:
 class VoxelGrid:
     """Distances at the points of a regular grid, linear in between.
 
-    values : (nx, ny, nz) metres, negative inside. origin : (3,) of the first point. size : metres
-    between points. solid : (2, 3) bounding box of what is solid, well within the grid. notes : what
-    was assumed when it was built.
+    Attributes
+    ----------
+    values
+        (nx, ny, nz) metres, negative inside.
+    origin
+        (3,) of the first point.
+    size
+        Metres between points.
+    solid
+        (2, 3) bounding box of what is solid, well within the grid.
+    notes
+        What was assumed when it was built.
     """
 
     values: npt.NDArray[np.float32]
@@ -56,11 +65,16 @@ class VoxelGrid:
 class DistanceField:
     """Distance, gradient and sight in a scene.
 
-    Attributes
+    Parameters
     ----------
-    arrays : what kernels take (`netsp.online.scene.sampling.Field`).
-    voxel : metres, size of a voxel; None when all is exact.
-    notes : what was assumed about meshes and clouds.
+    arrays : Field
+        What kernels take (`netsp.online.scene.sampling.Field`).
+    voxel : float, optional
+        Size of a voxel, metres; None when all is exact.
+    notes : tuple of str
+        What was assumed about meshes and clouds.
+    thickness : tuple of (str, float)
+        Thickness of each part, metres.
     """
 
     arrays: Field
@@ -79,7 +93,30 @@ class DistanceField:
         offset: float,
         thickness: Sequence[tuple[str, float]] = (),
     ) -> DistanceField:
-        """From encoded solids, their bounding boxes and voxels."""
+        """A field from encoded solids, their bounding boxes and voxels.
+
+        Parameters
+        ----------
+        kinds : list of int
+            Kind of each solid (`netsp.online.scene.solids`).
+        rows : list of list of float
+            Its numbers.
+        outline : array_like, shape (e, 4)
+            Edges of the prisms, all in one list.
+        boxes : sequence of ndarray
+            Bounding box of each solid.
+        grid : VoxelGrid or None
+            The voxels.
+        offset : float
+            Metres that everything is grown by.
+        thickness : sequence of (str, float)
+            Thickness of each part, metres.
+
+        Returns
+        -------
+        DistanceField
+            The field.
+        """
         arrays = of_solids(kinds, rows, outline, offset)
         if len(kinds) > ASK_ALL and boxes:
             low = np.min([b[0] for b in boxes], axis=0)
@@ -104,28 +141,76 @@ class DistanceField:
         )
 
     def distance(self, points: npt.ArrayLike) -> Floats:
-        """Distances (...) of points (..., 3), metres; negative inside a solid.
+        """Distances of points, negative inside a solid.
 
         Exact outside of solids, and trilinear between voxels. Inside overlapping solids it is the
         distance to the nearest of their surfaces.
+
+        Parameters
+        ----------
+        points : array_like, shape (..., 3)
+            Metres.
+
+        Returns
+        -------
+        ndarray, shape (...)
+            Metres.
         """
         p = self._points(points)
         return np.asarray(sample_many(self.arrays, p.reshape(-1, 3))[:, 0].reshape(p.shape[:-1]))
 
     def gradient(self, points: npt.ArrayLike) -> Floats:
-        """Unit gradients (..., 3): the way out, or away from the nearest solid."""
+        """Unit gradients of the distance: the way out, or away from the nearest solid.
+
+        Parameters
+        ----------
+        points : array_like, shape (..., 3)
+            Metres.
+
+        Returns
+        -------
+        ndarray, shape (..., 3)
+            Unit vectors.
+        """
         p = self._points(points)
         return np.asarray(sample_many(self.arrays, p.reshape(-1, 3))[:, 1:4].reshape(p.shape))
 
     def nearest(self, points: npt.ArrayLike) -> npt.NDArray[np.int64]:
-        """Index (...) of the nearest solid, -1 for voxels."""
+        """The solid nearest to each point.
+
+        Parameters
+        ----------
+        points : array_like, shape (..., 3)
+            Metres.
+
+        Returns
+        -------
+        ndarray of int, shape (...)
+            Index of the solid, -1 for voxels.
+        """
         p = self._points(points)
         found = sample_many(self.arrays, p.reshape(-1, 3))[:, 4]
         return np.asarray(found.astype(np.int64).reshape(p.shape[:-1]))
 
     def line_of_sight(self, a: npt.ArrayLike, b: npt.ArrayLike, depth: float = 0.0) -> bool:
-        """Whether the segment from a to b is nowhere deeper than `depth` inside a solid, to within
-        a thousandth of its length or of a voxel (sphere tracing)."""
+        """Whether a segment is nowhere deeper inside a solid than allowed.
+
+        To within a thousandth of its length or of a voxel (sphere tracing).
+
+        Parameters
+        ----------
+        a : array_like, shape (3,)
+            One end, metres.
+        b : array_like, shape (3,)
+            The other end, metres.
+        depth : float
+            Depth that is allowed, metres.
+
+        Returns
+        -------
+        bool
+            Whether the segment is free.
+        """
         p, q = self._points(a), self._points(b)
         step = max(1e-3 * float(np.linalg.norm(q - p)), 1e-9)
         if self.voxel is not None:
@@ -134,8 +219,27 @@ class DistanceField:
         return bool(low >= -max(depth, 1e-9))
 
     def free_point(self, value: npt.ArrayLike, name: str, depth: float = 1e-6) -> Floats:
-        """A point (3,) as floats; InputError, that names it, if it is not finite, not three numbers
-        or deeper than `depth` inside a solid."""
+        """A point as floats, checked.
+
+        Parameters
+        ----------
+        value : array_like, shape (3,)
+            The point, metres.
+        name : str
+            What messages call it.
+        depth : float
+            Depth inside a solid that is allowed, metres.
+
+        Returns
+        -------
+        ndarray, shape (3,)
+            The point.
+
+        Raises
+        ------
+        InputError
+            It is not three finite numbers, or deeper inside a solid.
+        """
         point = np.array(finite_point(value, name))
         d = float(sample_many(self.arrays, point[None])[0, 0])
         if d < -depth:
@@ -144,7 +248,18 @@ class DistanceField:
         return point
 
     def thinner_than(self, thickness: float) -> tuple[str, ...]:
-        """One line for each part of the scene that is thinner than this."""
+        """Parts of the scene that are thinner than a thickness.
+
+        Parameters
+        ----------
+        thickness : float
+            Metres.
+
+        Returns
+        -------
+        tuple of str
+            One line for each such part.
+        """
         lines = [
             f"{name} is {t:.3g} thick, thinner than {thickness:.3g}"
             for name, t in self.thickness
@@ -177,7 +292,18 @@ class DistanceField:
         return self.voxel or math.nan
 
     def grown(self, by: float) -> DistanceField:
-        """The field of the same scene with everything grown by a clearance."""
+        """The field of the same scene with everything grown.
+
+        Parameters
+        ----------
+        by : float
+            Metres.
+
+        Returns
+        -------
+        DistanceField
+            The grown field.
+        """
         arrays = self.arrays._replace(offset=float(self.arrays.offset) + by)
         return DistanceField(arrays, self.voxel, self.notes, self.thickness)
 
@@ -195,7 +321,18 @@ class DistanceField:
         return p
 
     def save(self, path: str | Path) -> None:
-        """Write the field to an .npz file, voxels and solids."""
+        """Write the field to an .npz file, voxels and solids.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file.
+
+        Raises
+        ------
+        InputError
+            The file cannot be written.
+        """
         try:
             np.savez_compressed(
                 path,
@@ -211,7 +348,23 @@ class DistanceField:
 
     @classmethod
     def load(cls, path: str | Path) -> DistanceField:
-        """Read what `save` wrote; InputError if it is something else."""
+        """Read what `save` wrote.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file.
+
+        Returns
+        -------
+        DistanceField
+            The field.
+
+        Raises
+        ------
+        InputError
+            The file cannot be read or is something else.
+        """
         try:
             with open(path, "rb") as file, np.load(file, allow_pickle=False) as data:
                 if int(data["version"]) != FILE_VERSION:

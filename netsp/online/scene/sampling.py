@@ -19,13 +19,19 @@ from netsp.online.scene.solids import ROW, solid_distance
 class Field(NamedTuple):
     """The arrays of a distance field.
 
-    kinds, rows, outline : the solids. (n,), (n, 16), (m, 2).
-    cells, items, near : which solids may be nearest in a cell of a coarse grid: cell k has
-        ``items[cells[k]:cells[k + 1]]``; near = origin (3), cell size, cell counts (3). An empty
-        `cells` means that all solids are asked.
-    grid, place : distances at grid points, (nx, ny, nz), empty without voxels; place = origin (3),
-        voxel size, bounding box of all that is solid (6).
-    offset : subtracted from every distance (the tether's radius).
+    Attributes
+    ----------
+    kinds, rows, outline
+        The solids. (n,), (n, 16), (m, 2).
+    cells, items, near
+        Which solids may be nearest in a cell of a coarse grid: cell k has ``items[cells[k]:cells[k
+        + 1]]``; near = origin (3), cell size, cell counts (3). An empty `cells` means that all
+        solids are asked.
+    grid, place
+        Distances at grid points, (nx, ny, nz), empty without voxels; place = origin (3), voxel
+        size, bounding box of all that is solid (6).
+    offset
+        Subtracted from every distance (the tether's radius).
     """
 
     kinds: npt.NDArray[np.int64]

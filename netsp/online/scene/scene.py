@@ -69,8 +69,14 @@ class Solid(BaseModel):
 class Source(BaseModel):
     """A mesh or cloud in a file beside the scene's.
 
-    file : path, relative to the scene file. scale : metres per unit of the file. voxel : metres;
-    size of a voxel, default 1/200 of the longest side.
+    Attributes
+    ----------
+    file
+        Path, relative to the scene file.
+    scale
+        Metres per unit of the file.
+    voxel
+        Metres; size of a voxel, default 1/200 of the longest side.
     """
 
     model_config = STRICT
@@ -84,20 +90,28 @@ class Source(BaseModel):
 
 
 class Scene(BaseModel):
-    """A scene: the union of its solids, its mesh, its cloud and the obstacles of its problem.
+    """The union of solids, a mesh, a cloud and the obstacles of a problem.
 
     Attributes
     ----------
-    solids : exact shapes.
-    mesh, cloud : files, turned into voxels (`netsp.online.scene.voxels`).
-    problem : an NE-TSP problem file, whose obstacles, grown by its clearance, stand from the sea
-        floor to the surface.
-    tether_radius : everything is grown by it for the tether.
-    bounds : (xmin, ymin, zmin, xmax, ymax, zmax) that the robot stays in, or None.
+    solids : tuple of Solid
+        Exact shapes.
+    mesh : Source or None
+        A file, turned into voxels (`netsp.online.scene.voxels`).
+    cloud : Source or None
+        A file, turned into voxels.
+    problem : str or None
+        An NE-TSP problem file, whose obstacles, grown by its clearance, stand from the sea floor to
+        the surface.
+    tether_radius : float
+        Everything is grown by it for the tether, metres.
+    bounds : (xmin, ymin, zmin, xmax, ymax, zmax) or None
+        What the robot stays in, metres.
 
     Raises
     ------
-    InputError : from `load` and `field`, in one line.
+    InputError
+        From `load` and `field`, in one line.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", title="netsp scene")
@@ -135,12 +149,46 @@ class Scene(BaseModel):
 
     @classmethod
     def from_json(cls, text: str | bytes, *, source: str = "scene") -> Self:
-        """Parse and validate; `InputError` with one line for anything wrong."""
+        """Parse and validate the text of a scene file.
+
+        Parameters
+        ----------
+        text : str or bytes
+            JSON of format version 1.
+        source : str
+            What messages call it.
+
+        Returns
+        -------
+        Scene
+            The scene.
+
+        Raises
+        ------
+        InputError
+            Anything wrong, in one line.
+        """
         return read_model(cls, text, source)
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
-        """Read a scene file; file names in it become relative to the working directory."""
+        """Read a scene file; file names in it become relative to the working directory.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file.
+
+        Returns
+        -------
+        Scene
+            The scene.
+
+        Raises
+        ------
+        InputError
+            The file cannot be read or is not valid, in one line.
+        """
         scene = cls.from_json(read_text(path), source=str(path))
         folder = Path(path).parent
         changes: dict[str, Any] = {
@@ -154,12 +202,34 @@ class Scene(BaseModel):
 
     @classmethod
     def from_problem(cls, problem: Problem) -> Self:
-        """The obstacles of an NE-TSP problem as posts and prisms, grown by its clearance: offline
-        and online share one world."""
+        """The obstacles of an NE-TSP problem as posts and prisms: offline and online share one
+        world.
+
+        Parameters
+        ----------
+        problem : Problem
+            Its obstacles are grown by its clearance.
+
+        Returns
+        -------
+        Scene
+            The scene.
+        """
         return cls(name=problem.name, units=problem.units, solids=_standing(problem))
 
     def all_solids(self) -> tuple[Solid, ...]:
-        """The solids with those of the problem."""
+        """The solids with those of the problem.
+
+        Returns
+        -------
+        tuple of Solid
+            All solids.
+
+        Raises
+        ------
+        InputError
+            The problem file cannot be read.
+        """
         more = _standing(Problem.load(self.problem)) if self.problem is not None else ()
         return (*self.solids, *more)
 
@@ -174,13 +244,22 @@ class Scene(BaseModel):
 
         Parameters
         ----------
-        voxel : metres; overrides that of mesh and cloud.
-        memory_limit : GiB; a grid that needs more is refused with a voxel size that does not.
-        on_progress : is told (stage, fraction done) of long builds.
+        voxel : float, optional
+            Metres; overrides that of mesh and cloud.
+        memory_limit : float
+            GiB; a grid that needs more is refused with a voxel size that does not.
+        on_progress : callable, optional
+            Called with (stage, fraction done) of long builds.
+
+        Returns
+        -------
+        DistanceField
+            The field.
 
         Raises
         ------
-        InputError : nothing in the scene, unreadable files, a grid that is too large.
+        InputError
+            Nothing in the scene, unreadable files, a grid that is too large.
         """
         solids = self.all_solids()
         if not solids and self.mesh is None and self.cloud is None:

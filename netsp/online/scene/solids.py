@@ -21,7 +21,13 @@ ROW = 16
 
 @njit(cache=True)
 def solid_distance(kind, row, outline, x, y, z):
-    """(d, gx, gy, gz) of one solid at a point. outline : (m, 2) vertices of all prisms."""
+    """(d, gx, gy, gz) of one solid at a point.
+
+    Parameters
+    ----------
+    outline
+        (m, 2) vertices of all prisms.
+    """
     if kind == CAPSULE:
         return _capsule(row, x, y, z)
     if kind == CYLINDER:

@@ -48,7 +48,8 @@ def of_mesh(
 
     Raises
     ------
-    InputError : not readable, no triangles, coordinates that are not finite, a grid too large for
+    InputError
+        Not readable, no triangles, coordinates that are not finite, a grid too large for
         `memory_limit` (GiB), or trimesh is not installed.
     """
     vertices, faces = read_mesh(path)

@@ -21,16 +21,68 @@ class TetherModel(Protocol):
     name: str
 
     def start(self, anchor: npt.ArrayLike, robot: npt.ArrayLike) -> Tether:
-        """The tether along the line of sight from the anchor (3,) to the robot (3,)."""
+        """The tether along the line of sight.
+
+        Parameters
+        ----------
+        anchor : array_like, shape (3,)
+            Where it is fixed, metres.
+        robot : array_like, shape (3,)
+            Where it ends, metres.
+
+        Returns
+        -------
+        Tether
+            The tether.
+        """
 
     def update(self, tether: Tether, robot: npt.ArrayLike) -> Tether:
-        """The tether after the robot has gone straight to a place (3,)."""
+        """The tether after the robot has gone straight to a place.
+
+        Parameters
+        ----------
+        tether : Tether
+            Before; it must not be changed.
+        robot : array_like, shape (3,)
+            New position of the robot, metres.
+
+        Returns
+        -------
+        Tether
+            After.
+        """
 
     def drive(self, tether: Tether, path: npt.ArrayLike) -> tuple[Tether, Floats]:
-        """The tether after the robot has passed the points (k, 3), and its length (k,) at each."""
+        """The tether after the robot has passed some points.
+
+        Parameters
+        ----------
+        tether : Tether
+            Before; it must not be changed.
+        path : array_like, shape (k, 3)
+            The points, metres.
+
+        Returns
+        -------
+        tether : Tether
+            At the last point.
+        lengths : ndarray, shape (k,)
+            Length at each point, metres.
+        """
 
     def lay(self, path: npt.ArrayLike) -> Tether:
-        """The tether after a robot has travelled a path (k, 3) from its anchor on."""
+        """The tether after a robot has travelled a path from its anchor on.
+
+        Parameters
+        ----------
+        path : array_like, shape (k, 3)
+            From the anchor to the robot, metres.
+
+        Returns
+        -------
+        Tether
+            The tether.
+        """
 
 
 TETHERS: Registry[Callable[[DistanceField, float], Any]] = Registry(
@@ -42,7 +94,27 @@ TETHERS: Registry[Callable[[DistanceField, float], Any]] = Registry(
 def make_tether(
     model: str | Callable[[DistanceField, float], Any], field: DistanceField, delta: float
 ) -> Any:
-    """A `TetherModel` by name, or made by a callable. InputError for a name that is none."""
+    """A tether model by name, or made by a callable.
+
+    Parameters
+    ----------
+    model : str or callable
+        One of `TETHERS`, or `f(field, delta) -> TetherModel`.
+    field : DistanceField
+        The scene.
+    delta : float
+        Resolution, metres.
+
+    Returns
+    -------
+    TetherModel
+        The model.
+
+    Raises
+    ------
+    InputError
+        No model has that name.
+    """
     return (model if callable(model) else TETHERS.named(model))(field, delta)
 
 

@@ -27,17 +27,28 @@ from netsp.online.tether.tether import Tether, strand_of
 
 @dataclass(frozen=True)
 class GeodesicTether:
-    """Parameters of the model; `start`, then `update` with every new position of the robot.
+    """A taut tether over the solids of a scene: shortest in its homotopy class.
 
-    field : the scene.
-    delta : metres; resolution. Edges over a surface dip into it by at most delta / 8 (their length
-        is corrected for it), and solids thinner than 1.8 delta may be lost.
-    precision : metres; the rounds end when no node has farther to go, or the tether would get
-        shorter by less than 0.4 of it. Default delta / 200.
-    rounds : at most so many in one update, and one more for every delta / 5 that the robot moved.
-        Where the tether slips over an edge it may take a few updates to come to rest; until then
-        its length is too long, and `Tether.residual` above `precision`.
+    These are the parameters of the model; `start` gives a tether, `update` moves it on with every
+    new position of the robot.
 
+    Parameters
+    ----------
+    field : DistanceField
+        The scene.
+    delta : float
+        Resolution, metres. Edges over a surface dip into it by at most delta / 8 (their length is
+        corrected for it), and solids thinner than 1.8 delta may be lost.
+    precision : float, optional
+        Metres; the rounds end when no node has farther to go, or the tether would get shorter by
+        less than 0.4 of it. By default delta / 200.
+    rounds : int
+        At most so many in one update, and one more for every delta / 5 that the robot moved. Where
+        the tether slips over an edge it may take a few updates to come to rest; until then its
+        length is too long, and `Tether.residual` above `precision`.
+
+    Examples
+    --------
     >>> from netsp.online import Scene
     >>> scene = Scene(solids=[{"capsule": {"a": [0, 0, -5], "b": [0, 0, 5], "radius": 0.5}}])
     >>> model = GeodesicTether(scene.field())
@@ -68,12 +79,25 @@ class GeodesicTether:
         return self.delta, spread, 1e-6 if voxel is None else 0.02, self.rounds, precision
 
     def start(self, anchor: npt.ArrayLike, robot: npt.ArrayLike) -> Tether:
-        """A tether along the line of sight from the anchor to the robot.
+        """A tether along the line of sight.
+
+        Parameters
+        ----------
+        anchor : array_like, shape (3,)
+            Where it is fixed, metres.
+        robot : array_like, shape (3,)
+            Where it ends, metres.
+
+        Returns
+        -------
+        Tether
+            The straight tether.
 
         Raises
         ------
-        InputError : anchor or robot inside a solid or not finite, or no line of sight: then `lay`
-            a tether along a path.
+        InputError
+            Anchor or robot inside a solid or not finite, or no line of sight: then `lay` a tether
+            along a path.
         """
         a, r = self.field.free_point(anchor, "anchor"), self.field.free_point(robot, "robot")
         if not self.field.line_of_sight(a, r, depth=0.125 * self.delta):
@@ -84,11 +108,22 @@ class GeodesicTether:
         return self._taut(strand_of([a, r]))
 
     def lay(self, path: npt.ArrayLike) -> Tether:
-        """A tether laid along a path (k, 3) from the anchor on, then pulled taut.
+        """A tether laid along a path, then pulled taut.
+
+        Parameters
+        ----------
+        path : array_like, shape (k, 3)
+            From the anchor to the robot, metres.
+
+        Returns
+        -------
+        Tether
+            The taut tether.
 
         Raises
         ------
-        InputError : a point inside a solid or not finite, fewer than two points.
+        InputError
+            A point inside a solid or not finite, fewer than two points.
         """
         points = np.asarray(path, dtype=float).reshape(-1, 3)
         if len(points) < 2:
@@ -99,8 +134,22 @@ class GeodesicTether:
         return self.refine(self.drive(tether, points[1:])[0])
 
     def relaxed(self, path: npt.ArrayLike, rounds: int) -> Tether:
-        """A tether that lies along a free path (k, 3), pulled for so many rounds: faster than `lay`
-        where the way matters more than the last millimetre."""
+        """A tether along a free path, pulled for some rounds only.
+
+        Faster than `lay` where its class matters more than the last millimetre.
+
+        Parameters
+        ----------
+        path : array_like, shape (k, 3)
+            From the anchor to the robot, metres; not checked.
+        rounds : int
+            Rounds of pulling.
+
+        Returns
+        -------
+        Tether
+            The tether; `residual` tells how far from taut.
+        """
         return self._taut(strand_of(path), rounds)
 
     def _taut(self, strand: Floats, rounds: int | None = None) -> Tether:
@@ -117,9 +166,24 @@ class GeodesicTether:
 
         Long motions are followed in steps as short as the scene asks for; any is allowed.
 
+        Parameters
+        ----------
+        tether : Tether
+            Before; it is not changed.
+        robot : array_like, shape (3,)
+            New position of the robot, metres.
+        anchor : array_like, shape (3,), optional
+            New position of the anchor, metres; None where it was.
+
+        Returns
+        -------
+        Tether
+            After.
+
         Raises
         ------
-        InputError : robot or anchor not finite, or deeper than delta / 4 inside a solid.
+        InputError
+            Robot or anchor not finite, or deeper than delta / 4 inside a solid.
         """
         strand, length, residual = tether.strand, tether.length, tether.residual
         ends = [(True, robot)] if anchor is None else [(False, anchor), (True, robot)]
@@ -134,9 +198,25 @@ class GeodesicTether:
         return Tether(strand, length, residual)
 
     def drive(self, tether: Tether, path: npt.ArrayLike) -> tuple[Tether, Floats]:
-        """The tether after the robot has followed a path (k, 3), and its length at each point:
-        look-ahead in one call. Points inside solids are the caller's to avoid: the tether follows
-        to them as well as it can."""
+        """The tether after the robot has followed a path: look-ahead in one call.
+
+        Points inside solids are the caller's to avoid: the tether follows to them as well as it
+        can.
+
+        Parameters
+        ----------
+        tether : Tether
+            Before; it is not changed.
+        path : array_like, shape (k, 3)
+            Points that the robot passes, metres.
+
+        Returns
+        -------
+        tether : Tether
+            At the last point.
+        lengths : ndarray, shape (k,)
+            Length at each point, metres.
+        """
         points = np.ascontiguousarray(path, dtype=float).reshape(-1, 3)
         if not np.isfinite(points).all():
             raise InputError("path: expected finite coordinates")
@@ -146,8 +226,21 @@ class GeodesicTether:
         return _state(strand, count, residual), lengths
 
     def refine(self, tether: Tether) -> Tether:
-        """The same tether, every contact looked at afresh, pulled until nothing moves or for 5000
-        rounds (`Tether.residual` tells); after a change of the scene, too."""
+        """The same tether, every contact looked at afresh, pulled until nothing moves.
+
+        For use after a change of the scene, too. It ends after 5000 rounds (`Tether.residual`
+        tells).
+
+        Parameters
+        ----------
+        tether : Tether
+            Before; it is not changed.
+
+        Returns
+        -------
+        Tether
+            The taut tether.
+        """
         return self.relaxed(tether.nodes, rounds=5000)
 
     @property

@@ -35,10 +35,24 @@ READINGS = ("listing", "text")
 
 @dataclass(frozen=True)
 class ReactTether:
-    """Parameters of the model; the same methods as `GeodesicTether`.
+    """The tether model of the REACT paper; the same methods as `GeodesicTether`.
 
-    delta : metres between nodes. clearance : metres; sight passes no solid closer than this.
-    tolerance : metres; see above. passes : at most so many in one update.
+    Source: Amer et al. 2025, section III.
+
+    Parameters
+    ----------
+    field : DistanceField
+        The scene.
+    delta : float
+        Metres between nodes.
+    reading : str
+        Which reading of the paper: its `listing` or its `text`.
+    clearance : float
+        Metres; sight passes no solid closer than this.
+    tolerance : float
+        Metres; the passes end when a node moves less.
+    passes : int
+        At most so many in one update.
     """
 
     field: DistanceField
@@ -57,14 +71,43 @@ class ReactTether:
             raise InputError(f"reading: expected listing or text, got {self.reading!r}")
 
     def start(self, anchor: npt.ArrayLike, robot: npt.ArrayLike) -> Tether:
-        """A tether along the line of sight. InputError as in `GeodesicTether.start`."""
+        """A tether along the line of sight.
+
+        Parameters
+        ----------
+        anchor : array_like, shape (3,)
+            Where it is fixed, metres.
+        robot : array_like, shape (3,)
+            Where it ends, metres.
+
+        Returns
+        -------
+        Tether
+            The straight tether.
+
+        Raises
+        ------
+        InputError
+            As of `GeodesicTether.start`.
+        """
         a, r = self.field.free_point(anchor, "anchor"), self.field.free_point(robot, "robot")
         if not self.field.line_of_sight(a, r, depth=0.01 * self.delta):
             raise InputError("robot: is not in sight of the anchor; lay the tether along a path")
         return self.update(_tether(np.array([a, a])), r)
 
     def lay(self, path: npt.ArrayLike) -> Tether:
-        """A tether laid along a path (k, 3) from the anchor on."""
+        """A tether laid along a path.
+
+        Parameters
+        ----------
+        path : array_like, shape (k, 3)
+            From the anchor to the robot, metres.
+
+        Returns
+        -------
+        Tether
+            The tether.
+        """
         points = np.asarray(path, dtype=float).reshape(-1, 3)
         if len(points) < 2:
             raise InputError(f"path: expected at least two points, got {len(points)}")
@@ -74,7 +117,22 @@ class ReactTether:
     def update(
         self, tether: Tether, robot: npt.ArrayLike, anchor: npt.ArrayLike | None = None
     ) -> Tether:
-        """The tether after a motion of the robot, of the anchor, or both."""
+        """The tether after a motion of the robot, of the anchor, or both.
+
+        Parameters
+        ----------
+        tether : Tether
+            Before; it is not changed.
+        robot : array_like, shape (3,)
+            New position of the robot, metres.
+        anchor : array_like, shape (3,), optional
+            New position of the anchor, metres; None where it was.
+
+        Returns
+        -------
+        Tether
+            After.
+        """
         nodes = tether.nodes
         text = self.reading == "text"
         ends = [(True, robot)] if anchor is None else [(False, anchor), (True, robot)]
@@ -93,7 +151,22 @@ class ReactTether:
         return _tether(nodes)
 
     def drive(self, tether: Tether, path: npt.ArrayLike) -> tuple[Tether, Floats]:
-        """The tether after a path (k, 3), and its length at each point."""
+        """The tether after the robot has followed a path.
+
+        Parameters
+        ----------
+        tether : Tether
+            Before; it is not changed.
+        path : array_like, shape (k, 3)
+            Points that the robot passes, metres.
+
+        Returns
+        -------
+        tether : Tether
+            At the last point.
+        lengths : ndarray, shape (k,)
+            Length at each point, metres.
+        """
         lengths = []
         for point in np.asarray(path, dtype=float).reshape(-1, 3):
             tether = self.update(tether, point)

@@ -282,8 +282,18 @@ def take_frame(field, strand, i, spread, flat, reach):
     The two normals span the plane in which the tether turns over the surface; their cross product
     is the direction conjugate to the tether. Where they differ much the contact is on a sharp edge,
     and the node is put on it: the point on both tangent planes. Else the node is put on the
-    surface. spread : distance of the two samples. flat : sines below it mean no curvature. reach :
-    a node is put on a sharp edge from no farther than this. Returns how far the node was moved.
+    surface.
+
+    Returns how far the node was moved.
+
+    Parameters
+    ----------
+    spread
+        Distance of the two samples.
+    flat
+        Sines below it mean no curvature.
+    reach
+        A node is put on a sharp edge from no farther than this.
     """
     px, py, pz = strand[i, X], strand[i, Y], strand[i, Z]
     ux, uy, uz = px - strand[i - 1, X], py - strand[i - 1, Y], pz - strand[i - 1, Z]

@@ -16,9 +16,16 @@ from netsp.online.tether.strand import EXTRA, NX, NZ, PART, REACH0, REACH1, USED
 class Contact:
     """A stretch of the tether that rests on one part of the scene.
 
-    first, last : nodes of the tether, both included.
-    part : index of the solid in the scene, -1 for voxels.
-    length : length of tether between the two nodes, along the surface.
+    Parameters
+    ----------
+    first : int
+        First node of the tether.
+    last : int
+        Last node, included.
+    part : int
+        Index of the solid in the scene, -1 for voxels.
+    length : float
+        Metres of tether between the two nodes, along the surface.
     """
 
     first: int
@@ -31,12 +38,15 @@ class Contact:
 class Tether:
     """A tether at rest, from its anchor to the robot.
 
-    Attributes
+    Parameters
     ----------
-    strand : (n, 18) what the model keeps of each node (`netsp.online.tether.strand`); never changed
-        in place, so a state can be kept, compared and continued from.
-    length : metres, along the surface where the tether rests on it.
-    residual : metres by which a node still moved when the model stopped.
+    strand : ndarray, shape (n, 18)
+        What the model keeps of each node (`netsp.online.tether.strand`); never changed in place, so
+        a state can be kept, compared and continued from.
+    length : float
+        Metres, along the surface where the tether rests on it.
+    residual : float
+        Metres by which a node still moved when the model stopped.
     """
 
     strand: Floats

@@ -27,11 +27,26 @@ VEHICLES: Registry[Callable[[npt.NDArray[np.float64], float], Vehicle]] = Regist
 
 
 def make_vehicle(name: str, place: npt.NDArray[np.float64], speed: float) -> Vehicle:
-    """A vehicle by name, at rest at a place (3,), that is to go at `speed` (m/s).
+    """A vehicle by name, at rest.
+
+    Parameters
+    ----------
+    name : str
+        One of `VEHICLES`.
+    place : ndarray, shape (3,)
+        Where it is, metres.
+    speed : float
+        That it is to go at, m/s.
+
+    Returns
+    -------
+    Vehicle
+        The vehicle.
 
     Raises
     ------
-    InputError : a name that is none.
+    InputError
+        No vehicle has that name.
     """
     return VEHICLES.named(name)(place, speed)
 

@@ -36,8 +36,17 @@ class PredictiveControl:
         self.forces = np.zeros((HORIZON, 4))
 
     def force(self, state: Floats, aims: Floats, water: Floats) -> Floats:
-        """The input (4,) for the next step. state : (8,). aims : (HORIZON, 8) where to be after
-        each step. water : (3,) what the water is thought to do."""
+        """The input (4,) for the next step.
+
+        Parameters
+        ----------
+        state
+            (8,).
+        aims
+            (HORIZON, 8) where to be after each step.
+        water
+            (3,) what the water is thought to do.
+        """
         self.forces = improved(self.forces, state, aims, water)
         return np.asarray(self.forces[0])
 

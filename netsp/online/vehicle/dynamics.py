@@ -33,7 +33,13 @@ one axis; the four share what they have between surge, sway and yaw."""
 
 @njit(cache=True)
 def derivative(state, force, water, out):
-    """d state / dt into `out` (8,). water : (3,) m/s."""
+    """d state / dt into `out` (8,).
+
+    Parameters
+    ----------
+    water
+        (3,) m/s.
+    """
     c, s = math.cos(state[3]), math.sin(state[3])
     u, v, w, r = state[4], state[5], state[6], state[7]
     out[0] = c * u - s * v + water[0]

@@ -16,8 +16,14 @@ TURN = math.radians(60.0)
 class Vehicle(Protocol):
     """A robot that can be told a path.
 
-    position : (3,) m. yaw : rad, in which horizontal direction it looks. control_s : seconds of
-    computing that each control step took.
+    Attributes
+    ----------
+    position : ndarray, shape (3,)
+        Metres.
+    yaw : float
+        Heading, radians.
+    control_s : list of float
+        Seconds of computing that each control step took.
     """
 
     control_s: list[float]
@@ -33,19 +39,49 @@ class Vehicle(Protocol):
     def go(
         self, path: Floats, seconds: float, yaw: float, water: Floats, fresh: bool
     ) -> tuple[list[Floats], int]:
-        """Follow a path (k, 3) for some seconds, turning to `yaw`, in moving water (3,) m/s.
+        """Follow a path for some seconds, turning to a heading, in moving water.
 
-        fresh : the path does not continue the one before. Returns the points that the vehicle
-        passed on straight lines, the last one its new position, and how many points of the path are
-        behind it.
+        Parameters
+        ----------
+        path : ndarray, shape (k, 3)
+            Points to pass, metres.
+        seconds : float
+            How long.
+        yaw : float
+            Heading, radians.
+        water : ndarray, shape (3,)
+            Velocity of the water, m/s.
+        fresh : bool
+            Whether the path does not continue the one before.
+
+        Returns
+        -------
+        points : list of ndarray
+            Points passed on straight lines, the last one its new position.
+        count : int
+            How many points of the path are behind it.
         """
 
     def stop_at(self, place: Floats) -> None:
-        """Be at rest at a place (3,)."""
+        """Be at rest at a place.
+
+        Parameters
+        ----------
+        place : ndarray, shape (3,)
+            Metres.
+        """
 
 
 class KinematicVehicle:
-    """Goes along the path at its speed, whatever the water does."""
+    """Goes along the path at its speed, whatever the water does.
+
+    Parameters
+    ----------
+    place : ndarray, shape (3,)
+        Where it is, metres.
+    speed : float
+        m/s.
+    """
 
     def __init__(self, place: Floats, speed: float) -> None:
         self.position: Floats = np.array(place, dtype=float)
@@ -56,7 +92,28 @@ class KinematicVehicle:
     def go(
         self, path: Floats, seconds: float, yaw: float, water: Floats, fresh: bool
     ) -> tuple[list[Floats], int]:
-        """See `Vehicle`."""
+        """Follow a path for some seconds; see `Vehicle.go`.
+
+        Parameters
+        ----------
+        path : ndarray, shape (k, 3)
+            Points to pass, metres.
+        seconds : float
+            How long.
+        yaw : float
+            Heading, radians, taken at once.
+        water : ndarray, shape (3,)
+            Velocity of the water, m/s; it has no effect.
+        fresh : bool
+            Whether the path does not continue the one before.
+
+        Returns
+        -------
+        points : list of ndarray
+            Points passed on straight lines, the last one its new position.
+        count : int
+            How many points of the path are behind it.
+        """
         del water, fresh
         self.yaw += float(np.clip(turned(yaw - self.yaw), -TURN * seconds, TURN * seconds))
         stops, passed = advance(self.position, path, self.speed * seconds)
@@ -64,7 +121,13 @@ class KinematicVehicle:
         return stops, passed
 
     def stop_at(self, place: Floats) -> None:
-        """See `Vehicle`."""
+        """Be at rest at a place.
+
+        Parameters
+        ----------
+        place : ndarray, shape (3,)
+            Metres.
+        """
         self.position = np.array(place)
 
 

@@ -1,0 +1,107 @@
+"""Public names are documented in numpydoc's form: every parameter, what is returned and raised."""
+
+import dataclasses
+import enum
+import importlib
+import inspect
+import pkgutil
+
+import pytest
+from numpydoc.validate import validate
+from pydantic import BaseModel
+
+import netsp
+
+MODULES = (
+    "netsp.errors", "netsp.execute.log", "netsp.online.log", "netsp.online.mission",
+    "netsp.online.order", "netsp.online.simulate", "netsp.registry", "netsp.solvers.table",
+    "netsp.solving.limits", "netsp.travel.result", "netsp.worlds",
+)  # fmt: skip
+"""Modules that docs import from by name, beside the packages with an `__all__`."""
+
+WANTED = {
+    "GL08": "a docstring",
+    "SS01": "a summary",
+    "SS03": "a full stop after the summary",
+    "PR01": "all parameters",
+    "PR02": "no parameters that are none",
+    "PR03": "parameters in order",
+    "PR04": "a type of each parameter",
+    "PR07": "a description of each parameter",
+    "RT01": "what is returned",
+    "RT03": "a description of what is returned",
+    "YD01": "what is yielded",
+}
+
+
+def _public():
+    """Names of all public classes, functions and methods, with the objects."""
+    packages = [
+        module
+        for found in pkgutil.walk_packages(netsp.__path__, "netsp.")
+        if found.ispkg
+        for module in (importlib.import_module(found.name),)
+        if hasattr(module, "__all__")
+    ]
+    own = [netsp, *packages]
+    named = [getattr(module, name) for module in own for name in module.__all__]
+    for name in MODULES:
+        module = importlib.import_module(name)
+        named += [
+            value
+            for key, value in vars(module).items()
+            if not key.startswith("_") and getattr(value, "__module__", "") == name
+        ]
+    out = {}
+    for value in named:
+        if not (inspect.isclass(value) or inspect.isfunction(value)):
+            continue
+        name = f"{value.__module__}.{value.__qualname__}"
+        out[name] = value
+        if inspect.isclass(value):
+            for key, member in vars(value).items():
+                function = getattr(member, "__func__", member)
+                if not key.startswith("_") and inspect.isfunction(function):
+                    out[f"{name}.{key}"] = function
+    return out
+
+
+PUBLIC = _public()
+
+
+def _made_otherwise(value):
+    """Classes whose constructor nobody calls with the parameters that its signature shows: fields
+    of models are described in their schema (test_schema.py)."""
+    return inspect.isclass(value) and (
+        issubclass(value, BaseModel | Exception | enum.Enum)
+        or getattr(value, "_is_protocol", False)
+    )
+
+
+@pytest.mark.parametrize("name", sorted(PUBLIC))
+def test_public_names_have_every_section_of_numpydoc(name):
+    value = PUBLIC[name]
+    missing = {}
+    for code, message in validate(name)["errors"]:
+        private = dataclasses.is_dataclass(value) and "{'_" in message
+        if code in WANTED and not private and not (code == "PR01" and _made_otherwise(value)):
+            missing[code] = f"expected {WANTED[code]}: {message}"
+    assert not missing
+
+
+def test_there_is_a_public_interface_to_document():
+    assert {"netsp.solvers.solve.solve", "netsp.travel.graph.TravelGraph.path"} <= set(PUBLIC)
+    assert len(PUBLIC) > 150
+
+
+@pytest.mark.parametrize("name", sorted(PUBLIC))
+def test_what_a_docstring_says_is_raised_is_an_error_that_exists(name):
+    from numpydoc.docscrape import FunctionDoc
+
+    if inspect.isclass(PUBLIC[name]):
+        return
+    import netsp.errors
+    import netsp.worlds
+
+    raised = [row.type for row in FunctionDoc(PUBLIC[name])["Raises"]]
+    assert all(hasattr(netsp.errors, r) or hasattr(netsp.worlds, r) for r in raised), raised
