@@ -345,7 +345,7 @@ class Problem(Drawn, BaseModel):
             if depth > self.tolerance:
                 raise ValueError(
                     f"state.position: {_show(self.state.position)} lies inside "
-                    f"{self.obstacle_label(i)} (by {depth:.6g}); expected a point in free space"
+                    f"{self._obstacle_field(i)} (by {depth:.6g}); expected a point in free space"
                 )
         for a in self.state.signature:
             if not 1 <= abs(a) <= len(self.obstacles):
@@ -360,8 +360,8 @@ class Problem(Drawn, BaseModel):
             first = seen.setdefault(goal.position, k)
             if first != k:
                 raise ValueError(
-                    f"{self.goal_label(k)}: same position {_show(goal.position)} as "
-                    f"{self.goal_label(first)}; expected distinct goals"
+                    f"{self._goal_field(k)}: same position {_show(goal.position)} as "
+                    f"{self._goal_field(first)}; expected distinct goals"
                 )
 
     def _check_free(self) -> None:
@@ -375,7 +375,7 @@ class Problem(Drawn, BaseModel):
         inside = distances < self.clearance - tolerance
         for k in np.flatnonzero(outside | inside.any(axis=0)):
             position = self.base if k == 0 else self.goals[k - 1].position
-            label = "base" if k == 0 else self.goal_label(int(k) - 1)
+            label = "base" if k == 0 else self._goal_field(int(k) - 1)
             if outside[k]:
                 raise ValueError(
                     f"{label}: {_show(position)} is outside bounds {list(self.bounds or ())}"
@@ -383,7 +383,7 @@ class Problem(Drawn, BaseModel):
             i = int(np.argmax(inside[:, k]))
             grown = f" grown by the clearance {self.clearance:g}" if self.clearance else ""
             raise ValueError(
-                f"{label}: {_show(position)} lies inside {self.obstacle_label(i)}{grown} "
+                f"{label}: {_show(position)} lies inside {self._obstacle_field(i)}{grown} "
                 f"(by {self.clearance - distances[i, k]:.6g}); expected a point in free space"
             )
 
@@ -423,8 +423,8 @@ class Problem(Drawn, BaseModel):
         """(1 + m, 3) base, then goals."""
         return np.array([self.base, *(g.position for g in self.goals)], dtype=float)
 
-    def goal_label(self, k: int) -> str:
-        """How messages name a goal.
+    def goal_name(self, k: int) -> str:
+        """What tables and pictures call a goal.
 
         Parameters
         ----------
@@ -434,13 +434,12 @@ class Problem(Drawn, BaseModel):
         Returns
         -------
         str
-            ``goals[k]``, and its name if it has one.
+            Its name, or ``#k`` if it has none.
         """
-        name = self.goals[k].name
-        return f"goals[{k}]" + (f" ({name})" if name else "")
+        return self.goals[k].name or f"#{k}"
 
-    def obstacle_label(self, i: int) -> str:
-        """How messages name an obstacle.
+    def obstacle_name(self, i: int) -> str:
+        """What tables and pictures call an obstacle.
 
         Parameters
         ----------
@@ -450,8 +449,46 @@ class Problem(Drawn, BaseModel):
         Returns
         -------
         str
-            ``obstacles[i]``, and its name if it has one.
+            Its name, or ``#i`` if it has none.
         """
+        return self.obstacles[i].name or f"#{i}"
+
+    def goal_label(self, k: int) -> str:
+        """What messages call a goal.
+
+        Parameters
+        ----------
+        k : int
+            Index of the goal, from 0.
+
+        Returns
+        -------
+        str
+            ``goal B1``, or ``goal #k`` if it has no name.
+        """
+        return f"goal {self.goal_name(k)}"
+
+    def obstacle_label(self, i: int) -> str:
+        """What messages call an obstacle.
+
+        Parameters
+        ----------
+        i : int
+            Index of the obstacle, from 0.
+
+        Returns
+        -------
+        str
+            ``obstacle pier``, or ``obstacle #i`` if it has no name.
+        """
+        return f"obstacle {self.obstacle_name(i)}"
+
+    def _goal_field(self, k: int) -> str:
+        """Where a goal stands in the file, for what is wrong with it."""
+        name = self.goals[k].name
+        return f"goals[{k}]" + (f" ({name})" if name else "")
+
+    def _obstacle_field(self, i: int) -> str:
         name = self.obstacles[i].name
         return f"obstacles[{i}]" + (f" ({name})" if name else "")
 

@@ -41,7 +41,7 @@ class Registry(MutableMapping[str, R], Generic[R]):
         self.kind, self.group, self._own, self._record = kind, group, own, record
 
     @cached_property
-    def _offered(self) -> dict[str, R]:
+    def _foreign(self) -> dict[str, R]:
         """Of other packages; a name of ours cannot be taken."""
         found = importlib.metadata.entry_points(group=self.group)
         return {e.name: self._record(e.name, e.value) for e in found if e.name not in self._own}
@@ -49,7 +49,7 @@ class Registry(MutableMapping[str, R], Generic[R]):
     def __getitem__(self, name: str) -> R:
         if name in self._own:
             return self._own[name]
-        return self._offered[name]
+        return self._foreign[name]
 
     def __setitem__(self, name: str, record: R) -> None:
         self._own[name] = record
@@ -58,10 +58,10 @@ class Registry(MutableMapping[str, R], Generic[R]):
         del self._own[name]
 
     def __iter__(self) -> Iterator[str]:
-        return iter({**self._own, **self._offered})
+        return iter({**self._own, **self._foreign})
 
     def __len__(self) -> int:
-        return len({**self._own, **self._offered})
+        return len({**self._own, **self._foreign})
 
     def named(self, name: object) -> R:
         """The record of a name.

@@ -76,7 +76,7 @@ def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | Non
     rng = limits.rng
     run = SolverRun(graph, limits)
     with run.until_stopped():
-        run.offer(limits.warm_start)
+        run.update_incumbent(limits.warm_start)
         if not run.trivial():
             _anneal(run, rng, chosen)
     return run.finish("done", entangled=0)
@@ -103,7 +103,7 @@ def _anneal(run: SolverRun, rng: np.random.Generator, chosen: Params) -> None:
     best = state.copy()
     best_length = length
     chance = seeded(rng)
-    run.offer(instance.original(best))
+    run.update_incumbent(instance.original(best))
     run.report("anneal", current=length, entangled=0)
     while run.iterations < run.iteration_limit:
         run.check()
@@ -113,7 +113,7 @@ def _anneal(run: SolverRun, rng: np.random.Generator, chosen: Params) -> None:
             instance.costs, instance.start, of_vertex, chance,
         )  # fmt: skip
         run.iterations += count
-        run.offer(instance.original(best))
+        run.update_incumbent(instance.original(best))
         run.report("anneal", current=length, entangled=0)
 
 

@@ -123,7 +123,7 @@ def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | Non
     rng = limits.rng
     run = SolverRun(graph, limits)
     with run.until_stopped(blind=True):
-        run.offer(limits.warm_start)
+        run.update_incumbent(limits.warm_start)
         if not run.trivial():
             _anneal(run, rng, chosen)
     return run.finish("done")
@@ -168,7 +168,7 @@ def _anneal(run: SolverRun, rng: np.random.Generator, chosen: Params) -> None:
         )
         run.iterations += count
         if best_length < before:
-            run.offer(state.best.tolist())
+            run.update_incumbent(state.best.tolist())
         run.report("anneal", current=length, entangled=int(entangled))
 
 

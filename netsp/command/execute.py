@@ -101,7 +101,7 @@ def show_execution(problem: Problem) -> Callable[[ExecutionRow], None]:
     def on_step(row: ExecutionRow) -> None:
         count[0] += 1
         if count[0] % 20 == 1:
-            name = "base" if row.goal < 0 else f"goal {row.goal}"
+            name = "base" if row.goal < 0 else problem.goal_label(row.goal)
             print(
                 f"\r{row.time:8.1f} s  to {name:<9} tether {row.tether:8.2f} of {row.limit:g} "
                 f"{problem.units}   ",

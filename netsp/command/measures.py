@@ -42,7 +42,7 @@ def describe_tethers(problem: Problem, solution: Solution) -> str:
     for k, stop in enumerate(solution.tour):
         m = measure(problem, paths.tether(stop.goal, stop.signature))
         free = ["free" if not getattr(m, field) else "no" for _, field in DEFINITIONS]
-        name = problem.goals[stop.goal].name or str(stop.goal)
+        name = problem.goal_name(stop.goal)
         lines.append(
             f"{k + 1:>4}  {name:<12.12} {stop.tether_length:>10.6g}  {free[0]:<5} {free[1]:<6} "
             f"{free[2]:<5} {list(stop.signature)}"
@@ -59,7 +59,7 @@ def _entangled(problem: Problem, m: Measures) -> str:
         return "the path is not closed"
     if not m.entangled:
         return "none"
-    names = ", ".join(problem.obstacle_label(k) for k in m.entangled)
+    names = ", ".join(problem.obstacle_name(k) for k in m.entangled)
     return f"{len(m.entangled)}: {names}"
 
 
@@ -67,10 +67,10 @@ def _winding(problem: Problem, m: Measures) -> str:
     if m.winding is None:
         return "the path is not closed"
     turned = [(k, w) for k, w in enumerate(m.winding) if w]
-    return ", ".join(f"{problem.obstacle_label(k)} {w:+d}" for k, w in turned) or "all zero"
+    return ", ".join(f"{problem.obstacle_name(k)} {w:+d}" for k, w in turned) or "all zero"
 
 
 def _verdict(problem: Problem, broken: tuple[int, ...]) -> str:
     if not broken:
         return "holds"
-    return f"fails at {', '.join(problem.obstacle_label(k) for k in broken)}"
+    return f"fails at {', '.join(problem.obstacle_name(k) for k in broken)}"

@@ -45,7 +45,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument("--samples", type=positive, metavar="N", help="prm: milestones; default 1000")
     p.add_argument("--seed", type=natural, default=0, metavar="N", help="prm: random seed")
     p.add_argument(
-        "--classes", metavar="GOAL", help="draw all taut tethers to this goal (number or name)"
+        "--classes", metavar="GOAL", help="draw all taut tethers to this goal (name or #index)"
     )
     p.set_defaults(shortcut=False, max_classes=None, classes_rule=None)
 
@@ -101,9 +101,10 @@ def _goal_number(problem: Problem, text: str) -> int:
     names = [g.name for g in problem.goals]
     if text in names:
         return names.index(text)
-    if text.isdigit() and int(text) < len(names):
-        return int(text)
+    number = text.removeprefix("#")
+    if number.isdigit() and int(number) < len(names):
+        return int(number)
     raise InputError(
-        f"--classes: no goal {text!r}; expected a number from 0 to {len(names) - 1}"
+        f"--classes: no goal {text!r}; expected #0 to #{len(names) - 1}"
         + (f" or a name such as {next(n for n in names if n)!r}" if any(names) else "")
     )

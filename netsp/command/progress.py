@@ -121,9 +121,9 @@ def summary(
         verdict = "no bound"
     else:
         verdict = f"bound {solution.lower_bound:.6g}, gap {100 * (solution.gap or 0.0):.2f} %"
-    names = [problem.goals[v.goal].name or str(v.goal) for v in solution.tour]
+    names = [problem.goal_name(v.goal) for v in solution.tour]
     longest = max((v.tether_length for v in solution.tour), default=0.0)
-    wrapped = ", ".join(problem.obstacle_label(k) for k in solution.entangled)
+    wrapped = ", ".join(problem.obstacle_name(k) for k in solution.entangled)
     lines = [
         f"tour     {solution.length:.6f} {problem.units}, {verdict}",
         f"order    base → {' → '.join(names)} → base",

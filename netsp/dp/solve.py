@@ -98,7 +98,7 @@ def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | Non
         )
     run = SearchingRun(graph, limits, search_rounds=chosen.search_rounds)
     with run.until_stopped():
-        run.offer(limits.warm_start)
+        run.update_incumbent(limits.warm_start)
         if not run.trivial():
             run.begin()
             costs = LegCosts(graph)
@@ -137,7 +137,7 @@ def bound_by_walks(run: SearchingRun, costs: LegCosts) -> None:
         if whole:
             measured = costs.exact is None
             costs.measure(np.concatenate([[0], walk.rows]))
-            run.offer([0, *costs.vertices[walk.rows].tolist()])
+            run.update_incumbent([0, *costs.vertices[walk.rows].tolist()])
             walks.set_values(costs.values)
         _forget(run, walks, costs)
         run.report("walks", vertices=len(costs), legs=len(costs) * (len(costs) - 1) // 2)

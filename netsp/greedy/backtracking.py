@@ -70,7 +70,7 @@ def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | Non
     run = SolverRun(graph, limits)
     stage = "trivial"
     with run.until_stopped():
-        run.offer(limits.warm_start)
+        run.update_incumbent(limits.warm_start)
         if not run.trivial():
             stage = _nearest_by_tether(run, retrace=chosen.retrace == "path" and graph.geometric)
     return run.finish(stage)
@@ -92,7 +92,7 @@ def _nearest_by_tether(run: SolverRun, *, retrace: bool) -> str:
         tour.append(here)
         left &= graph.cluster != graph.cluster[here]
     run.iterations = 1
-    run.offer(tour, walk=[*tour, *tour[-2::-1]] if retrace else None)
+    run.update_incumbent(tour, walk=[*tour, *tour[-2::-1]] if retrace else None)
     return "greedy"
 
 
@@ -140,7 +140,7 @@ def solve_2016(graph: TravelGraph, params: None = None, limits: Limits | None = 
     limits = limits or Limits()
     run = SolverRun(graph, limits)
     with run.until_stopped():
-        run.offer(limits.warm_start)
+        run.update_incumbent(limits.warm_start)
         if not run.trivial():
             run.check()
             _out_and_back(run)
@@ -160,6 +160,6 @@ def _out_and_back(run: SolverRun) -> None:
         walk = [0]
         for v in nearest:
             walk += [v, 0]
-        run.offer([0, *nearest], walk=walk, length=2.0 * float(out[nearest].sum()))
+        run.update_incumbent([0, *nearest], walk=walk, length=2.0 * float(out[nearest].sum()))
     else:
-        run.offer([0, *nearest])
+        run.update_incumbent([0, *nearest])

@@ -59,7 +59,7 @@ def solve(graph: TravelGraph, params: None = None, limits: Limits | None = None)
 
 
 def _nearest_neighbour(run: SolverRun) -> Trajectory | None:
-    """The trajectory, or None if it happens to be a tour of the graph: then that is offered."""
+    """The trajectory, or None if it happens to be a tour of the graph: then that is the incumbent."""
     graph = run.graph
     detours = graph.detours(sub_goals=False, check=run.check)
     order, here = [], 0
@@ -76,7 +76,7 @@ def _nearest_neighbour(run: SolverRun) -> Trajectory | None:
     tour = graph.vertices_of(order, words[1:-1])
     if not words[-1] and tour is not None:
         # it happens to keep all promises; the walk is the same, for its legs are taut
-        run.offer([0, *tour])
+        run.update_incumbent([0, *tour])
         return None
     legs = [detours.path(a, b) for a, b in pairwise(stops)]
     path = np.vstack([legs[0], *(leg[1:] for leg in legs[1:])])

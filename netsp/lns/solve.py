@@ -50,7 +50,7 @@ def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | Non
     rng = limits.rng
     run = SolverRun(graph, limits)
     with run.until_stopped():
-        run.offer(limits.warm_start)
+        run.update_incumbent(limits.warm_start)
         if not run.trivial():
             _search(run, rng, chosen)
     return run.finish("done")
@@ -99,7 +99,7 @@ def core_of(run: SolverRun, classes: int = 0, vertices: int = MOST_VERTICES) -> 
 
 def _take(run: SolverRun, search: Search) -> None:
     length, tour = search.best()
-    run.offer(tour, length=length)
+    run.update_incumbent(tour, length=length)
 
 
 def most_classes(graph: TravelGraph, vertices: int) -> int:

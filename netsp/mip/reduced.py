@@ -72,7 +72,7 @@ def solve(
 
     def pass_on(row: Progress) -> None:
         if part.tour is not None:
-            outer.offer(kept[np.array(part.tour)].tolist())
+            outer.update_incumbent(kept[np.array(part.tour)].tolist())
         if whole and part.bound is not None:
             outer.raise_bound(part.bound)
         outer.iterations = row.iteration
@@ -80,7 +80,7 @@ def solve(
 
     part.on_progress = pass_on
     with outer.until_stopped():
-        outer.offer(limits.warm_start)
+        outer.update_incumbent(limits.warm_start)
         if outer.trivial():
             return outer.finish("trivial")
         place = {int(v): k for k, v in enumerate(kept)}
@@ -88,13 +88,13 @@ def solve(
         result = part.solve(chosen.backend, start if start and -1 not in start else None)
         outer.stopped = part.stopped
         if result.tour is not None:
-            outer.offer(kept[np.array(result.tour)].tolist())
+            outer.update_incumbent(kept[np.array(result.tour)].tolist())
             if chosen.polish and not whole:
                 outer.check()
                 instance = Instance.among(graph, core_of(outer, vertices=MOST_POLISHED))
                 order = graph.cluster[kept[np.array(result.tour[1:])]]
                 _, tour = best_classes(order, instance.start, instance.costs)
-                outer.offer(instance.original(tour))
+                outer.update_incumbent(instance.original(tour))
     if whole:
         outer.infeasible = part.infeasible
         if part.bound is not None:

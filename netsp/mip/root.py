@@ -137,10 +137,10 @@ class Root:
         run: SearchingRun,
         costs: LegCosts,
         relaxation: Callable[[Ints, Ints, Floats], Relaxation],
-        offer: Callable[[Root, Point], None],
+        round_point: Callable[[Root, Point], None],
         warm: Warm | None = None,
     ) -> None:
-        self.run, self.costs, self.offer = run, costs, offer
+        self.run, self.costs, self.round_point = run, costs, round_point
         graph = costs.graph
         self.branch = branches([graph.signatures[v] for v in costs.vertices])
         self.dead: Bools = ~np.isfinite(costs.values)
@@ -178,7 +178,7 @@ class Root:
                     continue
             priced, risen = self._look(point, pace)
             if self.point is not None:
-                self.offer(self, point)
+                self.round_point(self, point)
             run.report("root", **self.size())
             if run.done:
                 return

@@ -118,7 +118,7 @@ class MipRun(SearchingRun):
     ) -> Result:
         """Heuristic, walks if wanted, root, integer rounds."""
         with self.until_stopped():
-            self.offer(warm_start)
+            self.update_incumbent(warm_start)
             if not self.trivial():
                 self.begin()
                 warm: Warm | None = None
@@ -217,7 +217,7 @@ class MipRun(SearchingRun):
         if whole:
             cycles = tour_from(point.x, point.legs, point.y)
             if len(cycles) == 1:
-                self.offer(costs.vertices[cycles[0]].tolist())
+                self.update_incumbent(costs.vertices[cycles[0]].tolist())
             order = [int(cluster[v]) for cycle in cycles for v in cycle]
         else:
             order = follow(point.legs, point.y, cluster)

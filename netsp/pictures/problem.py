@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -58,7 +58,7 @@ def draw(problem: Problem, solution: Solution | None = None) -> Any:
         if k >= len(stops):
             continue
         stop = stops[k]
-        _obstacles(ax, problem, labels=False)
+        _obstacles(ax, problem)
         tether = paths.tether(stop.goal, stop.signature)
         ax.plot(tether[:, 0], tether[:, 1], color=style.TETHER, lw=1.3)
         ax.plot(*problem.base[:2], marker="*", ms=8, color=style.BASE, mec="none")
@@ -158,21 +158,27 @@ def save_classes(problem: Problem, goal: int, path: str | Path) -> None:
         if k >= len(shown):
             continue
         v = int(shown[k])
-        _obstacles(ax, problem, labels=len(problem.obstacles) <= 20)
+        _obstacles(ax, problem, label=_letter if len(problem.obstacles) <= 20 else None)
         tether = roadmap.paths.path(0, goal + 1, roadmap.signatures[v])
         ax.plot(tether[:, 0], tether[:, 1], color=style.TETHER, lw=1.4, zorder=3)
         ax.plot(*problem.base[:2], marker="*", ms=9, color=style.BASE, mec="none", zorder=4)
         ax.plot(*problem.points[goal + 1, :2], "o", ms=5, color=style.PATH, zorder=4)
-        word = " ".join(f"{a:+d}" for a in roadmap.signatures[v]) or "empty word"
+        word = list(roadmap.signatures[v])
         ax.set_title(f"{roadmap.tethers[v]:.5g} {problem.units}: {word}", fontsize=7, pad=2)
         _frame(ax, problem, None)
     more = f", the {len(shown)} shortest shown" if len(shown) < len(rows) else ""
     figure.suptitle(
         f"{problem.name}: {len(rows)} classes reach {problem.goal_label(goal)} within "
-        f"{problem.tether_length:g} {problem.units}{more}",
+        f"{problem.tether_length:g} {problem.units}{more}\n"
+        "(obstacles bear the letters of the words)",
         fontsize=10,
     )
     style.save(figure, path)
+
+
+def _letter(i: int) -> str:
+    """The letter of obstacle i in words, which count from 1 for the sign's sake."""
+    return str(i + 1)
 
 
 def _single(problem: Problem) -> tuple[Any, Any]:
@@ -200,7 +206,8 @@ def draw_map(
     if ax is None:
         _, ax = _single(problem)
     wrapped = solution.entangled if solution else ()
-    _obstacles(ax, problem, labels=len(problem.obstacles) <= 40, wrapped=wrapped)
+    label = problem.obstacle_name if len(problem.obstacles) <= 40 else None
+    _obstacles(ax, problem, label=label, wrapped=wrapped)
     if problem.bounds is not None:
         xmin, ymin, xmax, ymax = problem.bounds
         ax.plot(
@@ -292,7 +299,10 @@ def _title(problem: Problem, solution: Solution | None) -> str:
     )
 
 
-def _obstacles(ax: Axes, problem: Problem, *, labels: bool, wrapped: tuple[int, ...] = ()) -> None:
+def _obstacles(
+    ax: Axes, problem: Problem, *, label: Callable[[int], str] | None = None,
+    wrapped: tuple[int, ...] = (),
+) -> None:  # fmt: skip
     from matplotlib.patches import Circle as Disk
     from matplotlib.patches import Polygon as Patch
 
@@ -313,10 +323,10 @@ def _obstacles(ax: Axes, problem: Problem, *, labels: bool, wrapped: tuple[int, 
                 ring = shapely.Polygon(o.polygon).buffer(problem.clearance).exterior
                 ax.plot(*ring.xy, color=style.EDGE, lw=0.5, ls=":", zorder=1)
             ax.add_patch(Patch(o.polygon, closed=True, **look))
-        if labels:
+        if label is not None:
             x, y = o.representative_point
             ax.annotate(
-                o.name or str(i + 1), (x, y), ha="center", va="center", fontsize=6,
+                label(i), (x, y), ha="center", va="center", fontsize=6,
                 color=style.BASE, zorder=2, clip_on=True,
             )  # fmt: skip
 

@@ -275,7 +275,7 @@ def _goals(problem: Problem, solution: Solution, run: Path | None) -> str:
     body, total = [], 0.0
     for n, v in enumerate(solution.tour):
         cells = [
-            str(n + 1), html.escape(problem.goal_label(v.goal)), f"{v.tether_length:.5g}",
+            str(n + 1), html.escape(problem.goal_name(v.goal)), f"{v.tether_length:.5g}",
             f"{problem.tether_length - v.tether_length:.5g}",
             html.escape(" ".join(map(str, v.signature)) or "empty"),
         ]  # fmt: skip
@@ -308,7 +308,7 @@ def _measures(problem: Problem, solution: Solution) -> str:
     m = measure(problem, np.array(solution.path))
 
     def names(which: tuple[int, ...] | None) -> str:
-        return ", ".join(problem.obstacle_label(i) for i in which or ()) or "none"
+        return ", ".join(problem.obstacle_name(i) for i in which or ()) or "none"
 
     turns = "all zero" if not any(m.winding or ()) else str(m.winding)
     rows = [

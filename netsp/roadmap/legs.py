@@ -146,8 +146,8 @@ class TautLegs:
             k = int(np.argmax(np.isinf(found)))
             u, w = np.argwhere(pair == k)[0]
             raise NetspError(
-                f"internal: no taut leg found between goal {g - 1} and goal "
-                f"{tethers.cluster[there[w]] - 1} for word "
+                f"internal: no taut leg found between goal #{g - 1} and goal "
+                f"#{tethers.cluster[there[w]] - 1} for word "
                 f"{self.relative_word(int(here[u]), int(there[w]))}; please report the problem file"
             )
         return np.where(pair >= 0, np.append(found, np.inf)[pair], np.inf)

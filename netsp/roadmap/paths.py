@@ -95,7 +95,9 @@ class TautPaths:
                 return self.path(0, goal + 1, tuple(word))
             except NetspError:
                 pass
-        raise InputError(f"solution: tour: no taut tether to goal {goal} has the word {list(word)}")
+        raise InputError(
+            f"solution: tour: no taut tether to goal #{goal} has the word {list(word)}"
+        )
 
     def _pieces(
         self, a: int, b: int, word: Word, longest: float | None = None

@@ -68,7 +68,7 @@ def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | Non
     if exact.fits(graph):
         small = SolverRun(graph, limits)
         with small.until_stopped():
-            small.offer(limits.warm_start)
+            small.update_incumbent(limits.warm_start)
             if not small.trivial():
                 exact.solve(small)
         return small.finish("proven" if small.done else "exact")

@@ -55,7 +55,7 @@ def call(
     run = SolverRun(graph, limits)
     if tour is not None:
         try:
-            taken = run.offer([int(v) for v in tour])
+            taken = run.update_incumbent([int(v) for v in tour])
         except (TypeError, ValueError):
             taken = False
         if not taken:

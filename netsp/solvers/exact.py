@@ -59,5 +59,5 @@ def solve(run: SolverRun) -> None:
         s &= ~(1 << (int(graph.cluster[v]) - 1))
         if s:
             v = int(np.argmin(reach[s] + costs[:, v]))
-    run.offer([0, *reversed(tour)])
+    run.update_incumbent([0, *reversed(tour)])
     run.raise_bound(min(length, run.length))

@@ -48,7 +48,7 @@ class SolverRun:
         self.infeasible = False
         self.stopped = False
 
-    def offer(
+    def update_incumbent(
         self,
         tour: Sequence[int] | None,
         walk: Sequence[int] | None = None,
@@ -101,10 +101,12 @@ class SolverRun:
         if self.graph.goal_count > 1:
             return False
         if self.graph.goal_count == 0:
-            self.offer([0])
+            self.update_incumbent([0])
         else:
             there = self.graph.members(1)
-            self.offer([0, int(there[np.argmin(self.graph.costs_among([0, *there])[0, 1:])])])
+            self.update_incumbent(
+                [0, int(there[np.argmin(self.graph.costs_among([0, *there])[0, 1:])])]
+            )
         self.bound = self.length
         return True
 
@@ -119,7 +121,9 @@ class SolverRun:
             # out and back to every goal: those legs are the tethers, which are known
             out = core[1:].tolist()
             walk = [0, *(w for v in out for w in (v, 0))]
-            self.offer([0, *out], walk=walk, length=2.0 * float(graph.costs_to_base[out].sum()))
+            self.update_incumbent(
+                [0, *out], walk=walk, length=2.0 * float(graph.costs_to_base[out].sum())
+            )
             return
         with graph.on_clock(None):  # a few legs; without them there would be nothing to show
             few = len(core) <= UNTIMED
@@ -130,7 +134,7 @@ class SolverRun:
                 k = int(np.argmin(np.where(left, near[tour[-1]], np.inf)))
                 tour.append(k)
                 left[k] = False
-            self.offer(core[tour].tolist())
+            self.update_incumbent(core[tour].tolist())
 
     def raise_bound(self, bound: float) -> None:
         """Take a lower bound if it is better; never above the incumbent."""

@@ -52,8 +52,8 @@ class SearchingRun(SolverRun):
     search_rounds
         Rounds of ruin and recreate of one search.
     outer
-        For a run over a core, the run over all classes and the core's vertices there: tours are
-        offered to it too, and its report shows them; bounds of the core mean nothing to it.
+        For a run over a core, the run over all classes and the core's vertices there: its
+        incumbent is updated, too, and its report shows it; bounds of the core mean nothing to it.
     """
 
     def __init__(
@@ -101,7 +101,7 @@ class SearchingRun(SolverRun):
         inner.iteration_limit = self.iteration_limit - self.iterations
         inner.outer = self, core
         if self.tour is not None:
-            inner.offer(np.searchsorted(core, np.array(self.tour)).tolist())
+            inner.update_incumbent(np.searchsorted(core, np.array(self.tour)).tolist())
         try:
             yield inner
         except (Stop, LimitReachedError):
@@ -114,17 +114,17 @@ class SearchingRun(SolverRun):
         """In the core."""
         return min(max(3, CORE // (self.graph.goal_count + 1)), MOST_CLASSES)
 
-    def offer(
+    def update_incumbent(
         self,
         tour: Sequence[int] | None,
         walk: Sequence[int] | None = None,
         length: float | None = None,
     ) -> bool:
-        """As `SolverRun.offer`; a tour of the core is offered to the outer run as well."""
-        taken = super().offer(tour, walk, length)
+        """As `SolverRun.update_incumbent`; a tour of the core is one of the outer run as well."""
+        taken = super().update_incumbent(tour, walk, length)
         if taken and self.outer and self.tour is not None:
             outer, core = self.outer
-            outer.offer(core[list(self.tour)].tolist(), length=self.length)
+            outer.update_incumbent(core[list(self.tour)].tolist(), length=self.length)
         return taken
 
     def report(self, stage: str, **more: Any) -> None:
@@ -159,7 +159,7 @@ class SearchingRun(SolverRun):
     def take(self, search: Search) -> None:
         """Offer what a search found; its legs are measured, so its length is known."""
         length, tour = search.best()
-        self.offer(tour, length=length)
+        self.update_incumbent(tour, length=length)
 
     @property
     def cutoff(self) -> float:

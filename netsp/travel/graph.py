@@ -39,7 +39,7 @@ the time: the length of a tour, say."""
 
 
 class Legs(Protocol):
-    """What a roadmap offers: lengths of legs between vertices, and their paths."""
+    """What a roadmap gives: lengths of legs between vertices, and their paths."""
 
     def lengths(
         self, vertices: Ints, asked: Bools | None = None, clock: Clock | None = None
