@@ -14,10 +14,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
+import numpy.typing as npt
 
 from netsp.anneal.cooling import Cooling, Schedule
+from netsp.arrays import Floats, Ints
 from netsp.compiled.chance import below, metropolis, seeded
+from netsp.compiled.kernel import kernel
 from netsp.lns.layers import Instance
 from netsp.lns.solve import core_of
 from netsp.solving.limits import Limits
@@ -117,10 +119,20 @@ def _anneal(run: SolverRun, rng: np.random.Generator, chosen: Params) -> None:
         run.report("anneal", current=length, entangled=0)
 
 
-@njit(cache=True)
+@kernel
 def anneal(
-    tour, best, length, best_length, count, theta, swaps, costs, start, cluster, chance
-):  # fmt: skip
+    tour: Ints,
+    best: Ints,
+    length: float,
+    best_length: float,
+    count: int,
+    theta: float,
+    swaps: float,
+    costs: Floats,
+    start: Ints,
+    cluster: Ints,
+    chance: npt.NDArray[np.uint64],
+) -> tuple[float, float]:
     """Make `count` proposals at temperature θ, in place; returns the length of the present tour
     and of the best, kept in `best`."""
     n = len(tour)

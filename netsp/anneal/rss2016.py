@@ -23,11 +23,12 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
+import numpy.typing as npt
 
 from netsp.anneal.cooling import Cooling, Schedule
 from netsp.arrays import Floats, Ints
 from netsp.compiled.chance import below, metropolis, seeded
+from netsp.compiled.kernel import kernel
 from netsp.solving.limits import Limits
 from netsp.solving.run import SolverRun
 from netsp.travel.graph import TravelGraph
@@ -190,14 +191,14 @@ def _admissible(graph: TravelGraph) -> tuple[Ints, Ints]:
     return np.array(children, dtype=np.int64), np.array(vertex, dtype=np.int64)
 
 
-@njit(cache=True)
-def _detour_length(a, b, via, planar, height):
+@kernel
+def _detour_length(a: int, b: int, via: int, planar: Floats, height: Floats) -> float:
     p = planar[a, b] if via < 0 else planar[a, via] + planar[b, via]
     return math.hypot(p, height[b] - height[a])
 
 
-@njit(cache=True)
-def _push(letter, size, stack, trie):
+@kernel
+def _push(letter: int, size: int, stack: Ints, trie: Ints) -> int:
     """Append a letter to the reduced word on the stack, with the trie node it leads to."""
     if size > 0 and stack[0, size - 1] == -letter:
         return size - 1
@@ -211,8 +212,8 @@ def _push(letter, size, stack, trie):
     return size + 1
 
 
-@njit(cache=True)
-def evaluate(state, table):
+@kernel
+def evaluate(state: State, table: Table) -> tuple[float, int, int]:
     """Length, entangled obstacles, and goals in a class the tether does not admit; `state.stops`
     takes the vertices."""
     order, via, stops, stack, turns = state.order, state.via, state.stops, state.stack, state.turns
@@ -269,8 +270,17 @@ def evaluate(state, table):
     return length, entangled, missed
 
 
-@njit(cache=True)
-def anneal(state, best_length, count, theta, k, swaps, table, chance):
+@kernel
+def anneal(
+    state: State,
+    best_length: float,
+    count: int,
+    theta: float,
+    k: float,
+    swaps: float,
+    table: Table,
+    chance: npt.NDArray[np.uint64],
+) -> tuple[float, int, float]:
     """Make `count` proposals at temperature θ, in place; returns length and entanglement of the
     present state and the length of the best valid one, whose vertices are in `state.best`."""
     order, via, stops, best = state.order, state.via, state.stops, state.best

@@ -11,7 +11,8 @@ import math
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
+
+from netsp.compiled.kernel import kernel
 
 
 def seeded(rng: np.random.Generator) -> npt.NDArray[np.uint64]:
@@ -19,8 +20,8 @@ def seeded(rng: np.random.Generator) -> npt.NDArray[np.uint64]:
     return np.array([rng.integers(1, 2**63)], dtype=np.uint64)
 
 
-@njit(cache=True)
-def uniform(state):
+@kernel
+def uniform(state: npt.NDArray[np.uint64]) -> float:
     """A double in [0, 1)."""
     x = state[0]
     x ^= x >> np.uint64(12)
@@ -30,14 +31,14 @@ def uniform(state):
     return np.float64((x * np.uint64(2685821657736338717)) >> np.uint64(11)) / 9007199254740992.0
 
 
-@njit(cache=True)
-def below(n, state):
+@kernel
+def below(n: int, state: npt.NDArray[np.uint64]) -> int:
     """A whole number in 0 … n - 1."""
     return int(uniform(state) * n)
 
 
-@njit(cache=True)
-def metropolis(rise, theta, state):
+@kernel
+def metropolis(rise: float, theta: float, state: npt.NDArray[np.uint64]) -> bool:
     """Whether a change of cost is accepted: always if it falls, else with probability
     exp(-rise / θ); equation (5) of 2017, (2) of 2016."""
     return rise <= 0.0 or uniform(state) < math.exp(-rise / theta)

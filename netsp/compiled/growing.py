@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from netsp.arrays import Floats, Ints
+from netsp.compiled.kernel import kernel
 
 
-@njit(cache=True)
-def more_rows(a):
+@kernel
+def more_rows(a: Floats) -> Floats:
     """The same rows with room for twice as many. Copied by hand: a slice assignment would compile
     NumPy's broadcasting and its error messages, seconds of work."""
     b = np.empty((2 * a.shape[0], a.shape[1]))
@@ -17,8 +19,8 @@ def more_rows(a):
     return b
 
 
-@njit(cache=True)
-def sort_in_place(a, n):
+@kernel
+def sort_in_place(a: Floats, n: int) -> None:
     """Sort the first n entries, few as they are, by insertion."""
     for i in range(1, n):
         x = a[i]
@@ -29,8 +31,8 @@ def sort_in_place(a, n):
         a[j + 1] = x
 
 
-@njit(cache=True, nogil=True)
-def more_int_rows(a):
+@kernel
+def more_int_rows(a: Ints) -> Ints:
     """The same rows with room for twice as many (copied by hand, see `more_rows`)."""
     b = np.empty((2 * a.shape[0], a.shape[1]), dtype=np.int64)
     for i in range(a.shape[0]):
@@ -39,8 +41,8 @@ def more_int_rows(a):
     return b
 
 
-@njit(cache=True, nogil=True)
-def longer(a):
+@kernel
+def longer(a: Floats) -> Floats:
     """A float array with room for twice as many."""
     b = np.empty(2 * len(a))
     for i in range(len(a)):

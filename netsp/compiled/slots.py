@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from netsp.arrays import Floats, Ints
+from netsp.compiled.kernel import kernel
 
 
-@njit(cache=True, nogil=True)
-def rehashed(key, value):
+@kernel
+def rehashed(key: Ints, value: Floats) -> tuple[Ints, Floats]:
     """The same keys (slots,), -1 where empty, and values (slots,) in twice the slots."""
     n = 2 * len(key)
     key2 = np.full(n, -1, dtype=np.int64)

@@ -12,9 +12,11 @@ import math
 from collections.abc import Callable, Iterator
 from functools import cache
 from types import FunctionType, SimpleNamespace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
+
+F = TypeVar("F", bound=Callable[..., Any])
 
 ALLOWANCE = 100_000
 """Steps of the innermost loop, about a tenth of a second, that a kernel may do interpreted."""
@@ -23,7 +25,7 @@ _left: dict[Any, int] = {}
 """Steps that are left of it, by kernel."""
 
 
-def choose(kernel: Any, steps: int) -> Callable[..., Any]:
+def choose(kernel: F, steps: int) -> F:
     """The kernel, or the interpreted one if the work is small and the kernel not loaded.
 
     Parameters
@@ -32,10 +34,10 @@ def choose(kernel: Any, steps: int) -> Callable[..., Any]:
         Most steps of its innermost loop.
     """
     left = _left.get(kernel, ALLOWANCE)
-    if steps > left or not _is_compiled(kernel) or kernel.signatures:
-        return kernel  # type: ignore[no-any-return]
+    if steps > left or not _is_compiled(kernel) or getattr(kernel, "signatures", False):
+        return kernel
     _left[kernel] = left - steps
-    return interpreted(kernel)
+    return interpreted(kernel)  # type: ignore[return-value]
 
 
 @contextlib.contextmanager

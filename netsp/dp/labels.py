@@ -11,15 +11,26 @@ known about the last k.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+import numpy.typing as npt
 
+from netsp.arrays import Bools, Floats, Ints
+from netsp.compiled.kernel import kernel
 from netsp.dp.memory import CHUNK
 
 LOW = (1 << CHUNK) - 1
 
 
-@njit(cache=True, nogil=True)
-def completions(costs, goal, start, prices, alive, least, onward, stop):
+@kernel
+def completions(
+    costs: Floats,
+    goal: Ints,
+    start: Ints,
+    prices: Floats,
+    alive: Bools,
+    least: Floats,
+    onward: Floats,
+    stop: Ints,
+) -> None:
     """Walks without memory but that of the goal before last: bounds on how labels are completed.
 
     Parameters
@@ -76,20 +87,33 @@ def completions(costs, goal, start, prices, alive, least, onward, stop):
             before[k + 1, u] = last
 
 
-@njit(cache=True, nogil=True)
-def translate(tables, g, h, memory):
+@kernel
+def translate(tables: npt.NDArray[np.int32], g: int, h: int, memory: int) -> int:
     """The memory at goal h of a walk that comes from goal g; negative if it must not."""
-    return (
+    return int(
         tables[g, h, 0, memory & LOW]
         | tables[g, h, 1, (memory >> CHUNK) & LOW]
         | tables[g, h, 2, memory >> (2 * CHUNK)]
     )
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def extend(
-    costs, start, first, last, bits, tables, pointer, cost, memory, onward, limit, cut, prices, stop
-):
+    costs: Floats,
+    start: Ints,
+    first: int,
+    last: int,
+    bits: Ints,
+    tables: npt.NDArray[np.int32],
+    pointer: Ints,
+    cost: Floats,
+    memory: npt.NDArray[np.int32],
+    onward: Floats,
+    limit: Floats,
+    cut: float,
+    prices: Floats,
+    stop: Ints,
+) -> tuple[Ints, Floats, npt.NDArray[np.int32]]:
     """Labels of the next layer at goals first to last - 1, from those of this layer.
 
     Parameters
@@ -184,8 +208,17 @@ def extend(
     return out_pointer, out_cost[:used_up], out_memory[:used_up]
 
 
-@njit(cache=True, nogil=True)
-def join(goal, prices, a_pointer, a_cost, a_memory, b_pointer, b_cost, b_memory):
+@kernel
+def join(
+    goal: Ints,
+    prices: Floats,
+    a_pointer: Ints,
+    a_cost: Floats,
+    a_memory: npt.NDArray[np.int32],
+    b_pointer: Ints,
+    b_cost: Floats,
+    b_memory: npt.NDArray[np.int32],
+) -> Floats:
     """(V,) cost of the best walk through v, from walks that end there and such read backwards: they
     may remember no goal in common but that of v."""
     count = len(goal)
@@ -206,8 +239,19 @@ def join(goal, prices, a_pointer, a_cost, a_memory, b_pointer, b_cost, b_memory)
     return out
 
 
-@njit(cache=True, nogil=True)
-def step_back(costs, goal, prices, tables, v, at_cost, at_memory, pointer, cost, memory):
+@kernel
+def step_back(
+    costs: Floats,
+    goal: Ints,
+    prices: Floats,
+    tables: npt.NDArray[np.int32],
+    v: int,
+    at_cost: float,
+    at_memory: int,
+    pointer: Ints,
+    cost: Floats,
+    memory: npt.NDArray[np.int32],
+) -> tuple[int, int]:
     """(vertex, label) of the layer before that a label at v came from."""
     off, from_vertex, from_label = np.inf, -1, -1
     h = goal[v]

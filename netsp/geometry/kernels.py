@@ -10,9 +10,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from netsp.arrays import Floats, Ints
+from netsp.compiled.kernel import kernel
 
 TWO_PI = 2.0 * math.pi
 
@@ -40,8 +40,10 @@ class Blockers(NamedTuple):
     eps: float
 
 
-@njit(cache=True)
-def point_segment_distance(px, py, ax, ay, bx, by):
+@kernel
+def point_segment_distance(
+    px: float, py: float, ax: float, ay: float, bx: float, by: float
+) -> float:
     """Distance from a point to the segment ab."""
     dx, dy = bx - ax, by - ay
     length2 = dx * dx + dy * dy
@@ -51,8 +53,10 @@ def point_segment_distance(px, py, ax, ay, bx, by):
     return math.hypot(px - ax - t * dx, py - ay - t * dy)
 
 
-@njit(cache=True)
-def segments_cross(ax, ay, bx, by, cx, cy, dx, dy):
+@kernel
+def segments_cross(
+    ax: float, ay: float, bx: float, by: float, cx: float, cy: float, dx: float, dy: float
+) -> bool:
     """Whether two segments properly cross."""
     d1 = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
     d2 = (bx - ax) * (dy - ay) - (by - ay) * (dx - ax)
@@ -61,8 +65,10 @@ def segments_cross(ax, ay, bx, by, cx, cy, dx, dy):
     return (d1 > 0.0) != (d2 > 0.0) and (d3 > 0.0) != (d4 > 0.0)
 
 
-@njit(cache=True)
-def segment_segment_distance(ax, ay, bx, by, cx, cy, dx, dy):
+@kernel
+def segment_segment_distance(
+    ax: float, ay: float, bx: float, by: float, cx: float, cy: float, dx: float, dy: float
+) -> float:
     """Distance between the segments ab and cd; 0 where they cross."""
     if segments_cross(ax, ay, bx, by, cx, cy, dx, dy):
         return 0.0
@@ -74,8 +80,8 @@ def segment_segment_distance(ax, ay, bx, by, cx, cy, dx, dy):
     )
 
 
-@njit(cache=True)
-def point_in_polygon(px, py, edges, start, stop):
+@kernel
+def point_in_polygon(px: float, py: float, edges: Floats, start: int, stop: int) -> bool:
     """Whether a point lies in the polygon of edges (n, 4) start to stop - 1."""
     inside = False
     for e in range(start, stop):
@@ -87,12 +93,12 @@ def point_in_polygon(px, py, edges, start, stop):
     return inside
 
 
-@njit(cache=True)
-def depth_in_obstacle(px, py, o, blockers):
+@kernel
+def depth_in_obstacle(px: float, py: float, o: int, blockers: Blockers) -> float:
     """How deep a point lies inside obstacle `o`; negative outside."""
     circles, edges, edge_start = blockers.circles, blockers.edges, blockers.edge_start
     if circles[o, 2] >= 0.0:
-        return circles[o, 2] - math.hypot(px - circles[o, 0], py - circles[o, 1])
+        return float(circles[o, 2] - math.hypot(px - circles[o, 0], py - circles[o, 1]))
     d = np.inf
     for e in range(edge_start[o], edge_start[o + 1]):
         d = min(
@@ -100,16 +106,16 @@ def depth_in_obstacle(px, py, o, blockers):
         )
     if point_in_polygon(px, py, edges, edge_start[o], edge_start[o + 1]):
         d = -d
-    return blockers.grow[o] - d
+    return float(blockers.grow[o] - d)
 
 
-@njit(cache=True)
-def enters_obstacle(ax, ay, bx, by, o, blockers):
+@kernel
+def enters_obstacle(ax: float, ay: float, bx: float, by: float, o: int, blockers: Blockers) -> bool:
     """Whether a segment enters obstacle `o` deeper than eps."""
     circles, edges, edge_start = blockers.circles, blockers.edges, blockers.edge_start
     if circles[o, 2] >= 0.0:
         d = point_segment_distance(circles[o, 0], circles[o, 1], ax, ay, bx, by)
-        return d < circles[o, 2] - blockers.eps
+        return bool(d < circles[o, 2] - blockers.eps)
     for e in range(edge_start[o], edge_start[o + 1]):
         d = segment_segment_distance(
             ax, ay, bx, by, edges[e, 0], edges[e, 1], edges[e, 2], edges[e, 3]
@@ -119,8 +125,8 @@ def enters_obstacle(ax, ay, bx, by, o, blockers):
     return point_in_polygon(ax, ay, edges, edge_start[o], edge_start[o + 1])
 
 
-@njit(cache=True)
-def segment_blocked(ax, ay, bx, by, blockers):
+@kernel
+def segment_blocked(ax: float, ay: float, bx: float, by: float, blockers: Blockers) -> bool:
     """Whether the segment ab enters any of the blockers by more than eps."""
     box = blockers.box
     left, right, low, high = min(ax, bx), max(ax, bx), min(ay, by), max(ay, by)
@@ -132,8 +138,10 @@ def segment_blocked(ax, ay, bx, by, blockers):
     return False
 
 
-@njit(cache=True)
-def circle_line_angles(cx, cy, r, ax, ay, bx, by, out, n):
+@kernel
+def circle_line_angles(
+    cx: float, cy: float, r: float, ax: float, ay: float, bx: float, by: float, out: Floats, n: int
+) -> int:
     """Append the angles at which a circle meets the line through two points; returns the count."""
     dx, dy = bx - ax, by - ay
     length = math.hypot(dx, dy)
@@ -150,8 +158,10 @@ def circle_line_angles(cx, cy, r, ax, ay, bx, by, out, n):
     return n
 
 
-@njit(cache=True)
-def circle_circle_angles(cx, cy, r, ox, oy, q, out, n):
+@kernel
+def circle_circle_angles(
+    cx: float, cy: float, r: float, ox: float, oy: float, q: float, out: Floats, n: int
+) -> int:
     """Append the angles (on the first circle) at which two circles meet; returns the count."""
     d = math.hypot(ox - cx, oy - cy)
     if d == 0.0 or r == 0.0:

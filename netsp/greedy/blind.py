@@ -59,7 +59,7 @@ def solve(graph: TravelGraph, params: None = None, limits: Limits | None = None)
 
 
 def _nearest_neighbour(run: SolverRun) -> Trajectory | None:
-    """The trajectory, or None if it happens to be a tour of the graph: then that is the incumbent."""
+    """The trajectory, or None if it is a tour of the graph: then that is the incumbent."""
     graph = run.graph
     detours = graph.detours(sub_goals=False, check=run.check)
     order, here = [], 0

@@ -6,9 +6,9 @@ from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
 from netsp.arrays import Floats, Ints
+from netsp.compiled.kernel import kernel
 from netsp.travel.graph import TravelGraph
 
 NEAR = 12
@@ -118,8 +118,8 @@ class Instance:
         return tuple(int(v) for v in self.labels[np.asarray(tour, dtype=np.int64)])
 
 
-@njit(cache=True)
-def best_classes(clusters, start, costs):
+@kernel
+def best_classes(clusters: Ints, start: Ints, costs: Floats) -> tuple[float, Ints]:
     """Length and vertices (base first) of the best tour that visits clusters in the given order."""
     n = len(clusters)
     largest = 0

@@ -14,9 +14,11 @@ behind[k + 1, l]``, every class of every other goal chosen anew.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+import numpy.typing as npt
 
+from netsp.arrays import Bools, Floats, Ints
 from netsp.compiled.chance import below, uniform
+from netsp.compiled.kernel import kernel
 
 LONGEST_STRING = 10
 """Most clusters in one removed stretch."""
@@ -28,8 +30,8 @@ BLINK = 0.01
 """Chance that a place is overlooked (same paper, section 3.3)."""
 
 
-@njit(cache=True, nogil=True)
-def forward(order, n, first, start, costs, ahead):
+@kernel
+def forward(order: Ints, n: int, first: int, start: Ints, costs: Floats, ahead: Floats) -> None:
     """Fill ``ahead`` from position `first` on; order[0] is the base, positions run to n - 1."""
     for k in range(first, n):
         c, p = order[k], order[k - 1]
@@ -42,8 +44,8 @@ def forward(order, n, first, start, costs, ahead):
             ahead[k, j - start[c]] = best
 
 
-@njit(cache=True, nogil=True)
-def backward(order, n, last, start, costs, behind):
+@kernel
+def backward(order: Ints, n: int, last: int, start: Ints, costs: Floats, behind: Floats) -> None:
     """Fill ``behind`` from position `last` down to 1; behind[n] is the way from the base home."""
     for k in range(last, 0, -1):
         c = order[k]
@@ -57,8 +59,18 @@ def backward(order, n, last, start, costs, behind):
             behind[k, j - start[c]] = best
 
 
-@njit(cache=True, nogil=True)
-def inserted(c, k, order, n, start, costs, ahead, behind, limit):
+@kernel
+def inserted(
+    c: int,
+    k: int,
+    order: Ints,
+    n: int,
+    start: Ints,
+    costs: Floats,
+    ahead: Floats,
+    behind: Floats,
+    limit: float,
+) -> float:
     """Length of the best tour with cluster c after position k."""
     p = order[k]
     q = order[k + 1] if k + 1 < n else 0
@@ -78,8 +90,19 @@ def inserted(c, k, order, n, start, costs, ahead, behind, limit):
     return best
 
 
-@njit(cache=True, nogil=True)
-def insert_best(c, order, n, start, costs, near, ahead, behind, blink, chance):
+@kernel
+def insert_best(
+    c: int,
+    order: Ints,
+    n: int,
+    start: Ints,
+    costs: Floats,
+    near: Bools,
+    ahead: Floats,
+    behind: Floats,
+    blink: float,
+    chance: npt.NDArray[np.uint64],
+) -> tuple[int, float]:
     """Put a cluster where it costs least, next to one of its near clusters or the base; returns the
     new size and the length of the tour."""
     best, at = np.inf, -1
@@ -110,8 +133,17 @@ def insert_best(c, order, n, start, costs, near, ahead, behind, blink, chance):
     return n, best
 
 
-@njit(cache=True, nogil=True)
-def descend(order, start, costs, near, ahead, behind, chance, stop):
+@kernel
+def descend(
+    order: Ints,
+    start: Ints,
+    costs: Floats,
+    near: Bools,
+    ahead: Floats,
+    behind: Floats,
+    chance: npt.NDArray[np.uint64],
+    stop: Ints,
+) -> float:
     """Take every cluster out and put it back where it costs least, until nothing improves; returns
     the length."""
     n = len(order)
@@ -140,8 +172,8 @@ def descend(order, start, costs, near, ahead, behind, chance, stop):
     return length
 
 
-@njit(cache=True, nogil=True)
-def tour_length(order, start, costs, ahead, behind):
+@kernel
+def tour_length(order: Ints, start: Ints, costs: Floats, ahead: Floats, behind: Floats) -> float:
     """Length of the best tour in the given order."""
     n = len(order)
     if n == 1:
@@ -155,8 +187,16 @@ def tour_length(order, start, costs, ahead, behind):
     return best
 
 
-@njit(cache=True, nogil=True)
-def two_opt(order, start, costs, nearest, ahead, behind, stop):
+@kernel
+def two_opt(
+    order: Ints,
+    start: Ints,
+    costs: Floats,
+    nearest: Floats,
+    ahead: Floats,
+    behind: Floats,
+    stop: Ints,
+) -> float:
     """Reverse stretches of the order as long as that shortens the tour; candidates are those whose
     two new legs could be shorter than the two old ones; returns the length."""
     n = len(order)
@@ -189,8 +229,8 @@ def two_opt(order, start, costs, nearest, ahead, behind, stop):
     return length
 
 
-@njit(cache=True, nogil=True)
-def trace(order, start, costs, ahead, tour):
+@kernel
+def trace(order: Ints, start: Ints, costs: Floats, ahead: Floats, tour: Ints) -> None:
     """The vertices of the best tour, from ``ahead`` filled for the order."""
     n = len(order)
     tour[0] = 0
@@ -206,10 +246,21 @@ def trace(order, start, costs, ahead, tour):
         v = pick
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def ruin_and_recreate(
-    order, best, length, best_length, count, theta, start, costs, nearest, near, rank, chance
-):  # fmt: skip
+    order: Ints,
+    best: Ints,
+    length: float,
+    best_length: float,
+    count: int,
+    theta: float,
+    start: Ints,
+    costs: Floats,
+    nearest: Floats,
+    near: Bools,
+    rank: Ints,
+    chance: npt.NDArray[np.uint64],
+) -> tuple[float, float]:
     """Make `count` rounds at temperature θ, in place; returns the lengths of the present order and
     of the best, which is kept in `best`.
 

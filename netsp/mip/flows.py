@@ -3,14 +3,26 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from netsp.arrays import Bools, Floats, Ints
+from netsp.compiled.kernel import kernel
 
 TINY = 1e-11
 """Residual capacity that counts as none."""
 
 
-@njit(cache=True, nogil=True)
-def min_cuts(n, tail, head, capacity, x, cluster, sink, wanted, enough):
+@kernel
+def min_cuts(
+    n: int,
+    tail: Ints,
+    head: Ints,
+    capacity: Floats,
+    x: Floats,
+    cluster: Ints,
+    sink: int,
+    wanted: Ints,
+    enough: float,
+) -> tuple[Bools, Ints, Floats]:
     r"""For every wanted cluster C the vertex set S of least ``capacity(δ(S)) + 2 x(C \ S)`` without
     the sink, if that is below `enough`.
 

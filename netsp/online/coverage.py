@@ -11,13 +11,13 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
-from netsp.arrays import Floats
+from netsp.arrays import Bools, Floats
+from netsp.compiled.kernel import kernel
 from netsp.errors import InputError
 from netsp.online.mission import Camera
 from netsp.online.scene.field import DistanceField
-from netsp.online.scene.sampling import lowest_along
+from netsp.online.scene.sampling import Field, lowest_along
 from netsp.online.scene.scene import Scene
 from netsp.online.scene.shapes import HalfSpace
 from netsp.online.scene.surfaces import drawn_points, extent, mesh_of, surface_of
@@ -157,8 +157,8 @@ class Coverage:
         return np.asarray(self.patches.centres[nearest(self.patches.centres, eye)] - eye)
 
 
-@njit(cache=True)
-def nearest(centres, eye):
+@kernel
+def nearest(centres: Floats, eye: Floats) -> int:
     """Which of some points (n, 3) is nearest."""
     best, at = math.inf, 0
     for i in range(len(centres)):
@@ -172,10 +172,21 @@ def nearest(centres, eye):
     return at
 
 
-@njit(cache=True)
+@kernel
 def mark(
-    field, centres, normals, shares, seen, seen_through, eye, yaw, pitch, half, reach, off
-):  # fmt: skip
+    field: Field,
+    centres: Floats,
+    normals: Floats,
+    shares: Floats,
+    seen: Bools,
+    seen_through: Bools,
+    eye: Floats,
+    yaw: float,
+    pitch: float,
+    half: float,
+    reach: float,
+    off: float,
+) -> tuple[float, float]:
     """Mark the patches that are in view, no farther than `reach`.
 
     Returns the shares that were new, with and without regard to what stands in between.

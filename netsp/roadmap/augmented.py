@@ -15,11 +15,11 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from numba import njit
 
 from netsp.arrays import Floats, Ints
 from netsp.clock import NEVER, Flag
 from netsp.compiled.growing import longer, more_int_rows
+from netsp.compiled.kernel import kernel
 from netsp.errors import InputError, NetspError
 from netsp.hsignature import Word
 from netsp.roadmap.trie import LETTER, PARENT, Trie, add_child, trie_child
@@ -189,8 +189,8 @@ def augment(
     )  # fmt: skip
 
 
-@njit(cache=True)
-def _onward(node, k, letters, row, trie, size):
+@kernel
+def _onward(node: int, k: int, letters: Ints, row: Ints, trie: Ints, size: int) -> tuple[int, int]:
     """The trie node after edge k (negative: backwards); -1 where the word loops. Makes nodes up to
     the capacity of the trie when size >= 0, else only finds them. Returns node, size."""
     backward = k < 0
@@ -212,8 +212,8 @@ def _onward(node, k, letters, row, trie, size):
     return node, size
 
 
-@njit(cache=True)
-def _loops(node, trie):
+@kernel
+def _loops(node: int, trie: Ints) -> bool:
     v = node
     while v > 0:
         u = trie[v, PARENT]
@@ -225,8 +225,18 @@ def _loops(node, trie):
     return False
 
 
-@njit(cache=True)
-def _reach(start, number, head, cost, letters, row, limit, cap, stop):
+@kernel
+def _reach(
+    start: Ints,
+    number: Ints,
+    head: Ints,
+    cost: Floats,
+    letters: Ints,
+    row: Ints,
+    limit: float,
+    cap: int,
+    stop: Ints,
+) -> tuple[Ints, Ints, Floats, Ints, int, bool, bool]:
     """Dijkstra over (milestone, word) from (0, empty word), up to the tether length."""
     trie = np.full((256, 5), -1, dtype=np.int64)
     trie[0, LETTER] = 0
@@ -336,8 +346,8 @@ def _reach(start, number, head, cost, letters, row, limit, cap, stop):
     )
 
 
-@njit(cache=True)
-def _sift_up(heap_d, heap_v, at, d, v):
+@kernel
+def _sift_up(heap_d: Floats, heap_v: Ints, at: int, d: float, v: int) -> None:
     while at > 0:
         up = (at - 1) // 2
         if heap_d[up] <= d:
@@ -347,8 +357,8 @@ def _sift_up(heap_d, heap_v, at, d, v):
     heap_d[at], heap_v[at, 0] = d, v
 
 
-@njit(cache=True)
-def _sift_down(heap_d, heap_v, heap):
+@kernel
+def _sift_down(heap_d: Floats, heap_v: Ints, heap: int) -> None:
     """Put the last entry in the place of the first."""
     d, v = heap_d[heap], heap_v[heap, 0]
     at = 0
@@ -365,8 +375,18 @@ def _sift_down(heap_d, heap_v, heap):
     heap_d[at], heap_v[at, 0] = d, v
 
 
-@njit(cache=True)
-def _expand(start, number, head, letters, row, milestone, node, trie, n):
+@kernel
+def _expand(
+    start: Ints,
+    number: Ints,
+    head: Ints,
+    letters: Ints,
+    row: Ints,
+    milestone: Ints,
+    node: Ints,
+    trie: Ints,
+    n: int,
+) -> tuple[Ints, Ints, Ints]:
     """Edges among the augmented vertices, as compressed rows; `edge` is the undirected number."""
     count = len(milestone)
     slots = 4

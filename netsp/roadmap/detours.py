@@ -14,10 +14,10 @@ from dataclasses import replace
 
 import numpy as np
 import shapely
-from numba import njit
 
 from netsp.arrays import Floats, Ints
 from netsp.clock import NEVER, Flag
+from netsp.compiled.kernel import kernel
 from netsp.hsignature import signature
 from netsp.problem import Problem
 from netsp.roadmap.outline import Outline, build_outline
@@ -152,8 +152,10 @@ def tabulate(
     )
 
 
-@njit(cache=True)
-def _far_sides(xy, middles, places, side, first):
+@kernel
+def _far_sides(
+    xy: Floats, middles: Floats, places: Floats, side: Ints, first: int
+) -> tuple[Floats, Ints]:
     """Distance of a path from every obstacle's middle, and the sub-goal most opposite to it."""
     n = len(middles)
     near = np.full(n, np.inf)

@@ -20,11 +20,11 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
 from netsp.arrays import Floats, Ints
 from netsp.clock import NEVER, Flag
 from netsp.compiled.growing import longer, more_int_rows, more_rows
+from netsp.compiled.kernel import kernel
 from netsp.compiled.slots import rehashed
 from netsp.roadmap.tangents import TangentGraph
 from netsp.roadmap.trie import CORE, LETTER, PARENT, Trie, add_child, trie_child
@@ -113,8 +113,8 @@ TURN, REACHED, SLID = range(3)
 """Its angle to the first departure, length at arrival, angle slid before the departure taken."""
 
 
-@njit(cache=True, nogil=True)
-def _may_wait(node, x, y, trie, pending):
+@kernel
+def _may_wait(node: int, x: float, y: float, trie: Ints, pending: Floats) -> bool:
     """Whether the letters that lead out of the core can all still be cancelled from a bend at
     (x, y)."""
     v = node
@@ -131,11 +131,11 @@ def _may_wait(node, x, y, trie, pending):
     return True
 
 
-@njit(cache=True, nogil=True)
-def _in_box(a, x, y, pending):
+@kernel
+def _in_box(a: int, x: float, y: float, pending: Floats) -> bool:
     side = 0 if a > 0 else 1
     i = abs(a) - 1
-    return (
+    return bool(
         x >= pending[side, i, 0]
         and y >= pending[side, i, 1]
         and x <= pending[side, i, 2]
@@ -143,8 +143,8 @@ def _in_box(a, x, y, pending):
     )
 
 
-@njit(cache=True, nogil=True)
-def _joins(node, a, rule, trie):
+@kernel
+def _joins(node: int, a: int, rule: int, trie: Ints) -> bool:
     """Whether the word of a node with one letter more is one of those that are sought."""
     if rule == GIVEN or trie[node, CORE] == 0:
         return False
@@ -157,12 +157,24 @@ def _joins(node, a, rule, trie):
     return True
 
 
-@njit(cache=True, nogil=True)
-def _walk(node, lo, hi, x, y, letters, pending, rule, trie, limit, size):
+@kernel
+def _walk(
+    node: int,
+    lo: int,
+    hi: int,
+    x: float,
+    y: float,
+    letters: npt.NDArray[np.int32],
+    pending: Floats,
+    rule: int,
+    trie: Ints,
+    limit: Floats,
+    size: int,
+) -> tuple[int, int]:
     """The trie node after the letters lo … hi on the way to a bend at (x, y), made where it may
     exist; -1 if no wanted word can follow. Returns node, size."""
     for k in range(lo, hi):
-        a = np.int64(letters[k])
+        a = int(letters[k])
         if node > 0 and trie[node, LETTER] == -a:
             node = trie[node, PARENT]
             continue
@@ -181,8 +193,8 @@ def _walk(node, lo, hi, x, y, letters, pending, rule, trie, limit, size):
     return node, size
 
 
-@njit(cache=True, nogil=True)
-def _arrives_anew(code, mark, same, key, length):
+@kernel
+def _arrives_anew(code: int, mark: float, same: float, key: Ints, length: Floats) -> bool:
     """Whether no arrival with this code (word and directed arc) had this length; it is noted.
     Collinear tangents give one path several spellings."""
     slots = len(key)
@@ -198,8 +210,10 @@ def _arrives_anew(code, mark, same, key, length):
     return True
 
 
-@njit(cache=True, nogil=True)
-def explore(net, words, ask, source, trie, limit, size, stop):
+@kernel
+def explore(
+    net: Net, words: Words, ask: Ask, source: int, trie: Ints, limit: Floats, size: int, stop: Ints
+) -> tuple[tuple[Ints, Floats, int], tuple[Ints, Floats], tuple[Ints, Floats], bool]:
     """All taut paths from node `source` whose words stay in (or pend from) the core of the trie,
     which has `size` nodes, each with the limit of its paths.
 

@@ -9,11 +9,11 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from netsp.arrays import Bools, Floats, Ints
 from netsp.clock import NEVER, Clock, Flag
 from netsp.compiled.growing import longer, more_int_rows
+from netsp.compiled.kernel import kernel
 from netsp.errors import LimitReachedError, NetspError
 from netsp.hsignature import Word, concatenate, invert
 from netsp.memory import ask
@@ -232,8 +232,8 @@ class TautLegs:
         return out
 
 
-@njit(cache=True, nogil=True)
-def _together(u, v, last, parent, depth):
+@kernel
+def _together(u: int, v: int, last: Ints, parent: Ints, depth: Ints) -> int:
     """The last bend that the tethers of two vertices share."""
     s, t = last[u], last[v]
     while s != t:
@@ -241,30 +241,32 @@ def _together(u, v, last, parent, depth):
             s = parent[s]
         else:
             t = parent[t]
-    return s
+    return int(s)
 
 
-@njit(cache=True, nogil=True)
-def _shared(u, v, letters, row):
+@kernel
+def _shared(u: int, v: int, letters: Ints, row: Ints) -> int:
     """How many letters two words begin with in common."""
     n = min(row[u + 1] - row[u], row[v + 1] - row[v])
     for k in range(n):
         if letters[row[u] + k] != letters[row[v] + k]:
             return k
-    return n
+    return int(n)
 
 
-@njit(cache=True, nogil=True)
-def _entry(goal, node, head, entry):
+@kernel
+def _entry(goal: int, node: int, head: Ints, entry: Ints) -> int:
     """The entry of a goal in a node's list, -1 if there is none."""
     e = head[node, 0]
     while e >= 0 and entry[e, 0] != goal:
         e = entry[e, 1]
-    return e
+    return int(e)
 
 
-@njit(cache=True, nogil=True)
-def _wanted(here, there, asked, tethers, margin, pending):
+@kernel
+def _wanted(
+    here: Ints, there: Ints, asked: Bools, tethers: Tethers, margin: float, pending: Floats
+) -> tuple[Ints, Floats, int, Ints, Ints, Ints, Ints]:
     """The trie of all relative words between two lists of vertices.
 
     Returns the trie, per node the head of a list of (goal, entry), and the entry of each pair.
@@ -274,7 +276,7 @@ def _wanted(here, there, asked, tethers, margin, pending):
     trie = np.full((256, 5), -1, dtype=np.int64)
     limit = np.zeros(256)
     trie[0, LETTER], trie[0, CORE] = 0, 1
-    zero, one = np.int64(0), np.int64(1)  # no literals: callees are compiled once
+    zero, one = int(np.int64(0)), int(np.int64(1))  # no literals: callees are compiled once
     size = one
     head = np.full((256, 1), -1, dtype=np.int64)
     entry = np.empty((1024, 2), dtype=np.int64)
@@ -330,8 +332,16 @@ def _wanted(here, there, asked, tethers, margin, pending):
     return trie, limit, size, head[:, 0], entry[:entries, 0], entry[:entries, 1], pair
 
 
-@njit(cache=True, nogil=True)
-def _match(goal, node, length, head, entry_goal, entry_next, entries):
+@kernel
+def _match(
+    goal: Ints,
+    node: Ints,
+    length: Floats,
+    head: Ints,
+    entry_goal: Ints,
+    entry_next: Ints,
+    entries: int,
+) -> Floats:
     """Shortest hit of every entry; inf where there is none."""
     out = np.full(entries, np.inf)
     for i in range(len(goal)):

@@ -7,12 +7,26 @@ letters of consecutive pieces that share an end fit together exactly.
 from __future__ import annotations
 
 import math
+from typing import Any
 
-from numba import njit
+import numpy as np
+import numpy.typing as npt
+
+from netsp.arrays import Floats, Ints
+from netsp.compiled.kernel import kernel
 
 
-@njit(cache=True)
-def segment_letters(ax, ay, bx, by, rays, order, out, n):
+@kernel
+def segment_letters(
+    ax: float,
+    ay: float,
+    bx: float,
+    by: float,
+    rays: Floats,
+    order: Ints,
+    out: npt.NDArray[np.integer[Any]],
+    n: int,
+) -> int:
     """Append the letters of a straight segment to `out`; returns the new count."""
     k = len(order)
     rightward = bx > ax
@@ -28,8 +42,20 @@ def segment_letters(ax, ay, bx, by, rays, order, out, n):
     return n
 
 
-@njit(cache=True)
-def arc_letters(cx, cy, r, ax, bx, start, turn, rays, order, out, n):
+@kernel
+def arc_letters(
+    cx: float,
+    cy: float,
+    r: float,
+    ax: float,
+    bx: float,
+    start: float,
+    turn: float,
+    rays: Floats,
+    order: Ints,
+    out: npt.NDArray[np.int32],
+    n: int,
+) -> int:
     """Append the letters of an arc from angle `start` through the signed angle `turn`.
 
     Parameters

@@ -19,10 +19,10 @@ from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
 from netsp.arrays import Floats
 from netsp.compiled.growing import more_rows, sort_in_place
+from netsp.compiled.kernel import kernel
 from netsp.compiled.tiers import choose
 from netsp.geometry.kernels import (
     TWO_PI,
@@ -44,8 +44,8 @@ tangents are well conditioned even at the tiny arcs of a polygon without clearan
 no length changes by more."""
 
 
-@njit(cache=True)
-def depths(x, y, blockers):
+@kernel
+def depths(x: float, y: float, blockers: Blockers) -> Floats:
     """(n,) depth of a point in each grown obstacle, negative outside."""
     out = np.empty(len(blockers.grow))
     for o in range(len(out)):
@@ -57,7 +57,7 @@ def is_free(points: Floats, blockers: Blockers) -> bool:
     """Whether a polyline (k, 2 or 3) enters no grown obstacle."""
     xy = np.asarray(points, dtype=float)[:, :2]
     blocked = choose(segment_blocked, len(xy) * (len(blockers.box) + len(blockers.edges)))
-    return not any(blocked(*p, *q, blockers) for p, q in pairwise(xy))
+    return not any(blocked(p[0], p[1], q[0], q[1], blockers) for p, q in pairwise(xy))
 
 
 @dataclass(frozen=True)
@@ -192,8 +192,8 @@ def _push_out_of_polygon(p: Floats, o: int, blockers: Blockers, stand_off: float
     return np.asarray(foot[k] + unit * (blockers.grow[o] + stand_off))
 
 
-@njit(cache=True)
-def _covered(x, y, blockers, bounds):
+@kernel
+def _covered(x: float, y: float, blockers: Blockers, bounds: Floats) -> bool:
     box, eps = blockers.box, blockers.eps
     if x < bounds[0] - eps or x > bounds[2] + eps or y < bounds[1] - eps or y > bounds[3] + eps:
         return True
@@ -207,13 +207,13 @@ def _covered(x, y, blockers, bounds):
     return False
 
 
-@njit(cache=True)
-def _visible_arcs(disks, blockers, bounds):
+@kernel
+def _visible_arcs(disks: Floats, blockers: Blockers, bounds: Floats) -> Floats:
     """The parts of each disk's cone that no other obstacle covers and that lie within bounds."""
     circles, edges, edge_start = blockers.circles, blockers.edges, blockers.edge_start
     grow, box, eps = blockers.grow, blockers.box, blockers.eps
     arcs = np.empty((16, 6))  # the sixth column tells a whole circle
-    zero = np.int64(0)  # no literal: numba would compile every callee for it once more
+    zero = int(np.int64(0))  # no literal: numba would compile every callee for it once more
     count = zero
     room = 2 * len(circles) + 6 * len(edges) + 16
     cuts = np.empty(room)
@@ -282,8 +282,10 @@ def _visible_arcs(disks, blockers, bounds):
     return arcs[:count]
 
 
-@njit(cache=True)
-def _append(arcs, count, cx, cy, r, start, end, whole):
+@kernel
+def _append(
+    arcs: Floats, count: int, cx: float, cy: float, r: float, start: float, end: float, whole: float
+) -> tuple[Floats, int]:
     if count == len(arcs):
         arcs = more_rows(arcs)
     arcs[count, 0], arcs[count, 1], arcs[count, 2] = cx, cy, r

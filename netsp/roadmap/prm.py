@@ -16,12 +16,12 @@ from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from netsp.arrays import Bools, Floats, Ints
 from netsp.clock import NEVER, Clock, Flag, TimeLimit
+from netsp.compiled.kernel import kernel
 from netsp.errors import InfeasibleError, InputError, LimitReachedError
-from netsp.geometry.kernels import depth_in_obstacle, segment_blocked
+from netsp.geometry.kernels import Blockers, depth_in_obstacle, segment_blocked
 from netsp.hsignature import Word
 from netsp.problem import Circle, Problem
 from netsp.roadmap.augmented import AugmentedGraph, augment
@@ -365,8 +365,8 @@ def _exactly_free(edges: Ints, milestones: Floats, outline: Outline) -> Ints:
     return np.asarray(edges[_free_edges(edges, milestones, outline.blockers)])
 
 
-@njit(cache=True)
-def _point_free(x, y, blockers):
+@kernel
+def _point_free(x: float, y: float, blockers: Blockers) -> bool:
     box = blockers.box
     for o in range(len(box)):
         if (
@@ -378,8 +378,8 @@ def _point_free(x, y, blockers):
     return True
 
 
-@njit(cache=True)
-def _free_edges(pairs, points, blockers):
+@kernel
+def _free_edges(pairs: Ints, points: Floats, blockers: Blockers) -> Bools:
     out = np.empty(len(pairs), dtype=np.bool_)
     for k in range(len(pairs)):
         a, b = pairs[k, 0], pairs[k, 1]
@@ -396,8 +396,8 @@ def _edge_letters(edges: Ints, milestones: Floats, rays: Floats) -> tuple[Ints, 
     return out, start
 
 
-@njit(cache=True)
-def _all_letters(edges, points, rays, order):
+@kernel
+def _all_letters(edges: Ints, points: Floats, rays: Floats, order: Ints) -> tuple[Ints, Ints]:
     start = np.zeros(len(edges) + 1, dtype=np.int64)
     scratch = np.empty(len(rays) + 1, dtype=np.int64)
     for k in range(len(edges)):

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from netsp.problem import Circle, Problem
 from netsp.roadmap.outline import Outline
 from netsp.roadmap.shortest import ContactGraph
+
+if TYPE_CHECKING:
+    import shapely
 
 
 def explain_unreached(problem: Problem, outline: Outline, missing: list[int]) -> str:
@@ -49,7 +53,12 @@ def _enclosure(problem: Problem, g: int) -> str:
     return "the obstacles between close every way"
 
 
-def _ring_around(point, shapes, box, problem):
+def _ring_around(
+    point: shapely.Point,
+    shapes: list[shapely.Polygon],
+    box: shapely.Polygon | None,
+    problem: Problem,
+) -> list[str]:
     import shapely
 
     tolerance = 1e-6 * problem.scale

@@ -26,10 +26,10 @@ from typing import NamedTuple
 
 import numpy as np
 import shapely
-from numba import njit
 
 from netsp.arrays import Floats, Ints
 from netsp.clock import NEVER, Flag
+from netsp.compiled.kernel import kernel
 from netsp.hsignature import Word
 from netsp.problem import Circle, Problem
 
@@ -129,8 +129,18 @@ def slit_lengths(
     return out
 
 
-@njit(cache=True, nogil=True)
-def _rows(first, last, asked, whole, cluster, ends, slits, out, stop):
+@kernel
+def _rows(
+    first: int,
+    last: int,
+    asked: Ints,
+    whole: bool,
+    cluster: Ints,
+    ends: Ends,
+    slits: Slits,
+    out: Floats,
+    stop: Ints,
+) -> None:
     """Fill rows first … last - 1, which are those of the vertices `asked`; of the whole matrix only
     what is beyond the diagonal, and the columns with the same numbers."""
     longest = 0
@@ -149,8 +159,8 @@ def _rows(first, last, asked, whole, cluster, ends, slits, out, stop):
                 out[v, k] = out[k, v]
 
 
-@njit(cache=True, nogil=True)
-def _length(u, v, ends, slits, gate):
+@kernel
+def _length(u: int, v: int, ends: Ends, slits: Slits, gate: Floats) -> float:
     """Length of the path from u to v of the word inverse(word of u) times (word of v)."""
     letters, row = ends.letters, ends.row
     rank, x, bottom, top = slits.rank, slits.x, slits.bottom, slits.top
@@ -193,8 +203,8 @@ def _length(u, v, ends, slits, gate):
     return _taut(ends.place[u, 1], gate, k + 1)
 
 
-@njit(cache=True, nogil=True)
-def _taut(y, gate, count):
+@kernel
+def _taut(y: float, gate: Floats, count: int) -> float:
     """Length of the taut string from (0, y) through the first `count` gates (s, low, high)."""
     s = 0.0
     total = 0.0

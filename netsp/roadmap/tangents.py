@@ -13,13 +13,13 @@ from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
-from netsp.arrays import Floats, Ints
+from netsp.arrays import Bools, Floats, Ints
 from netsp.clock import NEVER, Flag
 from netsp.compiled.growing import more_rows
+from netsp.compiled.kernel import kernel
 from netsp.compiled.tiers import choose
-from netsp.geometry.kernels import TWO_PI, segment_blocked
+from netsp.geometry.kernels import TWO_PI, Blockers, segment_blocked
 from netsp.roadmap.letters import arc_letters, segment_letters
 from netsp.roadmap.outline import Outline
 
@@ -234,8 +234,8 @@ def _pending_boxes(outline: Outline) -> Floats:
     return out
 
 
-@njit(cache=True)
-def _key(theta, sense, start, end, full):
+@kernel
+def _key(theta: float, sense: int, start: float, end: float, full: bool) -> float:
     """How far along the directed arc a contact angle lies; NaN if not on the arc."""
     span = end - start
     if sense > 0:
@@ -251,8 +251,16 @@ def _key(theta, sense, start, end, full):
     return key
 
 
-@njit(cache=True)
-def _tangents(place, a_count, full, base, reach, blockers, stop):
+@kernel
+def _tangents(
+    place: Floats,
+    a_count: int,
+    full: Bools,
+    base: Floats,
+    reach: float,
+    blockers: Blockers,
+    stop: Ints,
+) -> Floats:
     """All free directed segments between arcs and points, unsorted: rows of source, target, key,
     arrival key, length, ends (4), angles (2).
 
@@ -327,8 +335,19 @@ def _tangents(place, a_count, full, base, reach, blockers, stop):
     return out[:n]
 
 
-@njit(cache=True)
-def _write_letters(arcs, full, start, target, key, arrival_key, ends, angle, rays, order):
+@kernel
+def _write_letters(
+    arcs: Floats,
+    full: Bools,
+    start: Ints,
+    target: Ints,
+    key: Floats,
+    arrival_key: Floats,
+    ends: Floats,
+    angle: Floats,
+    rays: Floats,
+    order: Ints,
+) -> tuple[Ints, Floats, Floats, npt.NDArray[np.int32], Ints, Ints, Ints]:
     """Words of segments and of the arc pieces between arrivals and departures."""
     e_count = len(target)
     arc_nodes = 2 * len(arcs)
@@ -339,7 +358,7 @@ def _write_letters(arcs, full, start, target, key, arrival_key, ends, angle, ray
     arrival_row = np.zeros((e_count, 2), dtype=np.int64)
     gap_row = np.zeros((e_count, 2), dtype=np.int64)
     pool = np.empty(1024 + 8 * e_count, dtype=np.int32)
-    n = np.int64(0)  # no literal: callees are compiled once
+    n = int(np.int64(0))  # no literal: callees are compiled once
     room = 16 * (len(rays) + 1)
     for node in range(len(start) - 1):
         for e in range(start[node], start[node + 1]):

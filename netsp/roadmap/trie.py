@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
-from numba import njit
 
 from netsp.arrays import Floats, Ints
+from netsp.compiled.kernel import kernel
 
 PARENT, LETTER, CHILD, SIBLING, CORE = range(5)
 """Columns of a trie's nodes. SIBLING chains the children of one parent."""
@@ -61,17 +61,17 @@ class Trie:
         return self.words[node]
 
 
-@njit(cache=True, nogil=True)
-def trie_child(node, a, trie):
+@kernel
+def trie_child(node: int, a: int, trie: Ints) -> int:
     """The child of a node along letter a, or -1."""
     c = trie[node, CHILD]
     while c >= 0 and trie[c, LETTER] != a:
         c = trie[c, SIBLING]
-    return c
+    return int(c)
 
 
-@njit(cache=True, nogil=True)
-def add_child(node, a, core, size, trie):
+@kernel
+def add_child(node: int, a: int, core: int, size: int, trie: Ints) -> None:
     """Make the child of a node along letter a at the row `size`."""
     trie[size, PARENT], trie[size, LETTER], trie[size, CORE] = node, a, core
     trie[size, CHILD] = -1

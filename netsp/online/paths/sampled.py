@@ -111,7 +111,8 @@ class SampledPaths:
         if path is None:
             return None
         free = all(
-            lowest_along(field, *a, *b, 0.1 * grid.cell)[0] > -0.25 * grid.cell
+            lowest_along(field, a[0], a[1], a[2], b[0], b[1], b[2], 0.1 * grid.cell)[0]
+            > -0.25 * grid.cell
             for a, b in pairwise(path)
         )
         return path if free else None

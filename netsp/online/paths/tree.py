@@ -11,13 +11,13 @@ from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
-from netsp.arrays import Floats
+from netsp.arrays import Bools, Floats, Ints
+from netsp.compiled.kernel import kernel
 from netsp.errors import InputError
 from netsp.geometry import polylines
 from netsp.online.scene.field import DistanceField
-from netsp.online.scene.sampling import distance, lowest_along
+from netsp.online.scene.sampling import Field, distance, lowest_along
 from netsp.online.tether.geodesic import GeodesicTether
 
 MOST_CELLS = 20_000_000
@@ -64,7 +64,9 @@ class Grid:
                 f"cell: {cell:g} makes {' x '.join(map(str, shape))} cells; expected {better:.2g} "
                 "or more"
             )
-        self.free = free_cells(field.arrays, self.low, cell, tuple(map(int, shape)), clearance)
+        self.free = free_cells(
+            field.arrays, self.low, cell, (int(shape[0]), int(shape[1]), int(shape[2])), clearance
+        )
 
     def index(self, points: npt.ArrayLike) -> npt.NDArray[np.int64]:
         """Cells (..., 3) of points (..., 3), the nearest within the box."""
@@ -156,8 +158,10 @@ STEPS = np.array([s for s in np.ndindex(3, 3, 3) if s != (1, 1, 1)], dtype=np.in
 _LONG = np.sqrt((STEPS**2).sum(1).astype(float))
 
 
-@njit(cache=True)
-def free_cells(field, low, cell, shape, clearance):
+@kernel
+def free_cells(
+    field: Field, low: Floats, cell: float, shape: tuple[int, int, int], clearance: float
+) -> Bools:
     """Which cells of a grid have their centre at least the clearance from all solids."""
     out = np.zeros(shape, dtype=np.bool_)
     for i in range(shape[0]):
@@ -173,8 +177,8 @@ def free_cells(field, low, cell, shape, clearance):
     return out
 
 
-@njit(cache=True)
-def grow(free, root, wanted, toward):
+@kernel
+def grow(free: Bools, root: Ints, wanted: Ints, toward: npt.NDArray[np.int8]) -> Floats:
     """Dijkstra from the root until all wanted cells are settled. `toward` gets, for every settled
     cell, the step that leads on to the root (26 at the root). Returns lengths in cells."""
     nx, ny, nz = free.shape
@@ -221,8 +225,8 @@ def taut(field: DistanceField, path: Floats, clearance: float, delta: float) -> 
     return nodes[np.r_[True, np.linalg.norm(np.diff(nodes, axis=0), axis=1) > 1e-9]]
 
 
-@njit(cache=True)
-def shortcut(field, path, tolerance):
+@kernel
+def shortcut(field: Field, path: Floats, tolerance: float) -> Floats:
     """A path without the points that can be left out: from each point straight to the last of those
     that it sees without a break. The triangles that are swept are as wide as the path's points are
     apart, so nothing wider is passed over."""
@@ -259,8 +263,8 @@ def _shares(path: Floats, k: int) -> Floats:
     return np.column_stack([np.interp(u, s, path[:, axis]) for axis in range(3)])
 
 
-@njit(cache=True)
-def all_see(field, a, b, step):
+@kernel
+def all_see(field: Field, a: Floats, b: Floats, step: float) -> bool:
     """Whether the points a[k] and b[k] (n, 3) see one another, all of them, in steps of `step`."""
     for k in range(len(a)):
         low, _ = lowest_along(

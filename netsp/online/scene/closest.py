@@ -9,11 +9,17 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+import numpy.typing as npt
+
+from netsp.arrays import Floats
+from netsp.compiled.kernel import kernel
+
+Singles = npt.NDArray[np.float32]
+Owners = npt.NDArray[np.int32]
 
 
-@njit(cache=True)
-def triangle_distance(t, x, y, z):
+@kernel
+def triangle_distance(t: Floats, x: float, y: float, z: float) -> float:
     """Distance of a point to the triangle t[0:9].
 
     The closest point is the foot of the perpendicular where that lies inside, else it is on an
@@ -49,17 +55,19 @@ def triangle_distance(t, x, y, z):
     return math.sqrt(best)
 
 
-@njit(cache=True)
-def _site_distance(site, points, x, y, z):
+@kernel
+def _site_distance(site: Floats, points: bool, x: float, y: float, z: float) -> float:
     if points:
         d = math.sqrt((x - site[0]) ** 2 + (y - site[1]) ** 2 + (z - site[2]) ** 2)
     else:
         d = triangle_distance(site, x, y, z)
-    return d - site[9]
+    return float(d - site[9])
 
 
-@njit(cache=True, nogil=True)
-def nearest_sites(sites, points, origin, size, distances, owner):
+@kernel
+def nearest_sites(
+    sites: Floats, points: bool, origin: Floats, size: float, distances: Singles, owner: Owners
+) -> None:
     """Measure each site from the grid points around it."""
     nx, ny, nz = distances.shape
     corners = 1 if points else 3
@@ -85,8 +93,16 @@ def nearest_sites(sites, points, origin, size, distances, owner):
                         owner[i, j, k] = s
 
 
-@njit(cache=True, nogil=True)
-def sweep(sites, points, origin, size, distances, owner, turn):
+@kernel
+def sweep(
+    sites: Floats,
+    points: bool,
+    origin: Floats,
+    size: float,
+    distances: Singles,
+    owner: Owners,
+    turn: int,
+) -> None:
     """Pass through the grid in one of the eight diagonal directions; each grid point measures the
     nearest sites of the three neighbours that were passed before it."""
     nx, ny, nz = distances.shape
@@ -121,8 +137,10 @@ def sweep(sites, points, origin, size, distances, owner, turn):
                 distances[i, j, k], owner[i, j, k] = best, mine
 
 
-@njit(cache=True, nogil=True)
-def windings(triangles, origin, size, counts):
+@kernel
+def windings(
+    triangles: Floats, origin: Floats, size: float, counts: tuple[int, int, int]
+) -> npt.NDArray[np.int16]:
     """(nx, ny, nz) how often the mesh winds around each grid point: the signed crossings of the ray
     from it in the direction -x."""
     nx, ny, nz = counts
@@ -158,8 +176,8 @@ def windings(triangles, origin, size, counts):
     return out
 
 
-@njit(cache=True)
-def _side(ay, az, by, bz, y, z):
+@kernel
+def _side(ay: float, az: float, by: float, bz: float, y: float, z: float) -> float:
     """Twice the signed area of a, b and the point, computed alike for both triangles at an edge."""
     if (ay, az) < (by, bz):
         return (by - ay) * (z - az) - (bz - az) * (y - ay)

@@ -215,7 +215,9 @@ class DistanceField:
         step = max(1e-3 * float(np.linalg.norm(q - p)), 1e-9)
         if self.voxel is not None:
             step = min(step, 0.1 * self.voxel)
-        low, _ = lowest_along(self.arrays, *p, *q, max(min(step, depth or step), 1e-9))
+        low, _ = lowest_along(
+            self.arrays, p[0], p[1], p[2], q[0], q[1], q[2], max(min(step, depth or step), 1e-9)
+        )
         return bool(low >= -max(depth, 1e-9))
 
     def free_point(self, value: npt.ArrayLike, name: str, depth: float = 1e-6) -> Floats:

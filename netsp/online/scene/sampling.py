@@ -11,8 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
+from netsp.arrays import Floats, Ints
+from netsp.compiled.kernel import kernel
 from netsp.online.scene.solids import ROW, solid_distance
 
 
@@ -45,8 +46,8 @@ class Field(NamedTuple):
     offset: float
 
 
-@njit(cache=True)
-def sample(field, x, y, z):
+@kernel
+def sample(field: Field, x: float, y: float, z: float) -> tuple[float, float, float, float, int]:
     """(d, gx, gy, gz, solid): distance, its unit gradient, and which solid is nearest (-1: the
     voxels)."""
     d, gx, gy, gz, which = _solids(field, x, y, z)
@@ -57,8 +58,8 @@ def sample(field, x, y, z):
     return d - field.offset, gx, gy, gz, which
 
 
-@njit(cache=True)
-def distance(field, x, y, z):
+@kernel
+def distance(field: Field, x: float, y: float, z: float) -> float:
     """Distance alone."""
     d = math.inf
     if len(field.kinds) > 0:
@@ -68,8 +69,8 @@ def distance(field, x, y, z):
     return d - field.offset
 
 
-@njit(cache=True)
-def _solids(field, x, y, z):
+@kernel
+def _solids(field: Field, x: float, y: float, z: float) -> tuple[float, float, float, float, int]:
     d, gx, gy, gz, which = math.inf, 0.0, 0.0, 1.0, -1
     cells, near = field.cells, field.near
     if cells.size > 0:
@@ -94,8 +95,10 @@ def _solids(field, x, y, z):
     return d, gx, gy, gz, which
 
 
-@njit(cache=True)
-def _cell(grid, place, x, y, z):
+@kernel
+def _cell(
+    grid: npt.NDArray[np.float32], place: Floats, x: float, y: float, z: float
+) -> tuple[int, int, int, float, float, float, bool]:
     """Cell and the fractions within it; whether the point lies in the grid, to within rounding."""
     nx, ny, nz = grid.shape
     u, v, w = (x - place[0]) / place[3], (y - place[1]) / place[3], (z - place[2]) / place[3]
@@ -107,8 +110,10 @@ def _cell(grid, place, x, y, z):
     return i, j, k, u - i, v - j, w - k, True
 
 
-@njit(cache=True)
-def _border(grid, place, x, y, z):
+@kernel
+def _border(
+    grid: npt.NDArray[np.float32], place: Floats, x: float, y: float, z: float
+) -> tuple[float, float, float]:
     """The point of the grid nearest to one outside of it."""
     nx, ny, nz = grid.shape
     h = place[3]
@@ -119,8 +124,10 @@ def _border(grid, place, x, y, z):
     )
 
 
-@njit(cache=True)
-def _voxel_distance(grid, place, x, y, z):
+@kernel
+def _voxel_distance(
+    grid: npt.NDArray[np.float32], place: Floats, x: float, y: float, z: float
+) -> float:
     i, j, k, u, v, w, inside = _cell(grid, place, x, y, z)
     if not inside:
         # all solids lie in the grid, a box: seen from its nearest point c, they are behind it, so
@@ -136,17 +143,21 @@ def _voxel_distance(grid, place, x, y, z):
     return _trilinear(grid, i, j, k, u, v, w)
 
 
-@njit(cache=True)
-def _trilinear(grid, i, j, k, u, v, w):
+@kernel
+def _trilinear(
+    grid: npt.NDArray[np.float32], i: int, j: int, k: int, u: float, v: float, w: float
+) -> float:
     a = (1.0 - w) * grid[i, j, k] + w * grid[i, j, k + 1]
     b = (1.0 - w) * grid[i, j + 1, k] + w * grid[i, j + 1, k + 1]
     c = (1.0 - w) * grid[i + 1, j, k] + w * grid[i + 1, j, k + 1]
     d = (1.0 - w) * grid[i + 1, j + 1, k] + w * grid[i + 1, j + 1, k + 1]
-    return (1.0 - u) * ((1.0 - v) * a + v * b) + u * ((1.0 - v) * c + v * d)
+    return float((1.0 - u) * ((1.0 - v) * a + v * b) + u * ((1.0 - v) * c + v * d))
 
 
-@njit(cache=True)
-def _voxels(grid, place, x, y, z):
+@kernel
+def _voxels(
+    grid: npt.NDArray[np.float32], place: Floats, x: float, y: float, z: float
+) -> tuple[float, float, float, float]:
     # half a voxel to either side: a central difference does not jump at the cells' faces
     h = 0.5 * place[3]
     d = _voxel_distance(grid, place, x, y, z)
@@ -159,8 +170,8 @@ def _voxels(grid, place, x, y, z):
     return d, gx / length, gy / length, gz / length
 
 
-@njit(cache=True, nogil=True)
-def sample_many(field, points):
+@kernel
+def sample_many(field: Field, points: Floats) -> Floats:
     """(n, 5) distance, gradient and nearest solid at (n, 3) points."""
     out = np.empty((len(points), 5))
     for p in range(len(points)):
@@ -169,8 +180,10 @@ def sample_many(field, points):
     return out
 
 
-@njit(cache=True)
-def lowest_along(field, ax, ay, az, bx, by, bz, tolerance):
+@kernel
+def lowest_along(
+    field: Field, ax: float, ay: float, az: float, bx: float, by: float, bz: float, tolerance: float
+) -> tuple[float, float]:
     """Least distance along a segment and where (fraction), to within `tolerance`.
 
     Sphere tracing: within a distance d of a point no distance is below 0, so the next sample may be
@@ -191,8 +204,8 @@ def lowest_along(field, ax, ay, az, bx, by, bz, tolerance):
         s = min(length, s + max(d, 0.0) + tolerance)
 
 
-@njit(cache=True)
-def candidates(field, near):
+@kernel
+def candidates(field: Field, near: Floats) -> tuple[Ints, Ints]:
     """For every cell of a coarse grid, the solids that may be nearest to some point of it: those no
     farther from its centre than the nearest plus the cell's diagonal. Returns (cells, items)."""
     nx, ny, nz = int(near[4]), int(near[5]), int(near[6])

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from netsp.arrays import Floats
+from netsp.compiled.kernel import kernel
 from netsp.geometry.kernels import TWO_PI
 
 CAPSULE, CYLINDER, BOX, TORUS, POST, PRISM, HALF_SPACE = range(7)
@@ -19,8 +19,10 @@ ROW = 16
 """Numbers per solid."""
 
 
-@njit(cache=True)
-def solid_distance(kind, row, outline, x, y, z):
+@kernel
+def solid_distance(
+    kind: int, row: Floats, outline: Floats, x: float, y: float, z: float
+) -> tuple[float, float, float, float]:
     """(d, gx, gy, gz) of one solid at a point.
 
     Parameters
@@ -44,8 +46,8 @@ def solid_distance(kind, row, outline, x, y, z):
     return d, row[3], row[4], row[5]
 
 
-@njit(cache=True)
-def _round(vx, vy, vz, radius):
+@kernel
+def _round(vx: float, vy: float, vz: float, radius: float) -> tuple[float, float, float, float]:
     """From the vector out of the closest point of the core."""
     length = math.sqrt(vx * vx + vy * vy + vz * vz)
     if length == 0.0:
@@ -53,8 +55,8 @@ def _round(vx, vy, vz, radius):
     return length - radius, vx / length, vy / length, vz / length
 
 
-@njit(cache=True)
-def _capsule(row, x, y, z):
+@kernel
+def _capsule(row: Floats, x: float, y: float, z: float) -> tuple[float, float, float, float]:
     """All points within row[6] of the segment from row[0:3] to row[3:6]."""
     ax, ay, az = row[3] - row[0], row[4] - row[1], row[5] - row[2]
     vx, vy, vz = x - row[0], y - row[1], z - row[2]
@@ -65,8 +67,8 @@ def _capsule(row, x, y, z):
     return _round(vx, vy, vz, row[6])
 
 
-@njit(cache=True)
-def _cylinder(row, x, y, z):
+@kernel
+def _cylinder(row: Floats, x: float, y: float, z: float) -> tuple[float, float, float, float]:
     """A solid cylinder with flat ends: axis from row[0:3] along the unit vector row[3:6] for
     row[7], radius row[6]."""
     vx, vy, vz = x - row[0], y - row[1], z - row[2]
@@ -95,8 +97,8 @@ def _cylinder(row, x, y, z):
     return d, a * qx + b * row[3], a * qy + b * row[4], a * qz + b * row[5]
 
 
-@njit(cache=True)
-def _box(row, x, y, z):
+@kernel
+def _box(row: Floats, x: float, y: float, z: float) -> tuple[float, float, float, float]:
     """Centre row[0:3], half sizes row[3:6], the three axes row[6:15]."""
     vx, vy, vz = x - row[0], y - row[1], z - row[2]
     best, axis, sign, squares = -math.inf, 0, 1.0, 0.0
@@ -118,8 +120,8 @@ def _box(row, x, y, z):
     return best, sign * row[k], sign * row[k + 1], sign * row[k + 2]
 
 
-@njit(cache=True)
-def _torus(row, x, y, z):
+@kernel
+def _torus(row: Floats, x: float, y: float, z: float) -> tuple[float, float, float, float]:
     """All points within row[10] of an arc: centre row[0:3], axis row[3:6], first point in the
     direction row[6:9] at distance row[9], turning by row[11] about the axis (2 pi: closed)."""
     vx, vy, vz = x - row[0], y - row[1], z - row[2]
@@ -143,8 +145,8 @@ def _torus(row, x, y, z):
     )  # fmt: skip
 
 
-@njit(cache=True)
-def _prism(row, outline, x, y):
+@kernel
+def _prism(row: Floats, outline: Floats, x: float, y: float) -> tuple[float, float, float, float]:
     """A vertical prism without ends over the polygon outline[row[0]:row[1]], grown by row[2]."""
     start, stop = int(row[0]), int(row[1])
     best, inside = math.inf, False

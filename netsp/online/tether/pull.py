@@ -17,9 +17,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
-from netsp.online.scene.sampling import distance
+from netsp.arrays import Floats
+from netsp.compiled.kernel import kernel
+from netsp.online.scene.sampling import Field, distance
 from netsp.online.tether.strand import (
     CURVE,
     EX,
@@ -74,8 +75,21 @@ CONVEX = 0.5
 strand reaches half way round."""
 
 
-@njit(cache=True)
-def pull_end(field, strand, count, last, x, y, z, delta, spread, flat, rounds, precision):
+@kernel
+def pull_end(
+    field: Field,
+    strand: Floats,
+    count: int,
+    last: bool,
+    x: float,
+    y: float,
+    z: float,
+    delta: float,
+    spread: float,
+    flat: float,
+    rounds: int,
+    precision: float,
+) -> tuple[Floats, int, float]:
     """Move one end (the robot's if `last`) to (x, y, z) and pull taut. Returns (strand, count,
     residual): the strand may have been copied to grow; residual is the last round's motion."""
     stride, slip = STRIDE * delta, SLIP * delta
@@ -114,8 +128,17 @@ def pull_end(field, strand, count, last, x, y, z, delta, spread, flat, rounds, p
     return strand, count, residual
 
 
-@njit(cache=True)
-def pull(field, strand, count, delta, spread, flat, rounds, precision):
+@kernel
+def pull(
+    field: Field,
+    strand: Floats,
+    count: int,
+    delta: float,
+    spread: float,
+    flat: float,
+    rounds: int,
+    precision: float,
+) -> tuple[Floats, int, float]:
     """Rounds of: put edges back that went too deep, drop nodes that hold nothing, slide the others
     to where the strand is shortest; until no node moves by more than `precision`."""
     slip, stride = SLIP * delta, STRIDE * delta
@@ -143,8 +166,8 @@ def pull(field, strand, count, delta, spread, flat, rounds, precision):
     return strand, count, most
 
 
-@njit(cache=True)
-def repair(field, strand, count, slip):
+@kernel
+def repair(field: Field, strand: Floats, count: int, slip: float) -> tuple[Floats, int]:
     """Look again along every edge that may have gone too deep; where it has, its deepest point
     becomes a node on the surface."""
     i, budget = 0, 64 + 2 * count
@@ -163,17 +186,25 @@ def repair(field, strand, count, slip):
     return strand, count
 
 
-@njit(cache=True)
-def nearer(strand, i, x, y, z, reach):
+@kernel
+def nearer(strand: Floats, i: int, x: float, y: float, z: float, reach: float) -> bool:
     """Whether an end of edge i is nearer to a point than `reach`."""
     a = (strand[i, X] - x) ** 2 + (strand[i, Y] - y) ** 2 + (strand[i, Z] - z) ** 2
     j = i + 1
     b = (strand[j, X] - x) ** 2 + (strand[j, Y] - y) ** 2 + (strand[j, Z] - z) ** 2
-    return min(a, b) < reach * reach
+    return bool(min(a, b) < reach * reach)
 
 
-@njit(cache=True)
-def refresh(field, strand, count, spread, flat, stride, delta):
+@kernel
+def refresh(
+    field: Field,
+    strand: Floats,
+    count: int,
+    spread: float,
+    flat: float,
+    stride: float,
+    delta: float,
+) -> float:
     """Take the frames of contacts that have moved; the largest correction of a position."""
     most = 0.0
     for i in range(1, count - 1):
@@ -186,8 +217,8 @@ def refresh(field, strand, count, spread, flat, stride, delta):
     return most
 
 
-@njit(cache=True)
-def lift(field, strand, count, slip, stride):
+@kernel
+def lift(field: Field, strand: Floats, count: int, slip: float, stride: float) -> tuple[int, float]:
     """Drop nodes that hold nothing: those that the strand would leave, and those on a line. A node
     that cannot reach the line between its neighbours freely is only brought nearer."""
     lifted = 0.0
@@ -247,8 +278,16 @@ def lift(field, strand, count, slip, stride):
     return count, lifted
 
 
-@njit(cache=True)
-def slide(field, strand, count, stride, precision, damping, gain):
+@kernel
+def slide(
+    field: Field,
+    strand: Floats,
+    count: int,
+    stride: float,
+    precision: float,
+    damping: float,
+    gain: float,
+) -> tuple[float, float]:
     """One Newton step of the length in the motions of the contacts along their directions. `gain`
     is what the step before was multiplied by. Returns (largest way still to go, gain)."""
     n = count - 2
@@ -330,8 +369,20 @@ def slide(field, strand, count, stride, precision, damping, gain):
     return max(gain, f) * most, max(f, 1e-3)
 
 
-@njit(cache=True)
-def follow(field, strand, last, x, y, z, delta, spread, flat, rounds, precision):
+@kernel
+def follow(
+    field: Field,
+    strand: Floats,
+    last: bool,
+    x: float,
+    y: float,
+    z: float,
+    delta: float,
+    spread: float,
+    flat: float,
+    rounds: int,
+    precision: float,
+) -> tuple[Floats, float, float, float]:
     """`pull_end` on a copy, with what its callers ask next. Returns (strand, residual, length,
     depth): depth is how deep the target lies inside a solid; then nothing is done."""
     depth = -distance(field, x, y, z)
@@ -343,8 +394,18 @@ def follow(field, strand, last, x, y, z, delta, spread, flat, rounds, precision)
     return strand[:count].copy(), residual, strand_length(strand, count), depth
 
 
-@njit(cache=True)
-def drive(field, strand, count, path, delta, spread, flat, rounds, precision):
+@kernel
+def drive(
+    field: Field,
+    strand: Floats,
+    count: int,
+    path: Floats,
+    delta: float,
+    spread: float,
+    flat: float,
+    rounds: int,
+    precision: float,
+) -> tuple[Floats, int, float, Floats]:
     """Take the robot along a path (k, 3). Returns (strand, count, residual, lengths after each
     point)."""
     lengths, residual = np.empty(len(path)), 0.0

@@ -20,13 +20,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
 from netsp.arrays import Floats
+from netsp.compiled.kernel import kernel
 from netsp.errors import InputError
 from netsp.geometry import polylines
 from netsp.online.scene.field import DistanceField
-from netsp.online.scene.sampling import distance
+from netsp.online.scene.sampling import Field, distance
 from netsp.online.tether.strand import see
 from netsp.online.tether.tether import Tether, strand_of
 
@@ -178,8 +178,16 @@ def _tether(nodes: Floats) -> Tether:
     return Tether(strand_of(nodes), polylines.length(nodes))
 
 
-@njit(cache=True)
-def tighten(field, nodes, delta, clearance, text, tolerance, passes):
+@kernel
+def tighten(
+    field: Field,
+    nodes: Floats,
+    delta: float,
+    clearance: float,
+    text: bool,
+    tolerance: float,
+    passes: int,
+) -> Floats:
     """Algorithm 1 after ``appendPath``: shortcut and pull until nothing changes."""
     slack = 0.01 * delta
     before = _length(nodes)
@@ -193,16 +201,18 @@ def tighten(field, nodes, delta, clearance, text, tolerance, passes):
     return nodes
 
 
-@njit(cache=True)
-def _sees(field, nodes, i, j, clearance, slack):
+@kernel
+def _sees(field: Field, nodes: Floats, i: int, j: int, clearance: float, slack: float) -> bool:
     return see(
         field, nodes[i, 0], nodes[i, 1], nodes[i, 2], nodes[j, 0], nodes[j, 1], nodes[j, 2],
         slack - clearance, slack,
     )  # fmt: skip
 
 
-@njit(cache=True)
-def _shortcut(field, nodes, delta, clearance, text, slack):
+@kernel
+def _shortcut(
+    field: Field, nodes: Floats, delta: float, clearance: float, text: bool, slack: float
+) -> Floats:
     out = np.empty((16, 3))
     out[0] = nodes[-1]
     size, i = 1, len(nodes) - 1
@@ -226,8 +236,8 @@ def _shortcut(field, nodes, delta, clearance, text, slack):
     return out[:size][::-1].copy()
 
 
-@njit(cache=True)
-def _pull_nodes(field, nodes, delta, clearance, slack):
+@kernel
+def _pull_nodes(field: Field, nodes: Floats, delta: float, clearance: float, slack: float) -> None:
     last = len(nodes) - 1
     for j in range(1, last):
         v = nodes[last] - nodes[j]
@@ -250,13 +260,13 @@ def _pull_nodes(field, nodes, delta, clearance, slack):
             step *= 0.5
 
 
-@njit(cache=True)
-def _edge(nodes, i):
+@kernel
+def _edge(nodes: Floats, i: int) -> float:
     return math.sqrt(((nodes[i + 1] - nodes[i]) ** 2).sum())
 
 
-@njit(cache=True)
-def _length(nodes):
+@kernel
+def _length(nodes: Floats) -> float:
     total = 0.0
     for i in range(len(nodes) - 1):
         total += _edge(nodes, i)

@@ -9,9 +9,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
-from netsp.online.scene.sampling import distance, lowest_along, sample
+from netsp.arrays import Floats
+from netsp.compiled.kernel import kernel
+from netsp.online.scene.sampling import Field, distance, lowest_along, sample
 
 X, Y, Z = 0, 1, 2
 """Position."""
@@ -51,8 +52,8 @@ SHARP_SINE = 0.5
 """Normals that differ by more than 30 degrees across a contact mean a sharp edge."""
 
 
-@njit(cache=True)
-def grown(strand, count):
+@kernel
+def grown(strand: Floats, count: int) -> Floats:
     """The strand with room for one more node."""
     if count < len(strand):
         return strand
@@ -61,8 +62,8 @@ def grown(strand, count):
     return out
 
 
-@njit(cache=True)
-def insert(strand, count, at, x, y, z):
+@kernel
+def insert(strand: Floats, count: int, at: int, x: float, y: float, z: float) -> tuple[Floats, int]:
     """A new node before row `at`, its frame and the two edges beside it unknown."""
     strand = grown(strand, count)
     for i in range(count, at, -1):
@@ -77,8 +78,8 @@ def insert(strand, count, at, x, y, z):
     return strand, count + 1
 
 
-@njit(cache=True)
-def remove(strand, count, at):
+@kernel
+def remove(strand: Floats, count: int, at: int) -> int:
     """Without row `at`; the edge that takes its place is unknown."""
     for i in range(at, count - 1):
         strand[i] = strand[i + 1]
@@ -87,8 +88,8 @@ def remove(strand, count, at):
     return count - 1
 
 
-@njit(cache=True)
-def gap(strand, i, j):
+@kernel
+def gap(strand: Floats, i: int, j: int) -> float:
     """Distance between two nodes."""
     return math.sqrt(
         (strand[i, X] - strand[j, X]) ** 2
@@ -97,8 +98,8 @@ def gap(strand, i, j):
     )
 
 
-@njit(cache=True)
-def strand_length(strand, count):
+@kernel
+def strand_length(strand: Floats, count: int) -> float:
     """Arc-corrected length of a strand."""
     total = 0.0
     for i in range(count - 1):
@@ -106,8 +107,8 @@ def strand_length(strand, count):
     return total
 
 
-@njit(cache=True)
-def moved(strand, count, i, by):
+@kernel
+def moved(strand: Floats, count: int, i: int, by: float) -> None:
     """Book a motion of node i against the edges beside it."""
     strand[i, STALE] += by
     if i > 0:
@@ -116,8 +117,8 @@ def moved(strand, count, i, by):
         strand[i, USED] += by / strand[i, REACH0]
 
 
-@njit(cache=True)
-def look_along(field, strand, i, tolerance):
+@kernel
+def look_along(field: Field, strand: Floats, i: int, tolerance: float) -> tuple[float, float]:
     """Look along edge i: (least distance, its place as a fraction), and book how far its ends may
     move before the edge is deeper than `tolerance`, and the arc over it."""
     ax, ay, az = strand[i, X], strand[i, Y], strand[i, Z]
@@ -157,14 +158,16 @@ def look_along(field, strand, i, tolerance):
     return low, where
 
 
-@njit(cache=True)
-def rests(strand, i):
+@kernel
+def rests(strand: Floats, i: int) -> bool:
     """Whether node i rests on something."""
-    return strand[i, NX] != 0.0 or strand[i, NY] != 0.0 or strand[i, NZ] != 0.0
+    return bool(strand[i, NX] != 0.0 or strand[i, NY] != 0.0 or strand[i, NZ] != 0.0)
 
 
-@njit(cache=True)
-def _look_across(field, strand, i, length, tolerance):
+@kernel
+def _look_across(
+    field: Field, strand: Floats, i: int, length: float, tolerance: float
+) -> tuple[float, float]:
     """`look_along` for a short edge between two contacts, by its quarter points: no point of it is
     farther than an eighth of the edge, at most the tolerance, from one of them."""
     low, where, middle = math.inf, 0.5, 0.0
@@ -188,8 +191,19 @@ def _look_across(field, strand, i, length, tolerance):
     return low, where
 
 
-@njit(cache=True)
-def _arc_over(field, ax, ay, az, bx, by, bz, length, low, where):
+@kernel
+def _arc_over(
+    field: Field,
+    ax: float,
+    ay: float,
+    az: float,
+    bx: float,
+    by: float,
+    bz: float,
+    length: float,
+    low: float,
+    where: float,
+) -> float:
     """What the surface's arc over an edge is longer than the edge.
 
     Both ends on the surface: the edge is the chord of an arc of sagitta g, and an arc of half angle
@@ -209,8 +223,8 @@ def _arc_over(field, ax, ay, az, bx, by, bz, length, low, where):
     return min(4.0 / 3.0 * low * low / chord, 0.5 * -low)
 
 
-@njit(cache=True)
-def let_go(strand, i):
+@kernel
+def let_go(strand: Floats, i: int) -> None:
     """Node i rests on nothing: no direction to slide in, no normal that holds it."""
     for k in range(EX, NZ + 1):
         strand[i, k] = 0.0
@@ -218,8 +232,10 @@ def let_go(strand, i):
     strand[i, PART] = -1.0
 
 
-@njit(cache=True)
-def to_surface(field, x, y, z, tolerance):
+@kernel
+def to_surface(
+    field: Field, x: float, y: float, z: float, tolerance: float
+) -> tuple[float, float, float]:
     """From a point near the surface, or not deep, to the surface. Out of one solid may be into
     another: in the crease between two it goes back and forth, ever less."""
     for turn in range(12):
@@ -230,8 +246,22 @@ def to_surface(field, x, y, z, tolerance):
     return x, y, z
 
 
-@njit(cache=True)
-def edge_point(ax, ay, az, na, da, bx, by, bz, nb, db, px, py, pz):
+@kernel
+def edge_point(
+    ax: float,
+    ay: float,
+    az: float,
+    na: tuple[float, float, float],
+    da: float,
+    bx: float,
+    by: float,
+    bz: float,
+    nb: tuple[float, float, float],
+    db: float,
+    px: float,
+    py: float,
+    pz: float,
+) -> tuple[float, float, float, float]:
     """The point nearest to p on the planes that touch the solid near a and near b (distances da and
     db, normals na and nb there), and the sine of their angle; p itself if they are parallel."""
     cosine = na[0] * nb[0] + na[1] * nb[1] + na[2] * nb[2]
@@ -250,8 +280,10 @@ def edge_point(ax, ay, az, na, da, bx, by, bz, nb, db, px, py, pz):
     )
 
 
-@njit(cache=True)
-def path_out(field, strand, i, where, slip):
+@kernel
+def path_out(
+    field: Field, strand: Floats, i: int, where: float, slip: float
+) -> tuple[float, float, float]:
     """Where a strand that is too deep at fraction `where` of edge i comes to the surface: on the
     sharp edge of the solid if it cuts one off, else straight out."""
     ux = strand[i + 1, X] - strand[i, X]
@@ -275,8 +307,10 @@ def path_out(field, strand, i, where, slip):
     return to_surface(field, mx, my, mz, 0.01 * slip)
 
 
-@njit(cache=True)
-def take_frame(field, strand, i, spread, flat, reach):
+@kernel
+def take_frame(
+    field: Field, strand: Floats, i: int, spread: float, flat: float, reach: float
+) -> float:
     """Slide direction and normal of contact i, from the surface a little before and after it.
 
     The two normals span the plane in which the tether turns over the surface; their cross product
@@ -356,8 +390,20 @@ def take_frame(field, strand, i, spread, flat, reach):
     return math.sqrt((qx - px) ** 2 + (qy - py) ** 2 + (qz - pz) ** 2)
 
 
-@njit(cache=True)
-def sweep_is_free(field, cx, cy, cz, ax, ay, az, bx, by, bz, tolerance):
+@kernel
+def sweep_is_free(
+    field: Field,
+    cx: float,
+    cy: float,
+    cz: float,
+    ax: float,
+    ay: float,
+    az: float,
+    bx: float,
+    by: float,
+    bz: float,
+    tolerance: float,
+) -> bool:
     """Whether the triangle that an edge sweeps, one end held at c and the other moved from a to b,
     is free to within `tolerance`: a point at fraction t of the edge moves by t |ab|."""
     motion = math.sqrt((bx - ax) ** 2 + (by - ay) ** 2 + (bz - az) ** 2)
@@ -376,8 +422,18 @@ def sweep_is_free(field, cx, cy, cz, ax, ay, az, bx, by, bz, tolerance):
         s = min(length, s + max(room, 0.25 * tolerance) / (1.0 + motion / length))
 
 
-@njit(cache=True)
-def see(field, ax, ay, az, bx, by, bz, depth, step):
+@kernel
+def see(
+    field: Field,
+    ax: float,
+    ay: float,
+    az: float,
+    bx: float,
+    by: float,
+    bz: float,
+    depth: float,
+    step: float,
+) -> bool:
     """Whether the segment is nowhere deeper than `depth` (negative: nearer than), to within
     `step`."""
     return lowest_along(field, ax, ay, az, bx, by, bz, step)[0] >= -depth

@@ -12,9 +12,9 @@ two and its library crashed beside that of HiGHS.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from netsp.arrays import Floats
+from netsp.compiled.kernel import kernel
 from netsp.online.vehicle.dynamics import MOST, linearised, step
 
 HORIZON, DT = 20, 0.1
@@ -51,8 +51,8 @@ class PredictiveControl:
         return np.asarray(self.forces[0])
 
 
-@njit(cache=True)
-def improved(last, state, aims, water):
+@kernel
+def improved(last: Floats, state: Floats, aims: Floats, water: Floats) -> Floats:
     """The inputs after one iteration, from those (n, 4) of the step before."""
     n = len(last)
     guess = np.empty((n, 4))
@@ -100,8 +100,8 @@ def improved(last, state, aims, water):
     return out
 
 
-@njit(cache=True)
-def within(hessian, slope, low, high, steps):
+@kernel
+def within(hessian: Floats, slope: Floats, low: Floats, high: Floats, steps: int) -> Floats:
     """The minimum of x H x / 2 + g x between bounds, H positive definite: projected Newton."""
     n = len(slope)
     x = np.minimum(np.maximum(np.zeros(n), low), high)

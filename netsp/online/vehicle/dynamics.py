@@ -15,7 +15,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from netsp.arrays import Floats
+from netsp.compiled.kernel import kernel
 
 MASS, VOLUME, GRAVITY, DENSITY = 13.5, 0.0134, 9.82, 1000.0
 
@@ -31,8 +33,8 @@ MOST = np.array([80.0, 80.0, 80.0, 14.0])
 one axis; the four share what they have between surge, sway and yaw."""
 
 
-@njit(cache=True)
-def derivative(state, force, water, out):
+@kernel
+def derivative(state: Floats, force: Floats, water: Floats, out: Floats) -> None:
     """d state / dt into `out` (8,).
 
     Parameters
@@ -56,8 +58,8 @@ def derivative(state, force, water, out):
     ) / m[3]  # fmt: skip
 
 
-@njit(cache=True)
-def step(state, force, water, seconds):
+@kernel
+def step(state: Floats, force: Floats, water: Floats, seconds: float) -> Floats:
     """The state after one step of the classical Runge-Kutta method."""
     k1, k2, k3, k4 = np.empty(8), np.empty(8), np.empty(8), np.empty(8)
     derivative(state, force, water, k1)
@@ -67,8 +69,10 @@ def step(state, force, water, seconds):
     return state + seconds / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
 
 
-@njit(cache=True)
-def linearised(states, forces, water, seconds):
+@kernel
+def linearised(
+    states: Floats, forces: Floats, water: Floats, seconds: float
+) -> tuple[Floats, Floats, Floats]:
     """Along a trajectory (n + 1, 8), (n, 4): the steps' Jacobians by state (n, 8, 8) and by input
     (n, 8, 4), by central differences, and what each step comes to (n, 8)."""
     n = len(forces)
