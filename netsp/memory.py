@@ -43,7 +43,7 @@ def available() -> float:
 
 
 def ask(size: float, what: str, advice: str) -> None:
-    """MemoryLimitError, in one line, if `size` bytes are more than can be had.
+    """MemoryLimitError, in one line, if `size` bytes are more than are available.
 
     Parameters
     ----------
@@ -57,6 +57,6 @@ def ask(size: float, what: str, advice: str) -> None:
     there = SHARE * available()
     if size > there:
         raise MemoryLimitError(
-            f"{what} would take {size / 2**30:.3g} GiB of memory, and {there / 2**30:.3g} GiB can "
-            f"be had; {advice}"
+            f"{what} would take {size / 2**30:.3g} GiB of memory, and {there / 2**30:.3g} GiB are "
+            f"available; {advice}"
         )

@@ -294,7 +294,7 @@ def random_world(
         if len(found) >= goals:
             return world(found[:goals])
     raise DoesNotFitError(
-        f"goals: only {len(found)} of {goals} places in reach of the tether found"
+        f"goals: only {len(found)} of {goals} places within reach of the tether found"
     )
 
 

@@ -99,7 +99,7 @@ def test_a_goal_out_of_reach_exits_with_3(tmp_path, capsys):
     short.write_text(json.dumps(data))
     assert main(["solve", str(short), "-o", str(tmp_path / "s.json")]) == 3
     err = capsys.readouterr().err.splitlines()[-1]
-    assert err.startswith("netsp: goals[0] is out of reach: tether_length 10")
+    assert err.startswith("netsp: goal #0 is out of reach: tether_length is 10")
     assert not (tmp_path / "s.json").exists()
 
 

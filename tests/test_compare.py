@@ -193,7 +193,7 @@ def test_solvers_that_crash_hang_or_eat_cost_one_row_each(tmp_path, monkeypatch)
     (tmp_path / "sitecustomize.py").write_text(textwrap.dedent(patch))
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     monkeypatch.syspath_prepend(str(tmp_path))
-    monkeypatch.setattr(pool, "GRACE_S", 8.0)
+    monkeypatch.setattr(pool, "GRACE_S", 15.0)
     for name in names:
         monkeypatch.setitem(SOLVERS, name, Solver(name, f"badsolvers:{name}"))
     study = Study.checked(
@@ -222,7 +222,7 @@ def test_solvers_that_crash_hang_or_eat_cost_one_row_each(tmp_path, monkeypatch)
         (("goals = [3, 4]", "goals = [0]"), "line 3: goals[0]"),
         (("count = 2", "cuont = 2"), "line 9: worlds.cuont"),
         (("tether_lengths = [200]", "tether_lengths = []"), "line 4: tether_lengths"),
-        (('label = "short"', 'label = "greedy"'), "'greedy' is there twice; give each a label"),
+        (('label = "short"', 'label = "greedy"'), "'greedy' appears twice; give each a label"),
         (("[worlds]", "[worlds]\nfamily = 'reef'"), "family: unknown 'reef'"),
         (("seeds = [0, 1]", "seeds = [0, 1"), "line"),
         (("obstacles = 6", "radii = [30, 10]"), "radii: expected least <= most, got 30 and 10"),

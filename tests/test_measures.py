@@ -148,8 +148,8 @@ def test_the_command_prints_measures_of_any_path(tmp_path, capsys):
         (tmp_path / name).write_text(text)
         assert main(["verify", str(problem), str(tmp_path / name), "--measures"]) == 0
         out = capsys.readouterr().out
-        assert "entangled obstacles  1: obstacles[0]" in out
-        assert "winding numbers      obstacles[0] -1" in out
+        assert "entangled obstacles  1: #0" in out
+        assert "winding numbers      #0 -1" in out
     (tmp_path / "bad.csv").write_text("x,y\n1,2\n3\n")
     assert main(["verify", str(problem), str(tmp_path / "bad.csv"), "--measures"]) == 2
     assert "point 1" in capsys.readouterr().err

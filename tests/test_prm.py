@@ -181,7 +181,7 @@ def test_a_goal_that_only_the_samples_miss_is_not_called_infeasible():
         obstacles=[Circle(center=(5, 0), radius=3)],
     )
     assert solve(problem).length == pytest.approx(2 * 11.86, rel=1e-2)
-    with pytest.raises(LimitReachedError, match=r"prm roadmap reaches goals\[0\].*more samples"):
+    with pytest.raises(LimitReachedError, match=r"prm roadmap reaches goal #0.*more samples"):
         PrmRoadmap(problem, samples=60)
 
 
@@ -192,5 +192,5 @@ def test_a_goal_the_roadmap_cannot_reach_is_infeasible_with_the_reason():
         tether_length=11.0,
         obstacles=[Circle(center=(5, 0), radius=3)],
     )
-    with pytest.raises(InfeasibleError, match=r"goals\[0\] is out of reach"):
+    with pytest.raises(InfeasibleError, match=r"goal #0 is out of reach"):
         PrmRoadmap(problem, samples=200)

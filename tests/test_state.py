@@ -110,7 +110,7 @@ def test_bad_states_are_named(state, message):
 
 
 def test_goals_out_of_reach_are_named():
-    with pytest.raises(InfeasibleError, match=r"goals\[0\] is out of reach"):
+    with pytest.raises(InfeasibleError, match=r"goal #0 is out of reach"):
         solve(Problem(**FEW, tether_length=6, state=State(position=(-2, 0, 0))))
 
 

@@ -245,7 +245,7 @@ def test_a_goal_out_of_reach_is_named_with_the_tether_that_would_do():
         obstacles=[Circle(center=(5, 0), radius=3)],
         tether_length=11,
     )
-    with pytest.raises(InfeasibleError, match=r"goals\[1\] \(far\) is out of reach") as caught:
+    with pytest.raises(InfeasibleError, match=r"goal far is out of reach") as caught:
         TautRoadmap(problem)
     needed = 8 + 6 * math.asin(0.6)
     shown = float(str(caught.value).rsplit(" ", 1)[1])
@@ -263,11 +263,11 @@ def test_a_goal_sealed_in_names_the_obstacles_round_it():
         base=(0, 0), goals=[(10, 0)], obstacles=[*ring, Circle(center=(0, 9), radius=1)],
         tether_length=100,
     )  # fmt: skip
-    with pytest.raises(InfeasibleError, match=r"cannot be reached with any tether.*obstacles\[0\]"):
+    with pytest.raises(InfeasibleError, match=r"a tether of any length.*obstacles #0, #1"):
         TautRoadmap(problem)
     with pytest.raises(InfeasibleError) as caught:
         TautRoadmap(problem)
-    assert "obstacles[6]" not in str(caught.value)
+    assert "#6" not in str(caught.value)
 
 
 def test_touching_circles_leave_no_gap():

@@ -93,7 +93,7 @@ def test_netsp_world_writes_a_problem_that_solve_reads(tmp_path, capsys):
         (["--goals", "100000000"], "goals: expected 1 to 10000"),
         (["--tether", "1e300"], "tether_length: expected more than 0 and at most 1e11"),
         (["--side", "1e300"], "side: expected more than 0 and at most 1e11"),
-        (["--tether", "0.001"], "places in reach of the tether found"),
+        (["--tether", "0.001"], "places within reach of the tether found"),
     ],
 )
 def test_bad_worlds_are_told_in_one_line(args, said, capsys):
@@ -107,7 +107,7 @@ def test_bad_worlds_are_told_in_one_line(args, said, capsys):
     ("kwargs", "said"),
     [
         ({"obstacles": 2000}, "2000 circles do not fit"),
-        ({"tether_length": 1e-3}, "places in reach of the tether found"),
+        ({"tether_length": 1e-3}, "places within reach of the tether found"),
     ],
 )
 def test_worlds_that_do_not_fit_are_told(kwargs, said):

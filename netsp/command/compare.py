@@ -102,7 +102,9 @@ def study_of(args: argparse.Namespace) -> Study:
     if args.study:
         if given or given_worlds:
             name = next(iter({**given, **given_worlds}))
-            raise InputError(f"compare: {name} is given by a flag and a study file too; choose one")
+            raise InputError(
+                f"compare: {name} is given both as a flag and in the study file; choose one"
+            )
         return Study.load(args.study)
     missing = [name for name in ("goals", "tether_lengths", "solvers") if name not in given]
     if missing:

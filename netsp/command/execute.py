@@ -30,7 +30,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
     """Of the command line."""
     p.add_argument("problem", metavar="PROBLEM", help="problem file (JSON)")
     p.add_argument("solution", metavar="SOLUTION", help="solution file (JSON)")
-    p.add_argument("--surprise", metavar="FILE", help="what happens on the way (JSON)")
+    p.add_argument("--surprise", metavar="FILE", help="what happens during the run (JSON)")
     p.add_argument("--speed", type=length, default=0.5, metavar="V", help="per second; default 0.5")
     p.add_argument(
         "--vehicle", default="kinematic", metavar="NAME", help="kinematic (default) or bluerov2"
@@ -41,11 +41,11 @@ def arguments(p: argparse.ArgumentParser) -> None:
     )
     p.add_argument(
         "--planner", default="repair", metavar="NAME",
-        help="repair (default): mend what breaks; none: go on with the plan",
+        help="repair (default): repair a broken plan; none: carry on regardless",
     )  # fmt: skip
     p.add_argument(
         "--planning-limit", type=seconds, default=2.0, metavar="S",
-        help="for mending a plan, while the robot holds its place; default 2",
+        help="for repairing a plan while the robot holds its position; default 2",
     )  # fmt: skip
     p.add_argument("--delta", type=length, metavar="D", help="resolution of the tether")
     p.add_argument("--seed", type=natural, default=0, metavar="N", help="of gusts and solvers")

@@ -33,7 +33,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     p.add_argument(
         "--acceptance", type=length, default=0.0, metavar="R",
-        help="acceptance radius of the vehicle (m): corners may be cut by it",
+        help="acceptance radius of the vehicle (m), by which corners may be cut",
     )  # fmt: skip
     p.add_argument("--hold", type=natural, default=5, metavar="S", help="at goals; default 5")
     p.add_argument("--speed", type=length, default=0.5, metavar="V", help="m/s; default 0.5")
@@ -72,7 +72,9 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(f"{args.solution}: fails its check {failed.name!r}: {failed.detail}")
     kind = format_of(args.output, args.format)
     slack, clearance = margins(args.margin)
-    projection = Projection.parse(args.origin, problem.base[:2]) if args.origin else None
+    projection = None
+    if args.origin:
+        projection = Projection.parse(args.origin, problem.base[:2], "--origin")
     settings = Settings(hold=args.hold, speed=args.speed, most=args.most)
     points = export(
         problem, solution, args.output, kind, projection, acceptance=args.acceptance,
@@ -98,12 +100,11 @@ def run(args: argparse.Namespace) -> int:
         shallow = sum(p.position[2] > -SHALLOWEST for p in points)
         if shallow:
             print(
-                f"netsp: {shallow} waypoints were shallower than {SHALLOWEST} m and were lowered "
-                "to it",
+                f"netsp: {shallow} waypoints shallower than {SHALLOWEST} m were lowered to it",
                 file=sys.stderr,
             )
         print(
-            "netsp: home is taken to be the water surface at the base: do not set it by hand",
+            "netsp: home is assumed to be at the surface above the base; do not set it by hand",
             file=sys.stderr,
         )
     return 0

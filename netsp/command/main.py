@@ -107,7 +107,7 @@ COMMANDS = {
         "solve": ("solve", "find the shortest non-entangling tour of a problem"),
         "verify": ("verify", "judge a solution independently of what found it"),
         "plot": ("plot", "draw a problem or a scene, with a solution or a tether"),
-        "world": ("world", "draw a random problem, the same on every machine"),
+        "world": ("world", "draw a random problem; same seed, same problem on every machine"),
     },
     "carry out": {
         "simulate": ("simulate", "run a mission in a scene with a taut tether"),
@@ -125,7 +125,7 @@ COMMANDS = {
     },
     "tools": {
         "schema": ("schema", "print the JSON Schema of a file format"),
-        "warm-up": ("warm_up", "compile everything now, not at the first use"),
+        "warm-up": ("warm_up", "compile everything ahead of the first use"),
     },
 }
 """By what they are for: name → module of this package, and a line of help. Each module has

@@ -31,7 +31,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     p.add_argument(
         "-o", "--output", required=True, metavar="FILE",
-        help="png, svg or pdf; a scene also html, to be turned in a browser",
+        help="png, svg or pdf; a scene also html, interactive",
     )  # fmt: skip
     p.add_argument(
         "--tether-model", default="geodesic", metavar="NAME",

@@ -40,7 +40,7 @@ def dask_executor(address: str) -> Executor:
         client = Client(address, timeout=CONNECT)
     except (OSError, ValueError, TypeError) as error:
         raise InputError(
-            f"--scheduler: no Dask scheduler at {address!r} ({type(error).__name__}); expected "
+            f"scheduler: no Dask scheduler at {address!r} ({type(error).__name__}); expected "
             "tcp://host:port of a running `dask scheduler`"
         ) from None
 

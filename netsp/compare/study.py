@@ -146,7 +146,7 @@ class Study(BaseModel):
             labels = [s.label or s.name for s in specs]
             twice = [name for name in labels if labels.count(name) > 1]
             if twice:
-                raise ValueError(f"{what}: {twice[0]!r} is there twice; give each a label")
+                raise ValueError(f"{what}: {twice[0]!r} appears twice; give each a label")
         count = self.worlds.count * len(self.goals) * len(self.tether_lengths)
         count *= len(self.roadmaps) * len(self.solvers) * len(self.seeds)
         if count > MOST_TRIALS:

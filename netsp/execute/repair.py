@@ -80,7 +80,7 @@ def broken(problem: Problem, tether: Floats, legs: list[Leg]) -> tuple[str | Non
         obstacle = _in_the_way(problem, leg.path)
         if obstacle is not None:
             label = problem.obstacle_label(obstacle)
-            return f"{label} stands in the way to {_label(problem, leg)}", legs
+            return f"{label} blocks the path to {_label(problem, leg)}", legs
     rest = problem.model_copy(update={"goals": tuple(problem.goals[g] for g in left)})
     tethers = TautPaths(rest, FAR * max(problem.tether_length, polylines.length(tether)))
     now: list[Leg] = []
@@ -99,7 +99,7 @@ def broken(problem: Problem, tether: Floats, legs: list[Leg]) -> tuple[str | Non
                 f"{problem.tether_length:g}"
             ), legs
         now.append(Leg(leg.goal, leg.path, word, needs))
-    return ("the tether would not come home free", legs) if word else (None, now)
+    return ("the tether would not be free at the base", legs) if word else (None, now)
 
 
 def _label(problem: Problem, leg: Leg) -> str:

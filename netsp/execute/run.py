@@ -149,7 +149,7 @@ class _Run:
         if event.kind == "push":
             assert event.push is not None
             self._push(np.array(event.push))
-            must = "pushed off its way"
+            must = "pushed off its path"
         else:
             before = self.problem
             self._enter_changed(event)
@@ -165,7 +165,7 @@ class _Run:
             self.shorten = True
         back = self._in_reach_again() if self.options.repair else []
         if back:
-            left, must = [*left, *back], "goals are in reach again"
+            left, must = [*left, *back], "goals are within reach again"
             for goal in back:
                 del self.out.lost[goal]
         if must is None:
@@ -174,11 +174,11 @@ class _Run:
                 self.legs = legs
                 self.path, self.leg_s = self.legs[0].path[1:], 0.0
         if must is None:
-            self._enter_log(event.kind, "kept", "nothing that is left of the plan is broken", 0.0)
+            self._enter_log(event.kind, "kept", "the rest of the plan still holds", 0.0)
         elif not self.options.repair:
             self._enter_log(event.kind, "ignored", must, 0.0)
             for goal in set(left) - set(self.left):
-                self.out.lost[goal] = "was added, and plans are not mended"
+                self.out.lost[goal] = "was added, and plans are not repaired"
         else:
             self._mend(must, left, event.kind)
 

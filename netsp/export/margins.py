@@ -20,13 +20,15 @@ def warnings(
     if longest is not None and problem.tether_length - longest.tether_length < slack:
         left = problem.tether_length - longest.tether_length
         out.append(
-            f"{left:.2f} {problem.units} of tether are left at {problem.goal_label(longest.goal)}; "
-            f"expected {slack:g}: plan with a shorter tether_length, or set --margin"
+            f"only {left:.2f} {problem.units} of tether are left at "
+            f"{problem.goal_label(longest.goal)}, less than the margin of {slack:g}: plan with a "
+            "shorter tether_length, or set another margin"
         )
     near = clearance_of(problem, points)
     if near < clearance:
         out.append(
             f"the lines between waypoints come within {near:.2f} {problem.units} of an obstacle; "
-            f"expected {clearance:g}: plan with a larger clearance, or set --margin"
+            f"less than the margin of {clearance:g}: plan with a larger clearance, or set another "
+            "margin"
         )
     return out

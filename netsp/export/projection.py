@@ -41,7 +41,7 @@ class Projection:
 
     def __init__(
         self, latitude: float, longitude: float, heading: float = 0.0,
-        base: tuple[float, float] = (0.0, 0.0), name: str = "--origin",
+        base: tuple[float, float] = (0.0, 0.0), name: str = "origin",
     ) -> None:  # fmt: skip
         if not (math.isfinite(latitude) and abs(latitude) <= 90.0):
             raise InputError(f"{name}: latitude: expected -90 to 90, got {latitude:g}")
@@ -54,7 +54,7 @@ class Projection:
 
     @classmethod
     def parse(
-        cls, text: str, base: tuple[float, float] = (0.0, 0.0), name: str = "--origin"
+        cls, text: str, base: tuple[float, float] = (0.0, 0.0), name: str = "origin"
     ) -> Projection:
         """A projection from ``lat,lon`` or ``lat,lon,heading``.
 

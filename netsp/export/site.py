@@ -54,13 +54,17 @@ def read_site(
     base = bases[0] if bases else None
     if projection is None:
         if base is None:
-            raise InputError(f"{file}: has no base; expected --base lat,lon")
+            raise InputError(
+                f"{file}: has no base; expected a Point of kind base, or lat,lon given besides"
+            )
         lon, lat = base["coordinates"][:2]
         projection = Projection(lat, lon)
     own = base["properties"] if base is not None else {}
     tether = tether if tether is not None else own.get("tether_length")
     if tether is None:
-        raise InputError(f"{file}: has no tether length; expected --tether")
+        raise InputError(
+            f"{file}: has no tether length; expected tether_length of the base, or one besides"
+        )
 
     def place(c: list[float]) -> tuple[float, ...]:
         ((x, y),) = projection.to_plane([[c[1], c[0]]])
@@ -78,7 +82,8 @@ def read_site(
             r = part["properties"].get("radius_m", radius)
             if r is None:
                 raise InputError(
-                    f"{file}: features[{k}]: an obstacle without radius_m; expected --radius"
+                    f"{file}: features[{k}]: an obstacle without radius_m; expected one, or a "
+                    "radius for all that have none"
                 )
             obstacles.append({"center": place(part["coordinates"])[:2], "radius": r, **label})
         elif part["kind"] == "obstacle":

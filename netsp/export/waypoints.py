@@ -224,7 +224,7 @@ def _widened(
     if bad:
         x, y, _ = out[bad[0]]
         raise InputError(
-            f"--acceptance: {radius:g} would let the vehicle cut a corner at ({x:.6g}, {y:.6g}) "
+            f"acceptance: {radius:g} would let the vehicle cut a corner at ({x:.6g}, {y:.6g}) "
             "through an obstacle; expected a smaller radius, or a plan with a larger clearance"
         )
     return out

@@ -110,15 +110,15 @@ def export(
         not be of the plan's class.
     """
     if kind not in FORMATS:
-        raise InputError(f"--format: expected {', '.join(FORMATS)}, got {kind!r}")
+        raise InputError(f"format: expected {', '.join(FORMATS)}, got {kind!r}")
     if projection is None and kind != "csv":
-        raise InputError(f"--origin: format {kind!r} needs lat,lon or lat,lon,heading of the base")
+        raise InputError(f"origin: format {kind!r} needs latitude and longitude of the base")
     settings = settings or Settings()
     if settings.speed is not None and not 0.0 < settings.speed <= FASTEST:
-        raise InputError(f"--speed: expected at most {FASTEST:g} m/s, got {settings.speed!r}")
+        raise InputError(f"speed: expected at most {FASTEST:g} m/s, got {settings.speed!r}")
     if not 0 <= settings.hold <= 3600 or not 1 <= settings.bend <= 3600:
         raise InputError(
-            f"--hold: expected whole seconds from 0 to 3600 (at bends from 1), got {settings.hold}"
+            f"hold: expected whole seconds from 0 to 3600 (at bends from 1), got {settings.hold}"
         )
     points = [start_of(problem, solution), *waypoints_of(problem, solution, acceptance)]
     if len(points) > settings.most and kind in ("plan", "wpl"):
@@ -338,12 +338,11 @@ def format_of(file: str, asked: str | None) -> str:
     extension = os.path.splitext(file)[1].lower()
     own = EXTENSIONS.get(extension)
     if asked is not None and asked not in FORMATS:
-        raise InputError(f"--format: expected {', '.join(FORMATS)}, got {asked!r}")
+        raise InputError(f"format: expected {', '.join(FORMATS)}, got {asked!r}")
     if asked is not None and own is not None and asked != own:
-        raise InputError(f"--format: {asked}, but {file!r} ends like a file of format {own}")
+        raise InputError(f"format: {asked!r}, but {file!r} ends like a file of format {own}")
     if asked is None and own is None:
         raise InputError(
-            f"-o: expected a file that ends in {', '.join(EXTENSIONS)}, got {file!r}; or say "
-            "--format"
+            f"file: expected a name that ends in {', '.join(EXTENSIONS)}, got {file!r}; or a format"
         )
     return asked or own or ""

@@ -188,7 +188,8 @@ class Mission(BaseModel):
         if not snap:
             raise InputError(
                 f"waypoints {', '.join(map(str, inside[:10]))}"
-                f"{' …' if len(inside) > 10 else ''} lie inside a solid; move them out with --snap"
+                f"{' …' if len(inside) > 10 else ''} lie inside a solid; expected points in the "
+                "water, or snap"
             )
         points[inside] = pushed_out(field, points[inside], self.clearance)
         return self.model_copy(update={"waypoints": tuple(map(tuple, points.tolist()))})

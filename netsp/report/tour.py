@@ -230,7 +230,7 @@ def _summary(problem: Problem, solution: Solution, run: Path | None) -> str:
         lines.append(
             f"Carried out in {s['time_s']:.5g} s over {s['path']:.6g} {units}: "
             f"{s['visited']} goals visited, the tether at most {s['longest_tether']:.5g} long, "
-            f"longer than allowed for {s['exceedance_s']:.3g} s, "
+            f"over the limit for {s['exceedance_s']:.3g} s, "
             f"{'recovered free' if s['tether_free'] else 'not recovered free'} at the end."
         )
     return "".join(f"<p>{line}</p>" for line in lines)

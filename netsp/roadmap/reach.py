@@ -24,12 +24,13 @@ def explain_unreached(problem: Problem, outline: Outline, missing: list[int]) ->
     for g in missing[:3]:
         label = problem.goal_label(g - 1)
         if math.isinf(needed[g]):
-            parts.append(f"{label} cannot be reached with any tether: {_enclosure(problem, g)}")
+            why = _enclosure(problem, g)
+            parts.append(f"{label} cannot be reached with a tether of any length: {why}")
         else:
             shortest = math.ceil(needed[g] * 1e6) / 1e6
             parts.append(
-                f"{label} is out of reach: tether_length {problem.tether_length:g}, the shortest "
-                f"tether that would do is {shortest:.6f}"
+                f"{label} is out of reach: tether_length is {problem.tether_length:g}; "
+                f"expected at least {shortest:.6f}"
             )
     if len(missing) > 3:
         parts.append(f"{len(missing) - 3} more goals are out of reach")
@@ -49,8 +50,8 @@ def _enclosure(problem: Problem, g: int) -> str:
     for sealed, label in ((goal, "it"), (base, "the base")):
         names = _ring_around(sealed, grown, box, problem)
         if names:
-            return f"{label} is enclosed by {', '.join(names)}"
-    return "the obstacles between close every way"
+            return f"{label} is enclosed by obstacles {', '.join(names)}"
+    return "the obstacles in between block every path"
 
 
 def _ring_around(
@@ -72,4 +73,4 @@ def _ring_around(
     if box is None and pocket.buffer(tolerance).contains(everything.exterior):
         return []
     near = [i for i, s in enumerate(shapes) if s.distance(pocket) <= 3 * tolerance]
-    return [problem.obstacle_label(i) for i in near]
+    return [problem.obstacle_name(i) for i in near]

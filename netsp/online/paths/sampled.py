@@ -48,7 +48,7 @@ class SampledPaths:
         self, name: str, grid: Grid, target: Floats, points: Floats, seed: int = 0
     ) -> None:
         if name not in OMPL_PLANNERS:
-            raise InputError(f"--paths: expected tree, {', '.join(OMPL_PLANNERS)}, got {name!r}")
+            raise InputError(f"paths: expected tree, {', '.join(OMPL_PLANNERS)}, got {name!r}")
         self.name, self.grid, self.seed = name, grid, seed
         self.target = np.asarray(target, dtype=float)
         self.points = np.asarray(points, dtype=float).reshape(-1, 3)

@@ -101,11 +101,11 @@ def of_triangles(
         around = windings(triangles, origin, size, counts)
         if uneven:
             notes.append(
-                f"triangles at {uneven} edges are turned against each other: taken as solid "
-                "wherever the mesh winds at all"
+                f"faces at {uneven} edges have opposite orientations: taken as solid wherever the "
+                "winding number is not zero"
             )
         if turned:
-            notes.append(f"{turned} parts are turned inside out or cavities: taken as solid")
+            notes.append(f"{turned} parts are inside out, or cavities: taken as solid")
         elif np.abs(around).max(initial=0) > 1:
             notes.append("parts of the mesh overlap: taken as their union")
         values = np.where(around != 0, -distances, distances)
