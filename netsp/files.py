@@ -12,12 +12,15 @@ import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import ClassVar, Self
 
 import numpy as np
+from pydantic import BaseModel
 
 from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.fields import LARGEST
+from netsp.models import read_model
 
 MOST_BYTES = 256 * 2**20
 """Largest file that is read, unpacked if it is packed: a problem of a million goals is smaller."""
@@ -199,3 +202,53 @@ def _is_point(row: object) -> bool:
         return all(abs(float(x)) <= LARGEST for x in row)
     except (TypeError, ValueError):
         return False
+
+
+class FileModel(BaseModel):
+    """A model that is a file of its own, JSON of a format version."""
+
+    file_kind: ClassVar[str] = "file"
+
+    @classmethod
+    def from_json(cls, text: str | bytes, *, source: str | None = None) -> Self:
+        """Parse and validate the text of a file.
+
+        Parameters
+        ----------
+        text : str or bytes
+            JSON of the format version.
+        source : str, optional
+            What messages call it; by default the kind of file.
+
+        Returns
+        -------
+        Self
+            The model.
+
+        Raises
+        ------
+        InputError
+            Anything wrong, in one line.
+        """
+        return read_model(cls, text, source or cls.file_kind)
+
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """Read a file.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file.
+
+        Returns
+        -------
+        Self
+            The model.
+
+        Raises
+        ------
+        InputError
+            The file cannot be read or is not valid, in one line.
+        """
+        return cls.from_json(read_text(path), source=str(path))

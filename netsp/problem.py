@@ -10,7 +10,6 @@ import hashlib
 import json
 from collections.abc import Sequence
 from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
@@ -38,9 +37,9 @@ from netsp.fields import (
     Positive,
     checked_number,
 )
-from netsp.files import read_text
+from netsp.files import FileModel
 from netsp.geometry.polygons import check_polygon, polygon_interior_point, polygon_signed_distance
-from netsp.models import read_model, shown
+from netsp.models import shown
 
 if TYPE_CHECKING:
     import shapely
@@ -219,7 +218,7 @@ class State(BaseModel):
     ] = ()
 
 
-class Problem(Drawn, BaseModel):
+class Problem(Drawn, FileModel):
     """An instance of the Non-Entangling Travelling Salesperson Problem.
 
     Source: McCammon & Hollinger 2017, section III.
@@ -261,6 +260,7 @@ class Problem(Drawn, BaseModel):
     """
 
     picture: ClassVar[str] = "netsp.pictures.problem:draw_map"
+    file_kind: ClassVar[str] = "problem"
 
     model_config = ConfigDict(frozen=True, extra="forbid", title="netsp problem")
 
@@ -502,50 +502,6 @@ class Problem(Drawn, BaseModel):
         )
 
     __str__ = __repr__
-
-    @classmethod
-    def from_json(cls, text: str | bytes, *, source: str = "problem") -> Self:
-        """Parse and validate the text of a problem file.
-
-        Parameters
-        ----------
-        text : str or bytes
-            JSON of format version 1.
-        source : str
-            What messages call it.
-
-        Returns
-        -------
-        Problem
-            The problem.
-
-        Raises
-        ------
-        InputError
-            Anything wrong, in one line.
-        """
-        return read_model(cls, text, source)
-
-    @classmethod
-    def load(cls, path: str | Path) -> Self:
-        """Read a problem file.
-
-        Parameters
-        ----------
-        path : str or Path
-            The file.
-
-        Returns
-        -------
-        Problem
-            The problem.
-
-        Raises
-        ------
-        InputError
-            The file cannot be read or is not valid, in one line.
-        """
-        return cls.from_json(read_text(path), source=str(path))
 
     def to_json(self) -> str:
         """The problem as JSON of format version 1, in a form that reads back equal.

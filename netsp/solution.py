@@ -5,14 +5,13 @@ from __future__ import annotations
 import json
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from netsp.drawn import Drawn
 from netsp.fields import STRICT, Name, NonNegative, Number, Point3
-from netsp.files import read_text, write_text
-from netsp.models import read_model
+from netsp.files import FileModel, write_text
 
 
 class Status(StrEnum):
@@ -67,7 +66,7 @@ class Timings(BaseModel):
     total_s: Annotated[float, Field(description="seconds of the whole call")] = 0.0
 
 
-class Solution(Drawn, BaseModel):
+class Solution(Drawn, FileModel):
     """A tour with its proof status.
 
     Lengths are in the problem's units. Without a tour, `length` and `gap` are None.
@@ -89,6 +88,7 @@ class Solution(Drawn, BaseModel):
     """
 
     picture: ClassVar[str] = "netsp.pictures.problem:draw_solution"
+    file_kind: ClassVar[str] = "solution"
 
     model_config = ConfigDict(frozen=True, extra="forbid", title="netsp solution")
 
@@ -132,7 +132,9 @@ class Solution(Drawn, BaseModel):
         ),
     ] = ()
     timings: Annotated[Timings, Field(description="how long it took")] = Timings()
-    versions: Annotated[dict[str, str], Field(description="of netsp and what it used")] = {}
+    versions: Annotated[
+        dict[str, str], Field(description="of netsp and what it used", default_factory=dict)
+    ]
 
     def __repr__(self) -> str:
         """In a line."""
@@ -144,50 +146,6 @@ class Solution(Drawn, BaseModel):
         )
 
     __str__ = __repr__
-
-    @classmethod
-    def from_json(cls, text: str | bytes, *, source: str = "solution") -> Self:
-        """Parse and validate the text of a solution file.
-
-        Parameters
-        ----------
-        text : str or bytes
-            JSON of format version 1.
-        source : str
-            What messages call it.
-
-        Returns
-        -------
-        Solution
-            The solution.
-
-        Raises
-        ------
-        InputError
-            Anything wrong, in one line.
-        """
-        return read_model(cls, text, source)
-
-    @classmethod
-    def load(cls, path: str | Path) -> Self:
-        """Read a solution file.
-
-        Parameters
-        ----------
-        path : str or Path
-            The file.
-
-        Returns
-        -------
-        Solution
-            The solution.
-
-        Raises
-        ------
-        InputError
-            The file cannot be read or is not valid, in one line.
-        """
-        return cls.from_json(read_text(path), source=str(path))
 
     def to_json(self) -> str:
         """The solution as JSON of format version 1.

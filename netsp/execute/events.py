@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from netsp.errors import InputError
 from netsp.fields import STRICT, NonNegative, Point2, Point3, Positive
-from netsp.files import read_text
-from netsp.models import explain, read_model
+from netsp.files import FileModel
+from netsp.models import explain
 from netsp.problem import Circle, GoalLike, Obstacle, Polygon, Problem
 
 Which = Annotated[int, Field(ge=0)] | str
@@ -89,7 +88,7 @@ class Event(BaseModel):
         )
 
 
-class Surprises(BaseModel):
+class Surprises(FileModel):
     """The surprise file.
 
     >>> text = '{"schema_version": 1, "events": [{"time": 60, "tether_length": 40}]}'
@@ -97,54 +96,12 @@ class Surprises(BaseModel):
     'tether_length'
     """
 
+    file_kind: ClassVar[str] = "surprises"
+
     model_config = ConfigDict(frozen=True, extra="forbid", title="netsp surprises")
 
     schema_version: Annotated[Literal[1], Field(description="of the file format")] = 1
     events: Annotated[tuple[Event, ...], Field(description="in any order")]
-
-    @classmethod
-    def from_json(cls, text: str | bytes, *, source: str = "surprises") -> Self:
-        """Parse and validate the text of a surprise file.
-
-        Parameters
-        ----------
-        text : str or bytes
-            JSON of format version 1.
-        source : str
-            What messages call it.
-
-        Returns
-        -------
-        Surprises
-            The events.
-
-        Raises
-        ------
-        InputError
-            Anything wrong, in one line.
-        """
-        return read_model(cls, text, source)
-
-    @classmethod
-    def load(cls, path: str | Path) -> Self:
-        """Read a surprise file.
-
-        Parameters
-        ----------
-        path : str or Path
-            The file.
-
-        Returns
-        -------
-        Surprises
-            The events.
-
-        Raises
-        ------
-        InputError
-            The file cannot be read or is not valid, in one line.
-        """
-        return cls.from_json(read_text(path), source=str(path))
 
     def check(self, problem: Problem) -> None:
         """Refuse events that a problem cannot have.

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from netsp.errors import InputError
 from netsp.fields import STRICT, Name, NonNegative, Point3, Positive
-from netsp.files import read_text
-from netsp.models import read_model
+from netsp.files import FileModel, read_text
 from netsp.online.scene.field import DistanceField, pushed_out
 from netsp.online.scene.scene import Scene
 
@@ -45,7 +44,7 @@ class Camera(BaseModel):
     patch: Annotated[Positive, Field(description="edge of the patches that are counted, m")] = 0.1
 
 
-class Mission(BaseModel):
+class Mission(FileModel):
     """Waypoints to visit in their order.
 
     Attributes
@@ -85,6 +84,8 @@ class Mission(BaseModel):
         From `load`, in one line.
     """
 
+    file_kind: ClassVar[str] = "mission"
+
     model_config = ConfigDict(frozen=True, extra="forbid", title="netsp mission")
 
     schema_version: Annotated[Literal[1], Field(description="of the file format")] = 1
@@ -115,29 +116,6 @@ class Mission(BaseModel):
     ] = 0.0
     delta: Annotated[Positive, Field(description="resolution of the tether, m")] = 0.1
     cell: Annotated[Positive, Field(description="of the grid on which paths are sought, m")] = 0.2
-
-    @classmethod
-    def from_json(cls, text: str | bytes, *, source: str = "mission") -> Self:
-        """Parse and validate the text of a mission file.
-
-        Parameters
-        ----------
-        text : str or bytes
-            JSON of format version 1.
-        source : str
-            What messages call it.
-
-        Returns
-        -------
-        Mission
-            The mission.
-
-        Raises
-        ------
-        InputError
-            Anything wrong, in one line.
-        """
-        return read_model(cls, text, source)
 
     @classmethod
     def load(cls, path: str | Path) -> Self:

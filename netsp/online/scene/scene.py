@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -15,8 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.fields import STRICT, Name, NonNegative, Number, Positive
-from netsp.files import read_text
-from netsp.models import read_model
+from netsp.files import FileModel, read_text
 from netsp.online.scene.field import DistanceField
 from netsp.online.scene.shapes import (
     Box,
@@ -89,7 +88,7 @@ class Source(BaseModel):
     ] = None
 
 
-class Scene(BaseModel):
+class Scene(FileModel):
     """The union of solids, a mesh, a cloud and the obstacles of a problem.
 
     Attributes
@@ -113,6 +112,8 @@ class Scene(BaseModel):
     InputError
         From `load` and `field`, in one line.
     """
+
+    file_kind: ClassVar[str] = "scene"
 
     model_config = ConfigDict(frozen=True, extra="forbid", title="netsp scene")
 
@@ -146,29 +147,6 @@ class Scene(BaseModel):
                 f"{list(self.bounds)}"
             )
         return self
-
-    @classmethod
-    def from_json(cls, text: str | bytes, *, source: str = "scene") -> Self:
-        """Parse and validate the text of a scene file.
-
-        Parameters
-        ----------
-        text : str or bytes
-            JSON of format version 1.
-        source : str
-            What messages call it.
-
-        Returns
-        -------
-        Scene
-            The scene.
-
-        Raises
-        ------
-        InputError
-            Anything wrong, in one line.
-        """
-        return read_model(cls, text, source)
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
