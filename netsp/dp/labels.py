@@ -90,11 +90,12 @@ def completions(
 @kernel
 def translate(tables: npt.NDArray[np.int32], g: int, h: int, memory: int) -> int:
     """The memory at goal h of a walk that comes from goal g; negative if it must not."""
-    return int(
+    mask: int = (
         tables[g, h, 0, memory & LOW]
         | tables[g, h, 1, (memory >> CHUNK) & LOW]
         | tables[g, h, 2, memory >> (2 * CHUNK)]
     )
+    return mask
 
 
 @kernel
