@@ -170,7 +170,7 @@ def save_classes(problem: Problem, goal: int, path: str | Path) -> None:
     figure.suptitle(
         f"{problem.name}: {len(rows)} classes reach {problem.goal_label(goal)} within "
         f"{problem.tether_length:g} {problem.units}{more}\n"
-        "(obstacles bear the letters of the words)",
+        "(obstacle numbers are the letters of the words)",
         fontsize=10,
     )
     style.save(figure, path)
