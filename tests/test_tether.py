@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -267,3 +268,29 @@ def test_a_strand_laid_densely_round_something_stays_on_its_side():
     assert model.relaxed(path, 2000).length == pytest.approx(model.lay(path).length, rel=2e-3)
     assert lengths[0] >= lengths[1] - 1e-6 >= lengths[2] - 2e-6
     assert box.field().distance(model.relaxed(path, 2000).nodes).min() > -0.1
+
+
+@pytest.fixture(scope="module")
+def wreck():
+    """Seven overlapping tilted boxes as a mesh, and stops of a robot among them, by other hands
+    (free to use): a Newton step used to fling the tether 10^11 m away here."""
+    data = Path(__file__).parent / "data"
+    scene = Scene.model_validate(
+        {"schema_version": 1, "mesh": {"file": str(data / "wreck.stl"), "voxel": 0.08}}
+    )
+    return scene.field(), np.load(data / "wreck-stops.npz")["stops"].astype(float)
+
+
+def test_a_tether_over_a_wreck_stays_taut_where_its_newton_steps_have_no_end(wreck):
+    field, stops = wreck
+    model = GeodesicTether(field, 0.12)
+    tether = model.start((0, 6, 0), (0, 5.5, -1))
+    for k, place in enumerate(stops):
+        tether = model.update(tether, place)
+        assert tether.residual < 1e4
+        if k % 100 == 0:
+            rested = tether
+            for _ in range(3):
+                rested = model.update(rested, place)
+            taut = model.refine(rested).length
+            assert -0.001 * taut <= rested.length - taut <= 0.005 * taut

@@ -22,6 +22,7 @@ from netsp.arrays import Floats
 from netsp.compiled.kernel import kernel
 from netsp.online.scene.sampling import Field, distance
 from netsp.online.tether.strand import (
+    CONE,
     CURVE,
     EX,
     EY,
@@ -57,6 +58,8 @@ HELD, HELD_SHARP = 0.5, 0.2
 """A contact holds the strand when at least this share of the two edges' pull goes into the surface:
 else the strand slips off, as where it doubles back."""
 
+LOOSE = 0.03
+"""How far, as a sine, a pull may leave the cone of both faces before an edge lets go."""
 
 DAMPING = 0.02
 """Stiffness of a contact that slides along the strand itself: it has none of its own, and no reason
@@ -65,6 +68,10 @@ to move."""
 WORTH = 0.4
 """A step is not taken unless it shortens the strand by this share of the precision: where all
 positions are nearly as good, rounding would keep the strand moving."""
+
+
+PIVOT = 0.1
+"""Least share of a contact's own stiffness that elimination leaves."""
 
 MOST_GAIN = 10.0
 """Newton steps are lengthened by at most this: where rulings bend, they fall short of the minimum
@@ -241,8 +248,13 @@ def lift(field: Field, strand: Floats, count: int, slip: float, stride: float) -
             fy = (strand[i + 1, Y] - py) / lb - (py - ay) / la
             fz = (strand[i + 1, Z] - pz) / lb - (pz - az) / la
             pressed = -(fx * strand[i, NX] + fy * strand[i, NY] + fz * strand[i, NZ])
-            share = HELD_SHARP if strand[i, SHARP] == 1.0 else HELD
-            held = pressed > share * math.sqrt(fx * fx + fy * fy + fz * fz)
+            force = math.sqrt(fx * fx + fy * fy + fz * fz)
+            along = fx * strand[i, EX] + fy * strand[i, EY] + fz * strand[i, EZ]
+            if strand[i, SHARP] == 1.0:
+                across = math.sqrt(max(force * force - along * along, 0.0))
+                held = pressed > HELD_SHARP * force and pressed > (strand[i, CONE] - LOOSE) * across
+            else:
+                held = pressed > HELD * force and strand[i, CONE] * along <= LOOSE * force
         if h <= (0.125 * slip if held else stride):
             count = remove(strand, count, i)
             lifted = max(lifted, h)
@@ -327,16 +339,18 @@ def slide(
         # a contact that is met head on cannot slide: a small weight keeps the system regular
         diagonal[k] = diagonal[k] * (1.0 + 1e-9) + 1e-9
     pull_along = slope.copy()
+    stiffness = diagonal.copy()
     for k in range(1, n):
         w = beside[k - 1] / diagonal[k - 1]
-        diagonal[k] -= w * beside[k - 1]
+        # where the strand is not convex, a pivot would vanish and the step know no end
+        diagonal[k] = max(diagonal[k] - w * beside[k - 1], PIVOT * stiffness[k])
         slope[k] -= w * slope[k - 1]
     most = 0.0
     for k in range(n - 1, -1, -1):
         right = slope[k]
         if k < n - 1:
             right -= beside[k] * slope[k + 1]
-        slope[k] = right / max(diagonal[k], 1e-12)
+        slope[k] = right / diagonal[k]
         most = max(most, abs(slope[k]))
     # e, the way to go, shrinks by gain * s when a step s = c e was taken gain times: c follows from
     # two steps, and the next is taken 1 / c times
@@ -352,9 +366,9 @@ def slide(
         saved += 0.5 * gain * pull_along[k] * slope[k]
     if saved <= WORTH * precision:
         return 0.0, gain
-    f = min(damping * gain, stride / most) if most > 0.0 else 0.0
+    f = damping * gain
     for k in range(n):
-        by = -f * slope[k]
+        by = min(max(-f * slope[k], -stride), stride)
         if abs(by) <= 0.1 * precision:
             continue
         i = k + 1

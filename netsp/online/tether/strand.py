@@ -46,7 +46,12 @@ CURVE = 16
 STEP = 17
 """The node's last Newton step along its direction."""
 
-WIDTH = 18
+CONE = 18
+"""On an edge, the cosine of half the angle between the normals of its two faces: the contact holds
+only what presses within it. Elsewhere, +1 or -1 where the surface ends in an edge close by, along
+or against the slide direction, else 0."""
+
+WIDTH = 19
 
 SHARP_SINE = 0.5
 """Normals that differ by more than 30 degrees across a contact mean a sharp edge."""
@@ -363,6 +368,7 @@ def take_frame(
     if strand[i, SHARP] == 1.0:
         nx, ny, nz = ax + bx, ay + by, az + bz
         length = math.sqrt(nx * nx + ny * ny + nz * nz)
+        strand[i, CONE] = 0.5 * length
         nx, ny, nz = nx / length, ny / length, nz / length
     # the mean direction of the tether
     tx, ty, tz = ux + wx, uy + wy, uz + wz
@@ -379,8 +385,13 @@ def take_frame(
         if strand[i, SHARP] == 0.0:
             _, ax, ay, az, _ = sample(field, qx - spread * ex, qy - spread * ey, qz - spread * ez)
             _, bx, by, bz, _ = sample(field, qx + spread * ex, qy + spread * ey, qz + spread * ez)
-            turn = (bx - ax) * ex + (by - ay) * ey + (bz - az) * ez
-            strand[i, CURVE] = turn / (2.0 * spread)
+            before, after = ax * ex + ay * ey + az * ez, bx * ex + by * ey + bz * ez
+            strand[i, CURVE] = (after - before) / (2.0 * spread)
+            strand[i, CONE] = 0.0
+            if after > SHARP_SINE and before > -0.1:
+                strand[i, CONE] = 1.0
+            elif before < -SHARP_SINE and after < 0.1:
+                strand[i, CONE] = -1.0
         else:
             strand[i, CURVE] = 0.0
     strand[i, NX], strand[i, NY], strand[i, NZ] = nx, ny, nz

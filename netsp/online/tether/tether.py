@@ -40,7 +40,7 @@ class Tether:
 
     Parameters
     ----------
-    strand : ndarray, shape (n, 18)
+    strand : ndarray, shape (n, 19)
         What the model keeps of each node (`netsp.online.tether.strand`); never changed in place, so
         a state can be kept, compared and continued from.
     length : float
