@@ -24,7 +24,7 @@ class Drawn:
         Parameters
         ----------
         more
-            What the picture takes besides; of a solution its `problem`, to be drawn beneath.
+            Further options of the picture; for a solution its `problem`, drawn underneath.
         """
         return load(self.picture)(self, ax=ax, **more)
 

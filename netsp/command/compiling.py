@@ -77,10 +77,18 @@ def steps() -> Iterator[tuple[str, Callable[[], object]]]:
     problem = random_world(1, goals=9, tether_length=450.0)
     polygons = random_world(1, family="harbour", goals=4, tether_length=250.0)
     for solver in SOLVERS:
-        yield f"solver {solver}", partial(solve, problem, solver, time_limit=3.0)
+        # on a busy machine a time limit alone would leave kernels out
+        yield (
+            f"solver {solver}",
+            partial(solve, problem, solver, iteration_limit=20_000, time_limit=60.0),
+        )
     fewer = problem.model_copy(update={"goals": problem.goals[:6]})
     for solver in ("dp", "mip"):
         yield f"solver {solver}, measured legs", partial(solve, fewer, solver, iteration_limit=4)
+    yield (
+        "solver dp, to the end",
+        partial(solve, random_world(2, goals=12, tether_length=300.0), "dp", iteration_limit=30),
+    )
     yield "polygons and the judge", lambda: verify(polygons, solve(polygons))
 
     def sampled() -> None:

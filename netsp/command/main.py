@@ -1,7 +1,7 @@
 """The command line. Data goes to stdout or `-o`, progress and messages to stderr.
 
 Exit codes: 0 done, 1 internal error, 2 bad input, 3 proven infeasible, 4 limit reached without a
-solution, 5 verification failed, 130 interrupted with nothing to show. Heavy modules are imported by
+solution, 5 verification failed, 130 interrupted before any result. Heavy modules are imported by
 the commands that need them, so that `--help` is instant.
 """
 
@@ -168,7 +168,7 @@ def _parser(wanted: str | None) -> argparse.ArgumentParser:
 EPILOG = (
     "netsp COMMAND --help gives the details, with an example. Exit codes: 0 done, 1 a defect of",
     "netsp, 2 bad input, 3 proven infeasible, 4 no solution within the limit or goals left out,",
-    "5 verification failed, 130 interrupted with nothing to show.",
+    "5 verification failed, 130 interrupted before any result.",
 )
 
 

@@ -112,8 +112,8 @@ def summary(
         verdict = "proven optimal" if exact else f"optimal over this {solution.roadmap} roadmap"
     elif solution.status is Status.OPTIMAL_OF_KEPT:
         verdict = (
-            f"optimal among the classes kept; bound over all {solution.lower_bound:.6g}, "
-            f"gap {100 * (solution.gap or 0.0):.2f} %"
+            f"shortest over the classes kept; bound over all classes {solution.lower_bound:.6g} "
+            f"{problem.units}, gap {100 * (solution.gap or 0.0):.2f} %"
         )
     elif solution.status is Status.INVALID:
         verdict = "INVALID: the solver is blind to the tether"
@@ -122,6 +122,8 @@ def summary(
     else:
         verdict = f"bound {solution.lower_bound:.6g}, gap {100 * (solution.gap or 0.0):.2f} %"
     names = [problem.goal_name(v.goal) for v in solution.tour]
+    if solution.classes == "shortest" and solution.status is not Status.OPTIMAL_OF_KEPT:
+        verdict += "; not all classes were kept"
     longest = max((v.tether_length for v in solution.tour), default=0.0)
     wrapped = ", ".join(problem.obstacle_name(k) for k in solution.entangled)
     lines = [

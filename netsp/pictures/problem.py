@@ -291,7 +291,7 @@ def _title(problem: Problem, solution: Solution | None) -> str:
     longest = max((v.tether_length for v in solution.tour), default=0.0)
     kind = "non-entangling tour"
     if solution.status is Status.INVALID:
-        kind, proof = "tour", f"entangles {len(solution.entangled)} obstacles (purple)"
+        kind, proof = "tour", f"entangles {len(solution.entangled)} obstacles (pink)"
     return (
         f"{problem.name}: {kind} of {solution.length:.6g} {problem.units}, {proof}\n"
         f"longest tether {longest:.4g} of {problem.tether_length:g} {problem.units}; "

@@ -116,9 +116,14 @@ def find_classes(paths: TautPaths, rule: int, most: int, clock: Clock) -> Classe
 
     Raises InfeasibleError for a goal that no tether within the limit reaches.
     """
-    search = _Search(paths, rule, most, Clock(SHARE * clock.left, within=clock))
+    search = _Search(paths, rule, most, clock)
+    search.ready()
+    search.clock = Clock(SHARE * clock.left, within=clock)
     found = search.everything()
-    return found if found is not None else search.shortest()
+    if found is not None:
+        return found
+    search.clock = Clock(SHARE * clock.left, within=clock)
+    return search.shortest()
 
 
 class _Search:
@@ -132,6 +137,10 @@ class _Search:
         # a hypotenuse within the limit, and a rounding more
         self.within = np.sqrt(np.maximum(self.limit**2 - self.dz**2, 0.0)) * (1.0 + 1e-15)
         self.within[0] = -1.0
+
+    def ready(self) -> None:
+        """Load the kernel, or compile it: that takes none of the share."""
+        run_explore(self.paths.tangents, 0, Trie.root(0.0), margin=self.paths.outline.margin, cap=0)
 
     def everything(self) -> Classes | None:
         """All classes; None if they are too many, or the time is too short."""

@@ -1,4 +1,4 @@
-"""Solvers by other hands: any callable that takes a travel graph."""
+"""Solvers third-party: any callable that takes a travel graph."""
 
 from __future__ import annotations
 

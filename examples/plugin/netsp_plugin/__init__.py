@@ -1,1 +1,1 @@
-"""A solver, a tether model and a planner for netsp by other hands."""
+"""A solver, a tether model and a planner for netsp third-party."""
