@@ -14,6 +14,9 @@ from netsp.models import shown
 LARGEST = 1e12
 """Largest coordinate, radius or length in absolute value."""
 
+SMALLEST = 1e-100
+"""Smallest that is not 0: squares of less underflow."""
+
 
 def checked_number(value: Any) -> Any:
     """Numbers only: no strings, no booleans; numpy scalars are welcome."""
@@ -27,6 +30,8 @@ def checked_number(value: Any) -> Any:
         raise ValueError(f"expected a finite number, got {shown(value)}")
     if abs(number) > LARGEST:
         raise ValueError(f"expected a magnitude of at most {LARGEST:g}, got {shown(value)}")
+    if 0.0 < abs(number) < SMALLEST:
+        raise ValueError(f"expected 0 or at least {SMALLEST:g}, got {shown(value)}")
     return number
 
 

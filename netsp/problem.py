@@ -45,6 +45,10 @@ if TYPE_CHECKING:
     import shapely
 
 
+WIDEST = 1e4
+"""Of an obstacle within reach, in units of the farthest goal: with more, the tolerances would come
+near the distances between goals."""
+
 RELATIVE_TOLERANCE = 1e-9
 """Lengths below this fraction of the problem's size count as zero (touching, on a boundary)."""
 
@@ -331,6 +335,7 @@ class Problem(Drawn, FileModel):
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         self._check_distinct_goals()
+        self._check_sizes()
         self._check_free()
         self._check_state()
         return self
@@ -364,6 +369,19 @@ class Problem(Drawn, FileModel):
                     f"{self._goal_field(first)}; expected distinct goals"
                 )
 
+    def _check_sizes(self) -> None:
+        """No obstacle within reach is so large that tolerances, which go by the largest, would hide
+        the goals."""
+        reach = self.tether_length + self.clearance
+        away = float(np.abs(self.points - np.array(self.base)).max())
+        for i, o in enumerate(self.obstacles):
+            near, far = self._span(o)
+            if near <= reach and far > WIDEST * max(away, 1e-3 * reach):
+                raise ValueError(
+                    f"{self._obstacle_field(i)}: reaches {far:.6g} from the base, and no goal is "
+                    f"farther than {away:.6g}; expected at most {WIDEST:g} times as far"
+                )
+
     def _check_free(self) -> None:
         """Base and goals lie within the bounds and outside of every grown obstacle."""
         xy, tolerance = self.points[:, :2], self.tolerance
@@ -392,20 +410,22 @@ class Problem(Drawn, FileModel):
         """Size of the problem, the unit of every tolerance: the largest coordinate difference from
         the base to any goal and any obstacle within the tether's reach. Geometry is computed
         relative to the base, so far-off origins (UTM) cost no precision."""
-        base = np.array(self.base[:2])
         reach = self.tether_length + self.clearance
-        away = [float(np.abs(self.points[:, :2] - base).max())]
+        away = [float(np.abs(self.points[:, :2] - np.array(self.base[:2])).max())]
         for o in self.obstacles:
-            if isinstance(o, Circle):
-                off = np.abs(np.array(o.center) - base)
-                near, far = float(np.hypot(*off)) - o.radius, float(off.max()) + o.radius
-            else:
-                corners = np.array(o.polygon)
-                near = max(float(o.signed_distance(base)), 0.0)
-                far = float(np.abs(corners - base).max())
+            near, far = self._span(o)
             if near <= reach:
                 away.append(far)
         return max(*away, 1e-9 * self.tether_length)
+
+    def _span(self, o: Circle | Polygon) -> tuple[float, float]:
+        """How near an obstacle comes to the base, and how far it goes from there along an axis."""
+        base = np.array(self.base[:2])
+        if isinstance(o, Circle):
+            off = np.abs(np.array(o.center) - base)
+            return float(np.hypot(*off)) - o.radius, float(off.max()) + o.radius
+        near = max(float(o.signed_distance(base)), 0.0)
+        return near, float(np.abs(np.array(o.polygon) - base).max())
 
     @property
     def tolerance(self) -> float:

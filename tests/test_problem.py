@@ -75,6 +75,14 @@ BAD = {
         variant(clearance=1.5),
         "base: (0, 0, 0) lies inside obstacles[0] (pile) grown by the clearance 1.5",
     ),
+    "obstacle too wide for the goals": (
+        variant(obstacles=[{"center": [1e6, 0], "radius": 999_999}], goals=[[-4, 0]]),
+        "obstacles[0]: reaches 2e+06 from the base, and no goal is farther than 4",
+    ),
+    "radius that underflows": (
+        variant(obstacles=[{"center": [2, 0], "radius": 1e-170}]),
+        "obstacles[0].radius: expected 0 or at least 1e-100",
+    ),
     "goal out of bounds": (variant(bounds=[-1, -1, 3, 5]), "goals[0]: (4, 0, 0) is outside bounds"),
     "empty bounds": (variant(bounds=[1, 0, 1, 5]), "bounds: expected xmin < xmax and ymin < ymax"),
     "short bounds": (variant(bounds=[1, 0]), "bounds: expected [xmin, ymin, xmax, ymax], got [1, 0]"),  # noqa: E501

@@ -569,3 +569,12 @@ def test_time_up_while_classes_are_sought_leaves_some_of_every_goal():
     solution = solve(problem, time_limit=1e-9)
     assert solution.status in (Status.FEASIBLE, Status.OPTIMAL_OF_KEPT)
     assert verify(problem, solution)
+
+
+@pytest.mark.parametrize("radius", [1e2, 1e3, 1e4])
+def test_beside_a_circle_ever_wider_the_tour_stays_as_long_as_beside_its_tangent(radius):
+    problem = Problem(
+        base=(0, 0), goals=[(-4, 0), (-4, 1)], tether_length=10,
+        obstacles=[Circle(center=(radius + 1e-3, 0), radius=radius)],
+    )  # fmt: skip
+    assert solve(problem).length == pytest.approx(4 + 1 + math.hypot(4, 1), rel=1e-6)

@@ -102,7 +102,7 @@ def _goal_number(problem: Problem, text: str) -> int:
     if text in names:
         return names.index(text)
     number = text.removeprefix("#")
-    if number.isdigit() and int(number) < len(names):
+    if number.isdecimal() and len(number) < 10 and int(number) < len(names):
         return int(number)
     raise InputError(
         f"--classes: no goal {text!r}; expected #0 to #{len(names) - 1}"

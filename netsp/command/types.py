@@ -110,6 +110,8 @@ def check_writable(*paths: str | None, inputs: Sequence[str | None] = ()) -> Non
         if path is None:
             continue
         folder = os.path.dirname(os.path.abspath(path))
+        if len(os.path.basename(path).encode(errors="replace")) > 250:
+            raise InputError(f"{path}: cannot be written: the name is too long")
         if os.path.isdir(path):
             raise InputError(f"{path}: cannot be written: it is a directory")
         if not os.path.isdir(folder):
