@@ -39,7 +39,7 @@ MOST_CLASSES = 12
 CORE_SHARE = 0.4
 """Part of the time that is left which the core may take."""
 
-LARGER = 4
+LARGER = 6
 """The core comes first where there are more than so many times as many vertices in all: below that
 it costs more than it saves, and shows no bound meanwhile."""
 
