@@ -9,13 +9,14 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import BeforeValidator, ConfigDict, Field, WithJsonSchema
 
+from netsp.errors import InputError
 from netsp.models import shown
 
 LARGEST = 1e12
 """Largest coordinate, radius or length in absolute value."""
 
 SMALLEST = 1e-100
-"""Smallest that is not 0: squares of less underflow."""
+"""Smallest length or radius: squares of less underflow."""
 
 
 def checked_number(value: Any) -> Any:
@@ -30,9 +31,33 @@ def checked_number(value: Any) -> Any:
         raise ValueError(f"expected a finite number, got {shown(value)}")
     if abs(number) > LARGEST:
         raise ValueError(f"expected a magnitude of at most {LARGEST:g}, got {shown(value)}")
-    if 0.0 < abs(number) < SMALLEST:
-        raise ValueError(f"expected 0 or at least {SMALLEST:g}, got {shown(value)}")
     return number
+
+
+def _size(value: Any) -> Any:
+    """A length or radius: squares of the smallest underflow."""
+    number = checked_number(value)
+    if 0.0 < number < SMALLEST:
+        raise ValueError(f"expected at least {SMALLEST:g}, got {shown(value)}")
+    return number
+
+
+def checked_argument(name: str, value: Any, low: float, high: float = LARGEST) -> float:
+    """An argument of a call as a number within limits; InputError, that names it, for all else."""
+    try:
+        number = float(checked_number(value))
+    except ValueError as error:
+        raise InputError(f"{name}: {error}") from None
+    if not low <= number <= high:
+        limits = f"at least {low:g}" if high == LARGEST else f"{low:g} to {high:g}"
+        raise InputError(f"{name}: expected {limits}, got {shown(value)}")
+    return number
+
+
+def checked_instance(name: str, value: object, kind: type) -> None:
+    """InputError, that names the argument, unless a value is of a kind."""
+    if not isinstance(value, kind):
+        raise InputError(f"{name}: expected a {kind.__name__}, got {shown(value)}")
 
 
 def _name(value: Any) -> Any:
@@ -62,7 +87,7 @@ Name = Annotated[str, BeforeValidator(_name)]
 Number = Annotated[float, BeforeValidator(checked_number)]
 
 
-Positive = Annotated[float, Field(gt=0), BeforeValidator(checked_number)]
+Positive = Annotated[float, Field(gt=0), BeforeValidator(_size)]
 
 
 NonNegative = Annotated[float, Field(ge=0), BeforeValidator(checked_number)]

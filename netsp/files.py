@@ -20,7 +20,7 @@ from pydantic import BaseModel
 from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.fields import LARGEST
-from netsp.models import read_model
+from netsp.models import read_model, shown
 
 MOST_BYTES = 256 * 2**20
 """Largest file that is read, unpacked if it is packed: a problem of a million goals is smaller."""
@@ -88,17 +88,24 @@ def read_gzip(path: str | Path, most: int = MOST_BYTES) -> bytes:
 def write_text(path: str | Path, text: str) -> None:
     """Write a file by renaming a finished one into place, so that it is never half there; through a
     symbolic link, what it points to is replaced."""
-    target = Path(os.path.realpath(path)) if os.path.islink(path) else Path(path)
-    if target.exists() and not target.is_file():  # /dev/stdout and the like
+    try:
+        text.encode()
+        target = Path(os.path.realpath(path)) if os.path.islink(path) else Path(path)
+        special = target.exists() and not target.is_file()  # /dev/stdout and the like
+    except (UnicodeError, ValueError, OSError) as error:
+        raise InputError(f"{shown(str(path))}: cannot be written: {error}"[:300]) from None
+    if special:
         try:
             target.write_text(text, encoding="utf-8")
         except OSError as error:
             raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
         return
     try:
-        handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name[:80]}.")
+        handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name[:40]}.")
     except OSError as error:
         raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
+    except ValueError as error:  # half a character, a zero
+        raise InputError(f"{shown(str(path))}: cannot be written: {error}") from None
     try:
         with os.fdopen(handle, "w", encoding="utf-8") as stream:
             stream.write(text)
@@ -230,6 +237,8 @@ class FileModel(BaseModel):
         InputError
             Anything wrong, in one line.
         """
+        if not isinstance(text, str | bytes):
+            raise InputError(f"{cls.file_kind}: expected text, got {shown(text)}")
         return read_model(cls, text, source or cls.file_kind)
 
     @classmethod
@@ -251,4 +260,6 @@ class FileModel(BaseModel):
         InputError
             The file cannot be read or is not valid, in one line.
         """
+        if not isinstance(path, str | os.PathLike):
+            raise InputError(f"path: expected the name of a file, got {shown(path)}")
         return cls.from_json(read_text(path), source=str(path))

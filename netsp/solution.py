@@ -60,10 +60,10 @@ class Timings(BaseModel):
     """Wall-clock seconds by stage."""
 
     model_config = STRICT
-    roadmap_s: Annotated[float, Field(description="seconds to build the roadmap")] = 0.0
-    matrix_s: Annotated[float, Field(description="seconds to measure legs")] = 0.0
-    solve_s: Annotated[float, Field(description="seconds of the solver")] = 0.0
-    total_s: Annotated[float, Field(description="seconds of the whole call")] = 0.0
+    roadmap_s: Annotated[NonNegative, Field(description="seconds to build the roadmap")] = 0.0
+    matrix_s: Annotated[NonNegative, Field(description="seconds to measure legs")] = 0.0
+    solve_s: Annotated[NonNegative, Field(description="seconds of the solver")] = 0.0
+    total_s: Annotated[NonNegative, Field(description="seconds of the whole call")] = 0.0
 
 
 class Solution(Drawn, FileModel):
@@ -94,8 +94,8 @@ class Solution(Drawn, FileModel):
 
     schema_version: Annotated[Literal[1], Field(description="of the file format")] = 1
     problem: Annotated[ProblemReference, Field(description="which problem is solved")]
-    solver: Annotated[str, Field(description="name of the solver")]
-    roadmap: Annotated[str, Field(description="name of the roadmap")]
+    solver: Annotated[Name, Field(description="name of the solver")]
+    roadmap: Annotated[Name, Field(description="name of the roadmap")]
     classes: Annotated[
         KeptClasses | None, Field(description="which homotopy classes the roadmap held")
     ] = None
@@ -133,7 +133,7 @@ class Solution(Drawn, FileModel):
     ] = ()
     timings: Annotated[Timings, Field(description="how long it took")] = Timings()
     versions: Annotated[
-        dict[str, str], Field(description="of netsp and what it used", default_factory=dict)
+        dict[Name, Name], Field(description="of netsp and what it used", default_factory=dict)
     ]
 
     def __repr__(self) -> str:

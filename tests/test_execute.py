@@ -92,7 +92,7 @@ def test_an_obstacle_within_the_loop_would_be_wrapped_and_is_not():
     inside = {"time": 1.0, "appear": {"center": [15.0, 0.0], "radius": 2.0}}
     run = execute(problem, solution, FAST, surprises=events(inside))
     check(run, 2)
-    assert "would not come home free" in run.entries[0].reason
+    assert "would not be free at the base" in run.entries[0].reason
     blind = execute(
         problem, solution, ExecutionOptions(speed=1.0, repair=False), surprises=events(inside)
     )
@@ -309,7 +309,7 @@ def test_without_repair_nothing_is_mended_and_nothing_forgotten():
     )
     assert run.summary["visited"] == 2
     assert not run.cancelled
-    assert "not mended" in run.lost[2]
+    assert "not repaired" in run.lost[2]
     wall = {"time": 1.0, "appear": {"polygon": [[10, -40], [12, -40], [12, 40], [10, 40]]}}
     run = execute(
         CORNER, solve(CORNER), ExecutionOptions(speed=1.0, repair=False), surprises=events(wall)

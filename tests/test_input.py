@@ -3,6 +3,7 @@
 import gzip
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -14,6 +15,8 @@ from netsp import Circle, InputError, Problem, Solution, solve, verify
 from netsp.command.main import main
 from netsp.errors import brief
 from netsp.execute import ExecutionOptions, Surprises, execute
+from netsp.export import Projection, export
+from netsp.export.write import Settings
 from netsp.files import cell, read_gzip, write_text
 from netsp.online.mission import Mission
 from netsp.pictures.style import literal
@@ -337,3 +340,63 @@ def test_a_run_that_cannot_begin_leaves_no_folder(command, tmp_path, capsys):
     run.mkdir()
     assert main([tour if word == "TOUR" else word for word in command] + ["-o", str(run)]) == 2
     assert run.exists()
+
+
+BAD_CALLS = {
+    "load of nothing": (lambda t, s: Problem.load(None), "path: expected the name of a file"),
+    "load of a number": (lambda t, s: Problem.load(3), "path: expected the name of a file"),
+    "text that is none": (lambda t, s: Problem.from_json(5), "problem: expected text, got 5"),
+    "execute without a solution": (lambda t, s: execute(t, None), "solution: expected a Solution"),
+    "options as a mapping": (
+        lambda t, s: execute(t, s, {"speed": 1}), "options: expected a ExecutionOptions",
+    ),
+    "speed as text": (
+        lambda t, s: execute(t, s, ExecutionOptions(speed="x")), "speed: expected a number",
+    ),
+    "current of two": (
+        lambda t, s: execute(t, s, ExecutionOptions(current=(1, 2))), "current: expected three",
+    ),
+    "gusts that are none": (
+        lambda t, s: execute(t, s, ExecutionOptions(gusts=None)), "gusts: expected a number",
+    ),
+    "negative seed": (
+        lambda t, s: execute(t, s, ExecutionOptions(seed=-1)), "seed: expected a whole number",
+    ),
+    "format as a list": (lambda t, s: export(t, s, "x.csv", ["csv"]), "format: expected plan"),
+    "export of nothing": (lambda t, s: export(t, None, "x.csv", "csv"), "solution: expected a Sol"),
+    "acceptance as text": (
+        lambda t, s: export(t, s, "x.csv", "csv", acceptance="x"), "acceptance: expected a number",
+    ),
+    "hold as text": (
+        lambda t, s: export(t, s, "x.csv", "csv", settings=Settings(hold="a")),
+        "hold: expected whole",
+    ),
+    "latitude of nothing": (lambda t, s: Projection(None, 0), "latitude: expected a number"),
+    "save to a name too long": (lambda t, s: s.save("x" * 3000), "cannot be written"),
+    "save to half a character": (lambda t, s: s.save("\ud800"), "cannot be written"),
+    "save to a name with a zero": (lambda t, s: s.save("a\0b"), "cannot be written"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("call", BAD_CALLS.values(), ids=BAD_CALLS.keys())
+def test_calls_with_wrong_values_are_refused_naming_the_argument(call, tmp_path, monkeypatch):
+    run, message = call
+    monkeypatch.chdir(tmp_path)
+    problem = Problem(base=(0, 0), goals=[(3, 4)], obstacles=[], tether_length=6)
+    solution = solve(problem)
+    with pytest.raises(InputError, match=re.escape(message)) as caught:
+        run(problem, solution)
+    assert "\n" not in str(caught.value)
+    assert not list(tmp_path.iterdir())
+
+
+def test_solutions_with_names_that_cannot_be_written_or_times_that_are_no_numbers_are_refused():
+    problem = Problem(base=(0, 0), goals=[(3, 4)], obstacles=[], tether_length=6)
+    text = solve(problem).to_json()
+    for bad in (
+        text.replace('"solver": "auto"', '"solver": "\\ud800"'),
+        re.sub(r'"roadmap_s": [\d.e-]+', '"roadmap_s": NaN', text),
+    ):
+        assert bad != text
+        with pytest.raises(InputError):
+            Solution.from_json(bad)

@@ -81,7 +81,7 @@ BAD = {
     ),
     "radius that underflows": (
         variant(obstacles=[{"center": [2, 0], "radius": 1e-170}]),
-        "obstacles[0].radius: expected 0 or at least 1e-100",
+        "obstacles[0].radius: expected at least 1e-100",
     ),
     "goal out of bounds": (variant(bounds=[-1, -1, 3, 5]), "goals[0]: (4, 0, 0) is outside bounds"),
     "empty bounds": (variant(bounds=[1, 0, 1, 5]), "bounds: expected xmin < xmax and ymin < ymax"),

@@ -84,7 +84,16 @@ def _parsed(line: bytes) -> TrialRow | None:
             for p in row.get("history") or ()
         )
     )
-    return row if good else None
+    return row if good and _encodable(row) else None
+
+
+def _encodable(row: object) -> bool:
+    """Whether no name is something that cannot be written, such as half a character."""
+    try:
+        json.dumps(row, ensure_ascii=False).encode()
+    except UnicodeError:
+        return False
+    return True
 
 
 _MAYBE = (int, float, type(None))

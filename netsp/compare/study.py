@@ -159,8 +159,11 @@ class Study(BaseModel):
         text = read_text(path)
         try:
             data = tomllib.loads(text)
-        except tomllib.TOMLDecodeError as error:
-            raise InputError(f"{path}: {error}") from None
+        except (
+            ValueError,
+            RecursionError,
+        ) as error:  # numbers of thousands of digits, deep nesting
+            raise InputError(f"{path}: not TOML that netsp reads: {error}"[:300]) from None
         return cls.checked(data, str(path), text)
 
     @classmethod

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from netsp.execute.events import Event, Surprises, changed, index_of
 from netsp.execute.log import Arrival, Entry, Execution, ExecutionOptions, ExecutionRow
 from netsp.execute.plan import HOME, Leg, legs_of
 from netsp.execute.repair import Repair, broken, reachable, repair
+from netsp.fields import LARGEST, checked_argument, checked_instance
 from netsp.geometry import polylines
 from netsp.hsignature import signature
 from netsp.judge import verify
@@ -312,12 +313,20 @@ def execute(
     """
     options = options or ExecutionOptions()
     surprises = surprises or Surprises(events=())
-    if not (np.isfinite(options.planning_limit) and options.planning_limit > 0.0):
-        raise InputError(
-            f"planning_limit: expected a positive number, got {options.planning_limit!r}"
-        )
-    if not (np.isfinite(options.speed) and options.speed > 0.0):
-        raise InputError(f"speed: expected a positive number, got {options.speed!r}")
+    checked_instance("problem", problem, Problem)
+    checked_instance("solution", solution, Solution)
+    checked_instance("options", options, ExecutionOptions)
+    checked_instance("surprises", surprises, Surprises)
+    for name in ("planning_limit", "speed", "reach"):
+        if not checked_argument(name, getattr(options, name), 0.0):
+            raise InputError(f"{name}: expected a positive number, got 0")
+    checked_argument("gusts", options.gusts, 0.0)
+    if not isinstance(options.current, Sequence) or len(options.current) != 3:
+        raise InputError(f"current: expected three numbers, got {options.current!r}"[:200])
+    for value in options.current:
+        checked_argument("current", value, -LARGEST)
+    if not isinstance(options.seed, int) or options.seed < 0:
+        raise InputError(f"seed: expected a whole number from 0 on, got {options.seed!r}")
     if solution.status is Status.INVALID or solution.length is None:
         raise InputError(f"solution: has status {solution.status.value}; expected a tour that fits")
     judged = verify(problem, solution)
@@ -326,7 +335,10 @@ def execute(
         raise InputError(f"solution: fails its check {failed.name!r}: {failed.detail}")
     surprises.check(problem)
     coarsest = coarsest_delta(problem)
-    if options.delta is not None and not 0.0 < options.delta <= coarsest:
+    if (
+        options.delta is not None
+        and not 0.0 < checked_argument("delta", options.delta, 0.0) <= coarsest
+    ):
         raise InputError(
             f"delta: expected at most {coarsest:.4g}, or the tether would slip through the "
             f"thinnest obstacle, got {options.delta!r}"

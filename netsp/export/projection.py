@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from netsp.arrays import Floats
 from netsp.errors import InputError
+from netsp.fields import checked_argument
 
 
 class Projection:
@@ -43,13 +44,9 @@ class Projection:
         self, latitude: float, longitude: float, heading: float = 0.0,
         base: tuple[float, float] = (0.0, 0.0), name: str = "origin",
     ) -> None:  # fmt: skip
-        if not (math.isfinite(latitude) and abs(latitude) <= 90.0):
-            raise InputError(f"{name}: latitude: expected -90 to 90, got {latitude:g}")
-        if not (math.isfinite(longitude) and abs(longitude) <= 180.0):
-            raise InputError(f"{name}: longitude: expected -180 to 180, got {longitude:g}")
-        if not (math.isfinite(heading) and abs(heading) <= 360.0):
-            raise InputError(f"{name}: heading: expected -360 to 360, got {heading:g}")
-        self.latitude, self.longitude, self.heading = latitude, longitude, heading
+        self.latitude = checked_argument(f"{name}: latitude", latitude, -90.0, 90.0)
+        self.longitude = checked_argument(f"{name}: longitude", longitude, -180.0, 180.0)
+        self.heading = checked_argument(f"{name}: heading", heading, -360.0, 360.0)
         self.base = np.array(base, dtype=float)
 
     @classmethod

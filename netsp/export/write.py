@@ -26,6 +26,7 @@ from netsp.errors import InputError
 from netsp.execute.plan import HOME
 from netsp.export.projection import Projection
 from netsp.export.waypoints import Waypoint, waypoints_of
+from netsp.fields import checked_argument, checked_instance
 from netsp.files import cell, write_text
 from netsp.problem import Circle, Problem
 from netsp.solution import Solution
@@ -109,22 +110,32 @@ def export(
         An unknown kind, no projection, more waypoints than the format allows, waypoints that would
         not be of the plan's class.
     """
-    if kind not in FORMATS:
+    checked_instance("problem", problem, Problem)
+    checked_instance("solution", solution, Solution)
+    if not solution.tour or len(solution.path) < 2:
+        raise InputError("solution: has no tour to export")
+    if max(v.goal for v in solution.tour) >= len(problem.goals):
+        raise InputError(f"solution: tour: expected goals #0 to #{len(problem.goals) - 1}")
+    acceptance = checked_argument("acceptance", acceptance, 0.0)
+    if not isinstance(kind, str) or kind not in FORMATS:
         raise InputError(f"format: expected {', '.join(FORMATS)}, got {kind!r}")
     if projection is None and kind != "csv":
         raise InputError(f"origin: format {kind!r} needs latitude and longitude of the base")
     settings = settings or Settings()
-    if settings.speed is not None and not 0.0 < settings.speed <= FASTEST:
-        raise InputError(f"speed: expected at most {FASTEST:g} m/s, got {settings.speed!r}")
-    if not 0 <= settings.hold <= 3600 or not 1 <= settings.bend <= 3600:
-        raise InputError(
-            f"hold: expected whole seconds from 0 to 3600 (at bends from 1), got {settings.hold}"
-        )
+    if settings.speed is not None and not checked_argument("speed", settings.speed, 0.0, FASTEST):
+        raise InputError("speed: expected more than 0, got 0")
+    for name, least in (("hold", 0), ("bend", 1)):
+        seconds = getattr(settings, name)
+        if not isinstance(seconds, int) or not least <= seconds <= 3600:
+            raise InputError(
+                f"{name}: expected whole seconds from {least} to 3600, got {seconds!r}"
+            )
+    checked_argument("most", settings.most, 1)
     points = [start_of(problem, solution), *waypoints_of(problem, solution, acceptance)]
     if len(points) > settings.most and kind in ("plan", "wpl"):
         raise InputError(
             f"solution: needs {len(points)} waypoints, and the vehicle takes {settings.most}; "
-            "raise --most if yours takes more"
+            "raise that number if yours takes more"
         )
     write_text(file, FORMATS[kind](problem, points, projection, settings))
     return points

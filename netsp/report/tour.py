@@ -72,12 +72,19 @@ def report_tour(source: str | Path, problem_file: str | Path | None, output: str
         place = run / "solution.json"
     solution = Solution.load(place)
     if problem_file is None:
-        raise InputError(f"{source}: a solution does not hold its problem; expected --problem FILE")
+        raise InputError(f"{source}: does not hold its problem; expected that file, too")
     problem = Problem.load(problem_file)
     if run is None and problem.sha256 != solution.problem.sha256:
         raise InputError(f"{source}: solves another problem than {problem_file} (sha256 differs)")
     if solution.length is None:
         raise InputError(f"{source}: has no tour (status {solution.status.value})")
+    if len(solution.path) < 2:
+        raise InputError(f"{source}: path: expected at least 2 points, got {len(solution.path)}")
+    beyond = [v.goal for v in solution.tour if v.goal >= len(problem.goals)]
+    if beyond:
+        raise InputError(
+            f"{source}: tour: no goal #{beyond[0]}; expected #0 to #{len(problem.goals) - 1}"
+        )
     drawn = polylines.length(np.array(solution.path))
     if drawn > 100.0 * (solution.length + problem.scale):
         raise InputError(
