@@ -8,6 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
@@ -400,3 +401,15 @@ def test_solutions_with_names_that_cannot_be_written_or_times_that_are_no_number
         assert bad != text
         with pytest.raises(InputError):
             Solution.from_json(bad)
+
+
+def test_numbers_and_arrays_of_numpy_are_as_good_as_those_of_python(tmp_path):
+    problem = Problem(base=(0, 0), goals=[(3, 4)], obstacles=[], tether_length=6)
+    solution = solve(problem)
+    options = ExecutionOptions(
+        speed=np.float64(1), current=np.zeros(3), gusts=np.float32(0), seed=np.int64(3)
+    )
+    assert execute(problem, solution, options).summary["visited"] == 1
+    settings = Settings(hold=np.int64(5), bend=np.int64(1), speed=np.float64(0.5))
+    export(problem, solution, tmp_path / "x.csv", "csv", settings=settings)
+    assert (tmp_path / "x.csv").exists()

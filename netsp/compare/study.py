@@ -159,10 +159,7 @@ class Study(BaseModel):
         text = read_text(path)
         try:
             data = tomllib.loads(text)
-        except (
-            ValueError,
-            RecursionError,
-        ) as error:  # numbers of thousands of digits, deep nesting
+        except (ValueError, RecursionError) as error:  # endless numbers, deep nesting, too
             raise InputError(f"{path}: not TOML that netsp reads: {error}"[:300]) from None
         return cls.checked(data, str(path), text)
 

@@ -321,11 +321,11 @@ def execute(
         if not checked_argument(name, getattr(options, name), 0.0):
             raise InputError(f"{name}: expected a positive number, got 0")
     checked_argument("gusts", options.gusts, 0.0)
-    if not isinstance(options.current, Sequence) or len(options.current) != 3:
+    if not isinstance(options.current, Sequence | np.ndarray) or len(options.current) != 3:
         raise InputError(f"current: expected three numbers, got {options.current!r}"[:200])
     for value in options.current:
         checked_argument("current", value, -LARGEST)
-    if not isinstance(options.seed, int) or options.seed < 0:
+    if not isinstance(options.seed, int | np.integer) or options.seed < 0:
         raise InputError(f"seed: expected a whole number from 0 on, got {options.seed!r}")
     if solution.status is Status.INVALID or solution.length is None:
         raise InputError(f"solution: has status {solution.status.value}; expected a tour that fits")

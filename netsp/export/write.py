@@ -126,7 +126,7 @@ def export(
         raise InputError("speed: expected more than 0, got 0")
     for name, least in (("hold", 0), ("bend", 1)):
         seconds = getattr(settings, name)
-        if not isinstance(seconds, int) or not least <= seconds <= 3600:
+        if not isinstance(seconds, int | np.integer) or not least <= seconds <= 3600:
             raise InputError(
                 f"{name}: expected whole seconds from {least} to 3600, got {seconds!r}"
             )
