@@ -7,7 +7,6 @@ it is asked for, so models and graphs stay free of Matplotlib.
 from __future__ import annotations
 
 import html
-import io
 from typing import Any, ClassVar
 
 from netsp.registry import load
@@ -19,18 +18,29 @@ class Drawn:
     picture: ClassVar[str]
 
     def plot(self, ax: Any = None, **more: Any) -> Any:
-        """Draw on axes (Matplotlib's) of the caller, or on new ones; returns the axes.
+        """Draw it with Matplotlib.
 
         Parameters
         ----------
-        more
-            Further options of the picture; for a solution its `problem`, drawn underneath.
+        ax : matplotlib.axes.Axes, optional
+            Where to draw; by default, axes of a new figure.
+        **more : Any
+            Options of the picture. A solution takes its `problem`, to draw the map underneath; the
+            tour alone is drawn without.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            What it is drawn on; `.figure` of it can be saved.
+
+        Examples
+        --------
+        >>> from netsp import Problem, solve
+        >>> problem = Problem(base=(0, 0), goals=[(3, 4)], tether_length=6)
+        >>> solve(problem).plot(problem=problem).figure.savefig("tour.png")  # doctest: +SKIP
         """
         return load(self.picture)(self, ax=ax, **more)
 
     def _repr_html_(self) -> str:
-        out = io.StringIO()
-        figure = load("netsp.pictures.style:literal")(self.plot().figure)
-        figure.savefig(out, format="svg", metadata={"Date": None}, bbox_inches="tight")
-        text = out.getvalue()
-        return f"<p><code>{html.escape(repr(self))}</code></p>{text[text.index('<svg') :]}"
+        picture = load("netsp.pictures.style:svg")(self.plot().figure, bbox_inches="tight")
+        return f"<p><code>{html.escape(repr(self))}</code></p>{picture}"

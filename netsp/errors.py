@@ -14,12 +14,13 @@ LONGEST_QUOTE = 80
 """Characters of a quoted value that a message shows."""
 
 _QUOTED = re.compile(rf"(['\"])((?:(?!\1).){{{LONGEST_QUOTE + 1},}}?)\1", re.S)
+_LIST = re.compile(rf"\[[^\[\]]{{{2 * LONGEST_QUOTE},}}\]")
 _WORD = re.compile(rf"[^\s/'\"]{{{2 * LONGEST_QUOTE},}}")
 
 
 def brief(message: str) -> str:
-    """A message in one line, quoted values and endless words cut short, what cannot be printed
-    escaped.
+    """A message in one line; quoted values, endless lists and words are cut short, what cannot be
+    printed is escaped.
 
     Parameters
     ----------
@@ -35,11 +36,30 @@ def brief(message: str) -> str:
     def cut(found: re.Match[str]) -> str:
         return f"{found[1]}{found[2][: LONGEST_QUOTE - 1]}…{found[1]}"
 
-    text = _WORD.sub(lambda w: w[0][: LONGEST_QUOTE - 1] + "…", _QUOTED.sub(cut, message))
+    text = _LIST.sub(lambda found: found[0][: LONGEST_QUOTE - 2] + "…]", _QUOTED.sub(cut, message))
+    text = _WORD.sub(lambda w: w[0][: LONGEST_QUOTE - 1] + "…", text)
     return "".join(
         c if c.isprintable() else c.encode("unicode_escape", "backslashreplace").decode()
         for c in text
     )
+
+
+def counted(number: int, noun: str) -> str:
+    """A number with its noun, which gets an s unless there is one of it.
+
+    Parameters
+    ----------
+    number : int
+        How many.
+    noun : str
+        In the singular.
+
+    Returns
+    -------
+    str
+        As ``1 goal`` or ``8 goals``.
+    """
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 class NetspError(Exception):
@@ -71,6 +91,10 @@ class LimitReachedError(NetspError):
 
 class MemoryLimitError(LimitReachedError):
     """The work would take more memory than there is; the message says what to lower."""
+
+
+class PluginError(NetspError):
+    """Another package's code failed. The message says which; the error itself is the cause."""
 
 
 class VerificationError(NetspError):

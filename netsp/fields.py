@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import BeforeValidator, ConfigDict, Field, WithJsonSchema
+from pydantic import BeforeValidator, Field, WithJsonSchema
 
 from netsp.errors import InputError
 from netsp.models import shown
@@ -15,11 +15,14 @@ from netsp.models import shown
 LARGEST = 1e12
 """Largest coordinate, radius or length in absolute value."""
 
+LARGEST_TOTAL = 1e6 * LARGEST
+"""Largest sum of lengths that a solution states."""
+
 SMALLEST = 1e-100
 """Smallest length or radius: squares of less underflow."""
 
 
-def checked_number(value: Any) -> Any:
+def checked_number(value: Any, most: float = LARGEST) -> Any:
     """Numbers only: no strings, no booleans; numpy scalars are welcome."""
     if isinstance(value, bool | np.bool_) or not isinstance(value, int | float | np.number):
         raise ValueError(f"expected a number, got {shown(value)}")
@@ -29,8 +32,8 @@ def checked_number(value: Any) -> Any:
         number = math.inf
     if not math.isfinite(number):
         raise ValueError(f"expected a finite number, got {shown(value)}")
-    if abs(number) > LARGEST:
-        raise ValueError(f"expected a magnitude of at most {LARGEST:g}, got {shown(value)}")
+    if abs(number) > most:
+        raise ValueError(f"expected a magnitude of at most {most:g}, got {shown(value)}")
     return number
 
 
@@ -67,30 +70,34 @@ def _name(value: Any) -> Any:
     return value
 
 
-def _coordinates(value: Any, sizes: tuple[int, ...]) -> tuple[float, ...]:
+def _coordinates(value: Any, sizes: tuple[int, ...], most: float = LARGEST) -> tuple[float, ...]:
     text = " or ".join(("[x, y]" if k == 2 else "[x, y, z]") for k in sizes)
     if isinstance(value, np.ndarray):
         value = value.tolist()
     if not isinstance(value, Sequence) or isinstance(value, str) or len(value) not in sizes:
         raise ValueError(f"expected {text}, got {shown(value)}")
-    return tuple(checked_number(v) for v in value)
+    return tuple(checked_number(v, most) for v in value)
 
 
-def _point3(value: Any) -> tuple[float, ...]:
-    xyz = _coordinates(value, (2, 3))
+def _point3(value: Any, most: float = LARGEST) -> tuple[float, ...]:
+    xyz = _coordinates(value, (2, 3), most)
     return xyz if len(xyz) == 3 else (*xyz, 0.0)
 
 
 Name = Annotated[str, BeforeValidator(_name)]
 
 
-Number = Annotated[float, BeforeValidator(checked_number)]
+Number = Annotated[float, BeforeValidator(lambda v: checked_number(v))]
+
+
+Total = Annotated[float, BeforeValidator(lambda v: checked_number(v, LARGEST_TOTAL))]
+"""A sum of lengths."""
 
 
 Positive = Annotated[float, Field(gt=0), BeforeValidator(_size)]
 
 
-NonNegative = Annotated[float, Field(ge=0), BeforeValidator(checked_number)]
+NonNegative = Annotated[float, Field(ge=0), BeforeValidator(lambda v: checked_number(v))]
 
 
 Point2 = Annotated[
@@ -104,8 +111,15 @@ POINT3_SCHEMA = {"type": "array", "items": {"type": "number"}, "minItems": 2, "m
 
 
 Point3 = Annotated[
-    tuple[float, float, float], BeforeValidator(_point3), WithJsonSchema(POINT3_SCHEMA)
+    tuple[float, float, float],
+    BeforeValidator(lambda v: _point3(v)),
+    WithJsonSchema(POINT3_SCHEMA),
 ]
 
 
-STRICT = ConfigDict(frozen=True, extra="forbid")
+PathPoint = Annotated[
+    tuple[float, float, float],
+    BeforeValidator(lambda v: _point3(v, LARGEST_TOTAL)),
+    WithJsonSchema(POINT3_SCHEMA),
+]
+"""Of a drawn path, which may pass beyond the outermost coordinate of a problem."""

@@ -15,12 +15,11 @@ from pathlib import Path
 from typing import ClassVar, Self
 
 import numpy as np
-from pydantic import BaseModel
 
 from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.fields import LARGEST
-from netsp.models import read_model, shown
+from netsp.models import Model, read_model, shown
 
 MOST_BYTES = 256 * 2**20
 """Largest file that is read, unpacked if it is packed: a problem of a million goals is smaller."""
@@ -211,7 +210,7 @@ def _is_point(row: object) -> bool:
         return False
 
 
-class FileModel(BaseModel):
+class FileModel(Model):
     """A model that is a file of its own, JSON of a format version."""
 
     file_kind: ClassVar[str] = "file"

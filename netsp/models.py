@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterable
 from typing import Any, TypeVar
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError
 
 from netsp.errors import InputError
 
@@ -22,10 +22,28 @@ MARKS = {
 }
 """What a file of each kind has and no other."""
 
-Model = TypeVar("Model", bound=BaseModel)
+
+class Model(BaseModel):
+    """Base of all models: frozen, with no unknown fields; a call with wrong values ends in one
+    line, an `InputError`, as a file with wrong values does."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    def __init__(self, /, **data: Any) -> None:
+        try:
+            super().__init__(**data)
+        except ValidationError as error:
+            raise InputError(f"{type(self).__name__}: {explain(error)}") from None
+
+    # nested models are then validated as if there were no `__init__` here, so that a complaint
+    # names the whole path of a field
+    __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
 
 
-def read_model(model: type[Model], text: str | bytes, source: str) -> Model:
+M = TypeVar("M", bound=BaseModel)
+
+
+def read_model(model: type[M], text: str | bytes, source: str) -> M:
     """A model of format version 1 from JSON, or `InputError` in one line."""
     data = parse_json_object(text, source)
     _check_kind(model, data, source)

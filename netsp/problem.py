@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 import numpy as np
 import numpy.typing as npt
 from pydantic import (
-    BaseModel,
     BeforeValidator,
     ConfigDict,
     Discriminator,
@@ -27,9 +26,9 @@ from pydantic import (
 )
 
 from netsp.drawn import Drawn
+from netsp.errors import counted
 from netsp.fields import (
     POINT3_SCHEMA,
-    STRICT,
     Name,
     NonNegative,
     Point2,
@@ -39,7 +38,7 @@ from netsp.fields import (
 )
 from netsp.files import FileModel
 from netsp.geometry.polygons import check_polygon, polygon_interior_point, polygon_signed_distance
-from netsp.models import shown
+from netsp.models import Model, shown
 
 if TYPE_CHECKING:
     import shapely
@@ -49,14 +48,17 @@ WIDEST = 1e4
 """Of an obstacle within reach, in units of the farthest goal: with more, the tolerances would come
 near the distances between goals."""
 
+THINNEST = 1e-7
+"""Width of the narrowest obstacle within reach, in units of the problem's size: with less, sides of
+it would come near the tolerances, and a tether could be wound around it without end."""
+
 RELATIVE_TOLERANCE = 1e-9
 """Lengths below this fraction of the problem's size count as zero (touching, on a boundary)."""
 
 
-class Circle(BaseModel):
+class Circle(Model):
     """A vertical cylinder of unlimited height, given by its plan: centre and radius."""
 
-    model_config = STRICT
     center: Annotated[Point2, Field(description="(x, y) of the axis, in the problem's units")]
     radius: Annotated[Positive, Field(description="of the circle, in the problem's units")]
     name: Annotated[Name | None, Field(description="shown in pictures and messages")] = None
@@ -100,10 +102,9 @@ class Circle(BaseModel):
         return shapely.Point(self.center).buffer(self.radius + grow, quad_segs=64)
 
 
-class Polygon(BaseModel):
+class Polygon(Model):
     """A vertical prism of unlimited height over a simple polygon, convex or not."""
 
-    model_config = STRICT
     polygon: Annotated[
         Annotated[tuple[Point2, ...], Field(min_length=3)],
         Field(description="corners (x, y) in order, not closed, in the problem's units"),
@@ -175,10 +176,9 @@ Obstacle = Annotated[
 ]
 
 
-class Goal(BaseModel):
+class Goal(Model):
     """A point to inspect."""
 
-    model_config = STRICT
     position: Annotated[
         Point3, Field(description="(x, y) or (x, y, z) to visit, in the problem's units; z is up")
     ]
@@ -208,10 +208,9 @@ GoalLike = Annotated[
 ]
 
 
-class State(BaseModel):
+class State(Model):
     """Where a robot on a tether is: its position, and the word of the taut tether there."""
 
-    model_config = STRICT
     position: Annotated[Point3, Field(description="(x, y, z) of the robot, in the problem's units")]
     signature: Annotated[
         tuple[int, ...],
@@ -220,6 +219,13 @@ class State(BaseModel):
             "order their rays are crossed, negative from right to left"
         ),
     ] = ()
+
+
+def _width(o: Circle | Polygon) -> float:
+    """Along the axis where it is widest."""
+    if isinstance(o, Circle):
+        return 2.0 * o.radius
+    return float(np.ptp(np.array(o.polygon), axis=0).max())
 
 
 class Problem(Drawn, FileModel):
@@ -250,10 +256,8 @@ class Problem(Drawn, FileModel):
 
     Raises
     ------
-    pydantic.ValidationError
-        Constructed from values that break the format.
     InputError
-        The same, in one line, from `load` and `from_json`.
+        Values that break the format, in one line; so do `load` and `from_json`.
 
     Examples
     --------
@@ -266,7 +270,7 @@ class Problem(Drawn, FileModel):
     picture: ClassVar[str] = "netsp.pictures.problem:draw_map"
     file_kind: ClassVar[str] = "problem"
 
-    model_config = ConfigDict(frozen=True, extra="forbid", title="netsp problem")
+    model_config = ConfigDict(title="netsp problem")
 
     schema_version: Annotated[Literal[1], Field(description="of the file format")] = 1
     name: Annotated[Name, Field(description="of the problem")] = "problem"
@@ -371,7 +375,7 @@ class Problem(Drawn, FileModel):
 
     def _check_sizes(self) -> None:
         """No obstacle within reach is so large that tolerances, which go by the largest, would hide
-        the goals."""
+        the goals, and none so small that they would hide it."""
         reach = self.tether_length + self.clearance
         away = float(np.abs(self.points - np.array(self.base)).max())
         for i, o in enumerate(self.obstacles):
@@ -380,6 +384,15 @@ class Problem(Drawn, FileModel):
                 raise ValueError(
                     f"{self._obstacle_field(i)}: reaches {far:.6g} from the base, and no goal is "
                     f"farther than {away:.6g}; expected at most {WIDEST:g} times as far"
+                )
+        least = THINNEST * self.scale
+        for i, o in enumerate(self.obstacles):
+            near, _ = self._span(o)
+            width = 2.0 * self.clearance + _width(o)
+            if near <= reach and width < least:
+                raise ValueError(
+                    f"{self._obstacle_field(i)}: is {width:.3g} wide, too little for a problem of "
+                    f"size {self.scale:.6g}; expected at least {least:.3g}"
                 )
 
     def _check_free(self) -> None:
@@ -514,12 +527,17 @@ class Problem(Drawn, FileModel):
 
     # JSON in and out
 
+    @property
+    def summary(self) -> str:
+        """How many goals and obstacles, and how long a tether."""
+        return (
+            f"{counted(len(self.goals), 'goal')}, {counted(len(self.obstacles), 'obstacle')}, "
+            f"tether {self.tether_length:g} {self.units}"
+        )
+
     def __repr__(self) -> str:
         """In a line."""
-        return (
-            f"<Problem {self.name!r}: {len(self.goals)} goals, {len(self.obstacles)} obstacles, "
-            f"tether {self.tether_length:g} {self.units}>"
-        )
+        return f"<Problem {self.name!r}: {self.summary}>"
 
     __str__ = __repr__
 

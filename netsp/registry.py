@@ -12,10 +12,11 @@ from __future__ import annotations
 import importlib
 import importlib.metadata
 from collections.abc import Callable, Iterator, MutableMapping
+from contextlib import contextmanager
 from functools import cached_property
 from typing import Any, Generic, TypeVar
 
-from netsp.errors import InputError
+from netsp.errors import InputError, NetspError, PluginError
 
 R = TypeVar("R")
 
@@ -121,15 +122,34 @@ def load(where: str) -> Any:
     Raises
     ------
     InputError
-        It belongs to another package and cannot be imported.
+        It belongs to another package, and is not there.
+    PluginError
+        It belongs to another package, which fails on import.
     """
     module, _, attribute = where.partition(":")
+    if module.split(".")[0] == "netsp":
+        return _found(module, attribute)
+    with foreign(f"{where}: cannot be loaded"):
+        try:
+            return _found(module, attribute)
+        except (ImportError, AttributeError) as error:
+            raise InputError(f"{where}: cannot be loaded: {error}") from error
+
+
+def _found(module: str, attribute: str) -> Any:
+    out: Any = importlib.import_module(module)
+    for part in attribute.split("."):
+        out = getattr(out, part)
+    return out
+
+
+@contextmanager
+def foreign(what: str) -> Iterator[None]:
+    """Whatever another package's code raises, also an exit, becomes a `PluginError` that begins
+    with these words; errors of netsp, and Ctrl-C, pass."""
     try:
-        found: Any = importlib.import_module(module)
-        for part in attribute.split("."):
-            found = getattr(found, part)
-    except (ImportError, AttributeError) as error:
-        if module.split(".")[0] == "netsp":
-            raise
-        raise InputError(f"{where}: cannot be loaded: {error}") from None
-    return found
+        yield
+    except (NetspError, MemoryError):
+        raise
+    except (Exception, SystemExit) as error:
+        raise PluginError(f"{what}: {type(error).__name__}: {error}") from error

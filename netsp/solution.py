@@ -7,11 +7,12 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import ConfigDict, Field
 
 from netsp.drawn import Drawn
-from netsp.fields import STRICT, Name, NonNegative, Number, Point3
+from netsp.fields import Name, NonNegative, PathPoint, Total
 from netsp.files import FileModel, write_text
+from netsp.models import Model
 
 
 class Status(StrEnum):
@@ -33,18 +34,16 @@ KeptClasses = Literal["all", "non-looping", "shortest"]
 """Which homotopy classes a roadmap held."""
 
 
-class ProblemReference(BaseModel):
+class ProblemReference(Model):
     """Which problem a solution belongs to."""
 
-    model_config = STRICT
     name: Annotated[Name, Field(description="of the problem")]
     sha256: Annotated[str, Field(description="of what the answer depends on: all values but names")]
 
 
-class Visit(BaseModel):
+class Visit(Model):
     """One stop of the tour: the goal (0-based), the word of the tether there, its taut length."""
 
-    model_config = STRICT
     goal: Annotated[
         Annotated[int, Field(ge=0)], Field(description="index in the problem's goals, from 0")
     ]
@@ -56,10 +55,9 @@ class Visit(BaseModel):
     ]
 
 
-class Timings(BaseModel):
+class Timings(Model):
     """Wall-clock seconds by stage."""
 
-    model_config = STRICT
     roadmap_s: Annotated[NonNegative, Field(description="seconds to build the roadmap")] = 0.0
     matrix_s: Annotated[NonNegative, Field(description="seconds to measure legs")] = 0.0
     solve_s: Annotated[NonNegative, Field(description="seconds of the solver")] = 0.0
@@ -90,7 +88,7 @@ class Solution(Drawn, FileModel):
     picture: ClassVar[str] = "netsp.pictures.problem:draw_solution"
     file_kind: ClassVar[str] = "solution"
 
-    model_config = ConfigDict(frozen=True, extra="forbid", title="netsp solution")
+    model_config = ConfigDict(title="netsp solution")
 
     schema_version: Annotated[Literal[1], Field(description="of the file format")] = 1
     problem: Annotated[ProblemReference, Field(description="which problem is solved")]
@@ -102,14 +100,14 @@ class Solution(Drawn, FileModel):
     seed: Annotated[int | None, Field(description="of all that was random")] = None
     status: Annotated[Status, Field(description="what is proven")]
     length: Annotated[
-        Number | None, Field(description="of the tour, in the problem's units; null without a tour")
+        Total | None, Field(description="of the tour, in the problem's units; null without a tour")
     ]
     lower_bound: Annotated[
-        Number | None,
+        Total | None,
         Field(description="no tour is shorter, in the problem's units; null if nothing is known"),
     ]
     gap: Annotated[
-        Number | None,
+        Total | None,
         Field(description="(length - lower_bound) / length; null if either is missing"),
     ]
     entangled: Annotated[
@@ -121,11 +119,11 @@ class Solution(Drawn, FileModel):
     ] = ()
     tour: Annotated[tuple[Visit, ...], Field(description="goals in the order of their visits")] = ()
     path: Annotated[
-        tuple[Point3, ...],
+        tuple[PathPoint, ...],
         Field(description="closed polyline from base to base, in the problem's units"),
     ] = ()
     start_tether: Annotated[
-        tuple[Point3, ...],
+        tuple[PathPoint, ...],
         Field(
             description="the tether at the start where the robot was out already, in "
             "the problem's units"
@@ -138,11 +136,11 @@ class Solution(Drawn, FileModel):
 
     def __repr__(self) -> str:
         """In a line."""
-        told = "" if self.length is None else f", length {self.length:.6g}"
+        length = "" if self.length is None else f", length {self.length:.6g}"
         gap = "" if self.gap is None else f", gap {100 * self.gap:.3g} %"
         return (
-            f"<Solution of {self.problem.name!r} by {self.solver}: {self.status.value}{told}{gap}, "
-            f"{len(self.tour)} visits>"
+            f"<Solution of {self.problem.name!r} by {self.solver}: "
+            f"{self.status.value}{length}{gap}, {len(self.tour)} visits>"
         )
 
     __str__ = __repr__

@@ -205,7 +205,7 @@ def test_tags_of_sea_charts_are_read(tmp_path):
         (["--origin", "here"], "--origin: expected lat,lon or lat,lon,heading, got 'here'"),
         ([], "origin: format 'plan' needs latitude"),
         (["--origin", "55,12", "--format", "kml"], "format: expected plan, wpl, geojson, csv"),
-        (["--origin", "55,12", "--most", "3"], "waypoints, and the vehicle takes 3"),
+        (["--origin", "55,12", "--max-waypoints", "3"], "waypoints, and the vehicle takes 3"),
         (["--origin", "55,12", "--hold", "9999"], "hold: expected whole seconds"),
     ],
 )
@@ -300,7 +300,7 @@ def test_southern_and_western_places_can_be_typed(tmp_path, capsys):
     "argv",
     [
         ["execute", "p.json"], ["simulate", "m.json", "--seed", "x"], ["nonsense"],
-        ["export", "s.json", "--problem", "p.json", "--most", "0", "-o", "x"],
+        ["export", "s.json", "--problem", "p.json", "--max-waypoints", "0", "-o", "x"],
     ],
 )  # fmt: skip
 def test_wrong_flags_take_one_line(argv, capsys):

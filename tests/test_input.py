@@ -2,6 +2,7 @@
 
 import gzip
 import json
+import math
 import os
 import re
 import subprocess
@@ -16,6 +17,7 @@ from netsp import Circle, InputError, Problem, Solution, solve, verify
 from netsp.command.main import main
 from netsp.errors import brief
 from netsp.execute import ExecutionOptions, Surprises, execute
+from netsp.execute.events import changed
 from netsp.export import Projection, export
 from netsp.export.write import Settings
 from netsp.files import cell, read_gzip, write_text
@@ -413,3 +415,151 @@ def test_numbers_and_arrays_of_numpy_are_as_good_as_those_of_python(tmp_path):
     settings = Settings(hold=np.int64(5), bend=np.int64(1), speed=np.float64(0.5))
     export(problem, solution, tmp_path / "x.csv", "csv", settings=settings)
     assert (tmp_path / "x.csv").exists()
+
+
+@pytest.mark.parametrize("which", [True, -1, 1.5, None, 2**40, [0]])
+def test_obstacles_of_surprises_are_named_or_numbered_and_nothing_else(which, tmp_path, capsys):
+    file = tmp_path / "s.json"
+    file.write_text(json.dumps({"schema_version": 1, "events": [{"time": 1, "vanish": which}]}))
+    with pytest.raises(InputError) as caught:
+        Surprises.load(file)
+    assert str(caught.value).startswith(f"{file}: events[0]")
+    assert "int" not in str(caught.value).replace("integer", "")  # pydantic's inner names
+
+
+def test_a_surprise_may_call_an_obstacle_as_messages_do():
+    problem = Problem(
+        base=(0, 0), goals=[(8, 0)], tether_length=30,
+        obstacles=[{"center": (4, 0), "radius": 1}, {"center": (4, 9), "radius": 1, "name": "#0"}],
+    )  # fmt: skip
+    for which, gone in (("#0", 1), (0, 0), (1, 1)):
+        event = {"time": 1, "vanish": which}
+        (event,) = Surprises(events=[event]).events
+        (left,) = changed(problem, event).obstacles
+        assert left == problem.obstacles[1 - gone]
+    nameless = problem.model_copy(update={"obstacles": problem.obstacles[:1]})
+    assert (
+        changed(nameless, Surprises(events=[{"time": 1, "vanish": "#0"}]).events[0]).obstacles == ()
+    )
+
+
+def test_an_event_that_cannot_be_is_told_with_its_file(tmp_path, capsys):
+    problem, solution = tmp_path / "p.json", tmp_path / "s.json"
+    problem.write_text(Problem.load(SMALL).to_json())
+    assert main(["solve", str(problem), "-o", str(solution), "--quiet"]) == 0
+    file = tmp_path / "surprises.json"
+    file.write_text('{"schema_version": 1, "events": [{"time": 1, "vanish": "nobody"}]}')
+    capsys.readouterr()
+    assert main(["execute", str(problem), str(solution), "--surprise", str(file), "--quiet"]) == 2
+    assert f"{file}: events[0]: vanish" in one_line(capsys)
+
+
+def test_complaints_about_a_site_name_its_features(tmp_path, capsys):
+    def at(x, **properties):
+        place = {"type": "Point", "coordinates": [12.0 + x, 55.0]}
+        return {"type": "Feature", "properties": properties, "geometry": place}
+
+    file = tmp_path / "site.geojson"
+    features = [at(0, kind="base", tether_length=100), at(3e-4), at(6e-4, radius_m=1.0), at(3e-4)]
+    file.write_text(json.dumps({"type": "FeatureCollection", "features": features}))
+    assert main(["import", str(file)]) == 2
+    said = one_line(capsys)
+    assert "features[3]: same position" in said
+    assert "as features[1]" in said
+    features[2]["properties"]["radius_m"] = -1.0
+    file.write_text(json.dumps({"type": "FeatureCollection", "features": features[:3]}))
+    assert main(["import", str(file)]) == 2
+    assert "features[2].radius" in one_line(capsys)
+
+
+def test_models_made_by_a_call_are_refused_in_one_line():
+    for call, said in (
+        (lambda: Problem(base=None, goals=[(1, 2)], tether_length=3), "base: expected [x, y]"),
+        (lambda: Problem(base=(0, 0), goals=[(1, 2)], tether_length=3,
+                         obstacles=[{"center": (5, 5), "radius": -1}]), "obstacles[0].radius"),
+        (lambda: Mission(anchor=(0, 0, 0)), "missing"),
+        (lambda: Surprises(events=3), "events"),
+    ):  # fmt: skip
+        with pytest.raises(InputError) as caught:
+            call()
+        assert said in str(caught.value)
+        assert "\n" not in str(caught.value)
+
+
+def test_a_tour_may_be_longer_than_any_length_of_its_problem():
+    far = 9e11
+    problem = Problem(base=(0, 0), goals=[(far, 0), (-far, 0)], tether_length=1e12)
+    solution = solve(problem)
+    assert solution.length == pytest.approx(4 * far)
+    assert verify(problem, Solution.from_json(solution.to_json()))
+
+
+@pytest.mark.parametrize("obstacle", [
+    {"center": (3e-8, 0), "radius": 3e-8}, {"center": (5, 3), "radius": 1e-80},
+    {"polygon": [(5, 3), (5 + 1e-9, 3), (5, 3 + 1e-9)]},
+])  # fmt: skip
+def test_obstacles_too_small_to_be_seen_beside_the_others_are_refused(obstacle):
+    with pytest.raises(InputError, match=r"obstacles\[1\]: is .* wide, too little"):
+        Problem(base=(0, 0), goals=[(10, 0), (3, 7)], tether_length=30,
+                obstacles=[{"center": (5, 5), "radius": 1}, obstacle])  # fmt: skip
+
+
+@pytest.mark.parametrize("turn", range(8))
+def test_an_obstacle_just_large_enough_may_touch_the_base(turn):
+    r = 6e-7
+    centre = (r * math.cos(turn * math.pi / 4), r * math.sin(turn * math.pi / 4))
+    obstacles = [{"center": (5, 5), "radius": 1}, {"center": centre, "radius": r}]
+    problem = Problem(base=(0, 0), goals=[(10, 0), (3, 7)], tether_length=30, obstacles=obstacles)
+    solution = solve(problem, roadmap_options={"classes": "non-looping"})
+    assert verify(problem, solution)
+
+
+def test_lists_are_cut_in_messages():
+    assert len(brief(f"state.signature: expected letters, got {list(range(40_000))}")) < 200
+    assert brief("word [1, -4]") == "word [1, -4]"
+
+
+def test_values_of_a_study_are_each_given_once(tmp_path, capsys):
+    file = tmp_path / "study.toml"
+    for line in ("seeds = [0, 0]", "goals = [4, 4]"):
+        text = 'name = "x"\ntether_lengths = [250]\n[[solvers]]\nname = "auto"\n'
+        head = line if "goals" in line else f"goals = [4]\n{line}"
+        file.write_text(f"{head}\n{text}")
+        assert main(["compare", str(file), "-o", str(tmp_path / "r.jsonl"), "--quiet"]) == 2
+        assert "appears twice" in one_line(capsys)
+
+
+def test_a_report_of_a_solution_whose_length_is_not_its_paths_is_refused(tmp_path, capsys):
+    problem = Problem.load(SMALL)
+    solution = solve(problem)
+    (tmp_path / "p.json").write_text(problem.to_json())
+    wrong = solution.model_copy(update={"length": 2 * solution.length})
+    (tmp_path / "s.json").write_text(wrong.to_json())
+    out = tmp_path / "r.html"
+    args = ["report", str(tmp_path / "s.json"), "--problem", str(tmp_path / "p.json")]
+    assert main([*args, "-o", str(out)]) == 2
+    assert "path: is" in one_line(capsys)
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("name", ["鹿児島 桟橋", "x" * 200, "ж" * 200, "🐟"])
+def test_names_in_any_script_and_of_any_length_leave_no_remark(name, tmp_path, recwarn):
+    problem = nasty("pile").model_copy(update={"name": name})
+    goals = tuple(
+        g.model_copy(update={"name": f"{k}{name}"[:200]}) for k, g in enumerate(problem.goals)
+    )
+    problem = problem.model_copy(update={"goals": goals})
+    from netsp.pictures.problem import save
+
+    save(problem, solve(problem), tmp_path / "p.png")
+    assert not [str(w.message) for w in recwarn]
+
+
+def test_positions_on_the_earth_are_of_the_earth():
+    here = Projection(55.0, 12.0)
+    for wrong in ([[math.nan, 0.0]], "here", [[1, 2, 3]], [[1e9, 0.0]], None):
+        with pytest.raises(InputError, match="xy: expected"):
+            here.to_earth(wrong)
+    for wrong in ([[91.0, 0.0]], [[0.0, math.inf]], "there"):
+        with pytest.raises(InputError, match="latlon: expected"):
+            here.to_plane(wrong)

@@ -125,6 +125,64 @@ def test_a_solver_without_options_refuses_them():
         solve_graph(graph, lambda graph: [0, 1, 2], params={"depth": 3})
 
 
+def test_options_in_a_dataclass_are_checked_before_the_work(installed, tmp_path):
+    for option, said in (("shufle=1", "expected one of shuffle"), ("shuffle=x", "a whole number")):
+        args = ("solve", WHARF, "--quiet", "--solver", "sweep", "--option", option, "-o", "s.json")
+        done = netsp(installed, *args, cwd=tmp_path)
+        assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+        assert said in done.stderr
+        assert not (tmp_path / "s.json").exists()
+
+
+def test_no_claim_about_a_tour_that_was_not_returned_is_passed_on():
+    from netsp import Status
+
+    claim = Result(None, None, 1e9, Status.NO_SOLUTION_FOUND)
+    problem = Problem.load(WHARF)
+    found = solve(problem, solver=lambda graph: claim)
+    assert (found.status, found.lower_bound) == (Status.NO_SOLUTION_FOUND, None)
+    claim = Result(None, None, None, Status.INFEASIBLE)
+    with pytest.raises(InputError, match="infeasible, but it has a tour"):
+        solve(problem, solver=lambda graph: claim)
+
+
+def test_a_function_without_arguments_is_refused_in_one_line():
+    with pytest.raises(InputError, match="takes no argument"):
+        solve(Problem.load(WHARF), solver=lambda: [0])
+
+
+BROKEN = """
+import sys
+def fails(graph): raise ZeroDivisionError("division by zero")
+def leaves(graph): sys.exit(7)
+class Plain:
+    def __init__(self, problem): self.problem = problem
+    def travel_graph(self):
+        from netsp import travel_graph
+        return travel_graph(self.problem)
+"""
+
+
+def test_what_other_packages_raise_is_told_in_one_line(tmp_path):
+    (tmp_path / "broken.py").write_text(BROKEN)
+    (tmp_path / "unloadable.py").write_text("1 / 0\n")
+    info = tmp_path / "broken-1.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: broken\nVersion: 1\n")
+    (info / "entry_points.txt").write_text(
+        "[netsp.solvers]\nfails = broken:fails\nleaves = broken:leaves\n"
+        "unloadable = unloadable:solve\n[netsp.roadmaps]\nplain = broken:Plain\n"
+    )
+    env = {**os.environ, "PYTHONPATH": str(tmp_path)}
+    for name, said in (("fails", "ZeroDivisionError"), ("leaves", "SystemExit: 7"),
+                       ("unloadable", "cannot be loaded: ZeroDivisionError")):  # fmt: skip
+        done = netsp(env, "solve", WHARF, "--solver", name, "--quiet", cwd=tmp_path)
+        assert (done.returncode, done.stderr.count("\n")) == (1, 1), done.stderr
+        assert said in done.stderr
+    plain = netsp(env, "solve", WHARF, "--roadmap", "plain", "--time-limit", "20", cwd=tmp_path)
+    assert plain.returncode == 0, plain.stderr
+
+
 def test_a_tether_model_and_a_planner_may_be_classes_of_ones_own():
     seen = []
 

@@ -10,8 +10,8 @@ EXAMPLE = "netsp combine part-1.jsonl part-2.jsonl -o rows.jsonl"
 
 def arguments(p: argparse.ArgumentParser) -> None:
     """Of the command line."""
-    p.add_argument("results", metavar="RESULTS", nargs="+", help="rows of netsp compare")
-    p.add_argument("-o", "--output", required=True, metavar="FILE", help="where all rows go")
+    p.add_argument("results", metavar="RESULTS", nargs="+", help="results of netsp compare")
+    p.add_argument("-o", "--output", required=True, metavar="FILE", help="file for all rows")
 
 
 def run(args: argparse.Namespace) -> int:

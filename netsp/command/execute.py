@@ -30,8 +30,14 @@ def arguments(p: argparse.ArgumentParser) -> None:
     """Of the command line."""
     p.add_argument("problem", metavar="PROBLEM", help="problem file (JSON)")
     p.add_argument("solution", metavar="SOLUTION", help="solution file (JSON)")
-    p.add_argument("--surprise", metavar="FILE", help="what happens during the run (JSON)")
-    p.add_argument("--speed", type=length, default=0.5, metavar="V", help="per second; default 0.5")
+    p.add_argument("--surprise", metavar="FILE", help="surprise file (JSON): events during the run")
+    p.add_argument(
+        "--speed",
+        type=length,
+        default=0.5,
+        metavar="V",
+        help="speed of the robot, in the problem's units per second; default 0.5",
+    )
     p.add_argument(
         "--vehicle", default="kinematic", metavar="NAME", help="kinematic (default) or bluerov2"
     )
@@ -41,14 +47,25 @@ def arguments(p: argparse.ArgumentParser) -> None:
     )
     p.add_argument(
         "--planner", default="repair", metavar="NAME",
-        help="repair (default): repair a broken plan; none: carry on regardless",
+        help="repair (default), or none: keep to the plan whatever happens",
     )  # fmt: skip
     p.add_argument(
         "--planning-limit", type=seconds, default=2.0, metavar="S",
-        help="for repairing a plan while the robot holds its position; default 2",
+        help="seconds that a repair may take, while the robot holds its position; default 2",
     )  # fmt: skip
-    p.add_argument("--delta", type=length, metavar="D", help="resolution of the tether")
-    p.add_argument("--seed", type=natural, default=0, metavar="N", help="of gusts and solvers")
+    p.add_argument(
+        "--delta",
+        type=length,
+        metavar="D",
+        help="resolution of the tether model; default by the smallest obstacle",
+    )
+    p.add_argument(
+        "--seed",
+        type=natural,
+        default=0,
+        metavar="N",
+        help="random seed of gusts and solvers; default 0",
+    )
     p.add_argument("-o", "--output", metavar="RUN", help="folder for logs, summary and run.png")
     p.add_argument("--quiet", action="store_true", help="no progress")
 
@@ -66,6 +83,8 @@ def run(args: argparse.Namespace) -> int:
 
     problem, solution = Problem.load(args.problem), Solution.load(args.solution)
     surprises = Surprises.load(args.surprise) if args.surprise else None
+    if surprises is not None:
+        surprises.check(problem, args.surprise)
     if args.planner not in ("repair", "none"):
         raise InputError(f"--planner: expected repair or none, got {args.planner!r}")
     options = ExecutionOptions(

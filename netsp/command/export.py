@@ -25,24 +25,34 @@ def arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument("--problem", required=True, metavar="FILE", help="the problem it solves")
     p.add_argument(
         "--format", metavar="NAME",
-        help="plan (QGroundControl), wpl (QGC WPL 110), geojson or csv; default by the file's name",
+        help="plan (QGroundControl), wpl (QGC WPL 110), geojson or csv; default: by the extension",
     )  # fmt: skip
     p.add_argument(
         "--origin", metavar="LAT,LON[,HEADING]",
-        help="where the base is, and where the y axis points to (degrees from north)",
+        help="position of the base, and compass heading of the y axis in degrees",
     )  # fmt: skip
     p.add_argument(
         "--acceptance", type=length, default=0.0, metavar="R",
-        help="acceptance radius of the vehicle (m), by which corners may be cut",
+        help="acceptance radius of the vehicle (m), within which it cuts corners; default 0",
     )  # fmt: skip
-    p.add_argument("--hold", type=natural, default=5, metavar="S", help="at goals; default 5")
-    p.add_argument("--speed", type=length, default=0.5, metavar="V", help="m/s; default 0.5")
     p.add_argument(
-        "--most", type=positive, default=650, metavar="N", help="waypoints at most; default 650"
+        "--hold",
+        type=natural,
+        default=5,
+        metavar="S",
+        help="seconds to hold at every goal; default 5",
+    )
+    p.add_argument("--speed", type=length, default=0.5, metavar="V", help="speed, m/s; default 0.5")
+    p.add_argument(
+        "--max-waypoints",
+        type=positive,
+        default=650,
+        metavar="N",
+        help="maximum number of waypoints; default 650",
     )
     p.add_argument(
         "--margin", default="0.3,0.2", metavar="SLACK[,CLEARANCE]",
-        help="warn when less tether is left or lines come nearer to an obstacle; default 0.3,0.2",
+        help="warn where less tether is left or an obstacle is closer; default 0.3,0.2",
     )  # fmt: skip
     p.add_argument("-o", "--output", required=True, metavar="FILE")
 
@@ -75,7 +85,7 @@ def run(args: argparse.Namespace) -> int:
     projection = None
     if args.origin:
         projection = Projection.parse(args.origin, problem.base[:2], "--origin")
-    settings = Settings(hold=args.hold, speed=args.speed, most=args.most)
+    settings = Settings(hold=args.hold, speed=args.speed, max_waypoints=args.max_waypoints)
     points = export(
         problem, solution, args.output, kind, projection, acceptance=args.acceptance,
         settings=settings,

@@ -17,12 +17,28 @@ def arguments(p: argparse.ArgumentParser) -> None:
     """Of the command line."""
     p.add_argument("site", metavar="SITE", help="GeoJSON file: obstacles and goals")
     p.add_argument(
-        "--base", metavar="LAT,LON[,HEADING]", help="where the tether is fixed; default the file's"
+        "--base",
+        metavar="LAT,LON[,HEADING]",
+        help="position of the base, and compass heading of the y axis; default: from the file",
     )
-    p.add_argument("--tether", type=length, metavar="L", help="tether length; default the file's")
-    p.add_argument("--clearance", type=length, metavar="C", help="default the file's, or 0")
-    p.add_argument("--radius", type=length, metavar="R", help="of obstacles that have none")
-    p.add_argument("-o", "--output", metavar="FILE", help="write the problem here (else stdout)")
+    p.add_argument(
+        "--tether", type=length, metavar="L", help="tether length (m); default: from the file"
+    )
+    p.add_argument(
+        "--clearance",
+        type=length,
+        metavar="C",
+        help="clearance to obstacles (m); default: from the file, or 0",
+    )
+    p.add_argument(
+        "--radius",
+        type=length,
+        metavar="R",
+        help="radius (m) of point obstacles that have none in the file",
+    )
+    p.add_argument(
+        "-o", "--output", metavar="FILE", help="write the problem to this file (default: stdout)"
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -37,8 +53,7 @@ def run(args: argparse.Namespace) -> int:
         args.site, projection, tether=args.tether, clearance=args.clearance, radius=args.radius
     )
     print(
-        f"{problem.name}: {len(problem.goals)} goals, {len(problem.obstacles)} obstacles, tether "
-        f"{problem.tether_length:g} m",
+        f"{problem.name}: {problem.summary}",
         file=sys.stderr,
     )
     if args.output is None:

@@ -21,10 +21,18 @@ def arguments(p: argparse.ArgumentParser) -> None:
     """Of the command line."""
     p.add_argument("mission", metavar="MISSION", help="mission file (JSON)")
     p.add_argument(
-        "--time-limit", type=seconds, default=20.0, metavar="S", help="of the search; default 20"
+        "--time-limit",
+        type=seconds,
+        default=20.0,
+        metavar="S",
+        help="seconds for the search; default 20",
     )
-    p.add_argument("--seed", type=natural, default=0, metavar="N", help="of the search")
-    p.add_argument("-o", "--output", metavar="FILE", help="write the mission here (else stdout)")
+    p.add_argument(
+        "--seed", type=natural, default=0, metavar="N", help="random seed of the search; default 0"
+    )
+    p.add_argument(
+        "-o", "--output", metavar="FILE", help="write the mission to this file (default: stdout)"
+    )
     p.add_argument("--quiet", action="store_true", help="no progress")
 
 
@@ -46,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
             print(
                 f"{name:<6} inspection {s['inspection_s']:.1f} s, with tether recovery "
                 f"{s['total_s']['tether']:.1f} s, tether at most {s['longest_tether_m']:.2f} of "
-                f"{s['tether_length']:g}, {s['visited']} of {s['waypoints']} visited",
+                f"{s['tether_length']:g} m, {s['visited']} of {s['waypoints']} visited",
                 file=sys.stderr,
             )
         if kept:

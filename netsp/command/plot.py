@@ -26,8 +26,8 @@ def arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument("problem", metavar="PROBLEM", help="problem or scene file (JSON)")
     p.add_argument(
         "solution", metavar="SOLUTION", nargs="?",
-        help="solution; with a scene: a path from the anchor on (CSV x,y,z or JSON), along which "
-        "the tether is laid",
+        help="solution; for a scene, a path that begins at the anchor (CSV x,y,z or JSON), along "
+        "which the tether is laid",
     )  # fmt: skip
     p.add_argument(
         "-o", "--output", required=True, metavar="FILE",
@@ -39,7 +39,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     p.add_argument(
         "--delta", type=length, metavar="L",
-        help="scene: resolution of the tether; default by the scene",
+        help="scene: resolution of the tether; default: by the scene",
     )  # fmt: skip
     p.add_argument("--roadmap", metavar="NAME", help="draw this roadmap: taut or prm")
     p.add_argument("--samples", type=positive, metavar="N", help="prm: milestones; default 1000")

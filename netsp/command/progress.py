@@ -36,10 +36,7 @@ class ProgressTable:
 
     def begin(self, problem: Problem) -> None:
         """Announce the problem."""
-        self._print(
-            f"{problem.name}: {len(problem.goals)} goals, {len(problem.obstacles)} obstacles, "
-            f"tether {problem.tether_length:g} {problem.units}"
-        )
+        self._print(f"{problem.name}: {problem.summary}")
         self._patience.start()
 
     def _explain(self) -> None:

@@ -16,9 +16,11 @@ def arguments(p: argparse.ArgumentParser) -> None:
         help="rows of `netsp compare`, a solution file, or the folder of `netsp execute`",
     )  # fmt: skip
     p.add_argument("--problem", metavar="FILE", help="the problem of a solution file")
-    p.add_argument("-o", "--output", required=True, metavar="FILE", help="the page (HTML)")
     p.add_argument(
-        "--figures", choices=("svg", "png", "pdf"), help="save the figures beside the page, too"
+        "-o", "--output", required=True, metavar="FILE", help="write the page (HTML) to this file"
+    )
+    p.add_argument(
+        "--figures", choices=("svg", "png", "pdf"), help="also save the figures beside the page"
     )
 
 

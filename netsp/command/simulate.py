@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from netsp.command.types import (
+    choices,
     length,
     natural,
     vector,
@@ -30,7 +31,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument("mission", metavar="MISSION", help="mission file (JSON)")
     p.add_argument(
         "--planner", default="predictive", metavar="NAME",
-        help="predictive (default), react, react-draft or none",
+        help=choices("predictive (default), react, react-draft or none", "netsp.planners"),
     )  # fmt: skip
     p.add_argument(
         "--tether", type=length, metavar="L", help="tether length, instead of the mission's"
@@ -41,7 +42,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     p.add_argument(
         "--tether-model", default="geodesic", metavar="NAME",
-        help="used by the planner: geodesic (default) or react",
+        help=choices("used by the planner: geodesic (default) or react", "netsp.tethers"),
     )  # fmt: skip
     p.add_argument("--current", metavar="X,Y,Z", help="current (m/s), instead of the mission's")
     p.add_argument(
@@ -51,8 +52,14 @@ def arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument(
         "--refine", metavar="NAME", help="none, paper or gradient; default is the planner's own"
     )
-    p.add_argument("--seed", type=natural, default=0, metavar="N", help="of gusts and sampling")
-    p.add_argument("--compare", metavar="NAME", help="fly with another planner too, side by side")
+    p.add_argument(
+        "--seed",
+        type=natural,
+        default=0,
+        metavar="N",
+        help="random seed of gusts and of sampling planners; default 0",
+    )
+    p.add_argument("--compare", metavar="NAME", help="also fly with this planner, for comparison")
     p.add_argument("--snap", action="store_true", help="move waypoints out of solids")
     p.add_argument(
         "-o",

@@ -7,7 +7,15 @@ import contextlib
 import sys
 from typing import TYPE_CHECKING
 
-from netsp.command.types import check_writable, natural, option, positive, roadmap_options, seconds
+from netsp.command.types import (
+    check_writable,
+    choices,
+    natural,
+    option,
+    positive,
+    roadmap_options,
+    seconds,
+)
 from netsp.errors import EXIT_NOT_ALL, EXIT_NOT_VERIFIED, InputError
 
 if TYPE_CHECKING:
@@ -23,8 +31,11 @@ def arguments(p: argparse.ArgumentParser) -> None:
         "--solver",
         default="auto",
         metavar="NAME",
-        help="auto (default), mip, dp, reduced-mip, lns, anneal, anneal-2016, greedy, "
-        "greedy-2016 or greedy-tsp",
+        help=choices(
+            "auto (default), mip, dp, reduced-mip, lns, anneal, anneal-2016, greedy, greedy-2016 "
+            "or greedy-tsp",
+            "netsp.solvers",
+        ),
     )
     p.add_argument(
         "--option",
@@ -34,13 +45,20 @@ def arguments(p: argparse.ArgumentParser) -> None:
         metavar="NAME=VALUE",
         help="an option of the solver, as docs/solvers.md lists them; may be repeated",
     )
-    p.add_argument("--roadmap", default="taut", metavar="NAME", help="taut (default) or prm")
+    p.add_argument(
+        "--roadmap",
+        default="taut",
+        metavar="NAME",
+        help=choices("taut (default) or prm", "netsp.roadmaps"),
+    )
     p.add_argument(
         "--classes", metavar="RULE", dest="classes_rule",
         help="taut: all homotopy classes (default), or non-looping as in the 2017 paper",
     )  # fmt: skip
     p.add_argument("--samples", type=positive, metavar="N", help="prm: milestones; default 1000")
-    p.add_argument("--shortcut", action="store_true", help="prm: pull every leg taut in its class")
+    p.add_argument(
+        "--shortcut", action="store_true", help="prm: pull every leg taut within its class"
+    )
     p.add_argument(
         "--max-classes",
         type=positive,
@@ -50,18 +68,28 @@ def arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument(
         "--mip-backend", metavar="NAME", help="highs (default) or cbc, for the solvers built on mip"
     )
-    p.add_argument("--time-limit", type=seconds, metavar="S", help="seconds; default none")
     p.add_argument(
-        "--iteration-limit", type=positive, metavar="N", help="of the solver; default none"
+        "--time-limit",
+        type=seconds,
+        metavar="S",
+        help="seconds for the whole run; default no limit",
+    )
+    p.add_argument(
+        "--iteration-limit",
+        type=positive,
+        metavar="N",
+        help="iterations of the solver; default no limit",
     )
     p.add_argument("--seed", type=natural, default=0, metavar="N", help="random seed; default 0")
     p.add_argument("--warm-start", metavar="SOLUTION", help="start from this solution's tour")
-    p.add_argument("-o", "--output", metavar="FILE", help="write the solution here (else stdout)")
+    p.add_argument(
+        "-o", "--output", metavar="FILE", help="write the solution to this file (default: stdout)"
+    )
     p.add_argument("--plot", metavar="FILE", help="draw the solution (png, svg or pdf)")
     p.add_argument(
         "--plot-trace",
         metavar="FILE",
-        help="draw length, bound and entanglement against iterations (png, svg or pdf)",
+        help="plot length, bound and entanglement against iterations (png, svg or pdf)",
     )
     p.add_argument("--quiet", action="store_true", help="no progress, no summary")
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import importlib.metadata
 import os
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
@@ -12,6 +13,13 @@ from netsp.errors import InputError
 if TYPE_CHECKING:
     from netsp.problem import Problem
     from netsp.solution import Solution
+
+
+def choices(own: str, group: str) -> str:
+    """Help for a choice of names: ours, then those that other packages add to a group of entry
+    points."""
+    others = sorted({e.name for e in importlib.metadata.entry_points(group=group)})
+    return f"{own}; from other packages: {', '.join(others)}" if others else own
 
 
 def _above_zero(what: str) -> Callable[[str], float]:

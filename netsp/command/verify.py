@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from netsp.command.types import load_pair
-from netsp.errors import EXIT_NOT_VERIFIED
+from netsp.errors import EXIT_NOT_VERIFIED, InputError
 
 EXAMPLE = "netsp verify problems/wharf.json solution.json"
 
@@ -17,7 +17,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument(
         "--measures",
         action="store_true",
-        help="print measures of entanglement; instead of a solution, any path will do "
+        help="print measures of entanglement; SOLUTION may then be any path "
         "(CSV x,y[,z] or a JSON list of points)",
     )
     p.add_argument("--quiet", action="store_true", help="exit code only")
@@ -36,6 +36,10 @@ def run(args: argparse.Namespace) -> int:
             if not args.quiet:
                 print(text)
             return 0
+    elif _is_path(args.solution):
+        raise InputError(
+            f"{args.solution}: this is a path; expected a solution, or --measures to measure a path"
+        )
     problem, solution = load_pair(args.problem, args.solution)
     from netsp.judge import verify
 
@@ -50,3 +54,13 @@ def run(args: argparse.Namespace) -> int:
 
         print(f"\n{describe_path(problem, solution.path)}\n\n{describe_tethers(problem, solution)}")
     return 0 if verdict else EXIT_NOT_VERIFIED
+
+
+def _is_path(file: str) -> bool:
+    """Whether a file holds a path; what cannot be read as one is left to who reads solutions."""
+    from netsp.files import read_path
+
+    try:
+        return read_path(file) is not None
+    except InputError:
+        return False

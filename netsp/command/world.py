@@ -18,16 +18,29 @@ def arguments(p: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help="icra2017 (default), rss2016, clustered, array or harbour",
     )
-    p.add_argument("--seed", type=natural, default=0, metavar="N", help="of all draws; default 0")
-    p.add_argument("--goals", type=positive, metavar="N", help="default 20; rss2016: 5 to 10")
-    p.add_argument("--obstacles", type=natural, metavar="N", help="default 20; rss2016: 5 to 10")
-    p.add_argument("--tether", type=length, default=300.0, metavar="L", help="default 300")
-    p.add_argument("--side", type=length, default=500.0, metavar="L", help="default 500")
+    p.add_argument("--seed", type=natural, default=0, metavar="N", help="random seed; default 0")
+    p.add_argument(
+        "--goals", type=positive, metavar="N", help="number of goals; default 20, rss2016: 5 to 10"
+    )
+    p.add_argument(
+        "--obstacles",
+        type=natural,
+        metavar="N",
+        help="number of obstacles; default 20, rss2016: 5 to 10",
+    )
+    p.add_argument(
+        "--tether", type=length, default=300.0, metavar="L", help="tether length; default 300"
+    )
+    p.add_argument(
+        "--side", type=length, default=500.0, metavar="L", help="side of the square; default 500"
+    )
     p.add_argument(
         "--radii", type=length, nargs=2, default=(10.0, 30.0), metavar="R",
         help="smallest and largest radius; default 10 30",
     )  # fmt: skip
-    p.add_argument("-o", "--output", metavar="FILE", help="write the problem here (else stdout)")
+    p.add_argument(
+        "-o", "--output", metavar="FILE", help="write the problem to this file (default: stdout)"
+    )
     p.add_argument("--plot", metavar="FILE", help="draw it (png, svg or pdf)")
 
 

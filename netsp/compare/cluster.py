@@ -34,7 +34,7 @@ def dask_executor(address: str) -> Executor:
         from distributed import Client
     except ImportError:
         raise InputError(
-            '--scheduler: needs Dask; install it with: pip install "netsp[cluster]"'
+            'a scheduler needs Dask; install it with: pip install "netsp[cluster]"'
         ) from None
     try:
         client = Client(address, timeout=CONNECT)

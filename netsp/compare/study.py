@@ -11,12 +11,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, Field, ValidationError, model_validator
+from pydantic import Field, ValidationError, model_validator
 
 from netsp.errors import InputError
-from netsp.fields import STRICT, Positive
+from netsp.fields import Name, Positive
 from netsp.files import read_text
-from netsp.models import explain
+from netsp.models import Model, explain
 from netsp.solvers.solve import check_solver
 from netsp.solvers.table import ROADMAPS, SOLVERS
 from netsp.worlds import FAMILIES
@@ -29,10 +29,9 @@ MOST_TRIALS = 500_000
 """Of one study."""
 
 
-class Worlds(BaseModel):
+class Worlds(Model):
     """Random worlds `first` to `first + count - 1` of a family (`netsp.worlds`)."""
 
-    model_config = STRICT
     family: Annotated[str, Field(description="of random worlds")] = "icra2017"
     count: Annotated[Whole, Field(description="worlds per cell")] = 10
     first: Annotated[Natural, Field(description="seed of the first")] = 0
@@ -55,13 +54,14 @@ class Worlds(BaseModel):
         return self
 
 
-class Roadmap(BaseModel):
+class Roadmap(Model):
     """A roadmap by name, with options; `label` tells it apart in the results."""
 
-    model_config = STRICT
     name: Annotated[str, Field(description="taut, prm or one of another package")] = "taut"
-    label: Annotated[str, Field(description="in tables; the name if empty")] = ""
-    options: Annotated[dict[str, Any], Field(description="of the roadmap, by name")] = {}
+    label: Annotated[Name, Field(description="in tables; the name if empty")] = ""
+    options: Annotated[dict[str, Any], Field(description="of the roadmap, by name")] = Field(
+        default_factory=dict
+    )
 
     @model_validator(mode="after")
     def _known(self) -> Self:
@@ -72,12 +72,11 @@ class Roadmap(BaseModel):
         return self
 
 
-class Solver(BaseModel):
+class Solver(Model):
     """A solver by name, with options and limits of its own; `label` tells it apart."""
 
-    model_config = STRICT
     name: Annotated[str, Field(description="one of netsp or of another package")]
-    label: Annotated[str, Field(description="in tables; the name if empty")] = ""
+    label: Annotated[Name, Field(description="in tables; the name if empty")] = ""
     time_limit: Annotated[Positive | None, Field(description="seconds; null for the study's")] = (
         None
     )
@@ -85,7 +84,9 @@ class Solver(BaseModel):
         Annotated[int, Field(ge=1, lt=2**62)] | None,
         Field(description="of the solver; null for none"),
     ] = None
-    options: Annotated[dict[str, Any], Field(description="of the solver, by name")] = {}
+    options: Annotated[dict[str, Any], Field(description="of the solver, by name")] = Field(
+        default_factory=dict
+    )
 
     @model_validator(mode="after")
     def _known(self) -> Self:
@@ -100,7 +101,7 @@ class Solver(BaseModel):
         return self
 
 
-class Study(BaseModel):
+class Study(Model):
     """Everything tried with everything: goals x tether lengths x worlds x roadmaps x solvers x
     seeds.
 
@@ -112,9 +113,8 @@ class Study(BaseModel):
         GiB for one trial beyond what the worker needs to start.
     """
 
-    model_config = STRICT
     schema_version: Annotated[Literal[1], Field(description="of the file format")] = 1
-    name: Annotated[Annotated[str, Field(min_length=1)], Field(description="of the study")]
+    name: Annotated[Annotated[Name, Field(min_length=1)], Field(description="of the study")]
     goals: Annotated[
         Annotated[tuple[Whole, ...], Field(min_length=1)], Field(description="numbers of goals")
     ]
@@ -147,6 +147,11 @@ class Study(BaseModel):
             twice = [name for name in labels if labels.count(name) > 1]
             if twice:
                 raise ValueError(f"{what}: {twice[0]!r} appears twice; give each a label")
+        for what in ("goals", "tether_lengths", "seeds"):
+            values = getattr(self, what)
+            again = [v for v in values if values.count(v) > 1]
+            if again:
+                raise ValueError(f"{what}: {again[0]:g} appears twice; expected each once")
         count = self.worlds.count * len(self.goals) * len(self.tether_lengths)
         count *= len(self.roadmaps) * len(self.solvers) * len(self.seeds)
         if count > MOST_TRIALS:

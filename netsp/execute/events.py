@@ -2,30 +2,39 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BeforeValidator, ConfigDict, Field, model_validator
 
 from netsp.errors import InputError
-from netsp.fields import STRICT, NonNegative, Point2, Point3, Positive
+from netsp.fields import NonNegative, Point2, Point3, Positive
 from netsp.files import FileModel
-from netsp.models import explain
+from netsp.models import Model, shown
 from netsp.problem import Circle, GoalLike, Obstacle, Polygon, Problem
 
-Which = Annotated[int, Field(ge=0)] | str
-"""An obstacle or goal: its index, or its name."""
+
+def _which(value: Any) -> Any:
+    whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+    if isinstance(value, str):
+        return value
+    if whole and 0 <= value < 2**31:
+        return int(value)
+    raise ValueError(f"expected a name or an index from 0 on, got {shown(value)}")
 
 
-class Move(BaseModel):
+Which = Annotated[Annotated[int, Field(ge=0)] | str, BeforeValidator(_which)]
+"""An obstacle or goal: its index, or its name; where it has none, `#index` as messages say."""
+
+
+class Move(Model):
     """An obstacle is somewhere else from now on."""
 
-    model_config = STRICT
     obstacle: Annotated[Which, Field(description="name or index from 0")]
     by: Annotated[Point2, Field(description="(x, y) to move it by, in the problem's units")]
 
 
-class Event(BaseModel):
+class Event(Model):
     """Something that happens at a time after the start; one of the other fields says what.
 
     Attributes
@@ -47,8 +56,6 @@ class Event(BaseModel):
     tether_length : float or None
         A new limit.
     """
-
-    model_config = STRICT
 
     time: Annotated[NonNegative, Field(description="seconds after the start")]
     appear: Annotated[
@@ -98,18 +105,20 @@ class Surprises(FileModel):
 
     file_kind: ClassVar[str] = "surprises"
 
-    model_config = ConfigDict(frozen=True, extra="forbid", title="netsp surprises")
+    model_config = ConfigDict(title="netsp surprises")
 
     schema_version: Annotated[Literal[1], Field(description="of the file format")] = 1
     events: Annotated[tuple[Event, ...], Field(description="in any order")]
 
-    def check(self, problem: Problem) -> None:
+    def check(self, problem: Problem, source: str = "") -> None:
         """Refuse events that a problem cannot have.
 
         Parameters
         ----------
         problem : Problem
             What is carried out.
+        source : str
+            What messages call these surprises; nothing if it is empty.
 
         Raises
         ------
@@ -121,7 +130,8 @@ class Surprises(FileModel):
             try:
                 problem = changed(problem, event)
             except InputError as error:
-                raise InputError(f"events[{k}]: {error}") from None
+                where = f"{source}: " if source else ""
+                raise InputError(f"{where}events[{k}]: {error}") from None
 
 
 def changed(problem: Problem, event: Event) -> Problem:
@@ -166,8 +176,8 @@ def moved(obstacle: Circle | Polygon, by: tuple[float, float]) -> Circle | Polyg
             return Circle(center=centre, radius=obstacle.radius, name=obstacle.name)
         corners = tuple((x + by[0], y + by[1]) for x, y in obstacle.polygon)
         return Polygon(polygon=corners, name=obstacle.name)
-    except ValidationError as error:
-        raise InputError(f"move: {explain(error)}") from None
+    except InputError as error:
+        raise InputError(f"move: {error}") from None
 
 
 def index_of(which: int | str, things: list, field: str) -> int:  # type: ignore[type-arg]
@@ -176,6 +186,9 @@ def index_of(which: int | str, things: list, field: str) -> int:  # type: ignore
         found = [k for k, thing in enumerate(things) if thing.name == which]
         if len(found) == 1:
             return found[0]
+        unnamed = [k for k, thing in enumerate(things) if thing.name is None]
+        if not found and which in (f"#{k}" for k in unnamed):
+            return int(which[1:])
         raise InputError(f"{field}: expected the name of one, got {which!r}, of which there are "
                          f"{len(found)}")  # fmt: skip
     if which >= len(things):

@@ -9,6 +9,7 @@ import numpy as np
 
 from netsp.arrays import Floats
 from netsp.drawn import Drawn
+from netsp.errors import counted
 from netsp.execute.plan import HOME
 from netsp.execute.repair import REPLAN_S
 from netsp.fields import Point3
@@ -206,8 +207,9 @@ class Execution(Drawn):
         """In a line."""
         s = self.summary
         return (
-            f"<Execution of {self.problem.name!r}: {s['visited']} goals in {s['time_s']:.1f} s, "
-            f"tether at most {s['longest_tether']:.4g} of {s['tether_length']:g}>"
+            f"<Execution of {self.problem.name!r}: {counted(s['visited'], 'goal')} in "
+            f"{s['time_s']:.1f} s, tether at most {s['longest_tether']:.4g} of "
+            f"{s['tether_length']:g}>"
         )
 
     @property
@@ -255,24 +257,31 @@ def describe_execution(done: Execution) -> str:
     str
         The lines.
     """
-    s = done.summary
+    s, units = done.summary, done.problem.units
     planned = s["planned_path"] or 0.0
     lines = [
         f"run      {s['problem']}: {s['status']} after {s['time_s']:.1f} s",
-        f"visited  {s['visited']} goals, the tether in the planned class at {s['as_planned']} of "
-        f"{len(done.arrivals)} stops",
-        f"path     {s['path']:.6g} ({100 * (s['path'] / planned - 1):+.2f} % of the plan's)"
-        if planned
-        else f"path     {s['path']:.6g}",
-        f"tether   longest {s['longest_tether']:.6g} of {s['tether_length']:g}, over the limit for "
-        f"{s['exceedance_s']:.1f} s, "
+        f"visited  {counted(s['visited'], 'goal')}; the tether in the planned class at "
+        f"{s['as_planned']} of {counted(len(done.arrivals), 'stop')}",
+        f"path     {s['path']:.6g} {units}"
+        + (f", {_beside(s['path'] / planned)}" if planned else ""),
+        f"tether   at most {s['longest_tether']:.6g} of {s['tether_length']:g} {units}, over the "
+        f"limit for {s['exceedance_s']:.1f} s, "
         + (
             "recovered free at the base" if s["tether_free"] and s["home"] else "not recovered free"
         ),
     ]
-    lines += [
-        f"event    {e.time:.1f} s, {e.event}: {e.done} ({e.reason}; {e.planning_s:.2f} s)"
-        for e in done.entries
-    ]
+    for e in done.entries:
+        lines += [
+            f"event    {e.event} at {e.time:.1f} s: {e.done}, planned in {e.planning_s:.2f} s",
+            f"         {e.reason}",
+        ]
     lines += [f"left out {done.problem.goal_label(x['goal'])}: {x['reason']}" for x in s["lost"]]
     return "\n".join(lines)
+
+
+def _beside(ratio: float) -> str:
+    """A path beside the planned one."""
+    if abs(ratio - 1.0) < 1e-4:
+        return "as planned"
+    return f"{100 * abs(ratio - 1.0):.2f} % {'longer' if ratio > 1.0 else 'shorter'} than planned"

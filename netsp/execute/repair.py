@@ -150,17 +150,17 @@ def repair(
     # with a short time left a new plan has less of it to pay for itself
     replan_s = max(clock.left, 0.0)
     chosen, kind = local, "local"
-    reason = f"{why}; in the same order {local.length:.4g} to go"
+    reason = f"{why}; {local.length:.4g} {problem.units} to go in the same order"
     saving = (local.length - _least(graph, len(order), clock)) / speed
     if saving > replan_s > 0.0:
         found = solve_graph(graph, "auto", time_limit=clock, seed=seed, warm_start=local.tour)
         if found.length is not None and found.length < local.length - speed * replan_s:
             chosen, kind = found, "replan"
-            reason += f", in a new one {found.length:.6g}"
+            reason += f", {found.length:.4g} {problem.units} in a new one"
         else:
             reason += ", a new order would not save enough"
     else:
-        reason += f", a new order saves {max(saving, 0.0):.1f} s at most"
+        reason += f", a new order could save at most {max(saving, 0.0):.1f} s"
     solution = to_solution(rest, graph, chosen, "auto", seed)
     legs = legs_of(rest, solution, order)
     return Repair(kind, reason, legs, tuple(lost), float(chosen.length or 0.0), clock.elapsed)

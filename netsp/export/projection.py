@@ -16,6 +16,10 @@ import numpy.typing as npt
 from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.fields import checked_argument
+from netsp.models import shown
+
+FARTHEST = 1e7
+"""Metres from the base: a quarter of the way around the earth."""
 
 
 class Projection:
@@ -107,8 +111,18 @@ class Projection:
         -------
         ndarray, shape (n, 2)
             Latitude and longitude, degrees.
+
+        Raises
+        ------
+        InputError
+            No pairs of finite numbers, or points that are farther off than the projection reaches.
         """
-        d = np.asarray(xy, dtype=float).reshape(-1, 2) - self.base
+        d = _pairs("xy", xy) - self.base
+        if len(d) and not np.abs(d).max() <= FARTHEST:
+            raise InputError(
+                f"xy: expected points within {FARTHEST / 1e3:g} km of the base, got one "
+                f"{np.abs(d).max() / 1e3:.4g} km off"
+            )
         c, s = math.cos(math.radians(self.heading)), math.sin(math.radians(self.heading))
         east, north = c * d[:, 0] + s * d[:, 1], -s * d[:, 0] + c * d[:, 1]
         longitude, latitude = self._transform.transform(east, north, direction="INVERSE")
@@ -126,8 +140,28 @@ class Projection:
         -------
         ndarray, shape (n, 2)
             Points in the problem's plane, metres.
+
+        Raises
+        ------
+        InputError
+            No pairs of finite numbers, or off the globe.
         """
-        p = np.asarray(latlon, dtype=float).reshape(-1, 2)
+        p = _pairs("latlon", latlon)
+        if len(p) and not (np.abs(p) <= (90.0, 360.0)).all():
+            raise InputError(
+                "latlon: expected latitudes within 90 and longitudes within 360 degrees"
+            )
         east, north = self._transform.transform(p[:, 1], p[:, 0])
         c, s = math.cos(math.radians(self.heading)), math.sin(math.radians(self.heading))
         return np.asarray(np.column_stack([c * east - s * north, s * east + c * north]) + self.base)
+
+
+def _pairs(name: str, value: npt.ArrayLike) -> Floats:
+    """An argument as an array (n, 2) of finite numbers."""
+    try:
+        pairs = np.asarray(value, dtype=float).reshape(-1, 2)
+    except (TypeError, ValueError):
+        raise InputError(f"{name}: expected pairs of numbers, got {shown(value)}") from None
+    if not np.isfinite(pairs).all():
+        raise InputError(f"{name}: expected finite numbers, got {shown(value)}")
+    return pairs

@@ -8,6 +8,7 @@ other points are goals. A `kind` property of base, goal, obstacle or path decide
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -71,12 +72,14 @@ def read_site(
 
     goals: list[Any] = []
     obstacles: list[Any] = []
+    sources: dict[str, list[int]] = {"goals": [], "obstacles": []}
     for k, part in enumerate(found):
         if part is None:
             continue
         label = {"name": str(part["properties"]["name"])} if part["properties"].get("name") else {}
         if part["kind"] == "goal":
             goals.append({"position": place(part["coordinates"]), **label})
+            sources["goals"].append(k)
         elif part["kind"] == "obstacle" and part["shape"] == "Point":
             r = part["properties"].get("radius_m", radius)
             if r is None:
@@ -85,12 +88,14 @@ def read_site(
                     "radius for all that have none"
                 )
             obstacles.append({"center": place(part["coordinates"])[:2], "radius": r, **label})
+            sources["obstacles"].append(k)
         elif part["kind"] == "obstacle":
             for rings in part["coordinates"]:
                 corners = [place(c)[:2] for c in rings[0]]
                 corners = [c for c, d in zip(corners, [*corners[1:], corners[0]], strict=True)
                            if not np.allclose(c, d, atol=1e-6)]  # fmt: skip
                 obstacles.append({"polygon": corners, **label})
+                sources["obstacles"].append(k)
     for what, things in (("goals", goals), ("obstacles", obstacles)):
         names = [t["name"] for t in things if "name" in t]
         twice = next((n for n in names if names.count(n) > 1), None)
@@ -109,7 +114,12 @@ def read_site(
             }
         )  # fmt: skip
     except ValidationError as error:
-        raise InputError(f"{file}: {explain(error)}") from None
+
+        def feature(found: re.Match[str]) -> str:  # the file knows of no goals and obstacles
+            return f"features[{sources[found[1]][int(found[2])]}]"
+
+        text = re.sub(r"\b(goals|obstacles)\[(\d+)\]", feature, explain(error))
+        raise InputError(f"{file}: {text}") from None
 
 
 KINDS = {

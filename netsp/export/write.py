@@ -65,14 +65,14 @@ class Settings:
         At bends and at the start, at least 1.
     speed
         m/s; None leaves it to the vehicle.
-    most
+    max_waypoints
         Waypoints.
     """
 
     hold: int = 5
     bend: int = 1
     speed: float | None = 0.5
-    most: int = MOST_ITEMS
+    max_waypoints: int = MOST_ITEMS
 
 
 def export(
@@ -130,12 +130,12 @@ def export(
             raise InputError(
                 f"{name}: expected whole seconds from {least} to 3600, got {seconds!r}"
             )
-    checked_argument("most", settings.most, 1)
+    checked_argument("max_waypoints", settings.max_waypoints, 1)
     points = [start_of(problem, solution), *waypoints_of(problem, solution, acceptance)]
-    if len(points) > settings.most and kind in ("plan", "wpl"):
+    if len(points) > settings.max_waypoints and kind in ("plan", "wpl"):
         raise InputError(
-            f"solution: needs {len(points)} waypoints, and the vehicle takes {settings.most}; "
-            "raise that number if yours takes more"
+            f"solution: needs {len(points)} waypoints, and the vehicle takes "
+            f"{settings.max_waypoints}; raise that number if yours takes more"
         )
     write_text(file, FORMATS[kind](problem, points, projection, settings))
     return points

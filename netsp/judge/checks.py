@@ -70,6 +70,11 @@ class Verification:
     def __bool__(self) -> bool:
         return self.passed
 
+    def __repr__(self) -> str:
+        """In a line."""
+        failed = ", ".join(c.name for c in self.checks if not c.passed)
+        return f"<Verification: {f'fails {failed}' if failed else f'all {len(self.checks)} pass'}>"
+
     def __str__(self) -> str:
         width = max(len(c.name) for c in self.checks)
         return "\n".join(
@@ -174,7 +179,7 @@ class _Judge:
         word = reduce(crossings(tether, self.problem.representative_points))
         if word != reduce(state.signature):
             return Check(name, False, f"the tether there has the word {list(word)}")
-        return Check(name, bool(miss <= self.place), f"misses it by {miss:.3g}")
+        return Check(name, bool(miss <= self.place), self._off(float(miss)))
 
     def _closed(self) -> Check:
         if len(self.path) < 2:
@@ -182,8 +187,11 @@ class _Judge:
         base = self.problem.points[0]
         miss = max(np.linalg.norm(self.path[0] - base), np.linalg.norm(self.path[-1] - base))
         return Check(
-            "starts and ends at the base", bool(miss <= self.place), f"misses it by {miss:.3g}"
+            "starts and ends at the base", bool(miss <= self.place), self._off(float(miss))
         )
+
+    def _off(self, miss: float) -> str:
+        return f"off by {miss:.3g} {self.problem.units}" if miss else "exactly"
 
     def _every_goal(self) -> Check:
         order = [v.goal for v in self.solution.tour]
@@ -250,7 +258,10 @@ class _Judge:
             if line.intersects(shapely.LineString(ends)):
                 one, other = self.problem.obstacle_label(i), self.problem.obstacle_label(j)
                 return Check(name, False, f"passes between {one} and {other}, which touch")
-        return Check(name, True, f"keeps {max(nearest, 0.0):.3g} from the nearest, {where}")
+        if not where:
+            return Check(name, True, "there is none")
+        near = f"{nearest:.3g} {self.problem.units} from" if nearest > self.place else "touches"
+        return Check(name, True, f"{near} {where}, the nearest")
 
     def _room(self, i: int, line: shapely.LineString) -> float:
         """How far the path stays from an obstacle grown by the clearance; negative inside, and of a

@@ -6,16 +6,17 @@ from pathlib import Path
 from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import ConfigDict, Field
 
 from netsp.errors import InputError
-from netsp.fields import STRICT, Name, NonNegative, Point3, Positive
+from netsp.fields import Name, NonNegative, Point3, Positive
 from netsp.files import FileModel, read_text
+from netsp.models import Model
 from netsp.online.scene.field import DistanceField, pushed_out
 from netsp.online.scene.scene import Scene
 
 
-class Camera(BaseModel):
+class Camera(Model):
     """What the robot sees with.
 
     Attributes
@@ -29,8 +30,6 @@ class Camera(BaseModel):
     patch : float
         Metres; pieces of surface that coverage is counted in.
     """
-
-    model_config = STRICT
 
     range: Annotated[Positive, Field(description="farthest that is seen, m")] = 2.0
     field_of_view: Annotated[
@@ -86,7 +85,7 @@ class Mission(FileModel):
 
     file_kind: ClassVar[str] = "mission"
 
-    model_config = ConfigDict(frozen=True, extra="forbid", title="netsp mission")
+    model_config = ConfigDict(title="netsp mission")
 
     schema_version: Annotated[Literal[1], Field(description="of the file format")] = 1
     name: Annotated[Name, Field(description="of the mission")] = "mission"

@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from netsp.errors import counted
 from netsp.execute.log import Execution
 from netsp.pictures import style
-from netsp.problem import Circle
+from netsp.pictures.problem import draw_obstacles
 
 
 def save_execution(done: Execution, file: str | Path) -> None:
@@ -20,10 +21,11 @@ def save_execution(done: Execution, file: str | Path) -> None:
     left, right = figure.subplots(1, 2, width_ratios=[1.0, 1.0])
     draw_map(done, ax=left)
     draw_tether(done, ax=right)
-    s = done.summary
+    s, units = done.summary, done.problem.units
     figure.suptitle(
-        f"{done.problem.name}: {s['visited']} goals in {s['time_s']:.0f} s, path {s['path']:.5g}, "
-        f"tether at most {s['longest_tether']:.5g} of {s['tether_length']:g}"
+        f"{done.problem.name}: {counted(s['visited'], 'goal')} in {s['time_s']:.0f} s, "
+        f"path {s['path']:.5g} {units}, "
+        f"tether at most {s['longest_tether']:.5g} of {s['tether_length']:g} {units}"
     )
     style.save(figure, file, dpi=120)
 
@@ -31,19 +33,13 @@ def save_execution(done: Execution, file: str | Path) -> None:
 def draw_map(done: Execution, *, ax: Any = None) -> Any:
     """Obstacles, plan, path and goals, on axes of the caller or on new ones; returns the axes."""
     from matplotlib.figure import Figure
-    from matplotlib.patches import Circle as Disk
-    from matplotlib.patches import Polygon as Face
 
     problem = done.problem
     if ax is None:
         ax = Figure(figsize=(7, 6), layout="constrained").subplots()
-    for k, o in enumerate(problem.obstacles):
-        look: dict[str, Any] = {"facecolor": style.OBSTACLE, "edgecolor": style.EDGE,
-                "label": "obstacle" if k == 0 else None}  # fmt: skip
-        if isinstance(o, Circle):
-            ax.add_patch(Disk(o.center, o.radius, **look))
-        else:
-            ax.add_patch(Face(o.polygon, **look))
+    draw_obstacles(
+        ax, problem, label=problem.obstacle_name if len(problem.obstacles) <= 40 else None
+    )
     plan = np.array(done.solution.path).reshape(-1, 3)
     path = np.array([[r.x, r.y] for r in done.rows])
     ax.plot(plan[:, 0], plan[:, 1], color=style.PLAN, lw=1.0, ls="--", label="plan")
@@ -60,7 +56,11 @@ def draw_map(done: Execution, *, ax: Any = None) -> Any:
             ax.plot(*np.array(places)[:, :2].T, mark, color=colour, ms=7, mew=1.8, label=name)
     ax.plot(*problem.base[:2], "*", color=style.BASE, mec="white", ms=14, ls="none", label="base")
     ax.set(aspect="equal", xlabel=f"x ({problem.units})", ylabel=f"y ({problem.units})")
-    ax.legend(loc="best", fontsize=8)
+    if len(problem.goals) <= 40:
+        for k, goal in enumerate(problem.goals):
+            ax.annotate(problem.goal_name(k), goal.position[:2], xytext=(6, 5), fontsize=7,
+                        textcoords="offset points", path_effects=style.halo())  # fmt: skip
+    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=6, fontsize=8, frameon=False)
     return ax
 
 
@@ -79,5 +79,5 @@ def draw_tether(done: Execution, *, ax: Any = None) -> Any:
         ax.annotate(f"{e.event}: {e.done}", (e.time, 0), xytext=(3, 4), rotation=90,
                     textcoords="offset points", fontsize=8, color=style.EDGE)  # fmt: skip
     ax.set(xlabel="time (s)", ylabel=f"length ({done.problem.units})", ylim=(0, None))
-    ax.legend(loc="upper right", fontsize=8)
+    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.1), ncols=2, fontsize=8, frameon=False)
     return ax

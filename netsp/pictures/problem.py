@@ -18,6 +18,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
+SMALL = 0.012
+"""Radius of the smallest circle that bears its own name, in units of the map."""
+
+
 def save(problem: Problem, solution: Solution | None, path: str | Path) -> None:
     """Draw a problem, with a solution if given, to a file; InputError if it cannot be written."""
     style.save(draw(problem, solution), path)
@@ -58,7 +62,7 @@ def draw(problem: Problem, solution: Solution | None = None) -> Any:
         if k >= len(stops):
             continue
         stop = stops[k]
-        _obstacles(ax, problem)
+        draw_obstacles(ax, problem)
         tether = paths.tether(stop.goal, stop.signature)
         ax.plot(tether[:, 0], tether[:, 1], color=style.TETHER, lw=1.3)
         ax.plot(*problem.base[:2], marker="*", ms=8, color=style.BASE, mec="none")
@@ -158,7 +162,7 @@ def save_classes(problem: Problem, goal: int, path: str | Path) -> None:
         if k >= len(shown):
             continue
         v = int(shown[k])
-        _obstacles(ax, problem, label=_letter if len(problem.obstacles) <= 20 else None)
+        draw_obstacles(ax, problem, label=_letter if len(problem.obstacles) <= 20 else None)
         tether = roadmap.paths.path(0, goal + 1, roadmap.signatures[v])
         ax.plot(tether[:, 0], tether[:, 1], color=style.TETHER, lw=1.4, zorder=3)
         ax.plot(*problem.base[:2], marker="*", ms=9, color=style.BASE, mec="none", zorder=4)
@@ -207,7 +211,7 @@ def draw_map(
         _, ax = _single(problem)
     wrapped = solution.entangled if solution else ()
     label = problem.obstacle_name if len(problem.obstacles) <= 40 else None
-    _obstacles(ax, problem, label=label, wrapped=wrapped)
+    draw_obstacles(ax, problem, label=label, wrapped=wrapped)
     if problem.bounds is not None:
         xmin, ymin, xmax, ymax = problem.bounds
         ax.plot(
@@ -234,7 +238,7 @@ def draw_map(
         if note and len(problem.goals) <= 40:
             ax.annotate(
                 note, (x, y), xytext=(8, -10), textcoords="offset points", fontsize=6,
-                color=style.EDGE, zorder=6,
+                color=style.EDGE, zorder=6, path_effects=style.halo(),
             )  # fmt: skip
     ax.plot(
         *problem.base[:2], marker="*", ms=17, color=style.BASE, mec="white", zorder=7, ls="none",
@@ -277,10 +281,7 @@ def draw_solution(
 
 def _title(problem: Problem, solution: Solution | None) -> str:
     if solution is None or solution.length is None:
-        return (
-            f"{problem.name}: {len(problem.goals)} goals, {len(problem.obstacles)} obstacles, "
-            f"tether {problem.tether_length:g} {problem.units}"
-        )
+        return f"{problem.name}: {problem.summary}"
     if solution.status is Status.OPTIMAL:
         exact = solution.roadmap == "taut"
         proof = "proven shortest" if exact else f"shortest over its {solution.roadmap} roadmap"
@@ -299,13 +300,24 @@ def _title(problem: Problem, solution: Solution | None) -> str:
     )
 
 
-def _obstacles(
+def draw_obstacles(
     ax: Axes, problem: Problem, *, label: Callable[[int], str] | None = None,
     wrapped: tuple[int, ...] = (),
 ) -> None:  # fmt: skip
+    """Obstacles, and dotted around them the clearance, on axes of the caller.
+
+    Parameters
+    ----------
+    label
+        What is written on obstacle i, or beside it where it is small.
+    wrapped
+        Obstacles that a path is wrapped around.
+    """
     from matplotlib.patches import Circle as Disk
     from matplotlib.patches import Polygon as Patch
 
+    xmin, ymin, xmax, ymax = _view(problem, None)
+    small = SMALL * max(xmax - xmin, ymax - ymin)
     for i, o in enumerate(problem.obstacles):
         look: dict[str, Any] = {"fc": style.OBSTACLE, "ec": style.EDGE, "lw": 0.6, "zorder": 1}
         if i in wrapped:
@@ -324,10 +336,15 @@ def _obstacles(
                 ax.plot(*ring.xy, color=style.EDGE, lw=0.5, ls=":", zorder=1)
             ax.add_patch(Patch(o.polygon, closed=True, **look))
         if label is not None:
-            x, y = o.representative_point
+            inside = not isinstance(o, Circle) or o.radius >= small
+            place: dict[str, Any] = (
+                {"ha": "center", "va": "center"} if inside
+                else {"ha": "right", "va": "bottom", "xytext": (-5, 4),
+                      "textcoords": "offset points"}
+            )  # fmt: skip
             ax.annotate(
-                label(i), (x, y), ha="center", va="center", fontsize=6,
-                color=style.BASE, zorder=2, clip_on=True,
+                label(i), o.representative_point, fontsize=6, color=style.BASE, zorder=6,
+                clip_on=True, path_effects=style.halo(), **place,
             )  # fmt: skip
 
 
@@ -368,8 +385,9 @@ def _view(problem: Problem, solution: Solution | None) -> tuple[float, float, fl
     low, high = points.min(axis=0), points.max(axis=0)
     size = max(float((high - low).max()), 1e-9)
     low, high = low - 0.05 * size, high + 0.05 * size
-    if any(g.name for g in problem.goals):
-        high[0] += 0.06 * size  # their labels stand to the right of the goals
+    longest = max(len(g.name or "") for g in problem.goals)
+    if longest and len(problem.goals) <= 40:  # their labels stand to the right of the goals
+        high[0] += min(0.03 + 0.008 * longest, 0.2) * size
     for axis in range(2):
         lack = 0.25 * size - float((high - low)[axis])
         if lack > 0:

@@ -108,6 +108,7 @@ def draw_space(scene: Scene, path: Floats, nodes: Floats, *, ax: Any = None) -> 
     """Solids, path (k, 3) and tether (n, 3) in space, on 3D axes of the caller or on new ones;
     returns the axes."""
     from matplotlib.figure import Figure
+    from matplotlib.ticker import MaxNLocator
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
     if ax is None:
@@ -122,7 +123,12 @@ def draw_space(scene: Scene, path: Floats, nodes: Floats, *, ax: Any = None) -> 
         ax.plot(*drawn_points(scene).T, ".", ms=0.6, color=style.OBSTACLE)
     draw_lines(ax, path, nodes, (0, 1, 2))
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-    ax.set_box_aspect(high - low)
+    ax.set_box_aspect(high - low, zoom=0.85)  # room for the labels
+    ax.set(xlabel="x (m)", ylabel="y (m)", zlabel="z (m)")
+    ax.tick_params(labelsize=7)
+    widest = float((high - low).max())
+    for axis, size in zip((ax.xaxis, ax.yaxis, ax.zaxis), high - low, strict=True):
+        axis.set_major_locator(MaxNLocator(5 if size > 0.5 * widest else 3))
     return ax
 
 

@@ -6,6 +6,10 @@ helped by shape and line style, so that a print in grey can be read as well.
 
 from __future__ import annotations
 
+import io
+import re
+import warnings
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +40,9 @@ SERIES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#00
 RUNS = (PATH, TETHER)
 """Two runs side by side."""
 
+LONGEST_WORD = 40
+"""Letters of one word that a picture shows."""
+
 FORMATS = (".png", ".svg", ".pdf")
 
 
@@ -63,14 +70,43 @@ def save(figure: Any, path: str | Path, dpi: int = 150) -> None:
     check_format(path)
     try:
         metadata = {"Date": None} if Path(path).suffix.lower() == ".svg" else None
-        literal(figure).savefig(path, dpi=dpi, metadata=metadata)
+        _write(figure, path, dpi=dpi, metadata=metadata)
     except OSError as error:
         raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
 
 
+def halo() -> list[Any]:
+    """A white edge around letters, so that lines may pass beneath them."""
+    from matplotlib.patheffects import withStroke
+
+    return [withStroke(linewidth=2.0, foreground="white")]
+
+
+def svg(figure: Any, **more: Any) -> str:
+    """A matplotlib Figure as the SVG element of a page.
+
+    Parameters
+    ----------
+    more
+        Of Matplotlib's `savefig`.
+    """
+    out = io.StringIO()
+    _write(figure, out, format="svg", metadata={"Date": None}, **more)
+    text = out.getvalue()
+    return text[text.index("<svg") :]
+
+
+def _write(figure: Any, target: Any, **more: Any) -> None:
+    """Save without Matplotlib's remarks on letters that no font has and names that leave no room:
+    the first show as boxes, the second are cut."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message=r"Glyph \d+|constrained_layout not applied")
+        literal(figure).savefig(target, **more)
+
+
 def literal(figure: Any) -> Any:
     """The figure (Matplotlib's), its texts not read as mathematics but for the labels of ticks,
-    which Matplotlib writes itself. To be called right before it is saved."""
+    which Matplotlib writes itself, and cut where they are endless."""
     from matplotlib.text import Text
 
     ticks = set()
@@ -80,6 +116,22 @@ def literal(figure: Any) -> Any:
                 ticks |= {id(tick.label1), id(tick.label2)}
             ticks.add(id(axis.get_offset_text()))
     for text in figure.findobj(match=Text):
-        if id(text) not in ticks:
-            text.set_parse_math(False)
+        if id(text) in ticks:
+            continue
+        text.set_parse_math(False)
+        content = text.get_text()
+        if not content.isascii():
+            text.set_fontfamily(["DejaVu Sans", *_fonts_of_other_scripts()])
+        text.set_text(re.sub(rf"(\S{{{LONGEST_WORD}}})\S+", r"\1…", content))
     return figure
+
+
+@cache
+def _fonts_of_other_scripts() -> tuple[str, ...]:
+    """Of this machine, for letters that Matplotlib's own font lacks."""
+    from matplotlib import font_manager
+
+    there = set(font_manager.get_font_names())
+    wanted = ("Noto Sans CJK JP", "Noto Sans CJK SC", "WenQuanYi Zen Hei", "Droid Sans Fallback",
+              "Noto Sans", "Unifont")  # fmt: skip
+    return tuple(name for name in wanted if name in there)

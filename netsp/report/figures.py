@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Callable
 from typing import Any
 
@@ -88,9 +87,10 @@ def entanglements(cells: dict[Cell, list[TrialRow]]) -> Any | None:
 
 
 def performance(by_method: dict[str, list[TrialRow]]) -> Any | None:
-    """Share of problems proven within a multiple of the fastest time; None if nothing is proven."""
+    """Share of problems proven within a multiple of the fastest time; None with nothing to compare:
+    fewer than two methods that prove anything."""
     ratios = profile(by_method)
-    if not ratios:
+    if len(ratios) < 2:
         return None
     figure, axes = _figure()
     panel = axes[0][0]
@@ -112,6 +112,8 @@ def performance(by_method: dict[str, list[TrialRow]]) -> Any | None:
 
 def anytime(by_method: dict[str, list[TrialRow]], best: dict[str, float]) -> Any | None:
     """Median per cent over the best known against time; None without histories."""
+    from matplotlib.ticker import FixedLocator, NullLocator, StrMethodFormatter
+
     last = max((r.get("total_s", 0.0) for rows in by_method.values() for r in rows), default=0.0)
     at = np.geomspace(1e-3, max(last, 1e-2), 120)
     figure, axes = _figure()
@@ -125,7 +127,10 @@ def anytime(by_method: dict[str, list[TrialRow]], best: dict[str, float]) -> Any
     if not drawn:
         return None
     panel.set(xscale="log", xlabel="seconds", ylabel="median % over the best known")
-    panel.set_yscale("symlog", linthresh=0.1)
+    panel.set_yscale("symlog", linthresh=0.1, linscale=0.5)
+    panel.yaxis.set_major_locator(FixedLocator([0.0, *(10.0**k for k in range(-1, 7))]))
+    panel.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+    panel.yaxis.set_minor_locator(NullLocator())
     panel.set_ylim(bottom=-0.02)
     panel.grid(alpha=0.3)
     if panel.get_legend_handles_labels()[0]:
@@ -137,8 +142,6 @@ def svg(figure: Any) -> str:
     """A figure as inline SVG."""
     from matplotlib import pyplot as plt
 
-    out = io.StringIO()
-    style.literal(figure).savefig(out, format="svg")
+    text = style.svg(figure)
     plt.close(figure)
-    text = out.getvalue()
-    return text[text.index("<svg") :]
+    return text

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.arrays import Floats
-from netsp.errors import InputError
+from netsp.errors import InputError, counted
 from netsp.execute.plan import HOME, legs_of
 from netsp.files import read_text, write_text
 from netsp.geometry import polylines
@@ -86,7 +86,7 @@ def report_tour(source: str | Path, problem_file: str | Path | None, output: str
             f"{source}: tour: no goal #{beyond[0]}; expected #0 to #{len(problem.goals) - 1}"
         )
     drawn = polylines.length(np.array(solution.path))
-    if drawn > 100.0 * (solution.length + problem.scale):
+    if abs(drawn - solution.length) > 0.05 * max(drawn, solution.length):
         raise InputError(
             f"{source}: path: is {drawn:.4g} long; expected about length, {solution.length:.4g}"
         )
@@ -114,7 +114,9 @@ def page(
     rows, tethers
         Of a run, else empty.
     """
-    frames = _frames_of_run(rows, tethers) if tethers else _frames_of_plan(problem, solution)
+    frames = (
+        _frames_of_run(problem, rows, tethers) if tethers else _frames_of_plan(problem, solution)
+    )
     view = _View(problem, np.vstack([f["nodes"] for f in frames]))
     title = f"{problem.name}: {'a run' if run else 'a tour'}"
     parts = [
@@ -131,7 +133,7 @@ def page(
         parts += ["<h2>Checks</h2>", _checks(problem, solution)]
     parts += ["<h2>Measures of entanglement</h2>", _measures(problem, solution)]
     if rows:
-        parts += ["<h2>Log</h2>", _charts(rows), _events(run)]
+        parts += ["<h2>Log</h2>", _charts(rows, problem.units), _events(run)]
     shown = [
         {
             "t": view.points(f["nodes"]), "r": view.point(f["nodes"][-1]),
@@ -202,7 +204,7 @@ def _frames_of_plan(problem: Problem, solution: Solution) -> list[dict[str, Any]
 
 
 def _frames_of_run(
-    rows: list[dict[str, str]], tethers: list[dict[str, Any]]
+    problem: Problem, rows: list[dict[str, str]], tethers: list[dict[str, Any]]
 ) -> list[dict[str, Any]]:
     times = np.array([float(r["time"]) for r in rows])
     path = np.array([[float(r[k]) for k in "xyz"] for r in rows])
@@ -215,8 +217,8 @@ def _frames_of_run(
         row = rows[k]
         thin = max(1, k // 400)
         text = (
-            f"{frame['time']:.4g} s; tether {float(row['tether']):.4g} of {float(row['limit']):g}; "
-            f"next: {'the base' if int(row['goal']) == HOME else 'goal ' + row['goal']}"
+            f"{frame['time']:.4g} s; tether {float(row['tether']):.4g} of {float(row['limit']):g} "
+            f"{problem.units}; next: {_next(problem, int(row['goal']))}"
         )
         frames.append(
             {"nodes": nodes, "path": np.vstack([path[:k:thin], nodes[-1:]]), "text": text}
@@ -224,20 +226,26 @@ def _frames_of_run(
     return frames
 
 
+def _next(problem: Problem, goal: int) -> str:
+    """What a run calls where it is going; goals that were added on the way have their number."""
+    if goal == HOME:
+        return "the base"
+    return problem.goal_label(goal) if goal < len(problem.goals) else f"goal #{goal}"
+
+
 def _summary(problem: Problem, solution: Solution, run: Path | None) -> str:
     units = html.escape(problem.units)
     gap = "" if solution.gap is None else f", at most {100 * solution.gap:.2g} % above the shortest"
     lines = [
-        f"{len(problem.goals)} goals, {len(problem.obstacles)} obstacles, a tether of "
-        f"{problem.tether_length:g} {units}. The plan is {solution.length:.6g} "
+        f"{html.escape(problem.summary)}. The plan is {solution.length:.6g} "
         f"{units} long ({solution.status.value} by {html.escape(solution.solver)}{gap})."
     ]
     if run is not None:
         s = _json(run / "summary.json")
         lines.append(
             f"Carried out in {s['time_s']:.5g} s over {s['path']:.6g} {units}: "
-            f"{s['visited']} goals visited, the tether at most {s['longest_tether']:.5g} long, "
-            f"over the limit for {s['exceedance_s']:.3g} s, "
+            f"{counted(s['visited'], 'goal')} visited, the tether at most "
+            f"{s['longest_tether']:.5g} {units}, over the limit for {s['exceedance_s']:.3g} s, "
             f"{'recovered free' if s['tether_free'] else 'not recovered free'} at the end."
         )
     return "".join(f"<p>{line}</p>" for line in lines)
@@ -333,41 +341,65 @@ def _measures(problem: Problem, solution: Solution) -> str:
     return f"<table>{body}</table>"
 
 
-def _charts(rows: list[dict[str, str]]) -> str:
+def _charts(rows: list[dict[str, str]], units: str) -> str:
     """The tether and its limit over time."""
     t = np.array([float(r["time"]) for r in rows])
     thin = slice(None, None, max(1, len(t) // 1200))
     length, limit = (np.array([float(r[k]) for r in rows]) for k in ("tether", "limit"))
     top = 1.05 * float(max(length.max(), limit.max()))
     span = float(t[-1]) or 1.0
+    units = html.escape(units)
+
+    def x(time: float) -> float:
+        return 50 + 830 * time / span
+
+    def y(value: float) -> float:
+        return 180 - 165 * value / top
 
     def line(values: Floats) -> str:
         return " ".join(
-            f"{50 + 830 * a / span:.1f},{180 - 165 * b / top:.1f}"
-            for a, b in zip(t[thin], values[thin], strict=True)
+            f"{x(a):.1f},{y(b):.1f}" for a, b in zip(t[thin], values[thin], strict=True)
         )
 
+    grid = "".join(
+        f'<line x1="50" y1="{y(v):.1f}" x2="880" y2="{y(v):.1f}" stroke="{style.OBSTACLE}"/>'
+        f'<text x="44" y="{y(v) + 4:.1f}" font-size="12" text-anchor="end">{v:g}</text>'
+        for v in _ticks(top)
+    )
+    times = "".join(
+        f'<text x="{x(v):.1f}" y="198" font-size="12" text-anchor="middle">{v:g}</text>'
+        for v in _ticks(span)
+    )
     return (
-        '<svg class="chart" viewBox="0 0 900 210" role="img" aria-label="tether over time">'
+        f'<svg class="chart" viewBox="0 0 900 222" role="img" aria-label="tether over time">{grid}'
         f'<polyline points="{line(limit)}" fill="none" stroke="{style.LIMIT}" '
         'stroke-dasharray="5 4"/>'
         f'<polyline points="{line(length)}" fill="none" stroke="{style.TETHER}" stroke-width="2"/>'
-        f'<line x1="50" y1="180" x2="880" y2="180" stroke="{style.EDGE}"/>'
-        f'<text x="50" y="198" font-size="12">0</text><text x="845" y="198" font-size="12">'
-        f'{span:.5g} s</text><text x="2" y="20" font-size="12">{top:.4g}</text>'
-        '<text x="2" y="180" font-size="12">0</text></svg>'
+        f'<text x="465" y="216" font-size="12" text-anchor="middle">time (s)</text>{times}'
+        f'<text x="12" y="98" font-size="12" text-anchor="middle" transform="rotate(-90 12 98)">'
+        f"length ({units})</text></svg>"
         '<p class="note">Taut tether (solid) and its limit (dashed).</p>'
     )
+
+
+def _ticks(top: float) -> list[float]:
+    """Round numbers from 0 to at most `top`, four to eight of them."""
+    step = 10.0 ** np.floor(np.log10(top / 4.0))
+    step *= next(k for k in (10.0, 5.0, 2.0, 1.0) if k * step <= top / 3.0)
+    return [float(v) for v in step * np.arange(int(top / step) + 1)]
 
 
 def _events(run: Path | None) -> str:
     events = _table(run / "events.csv") if run else []
     if not events:
         return "<p>Nothing unforeseen happened.</p>"
-    names = ("time", "event", "done", "reason", "planning_s")
-    top = "<tr>" + "".join(f"<th>{n}</th>" for n in names) + "</tr>"
+    columns = {
+        "time": "time (s)", "event": "event", "done": "response", "reason": "reason",
+        "planning_s": "planning (s)",
+    }  # fmt: skip
+    top = "<tr>" + "".join(f"<th>{n}</th>" for n in columns.values()) + "</tr>"
     body = "".join(
-        "<tr>" + "".join(f"<td>{html.escape(e[n])}</td>" for n in names) + "</tr>" for e in events
+        "<tr>" + "".join(f"<td>{html.escape(e[n])}</td>" for n in columns) + "</tr>" for e in events
     )
     return f"<table>{top}{body}</table>"
 

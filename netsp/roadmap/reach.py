@@ -48,9 +48,11 @@ def _enclosure(problem: Problem, g: int) -> str:
     base, goal = (shapely.Point(problem.points[k, :2]) for k in (0, g))
     box = shapely.box(*problem.bounds) if problem.bounds else None
     for sealed, label in ((goal, "it"), (base, "the base")):
-        names = _ring_around(sealed, grown, box, problem)
+        names, bounded = _ring_around(sealed, grown, box, problem)
         if names:
-            return f"{label} is enclosed by obstacles {', '.join(names)}"
+            if bounded:
+                return f"{label} is cut off by the bounds and {_listed(names)}"
+            return f"{label} is enclosed by {_listed(names)}"
     return "the obstacles in between block every path"
 
 
@@ -59,7 +61,8 @@ def _ring_around(
     shapes: list[shapely.Polygon],
     box: shapely.Polygon | None,
     problem: Problem,
-) -> list[str]:
+) -> tuple[list[str], bool]:
+    """Names of the obstacles about the free pocket of a point, and whether bounds help them."""
     import shapely
 
     tolerance = 1e-6 * problem.scale
@@ -68,9 +71,14 @@ def _ring_around(
     free = everything.difference(union)
     pockets = [p for p in getattr(free, "geoms", [free]) if p.distance(point) <= 2 * tolerance]
     if not pockets:
-        return []
+        return [], False
     pocket = min(pockets, key=lambda p: p.area)
     if box is None and pocket.buffer(tolerance).contains(everything.exterior):
-        return []
+        return [], False
     near = [i for i, s in enumerate(shapes) if s.distance(pocket) <= 3 * tolerance]
-    return [problem.obstacle_name(i) for i in near]
+    bounded = box is not None and pocket.distance(box.exterior) <= tolerance
+    return [problem.obstacle_name(i) for i in near], bounded
+
+
+def _listed(names: list[str]) -> str:
+    return f"obstacle{'s' if len(names) > 1 else ''} {', '.join(names)}"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Mapping
+from dataclasses import is_dataclass
 from inspect import Parameter
 from types import MappingProxyType
 from typing import Any
@@ -11,45 +12,77 @@ from typing import Any
 from netsp.errors import InputError
 from netsp.solution import Status
 from netsp.solving.limits import Limits
+from netsp.solving.params import read_params
 from netsp.solving.run import SolverRun
 from netsp.travel.graph import TravelGraph
 from netsp.travel.result import Result
 
+OFFERED = ("params", "limits", "time", "iterations", "rng", "warm_start")
+"""What a solver may ask for by name: its options, the limits, and each field of them."""
+
 VARIADIC = (Parameter.VAR_POSITIONAL, Parameter.VAR_KEYWORD)
+
+
+def read_options(solver: Callable[..., Any], name: str, params: Mapping[str, Any] | None) -> Any:
+    """What a solver gets as `params`: the dataclass that it annotates them with, its values checked
+    as those of our own solvers are, or else the mapping as it is.
+
+    Raises
+    ------
+    InputError
+        Options for a solver that takes none; an argument asked for that there is not; with a
+        dataclass, an option unknown or out of range.
+    """
+    asked = _asked(solver)
+    for k in [*asked][1:]:
+        optional = asked[k].default is not Parameter.empty or asked[k].kind in VARIADIC
+        if k not in OFFERED and not optional:
+            raise InputError(
+                f"solver {name!r}: asks for {k!r}; expected the graph, then {', '.join(OFFERED)}"
+            )
+    if params is not None and not isinstance(params, Mapping):
+        raise InputError(f"solver {name!r}: params: expected names with values, got {params!r}")
+    if params and "params" not in asked:
+        raise InputError(f"solver {name!r}: unknown option {next(iter(params))!r}; it takes none")
+    kind = asked["params"].annotation if "params" in asked else None
+    if isinstance(kind, type) and is_dataclass(kind):
+        return read_params(kind, name, params)
+    return dict(params or {})
+
+
+def _asked(solver: Callable[..., Any]) -> Mapping[str, Parameter]:
+    """What a solver takes, by name; nothing if it is compiled and does not say."""
+    try:
+        asked = inspect.signature(solver, eval_str=True).parameters
+    except NameError:  # annotations that only a type checker sees
+        asked = inspect.signature(solver).parameters
+    except (TypeError, ValueError):
+        return MappingProxyType({})
+    if not asked:
+        raise InputError(f"solver: {solver!r} takes no argument; expected one, the travel graph")
+    return asked
 
 
 def call(
     solver: Callable[..., Any], name: str, graph: TravelGraph, params: Mapping[str, Any] | None,
     limits: Limits,
 ) -> Result:  # fmt: skip
-    """Call a solver with the graph and whatever it asks for by name: `params` (a mapping),
-    `limits`, or a field of `limits` such as `rng`.
+    """Call a solver with the graph and whatever it asks for by name: `params` (a mapping, or the
+    dataclass it is annotated with), `limits`, or a field of `limits` such as `rng`.
 
     It returns a `Result`, or a tour as vertices from 0 on (then no bound is claimed), or None if it
     found none. A tour is checked against the graph, and its length is measured here. A bound cannot
-    be checked: it is taken at its word, but never above the tour's length.
+    be checked: it is taken at its word, but never above the tour's length, and only beside a tour.
 
     Raises
     ------
     InputError
-        Options for a solver that takes none; an argument asked for that there is not; something
-        returned that is neither.
+        As `read_options`; something returned that is neither.
     """
-    fields = {"params": dict(params or {}), "limits": limits}
-    fields |= {k: getattr(limits, k) for k in ("time", "iterations", "rng", "warm_start")}
-    try:
-        asked = inspect.signature(solver).parameters
-    except (TypeError, ValueError):  # compiled, and does not say what it takes
-        asked = MappingProxyType({})
-    for k in [*asked][1:]:
-        optional = asked[k].default is not Parameter.empty or asked[k].kind in VARIADIC
-        if k not in fields and not optional:
-            raise InputError(
-                f"solver {name!r}: asks for {k!r}; expected the graph, then {', '.join(fields)}"
-            )
-    if params and "params" not in asked:
-        raise InputError(f"solver {name!r}: unknown option {next(iter(params))!r}; it takes none")
-    found = solver(graph, **{k: v for k, v in fields.items() if k in asked})
+    fields = {"params": read_options(solver, name, params), "limits": limits}
+    fields |= {k: getattr(limits, k) for k in OFFERED[2:]}
+    asked = _asked(solver)
+    found = solver(graph, **{k: v for k, v in fields.items() if k in [*asked][1:]})
     claimed = found if isinstance(found, Result) else None
     tour = claimed.tour if claimed else found
     run = SolverRun(graph, limits)
@@ -63,7 +96,11 @@ def call(
                 f"solver {name!r}: returned {str(tour)[:80]}; expected vertices from 0 on, one of "
                 "every cluster, or a Result"
             )
-    if claimed is not None and claimed.lower_bound is not None:
+    if claimed is not None and claimed.lower_bound is not None and tour is not None:
         run.raise_bound(claimed.lower_bound)
-    run.infeasible = claimed is not None and claimed.status is Status.INFEASIBLE
+    if claimed is not None and claimed.status is Status.INFEASIBLE:
+        run.start()
+        if run.tour is not None:
+            raise InputError(f"solver {name!r}: calls the graph infeasible, but it has a tour")
+        run.infeasible = True
     return run.finish("done")

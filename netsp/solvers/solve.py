@@ -11,10 +11,10 @@ import numpy as np
 from netsp.clock import Clock, TimeLimit
 from netsp.errors import InputError
 from netsp.problem import Problem
-from netsp.registry import load
+from netsp.registry import foreign, load
 from netsp.solution import Solution, Timings
 from netsp.solvers.answer import to_solution
-from netsp.solvers.custom import call
+from netsp.solvers.custom import call, read_options
 from netsp.solvers.table import ROADMAPS, SOLVERS
 from netsp.solving.limits import Limits
 from netsp.solving.params import NoParams, read_params
@@ -43,6 +43,8 @@ def build_roadmap(problem: Problem, roadmap: str = DEFAULT_ROADMAP, **options: A
         raise InputError(f"problem: expected a Problem, got {problem!r}")
     build = load(ROADMAPS.named(roadmap).build)
     known = {k for k, p in inspect.signature(build).parameters.items() if p.kind == p.KEYWORD_ONLY}
+    if isinstance(options.get("time_limit"), Clock) and "time_limit" not in known:
+        del options["time_limit"]  # of another package, which cannot be hurried
     unknown = sorted(set(options) - known)
     if unknown:
         raise InputError(
@@ -165,7 +167,9 @@ def _run(
         kind = load(record.params) if record.params else NoParams
         run: Callable[..., Result] = load(record.function)
         return run(graph, read_params(kind, solver, params), limits)
-    return call(load(record.function), solver, graph, params, limits)
+    function = load(record.function)
+    with foreign(f"solver {solver!r} failed"):
+        return call(function, solver, graph, params, limits)
 
 
 def name_of(solver: SolverLike) -> str:
@@ -273,10 +277,13 @@ def solve(
 def check_solver(solver: SolverLike, params: Mapping[str, Any] | None) -> None:
     """InputError if there is no such solver, or an option of it is unknown or out of range."""
     if callable(solver):
+        read_options(solver, name_of(solver), params)
         return
     record = SOLVERS.named(solver)
     if record.ours:
         read_params(load(record.params) if record.params else NoParams, solver, params)
+    else:
+        read_options(load(record.function), solver, params)
 
 
 def _check_limits(time_limit: TimeLimit, iteration_limit: int | None) -> None:

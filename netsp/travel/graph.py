@@ -23,7 +23,7 @@ import numpy.typing as npt
 from netsp.arrays import Bools, Floats, Ints
 from netsp.clock import NEVER, Clock, Flag
 from netsp.drawn import Drawn
-from netsp.errors import InputError
+from netsp.errors import InputError, counted
 from netsp.hsignature import Word
 from netsp.travel.costs import CostTable, checked_costs
 from netsp.travel.detours import Detours
@@ -98,7 +98,7 @@ class TravelGraph(Drawn):
     picture: ClassVar[str] = "netsp.pictures.graph:draw_classes"
 
     start: int | None = None
-    start_tether: Floats = np.zeros((0, 3))
+    start_tether: Floats
 
     def __init__(
         self,
@@ -119,6 +119,7 @@ class TravelGraph(Drawn):
         self.classes = classes
         self.least_left_out = least_left_out
         self.legs_s = 0.0
+        self.start_tether = np.zeros((0, 3))
         self.clock: Clock | None = None
         self._legs = legs
         self._costs: Floats | None = None
@@ -163,7 +164,7 @@ class TravelGraph(Drawn):
     def __repr__(self) -> str:
         """In a line."""
         return (
-            f"<TravelGraph: {self.goal_count} goals, {len(self) - 1} classes, "
+            f"<TravelGraph: {counted(self.goal_count, 'goal')}, {len(self) - 1} classes, "
             f"roadmap {self.roadmap}>"
         )
 

@@ -118,6 +118,13 @@ class Result:
     walk: tuple[int, ...] | None = None
     trajectory: Trajectory | None = None
 
+    def __repr__(self) -> str:
+        """In a line."""
+        length = "no tour" if self.length is None else f"length {self.length:.6g}"
+        bound = "" if self.lower_bound is None else f", bound {self.lower_bound:.6g}"
+        visits = "" if self.tour is None else f", {len(self.tour) - 1} visits"
+        return f"<Result: {self.status.value}, {length}{bound}{visits}>"
+
 
 def relative_gap(length: float | None, bound: float | None) -> float | None:
     """(length - bound) / length, at least 0.

@@ -6,16 +6,26 @@ other vertices are (goal, homotopy class); a tour takes one vertex of every clus
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 
-def solve(graph, params, rng):
-    """A tour as vertices from 0 on. params : `shuffle`, a whole number: 1 for a random order."""
+@dataclass(frozen=True)
+class Options:
+    """netsp reads and checks these as it does those of its own solvers."""
+
+    shuffle: int = 0
+    """1 for a random order."""
+
+
+def solve(graph, params: Options, rng):
+    """A tour as vertices from 0 on."""
     nearest = [
         min(graph.members(goal), key=lambda v: graph.tethers[v])
         for goal in range(1, graph.goal_count + 1)
     ]
     order = sorted(nearest, key=lambda v: graph.tethers[v])
-    if int(params.get("shuffle", 0)):
+    if params.shuffle:
         order = list(np.array(order)[rng.permutation(len(order))])
     return [0, *order]

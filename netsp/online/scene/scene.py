@@ -10,12 +10,13 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
 from netsp.arrays import Floats
 from netsp.errors import InputError
-from netsp.fields import STRICT, Name, NonNegative, Number, Positive
+from netsp.fields import Name, NonNegative, Number, Positive
 from netsp.files import FileModel, read_text
+from netsp.models import Model
 from netsp.online.scene.field import DistanceField
 from netsp.online.scene.shapes import (
     Box,
@@ -33,10 +34,9 @@ from netsp.problem import Circle, Problem
 _KINDS = ("sphere", "capsule", "cylinder", "box", "torus", "post", "prism", "half_space")
 
 
-class Solid(BaseModel):
+class Solid(Model):
     """One solid: exactly one of its shapes, and a name."""
 
-    model_config = STRICT
     name: Annotated[Name | None, Field(description="shown in pictures, reports and `inspect`")] = (
         None
     )
@@ -65,7 +65,7 @@ class Solid(BaseModel):
         return next(s for s in shapes if s is not None)
 
 
-class Source(BaseModel):
+class Source(Model):
     """A mesh or cloud in a file beside the scene's.
 
     Attributes
@@ -78,7 +78,6 @@ class Source(BaseModel):
         Metres; size of a voxel, default 1/200 of the longest side.
     """
 
-    model_config = STRICT
     file: Annotated[
         str, Field(description="mesh (STL, OBJ, PLY) or cloud, relative to the scene file")
     ]
@@ -115,7 +114,7 @@ class Scene(FileModel):
 
     file_kind: ClassVar[str] = "scene"
 
-    model_config = ConfigDict(frozen=True, extra="forbid", title="netsp scene")
+    model_config = ConfigDict(title="netsp scene")
 
     schema_version: Annotated[Literal[1], Field(description="of the file format")] = 1
     name: Annotated[Name, Field(description="of the scene")] = "scene"

@@ -7,20 +7,20 @@ from typing import Annotated, Self
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import BaseModel, Field, model_validator
+from pydantic import Field, model_validator
 
 from netsp.arrays import Floats
-from netsp.fields import STRICT, NonNegative, Number, Point2, Point3, Positive
+from netsp.fields import NonNegative, Number, Point2, Point3, Positive
+from netsp.models import Model
 from netsp.online.scene import solids as kinds
 from netsp.problem import Polygon
 
 SolidRow = tuple[int, list[float]]
 
 
-class Sphere(BaseModel):
+class Sphere(Model):
     """A ball."""
 
-    model_config = STRICT
     center: Annotated[Point3, Field(description="(x, y, z), m")]
     radius: Annotated[Positive, Field(description="m")]
 
@@ -37,10 +37,9 @@ class Sphere(BaseModel):
         return _around([self.center], self.radius)
 
 
-class Capsule(BaseModel):
+class Capsule(Model):
     """All points within a radius of a segment: a pipe or a strut with round ends."""
 
-    model_config = STRICT
     a: Annotated[Point3, Field(description="(x, y, z) of one end of its axis, m")]
     b: Annotated[Point3, Field(description="(x, y, z) of the other end, m")]
     radius: Annotated[Positive, Field(description="m")]
@@ -58,10 +57,9 @@ class Capsule(BaseModel):
         return _around([self.a, self.b], self.radius)
 
 
-class Cylinder(BaseModel):
+class Cylinder(Model):
     """A solid cylinder with flat ends: a pipe, a flange."""
 
-    model_config = STRICT
     a: Annotated[Point3, Field(description="(x, y, z) of the centre of one face, m")]
     b: Annotated[Point3, Field(description="(x, y, z) of the centre of the other, m")]
     radius: Annotated[Positive, Field(description="m")]
@@ -94,10 +92,9 @@ class Cylinder(BaseModel):
         return np.array([ends.min(0) - reach, ends.max(0) + reach])
 
 
-class Box(BaseModel):
+class Box(Model):
     """A box of a full size, turned by angles in degrees about x, then y, then z."""
 
-    model_config = STRICT
     center: Annotated[Point3, Field(description="(x, y, z), m")]
     size: Annotated[
         tuple[Positive, Positive, Positive], Field(description="full lengths of its edges, m")
@@ -127,11 +124,10 @@ class Box(BaseModel):
         return np.array([np.array(self.center) - reach, np.array(self.center) + reach])
 
 
-class Torus(BaseModel):
+class Torus(Model):
     """All points within `minor_radius` of an arc of `major_radius` about an axis, that begins in
     the direction `start` and turns by `angle` degrees: a ring, or an elbow of a pipe."""
 
-    model_config = STRICT
     center: Annotated[Point3, Field(description="(x, y, z), m")]
     axis: Annotated[Point3, Field(description="direction (x, y, z), of any length")] = (
         0.0,
@@ -197,10 +193,9 @@ class Torus(BaseModel):
         return _around(self.centreline(), self.minor_radius + 0.002 * self.major_radius)
 
 
-class Post(BaseModel):
+class Post(Model):
     """A vertical cylinder without ends."""
 
-    model_config = STRICT
     center: Annotated[Point2, Field(description="(x, y) of an upright post through all depths, m")]
     radius: Annotated[Positive, Field(description="m")]
 
@@ -217,10 +212,9 @@ class Post(BaseModel):
         return _around([(*self.center, 0.0)], self.radius) * [1.0, 1.0, 0.0]
 
 
-class Prism(BaseModel):
+class Prism(Model):
     """A vertical prism without ends over a simple polygon, grown by `grow`."""
 
-    model_config = STRICT
     polygon: Annotated[
         Annotated[tuple[Point2, ...], Field(min_length=3)],
         Field(description="corners (x, y) of an upright prism through all depths, m"),
@@ -261,10 +255,9 @@ class Prism(BaseModel):
         return _around(flat, self.grow) * [1.0, 1.0, 0.0]
 
 
-class HalfSpace(BaseModel):
+class HalfSpace(Model):
     """Everything behind a plane: a sea floor, a wall."""
 
-    model_config = STRICT
     point: Annotated[Point3, Field(description="(x, y, z) on its face, m")]
     normal: Annotated[Point3, Field(description="direction (x, y, z) out of the solid")] = (
         0.0,
