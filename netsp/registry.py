@@ -145,8 +145,23 @@ def _found(module: str, attribute: str) -> Any:
 
 @contextmanager
 def foreign(what: str) -> Iterator[None]:
-    """Whatever another package's code raises, also an exit, becomes a `PluginError` that begins
-    with these words; errors of netsp, and Ctrl-C, pass."""
+    """Around a call of another package's code: errors of netsp, and Ctrl-C, pass.
+
+    Parameters
+    ----------
+    what : str
+        How messages begin.
+
+    Yields
+    ------
+    None
+        Once, to the call.
+
+    Raises
+    ------
+    PluginError
+        Whatever else was raised, an exit as well; the error itself is the cause.
+    """
     try:
         yield
     except (NetspError, MemoryError):

@@ -208,7 +208,7 @@ def test_execute_writes_its_logs_and_pictures(tmp_path, capsys):
         ["execute", str(problem), str(solution), "--surprise", str(surprises), "-o", str(run)]
     )
     assert code == 0
-    assert "push: local" in capsys.readouterr().err
+    assert re.search(r"push at [\d.]+ s: local", capsys.readouterr().err)
     names = {p.name for p in run.iterdir()}
     assert names >= {"log.csv", "visits.csv", "events.csv", "summary.json", "run.png"}
     with open(run / "visits.csv") as file:

@@ -105,7 +105,7 @@ def test_a_tether_that_is_too_long_already_may_be_at_the_start_only():
     ],
 )
 def test_bad_states_are_named(state, message):
-    with pytest.raises(ValueError, match=message):
+    with pytest.raises(InputError, match=message):
         Problem(**FEW, tether_length=9, state=state)
 
 

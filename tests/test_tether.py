@@ -294,3 +294,21 @@ def test_a_tether_over_a_wreck_stays_taut_where_its_newton_steps_have_no_end(wre
                 rested = model.update(rested, place)
             taut = model.refine(rested).length
             assert -0.001 * taut <= rested.length - taut <= 0.005 * taut
+
+
+def test_a_strand_handed_over_inside_a_cloud_never_grows_without_end(tmp_path):
+    """Out of one sheet is into the other where they cross: nodes were put to and fro between both
+    sides, ever more of them, and a mission about such a structure froze."""
+    u, v = (a.ravel() for a in np.meshgrid(np.linspace(0, 2, 60), np.linspace(0, 2, 60)))
+    sheets = [(u, v, 0 * u), (1 + 0 * u, u, v - 1), (u, 1 + 0 * u, v - 1)]
+    np.savez(tmp_path / "cloud.npz", points=np.vstack([np.column_stack(s) for s in sheets]))
+    field = Scene(cloud={"file": str(tmp_path / "cloud.npz"), "voxel": 0.05}).field().grown(0.2)
+    model = GeodesicTether(field, 0.1)
+    for seed in (2, 3, 14):
+        steps = np.random.default_rng(seed).normal(size=(80, 3)) * 0.12
+        path = np.clip(np.cumsum(np.vstack([[1.6, 1.6, 0.6], steps]), axis=0), -0.6, 2.6)
+        long = np.linalg.norm(np.diff(path, axis=0), axis=1).sum()
+        for rounds in (1, 3, 10):
+            tether = model.relaxed(path, rounds)
+            assert len(tether.strand) <= len(path) + 64 + long / (2 * 0.0125)
+            assert 0.0 <= tether.residual <= tether.length

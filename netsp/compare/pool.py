@@ -19,6 +19,7 @@ from typing import Any
 
 from netsp.compare.rows import LOST, TrialRow
 from netsp.compare.study import Trial
+from netsp.errors import PluginError
 
 GRACE_S = 60.0
 """Seconds beyond its time limit, twice over, after which a trial counts as hung: roadmaps are built
@@ -130,8 +131,10 @@ def _work(pipe: Connection) -> None:
         pipe.send(outcome)
 
 
-def crashed(error: Exception) -> TrialRow:
+def crashed(error: BaseException) -> TrialRow:
     """The outcome of a trial that raised what it should not."""
+    if isinstance(error, PluginError) and error.__cause__ is not None:
+        error = error.__cause__
     at = traceback.extract_tb(error.__traceback__)[-1]
     where = f"{os.path.basename(at.filename)}:{at.lineno}"
     return {"status": "crashed", "message": f"{type(error).__name__}: {error} ({where})"}

@@ -17,6 +17,7 @@ from netsp.errors import (
     LimitReachedError,
     MemoryLimitError,
     NetspError,
+    PluginError,
 )
 from netsp.problem import Goal, Problem
 from netsp.solution import Status
@@ -76,6 +77,8 @@ def run(trial: Trial) -> TrialRow:
         row["message"] = str(error)
     except LimitReachedError as error:  # also: a sampled roadmap that does not reach a goal
         row |= {"status": Status.NO_SOLUTION_FOUND.value, "message": str(error)}
+    except PluginError:
+        raise
     except NetspError as error:
         row["message"] = str(error)
     else:

@@ -150,11 +150,12 @@ def pull(
     to where the strand is shortest; until no node moves by more than `precision`."""
     slip, stride = SLIP * delta, STRIDE * delta
     most, damping, gain = 0.0, 1.0, 1.0
+    room = count + 64 + int(0.5 * strand_length(strand, count) / slip)
     for i in range(count):
         strand[i, STEP] = 0.0  # steps of another position of the ends say nothing about this one
     for _ in range(rounds):
         before = count
-        strand, count = repair(field, strand, count, slip)
+        strand, count = repair(field, strand, count, slip, room)
         changed = count != before
         most = refresh(field, strand, count, spread, flat, stride, delta)
         before = count
@@ -168,22 +169,30 @@ def pull(
         damping = max(0.1, 0.5 * damping) if longer else min(1.0, 1.5 * damping)
         if not changed and most <= precision:
             break
-    strand, count = repair(field, strand, count, slip)
+    strand, count = repair(field, strand, count, slip, room)
     refresh(field, strand, count, spread, flat, stride, 1e30)  # new nodes only
     return strand, count, most
 
 
 @kernel
-def repair(field: Field, strand: Floats, count: int, slip: float) -> tuple[Floats, int]:
+def repair(field: Field, strand: Floats, count: int, slip: float, room: int) -> tuple[Floats, int]:
     """Look again along every edge that may have gone too deep; where it has, its deepest point
-    becomes a node on the surface."""
-    i, budget = 0, 64 + 2 * count
+    becomes a node on the surface.
+
+    Parameters
+    ----------
+    room
+        Most nodes that the strand may have. One for every two slips of its length is more than any
+        surface asks for; a strand that is handed over inside a solid could ask for more in every
+        round.
+    """
+    i, budget = 0, min(64 + 2 * count, room - count)
     while i < count - 1:
         if strand[i, USED] > 1.0:
             low, where = look_along(field, strand, i, slip)
             if low < -slip and budget > 0:
                 mx, my, mz = path_out(field, strand, i, where, slip)
-                if nearer(strand, i, mx, my, mz, 0.1 * slip):
+                if is_there(strand, count, i, mx, my, mz, 0.1 * slip):
                     i += 1  # nothing is gained by a node upon another
                     continue
                 strand, count = insert(strand, count, i + 1, mx, my, mz)
@@ -194,12 +203,18 @@ def repair(field: Field, strand: Floats, count: int, slip: float) -> tuple[Float
 
 
 @kernel
-def nearer(strand: Floats, i: int, x: float, y: float, z: float, reach: float) -> bool:
-    """Whether an end of edge i is nearer to a point than `reach`."""
-    a = (strand[i, X] - x) ** 2 + (strand[i, Y] - y) ** 2 + (strand[i, Z] - z) ** 2
-    j = i + 1
-    b = (strand[j, X] - x) ** 2 + (strand[j, Y] - y) ** 2 + (strand[j, Z] - z) ** 2
-    return bool(min(a, b) < reach * reach)
+def is_there(
+    strand: Floats, count: int, i: int, x: float, y: float, z: float, reach: float
+) -> bool:
+    """Whether a node about edge i is nearer to a point than `reach`. Not only its ends are asked:
+    in the crease between two solids, out of the one is into the other, and nodes would be put to
+    and fro between the same two places without end."""
+    for j in range(max(0, i - 2), min(count, i + 4)):
+        if (strand[j, X] - x) ** 2 + (strand[j, Y] - y) ** 2 + (
+            strand[j, Z] - z
+        ) ** 2 < reach * reach:
+            return True
+    return False
 
 
 @kernel
@@ -306,9 +321,13 @@ def slide(
     if n < 1:
         return 0.0, 1.0
     slope, diagonal, beside = np.zeros(n), np.zeros(n), np.zeros(n)
-    pressing = np.zeros(n)
+    pressing, around = np.zeros(n), np.zeros(n)
     for k in range(count - 1):
         length = gap(strand, k, k + 1)
+        if k > 0:
+            around[k - 1] += length
+        if k < n:
+            around[k] += length
         if length < 1e-12:
             continue
         ux = (strand[k + 1, X] - strand[k, X]) / length
@@ -351,7 +370,8 @@ def slide(
         if k < n - 1:
             right -= beside[k] * slope[k + 1]
         slope[k] = right / diagonal[k]
-        most = max(most, abs(slope[k]))
+        # nothing has farther to go than past its neighbours
+        most = max(most, min(abs(slope[k]), around[k]))
     # e, the way to go, shrinks by gain * s when a step s = c e was taken gain times: c follows from
     # two steps, and the next is taken 1 / c times
     both, last = 0.0, 0.0
@@ -367,6 +387,7 @@ def slide(
     if saved <= WORTH * precision:
         return 0.0, gain
     f = damping * gain
+    was = strand[1 : count - 1, X : Z + 1].copy()
     for k in range(n):
         by = min(max(-f * slope[k], -stride), stride)
         if abs(by) <= 0.1 * precision:
@@ -380,7 +401,28 @@ def slide(
                 field, strand[i, X], strand[i, Y], strand[i, Z], 1e-3 * stride
             )
         moved(strand, count, i, abs(by))
+    put_back(strand, was)
     return max(gain, f) * most, max(f, 1e-3)
+
+
+@kernel
+def put_back(strand: Floats, was: Floats) -> None:
+    """Descent: each contact that now makes the strand longer than it would where it was goes back
+    there. Where solids meet in creases, or contacts are nearer to one another than they step, a
+    Newton step need not shorten anything, and what it folds would be mended by more and more
+    nodes."""
+    for k in range(len(was)):
+        i = k + 1
+        here = gap(strand, i - 1, i) + gap(strand, i, i + 1)
+        there = 0.0
+        for j in (i - 1, i + 1):
+            there += math.sqrt(
+                (strand[j, X] - was[k, 0]) ** 2
+                + (strand[j, Y] - was[k, 1]) ** 2
+                + (strand[j, Z] - was[k, 2]) ** 2
+            )
+        if here > there:
+            strand[i, X], strand[i, Y], strand[i, Z] = was[k, 0], was[k, 1], was[k, 2]
 
 
 @kernel
