@@ -19,7 +19,7 @@ import numpy as np
 from table import head, heading, row
 
 from netsp import Circle, Polygon, Problem, Solution, Status, solve, verify
-from netsp.errors import NetspError
+from netsp.errors import InputError, NetspError
 from netsp.solution import ProblemReference
 
 FEW = {"max_classes": 1000}
@@ -74,7 +74,7 @@ def hostile_world(seed: int) -> Problem | None:
                 angle = np.sort(rng.uniform(0, 2 * np.pi, n))
                 ring = np.column_stack([np.cos(angle), np.sin(angle)]) * rng.uniform(0.02, 0.15)
                 obstacles.append(Polygon(polygon=place(ring + np.array([x, y]))))
-        except ValueError:
+        except InputError:
             continue  # too thin for the format
     clearance = 0.0 if rng.random() < 0.6 else 10.0 ** rng.uniform(-8, -1.5) * scale
     points = place(rng.uniform(0, 1, (1 + int(rng.integers(1, 4)), 2)))
@@ -83,7 +83,7 @@ def hostile_world(seed: int) -> Problem | None:
             base=points[0], goals=points[1:], obstacles=obstacles, clearance=clearance,
             tether_length=rng.uniform(0.9, 1.8) * scale,
         )  # fmt: skip
-    except ValueError:
+    except InputError:
         return None
 
 

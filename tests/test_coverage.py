@@ -81,3 +81,20 @@ def test_dividing_keeps_the_area_and_bounds_the_sides():
 def test_names_of_nothing_are_refused():
     with pytest.raises(InputError, match="inspect: expected names of solids, got 'hull'"):
         cover([BALL], Camera(), inspect=("hull",))
+
+
+def test_a_sheet_is_seen_from_either_side_and_its_patches_lie_on_it(tmp_path):
+    u, v = (a.ravel() for a in np.meshgrid(np.linspace(-1, 1, 50), np.linspace(-1, 1, 50)))
+    np.savez(tmp_path / "sheet.npz", points=np.column_stack([u, 0 * u, v]))
+    scene = Scene(cloud={"file": str(tmp_path / "sheet.npz"), "voxel": 0.05})
+    field = scene.field()
+    patches = patches_of(scene, field, 0.3, np.array([[0.0, -2.0, 0.0]]))
+    inner = np.abs(patches.centres[:, [0, 2]]).max(axis=1) < 0.8
+    assert np.abs(np.abs(patches.centres[inner, 1]) - 0.1).max() < 0.01
+    assert patches.areas.sum() == pytest.approx(2500, rel=0.01)
+    camera = Camera(range=4.0, field_of_view=120.0)
+    for y, yaw in ((-2.0, math.pi / 2), (2.0, -math.pi / 2)):
+        coverage = Coverage(patches, field, camera)
+        coverage.look(np.array([0.0, y, 0.0]), yaw)
+        assert coverage.share > 0.9
+        assert coverage.share <= coverage.share_through <= 1.0 + 1e-9

@@ -205,11 +205,13 @@ def test_a_cloud_on_a_surface_is_solid_within_and_passes_through_its_points():
     assert field.distance([0.0, 0.0, 0.0]) < -0.7
 
 
-def test_a_sheet_of_points_is_solid_a_voxel_to_either_side():
+def test_a_sheet_of_points_is_solid_two_voxels_to_either_side():
     u, v = np.meshgrid(np.linspace(-1, 1, 60), np.linspace(-1, 1, 60))
     grid = of_cloud(np.column_stack([u.ravel(), v.ravel(), 0 * u.ravel()]), voxel=0.05)
     assert any("sheet" in n for n in grid.notes)
-    assert not voxel_field(grid).line_of_sight([0, 0, 1], [0, 0, -1])
+    field = voxel_field(grid)
+    assert not field.line_of_sight([0, 0, 1], [0, 0, -1])
+    assert field.distance([[0, 0, 0.3], [0, 0, -0.3]]) == pytest.approx(0.2, abs=0.01)
 
 
 def test_clouds_and_meshes_are_read_from_files(tmp_path):

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from netsp.arrays import Bools, Floats
+from netsp.arrays import Bools, Floats, Ints
 from netsp.compiled.kernel import kernel
 from netsp.errors import InputError
 from netsp.online.mission import Camera
@@ -35,11 +35,15 @@ class Patches:
         (n, 3), normals outward.
     areas
         (n,).
+    sides
+        (m, 2) patches that are the two sides of one piece of a sheet, which is seen when either is;
+        the second has no area of its own.
     """
 
     centres: Floats
     normals: Floats
     areas: Floats
+    sides: Ints
 
 
 def patches_of(
@@ -63,6 +67,7 @@ def patches_of(
         if name not in named:
             raise InputError(f"inspect: expected names of solids, got {name!r}")
     centres, normals, areas = [np.zeros((0, 3))], [np.zeros((0, 3))], [np.zeros(0)]
+    pairs = np.zeros((0, 2), dtype=np.int64)
     own = [
         (surface_of(s.shape, low, high), Scene(solids=(s,)).field())
         for s in solids
@@ -84,14 +89,34 @@ def patches_of(
             areas.append(0.5 * twice[good])
     if scene.cloud is not None and (inspect is None or "cloud" in inspect):
         points = drawn_points(scene)
-        centres.append(points)
-        normals.append(field.gradient(points))
-        areas.append(np.ones(len(points)))
+        sheet = field.distance(points) < -0.5 * (field.voxel or 0.0)
+        for k, side in enumerate(sides_of(field, points)):
+            chosen = sheet if k else np.ones(len(points), dtype=bool)
+            centres.append(side[chosen])
+            normals.append(field.gradient(side[chosen]))
+            areas.append(np.full(int(chosen.sum()), 1.0 - k))
+        cloud = sum(map(len, centres[:-2])) + np.flatnonzero(sheet)
+        pairs = np.column_stack([cloud, sum(map(len, centres[:-1])) + np.arange(len(cloud))])
     c, n, a = np.vstack(centres), np.vstack(normals), np.concatenate(areas)
     bare = field.distance(c + 0.1 * size * n) > 0.0 if len(c) else np.zeros(0, dtype=bool)
-    if not bare.any():
+    if not a[bare].any():
         raise InputError("inspect: expected a surface to be seen, and there is none")
-    return Patches(c[bare], n[bare], a[bare])
+    place = np.cumsum(bare) - 1
+    return Patches(c[bare], n[bare], a[bare], place[pairs[bare[pairs].all(axis=1)]])
+
+
+def sides_of(field: DistanceField, points: Floats) -> tuple[Floats, Floats]:
+    """Points (n, 3) of a cloud on the surface, and on its other side: those of a sheet lie in its
+    middle."""
+    normals = field.gradient(points)
+    out = []
+    for sign in (1.0, -1.0):
+        # from a little beside the middle, where it is plain which side is nearer
+        side = points + sign * 0.5 * (field.voxel or 0.0) * normals
+        for _ in range(3):
+            side = side - field.distance(side)[:, None] * field.gradient(side)
+        out.append(side)
+    return out[0], out[1]
 
 
 def divided(triangles: Floats, size: float) -> Floats:
@@ -143,6 +168,12 @@ class Coverage:
         )  # fmt: skip
         self.share += open_
         self.share_through += through
+        if len(self.patches.sides):
+            a, b = self.patches.sides.T
+            for seen in (self.seen, self.seen_through):
+                seen[a] = seen[b] = seen[a] | seen[b]
+            self.share = float(self._shares @ self.seen)
+            self.share_through = float(self._shares @ self.seen_through)
 
     def heading(self, eye: Floats, before: float) -> float:
         """The horizontal direction (rad) of the nearest patch; `before` if it is straight above or
