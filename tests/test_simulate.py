@@ -249,3 +249,16 @@ def test_planners_may_believe_the_papers_tether_and_the_log_tells_the_truth():
         simulate(mission(ring(2), 5.0), "predictive", tether="react", scene=POST)
     with pytest.raises(InputError, match="tether: unknown 'rope'; expected one of geodesic, react"):
         simulate(mission(ring(2), 5.0), "react", tether="rope", scene=POST)
+
+
+def test_a_scene_thinner_than_what_holds_a_tether_is_warned_of(tmp_path, capsys):
+    box = {"name": "plate", "box": {"center": [2, 0, 0], "size": [0.05, 1, 1]}}
+    (tmp_path / "scene.json").write_text(json.dumps({"schema_version": 1, "solids": [box]}))
+    for delta, warned in ((0.1, True), (0.02, False)):
+        mission = {
+            "schema_version": 1, "scene": "scene.json", "anchor": [0, 0, 0], "start": [0.5, 0, 0],
+            "waypoints": [[1, 0, 0]], "tether_length": 3, "delta": delta,
+        }  # fmt: skip
+        (tmp_path / "m.json").write_text(json.dumps(mission))
+        assert main(["simulate", str(tmp_path / "m.json"), "-o", str(tmp_path / "run")]) == 0
+        assert ("may slip through; lower the mission's delta" in capsys.readouterr().err) == warned

@@ -40,15 +40,21 @@ def plot_scene(args: argparse.Namespace) -> int:
     return 0
 
 
+def warn_of_thin(model: GeodesicTether, remedy: str) -> None:
+    """Say it when something in the scene is thinner than what holds a tether for certain."""
+    if thin := model.warnings:
+        more = f" (and {len(thin) - 1} more)" if len(thin) > 1 else ""
+        print(
+            f"netsp: {thin[0]}{more}: the tether may slip through; {remedy}",
+            file=sys.stderr,
+        )
+
+
 def lay(field: DistanceField, path: Floats, model: str, delta: float) -> Tether:
     """The tether after a robot has gone a path from its anchor, the first point, on."""
     chosen = make_tether(model, field, delta)
-    if isinstance(chosen, GeodesicTether) and (thin := chosen.warnings):
-        more = f" (and {len(thin) - 1} more)" if len(thin) > 1 else ""
-        print(
-            f"netsp: {thin[0]}{more}: the tether may slip through; take a smaller --delta",
-            file=sys.stderr,
-        )
+    if isinstance(chosen, GeodesicTether):
+        warn_of_thin(chosen, "take a smaller --delta")
     for k in range(len(path) - 1):
         if not field.line_of_sight(path[k], path[k + 1], depth=0.25 * delta):
             raise InputError(

@@ -72,12 +72,13 @@ def arguments(p: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Fly the mission, write what happened, and return the exit code."""
-    from netsp.command.plot_scene import tell
+    from netsp.command.plot_scene import tell, warn_of_thin
     from netsp.files import output_folder
     from netsp.online.log import describe_run, write_run
     from netsp.online.mission import Mission
     from netsp.online.planner import PLANNERS, PlannerOptions
     from netsp.online.simulate import simulate
+    from netsp.online.tether import GeodesicTether
 
     mission = Mission.load(args.mission)
     changes: dict[str, object] = {}
@@ -93,6 +94,8 @@ def run(args: argparse.Namespace) -> int:
     with output_folder(args.output):
         scene = mission.load_scene()
         field = scene.field(on_progress=tell)
+        if not args.quiet:
+            warn_of_thin(GeodesicTether(field, mission.delta), "lower the mission's delta")
         for planner in [args.planner, args.compare] if args.compare else [args.planner]:
             run = simulate(
                 mission, planner, vehicle=args.vehicle, tether=args.tether_model,
