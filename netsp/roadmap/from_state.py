@@ -26,6 +26,7 @@ from netsp.roadmap.paths import TautPaths
 from netsp.roadmap.taut import MAX_CLASSES, TautRoadmap
 from netsp.solution import Status
 from netsp.travel.graph import TravelGraph
+from netsp.travel.kept import within_kept
 from netsp.travel.result import OPTIMALITY_TOLERANCE, OnProgress, Progress, Result
 
 ENOUGH = 10.0 * OPTIMALITY_TOLERANCE
@@ -91,7 +92,7 @@ class GraphFromState(TravelGraph):
         path = dataclasses.replace(
             result, tour=tour, length=length, lower_bound=low, status=status, walk=walk[1:]
         )
-        return self.within_kept(path, self.least_left_out)
+        return within_kept(path, self.least_left_out)
 
     def least_by_way_of(self, tether: float) -> float:
         """No path by way of a class with so long a tether is shorter than the way home from there;

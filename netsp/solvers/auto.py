@@ -26,6 +26,7 @@ from netsp.solvers import exact
 from netsp.solving.limits import Limits
 from netsp.solving.run import SolverRun
 from netsp.travel.graph import TravelGraph, least_tethers
+from netsp.travel.kept import within_kept
 from netsp.travel.result import Progress, Result
 
 PROVABLE = 10_000
@@ -123,4 +124,4 @@ def _over_shortest(graph: TravelGraph, limits: Limits, backend: str) -> Result:
         return found
     whole = replace(found, tour=tuple(int(core[v]) for v in found.tour))
     least = float(graph.tethers[others].min(initial=np.inf))
-    return graph.within_kept(whole, graph.least_by_way_of(least))
+    return within_kept(whole, graph.least_by_way_of(least))

@@ -10,12 +10,11 @@ Solvers see this class and nothing beneath it.
 
 from __future__ import annotations
 
-import dataclasses
 import math
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, ClassVar, Protocol
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -27,6 +26,8 @@ from netsp.errors import InputError, counted
 from netsp.hsignature import Word
 from netsp.travel.costs import CostTable, checked_costs
 from netsp.travel.detours import Detours
+from netsp.travel.kept import within_kept
+from netsp.travel.legs import Legs
 
 if TYPE_CHECKING:
     from netsp.solution import KeptClasses
@@ -36,29 +37,6 @@ if TYPE_CHECKING:
 UNTIMED = 50
 """Legs among so few vertices, or as many single legs as there are among them, are measured whatever
 the time: the length of a tour, say."""
-
-
-class Legs(Protocol):
-    """What a roadmap gives: lengths of legs between vertices, and their paths."""
-
-    def lengths(
-        self, vertices: Ints, asked: Bools | None = None, clock: Clock | None = None
-    ) -> Floats:
-        """(k, k) symmetric leg lengths among the given vertices; inf within a cluster. Where
-        `asked` (k, k, symmetric) is given and false, anything. LimitReachedError when the clock is
-        up before many are measured."""
-
-    def to_base(self) -> Floats:
-        """(V,) lengths of the legs from the base."""
-
-    def lower_bounds(
-        self, vertices: Ints, rows: Ints | None = None, clock: Clock | None = None
-    ) -> Floats:
-        """(k, k) lower bounds on the leg lengths, much cheaper than the lengths; with `rows`, only
-        those from so many of the vertices (positions among them)."""
-
-    def path(self, u: int, v: int) -> Floats:
-        """(n, 3) polyline of the leg from vertex u to vertex v."""
 
 
 class TravelGraph(Drawn):
@@ -501,7 +479,7 @@ class TravelGraph(Drawn):
         Result
             The same, with a bound that holds for the classes that were left out, too.
         """
-        return self.within_kept(result, self.least_by_way_of(self.least_left_out))
+        return within_kept(result, self.least_by_way_of(self.least_left_out))
 
     def least_by_way_of(self, tether: float) -> float:
         """No tour by way of a class with so long a tether is shorter: it goes there and back.
@@ -517,32 +495,6 @@ class TravelGraph(Drawn):
             The bound.
         """
         return 2.0 * tether
-
-    def within_kept(self, result: Result, otherwise: float) -> Result:
-        """A result over the classes kept as one about all classes.
-
-        Parameters
-        ----------
-        result : Result
-            Over the classes kept.
-        otherwise : float
-            No tour that uses a class left out is shorter.
-
-        Returns
-        -------
-        Result
-            The same tour, with the bound and the status that hold for all classes.
-        """
-        from netsp.solution import Status
-        from netsp.travel.result import proven
-
-        bound, length = result.lower_bound, result.length
-        if bound is None or otherwise >= bound:
-            return result
-        status = result.status
-        if status is Status.OPTIMAL and length is not None and not proven(length, otherwise):
-            status = Status.OPTIMAL_OF_KEPT
-        return dataclasses.replace(result, lower_bound=otherwise, status=status)
 
     def progress_listener(self, listener: OnProgress | None) -> OnProgress | None:
         """A listener to a solver's progress that is told what callers are to see.

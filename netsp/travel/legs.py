@@ -1,0 +1,31 @@
+"""What a roadmap gives a travel graph: the lengths of legs, bounds on them, and their paths."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from netsp.arrays import Bools, Floats, Ints
+from netsp.clock import Clock
+
+
+class Legs(Protocol):
+    """What a roadmap gives: lengths of legs between vertices, and their paths."""
+
+    def lengths(
+        self, vertices: Ints, asked: Bools | None = None, clock: Clock | None = None
+    ) -> Floats:
+        """(k, k) symmetric leg lengths among the given vertices; inf within a cluster. Where
+        `asked` (k, k, symmetric) is given and false, anything. LimitReachedError when the clock is
+        up before many are measured."""
+
+    def to_base(self) -> Floats:
+        """(V,) lengths of the legs from the base."""
+
+    def lower_bounds(
+        self, vertices: Ints, rows: Ints | None = None, clock: Clock | None = None
+    ) -> Floats:
+        """(k, k) lower bounds on the leg lengths, much cheaper than the lengths; with `rows`, only
+        those from so many of the vertices (positions among them)."""
+
+    def path(self, u: int, v: int) -> Floats:
+        """(n, 3) polyline of the leg from vertex u to vertex v."""
