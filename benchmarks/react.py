@@ -1,6 +1,6 @@
 """Missions flown with every planner, beside the tables of Amer et al. 2025.
 
-    python benchmarks/react.py [--seeds 10] [--cloud CLOUD --tour TOUR --scale 0.1]
+    python benchmarks/react.py [--seeds 10] [--vehicle NAME] [--cloud CLOUD --tour TOUR --scale 0.1]
 
 Kinematic vehicle once (nothing is random), the BlueROV2 in a current with gusts for every seed.
 """
@@ -128,6 +128,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seeds", type=int, default=10)
     parser.add_argument("--missions", nargs="*", default=["basin", "pipes", "jacket"])
+    parser.add_argument("--vehicle", choices=("kinematic", "bluerov2"), help="only this one")
     parser.add_argument("--cloud", help="point cloud (npz) of a structure")
     parser.add_argument("--tour", help="with --cloud: waypoints (CSV, x,y,z first)")
     parser.add_argument("--scale", type=float, default=0.1)
@@ -135,13 +136,13 @@ def main() -> None:
     heading("Missions")
     missions = [Mission.load(HERE / f"{name}.json") for name in args.missions]
     there = [(m, s, s.field()) for m in missions for s in (m.load_scene(),)]
-    if there:
+    if there and args.vehicle != "bluerov2":
         print("### Kinematic vehicle\n")
         head(*COLUMNS, name="react-shipped")
         for k, (mission, scene, field) in enumerate(there):
             kinematic(mission, scene, field, VARIANTS + (OWN_TETHER if k == 0 else ()))
         print()
-    if there and args.seeds:
+    if there and args.vehicle != "kinematic":
         print(f"### BlueROV2, current {CURRENT}, gusts {GUSTS} m/s (median; worst)\n")
         head(
             "mission", "planner", "seeds", "inspection s", "longest tether m", "over the limit s",

@@ -24,7 +24,8 @@ SMALLEST = 1e-100
 
 def checked_number(value: Any, most: float = LARGEST) -> Any:
     """Numbers only: no strings, no booleans; numpy scalars are welcome."""
-    if isinstance(value, bool | np.bool_) or not isinstance(value, int | float | np.number):
+    real = isinstance(value, int | float | np.integer | np.floating)
+    if isinstance(value, bool | np.bool_ | np.timedelta64) or not real:
         raise ValueError(f"expected a number, got {shown(value)}")
     try:
         number = float(value)
@@ -35,6 +36,13 @@ def checked_number(value: Any, most: float = LARGEST) -> Any:
     if abs(number) > most:
         raise ValueError(f"expected a magnitude of at most {most:g}, got {shown(value)}")
     return number
+
+
+def _integer(value: Any) -> Any:
+    """Whole numbers only: no strings, no booleans, no fractions; of numpy, too."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer):
+        raise ValueError(f"expected a whole number, got {shown(value)}")
+    return int(value)
 
 
 def _size(value: Any) -> Any:
@@ -63,9 +71,14 @@ def checked_instance(name: str, value: object, kind: type) -> None:
         raise InputError(f"{name}: expected a {kind.__name__}, got {shown(value)}")
 
 
+SPACES = dict.fromkeys(map(ord, "\u00a0\u3000\u200c\u200d"), " ")
+"""Spaces and joiners of ordinary names in some scripts, which Python does not call printable."""
+
+
 def _name(value: Any) -> Any:
     """Names are shown in one line."""
-    if isinstance(value, str) and (len(value) > 200 or not value.isprintable()):
+    plain = isinstance(value, str) and value.translate(SPACES).isprintable()
+    if isinstance(value, str) and (len(value) > 200 or not plain):
         raise ValueError(f"expected a name of at most 200 printable characters, got {shown(value)}")
     return value
 
@@ -92,6 +105,9 @@ Number = Annotated[float, BeforeValidator(lambda v: checked_number(v))]
 
 Total = Annotated[float, BeforeValidator(lambda v: checked_number(v, LARGEST_TOTAL))]
 """A sum of lengths."""
+
+
+Integer = Annotated[int, BeforeValidator(_integer)]
 
 
 Positive = Annotated[float, Field(gt=0), BeforeValidator(_size)]

@@ -81,6 +81,8 @@ def parse_json_object(text: str | bytes, source: str) -> dict[str, Any]:
         raise InputError(
             f"{source}: not JSON: {error.msg} at line {error.lineno}, column {error.colno}"
         ) from None
+    except UnicodeDecodeError:
+        raise InputError(f"{source}: not text in UTF-8") from None
     except ValueError:
         raise InputError(
             f"{source}: not JSON that netsp reads: a number has too many digits"
@@ -132,5 +134,8 @@ def _decapitalise(text: str) -> str:
 
 def shown(value: Any) -> str:
     """A value in a message, cut at 60 characters."""
-    text = repr(value)
+    try:
+        text = repr(value)
+    except Exception:  # of somebody else's class, or a number of more digits than Python writes
+        text = f"a {type(value).__name__} that cannot be shown"
     return text if len(text) <= 60 else text[:57] + "…"

@@ -29,6 +29,7 @@ from netsp.drawn import Drawn
 from netsp.errors import counted
 from netsp.fields import (
     POINT3_SCHEMA,
+    Integer,
     Name,
     NonNegative,
     Point2,
@@ -213,7 +214,7 @@ class State(Model):
 
     position: Annotated[Point3, Field(description="(x, y, z) of the robot, in the problem's units")]
     signature: Annotated[
-        tuple[int, ...],
+        tuple[Integer, ...],
         Field(
             description="h-signature of its tether: obstacles numbered from 1 in the "
             "order their rays are crossed, negative from right to left"
@@ -339,7 +340,7 @@ class Problem(Drawn, FileModel):
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         self._check_distinct_goals()
-        self._check_sizes()
+        self.check_sizes()
         self._check_free()
         self._check_state()
         return self
@@ -373,9 +374,15 @@ class Problem(Drawn, FileModel):
                     f"{self._goal_field(first)}; expected distinct goals"
                 )
 
-    def _check_sizes(self) -> None:
-        """No obstacle within reach is so large that tolerances, which go by the largest, would hide
-        the goals, and none so small that they would hide it."""
+    def check_sizes(self) -> None:
+        """Sizes that tolerances, which go by the largest of all, can bear.
+
+        Raises
+        ------
+        ValueError
+            An obstacle within reach is so large that tolerances would hide the goals, or so small
+            that they would hide it.
+        """
         reach = self.tether_length + self.clearance
         away = float(np.abs(self.points - np.array(self.base)).max())
         for i, o in enumerate(self.obstacles):

@@ -164,7 +164,14 @@ def foreign(what: str) -> Iterator[None]:
     """
     try:
         yield
-    except (NetspError, MemoryError):
+    except (NetspError, MemoryError, KeyboardInterrupt):
         raise
-    except (Exception, SystemExit) as error:
-        raise PluginError(f"{what}: {type(error).__name__}: {error}") from error
+    except BaseException as error:
+        raise PluginError(f"{what}: {type(error).__name__}: {_text(error)}") from error
+
+
+def _text(error: BaseException) -> str:
+    try:
+        return str(error)
+    except Exception:
+        return "it cannot be shown"

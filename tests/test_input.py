@@ -19,6 +19,7 @@ from netsp.errors import brief
 from netsp.execute import ExecutionOptions, Surprises, execute
 from netsp.execute.events import changed
 from netsp.export import Projection, export
+from netsp.export.site import read_site
 from netsp.export.write import Settings
 from netsp.files import cell, read_gzip, write_text
 from netsp.online.mission import Mission
@@ -563,3 +564,79 @@ def test_positions_on_the_earth_are_of_the_earth():
     for wrong in ([[91.0, 0.0]], [[0.0, math.inf]], "there"):
         with pytest.raises(InputError, match="latlon: expected"):
             here.to_plane(wrong)
+
+
+@pytest.mark.parametrize("name", ["杭\u3000一", "می\u200cخواهم", "WEA\u00a05", "👩\u200d👩"])
+def test_names_of_every_script_are_welcome(name):
+    assert Circle(center=(0, 0), radius=1, name=name).name == name
+
+
+def test_numbers_too_long_to_write_are_told_in_one_line():
+    many = 10**5000
+    for call in (
+        lambda: Problem(base=(0, 0), goals=[[1, 2]], tether_length=many),
+        lambda: Problem(base=(0, 0), goals=[[1, 2]], tether_length=1, bounds=[many] * 4),
+        lambda: solve(Problem.load(SMALL), seed=many),
+        lambda: solve(Problem.load(SMALL), iteration_limit=many),
+        lambda: solve(Problem.load(SMALL), time_limit=10**400),
+        lambda: Projection(1, 2).to_plane([[10**400, 1]]),
+    ):
+        with pytest.raises(InputError) as caught:
+            call()
+        assert "\n" not in str(caught.value)
+
+
+def test_points_of_three_coordinates_are_no_positions_on_the_earth():
+    here = Projection(55.0, 12.0)
+    for wrong in ([[1, 2, 3], [4, 5, 6]], [[1, 2, 3, 4]], [["1", "2"]], [[True, False]]):
+        with pytest.raises(InputError, match="expected pairs of numbers"):
+            here.to_earth(wrong)
+    assert here.to_earth([]).shape == (0, 2)
+    assert here.to_earth([0.0, 0.0]) == pytest.approx(np.array([[55.0, 12.0]]))
+    with pytest.raises(InputError, match="base: expected"):
+        Projection(55.0, 12.0, base=(0, 0, 0))
+
+
+@pytest.mark.parametrize(
+    "event", [{"add_goal": [1e9, 0]}, {"appear": {"center": [4, 1], "radius": 1e-12}}]
+)
+def test_events_of_absurd_size_are_refused_before_the_run(event):
+    problem = nasty("pile")
+    surprises = Surprises(events=[{"time": 1, **event}])
+    with pytest.raises(InputError, match=r"events\[0\]: (add_goal|appear)"):
+        execute(problem, solve(problem), surprises=surprises)
+
+
+@pytest.mark.parametrize(
+    "line", ["goals = [true]", 'goals = ["3"]', "seeds = [true]", "seeds = [1.0]",
+             "seeds = [1180591620717411303424]", 'memory_limit = "4"'],
+)  # fmt: skip
+def test_studies_take_numbers_only(line, tmp_path, capsys):
+    file, out = tmp_path / "study.toml", tmp_path / "r.jsonl"
+    head = line if "goals" in line else f"goals = [4]\n{line}"
+    file.write_text(f'name = "x"\ntether_lengths = [250]\n{head}\n[[solvers]]\nname = "auto"\n')
+    assert main(["compare", str(file), "-o", str(out), "--quiet"]) == 2
+    assert line.split()[0] in one_line(capsys)
+    assert not out.exists()
+
+
+def test_the_parts_of_a_named_multipolygon_are_numbered(tmp_path):
+    def ring(x):
+        corners = [[x, 55.001], [x + 1e-4, 55.001], [x + 1e-4, 55.0011], [x, 55.0011]]
+        return [[*corners, corners[0]]]
+
+    features = [
+        {"type": "Feature", "properties": {"kind": "base", "tether_length": 500},
+         "geometry": {"type": "Point", "coordinates": [12.0, 55.0]}},
+        {"type": "Feature", "properties": {},
+         "geometry": {"type": "Point", "coordinates": [12.001, 55]}},
+        {"type": "Feature", "properties": {"name": "quay"},
+         "geometry": {"type": "MultiPolygon", "coordinates": [ring(12.0), ring(12.0003)]}},
+    ]  # fmt: skip
+    (tmp_path / "s.geojson").write_text(
+        json.dumps({"type": "FeatureCollection", "features": features})
+    )
+    assert [o.name for o in read_site(tmp_path / "s.geojson", None).obstacles] == [
+        "quay 1",
+        "quay 2",
+    ]

@@ -1,9 +1,12 @@
 """Other people's solvers, tether models and planners: by entry points, and as plain callables."""
 
+import dataclasses
 import json
+import math
 import os
 import subprocess
 import sys
+import typing
 from pathlib import Path
 
 import numpy as np
@@ -225,3 +228,71 @@ def test_a_name_of_ours_cannot_be_taken_and_a_broken_package_costs_one_line(monk
         load(registry["gone"])
     with pytest.raises(InputError, match="solver: unknown 'x'; expected one of auto, gone"):
         registry.named("x")
+
+
+def square():
+    return TravelGraph.from_costs([[0, 1, 5], [1, 0, 2], [5, 2, 0]], clusters=[0, 1, 2])
+
+
+@dataclasses.dataclass
+class Wishes:
+    depth: int
+    share: float = 1
+    fast: bool = False
+    label: typing.Literal["a", "b"] = "a"
+    most: int | None = None
+    names: list[str] = dataclasses.field(default_factory=list)
+
+
+@pytest.mark.parametrize(
+    ("params", "said"),
+    [
+        ({}, "'depth': missing"),
+        ({"depth": 1.5}, "expected a whole number, got 1.5"),
+        ({"depth": 1, "share": "x"}, "expected a number"),
+        ({"depth": 1, "fast": 5}, "expected true or false, got 5"),
+        ({"depth": 1, "label": "z"}, "expected one of a, b"),
+        ({"depth": 1, "dept": 2}, "unknown option 'dept'"),
+    ],
+)
+def test_options_are_checked_by_their_annotations(params, said):
+    def wishful(graph, params: Wishes):
+        return [0, 1, 2]
+
+    with pytest.raises(InputError, match=said):
+        solve_graph(square(), wishful, params=params)
+
+
+def test_options_arrive_as_they_are_annotated():
+    seen = []
+
+    def wishful(graph, params: Wishes | None = None):
+        seen.append(params)
+        return [0, 1, 2]
+
+    given = {"depth": 2**60 + 1, "share": "0.5", "fast": "true", "most": None, "names": ["x"]}
+    solve_graph(square(), wishful, params=given)
+    assert seen == [Wishes(2**60 + 1, 0.5, True, "a", None, ["x"])]
+
+
+@pytest.mark.parametrize(
+    "tour", [[0.5, 1.7, 2.2], "012", b"\x00\x01\x02", [False, True, 2], {0: 1, 1: 2, 2: 3},
+             {0, 1, 2}, np.array([0, 1, 2.9]), [math.inf, 1], [10**5000, 1, 2]],
+)  # fmt: skip
+def test_only_sequences_of_whole_numbers_are_tours(tour):
+    with pytest.raises(InputError, match="expected vertices from 0 on"):
+        solve_graph(square(), lambda graph: tour)
+
+
+def test_a_bound_that_is_no_number_is_refused_and_own_errors_pass():
+    from netsp import Status
+
+    with pytest.raises(InputError, match="lower_bound: expected a number"):
+        solve_graph(square(), lambda g: Result((0, 1, 2), 8.0, "x", Status.OPTIMAL))
+
+    def breaks(graph):
+        yield 0
+        raise ValueError("mine")
+
+    with pytest.raises(ValueError, match="mine"):
+        solve_graph(square(), breaks)

@@ -6,6 +6,7 @@ import argparse
 import json
 import sys
 from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -72,6 +73,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry the tour out, write what happened, and return the exit code."""
+    from netsp.command.compiling import compile_messages
     from netsp.execute.events import Surprises
     from netsp.execute.log import ExecutionOptions, describe_execution
     from netsp.execute.run import execute
@@ -94,7 +96,8 @@ def run(args: argparse.Namespace) -> int:
     )  # fmt: skip
     show = not args.quiet and sys.stderr.isatty()
     on_step = show_execution(problem) if show else None
-    with output_folder(args.output):
+    messages = nullcontext() if args.quiet else compile_messages(sys.stderr)
+    with output_folder(args.output), messages:
         done = execute(problem, solution, options, surprises=surprises, on_step=on_step)
     if show:
         print(file=sys.stderr)

@@ -6,6 +6,7 @@ import argparse
 import json
 import sys
 from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -72,6 +73,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Fly the mission, write what happened, and return the exit code."""
+    from netsp.command.compiling import compile_messages
     from netsp.command.plot_scene import tell, warn_of_thin
     from netsp.files import output_folder
     from netsp.online.log import describe_run, write_run
@@ -91,7 +93,8 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(f"--compare: expected {', '.join(PLANNERS)}, got {args.compare!r}")
     show = not args.quiet and sys.stderr.isatty()
     runs = []
-    with output_folder(args.output):
+    messages = nullcontext() if args.quiet else compile_messages(sys.stderr)
+    with output_folder(args.output), messages:
         scene = mission.load_scene()
         field = scene.field(on_progress=tell)
         if not args.quiet:

@@ -14,15 +14,15 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, ValidationError, model_validator
 
 from netsp.errors import InputError
-from netsp.fields import Name, Positive
+from netsp.fields import Integer, Name, Number, Positive
 from netsp.files import read_text
 from netsp.models import Model, explain
 from netsp.solvers.solve import check_solver
 from netsp.solvers.table import ROADMAPS, SOLVERS
 from netsp.worlds import FAMILIES
 
-Whole = Annotated[int, Field(ge=1, le=100_000)]
-Natural = Annotated[int, Field(ge=0)]
+Whole = Annotated[Integer, Field(ge=1, le=100_000)]
+Natural = Annotated[Integer, Field(ge=0, le=2**62)]
 
 
 MOST_TRIALS = 500_000
@@ -81,7 +81,7 @@ class Solver(Model):
         None
     )
     iteration_limit: Annotated[
-        Annotated[int, Field(ge=1, lt=2**62)] | None,
+        Annotated[Integer, Field(ge=1, lt=2**62)] | None,
         Field(description="of the solver; null for none"),
     ] = None
     options: Annotated[dict[str, Any], Field(description="of the solver, by name")] = Field(
@@ -136,7 +136,7 @@ class Study(Model):
         Positive | None, Field(description="seconds of a trial; null for none")
     ] = 120.0
     memory_limit: Annotated[
-        Annotated[float, Field(gt=0, le=1e6)] | None,
+        Annotated[Number, Field(gt=0, le=1e6)] | None,
         Field(description="GiB of a trial; null for none"),
     ] = None
 

@@ -11,7 +11,7 @@ from netsp.errors import InputError
 from netsp.fields import NonNegative, Point2, Point3, Positive
 from netsp.files import FileModel
 from netsp.models import Model, shown
-from netsp.problem import Circle, GoalLike, Obstacle, Polygon, Problem
+from netsp.problem import WIDEST, Circle, GoalLike, Obstacle, Polygon, Problem
 
 
 def _which(value: Any) -> Any:
@@ -160,6 +160,18 @@ def changed(problem: Problem, event: Event) -> Problem:
         update["tether_length"] = event.tether_length
     update |= {"obstacles": tuple(obstacles), "goals": tuple(goals)}
     out = problem.model_copy(update=update)
+    try:
+        out.check_sizes()
+    except ValueError as error:
+        raise InputError(f"{event.kind}: {error}") from None
+    if event.add_goal is not None:
+        away = float(np.abs(np.array(event.add_goal.position) - np.array(problem.base)).max())
+        most = WIDEST * max(problem.tether_length, problem.scale)
+        if away > most:
+            raise InputError(
+                f"add_goal: is {away:.4g} from the base; expected at most {most:.4g}, "
+                f"{WIDEST:g} times the tether"
+            )
     base = np.array([out.base[:2]])
     for i, o in enumerate(out.obstacles):
         if float(o.signed_distance(base)[0]) < out.clearance - out.tolerance:

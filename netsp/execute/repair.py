@@ -9,6 +9,7 @@ planned anew when that promises to save more time than planning takes.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +18,7 @@ import shapely
 
 from netsp.arrays import Floats
 from netsp.clock import Clock
+from netsp.compiled.tiers import everything_compiled
 from netsp.errors import LimitReachedError, NetspError
 from netsp.execute.plan import HOME, Leg, legs_of
 from netsp.geometry import polylines
@@ -123,6 +125,20 @@ def _in_the_way(problem: Problem, path: Floats) -> int | None:
     return None
 
 
+def made_ready() -> None:
+    """Have everything loaded that a repair needs, and compiled on a machine that never did: it
+    would take its time from planning."""
+    tiny = Problem(
+        base=(0.0, 0.0, 0.0),
+        goals=(Goal(position=(4.0, 0.0, 0.0)), Goal(position=(4.0, 3.0, 0.0))),
+        tether_length=9.0,
+        obstacles=(Circle(center=(2.0, 1.0), radius=0.5), Circle(center=(3.0, 2.0), radius=0.5)),
+    )  # fmt: skip
+    with everything_compiled():
+        repair(tiny, np.array([4.0, 0.0, 0.0]), np.array([[0.0, 0, 0], [4, 0, 0]]), [0, 1], 1.0,
+               "", limit=math.inf)  # fmt: skip
+
+
 def repair(
     problem: Problem, robot: Floats, tether: Floats, left: list[int], speed: float, why: str,
     seed: int = 0, limit: float = REPLAN_S,
@@ -147,6 +163,7 @@ def repair(
     with graph.within.on_clock(clock):
         local = _keeping_order(graph, len(order))
     assert local.length is not None
+    hurried = clock.left <= 0.0
     # with a short time left a new plan has less of it to pay for itself
     replan_s = max(clock.left, 0.0)
     chosen, kind = local, "local"
@@ -159,6 +176,8 @@ def repair(
             reason += f", {found.length:.4g} {problem.units} in a new one"
         else:
             reason += ", a new order would not save enough"
+    elif hurried:
+        reason += ", as far as planning came within its time limit; no new order was tried"
     else:
         reason += f", a new order could save at most {max(saving, 0.0):.1f} s"
     solution = to_solution(rest, graph, chosen, "auto", seed)

@@ -13,7 +13,7 @@ from netsp.execute.aside import aside
 from netsp.execute.events import Event, Surprises, changed, index_of
 from netsp.execute.log import Arrival, Entry, Execution, ExecutionOptions, ExecutionRow
 from netsp.execute.plan import HOME, Leg, legs_of
-from netsp.execute.repair import Repair, broken, reachable, repair
+from netsp.execute.repair import Repair, broken, made_ready, reachable, repair
 from netsp.fields import LARGEST, checked_argument, checked_instance
 from netsp.geometry import polylines
 from netsp.hsignature import signature
@@ -343,6 +343,8 @@ def execute(
             f"delta: expected at most {coarsest:.4g}, or the tether would slip through the "
             f"thinnest obstacle, got {options.delta!r}"
         )
+    if surprises.events and options.repair:
+        made_ready()
     begin = time.perf_counter()
     run = _Run(problem, solution, options)
     coming = sorted(surprises.events, key=lambda e: e.time)

@@ -51,7 +51,10 @@ class Projection:
         self.latitude = checked_argument(f"{name}: latitude", latitude, -90.0, 90.0)
         self.longitude = checked_argument(f"{name}: longitude", longitude, -180.0, 180.0)
         self.heading = checked_argument(f"{name}: heading", heading, -360.0, 360.0)
-        self.base = np.array(base, dtype=float)
+        pair = _pairs("base", base)
+        if len(pair) != 1:
+            raise InputError(f"base: expected (x, y), got {shown(base)}")
+        self.base = pair[0]
 
     @classmethod
     def parse(
@@ -78,6 +81,8 @@ class Projection:
         InputError
             Something else than two or three numbers, or out of range.
         """
+        if not isinstance(text, str):
+            raise InputError(f"{name}: expected lat,lon or lat,lon,heading, got {shown(text)}")
         try:
             numbers = [float(v) for v in text.split(",")]
         except ValueError:
@@ -159,8 +164,14 @@ class Projection:
 def _pairs(name: str, value: npt.ArrayLike) -> Floats:
     """An argument as an array (n, 2) of finite numbers."""
     try:
-        pairs = np.asarray(value, dtype=float).reshape(-1, 2)
-    except (TypeError, ValueError):
+        given = np.asarray(value)
+        pairs = np.atleast_2d(given).astype(float)
+        if (given.dtype.kind not in "iuf" and given.size) or given.ndim not in (1, 2):
+            raise ValueError
+        pairs = pairs.reshape(0, 2) if not given.size else pairs
+        if pairs.shape[1] != 2:
+            raise ValueError
+    except (TypeError, ValueError, OverflowError):
         raise InputError(f"{name}: expected pairs of numbers, got {shown(value)}") from None
     if not np.isfinite(pairs).all():
         raise InputError(f"{name}: expected finite numbers, got {shown(value)}")

@@ -90,11 +90,13 @@ def read_site(
             obstacles.append({"center": place(part["coordinates"])[:2], "radius": r, **label})
             sources["obstacles"].append(k)
         elif part["kind"] == "obstacle":
-            for rings in part["coordinates"]:
+            several = len(part["coordinates"]) > 1 and bool(label)
+            for j, rings in enumerate(part["coordinates"], 1):
                 corners = [place(c)[:2] for c in rings[0]]
                 corners = [c for c, d in zip(corners, [*corners[1:], corners[0]], strict=True)
                            if not np.allclose(c, d, atol=1e-6)]  # fmt: skip
-                obstacles.append({"polygon": corners, **label})
+                own_label = {"name": f"{label['name']} {j}"} if several else label
+                obstacles.append({"polygon": corners, **own_label})
                 sources["obstacles"].append(k)
     for what, things in (("goals", goals), ("obstacles", obstacles)):
         names = [t["name"] for t in things if "name" in t]

@@ -25,7 +25,7 @@ from netsp.online.tether.resolution import suggested_delta
 from netsp.pictures import style
 from netsp.problem import Circle, Problem
 from netsp.report.page import STYLE
-from netsp.solution import Solution
+from netsp.solution import Solution, Status
 
 FRAMES = 240
 WIDTH = 900.0
@@ -124,14 +124,15 @@ def page(
         _summary(problem, solution, run),
         '<h2>Map</h2><p class="note">The dashed line is the tour. Move the slider: the thick line '
         "is the tether, pulled taut round the obstacles as it is when the robot is there.</p>",
-        _map(problem, solution, view),
+        _map(problem, solution, view, _fates(run)),
         '<input id="slider" type="range" min="0" value="0" aria-label="position along the tour">',
         '<p id="state" class="note"></p>',
         "<h2>Goals in their order</h2>", _goals(problem, solution, run),
     ]  # fmt: skip
     if run is None or problem.sha256 == solution.problem.sha256:
         parts += ["<h2>Checks</h2>", _checks(problem, solution)]
-    parts += ["<h2>Measures of entanglement</h2>", _measures(problem, solution)]
+    if problem.state is None and problem.sha256 == solution.problem.sha256:
+        parts += ["<h2>Measures of entanglement</h2>", _measures(problem, solution)]
     if rows:
         parts += ["<h2>Log</h2>", _charts(rows, problem.units), _events(run)]
     shown = [
@@ -235,7 +236,9 @@ def _next(problem: Problem, goal: int) -> str:
 
 def _summary(problem: Problem, solution: Solution, run: Path | None) -> str:
     units = html.escape(problem.units)
-    gap = "" if solution.gap is None else f", at most {100 * solution.gap:.2g} % above the shortest"
+    gap = f", at most {100 * (solution.gap or 0.0):.2g} % above the shortest"
+    if solution.gap is None or solution.status is Status.OPTIMAL:
+        gap = ""
     lines = [
         f"{html.escape(problem.summary)}. The plan is {solution.length:.6g} "
         f"{units} long ({solution.status.value} by {html.escape(solution.solver)}{gap})."
@@ -251,7 +254,16 @@ def _summary(problem: Problem, solution: Solution, run: Path | None) -> str:
     return "".join(f"<p>{line}</p>" for line in lines)
 
 
-def _map(problem: Problem, solution: Solution, view: _View) -> str:
+def _fates(run: Path | None) -> dict[int, str]:
+    """Goals that were not visited, and why not in two words."""
+    if run is None:
+        return {}
+    s = _json(run / "summary.json")
+    left_out = {int(x["goal"]): "left out" for x in s["lost"]}
+    return left_out | {int(g): "cancelled" for g in s["cancelled"]}
+
+
+def _map(problem: Problem, solution: Solution, view: _View, fate: dict[int, str]) -> str:
     shapes = []
     look = f'fill="{style.OBSTACLE}" stroke="{style.EDGE}"'
     for i, o in enumerate(problem.obstacles):
@@ -260,6 +272,10 @@ def _map(problem: Problem, solution: Solution, view: _View) -> str:
             x, y = view.point(o.center)
             shapes.append(f'<circle cx="{x}" cy="{y}" r="{o.radius * view.scale:.2f}" '
                           f'{look}>{title}</circle>')  # fmt: skip
+            if len(problem.obstacles) <= 40:
+                shapes.append(f'<text x="{x}" y="{y + 4}" font-size="10" text-anchor="middle" '
+                              f'fill="{style.EDGE}">{html.escape(problem.obstacle_name(i))}'
+                              "</text>")  # fmt: skip
         else:
             corners = view.points(np.array(o.polygon))
             shapes.append(f'<polygon points="{corners}" {look}>{title}</polygon>')
@@ -271,9 +287,15 @@ def _map(problem: Problem, solution: Solution, view: _View) -> str:
     for k, goal in enumerate(problem.goals):
         x, y = view.point(goal.position)
         label = str(visit.get(k, "–"))
-        shapes.append(f'<circle cx="{x}" cy="{y}" r="5" fill="{style.VISITED}"><title>'
-                      f"{html.escape(problem.goal_label(k))}</title></circle>"
-                      f'<text x="{x + 7}" y="{y - 6}" font-size="12">{label}</text>')  # fmt: skip
+        colour = {"left out": style.LEFT_OUT, "cancelled": style.CANCELLED}.get(
+            fate.get(k, ""), style.VISITED
+        )
+        told = f" {fate[k]}" if k in fate else ""
+        shapes.append(f'<circle cx="{x}" cy="{y}" r="5" fill="{colour}"><title>'
+                      f"{html.escape(problem.goal_label(k))}{told}</title></circle>"
+                      f'<text x="{x + 7}" y="{y - 6}" font-size="12">{label}'
+                      f'<tspan fill="{style.EDGE}"> {html.escape(goal.name or "")}{told}</tspan>'
+                      "</text>")  # fmt: skip
     x, y = view.point(problem.base)
     shapes.append(f'<rect x="{x - 6}" y="{y - 6}" width="12" height="12" fill="{style.BASE}">'
                   "<title>base</title></rect>")  # fmt: skip
@@ -285,14 +307,19 @@ def _map(problem: Problem, solution: Solution, view: _View) -> str:
 def _goals(problem: Problem, solution: Solution, run: Path | None) -> str:
     legs = legs_of(problem, solution) if run is None else None
     arrived = {int(r["goal"]): r for r in _table(run / "visits.csv")} if run else {}
-    head = ["visit", "goal", "tether", "slack", "word"]
-    head += ["leg", "at"] if legs else ["reached at (s)", "tether online"]
+    units = html.escape(problem.units)
+    head = ["visit", "goal", f"tether ({units})", f"slack ({units})", "word"]
+    head += (
+        [f"leg ({units})", f"path so far ({units})"]
+        if legs
+        else ["reached at (s)", f"tether when reached ({units})"]
+    )
     body, total = [], 0.0
     for n, v in enumerate(solution.tour):
         cells = [
             str(n + 1), html.escape(problem.goal_name(v.goal)), f"{v.tether_length:.5g}",
             f"{problem.tether_length - v.tether_length:.5g}",
-            html.escape(" ".join(map(str, v.signature)) or "empty"),
+            str(list(v.signature)),
         ]  # fmt: skip
         if legs:
             total += legs[n].length
@@ -300,7 +327,9 @@ def _goals(problem: Problem, solution: Solution, run: Path | None) -> str:
         else:
             row = arrived.get(v.goal)
             cells += (
-                [f"{float(row['time']):.1f}", f"{float(row['tether']):.5g}"] if row else ["–"] * 2
+                [f"{float(row['time']):.1f}", f"{float(row['tether']):.5g}"]
+                if row
+                else [_fates(run).get(v.goal, "–"), "–"]
             )
         body.append("<tr>" + "".join(f"<td>{c}</td>" for c in cells) + "</tr>")
     top = "<tr>" + "".join(f"<th>{h}</th>" for h in head) + "</tr>"
@@ -318,8 +347,6 @@ def _checks(problem: Problem, solution: Solution) -> str:
 
 
 def _measures(problem: Problem, solution: Solution) -> str:
-    if problem.state is not None or problem.sha256 != solution.problem.sha256:
-        return '<p class="note">Measured for whole tours on the map that they were made for.</p>'
     m = measure(problem, np.array(solution.path))
 
     def names(which: tuple[int, ...] | None) -> str:
@@ -327,7 +354,7 @@ def _measures(problem: Problem, solution: Solution) -> str:
 
     turns = "all zero" if not any(m.winding or ()) else str(m.winding)
     rows = [
-        ("word of the whole tour", " ".join(map(str, m.signature)) or "empty"),
+        ("word of the whole tour", str(list(m.signature)) if m.signature else "empty"),
         ("obstacles wound around", names(m.entangled)),
         ("winding numbers", turns),
         ("crossings of the path with itself", str(m.self_crossings)),
@@ -399,7 +426,11 @@ def _events(run: Path | None) -> str:
     }  # fmt: skip
     top = "<tr>" + "".join(f"<th>{n}</th>" for n in columns.values()) + "</tr>"
     body = "".join(
-        "<tr>" + "".join(f"<td>{html.escape(e[n])}</td>" for n in columns) + "</tr>" for e in events
+        f"<tr><td>{float(e['time']):.1f}</td><td>{html.escape(e['event'])}</td>"
+        f"<td>{html.escape(e['done'])}</td>"
+        f'<td style="text-align:left">{html.escape(e["reason"])}</td>'
+        f"<td>{float(e['planning_s']):.2f}</td></tr>"
+        for e in events
     )
     return f"<table>{top}{body}</table>"
 

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping
+import typing
+from collections.abc import Callable, Iterable, Mapping, Set
+from contextlib import suppress
 from dataclasses import is_dataclass
 from inspect import Parameter
 from types import MappingProxyType
 from typing import Any
 
+import numpy as np
+
 from netsp.errors import InputError
+from netsp.models import shown
 from netsp.solution import Status
 from netsp.solving.limits import Limits
 from netsp.solving.params import read_params
@@ -45,21 +50,36 @@ def read_options(solver: Callable[..., Any], name: str, params: Mapping[str, Any
     if params and "params" not in asked:
         raise InputError(f"solver {name!r}: unknown option {next(iter(params))!r}; it takes none")
     kind = asked["params"].annotation if "params" in asked else None
-    if isinstance(kind, type) and is_dataclass(kind):
+    kinds = [kind, *typing.get_args(kind)]  # as `D | None`
+    kind = next((k for k in kinds if isinstance(k, type) and is_dataclass(k)), None)
+    if kind is not None:
         return read_params(kind, name, params)
     return dict(params or {})
+
+
+def whole_numbers(values: Any) -> tuple[int, ...]:
+    """A sequence of whole numbers as a tuple; empty if it is anything else."""
+    if isinstance(values, str | bytes | Mapping | Set) or not isinstance(values, Iterable):
+        return ()
+    listed = list(values)
+    good = all(isinstance(v, int | np.integer) and not isinstance(v, bool) for v in listed)
+    return tuple(int(v) for v in listed) if good else ()
 
 
 def _asked(solver: Callable[..., Any]) -> Mapping[str, Parameter]:
     """What a solver takes, by name; nothing if it is compiled and does not say."""
     try:
-        asked = inspect.signature(solver, eval_str=True).parameters
-    except NameError:  # annotations that only a type checker sees
         asked = inspect.signature(solver).parameters
     except (TypeError, ValueError):
         return MappingProxyType({})
-    if not asked:
-        raise InputError(f"solver: {solver!r} takes no argument; expected one, the travel graph")
+    with suppress(Exception):  # annotations that only a type checker can read
+        asked = inspect.signature(solver, eval_str=True).parameters
+    first = next(iter(asked.values()), None)
+    if first is None or first.kind in (Parameter.KEYWORD_ONLY, Parameter.VAR_KEYWORD):
+        raise InputError(f"solver: {shown(solver)} takes no argument; expected the travel graph")
+    for k, p in [*asked.items()][1:]:
+        if p.kind is Parameter.POSITIONAL_ONLY:
+            raise InputError(f"solver: {shown(solver)} takes {k!r} by place only; expected by name")
     return asked
 
 
@@ -87,17 +107,17 @@ def call(
     tour = claimed.tour if claimed else found
     run = SolverRun(graph, limits)
     if tour is not None:
-        try:
-            taken = run.update_incumbent([int(v) for v in tour])
-        except (TypeError, ValueError):
-            taken = False
-        if not taken:
+        vertices = whole_numbers(tour)
+        if not vertices or not run.update_incumbent(vertices):
             raise InputError(
-                f"solver {name!r}: returned {str(tour)[:80]}; expected vertices from 0 on, one of "
+                f"solver {name!r}: returned {shown(tour)}; expected vertices from 0 on, one of "
                 "every cluster, or a Result"
             )
     if claimed is not None and claimed.lower_bound is not None and tour is not None:
-        run.raise_bound(claimed.lower_bound)
+        bound = claimed.lower_bound
+        if isinstance(bound, bool) or not isinstance(bound, int | float | np.number):
+            raise InputError(f"solver {name!r}: lower_bound: expected a number, got {shown(bound)}")
+        run.raise_bound(float(bound))
     if claimed is not None and claimed.status is Status.INFEASIBLE:
         run.start()
         if run.tour is not None:

@@ -10,11 +10,12 @@ import numpy as np
 
 from netsp.clock import Clock, TimeLimit
 from netsp.errors import InputError
+from netsp.models import shown
 from netsp.problem import Problem
 from netsp.registry import foreign, load
 from netsp.solution import Solution, Timings
 from netsp.solvers.answer import to_solution
-from netsp.solvers.custom import call, read_options
+from netsp.solvers.custom import call, read_options, whole_numbers
 from netsp.solvers.table import ROADMAPS, SOLVERS
 from netsp.solving.limits import Limits
 from netsp.solving.params import NoParams, read_params
@@ -25,6 +26,9 @@ SolverLike = str | Callable[..., Any]
 """A solver's name, or a callable that takes a travel graph (`netsp.solvers.custom`)."""
 
 LARGEST_SEED = 2**62
+
+LONGEST_S = 1e9
+"""Of a time limit; some thirty years."""
 
 SPARE = 0.4
 """Of a time limit, what is kept for drawing the tour when a roadmap was cut short; a second at
@@ -41,7 +45,14 @@ def build_roadmap(problem: Problem, roadmap: str = DEFAULT_ROADMAP, **options: A
     """
     if not isinstance(problem, Problem):
         raise InputError(f"problem: expected a Problem, got {problem!r}")
-    build = load(ROADMAPS.named(roadmap).build)
+    record = ROADMAPS.named(roadmap)
+    if not record.build.startswith("netsp."):
+        with foreign(f"roadmap {roadmap!r} failed"):
+            return _built(problem, roadmap, load(record.build), options)
+    return _built(problem, roadmap, load(record.build), options)
+
+
+def _built(problem: Problem, roadmap: str, build: Any, options: dict[str, Any]) -> Any:
     known = {k for k, p in inspect.signature(build).parameters.items() if p.kind == p.KEYWORD_ONLY}
     if isinstance(options.get("time_limit"), Clock) and "time_limit" not in known:
         del options["time_limit"]  # of another package, which cannot be hurried
@@ -86,7 +97,14 @@ def travel_graph(problem: Problem, roadmap: str = DEFAULT_ROADMAP, **options: An
         from netsp.roadmap.from_state import graph_from_state
 
         return graph_from_state(problem, **options)
-    graph: TravelGraph = build_roadmap(problem, roadmap, **options).travel_graph()
+    built = build_roadmap(problem, roadmap, **options)
+    if ROADMAPS.named(roadmap).build.startswith("netsp."):
+        graph: TravelGraph = built.travel_graph()
+        return graph
+    with foreign(f"roadmap {roadmap!r} failed"):
+        graph = built.travel_graph()
+    if not isinstance(graph, TravelGraph):
+        raise InputError(f"roadmap {roadmap!r}: expected a TravelGraph from it, got {shown(graph)}")
     return graph
 
 
@@ -283,37 +301,37 @@ def check_solver(solver: SolverLike, params: Mapping[str, Any] | None) -> None:
     if record.ours:
         read_params(load(record.params) if record.params else NoParams, solver, params)
     else:
-        read_options(load(record.function), solver, params)
+        function = load(record.function)
+        with foreign(f"solver {solver!r} failed"):
+            read_options(function, solver, params)
 
 
 def _check_limits(time_limit: TimeLimit, iteration_limit: int | None) -> None:
     if time_limit is not None and not isinstance(time_limit, Clock):
         number = isinstance(time_limit, (int, float, np.number)) and time_limit is not True
-        if not (number and time_limit > 0):
+        if not (number and (0 < time_limit <= LONGEST_S or time_limit == np.inf)):
             raise InputError(
-                f"time_limit: expected a positive number of seconds, got {time_limit!r}"
+                f"time_limit: expected a positive number of seconds, got {shown(time_limit)}"
             )
     if iteration_limit is not None:
         whole = isinstance(iteration_limit, (int, np.integer)) and iteration_limit is not True
         if not (whole and 1 <= iteration_limit < 2**62):
             raise InputError(
-                f"iteration_limit: expected a whole number from 1 on, got {iteration_limit!r}"
+                f"iteration_limit: expected a whole number from 1 on, got {shown(iteration_limit)}"
             )
 
 
 def _seed(seed: int) -> int:
     whole = isinstance(seed, (int, np.integer)) and seed is not True
     if not (whole and 0 <= seed <= LARGEST_SEED):
-        raise InputError(f"seed: expected a whole number from 0 to {LARGEST_SEED}, got {seed!r}")
+        raise InputError(
+            f"seed: expected a whole number from 0 to {LARGEST_SEED}, got {shown(seed)}"
+        )
     return int(seed)
 
 
 def _as_tour(vertices: Sequence[int], graph: TravelGraph) -> tuple[int, ...]:
-    try:
-        given = np.asarray(list(vertices) if not isinstance(vertices, str) else None)
-        tour = tuple(int(v) for v in given) if given.dtype.kind in "iu" else ()
-    except (TypeError, ValueError):
-        tour = ()
+    tour = whole_numbers(vertices)
     if not tour or not graph.is_tour(tour):
         raise InputError(
             "warm_start: expected vertices from 0 on, one of every cluster, got "
