@@ -340,7 +340,8 @@ class Problem(Drawn, FileModel):
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         self._check_distinct_goals()
-        self.check_sizes()
+        if complaint := self.size_complaint():
+            raise ValueError(complaint)
         self._check_free()
         self._check_state()
         return self
@@ -374,21 +375,21 @@ class Problem(Drawn, FileModel):
                     f"{self._goal_field(first)}; expected distinct goals"
                 )
 
-    def check_sizes(self) -> None:
-        """Sizes that tolerances, which go by the largest of all, can bear.
+    def size_complaint(self) -> str | None:
+        """What is wrong with the sizes of obstacles within reach, if anything: tolerances, which go
+        by the largest of all, would hide the goals beside one too large, or hide one too small.
 
-        Raises
-        ------
-        ValueError
-            An obstacle within reach is so large that tolerances would hide the goals, or so small
-            that they would hide it.
+        Returns
+        -------
+        str or None
+            The complaint; None if there is none.
         """
         reach = self.tether_length + self.clearance
         away = float(np.abs(self.points - np.array(self.base)).max())
         for i, o in enumerate(self.obstacles):
             near, far = self._span(o)
             if near <= reach and far > WIDEST * max(away, 1e-3 * reach):
-                raise ValueError(
+                return (
                     f"{self._obstacle_field(i)}: reaches {far:.6g} from the base, and no goal is "
                     f"farther than {away:.6g}; expected at most {WIDEST:g} times as far"
                 )
@@ -397,10 +398,11 @@ class Problem(Drawn, FileModel):
             near, _ = self._span(o)
             width = 2.0 * self.clearance + _width(o)
             if near <= reach and width < least:
-                raise ValueError(
+                return (
                     f"{self._obstacle_field(i)}: is {width:.3g} wide, too little for a problem of "
                     f"size {self.scale:.6g}; expected at least {least:.3g}"
                 )
+        return None
 
     def _check_free(self) -> None:
         """Base and goals lie within the bounds and outside of every grown obstacle."""

@@ -160,10 +160,8 @@ def changed(problem: Problem, event: Event) -> Problem:
         update["tether_length"] = event.tether_length
     update |= {"obstacles": tuple(obstacles), "goals": tuple(goals)}
     out = problem.model_copy(update=update)
-    try:
-        out.check_sizes()
-    except ValueError as error:
-        raise InputError(f"{event.kind}: {error}") from None
+    if complaint := out.size_complaint():
+        raise InputError(f"{event.kind}: {complaint}")
     if event.add_goal is not None:
         away = float(np.abs(np.array(event.add_goal.position) - np.array(problem.base)).max())
         most = WIDEST * max(problem.tether_length, problem.scale)

@@ -87,10 +87,10 @@ def entanglements(cells: dict[Cell, list[TrialRow]]) -> Any | None:
 
 
 def performance(by_method: dict[str, list[TrialRow]]) -> Any | None:
-    """Share of problems proven within a multiple of the fastest time; None with nothing to compare:
-    fewer than two methods that prove anything."""
+    """Share of problems proven within a multiple of the fastest time; None if nothing is
+    proven, or there is only one method."""
     ratios = profile(by_method)
-    if len(ratios) < 2:
+    if not ratios or len(by_method) < 2:
         return None
     figure, axes = _figure()
     panel = axes[0][0]
