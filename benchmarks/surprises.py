@@ -185,9 +185,10 @@ def faults(done: Execution) -> list[str]:
         out.append("not as planned")
     last = max((e.time for e in done.entries), default=0.0)
     xy = np.array([[r.x, r.y] for r in done.rows if r.time > last]).reshape(-1, 2)
+    allowed = 0.25 * suggested_delta(problem)
     for i, o in enumerate(problem.obstacles):
         depth = problem.clearance - float(np.min(o.signed_distance(xy), initial=np.inf))
-        if depth > 0.25 * suggested_delta(problem):
+        if depth > allowed:
             out.append(f"in obstacle {i} by {depth:.3g}")
     named = {a.goal for a in done.arrivals} | set(done.lost) | done.cancelled | {-1}
     if len(named) != len(problem.goals) + 1:

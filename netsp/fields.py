@@ -38,7 +38,7 @@ def checked_number(value: Any, most: float = LARGEST) -> Any:
     return number
 
 
-def _integer(value: Any) -> Any:
+def checked_integer(value: Any) -> int:
     """Whole numbers only: no strings, no booleans, no fractions; of numpy, too."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer):
         raise ValueError(f"expected a whole number, got {shown(value)}")
@@ -99,6 +99,9 @@ def _point3(value: Any, most: float = LARGEST) -> tuple[float, ...]:
 
 Name = Annotated[str, BeforeValidator(_name)]
 
+# Validators of two parameters stand behind a lambda: pydantic would hand its own information about
+# the field to the second.
+
 
 Number = Annotated[float, BeforeValidator(lambda v: checked_number(v))]
 
@@ -107,7 +110,7 @@ Total = Annotated[float, BeforeValidator(lambda v: checked_number(v, LARGEST_TOT
 """A sum of lengths."""
 
 
-Integer = Annotated[int, BeforeValidator(_integer)]
+Integer = Annotated[int, BeforeValidator(checked_integer)]
 
 
 Positive = Annotated[float, Field(gt=0), BeforeValidator(_size)]

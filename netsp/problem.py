@@ -427,7 +427,7 @@ class Problem(Drawn, FileModel):
                 f"(by {self.clearance - distances[i, k]:.6g}); expected a point in free space"
             )
 
-    @property
+    @cached_property
     def scale(self) -> float:
         """Size of the problem, the unit of every tolerance: the largest coordinate difference from
         the base to any goal and any obstacle within the tether's reach. Geometry is computed

@@ -217,3 +217,15 @@ def test_signed_distance_of_a_polygon_is_the_distance_to_its_outline():
     points = [(1, 1), (0.5, 1), (3, 1), (3, 3), (1, -2), (0, 0)]
     expected = [-1, -0.5, 1, math.sqrt(2), 2, 0]
     assert square.signed_distance(points) == pytest.approx(expected)
+
+
+@given(x=st.floats(0.5, 100.0), y=st.floats(-100.0, 100.0))
+def test_a_copy_with_other_values_keeps_nothing_that_was_computed_of_the_old(x, y):
+    old = Problem(base=(0, 0), goals=[(4, 0)], tether_length=300.0)
+    moved = {"obstacles": (Circle(center=(x + 3.0, y), radius=0.5),)}
+    assert old.scale == 4.0
+    goals = (old.goals[0].model_copy(update={"position": (1.0, 0.0, 0.0)}),)
+    copy = old.model_copy(update=moved | {"goals": goals})
+    fresh = Problem(base=(0, 0), goals=[(1, 0)], tether_length=300.0, obstacles=moved["obstacles"])
+    assert copy == fresh
+    assert copy.scale == fresh.scale

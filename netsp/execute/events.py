@@ -8,18 +8,21 @@ import numpy as np
 from pydantic import BeforeValidator, ConfigDict, Field, model_validator
 
 from netsp.errors import InputError
-from netsp.fields import NonNegative, Point2, Point3, Positive
+from netsp.fields import NonNegative, Point2, Point3, Positive, checked_integer
 from netsp.files import FileModel
 from netsp.models import Model, shown
 from netsp.problem import WIDEST, Circle, GoalLike, Obstacle, Polygon, Problem
 
 
 def _which(value: Any) -> Any:
-    whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
     if isinstance(value, str):
         return value
-    if whole and 0 <= value < 2**31:
-        return int(value)
+    try:
+        index = checked_integer(value)
+    except ValueError:
+        index = -1
+    if 0 <= index < 2**31:
+        return index
     raise ValueError(f"expected a name or an index from 0 on, got {shown(value)}")
 
 
@@ -168,7 +171,7 @@ def changed(problem: Problem, event: Event) -> Problem:
         if away > most:
             raise InputError(
                 f"add_goal: is {away:.4g} from the base; expected at most {most:.4g}, "
-                f"{WIDEST:g} times the tether"
+                f"{WIDEST:g} times the size of the problem"
             )
     base = np.array([out.base[:2]])
     for i, o in enumerate(out.obstacles):

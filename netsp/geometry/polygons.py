@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -59,6 +61,25 @@ def polygon_signed_distance(vertices: Vertices, xy: npt.ArrayLike) -> npt.NDArra
     x = a[:, 0] + (p[..., None, 1] - a[:, 1]) / dy * edge[:, 0]
     inside = (up & (p[..., None, 0] < x)).sum(axis=-1) % 2 == 1
     return np.asarray(np.where(inside, -distance, distance))
+
+
+@functools.lru_cache(maxsize=4096)
+def polygon_thickness(vertices: tuple[tuple[float, float], ...]) -> float:
+    """Width of the thinnest part of a simple polygon, to a millionth of its size. Kept, because a
+    scene is made anew whenever one of its obstacles changes."""
+    import shapely
+
+    shape = shapely.Polygon(vertices)
+    low, high = 0.0, math.sqrt(shape.area)
+    for _ in range(20):
+        # an opening that keeps corners loses area only where the polygon is thin
+        t = 0.5 * (low + high)
+        opened = shape.buffer(-t / 2, join_style="mitre").buffer(t / 2, join_style="mitre")
+        if shape.difference(opened).area < 1e-6 * shape.area:
+            low = t
+        else:
+            high = t
+    return low
 
 
 def polygon_interior_point(vertices: Vertices) -> tuple[float, float]:

@@ -119,15 +119,16 @@ def page(
     )
     view = _View(problem, np.vstack([f["nodes"] for f in frames]))
     title = f"{problem.name}: {'a run' if run else 'a tour'}"
+    fates = _fates(run)
     parts = [
         f"<h1>{html.escape(title)}</h1>",
         _summary(problem, solution, run),
         '<h2>Map</h2><p class="note">The dashed line is the tour. Move the slider: the thick line '
         "is the tether, pulled taut round the obstacles as it is when the robot is there.</p>",
-        _map(problem, solution, view, _fates(run)),
+        _map(problem, solution, view, fates),
         '<input id="slider" type="range" min="0" value="0" aria-label="position along the tour">',
         '<p id="state" class="note"></p>',
-        "<h2>Goals in their order</h2>", _goals(problem, solution, run),
+        "<h2>Goals in their order</h2>", _goals(problem, solution, run, fates),
     ]  # fmt: skip
     if run is None or problem.sha256 == solution.problem.sha256:
         parts += ["<h2>Checks</h2>", _checks(problem, solution)]
@@ -263,7 +264,7 @@ def _fates(run: Path | None) -> dict[int, str]:
     return left_out | {int(g): "cancelled" for g in s["cancelled"]}
 
 
-def _map(problem: Problem, solution: Solution, view: _View, fate: dict[int, str]) -> str:
+def _map(problem: Problem, solution: Solution, view: _View, fates: dict[int, str]) -> str:
     shapes = []
     look = f'fill="{style.OBSTACLE}" stroke="{style.EDGE}"'
     for i, o in enumerate(problem.obstacles):
@@ -288,9 +289,9 @@ def _map(problem: Problem, solution: Solution, view: _View, fate: dict[int, str]
         x, y = view.point(goal.position)
         label = str(visit.get(k, "–"))
         colour = {"left out": style.LEFT_OUT, "cancelled": style.CANCELLED}.get(
-            fate.get(k, ""), style.VISITED
+            fates.get(k, ""), style.VISITED
         )
-        told = f" {fate[k]}" if k in fate else ""
+        told = f" {fates[k]}" if k in fates else ""
         shapes.append(f'<circle cx="{x}" cy="{y}" r="5" fill="{colour}"><title>'
                       f"{html.escape(problem.goal_label(k))}{told}</title></circle>"
                       f'<text x="{x + 7}" y="{y - 6}" font-size="12">{label}'
@@ -304,7 +305,7 @@ def _map(problem: Problem, solution: Solution, view: _View, fate: dict[int, str]
             f'aria-label="map">{"".join(shapes)}</svg>')  # fmt: skip
 
 
-def _goals(problem: Problem, solution: Solution, run: Path | None) -> str:
+def _goals(problem: Problem, solution: Solution, run: Path | None, fates: dict[int, str]) -> str:
     legs = legs_of(problem, solution) if run is None else None
     arrived = {int(r["goal"]): r for r in _table(run / "visits.csv")} if run else {}
     units = html.escape(problem.units)
@@ -329,7 +330,7 @@ def _goals(problem: Problem, solution: Solution, run: Path | None) -> str:
             cells += (
                 [f"{float(row['time']):.1f}", f"{float(row['tether']):.5g}"]
                 if row
-                else [_fates(run).get(v.goal, "–"), "–"]
+                else [fates.get(v.goal, "–"), "–"]
             )
         body.append("<tr>" + "".join(f"<td>{c}</td>" for c in cells) + "</tr>")
     top = "<tr>" + "".join(f"<th>{h}</th>" for h in head) + "</tr>"

@@ -46,10 +46,10 @@ def build_roadmap(problem: Problem, roadmap: str = DEFAULT_ROADMAP, **options: A
     if not isinstance(problem, Problem):
         raise InputError(f"problem: expected a Problem, got {problem!r}")
     record = ROADMAPS.named(roadmap)
-    if not record.build.startswith("netsp."):
-        with foreign(f"roadmap {roadmap!r} failed"):
-            return _built(problem, roadmap, load(record.build), options)
-    return _built(problem, roadmap, load(record.build), options)
+    if record.ours:
+        return _built(problem, roadmap, load(record.build), options)
+    with foreign(f"roadmap {roadmap!r} failed"):
+        return _built(problem, roadmap, load(record.build), options)
 
 
 def _built(problem: Problem, roadmap: str, build: Any, options: dict[str, Any]) -> Any:
@@ -98,7 +98,7 @@ def travel_graph(problem: Problem, roadmap: str = DEFAULT_ROADMAP, **options: An
 
         return graph_from_state(problem, **options)
     built = build_roadmap(problem, roadmap, **options)
-    if ROADMAPS.named(roadmap).build.startswith("netsp."):
+    if ROADMAPS.named(roadmap).ours:
         graph: TravelGraph = built.travel_graph()
         return graph
     with foreign(f"roadmap {roadmap!r} failed"):

@@ -56,6 +56,11 @@ class RoadmapKind:
     build: str
     seeded: bool = False
 
+    @property
+    def ours(self) -> bool:
+        """Whether what it raises is a defect of ours."""
+        return self.build.startswith("netsp.")
+
 
 SOLVERS: Registry[Solver] = Registry(
     "solver",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import MISSING, dataclass, fields
 from types import UnionType
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
@@ -77,25 +78,16 @@ def _typed(what: str, value: Any, kind: Any) -> Any:
 
 
 def _whole(what: str, value: Any) -> int:
-    try:
-        if isinstance(value, str):
-            number = float(value)
-            return (
-                int(value)
-                if number.is_integer() and value.strip("+-").isdigit()
-                else int(_integral(number))
-            )
-        if isinstance(value, int | np.integer):
-            return int(value)
-        return int(_integral(float(value)))
-    except (TypeError, ValueError, OverflowError):
-        raise InputError(f"{what}: expected a whole number, got {shown(value)}") from None
-
-
-def _integral(number: float) -> float:
-    if not number.is_integer():
-        raise ValueError
-    return number
+    """A whole number, also as text or as a float (``1e4``)."""
+    if isinstance(value, int | np.integer):
+        return int(value)
+    if isinstance(value, str):
+        with suppress(ValueError):
+            return int(value)  # not by way of a float, which has but 53 bits
+    with suppress(TypeError, ValueError, OverflowError):
+        if float(value).is_integer():
+            return int(float(value))
+    raise InputError(f"{what}: expected a whole number, got {shown(value)}")
 
 
 @dataclass(frozen=True)

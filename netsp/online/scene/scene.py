@@ -210,6 +210,21 @@ class Scene(FileModel):
         more = _standing(Problem.load(self.problem)) if self.problem is not None else ()
         return (*self.solids, *more)
 
+    def thickness(self) -> list[tuple[str, float]]:
+        """How thick each solid is where it is thinnest, without mesh and cloud.
+
+        Returns
+        -------
+        list of (str, float)
+            Name and metres of each solid; inf where nothing of it is thin.
+
+        Raises
+        ------
+        InputError
+            The problem file cannot be read.
+        """
+        return _thickness(self.all_solids())
+
     def field(
         self,
         *,
@@ -259,17 +274,13 @@ class Scene(FileModel):
                 on_progress=on_progress,
             )
         boxes = [b for s in solids if (b := s.shape.box()) is not None]
-        names = [s.name or f"solids[{k}]" for k, s in enumerate(solids)]
-        thickness = [s.shape.thickness() for s in solids]
         return DistanceField.build(
-            kind,
-            rows,
-            outline,
-            boxes,
-            grid,
-            self.tether_radius,
-            list(zip(names, thickness, strict=True)),
+            kind, rows, outline, boxes, grid, self.tether_radius, _thickness(solids)
         )
+
+
+def _thickness(solids: tuple[Solid, ...]) -> list[tuple[str, float]]:
+    return [(s.name or f"solids[{k}]", s.shape.thickness()) for k, s in enumerate(solids)]
 
 
 def _standing(problem: Problem) -> tuple[Solid, ...]:

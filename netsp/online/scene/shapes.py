@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 
 from netsp.arrays import Floats
 from netsp.fields import NonNegative, Number, Point2, Point3, Positive
+from netsp.geometry.polygons import polygon_thickness
 from netsp.models import Model
 from netsp.online.scene import solids as kinds
 from netsp.problem import Polygon
@@ -234,19 +235,7 @@ class Prism(Model):
 
     def thickness(self) -> float:
         """Of its thinnest part (m); inf if nothing of it is thin."""
-        import shapely
-
-        shape = shapely.Polygon(self.polygon)
-        low, high = 0.0, math.sqrt(shape.area)
-        for _ in range(20):
-            # an opening that keeps corners loses area only where the polygon is thin
-            t = 0.5 * (low + high)
-            opened = shape.buffer(-t / 2, join_style="mitre").buffer(t / 2, join_style="mitre")
-            if shape.difference(opened).area < 1e-6 * shape.area:
-                low = t
-            else:
-                high = t
-        return low + 2.0 * self.grow
+        return polygon_thickness(self.polygon) + 2.0 * self.grow
 
     def box(self) -> Floats:
         """(2, 3) least and greatest coordinates (m); 0 and 0 where it has no end."""

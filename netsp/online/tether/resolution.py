@@ -18,8 +18,8 @@ def suggested_delta(problem: Problem) -> float:
 
 def coarsest_delta(problem: Problem) -> float:
     """The coarsest resolution at which a tether passes through no obstacle."""
-    thickness = [t for _, t in scene_of(problem).field().thickness]
-    return float(min([problem.tether_length / 20.0, *(t / THINNEST for t in thickness)]))
+    thickness = scene_of(problem).thickness()
+    return float(min([problem.tether_length / 20.0, *(t / THINNEST for _, t in thickness)]))
 
 
 THINNEST = 1.8
