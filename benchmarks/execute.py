@@ -37,14 +37,14 @@ def surprise(problem: Problem, solution: Solution, seed: int) -> Surprises:
 
 
 def good(done: Execution) -> bool:
-    """Never over the limit, every stop in the planned class, home and free, nothing forgotten."""
+    """Never over the limit, every visit in the planned class, home and free, nothing forgotten."""
     s = done.summary
     return (
         s["exceedance_s"] == 0.0
         and s["as_planned"] == len(done.arrivals)
         and s["home"]
         and s["tether_free"]
-        and s["visited"] + len(s["lost"]) == len(done.problem.goals)
+        and s["visited"] + len(s["left_out"]) == len(done.problem.goals)
     )
 
 
@@ -58,7 +58,7 @@ def table(name: str, runs: list[Execution]) -> None:
         f"{sum(d.summary['as_planned'] == len(d.arrivals) for d in runs)}",
         f"{sum(d.summary['tether_free'] and d.summary['home'] for d in runs)}",
         f"{np.median(over):.3f}; {max(over):.3f}",
-        f"{sum(len(d.lost) for d in runs)}",
+        f"{sum(len(d.left_out) for d in runs)}",
         ", ".join(f"{kinds.count(k)} {k}" for k in sorted(set(kinds))),
         f"{np.median(planning):.2f}; {max(planning):.2f}" if planning else "",
     )  # fmt: skip
@@ -82,7 +82,7 @@ def orders() -> None:
             s = run.summary
             row(
                 name, label, f"{s['inspection_s']:.1f}", f"{s['total_s']['tether']:.1f}",
-                f"{s['longest_tether_m']:.2f}", f"{s['exceedance_s']:.1f}",
+                f"{s['longest_tether']:.2f}", f"{s['exceedance_s']:.1f}",
                 f"{100 * (1 - s['total_s']['tether'] / given):.1f}",
             )  # fmt: skip
     print()
@@ -119,7 +119,7 @@ def main() -> None:
     for done in [*plain, *surprised]:
         if not good(done):
             print(f"- {done.problem.name}: {done.summary}")
-    reasons = [why.split(" (")[0] for d in surprised for why in d.lost.values()]
+    reasons = [why.split(" (")[0] for d in surprised for why in d.left_out.values()]
     for why in sorted(set(reasons)):
         print(f"- left out {reasons.count(why)} times: {why}")
 

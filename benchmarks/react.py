@@ -65,7 +65,7 @@ def kinematic(mission: Mission, scene: Scene, field, variants) -> None:
         row(
             f"{mission.name}, {mission.tether_length:g} m", name, f"{s['inspection_s']:.1f}",
             *(f"{s['recovery_s'][k]:.0f}" for k in ("tether", "path")),
-            *(f"{s['total_s'][k]:.0f}" for k in ("tether", "path")), f"{s['longest_tether_m']:.2f}",
+            *(f"{s['total_s'][k]:.0f}" for k in ("tether", "path")), f"{s['longest_tether']:.2f}",
             f"{s['exceedance_s']:.1f}", f"{s['visited']} of {s['waypoints']}",
             f"{100 * s['coverage']:.1f}", f"{100 * s['coverage_through']:.1f}",
             f"{1e3 * s['replan_median_s']:.1f}", f"{1e3 * s['replan_worst_s']:.0f}",
@@ -90,7 +90,7 @@ def dynamic(mission: Mission, scene: Scene, field, seeds: int) -> None:
         row(
             mission.name, planner, len(rows),
             f"{np.median(of('inspection_s')):.1f}; {of('inspection_s').max():.1f}",
-            f"{of('longest_tether_m').max():.2f}",
+            f"{of('longest_tether').max():.2f}",
             f"{np.median(of('exceedance_s')):.1f}; {of('exceedance_s').max():.1f}",
             f"{of('visited').min()} of {len(mission.waypoints)}",
             f"{1e3 * of('replan_worst_s').max():.0f}",

@@ -4,8 +4,8 @@
 
 Worlds: circles, polygons (`harbour`), and every file of `problems/`. A run is good when the robot
 is home with its tether free, was never in an obstacle, never on a tether that was too long (but
-while it shortens one whose limit was lowered), visited every goal that is not lost, and lost
-exactly those that a judge of its own calls unreachable: a visibility graph of Shapely's, which
+while it shortens one whose limit was lowered), visited every goal that is not left out, and left
+out exactly those that a judge of its own calls unreachable: a visibility graph of Shapely's, which
 knows nothing of netsp's roadmap. Goals within three per mille of the tether are left to either.
 """
 
@@ -190,15 +190,15 @@ def faults(done: Execution) -> list[str]:
         depth = problem.clearance - float(np.min(o.signed_distance(xy), initial=np.inf))
         if depth > allowed:
             out.append(f"in obstacle {i} by {depth:.3g}")
-    named = {a.goal for a in done.arrivals} | set(done.lost) | done.cancelled | {-1}
+    named = {a.goal for a in done.arrivals} | set(done.left_out) | done.cancelled | {-1}
     if len(named) != len(problem.goals) + 1:
         out.append("a goal forgotten")
-    if done.lost:
+    if done.left_out:
         needs, limit = shortest(problem), problem.tether_length
         tolerance = 3e-3 * limit
-        for goal, why in done.lost.items():
+        for goal, why in done.left_out.items():
             if needs[goal] < limit - tolerance:
-                out.append(f"lost goal {goal} ({why}), {needs[goal]:.6g} of {limit:g} away")
+                out.append(f"left out goal {goal} ({why}), {needs[goal]:.6g} of {limit:g} away")
     return out
 
 
@@ -221,7 +221,7 @@ def main() -> None:
     parser.add_argument("--kind", choices=KINDS)
     args = parser.parse_args()
     heading("Surprises")
-    head("kind", "runs", "good", "goals visited", "goals lost", "local", "replan", "home",
+    head("kind", "runs", "good", "goals visited", "goals left out", "local", "replan", "home",
          "kept", "planning s (median; worst)",
          name=None if args.kind else "surprises")  # fmt: skip
     kinds = [args.kind] if args.kind else list(KINDS)
@@ -238,7 +238,7 @@ def main() -> None:
         spent = [e.planning_s for e in entries if e.planning_s] or [0.0]
         row(
             kind, len(runs), sum(not f for _, f in runs),
-            sum(d.summary["visited"] for d, _ in runs), sum(len(d.lost) for d, _ in runs),
+            sum(d.summary["visited"] for d, _ in runs), sum(len(d.left_out) for d, _ in runs),
             *(sum(e.done == done for e in entries) for done in ("local", "replan", "home", "kept")),
             f"{np.median(spent):.2f}; {max(spent):.2f}",
         )  # fmt: skip

@@ -242,7 +242,7 @@ def tour(field: DistanceField, file: str, scale: float) -> None:
         differs = (
             ""
             if before is None
-            else f"{100 * (np.abs(lengths / before - 1) > 0.01).mean():.0f} % of the way"
+            else f"{100 * (np.abs(lengths / before - 1) > 0.01).mean():.0f} % of the path"
         )
         before = np.maximum(lengths, 1e-9)
         row(delta, f"{tether.length:.3f}", f"{lengths.max():.3f}", f"{back:.3f}",

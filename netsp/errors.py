@@ -8,7 +8,7 @@ EXIT_DEFECT, EXIT_BAD_INPUT, EXIT_INFEASIBLE = 1, 2, 3
 """A defect of ours (whatever moved is safely home); input that cannot be used; no solution."""
 
 EXIT_NOT_ALL, EXIT_NOT_VERIFIED, EXIT_INTERRUPTED = 4, 5, 130
-"""No tour, or goals left out; a check that failed, or a tether too long or not free; Ctrl-C."""
+"""No tour, or goals left out; a failed check, or a tether over the limit or not free; Ctrl-C."""
 
 LONGEST_QUOTE = 80
 """Characters of a quoted value that a message shows."""

@@ -63,9 +63,14 @@ def read_model(model: type[M], text: str | bytes, source: str) -> M:
         raise InputError(f"{source}: {explain(error)}") from None
 
 
+def kind_of(data: Mapping[str, Any]) -> str | None:
+    """What a file plainly is, by its fields."""
+    return next((k for k, marks in MARKS.items() if marks <= data.keys()), None)
+
+
 def _check_kind(model: type[BaseModel], data: dict[str, Any], source: str) -> None:
     """InputError when a file is plainly of another kind than was asked for."""
-    kind = next((k for k, marks in MARKS.items() if marks <= data.keys()), None)
+    kind = kind_of(data)
     own = next((k for k, marks in MARKS.items() if marks <= model.model_fields.keys()), None)
     if kind and own and kind != own:
         raise InputError(f"{source}: this is a {kind}; expected a {own}")

@@ -42,7 +42,7 @@ class ProblemReference(Model):
 
 
 class Visit(Model):
-    """One stop of the tour: the goal (0-based), the word of the tether there, its taut length."""
+    """One visit of the tour: the goal (0-based), the word of the tether there, its taut length."""
 
     goal: Annotated[
         Annotated[int, Field(ge=0)], Field(description="index in the problem's goals, from 0")

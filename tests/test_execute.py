@@ -45,7 +45,7 @@ def check(run, goals):
     assert s["home"]
     assert s["tether_free"]
     assert all(a.as_planned for a in run.arrivals)
-    assert s["visited"] + len(s["lost"]) + len(run.cancelled) == goals
+    assert s["visited"] + len(s["left_out"]) + len(run.cancelled) == goals
     for a in run.arrivals:
         if a.goal != HOME:
             assert a.tether == pytest.approx(a.planned_tether, rel=2e-3)
@@ -131,9 +131,9 @@ def test_a_shorter_tether_loses_what_is_too_far_and_says_so(world):
     far = max(solution.tour, key=lambda v: v.tether_length).goal
     run = execute(problem, solution, FAST, surprises=events({"time": 1.0, "tether_length": limit}))
     check(run, 8)
-    if run.lost:
-        assert set(run.lost) == {far}
-        assert "out of reach" in run.lost[far]
+    if run.left_out:
+        assert set(run.left_out) == {far}
+        assert "out of reach" in run.left_out[far]
 
 
 def test_what_vanishes_sets_the_tether_free(world):
@@ -149,7 +149,7 @@ def test_a_goal_under_an_obstacle_is_left_out_with_the_reason(world):
     on = {"center": list(problem.goals[goal].position[:2]), "radius": 5.0}
     run = execute(problem, solution, FAST, surprises=events({"time": 1.0, "appear": on}))
     check(run, 8)
-    assert "stands on it" in run.lost[goal]
+    assert "stands on it" in run.left_out[goal]
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -269,7 +269,7 @@ def test_events_near_the_end_of_a_leg_take_no_time_from_it(when):
         problem, solve(problem), FAST, surprises=events({"time": when, "appear": AWAY})
     )  # fmt: skip
     check(run, 1)
-    assert not run.lost
+    assert not run.left_out
 
 
 @pytest.mark.parametrize("centre", [(20.0, 0.0), (20.0, 0.5), (18.0, -3.0), (24.0, 1.0)])
@@ -309,19 +309,19 @@ def test_without_repair_nothing_is_mended_and_nothing_forgotten():
     )
     assert run.summary["visited"] == 2
     assert not run.cancelled
-    assert "not repaired" in run.lost[2]
+    assert "not repaired" in run.left_out[2]
     wall = {"time": 1.0, "appear": {"polygon": [[10, -40], [12, -40], [12, 40], [10, 40]]}}
     run = execute(
         CORNER, solve(CORNER), ExecutionOptions(speed=1.0, repair=False), surprises=events(wall)
     )
-    assert set(run.lost) == {0, 1}
+    assert set(run.left_out) == {0, 1}
     assert {e.done for e in run.entries} == {"ignored"}
 
 
 def test_events_after_the_end_are_said_to_be():
     what = {"time": 1e6, "add_goal": [5, 5]}
     run = execute(CORNER, solve(CORNER), FAST, surprises=events(what))
-    assert "after the end" in run.lost[2]
+    assert "after the end" in run.left_out[2]
     assert run.entries[-1].done == "ignored"
 
 
@@ -388,7 +388,7 @@ def test_goals_come_back_when_the_tether_gets_longer(world):
     what = [{"time": 5.0, "tether_length": 60.0}, {"time": 8.0, "tether_length": 300.0}]
     run = execute(problem, solution, FAST, surprises=events(*what))
     check(run, 8)
-    assert not run.lost
+    assert not run.left_out
     assert run.summary["visited"] == 8
 
 
@@ -398,4 +398,4 @@ def test_a_tether_far_longer_than_its_new_limit_still_comes_home(world):
     assert run.summary["defects"] == 0
     assert run.summary["home"]
     assert run.summary["tether_free"]
-    assert all("out of reach" in why for why in run.lost.values())
+    assert all("out of reach" in why for why in run.left_out.values())

@@ -87,7 +87,7 @@ def test_a_tether_model_and_a_planner_of_another_package_fly(installed, tmp_path
     summary = json.loads((tmp_path / "run" / "summary.json").read_text())
     assert summary["planner"] == "cautious"
     assert 0 < summary["visited"] < summary["waypoints"]
-    assert "cautious" in summary["skipped"][0]["reason"]
+    assert "cautious" in summary["left_out"][0]["reason"]
 
 
 def test_a_plain_function_solves(tmp_path):

@@ -43,7 +43,7 @@ def ring(turns, radius=1.2, steps=16):
 
 def test_without_a_planner_the_tether_winds_up():
     run = fly("none", ring(3), 5.0)
-    assert run.summary["longest_tether_m"] > 8.0
+    assert run.summary["longest_tether"] > 8.0
     assert run.summary["exceedance_s"] > 10.0
 
 
@@ -52,7 +52,7 @@ def test_the_predictive_planner_visits_all_and_never_exceeds_the_tether(length):
     """Three turns about a post, whose far side is 3.4 m of tether away."""
     run = fly("predictive", ring(3), length)
     assert run.summary["visited"] == run.summary["waypoints"]
-    assert run.summary["longest_tether_m"] <= length
+    assert run.summary["longest_tether"] <= length
     assert run.summary["exceedance_s"] == 0.0
     places = np.array([[r.x, r.y, r.z] for r in run.log])
     assert POST.field().distance(places).min() > 0.15  # clearance, but for its corners
@@ -61,7 +61,7 @@ def test_the_predictive_planner_visits_all_and_never_exceeds_the_tether(length):
 def test_what_the_tether_cannot_reach_is_left_out_with_the_reason():
     run = fly("predictive", [(-2, 1.0, 0), (3.5, 0, 0), (-1, 1, 0)], 4.0)
     assert run.summary["visited"] == 2
-    (left,) = run.summary["skipped"]
+    (left,) = run.summary["left_out"]
     assert left["waypoint"] == 1
     assert "5.6" in left["reason"]
     assert run.summary["exceedance_s"] == 0.0
@@ -71,7 +71,7 @@ def test_the_papers_planner_exceeds_the_tether_before_it_turns():
     run = fly("react", ring(3), 5.0)
     assert run.summary["visited"] == run.summary["waypoints"]
     assert 0.0 < run.summary["exceedance_s"] < 20.0
-    assert run.summary["longest_tether_m"] < 5.3
+    assert run.summary["longest_tether"] < 5.3
 
 
 @pytest.mark.parametrize("planner", PLANNERS)
@@ -95,7 +95,7 @@ def test_no_waypoints_make_the_predictive_planner_exceed(waypoints, length):
     moved = pushed_out(field, np.array(waypoints), 0.25)
     run = fly("predictive", [tuple(map(float, p)) for p in moved], length)
     assert run.summary["exceedance_s"] == 0.0
-    assert run.summary["visited"] + len(run.summary["skipped"]) == len(waypoints)
+    assert run.summary["visited"] + len(run.summary["left_out"]) == len(waypoints)
 
 
 def test_the_basin_mission_is_flown_whole():
@@ -149,7 +149,7 @@ def test_simulate_writes_log_summary_and_picture(tmp_path, capsys):
         rows = list(csv.DictReader(file))
     assert summary["exceedance_s"] == 0.0
     assert max(float(r["tether"]) for r in rows) == pytest.approx(
-        summary["longest_tether_m"], abs=1e-4
+        summary["longest_tether"], abs=1e-4
     )
     assert (out / "run.png").stat().st_size > 10_000
     assert capsys.readouterr().err == ""
@@ -192,7 +192,7 @@ def test_a_planner_that_fails_holds_says_so_and_goes_on(monkeypatch):
     run = fly("none", [(-2, 1, 0), (-2, 1.5, 0), (-2, 2, 0)], 9.0)
     assert [r.mode for r in run.log].count("hold") >= 10
     assert run.summary["visited"] == 2
-    assert "ZeroDivisionError: of all things" in run.summary["skipped"][0]["reason"]
+    assert "ZeroDivisionError: of all things" in run.summary["left_out"][0]["reason"]
     assert run.summary["defects"] >= 10
 
 
@@ -244,7 +244,7 @@ def test_planners_may_believe_the_papers_tether_and_the_log_tells_the_truth():
     run = simulate(mission(ring(2), 5.0), "react", tether="react", scene=POST)
     own = simulate(mission(ring(2), 5.0), "react", scene=POST)
     assert run.summary["visited"] == own.summary["visited"]
-    assert run.summary["longest_tether_m"] < 6.0
+    assert run.summary["longest_tether"] < 6.0
     with pytest.raises(InputError, match="planner 'predictive' needs geodesic, got 'react'"):
         simulate(mission(ring(2), 5.0), "predictive", tether="react", scene=POST)
     with pytest.raises(InputError, match="tether: unknown 'rope'; expected one of geodesic, react"):

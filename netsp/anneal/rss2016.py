@@ -1,6 +1,6 @@
 """`anneal-2016`: simulated annealing over free paths, priced by what they entangle.
 
-McCammon & Hollinger 2016, section III. A state is an order of the goals and a way for each leg:
+McCammon & Hollinger 2016, section III. A state is an order of the goals and a path for each leg:
 the shortest path (the paper's A*) or one through a sub-goal. Goal-swapping exchanges two goals and
 plans the legs at them anew; path-inversion plans one leg through a sub-goal on the far side of an
 obstacle. Cost (3): ``C(T) = k (E + 1) L`` with E the number of obstacles that the trajectory

@@ -7,6 +7,7 @@ import sys
 import time
 from typing import TYPE_CHECKING, Any, TextIO
 
+from netsp.command import messages
 from netsp.command.types import (
     length,
     natural,
@@ -90,10 +91,7 @@ def run(args: argparse.Namespace) -> int:
         )
     except KeyboardInterrupt:
         bar.end()
-        print(
-            f"netsp: interrupted; {args.output} holds what is done, the same command goes on",
-            file=sys.stderr,
-        )
+        messages.error(f"interrupted; {args.output} holds what is done, the same command goes on")
         return EXIT_INTERRUPTED
     bar.end()
     if not args.quiet:

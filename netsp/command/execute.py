@@ -113,7 +113,7 @@ def run(args: argparse.Namespace) -> int:
         return EXIT_DEFECT
     if s["exceedance_s"] > 0.0 or (s["home"] and not s["tether_free"]):
         return EXIT_NOT_VERIFIED
-    return EXIT_NOT_ALL if s["lost"] or s["status"] != "done" else 0
+    return EXIT_NOT_ALL if s["left_out"] or s["status"] != "done" else 0
 
 
 def show_execution(problem: Problem) -> Callable[[ExecutionRow], None]:

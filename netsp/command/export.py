@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 
+from netsp.command import messages
 from netsp.command.types import (
     check_writable,
     length,
@@ -12,7 +13,7 @@ from netsp.command.types import (
     natural,
     positive,
 )
-from netsp.errors import InputError
+from netsp.errors import InputError, counted
 
 EXAMPLE = (
     "netsp export solution.json --problem problems/wharf.json --origin 41.18,-8.70 -o wharf.plan"
@@ -99,22 +100,17 @@ def run(args: argparse.Namespace) -> int:
         file=sys.stderr,
     )
     for line in warnings(problem, solution, points, slack, clearance):
-        print(f"netsp: warning: {line}", file=sys.stderr)
+        messages.warning(line)
     if kind in ("plan", "wpl"):
         if kind == "plan" and fence_points(problem) > MOST_FENCE_POINTS:
-            print(
-                f"netsp: warning: the obstacles take {fence_points(problem)} fence points; the "
-                f"vehicle stores about {MOST_FENCE_POINTS} without a card",
-                file=sys.stderr,
+            messages.warning(
+                f"the obstacles take {fence_points(problem)} fence points; the vehicle stores "
+                f"about {MOST_FENCE_POINTS} without a card"
             )
         shallow = sum(p.position[2] > -SHALLOWEST for p in points)
         if shallow:
-            print(
-                f"netsp: {shallow} waypoints shallower than {SHALLOWEST} m were lowered to it",
-                file=sys.stderr,
+            messages.note(
+                f"{counted(shallow, 'waypoint')} above {SHALLOWEST} m depth set to {SHALLOWEST} m"
             )
-        print(
-            "netsp: home is assumed to be at the surface above the base; do not set it by hand",
-            file=sys.stderr,
-        )
+        messages.note("home is assumed to be at the surface above the base; do not set it by hand")
     return 0

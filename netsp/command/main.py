@@ -17,6 +17,7 @@ import sys
 from collections.abc import Sequence
 from typing import Any, NoReturn
 
+from netsp.command import messages
 from netsp.errors import (
     EXIT_BAD_INPUT,
     EXIT_INTERRUPTED,
@@ -34,7 +35,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         words = _joined(sys.argv[1:] if argv is None else argv)
         wanted = next((w for w in words if not w.startswith("-")), None)
         try:
-            args = _parser(wanted).parse_args(words)
+            args = _parsed(words, wanted)
         except SystemExit:  # after --help or --version
             sys.stdout.flush()
             raise
@@ -42,16 +43,15 @@ def main(argv: Sequence[str] | None = None) -> int:
         sys.stdout.flush()
         return code
     except NetspError as error:
-        print(f"netsp: {error}", file=sys.stderr)
+        messages.error(str(error))
         return error.exit_code
     except MemoryError:
-        print(
-            "netsp: out of memory; lower tether_length, --max-classes or the size of what is asked",
-            file=sys.stderr,
+        messages.error(
+            "out of memory; lower tether_length, --max-classes or the size of what is asked"
         )
         return EXIT_NOT_ALL
     except KeyboardInterrupt:
-        print("netsp: interrupted before there was anything to write", file=sys.stderr)
+        messages.error("interrupted before there was anything to write")
         return EXIT_INTERRUPTED
     except BrokenPipeError:
         _forget_stdout()  # the reader has gone (| head)
@@ -60,7 +60,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         if error.errno not in (errno.ENOSPC, errno.EBADF, errno.EIO, errno.EFBIG, errno.EDQUOT):
             raise
         _forget_stdout()
-        print(f"netsp: output cannot be written: {error.strerror}", file=sys.stderr)
+        messages.error(f"output cannot be written: {error.strerror}")
         return EXIT_BAD_INPUT
 
 
@@ -130,6 +130,18 @@ COMMANDS = {
 }
 """By what they are for: name → module of this package, and a line of help. Each module has
 `arguments`, `run` and an `EXAMPLE`."""
+
+
+def _parsed(words: list[str], wanted: str | None) -> argparse.Namespace:
+    """The arguments; what argparse would say of a word that it does not know names neither the
+    command whose help would tell, nor itself in one line."""
+    names = [name for group in COMMANDS.values() for name in group]
+    if wanted is not None and wanted not in names:
+        raise InputError(f"unknown command {wanted!r}; expected one of {', '.join(names)}")
+    args, unknown = _parser(wanted).parse_known_args(words)
+    if unknown:
+        raise InputError(f"unknown argument {unknown[0]!r} (netsp {wanted} --help)")
+    return args
 
 
 def _parser(wanted: str | None) -> argparse.ArgumentParser:

@@ -1,4 +1,4 @@
-"""What `netsp verify --measures` prints: how entangled a path is, and the tether at every stop."""
+"""What `netsp verify --measures` prints: how entangled a path is, and the tether at every visit."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def describe_path(problem: Problem, path: npt.ArrayLike) -> str:
     """All measures of one path, a line each."""
     m = measure(problem, path)
     rows = [
-        ("signature", f"{list(m.signature)}" if m.signature else "empty"),
+        ("word", f"{list(m.signature)}" if m.signature else "empty"),
         ("entangled obstacles", _entangled(problem, m)),
         ("winding numbers", _winding(problem, m)),
         ("self-crossings", str(m.self_crossings)),
@@ -33,19 +33,19 @@ def describe_path(problem: Problem, path: npt.ArrayLike) -> str:
 
 
 def describe_tethers(problem: Problem, solution: Solution) -> str:
-    """The taut tether at every stop against the definitions of Battocletti et al. 2024."""
+    """The taut tether at every visit against the definitions of Battocletti et al. 2024."""
     path = np.array(solution.path)[:, :2]
     longest = float(np.hypot(*np.diff(path, axis=0).T).sum()) if len(path) > 1 else 0.0
     paths = TautPaths(problem, max(longest, problem.tether_length))
-    head = f"{'stop':>4}  {'goal':<12} {'tether':>10}  {'hull':<5} {'linear':<6} {'sight':<5} word"
+    head = f"{'visit':>5}  {'goal':<12} {'tether':>10}  {'hull':<5} {'linear':<6} {'sight':<5} word"
     lines = [head]
-    for k, stop in enumerate(solution.tour):
-        m = measure(problem, paths.tether(stop.goal, stop.signature))
+    for k, visit in enumerate(solution.tour):
+        m = measure(problem, paths.tether(visit.goal, visit.signature))
         free = ["free" if not getattr(m, field) else "no" for _, field in DEFINITIONS]
-        name = problem.goal_name(stop.goal)
+        name = problem.goal_name(visit.goal)
         lines.append(
-            f"{k + 1:>4}  {name:<12.12} {stop.tether_length:>10.6g}  {free[0]:<5} {free[1]:<6} "
-            f"{free[2]:<5} {list(stop.signature)}"
+            f"{k + 1:>5}  {name:<12.12} {visit.tether_length:>10.6g}  {free[0]:<5} {free[1]:<6} "
+            f"{free[2]:<5} {list(visit.signature)}"
         )
     lines.append(
         "hull, linear, sight: obstacle-free convex hull, obstacle-free linear homotopy and local "

@@ -8,6 +8,7 @@ import os
 import sys
 from pathlib import Path
 
+from netsp.command import messages
 from netsp.command.types import (
     check_writable,
     natural,
@@ -45,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
 
     mission = Mission.load(args.mission)
     scene_file = Mission.from_json(read_text(args.mission)).scene
-    say = None if args.quiet else lambda text: print(f"netsp: {text} …", file=sys.stderr)
+    say = None if args.quiet else lambda text: print(f"{text} …", file=sys.stderr)
     found = reorder(mission, time_limit=args.time_limit, seed=args.seed, on_progress=say)
     kept = found.order == tuple(range(len(mission.waypoints)))
     if not args.quiet:
@@ -53,12 +54,12 @@ def run(args: argparse.Namespace) -> int:
             s = run.summary
             print(
                 f"{name:<6} inspection {s['inspection_s']:.1f} s, with tether recovery "
-                f"{s['total_s']['tether']:.1f} s, tether at most {s['longest_tether_m']:.2f} of "
+                f"{s['total_s']['tether']:.1f} s, tether at most {s['longest_tether']:.2f} of "
                 f"{s['tether_length']:g} m, {s['visited']} of {s['waypoints']} visited",
                 file=sys.stderr,
             )
         if kept:
-            print("netsp: no better order was found", file=sys.stderr)
+            messages.note("no better order was found")
     placed = scene_file
     if args.output is not None and not Path(scene_file).is_absolute():
         there = Path(args.mission).parent / scene_file

@@ -91,9 +91,11 @@ def run(args: argparse.Namespace) -> int:
 def _is_scene(path: str) -> bool:
     """A file that describes a scene rather than a problem: by its fields."""
     from netsp.files import read_text
-    from netsp.models import parse_json_object
+    from netsp.models import kind_of, parse_json_object
 
     data = parse_json_object(read_text(path), path)
+    if kind_of(data) not in (None, "problem", "scene"):
+        raise InputError(f"{path}: this is a {kind_of(data)}; expected a problem or a scene")
     return "goals" not in data and bool({"solids", "mesh", "cloud", "problem"} & data.keys())
 
 

@@ -8,6 +8,7 @@ import sys
 import numpy as np
 
 from netsp.arrays import Floats
+from netsp.command import messages
 from netsp.errors import InputError
 from netsp.files import read_path
 from netsp.online.scene.field import DistanceField
@@ -27,7 +28,7 @@ def plot_scene(args: argparse.Namespace) -> int:
         path = points_of(args.solution)
         field = scene.field(on_progress=tell)
         for note in field.notes:
-            print(f"netsp: {scene.name}: {note}", file=sys.stderr)
+            messages.note(f"{scene.name}: {note}")
         check_overlap(scene, field, path, args.solution)
         delta = args.delta or delta_for_path(field, path)
         tether = lay(field, path, args.tether_model, delta)
@@ -44,10 +45,7 @@ def warn_of_thin(model: GeodesicTether, remedy: str) -> None:
     """Say it when something in the scene is thinner than what holds a tether for certain."""
     if thin := model.warnings:
         more = f" (and {len(thin) - 1} more)" if len(thin) > 1 else ""
-        print(
-            f"netsp: {thin[0]}{more}: the tether may slip through; {remedy}",
-            file=sys.stderr,
-        )
+        messages.warning(f"{thin[0]}{more}: the tether may slip through; {remedy}")
 
 
 def lay(field: DistanceField, path: Floats, model: str, delta: float) -> Tether:

@@ -30,12 +30,14 @@ class ProgressTable:
         self._header = False
         self._last: Progress | None = None
         self._shown = 0.0
-        self._held: Progress | None = None
+        self._held: tuple[float, Progress] | None = None
+        self._begin = time.monotonic()
         self._patience = threading.Timer(QUIET_S, self._explain)
         self._patience.daemon = True
 
     def begin(self, problem: Problem) -> None:
         """Announce the problem."""
+        self._begin = time.monotonic()
         self._print(f"{problem.name}: {problem.summary}")
         self._patience.start()
 
@@ -49,10 +51,12 @@ class ProgressTable:
             or row.stage != self._last.stage
             or row.incumbent != self._last.incumbent
         )
-        if news or time.monotonic() - self._shown >= EVERY:
-            self._show(row)
+        # the solver's own time does not count the roadmap, which the summary does
+        now = time.monotonic()
+        if news or now - self._shown >= EVERY:
+            self._show(now - self._begin, row)
         else:
-            self._held = row
+            self._held = now - self._begin, row
 
     def __enter__(self) -> ProgressTable:
         return self
@@ -63,9 +67,9 @@ class ProgressTable:
     def end(self) -> None:
         """Print the last row if it was held back."""
         if self._held is not None:
-            self._show(self._held)
+            self._show(*self._held)
 
-    def _show(self, row: Progress) -> None:
+    def _show(self, seconds: float, row: Progress) -> None:
         self._patience.cancel()
         if not self._header:
             self._print(_HEADER)
@@ -74,7 +78,7 @@ class ProgressTable:
         bound = "-" if row.bound is None else f"{row.bound:.6g}"
         gap = "-" if row.gap is None else f"{100 * row.gap:.3f}%"
         self._print(
-            f"{row.time:>6.1f}s  {row.stage:<10} {tour:>12} {bound:>12} {gap:>8} "
+            f"{seconds:>6.1f}s  {row.stage:<10} {tour:>12} {bound:>12} {gap:>8} "
             f"{row.cuts or '-':>6} {row.vertices or '-':>8} {row.legs or '-':>9} "
             f"{row.iteration:>11}"
         )

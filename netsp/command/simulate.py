@@ -123,7 +123,7 @@ def run(args: argparse.Namespace) -> int:
         draw_runs(runs, scene, Path(args.output))
     if any(r.summary["defects"] for r in runs):
         return EXIT_DEFECT
-    complete = runs[0].summary["status"] == "done" and not runs[0].summary["skipped"]
+    complete = runs[0].summary["status"] == "done" and not runs[0].summary["left_out"]
     return 0 if complete else EXIT_NOT_ALL
 
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 import argparse
 import sys
 
+from netsp.command import messages
 from netsp.command.types import check_writable, length, natural, positive
+from netsp.errors import counted
 
 EXAMPLE = "netsp world --goals 30 --tether 350 --seed 7 -o world.json"
 
@@ -65,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
         radii=tuple(args.radii),
     )
     if in_vain:
-        print(f"netsp: {in_vain} worlds of this seed did not fit and were redrawn", file=sys.stderr)
+        messages.note(f"{counted(in_vain, 'world')} of this seed did not fit and were redrawn")
     if args.output:
         write_text(args.output, problem.to_json())
     else:

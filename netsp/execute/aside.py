@@ -1,4 +1,4 @@
-"""Where a tether goes when an obstacle comes to stand on it: round it, the shorter way."""
+"""Where a tether goes when an obstacle comes to stand on it: round it, on the shorter side."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from netsp.problem import Problem
 def aside(problem: Problem, nodes: Floats, by: float) -> Floats:
     """The tether's nodes (k, 3) with every stretch inside obstacles replaced by the shorter part of
     their outline, `by` outside of it. A robot inside one is taken back along the tether to where it
-    leaves the obstacle. Heights stay as they are along the way."""
+    leaves the obstacle. Heights stay as they are along it."""
     line = np.array(nodes)
     solids = shapely.union_all([o.shape(problem.clearance) for o in problem.obstacles])
     base = shapely.Point(line[0, :2])

@@ -171,7 +171,7 @@ class Execution(Drawn):
         Goals reached.
     entries : list of Entry
         What happened, and what was done about it.
-    lost : dict
+    left_out : dict
         Goals left out, with the reason.
     cancelled : set of int
         Goals that were cancelled.
@@ -195,7 +195,7 @@ class Execution(Drawn):
     rows: list[ExecutionRow] = field(default_factory=list)
     arrivals: list[Arrival] = field(default_factory=list)
     entries: list[Entry] = field(default_factory=list)
-    lost: dict[int, str] = field(default_factory=dict)
+    left_out: dict[int, str] = field(default_factory=dict)
     cancelled: set[int] = field(default_factory=set)
     tethers: list[tuple[float, Floats]] = field(default_factory=list)
     free: bool = False
@@ -229,7 +229,7 @@ class Execution(Drawn):
             "planned_path": self.solution.length,
             "visited": len(goals),
             "as_planned": sum(a.as_planned for a in self.arrivals),
-            "lost": [{"goal": g, "reason": why} for g, why in sorted(self.lost.items())],
+            "left_out": [{"goal": g, "reason": why} for g, why in sorted(self.left_out.items())],
             "cancelled": sorted(self.cancelled),
             "longest_tether": max((r.tether for r in self.rows), default=0.0),
             "tether_length": self.problem.tether_length,
@@ -259,12 +259,12 @@ def describe_execution(done: Execution) -> str:
     """
     s, units = done.summary, done.problem.units
     planned = s["planned_path"] or 0.0
+    every_goal = not (s["cancelled"] or s["left_out"])
     lines = [
         f"run      {s['problem']}: {s['status']} after {s['time_s']:.1f} s",
-        f"visited  {counted(s['visited'], 'goal')}; the tether in the planned class at "
-        f"{s['as_planned']} of {counted(len(done.arrivals), 'stop')}",
+        f"visited  {counted(s['visited'], 'goal')}{_class_of(s['as_planned'], done.arrivals)}",
         f"path     {s['path']:.6g} {units}"
-        + (f", {_beside(s['path'] / planned)}" if planned else ""),
+        + (f", {_beside(s['path'] / planned)}" if planned and every_goal else ""),
         f"tether   at most {s['longest_tether']:.6g} of {s['tether_length']:g} {units}, over the "
         f"limit for {s['exceedance_s']:.1f} s, "
         + (
@@ -276,8 +276,18 @@ def describe_execution(done: Execution) -> str:
             f"event    {e.event} at {e.time:.1f} s: {e.done}, planned in {e.planning_s:.2f} s",
             f"         {e.reason}",
         ]
-    lines += [f"left out {done.problem.goal_label(x['goal'])}: {x['reason']}" for x in s["lost"]]
+    lines += [
+        f"left out {done.problem.goal_label(x['goal'])}: {x['reason']}" for x in s["left_out"]
+    ]
     return "\n".join(lines)
+
+
+def _class_of(as_planned: int, arrivals: list[Arrival]) -> str:
+    """In how many of the arrivals, home among them, the tether was as planned."""
+    if as_planned == len(arrivals):
+        return ", the tether always in the planned class"
+    others = len(arrivals) - as_planned
+    return f", the tether in another class than planned at {others} of {len(arrivals)} arrivals"
 
 
 def _beside(ratio: float) -> str:

@@ -49,7 +49,7 @@ class Repair:
         Kept, local, replan or home.
     reason
         For the log.
-    lost
+    left_out
         Goals that cannot be reached any more, with the reason.
     length
         Metres to go.
@@ -60,7 +60,7 @@ class Repair:
     kind: str
     reason: str
     legs: list[Leg]
-    lost: tuple[tuple[int, str], ...]
+    left_out: tuple[tuple[int, str], ...]
     length: float
     planning_s: float
 
@@ -109,7 +109,7 @@ def _label(problem: Problem, leg: Leg) -> str:
 
 
 def _in_the_way(problem: Problem, path: Floats) -> int | None:
-    """An obstacle, grown by the clearance, that a way enters."""
+    """An obstacle, grown by the clearance, that a path enters."""
     line = shapely.LineString(path[:, :2]) if len(path) > 1 else shapely.Point(path[0, :2])
     place = 1e-6 * problem.scale
     for i, o in enumerate(problem.obstacles):
@@ -154,10 +154,10 @@ def repair(
     clock = Clock(limit)
     word = signature(tether[:, :2], problem.representative_points)
     state = State(position=_outside(problem, robot), signature=word)
-    order, lost = reachable(problem, left)
+    order, left_out = reachable(problem, left)
     if not order:
         legs = [_home(problem, state, FAR * max(problem.tether_length, polylines.length(tether)))]
-        return Repair("home", why, legs, tuple(lost), legs[0].length, clock.elapsed)
+        return Repair("home", why, legs, tuple(left_out), legs[0].length, clock.elapsed)
     rest = _rest(problem, order, state)
     graph = graph_from_state(rest, max_classes=MOST_CLASSES, time_limit=clock)
     with graph.within.on_clock(clock):
@@ -182,15 +182,15 @@ def repair(
         reason += f", a new order could save at most {max(saving, 0.0):.1f} s"
     solution = to_solution(rest, graph, chosen, "auto", seed)
     legs = legs_of(rest, solution, order)
-    return Repair(kind, reason, legs, tuple(lost), float(chosen.length or 0.0), clock.elapsed)
+    return Repair(kind, reason, legs, tuple(left_out), float(chosen.length or 0.0), clock.elapsed)
 
 
 def reachable(problem: Problem, left: list[int]) -> tuple[list[int], list[tuple[int, str]]]:
     """The goals that a taut tether within the limit reaches, in their order, and the others with
     the reason."""
-    order, lost = _in_free_water(problem, left)
+    order, left_out = _in_free_water(problem, left)
     if not order:
-        return order, lost
+        return order, left_out
     goals = tuple(problem.goals[g] for g in order)
     plain = problem.model_copy(update={"goals": goals, "state": None})
     paths = TautPaths(plain)
@@ -199,8 +199,8 @@ def reachable(problem: Problem, left: list[int]) -> tuple[list[int], list[tuple[
     beyond = [k for k in range(len(order)) if needs[k] > problem.tether_length + paths.margin]
     for k in beyond:
         why = explain_unreached(plain, paths.outline, [k + 1])
-        lost.append((order[k], why.replace(plain.goal_label(k), problem.goal_label(order[k]))))
-    return [g for k, g in enumerate(order) if k not in beyond], lost
+        left_out.append((order[k], why.replace(plain.goal_label(k), problem.goal_label(order[k]))))
+    return [g for k, g in enumerate(order) if k not in beyond], left_out
 
 
 def _outside(problem: Problem, robot: Floats) -> tuple[float, float, float]:
@@ -291,7 +291,7 @@ def _keeping_order(graph: GraphFromState, goals: int) -> Result:
         tour.append(int(members[k]))
         k = int(best[k])
     full = (0, start, *reversed(tour))
-    # walked from the state on: the way there is behind the robot
+    # walked from the state on: the path to there is behind the robot
     return Result(full, length, None, Status.FEASIBLE, walk=(*full[1:], 0))
 
 

@@ -80,22 +80,22 @@ class _Run:
         return row
 
     def go(self) -> None:
-        """One step along the way; arrives where the leg ends."""
+        """One step along the path; arrives where the leg ends."""
         before = self.vehicle.position
-        stops, passed = self.vehicle.go(
+        points, passed = self.vehicle.go(
             self.path, self.step, self.vehicle.yaw, self.water(self.now), self.fresh
         )
         self.fresh = False
         self.now += self.step
         self.leg_s += self.step
-        for stop in stops:
-            inside = float(self.scene.distance(stop)) < -0.2 * self.delta
+        for point in points:
+            inside = float(self.scene.distance(point)) < -0.2 * self.delta
             if inside:
-                stop = pushed_out(self.scene, stop, 0.0)[0]
-                self.vehicle.stop_at(stop)
-            self.out.walked += float(np.linalg.norm(stop - before))
-            self.tether = self.model.update(self.tether, stop)
-            before = stop
+                point = pushed_out(self.scene, point, 0.0)[0]
+                self.vehicle.stop_at(point)
+            self.out.walked += float(np.linalg.norm(point - before))
+            self.tether = self.model.update(self.tether, point)
+            before = point
         end = self.path[-1]
         self.path = self.path[min(passed, len(self.path) - 1) :]
         near = (
@@ -124,15 +124,15 @@ class _Run:
     def _lose(self, goal: int, why: str) -> None:
         if goal == HOME:
             self.legs = []
-            self._enter_log("lost", "given up", f"the base was {why}", 0.0)
+            self._enter_log("left out", "given up", f"the base was {why}", 0.0)
             return
-        self.out.lost[goal] = why
+        self.out.left_out[goal] = why
         if not self.options.repair:
             self.legs.pop(0)
             first = self.legs[0]
             path = np.vstack([self.vehicle.position, first.path[1:]])
             self.legs[0] = Leg(first.goal, path, first.word, first.tether)
-            self._enter_log("lost", "ignored", f"{self.problem.goal_label(goal)} {why}", 0.0)
+            self._enter_log("left out", "ignored", f"{self.problem.goal_label(goal)} {why}", 0.0)
             self._next()
             return
         self._mend(f"{self.problem.goal_label(goal)} {why}", [g for g in self.left if g != goal])
@@ -168,7 +168,7 @@ class _Run:
         if back:
             left, must = [*left, *back], "goals are within reach again"
             for goal in back:
-                del self.out.lost[goal]
+                del self.out.left_out[goal]
         if must is None:
             must, legs = broken(self.problem, self.tether.nodes, self._from_here())
             if must is None:
@@ -179,13 +179,13 @@ class _Run:
         elif not self.options.repair:
             self._enter_log(event.kind, "ignored", must, 0.0)
             for goal in set(left) - set(self.left):
-                self.out.lost[goal] = "was added, and plans are not repaired"
+                self.out.left_out[goal] = "was added, and plans are not repaired"
         else:
             self._mend(must, left, event.kind)
 
     def _in_reach_again(self) -> list[int]:
         """Goals that no tether reached, and one does now."""
-        away = [g for g in self.unreachable if g in self.out.lost]
+        away = [g for g in self.unreachable if g in self.out.left_out]
         back = reachable(self.problem, away)[0] if away else []
         self.unreachable -= set(back)
         return back
@@ -196,7 +196,7 @@ class _Run:
         if event.add_goal is not None:
             problem = changed(self.problem, event)
             self.problem = self.out.problem = problem
-            self.out.lost[len(problem.goals) - 1] = "was added after the end"
+            self.out.left_out[len(problem.goals) - 1] = "was added after the end"
 
     def _from_here(self) -> list[Leg]:
         first = self.legs[0]
@@ -205,7 +205,7 @@ class _Run:
 
     def _enter_changed(self, event: Event) -> None:
         """The world after an event: what has come to stand on the tether or the robot has pushed
-        them aside, the shorter way; what is gone lets the tether go."""
+        them aside, to the nearer side; what is gone lets the tether go."""
         problem = changed(self.problem, event)
         self._enter(problem)
         if event.kind not in ("appear", "vanish", "move"):
@@ -224,17 +224,17 @@ class _Run:
         # farther than the tether goes there and back nothing is carried
         far = 2.0 * max(self.problem.tether_length, self.tether.length) + self.delta
         by = by * min(1.0, far / max(float(np.linalg.norm(by)), 1e-300))
-        stops = polylines.dense(np.array([start, start + by]), 0.5 * self.delta)
-        for stop in stops:
-            if float(self.scene.distance(stop)) < 0.0:
+        points = polylines.dense(np.array([start, start + by]), 0.5 * self.delta)
+        for point in points:
+            if float(self.scene.distance(point)) < 0.0:
                 break
-            tether = self.model.update(self.tether, stop)
+            tether = self.model.update(self.tether, point)
             if tether.length > max(self.problem.tether_length, self.tether.length):
                 break  # held by its tether
             self.tether = tether
-            self.vehicle.stop_at(stop)
+            self.vehicle.stop_at(point)
 
-    def _mend(self, why: str, left: list[int], event: str = "lost") -> None:
+    def _mend(self, why: str, left: list[int], event: str = "left out") -> None:
         begin = time.perf_counter()
         try:
             made = repair(
@@ -247,17 +247,17 @@ class _Run:
             # along the tether.
             home = Leg(HOME, np.ascontiguousarray(self.tether.nodes[::-1]), (), 0.0)
             what = f"{type(error).__name__}: {error}"
-            lost = tuple((g, f"a defect of netsp ended planning ({what})") for g in left)
+            left_out = tuple((g, f"a defect of netsp ended planning ({what})") for g in left)
             reason = f"{why}; a defect of netsp ended planning ({what})"
             spent = time.perf_counter() - begin
-            made = Repair("defect", reason, [home], lost, home.length, spent)
+            made = Repair("defect", reason, [home], left_out, home.length, spent)
         self._enter_log(event, made.kind, made.reason, made.planning_s)
         self._hold(self.options.planning_limit)
         self.legs = made.legs
-        for goal, reason in made.lost:
-            self.out.lost[goal] = reason
+        for goal, reason in made.left_out:
+            self.out.left_out[goal] = reason
         if made.kind != "defect":
-            self.unreachable |= {goal for goal, _ in made.lost}
+            self.unreachable |= {goal for goal, _ in made.left_out}
         self._next()
 
     def _hold(self, seconds: float) -> None:

@@ -167,7 +167,7 @@ def _coarsened(
 
 
 def _side(a: Floats, b: Floats, c: Floats) -> float:
-    """Signed angle in the plan by which a way turns at b."""
+    """Signed angle in the plan by which a path turns at b."""
     u, v = (b - a)[:2], (c - b)[:2]
     return float(np.arctan2(u[0] * v[1] - u[1] * v[0], u @ v))
 
@@ -186,7 +186,7 @@ def _meeting(a: Floats, b: Floats, c: Floats, d: Floats) -> Floats | None:
 
 
 def _turn(a: Floats, b: Floats, c: Floats) -> float:
-    """Angle (rad) by which a way turns at b."""
+    """Angle (rad) by which a path turns at b."""
     u, v = b - a, c - b
     lu, lv = np.linalg.norm(u), np.linalg.norm(v)
     if lu == 0.0 or lv == 0.0:

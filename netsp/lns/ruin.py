@@ -6,7 +6,7 @@ near a random goal is taken out, its clusters are put back one by one where they
 new tour is accepted by simulated annealing.
 
 What an insertion costs is exact in the sense of the whole tour: with ``ahead[k, i]`` the shortest
-way from the base to vertex i of the k-th cluster and ``behind[k, i]`` from there home, the best
+path from the base to vertex i of the k-th cluster and ``behind[k, i]`` from there home, the best
 tour that has cluster c after position k is ``min over i, j, l of ahead[k, i] + c_ij + c_jl +
 behind[k + 1, l]``, every class of every other goal chosen anew.
 """
@@ -46,7 +46,7 @@ def forward(order: Ints, n: int, first: int, start: Ints, costs: Floats, ahead: 
 
 @kernel
 def backward(order: Ints, n: int, last: int, start: Ints, costs: Floats, behind: Floats) -> None:
-    """Fill ``behind`` from position `last` down to 1; behind[n] is the way from the base home."""
+    """Fill ``behind`` from position `last` down to 1; behind[n] is the path from the base home."""
     for k in range(last, 0, -1):
         c = order[k]
         q = order[k + 1] if k + 1 < n else 0

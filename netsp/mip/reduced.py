@@ -1,17 +1,17 @@
 """The reduced MIP heuristic: one class per goal, then an ordinary TSP.
 
 McCammon & Hollinger 2017, section IV-C: every goal is taken in the class of its shortest tether;
-two goals are joined by the direct leg if it shares the homotopy class of the way through the base,
+two goals are joined by the direct leg if it shares the homotopy class of the path through the base,
 else by the shortest leg that does. On the covering space both cases are one: the leg from (i, h_i)
-to (j, h_j) is the shortest path of the class ``h_i^-1 h_j``, which is that of the way through the
+to (j, h_j) is the shortest path of the class ``h_i^-1 h_j``, which is that of the path through the
 base. So the reduced graph is the travel graph on the vertices of least tether, and the TSP on it
 goes to the same machinery, with equation (2) trivially satisfied.
 
 The paper reports tours within 5 % of the optimum. Its recipe by itself misses it by 17 % on our
-worlds (20 goals, tether 350: docs/solvers.md): the classes of least tether are too few to leave by
-one way and come back by another. So by default the three classes of least tether are kept for every
-goal (2 %), and the classes of the order found are chosen once more, exactly and from all, by a
-shortest path through layers. ``classes=1 polish=0`` is the paper's.
+worlds (20 goals, tether 350: docs/solvers.md): the classes of least tether are too few to leave on
+one side of an obstacle and come back on the other. So by default the three classes of least tether
+are kept for every goal (2 %), and the classes of the order found are chosen once more, exactly and
+from all, by a shortest path through layers. ``classes=1 polish=0`` is the paper's.
 """
 
 from __future__ import annotations

@@ -89,7 +89,7 @@ class Run(Drawn):
         s = self.summary
         return (
             f"<Run of {s['mission']!r} by {self.planner}: {s['visited']} of {s['waypoints']} "
-            f"waypoints in {s['inspection_s']:.1f} s, tether at most {s['longest_tether_m']:.4g} "
+            f"waypoints in {s['inspection_s']:.1f} s, tether at most {s['longest_tether']:.4g} "
             f"of {s['tether_length']:g}>"
         )
 
@@ -150,7 +150,7 @@ def describe_run(run: Run, units: str) -> str:
         f"visited  {s['visited']} of {s['waypoints']} waypoints",
         f"time     {s['inspection_s']:.1f} s, and back along the tether "
         f"{s['recovery_s']['tether']:.1f} s",
-        f"tether   longest {s['longest_tether_m']:.3f} of {s['tether_length']:g} {units}, "
+        f"tether   longest {s['longest_tether']:.3f} of {s['tether_length']:g} {units}, "
         f"over the limit for {s['exceedance_s']:.1f} s",
         f"planning {s['replans']} times, median {1e3 * s['replan_median_s']:.1f} ms, worst "
         f"{1e3 * s['replan_worst_s']:.0f} ms",
@@ -169,7 +169,7 @@ def describe_run(run: Run, units: str) -> str:
             f"{1e3 * s['control_worst_s']:.0f} ms; "
             f"{s['inspection_s'] / s['wall_s']:.0f} x real time"
         )
-    lines += [f"left out {left['waypoint']}: {left['reason']}" for left in s["skipped"][:5]]
-    if len(s["skipped"]) > 5:
-        lines.append(f"         and {len(s['skipped']) - 5} more")
+    lines += [f"left out {left['waypoint']}: {left['reason']}" for left in s["left_out"][:5]]
+    if len(s["left_out"]) > 5:
+        lines.append(f"         and {len(s['left_out']) - 5} more")
     return "\n".join(lines)

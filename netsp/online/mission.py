@@ -24,7 +24,7 @@ class Camera(Model):
     range : float
         Metres.
     field_of_view : float
-        Degrees, both ways.
+        Degrees to either side.
     tilt : float
         Degrees that it turns up or down at most.
     patch : float

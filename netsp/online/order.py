@@ -4,7 +4,7 @@ Offline, a goal and the class of its tether make one vertex, and legs belong to 
 tour can wind the tether up. The same here, with classes found by the tether model: the shortest
 tether to each waypoint, and those that come of going straight on to it from its neighbours. A leg
 within a class is the straight line if the tether that comes of it is that of the class; between any
-two classes there is the way back along one tether and out along the other, pulled taut. What comes
+two classes there is the path back along one tether and out along the other, pulled taut. What comes
 out is a generalised TSP, which our own solvers take.
 """
 

@@ -156,15 +156,15 @@ class Simulation:
         robot, yaw = self.vehicle.position, self.vehicle.yaw
         if self.coverage is not None:
             yaw = self.coverage.heading(robot, yaw)
-        stops, passed = self.vehicle.go(path, STEP, yaw, self.water(self.now), fresh)
+        points, passed = self.vehicle.go(path, STEP, yaw, self.water(self.now), fresh)
         self.now += STEP
-        if self.scene.distance(np.array(stops)).min() < -0.2 * self.tethers.delta:
+        if self.scene.distance(np.array(points)).min() < -0.2 * self.tethers.delta:
             self.vehicle.stop_at(robot)
             return passed, False
-        for stop in stops:
-            self.tether = self.tethers.update(self.tether, stop)
+        for point in points:
+            self.tether = self.tethers.update(self.tether, point)
             if self.model is not None and self.believed is not None:
-                self.believed = self.model.update(self.believed, stop)
+                self.believed = self.model.update(self.believed, point)
         return passed, True
 
 
@@ -353,13 +353,13 @@ def summarise(
         "inspection_s": inspection,
         "recovery_s": {"tether": by_tether, "path": by_path},
         "total_s": {"tether": inspection + by_tether, "path": inspection + by_path},
-        "path_m": walked,
+        "path": walked,
         "tether_length": mission.tether_length,
-        "longest_tether_m": float(lengths.max(initial=0.0)),
+        "longest_tether": float(lengths.max(initial=0.0)),
         "exceedance_s": float((lengths > mission.tether_length * (1 + 1e-9)).sum() * STEP),
         "visited": len(planner.reached),
         "waypoints": len(mission.waypoints),
-        "skipped": [{"waypoint": k, "reason": why} for k, why in planner.skipped],
+        "left_out": [{"waypoint": k, "reason": why} for k, why in planner.left_out],
         "defects": len(planner.defects),
         "replans": len(planned),
         "replan_median_s": float(np.median(planned)) if planned else 0.0,

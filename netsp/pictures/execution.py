@@ -48,7 +48,7 @@ def draw_map(done: Execution, *, ax: Any = None) -> Any:
     visited = {a.goal for a in done.arrivals}
     for mark, colour, name, wanted in (
         ("o", style.VISITED, "goal visited", visited),
-        ("x", style.LEFT_OUT, "goal left out", set(done.lost)),
+        ("x", style.LEFT_OUT, "goal left out", set(done.left_out)),
         ("+", style.CANCELLED, "goal cancelled", done.cancelled),
     ):
         places = [g.position for k, g in enumerate(problem.goals) if k in wanted]

@@ -40,7 +40,7 @@ def title_of(run: Run) -> str:
     s = run.summary
     return (
         f"{s['planner']}: {s['visited']} of {s['waypoints']} in {s['inspection_s']:.0f} s, "
-        f"tether at most {s['longest_tether_m']:.2f} of {s['tether_length']:g} m"
+        f"tether at most {s['longest_tether']:.2f} of {s['tether_length']:g} m"
     )
 
 

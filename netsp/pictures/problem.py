@@ -28,12 +28,12 @@ def save(problem: Problem, solution: Solution | None, path: str | Path) -> None:
 
 
 def draw(problem: Problem, solution: Solution | None = None) -> Any:
-    """A matplotlib Figure: the map with the tour on it, and beside it, for each stop of the tour,
+    """A matplotlib Figure: the map with the tour on it, and beside it, for each visit of the tour,
     the taut tether from the base to the robot."""
     from matplotlib.figure import Figure
 
-    stops = solution.tour if solution is not None else ()
-    panels = len(stops)
+    visits = solution.tour if solution is not None else ()
+    panels = len(visits)
     xmin, ymin, xmax, ymax = _view(problem, solution)
     aspect = (ymax - ymin) / (xmax - xmin)
     if panels == 0:
@@ -54,20 +54,20 @@ def draw(problem: Problem, solution: Solution | None = None) -> Any:
     left, right = sides
     draw_map(problem, solution, ax=left.subplots())
     axes = np.atleast_1d(right.subplots(rows, columns)).ravel()
-    right.suptitle("the taut tether at each stop", fontsize=9, color=style.EDGE)
-    longest = max(problem.tether_length, *(stop.tether_length for stop in stops))
+    right.suptitle("the taut tether at each visit", fontsize=9, color=style.EDGE)
+    longest = max(problem.tether_length, *(visit.tether_length for visit in visits))
     paths = TautPaths(problem, 2.0 * longest)
     for k, ax in enumerate(axes):
         ax.set_axis_off()
-        if k >= len(stops):
+        if k >= len(visits):
             continue
-        stop = stops[k]
+        visit = visits[k]
         draw_obstacles(ax, problem)
-        tether = paths.tether(stop.goal, stop.signature)
+        tether = paths.tether(visit.goal, visit.signature)
         ax.plot(tether[:, 0], tether[:, 1], color=style.TETHER, lw=1.3)
         ax.plot(*problem.base[:2], marker="*", ms=8, color=style.BASE, mec="none")
-        ax.plot(*problem.points[stop.goal + 1, :2], "o", ms=4, color=style.PATH)
-        ax.set_title(f"{k + 1}: {stop.tether_length:.4g} {problem.units}", fontsize=7, pad=2)
+        ax.plot(*problem.points[visit.goal + 1, :2], "o", ms=4, color=style.PATH)
+        ax.set_title(f"{k + 1}: {visit.tether_length:.4g} {problem.units}", fontsize=7, pad=2)
         _frame(ax, problem, solution)
     return figure
 
@@ -205,7 +205,7 @@ def draw_map(
     Parameters
     ----------
     tethers
-        The taut tether at every stop, too.
+        The taut tether at every visit, too.
     """
     if ax is None:
         _, ax = _single(problem)
@@ -233,8 +233,10 @@ def draw_map(
         ax.plot(
             x, y, "o", ms=13 if order else 9, color=style.GOAL, mec=style.PATH, mew=1.4, zorder=5
         )
-        ax.annotate(str(order.get(k, k)), (x, y), ha="center", va="center", fontsize=7, zorder=6)
-        note = " ".join(t for t in (goal.name or "", f"z {z:g}" if z else "") if t)
+        visit = str(order.get(k, ""))
+        ax.annotate(visit, (x, y), ha="center", va="center", fontsize=7, zorder=6)
+        name = goal.name or "" if order else problem.goal_name(k)
+        note = " ".join(t for t in (name, f"z {z:g}" if z else "") if t)
         if note and len(problem.goals) <= 40:
             ax.annotate(
                 note, (x, y), xytext=(8, -10), textcoords="offset points", fontsize=6,

@@ -260,7 +260,7 @@ def _fates(run: Path | None) -> dict[int, str]:
     if run is None:
         return {}
     s = _json(run / "summary.json")
-    left_out = {int(x["goal"]): "left out" for x in s["lost"]}
+    left_out = {int(x["goal"]): "left out" for x in s["left_out"]}
     return left_out | {int(g): "cancelled" for g in s["cancelled"]}
 
 
@@ -356,7 +356,7 @@ def _measures(problem: Problem, solution: Solution) -> str:
     turns = "all zero" if not any(m.winding or ()) else str(m.winding)
     rows = [
         ("word of the whole tour", str(list(m.signature)) if m.signature else "empty"),
-        ("obstacles wound around", names(m.entangled)),
+        ("entangled obstacles", names(m.entangled)),
         ("winding numbers", turns),
         ("crossings of the path with itself", str(m.self_crossings)),
         ("obstacles in the convex hull of the path", names(m.convex_hull)),

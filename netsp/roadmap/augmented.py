@@ -1,6 +1,6 @@
 """The homotopy-augmented graph of Bhattacharya, Likhachev & Kumar 2012 over any roadmap.
 
-Its vertices are (milestone, word): the milestone together with the class of the way from the base.
+Its vertices are (milestone, word): the milestone together with the class of the path from the base.
 As in McCammon & Hollinger 2017, section IV-A, a vertex exists only if the tether reaches it along
 the roadmap and if its word does not loop. An edge of the roadmap becomes one edge for every word at
 its tail, leading to the word with the edge's crossings appended and reduced.
@@ -97,7 +97,7 @@ class AugmentedGraph:
 
     def path(self, u: int, v: int, method: Literal["astar", "dijkstra"] = "astar") -> list[int]:
         """Vertices of a shortest path from u to v. A* is guided by the straight-line distance,
-        which never exceeds the way along edges, so both methods find the same length."""
+        which never exceeds the path along edges, so both methods find the same length."""
         goal = self.points[self.milestone[v]]
         guide = np.zeros(len(self.points))
         if method == "astar":
@@ -261,7 +261,7 @@ def _reach(
     heap = 1
     while heap > 0:
         if stop[0] != 0:
-            # what is not closed yet may still be reached by shorter ways
+            # what is not closed yet may still be reached by shorter paths
             kept = 0
             for i in range(count):
                 if closed[i, 0] == 1:

@@ -7,10 +7,10 @@ trie's *core*. Each taut path is generated once, and in its class it is the only
 (docs/theory.md).
 
 A ray that passes through another obstacle can be crossed and crossed back by one taut path, so the
-word on the way may leave the core for a while. Such *pending* letters are followed exactly as long
-as they can still be cancelled: the obstacle that interrupts the ray lies on the other side of it,
-no pending letter repeats, and the robot stays on the side it crossed to (the lemma on pending
-letters).
+word of its beginnings may leave the core for a while. Such *pending* letters are followed exactly
+as long as they can still be cancelled: the obstacle that interrupts the ray lies on the other side
+of it, no pending letter repeats, and the robot stays on the side it crossed to (the lemma on
+pending letters).
 """
 
 from __future__ import annotations
@@ -171,7 +171,7 @@ def _walk(
     limit: Floats,
     size: int,
 ) -> tuple[int, int]:
-    """The trie node after the letters lo … hi on the way to a bend at (x, y), made where it may
+    """The trie node after the letters lo … hi of the segment to a bend at (x, y), made where it may
     exist; -1 if no wanted word can follow. Returns node, size."""
     for k in range(lo, hi):
         a = int(letters[k])

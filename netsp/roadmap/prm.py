@@ -1,7 +1,7 @@
 """The sampled roadmap of the 2017 paper: PRM* (OMPL) with homotopy augmentation.
 
 McCammon & Hollinger 2017, section IV-A: milestones are sampled uniformly in free space, joined by
-the PRM* rule (Karaman & Frazzoli 2011), and augmented with the homotopy class of the way from the
+the PRM* rule (Karaman & Frazzoli 2011), and augmented with the homotopy class of the path from the
 base (Bhattacharya et al. 2012). Words come from the projection on the plane, lengths are 3D.
 
 OMPL samples motions at a resolution, so it is asked to check the ends only and every edge is

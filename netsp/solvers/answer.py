@@ -66,7 +66,7 @@ def _visits(graph: TravelGraph, tour: Sequence[int]) -> tuple[Visit, ...]:
 
 
 def _blind_visits(problem: Problem, walked: Trajectory) -> tuple[Visit, ...]:
-    """Stops of a blind baseline, with the taut tether that its way would need."""
+    """Visits of a blind baseline, with the taut tether that its path would need."""
     from netsp.roadmap.paths import TautPaths
 
     longest = float(np.hypot(*np.diff(walked.path[:, :2], axis=0).T).sum())

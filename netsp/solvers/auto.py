@@ -106,8 +106,8 @@ def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | Non
 
 
 def _over_shortest(graph: TravelGraph, limits: Limits, backend: str) -> Result:
-    """Prove over the classes of least tether; tours by way of the others are bounded by the way
-    there and back."""
+    """Prove over the classes of least tether; tours by way of the others are bounded by
+    twice its tether."""
     core = least_tethers(graph.costs_to_base, graph.cluster, MOST_KEPT // graph.goal_count)
     given = limits.warm_start
     if given is not None:

@@ -1,8 +1,9 @@
 """Few goals: dynamic programming over sets of goals, after Held & Karp (1962), with classes.
 
-The shortest way to visit a set of goals and end at a vertex is one leg longer than the shortest way
-to visit the set without that vertex's goal. So over n goals and V classes 2ⁿ V² sums prove the
-tour, in some milliseconds up to eight or nine goals, and nothing needs to be compiled for it.
+The shortest path that visits a set of goals and ends at a vertex is one leg longer than the
+shortest that visits the set without that vertex's goal. So over n goals and V classes 2ⁿ V² sums
+prove the tour, in some milliseconds up to eight or nine goals, and nothing needs to be compiled for
+it.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ def solve(run: SolverRun) -> None:
     graph = run.graph
     costs, n = graph.costs, graph.goal_count
     members = [graph.members(c) for c in range(1, n + 1)]
-    # reach[s, v]: the shortest way from the base through the goals of the set s, ending at v
+    # reach[s, v]: the shortest path from the base through the goals of the set s, ending at v
     reach: Floats = np.full((2**n, len(graph)), np.inf)
     for c in range(n):
         reach[1 << c, members[c]] = costs[0, members[c]]

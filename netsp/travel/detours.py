@@ -16,7 +16,7 @@ from netsp.arrays import Floats, Ints
 from netsp.hsignature import Word, concatenate, invert
 
 DIRECT = -1
-"""Instead of a sub-goal: the shortest way of all."""
+"""Instead of a sub-goal: the shortest path of all."""
 
 
 @dataclass(frozen=True)
@@ -26,19 +26,19 @@ class Detours:
     Attributes
     ----------
     planar
-        (m + 1, P) planar length of the shortest way from base or goal to every place.
+        (m + 1, P) planar length of the shortest detour from base or goal to every place.
     height
-        (m + 1,) z of base and goals. Sub-goals have none: depth changes evenly along a way.
+        (m + 1,) z of base and goals. Sub-goals have none: depth changes evenly along a detour.
     letters, row
-        Word of the way from a to p is ``letters[row[a, p] : row[a, p + 1]]``; row is (m + 1, P
+        Word of the detour from a to p is ``letters[row[a, p] : row[a, p + 1]]``; row is (m + 1, P
         + 1).
     far
-        (m + 1, P, n) for the way from a to p and each obstacle, the sub-goal on the far side of
+        (m + 1, P, n) for the detour from a to p and each obstacle, the sub-goal on the far side of
         the obstacle; -1 if the obstacle has none in free space.
     near
-        (m + 1, P, n) distance of the way from the middle of the obstacle.
+        (m + 1, P, n) distance of the detour from the middle of the obstacle.
     draw
-        Gives the (k, 2) polyline of the way from a to p.
+        Gives the (k, 2) polyline of the detour from a to p.
     """
 
     planar: Floats
@@ -50,18 +50,18 @@ class Detours:
     draw: Callable[[int, int], Floats]
 
     def length(self, a: int, b: int, via: int = DIRECT) -> float:
-        """3D length of the way from a to b, through a sub-goal if `via` is one."""
+        """3D length of the detour from a to b, through a sub-goal if `via` is one."""
         planar = self.planar[a, b] if via < 0 else self.planar[a, via] + self.planar[b, via]
         return float(np.hypot(planar, self.height[b] - self.height[a]))
 
     def word(self, a: int, b: int, via: int = DIRECT) -> Word:
-        """Reduced word of the way from a to b."""
+        """Reduced word of the detour from a to b."""
         if via < 0:
             return self._word(a, b)
         return concatenate(self._word(a, via), invert(self._word(b, via)))
 
     def path(self, a: int, b: int, via: int = DIRECT) -> Floats:
-        """(n, 3) polyline of the way from a to b; depth changes evenly along it."""
+        """(n, 3) polyline of the detour from a to b; depth changes evenly along it."""
         if via < 0:
             xy = self.draw(a, b)
         else:
@@ -72,7 +72,7 @@ class Detours:
         return np.column_stack([xy, z])
 
     def far_side(self, a: int, b: int, via: int, obstacle: int) -> int:
-        """The sub-goal on the far side of an obstacle from the present way; -1 if there is none."""
+        """The sub-goal on the far side of an obstacle from the present detour, or -1."""
         if via < 0:
             return int(self.far[a, b, obstacle])
         nearer = a if self.near[a, via, obstacle] <= self.near[b, via, obstacle] else b

@@ -251,7 +251,7 @@ def shortcut(field: Field, path: Floats, tolerance: float) -> Floats:
 
 def homotopic(field: DistanceField, a: Floats, b: Floats, step: float) -> bool:
     """Whether two paths between the same ends certainly are of one class: points at most `step`
-    apart, at the same share of both ways, all see one another. Nothing wider than `step` can then
+    apart, at the same share of both paths, all see one another. Nothing wider than `step` can then
     stand between the paths."""
     k = 2 + int(max(polylines.length(a), polylines.length(b)) / step)
     return bool(all_see(field.arrays, _shares(a, k), _shares(b, k), 0.1 * step))

@@ -85,7 +85,7 @@ class Planner:
         As of `Command`.
     path : ndarray, shape (k, 3)
         The path that is followed.
-    skipped : list of (int, str)
+    left_out : list of (int, str)
         Waypoints given up, with the reason.
     defects : list of str
         What went wrong in planning that never should, one text each time.
@@ -101,7 +101,7 @@ class Planner:
     index: int = 0
     mode: str = NORMAL
     path: Floats = field(default_factory=lambda: np.zeros((0, 3)))
-    skipped: list[tuple[int, str]] = field(default_factory=list)
+    left_out: list[tuple[int, str]] = field(default_factory=list)
     defects: list[str] = field(default_factory=list)
     reached: list[int] = field(default_factory=list)
     _held: int = 0
@@ -142,8 +142,8 @@ class Planner:
             return Command(np.array([robot]), DONE)
         begin = time.process_time()
         planned, given_up = False, -1
-        while not self.done and given_up < len(self.skipped):
-            given_up = len(self.skipped)
+        while not self.done and given_up < len(self.left_out):
+            given_up = len(self.left_out)
             try:
                 planned = self.plan(robot, tether) or planned
             except Exception as error:  # a vehicle in the water must not be left without a command
@@ -319,5 +319,5 @@ class Planner:
         reason : str
             Why; it is logged.
         """
-        self.skipped.append((self.index, reason))
+        self.left_out.append((self.index, reason))
         self._next()

@@ -1,9 +1,9 @@
 """`predictive`: simulates the tether along the coming path before the robot moves.
 
-So the limit is never exceeded on the path that was planned. A waypoint is given up only when no way
-to it is found on which the tether fits; since going all the way back along the tether and then the
-shortest path is among those that are tried, that does not happen to a waypoint whose own shortest
-tether fits (but for the clearance that the robot keeps, and the margin).
+So the limit is never exceeded on the path that was planned. A waypoint is left out only when no
+path to it is found on which the tether fits; since going back to the anchor along the tether and
+then the shortest path is among those that are tried, that does not happen to a waypoint whose own
+shortest tether fits (but for the clearance that the robot keeps, and the margin).
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class PredictivePlanner(Planner):
     name = "predictive"
 
     def plan(self, robot: Floats, tether: Tether) -> bool:
-        """One way per waypoint, planned when the robot sets out for it."""
+        """One path per waypoint, planned when the robot sets out for it."""
         if self._planned == self.index and len(self.path) and not self._surprised(tether):
             return False
         self._planned = self.index
@@ -98,7 +98,7 @@ class PredictivePlanner(Planner):
     def _fits(self, tether: Tether, path: Floats, limit: float) -> bool:
         """Whether the tether stays within the limit all along a path.
 
-        A taut tether gets longer by at most the way its end goes. So between points h apart, with
+        A taut tether gets longer by at most the path of its end. So between points h apart, with
         lengths a and b, it is at most (a + b + h) / 2 long, and only where that is too much need
         one look closer.
         """
@@ -126,10 +126,10 @@ class PredictivePlanner(Planner):
         to a pivot and on from there. One tree serves all pivots.
 
         What a pivot decides is the class of the tether at the target, and with it its length there.
-        Pivots in a row that lead to one class are taken together; classes that are too long need no
+        Pivots in a row that lead to one class are taken together; classes over the limit need no
         more. For the others the path is pulled taut as a whole, the part back along the tether too:
-        there is none shorter in its class. Where the tether is too long on that way, as much of the
-        part back along the tether as need be is left as it is.
+        there is none shorter in its class. Where the tether is over the limit on that path, as much
+        of the part back along the tether as need be is left as it is.
         """
         # the tether back from the robot, finely, off the surfaces; some of its points are pivots
         nodes = tether.nodes[::-1]
@@ -150,7 +150,7 @@ class PredictivePlanner(Planner):
         for first, last in self._classes(back, onward):
             on = onward[last]
             assert on is not None
-            if self._too_long(np.vstack([taken_back(last), on[1:]]), limit):
+            if self._over_the_limit(np.vstack([taken_back(last), on[1:]]), limit):
                 continue
             path = self.pulled(np.vstack([back[: last + 1], on[1:]]))
             whole.append((polylines.length(path), path, first, last))
@@ -204,8 +204,8 @@ class PredictivePlanner(Planner):
                 first = None
         return out
 
-    def _too_long(self, line: Floats, limit: float) -> bool:
-        """Whether a tether that lies along a line is too long even when it is taut."""
+    def _over_the_limit(self, line: Floats, limit: float) -> bool:
+        """Whether a tether that lies along a line is over the limit even when it is taut."""
         return all(self._model.relaxed(line, rounds).length > limit for rounds in ENOUGH_ROUNDS)
 
     def _own_tether(self, target: Floats) -> float | None:

@@ -160,7 +160,7 @@ class DistanceField:
         return np.asarray(sample_many(self.arrays, p.reshape(-1, 3))[:, 0].reshape(p.shape[:-1]))
 
     def gradient(self, points: npt.ArrayLike) -> Floats:
-        """Unit gradients of the distance: the way out, or away from the nearest solid.
+        """Unit gradients of the distance: the direction out, or away from the nearest solid.
 
         Parameters
         ----------

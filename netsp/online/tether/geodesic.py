@@ -45,7 +45,7 @@ class GeodesicTether:
     rounds : int
         At most so many in one update, and one more for every delta / 5 that the robot moved. Where
         the tether slips over an edge it may take a few updates to come to rest; until then its
-        length is too long, and `Tether.residual` above `precision`.
+        length is not the least, and `Tether.residual` above `precision`.
 
     Examples
     --------

@@ -105,7 +105,7 @@ def pull_end(
     residual = 0.0
     ox, oy, oz = strand[end, X], strand[end, Y], strand[end, Z]
     path = math.sqrt((x - ox) ** 2 + (y - oy) ** 2 + (z - oz) ** 2)
-    # the last round's count grows with the way: a node moves by at most a stride in each
+    # the last round's count grows with the path: a node moves by at most a stride in each
     last_rounds = rounds + min(2000, int(path / stride))
     while left > 0.0:
         end = count - 1 if last else 0
@@ -316,7 +316,7 @@ def slide(
     gain: float,
 ) -> tuple[float, float]:
     """One Newton step of the length in the motions of the contacts along their directions. `gain`
-    is what the step before was multiplied by. Returns (largest way still to go, gain)."""
+    is what the step before was multiplied by. Returns (largest distance still to go, gain)."""
     n = count - 2
     if n < 1:
         return 0.0, 1.0
@@ -372,8 +372,8 @@ def slide(
         slope[k] = right / diagonal[k]
         # nothing has farther to go than past its neighbours
         most = max(most, min(abs(slope[k]), around[k]))
-    # e, the way to go, shrinks by gain * s when a step s = c e was taken gain times: c follows from
-    # two steps, and the next is taken 1 / c times
+    # e, the distance to go, shrinks by gain * s when a step s = c e was taken gain times: c follows
+    # from two steps, and the next is taken 1 / c times
     both, last = 0.0, 0.0
     for k in range(n):
         both += slope[k] * strand[k + 1, STEP]

@@ -54,7 +54,7 @@ class BlueRov2:
         self, path: Floats, seconds: float, yaw: float, water: Floats, fresh: bool
     ) -> tuple[list[Floats], int]:
         """See `netsp.online.vehicle.Vehicle`. Control steps take 0.1 s."""
-        stops, behind = [], 0
+        points, behind = [], 0
         if fresh:
             self._carrot = self.position
         for _ in range(max(1, round(seconds / DT))):
@@ -71,8 +71,8 @@ class BlueRov2:
             for _ in range(FINE):
                 self.state = step(self.state, force, water, DT / FINE)
             self._drift += TRUST * (self.state[:3] - expected[:3]) / DT
-            stops.append(self.position)
-        return stops, behind
+            points.append(self.position)
+        return points, behind
 
     def stop_at(self, place: Floats) -> None:
         """See `netsp.online.vehicle.Vehicle`."""

@@ -116,9 +116,9 @@ class KinematicVehicle:
         """
         del water, fresh
         self.yaw += float(np.clip(turned(yaw - self.yaw), -TURN * seconds, TURN * seconds))
-        stops, passed = advance(self.position, path, self.speed * seconds)
-        self.position = stops[-1]
-        return stops, passed
+        points, passed = advance(self.position, path, self.speed * seconds)
+        self.position = points[-1]
+        return points, passed
 
     def stop_at(self, place: Floats) -> None:
         """Be at rest at a place.
@@ -139,12 +139,12 @@ def turned(angle: float) -> float:
 def advance(robot: Floats, path: Floats, step: float) -> tuple[list[Floats], int]:
     """The corners that a robot passes on its next `step` metres of a path, where it ends, and how
     many points of the path it has passed."""
-    stops: list[Floats] = []
+    points: list[Floats] = []
     here, left = robot, step
     for passed, point in enumerate(path):
         far = float(np.linalg.norm(point - here))
         if far > left:
-            return [*stops, here + (point - here) * (left / far)], passed
+            return [*points, here + (point - here) * (left / far)], passed
         here, left = point, left - far
-        stops.append(here)
-    return stops or [robot], len(path)
+        points.append(here)
+    return points or [robot], len(path)
