@@ -9,13 +9,15 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.sparse import lil_array
+from scipy.sparse.csgraph import dijkstra
 
 from netsp import InputError
 from netsp.command.main import main
 from netsp.geometry import polylines
 from netsp.online import Scene
 from netsp.online.mission import Mission
-from netsp.online.paths.tree import Grid, ShortestTree, taut
+from netsp.online.paths.tree import STEPS, Grid, ShortestTree, grow, states_of, taut
 from netsp.online.planner import PLANNERS
 from netsp.online.scene.field import pushed_out
 from netsp.online.simulate import simulate
@@ -262,3 +264,32 @@ def test_a_scene_thinner_than_what_holds_a_tether_is_warned_of(tmp_path, capsys)
         (tmp_path / "m.json").write_text(json.dumps(mission))
         assert main(["simulate", str(tmp_path / "m.json"), "-o", str(tmp_path / "run")]) == 0
         assert ("may slip through; lower the mission's delta" in capsys.readouterr().err) == warned
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    shape=st.tuples(st.integers(1, 7), st.integers(1, 7), st.integers(1, 7)),
+    share=st.sampled_from([0.0, 0.02, 0.1, 0.4]),
+    seed=st.integers(0, 10**6),
+)
+def test_lengths_in_a_grid_are_those_of_dijkstra_over_all_neighbours(shape, share, seed):
+    rng = np.random.default_rng(seed)
+    free = rng.random(shape) >= share
+    root = tuple(int(rng.integers(n)) for n in shape)
+    free[root] = True
+    cells = np.argwhere(free)
+    number = np.full(np.array(shape) + 2, -1)
+    number[1:-1, 1:-1, 1:-1][free] = np.arange(len(cells))
+    graph = lil_array((len(cells), len(cells)))
+    for step in STEPS:
+        to = number[tuple((cells + 1 + step).T)]
+        graph[np.flatnonzero(to >= 0), to[to >= 0]] = np.linalg.norm(step)
+    expected = dijkstra(graph.tocsr(), indices=int(number[tuple(np.add(root, 1))]))
+    lengths, toward = grow(states_of(free), np.array(root), cells)
+    assert lengths == pytest.approx(expected, abs=1e-9)
+    for cell, length in zip(cells, lengths, strict=True):
+        along, at = 0.0, cell
+        while np.isfinite(length) and (step := int(toward[tuple(at)])) < 26:
+            along, at = along + np.linalg.norm(STEPS[step]), at + STEPS[step]
+            assert free[tuple(at)]
+        assert not np.isfinite(length) or along == pytest.approx(length)

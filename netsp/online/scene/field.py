@@ -14,7 +14,8 @@ import numpy.typing as npt
 
 from netsp.arrays import Floats
 from netsp.errors import InputError
-from netsp.online.scene.sampling import Field, candidates, lowest_along, of_solids, sample_many
+from netsp.online.scene import packing
+from netsp.online.scene.sampling import Field, lowest_along, sample_many
 
 ASK_ALL = 6
 """So many solids or fewer are all asked at every point."""
@@ -22,7 +23,7 @@ ASK_ALL = 6
 CELLS = 40
 """Cells along the longest side of the coarse grid that tells which solids may be nearest."""
 
-FILE_VERSION = 1
+FILE_VERSION = 2
 
 
 def finite_point(value: npt.ArrayLike, name: str) -> tuple[float, float, float]:
@@ -117,24 +118,19 @@ class DistanceField:
         DistanceField
             The field.
         """
-        arrays = of_solids(kinds, rows, outline, offset)
+        data = packing.of_solids(kinds, rows, outline)
         if len(kinds) > ASK_ALL and boxes:
             low = np.min([b[0] for b in boxes], axis=0)
             high = np.max([b[1] for b in boxes], axis=0)
             room = 0.25 * float((high - low).max()) + 1e-9
             low, high = low - room, high + room
-            size = float((high - low).max()) / CELLS
-            counts = np.ceil((high - low) / size)
-            near = np.array([*low, size, *counts])
-            cells, items = candidates(arrays, near)
-            arrays = arrays._replace(cells=cells, items=items, near=near)
+            data = packing.with_lookup(data, low, high, float((high - low).max()) / CELLS)
+        voxels = np.empty((0, 0, 0), dtype=np.float32)
         if grid is not None:
-            place = np.array([*grid.origin, grid.size, *grid.solid.ravel()])
-            arrays = arrays._replace(
-                grid=np.ascontiguousarray(grid.values, dtype=np.float32), place=place
-            )
+            voxels = np.ascontiguousarray(grid.values, dtype=np.float32)
+            data = packing.with_voxels(data, grid.origin, grid.size, grid.solid)
         return cls(
-            arrays,
+            Field(data, voxels, float(offset)),
             grid.size if grid is not None else None,
             grid.notes if grid is not None else (),
             tuple(thickness),
@@ -312,7 +308,10 @@ class DistanceField:
     @property
     def box(self) -> Floats | None:
         """(2, 3) bounding box of the voxels' solid part; None without voxels."""
-        return self.arrays.place[4:10].reshape(2, 3).copy() if self.voxel is not None else None
+        if self.voxel is None:
+            return None
+        begin = packing.PLACE + 4
+        return self.arrays.data[begin : begin + 6].reshape(2, 3).copy()
 
     def _points(self, points: npt.ArrayLike) -> Floats:
         p = np.asarray(points, dtype=float)

@@ -297,7 +297,7 @@ def _standing(problem: Problem) -> tuple[Solid, ...]:
 
 
 def encode(solids: tuple[Solid, ...]) -> tuple[list[int], list[list[float]], Floats]:
-    """Kinds, rows and polygon vertices for `netsp.online.scene.sampling.of_solids`."""
+    """Kinds, rows and polygon vertices for `netsp.online.scene.packing.of_solids`."""
     kind: list[int] = []
     rows: list[list[float]] = []
     outline: list[tuple[float, float]] = []

@@ -1,7 +1,8 @@
 """Signed distance and its gradient, exact for each kind of solid. Compiled, no policy.
 
-A solid is a kind and a row of 16 numbers (`netsp.online.primitives` writes them). Distances are to
-the surface, negative inside; gradients are unit vectors away from the solid. Formulas: the closest
+A solid is a kind and a row of up to 16 numbers (`netsp.online.scene.shapes` has them), here from
+place r on in the one vector of a field (`netsp.online.scene.packing`). Distances are to the
+surface, negative inside; gradients are unit vectors away from the solid. Formulas: the closest
 point of each solid, by hand.
 """
 
@@ -15,35 +16,34 @@ from netsp.geometry.kernels import TWO_PI
 
 CAPSULE, CYLINDER, BOX, TORUS, POST, PRISM, HALF_SPACE = range(7)
 
-ROW = 16
-"""Numbers per solid."""
-
 
 @kernel
 def solid_distance(
-    kind: int, row: Floats, outline: Floats, x: float, y: float, z: float
+    data: Floats, at: int, x: float, y: float, z: float
 ) -> tuple[float, float, float, float]:
-    """(d, gx, gy, gz) of one solid at a point.
-
-    Parameters
-    ----------
-    outline
-        (m, 2) vertices of all prisms.
-    """
+    """(d, gx, gy, gz) at a point, of the solid with its kind at data[at] and its row behind."""
+    kind, r = int(data[at]), at + 1
     if kind == CAPSULE:
-        return _capsule(row, x, y, z)
+        return _capsule(data, r, x, y, z)
     if kind == CYLINDER:
-        return _cylinder(row, x, y, z)
+        return _cylinder(data, r, x, y, z)
     if kind == BOX:
-        return _box(row, x, y, z)
+        return _box(data, r, x, y, z)
     if kind == TORUS:
-        return _torus(row, x, y, z)
+        return _torus(data, r, x, y, z)
     if kind == POST:
-        return _round(x - row[0], y - row[1], 0.0, row[2])
+        return _round(x - data[r], y - data[r + 1], 0.0, data[r + 2])
     if kind == PRISM:
-        return _prism(row, outline, x, y)
-    d = (x - row[0]) * row[3] + (y - row[1]) * row[4] + (z - row[2]) * row[5]
-    return d, row[3], row[4], row[5]
+        return _prism(data, r, x, y)
+    px, py, pz = _three(data, r)
+    nx, ny, nz = _three(data, r + 3)
+    return (x - px) * nx + (y - py) * ny + (z - pz) * nz, nx, ny, nz
+
+
+@kernel
+def _three(data: Floats, at: int) -> tuple[float, float, float]:
+    """A point or vector of a row."""
+    return data[at], data[at + 1], data[at + 2]
 
 
 @kernel
@@ -56,37 +56,46 @@ def _round(vx: float, vy: float, vz: float, radius: float) -> tuple[float, float
 
 
 @kernel
-def _capsule(row: Floats, x: float, y: float, z: float) -> tuple[float, float, float, float]:
-    """All points within row[6] of the segment from row[0:3] to row[3:6]."""
-    ax, ay, az = row[3] - row[0], row[4] - row[1], row[5] - row[2]
-    vx, vy, vz = x - row[0], y - row[1], z - row[2]
+def _capsule(
+    data: Floats, r: int, x: float, y: float, z: float
+) -> tuple[float, float, float, float]:
+    """All points within a radius of a segment: its ends (3, 3), radius."""
+    px, py, pz = _three(data, r)
+    qx, qy, qz = _three(data, r + 3)
+    ax, ay, az = qx - px, qy - py, qz - pz
+    vx, vy, vz = x - px, y - py, z - pz
     aa = ax * ax + ay * ay + az * az
     if aa > 0.0:
         t = min(1.0, max(0.0, (vx * ax + vy * ay + vz * az) / aa))
         vx, vy, vz = vx - t * ax, vy - t * ay, vz - t * az
-    return _round(vx, vy, vz, row[6])
+    return _round(vx, vy, vz, data[r + 6])
 
 
 @kernel
-def _cylinder(row: Floats, x: float, y: float, z: float) -> tuple[float, float, float, float]:
-    """A solid cylinder with flat ends: axis from row[0:3] along the unit vector row[3:6] for
-    row[7], radius row[6]."""
-    vx, vy, vz = x - row[0], y - row[1], z - row[2]
-    t = vx * row[3] + vy * row[4] + vz * row[5]
-    qx, qy, qz = vx - t * row[3], vy - t * row[4], vz - t * row[5]
+def _cylinder(
+    data: Floats, r: int, x: float, y: float, z: float
+) -> tuple[float, float, float, float]:
+    """A solid cylinder with flat ends: start (3) and unit vector (3) of its axis, radius,
+    length."""
+    px, py, pz = _three(data, r)
+    ux, uy, uz = _three(data, r + 3)
+    radius, length = data[r + 6], data[r + 7]
+    vx, vy, vz = x - px, y - py, z - pz
+    t = vx * ux + vy * uy + vz * uz
+    qx, qy, qz = vx - t * ux, vy - t * uy, vz - t * uz
     rho = math.sqrt(qx * qx + qy * qy + qz * qz)
     if rho > 0.0:
         qx, qy, qz = qx / rho, qy / rho, qz / rho
     else:
         # on the axis every radial direction is as good: one perpendicular to the axis
-        if abs(row[3]) < 0.6:
-            qx, qy, qz = 0.0, row[5], -row[4]
+        if abs(ux) < 0.6:
+            qx, qy, qz = 0.0, uz, -uy
         else:
-            qx, qy, qz = -row[5], 0.0, row[3]
-        length = math.sqrt(qx * qx + qy * qy + qz * qz)
-        qx, qy, qz = qx / length, qy / length, qz / length
-    side = rho - row[6]
-    end, sign = (t - row[7], 1.0) if t > 0.5 * row[7] else (-t, -1.0)
+            qx, qy, qz = -uz, 0.0, ux
+        norm = math.sqrt(qx * qx + qy * qy + qz * qz)
+        qx, qy, qz = qx / norm, qy / norm, qz / norm
+    side = rho - radius
+    end, sign = (t - length, 1.0) if t > 0.5 * length else (-t, -1.0)
     if side > 0.0 and end > 0.0:
         d = math.hypot(side, end)
         a, b = side / d, sign * end / d
@@ -94,20 +103,21 @@ def _cylinder(row: Floats, x: float, y: float, z: float) -> tuple[float, float, 
         d, a, b = side, 1.0, 0.0
     else:
         d, a, b = end, 0.0, sign
-    return d, a * qx + b * row[3], a * qy + b * row[4], a * qz + b * row[5]
+    return d, a * qx + b * ux, a * qy + b * uy, a * qz + b * uz
 
 
 @kernel
-def _box(row: Floats, x: float, y: float, z: float) -> tuple[float, float, float, float]:
-    """Centre row[0:3], half sizes row[3:6], the three axes row[6:15]."""
-    vx, vy, vz = x - row[0], y - row[1], z - row[2]
+def _box(data: Floats, r: int, x: float, y: float, z: float) -> tuple[float, float, float, float]:
+    """Centre (3), half sizes (3), the three axes (9)."""
+    px, py, pz = _three(data, r)
+    vx, vy, vz = x - px, y - py, z - pz
     best, axis, sign, squares = -math.inf, 0, 1.0, 0.0
     gx, gy, gz = 0.0, 0.0, 0.0
     for k in range(3):
-        ux, uy, uz = row[6 + 3 * k], row[7 + 3 * k], row[8 + 3 * k]
+        ux, uy, uz = _three(data, r + 6 + 3 * k)
         t = vx * ux + vy * uy + vz * uz
         s = 1.0 if t >= 0.0 else -1.0
-        out = abs(t) - row[3 + k]
+        out = abs(t) - data[r + 3 + k]
         if out > best:
             best, axis, sign = out, k, s
         if out > 0.0:
@@ -116,44 +126,49 @@ def _box(row: Floats, x: float, y: float, z: float) -> tuple[float, float, float
     if squares > 0.0:
         d = math.sqrt(squares)
         return d, gx / d, gy / d, gz / d
-    k = 6 + 3 * axis
-    return best, sign * row[k], sign * row[k + 1], sign * row[k + 2]
+    ux, uy, uz = _three(data, r + 6 + 3 * axis)
+    return best, sign * ux, sign * uy, sign * uz
 
 
 @kernel
-def _torus(row: Floats, x: float, y: float, z: float) -> tuple[float, float, float, float]:
-    """All points within row[10] of an arc: centre row[0:3], axis row[3:6], first point in the
-    direction row[6:9] at distance row[9], turning by row[11] about the axis (2 pi: closed)."""
-    vx, vy, vz = x - row[0], y - row[1], z - row[2]
-    h = vx * row[3] + vy * row[4] + vz * row[5]
-    px, py, pz = vx - h * row[3], vy - h * row[4], vz - h * row[5]
-    sx, sy, sz = row[6], row[7], row[8]
+def _torus(data: Floats, r: int, x: float, y: float, z: float) -> tuple[float, float, float, float]:
+    """All points within a radius of an arc: its centre (3), axis (3), direction of its first point
+    (3), radius of the arc, radius about it, angle that it turns by about the axis (2 pi:
+    closed)."""
+    px, py, pz = _three(data, r)
+    ax, ay, az = _three(data, r + 3)
+    sx, sy, sz = _three(data, r + 6)
+    bend, radius, most = data[r + 9], data[r + 10], data[r + 11]
+    vx, vy, vz = x - px, y - py, z - pz
+    h = vx * ax + vy * ay + vz * az
+    px, py, pz = vx - h * ax, vy - h * ay, vz - h * az
     # the third axis: axis x start
-    tx = row[4] * sz - row[5] * sy
-    ty = row[5] * sx - row[3] * sz
-    tz = row[3] * sy - row[4] * sx
+    tx = ay * sz - az * sy
+    ty = az * sx - ax * sz
+    tz = ax * sy - ay * sx
     u, v = px * sx + py * sy + pz * sz, px * tx + py * ty + pz * tz
     angle = math.atan2(v, u)
     if angle < 0.0:
         angle += TWO_PI
-    if angle > row[11]:
+    if angle > most:
         # beyond the ends: the nearer one
-        angle = row[11] if angle - row[11] < TWO_PI - angle else 0.0
-    c, s = row[9] * math.cos(angle), row[9] * math.sin(angle)
+        angle = most if angle - most < TWO_PI - angle else 0.0
+    c, s = bend * math.cos(angle), bend * math.sin(angle)
     return _round(
-        vx - c * sx - s * tx, vy - c * sy - s * ty, vz - c * sz - s * tz, row[10]
+        vx - c * sx - s * tx, vy - c * sy - s * ty, vz - c * sz - s * tz, radius
     )  # fmt: skip
 
 
 @kernel
-def _prism(row: Floats, outline: Floats, x: float, y: float) -> tuple[float, float, float, float]:
-    """A vertical prism without ends over the polygon outline[row[0]:row[1]], grown by row[2]."""
-    start, stop = int(row[0]), int(row[1])
+def _prism(data: Floats, r: int, x: float, y: float) -> tuple[float, float, float, float]:
+    """A vertical prism without ends over a polygon: where its corners (x, y) begin and end in the
+    vector, what it is grown by."""
+    start, stop, grow = int(data[r]), int(data[r + 1]), data[r + 2]
     best, inside = math.inf, False
     vx, vy, nx, ny = 0.0, 0.0, 1.0, 0.0
-    j = stop - 1
-    for i in range(start, stop):
-        ax, ay, bx, by = outline[j, 0], outline[j, 1], outline[i, 0], outline[i, 1]
+    j = stop - 2
+    for i in range(start, stop, 2):
+        ax, ay, bx, by = data[j], data[j + 1], data[i], data[i + 1]
         ex, ey = bx - ax, by - ay
         t = min(1.0, max(0.0, ((x - ax) * ex + (y - ay) * ey) / (ex * ex + ey * ey)))
         qx, qy = x - ax - t * ex, y - ay - t * ey
@@ -169,4 +184,4 @@ def _prism(row: Floats, outline: Floats, x: float, y: float) -> tuple[float, flo
     sign = -1.0 if inside else 1.0
     if d > 1e-12:
         nx, ny = sign * vx / d, sign * vy / d
-    return sign * d - row[2], nx, ny, 0.0
+    return sign * d - grow, nx, ny, 0.0
