@@ -35,3 +35,10 @@ def points_along(path: Floats, step: float) -> Floats:
     n = max(1, int(np.ceil(s[-1] / step)))
     u = np.linspace(0.0, s[-1], n + 1)
     return np.column_stack([np.interp(u, s, path[:, k]) for k in range(path.shape[1])])
+
+
+def part(path: Floats, start: float, end: float) -> Floats:
+    """The part (n, d) of a polyline between two lengths along it, with the points in between."""
+    s = along(path)
+    ends = np.column_stack([np.interp([start, end], s, path[:, k]) for k in range(path.shape[1])])
+    return np.vstack([ends[:1], path[(s > start) & (s < end)], ends[1:]])

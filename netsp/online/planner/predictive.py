@@ -8,14 +8,14 @@ shortest tether fits (but for the clearance that the robot keeps, and the margin
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from netsp.arrays import Floats
 from netsp.geometry import polylines
-from netsp.online.paths.tree import homotopic, taut
+from netsp.online.paths.tree import ever_tauter, homotopic, roughly_taut, taut
 from netsp.online.planner.base import NORMAL, RECOVERY, Planner
 from netsp.online.scene.field import pushed_out
 from netsp.online.tether import GeodesicTether, Tether
@@ -26,11 +26,12 @@ MARGIN = 0.004
 PIVOTS = 24
 """At most so many places along the tether to turn at."""
 
-COARSE = 10.0
-"""The tether is first looked at this much farther apart."""
+ROUGH = 0.9
+"""Pulled taut, a path is seldom shorter than this share of what it is roughly pulled."""
 
-ENOUGH_ROUNDS = 10, 100
-"""Few rounds tell that a tether is short enough, many that it is not."""
+PULL, PULLS, FORESEEN = 10, 10, 2.0
+"""Rounds of a pull, how many pulls at most until a tether counts as taut, and how many times what
+a geometric series would still take away is allowed for."""
 
 
 @dataclass
@@ -98,27 +99,19 @@ class PredictivePlanner(Planner):
     def _fits(self, tether: Tether, path: Floats, limit: float) -> bool:
         """Whether the tether stays within the limit all along a path.
 
-        A taut tether gets longer by at most the path of its end. So between points h apart, with
-        lengths a and b, it is at most (a + b + h) / 2 long, and only where that is too much need
-        one look closer.
+        A taut tether gets longer by at most the path of its end. So as far as what is left of the
+        limit the robot may go at once, and where little is left in small steps.
         """
         most = max(limit, tether.length + 1e-6)
         fine = max(0.5 * self.mission.delta, 0.02)
-        points = polylines.dense(path, COARSE * fine)
-        _, lengths = self.tethers.drive(tether, points)
-        if lengths.max(initial=0.0) > most:
-            return False
-        corners = np.vstack([path[:1], points])
-        steps = np.linalg.norm(np.diff(corners, axis=0), axis=1)
-        close = np.r_[tether.length, lengths[:-1]] + lengths + steps > 2.0 * most
-        if not close.any():
-            return True
-        state = tether
-        for k, near in enumerate(close[: np.flatnonzero(close)[-1] + 1]):
-            stops = polylines.dense(corners[k : k + 2], fine) if near else points[k : k + 1]
-            state, lengths = self.tethers.drive(state, stops)
+        state, s, length = tether, 0.0, polylines.length(path)
+        while s < length:
+            until = min(length, s + max(fine, most - state.length))
+            points = polylines.part(path, s, until)[1:]
+            state, lengths = self.tethers.drive(state, points)
             if lengths.max() > most:
                 return False
+            s = until
         return True
 
     def _shortest_feasible(self, robot: Floats, tether: Tether, limit: float) -> Floats | None:
@@ -146,67 +139,77 @@ class PredictivePlanner(Planner):
             passed = int(np.searchsorted(along, places[i] - 1e-9, side="right"))
             return np.vstack([tether.nodes[: max(1, len(nodes) - passed)], back[i]])
 
-        whole: list[tuple[float, Floats, int, int]] = []
-        for first, last in self._classes(back, onward):
+        whole: list[tuple[float, Floats, int]] = []
+        for last in self._classes(back, onward):
+            on = onward[last]
+            assert on is not None
+            rough = self._roughly_pulled(np.vstack([back[: last + 1], on[1:]]))
+            whole.append((polylines.length(rough), rough, last))
+        best: Floats | None = None
+        least = np.inf
+        for length, rough, last in sorted(whole, key=lambda w: w[0]):
+            if ROUGH * length >= least:
+                break
             on = onward[last]
             assert on is not None
             if self._over_the_limit(np.vstack([taken_back(last), on[1:]]), limit):
                 continue
-            path = self.pulled(np.vstack([back[: last + 1], on[1:]]))
-            whole.append((polylines.length(path), path, first, last))
-        best: Floats | None = None
-        least = np.inf
-        for length, path, first, last in sorted(whole, key=lambda w: w[0]):
+            path = self.pulled(rough)
+            length = polylines.length(path)
             if length >= least:
-                break
+                continue
             if self._fits(tether, path, limit):
-                return path if length < least else best
-            # the more of the tether is taken back, the sooner the rest fits
-            kept: Floats | None = None
-            row = [int(i) for i in pivots if first <= i <= last]
-            while row:
-                i = row[(len(row) - 1) // 2]
-                on = onward[i]
-                assert on is not None
-                on = self.pulled(on)
-                if self._fits(self._model.relaxed(taken_back(i), ENOUGH_ROUNDS[0]), on, limit):
-                    kept = np.vstack([back[: i + 1], on[1:]])
-                    row = [j for j in row if j < i]
+                best, least = path, length
+                continue
+            # the less of the retreat is saved, the sooner the tether fits
+            paths = list(self._ever_tauter(np.vstack([back[: last + 1], on[1:]])))
+            while paths:
+                middle = len(paths) // 2
+                if self._fits(tether, paths[middle], limit):
+                    length = polylines.length(paths[middle])
+                    if length < least:
+                        best, least = paths[middle], length
+                    paths = paths[middle + 1 :]
                 else:
-                    row = [j for j in row if j > i]
-            if (
-                kept is not None
-                and polylines.length(kept) < least
-                and self._fits(tether, kept, limit)
-            ):
-                best, least = kept, polylines.length(kept)
+                    paths = paths[:middle]
         return best
 
-    def _classes(self, back: Floats, onward: Mapping[int, Floats | None]) -> list[tuple[int, int]]:
-        """Pivots in a row often lead to paths of one class: the first and last of each such row."""
-        out: list[tuple[int, int]] = []
-        first: int | None = None
+    def _roughly_pulled(self, path: Floats) -> Floats:
+        return roughly_taut(self.scene, path, self.mission.clearance, self.mission.delta)
+
+    def _ever_tauter(self, path: Floats) -> Iterator[Floats]:
+        return ever_tauter(self.scene, path, self.mission.clearance, self.mission.delta)
+
+    def _classes(self, back: Floats, onward: Mapping[int, Floats | None]) -> list[int]:
+        """Pivots in a row often lead to paths of one class: the last of each such row."""
+        out: list[int] = []
         pivots = list(onward)
         for i, j in zip(pivots, [*pivots[1:], None], strict=True):
             path, after = onward[i], None if j is None else onward[j]
-            if path is None:
-                first = None
-                continue
-            first = i if first is None else first
-            if (
+            if path is not None and (
                 j is None
                 or after is None
                 or not homotopic(
                     self.scene, path, np.vstack([back[i : j + 1], after[1:]]), self.grid.cell
                 )
             ):
-                out.append((first, i))
-                first = None
+                out.append(i)
         return out
 
     def _over_the_limit(self, line: Floats, limit: float) -> bool:
-        """Whether a tether that lies along a line is over the limit even when it is taut."""
-        return all(self._model.relaxed(line, rounds).length > limit for rounds in ENOUGH_ROUNDS)
+        """Whether a tether that lies along a line is over the limit even when it is taut, as far as
+        that can be foreseen: what a pull takes away becomes ever less."""
+        tether = self._model.relaxed(line, PULL)
+        length, less = tether.length, np.inf
+        for _ in range(PULLS):
+            if length <= limit:
+                return False
+            tether = self._model.relaxed(tether.nodes, PULL)
+            before, less, length = less, length - tether.length, tether.length
+            ratio = min(less / before, 0.95) if before > 0.0 else 0.0
+            if length - FORESEEN * less * ratio / (1.0 - ratio) > limit:
+                break
+        return length > limit
 
     def _own_tether(self, target: Floats) -> float | None:
         """Length of the shortest tether from the anchor to a place."""
