@@ -79,7 +79,7 @@ def run(args: argparse.Namespace) -> int:
     from netsp.online.log import describe_run, write_run
     from netsp.online.mission import Mission
     from netsp.online.planner import PLANNERS, PlannerOptions
-    from netsp.online.simulate import simulate
+    from netsp.online.simulate import check_names, simulate
     from netsp.online.tether import GeodesicTether
 
     mission = Mission.load(args.mission)
@@ -89,6 +89,7 @@ def run(args: argparse.Namespace) -> int:
     if args.current is not None:
         changes["current"] = vector(args.current, "--current")
     mission = mission.model_copy(update=changes)
+    check_names(args.planner, args.vehicle, args.tether_model)
     if args.compare is not None and args.compare not in PLANNERS:
         raise InputError(f"--compare: expected {', '.join(PLANNERS)}, got {args.compare!r}")
     show = not args.quiet and sys.stderr.isatty()

@@ -16,13 +16,13 @@ from netsp.online.coverage import Coverage, patches_of
 from netsp.online.log import LogRow, Run
 from netsp.online.mission import Mission
 from netsp.online.paths.tree import Grid
-from netsp.online.planner import Command, Planner, PlannerOptions, make_planner
+from netsp.online.planner import PLANNERS, Command, Planner, PlannerOptions, make_planner
 from netsp.online.planner.base import DONE, Tethers
 from netsp.online.scene.field import DistanceField
 from netsp.online.scene.scene import Scene
 from netsp.online.scene.surfaces import extent
-from netsp.online.tether import GeodesicTether, Tether, make_tether
-from netsp.online.vehicle import Vehicle, make_vehicle
+from netsp.online.tether import TETHERS, GeodesicTether, Tether, make_tether
+from netsp.online.vehicle import VEHICLES, Vehicle, make_vehicle
 from netsp.online.water import Water
 
 STEP = 0.1
@@ -175,6 +175,13 @@ MOST_STEPS, MOST_NODES = 5_000_000, 200_000
 """Steps of a run, and nodes of a tether, beyond which a mission is taken for a mistake of units."""
 
 
+def check_names(planner: object, vehicle: object, tether: object) -> None:
+    """InputError for a name that no record has; before a scene is read, which takes longer."""
+    for known, name in ((PLANNERS, planner), (VEHICLES, vehicle), (TETHERS, tether)):
+        if not callable(name):
+            known.named(name)
+
+
 def _check_size(mission: Mission) -> None:
     """InputError for a mission that would take for ever."""
     places = np.array([mission.start, *mission.waypoints])
@@ -250,6 +257,7 @@ def simulate(
         Before the first step: unknown names, waypoints inside solids, anchor and start not in sight
         of one another, a tether that is shorter than the path between them.
     """
+    check_names(planner, vehicle, tether)
     _check_size(mission)
     scene = scene or mission.load_scene()
     field = field or scene.field()
