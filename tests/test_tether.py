@@ -296,6 +296,26 @@ def test_a_tether_over_a_wreck_stays_taut_where_its_newton_steps_have_no_end(wre
             assert -0.001 * taut <= rested.length - taut <= 0.005 * taut
 
 
+def test_a_tether_comes_off_the_corners_of_a_comb():
+    """Plates in a row, by other hands (free to use). Near a corner two contacts on two edges kept
+    one another back, and a tether in the plane of a plate's end hung at its corner."""
+    data = Path(__file__).parent / "data"
+    model = GeodesicTether(Scene.load(data / "comb.json").field(), 0.1)
+    stops = np.load(data / "comb-stops.npz")["stops"].astype(float)
+    tether, hung = model.start((-4, 0, 0), (-4, 0, -1)), 0
+    for k, place in enumerate(np.vstack([stops, stops[::-1]])):
+        tether = model.update(tether, place)
+        if k % 25 == 0:
+            rested = tether
+            for _ in range(3):
+                rested = model.update(rested, place)
+            taut = model.refine(rested).length
+            assert rested.length >= taut * 0.9995
+            hung += rested.length > 1.005 * taut
+    assert hung <= 3  # of 300
+    assert tether.length == pytest.approx(math.dist((-4, 0, 0), stops[0]), rel=1e-4)
+
+
 def test_a_strand_handed_over_inside_a_cloud_never_grows_without_end(tmp_path):
     """Out of one sheet is into the other where they cross: nodes were put to and fro between both
     sides, ever more of them, and a mission about such a structure froze."""

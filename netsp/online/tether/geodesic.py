@@ -155,8 +155,9 @@ class GeodesicTether:
     def _taut(self, strand: Floats, rounds: int | None = None) -> Tether:
         delta, spread, flat, usual, precision = self._settings
         strand, count, residual = pull(
-            self.field.arrays, strand, len(strand), delta, spread, flat, rounds or usual, precision
-        )
+            self.field.arrays, strand, len(strand), delta, spread, flat, rounds or usual, precision,
+            0,
+        )  # fmt: skip
         return _state(strand, count, residual)
 
     def update(

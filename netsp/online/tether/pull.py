@@ -77,6 +77,13 @@ MOST_GAIN = 10.0
 """Newton steps are lengthened by at most this: where rulings bend, they fall short of the minimum
 by a factor that shows from one step to the next."""
 
+FALLS, MORE_ROUNDS = 0.05, 60
+"""A strand that a round makes shorter by so many strides has come off something: it gets up to so
+many rounds more."""
+
+HALVINGS = 4
+"""How often a step that went too far is halved."""
+
 CONVEX = 0.5
 """Most of a contact's stiffness that convexity may take away: on a sphere all of it goes where the
 strand reaches half way round."""
@@ -130,8 +137,9 @@ def pull_end(
             strand[end, Z] += f * dz
         moved(strand, count, end, f * motion)
         strand, count, residual = pull(
-            field, strand, count, delta, spread, flat, last_rounds if left == 0.0 else 2, precision
-        )
+            field, strand, count, delta, spread, flat, last_rounds if left == 0.0 else 2, precision,
+            MORE_ROUNDS if left == 0.0 else 0,
+        )  # fmt: skip
     return strand, count, residual
 
 
@@ -145,16 +153,20 @@ def pull(
     flat: float,
     rounds: int,
     precision: float,
+    more: int,
 ) -> tuple[Floats, int, float]:
     """Rounds of: put edges back that went too deep, drop nodes that hold nothing, slide the others
-    to where the strand is shortest; until no node moves by more than `precision`."""
+    to where the strand is shortest; until no node moves by more than `precision`. Up to `more`
+    rounds are added for a strand that has come off something."""
     slip, stride = SLIP * delta, STRIDE * delta
     most, damping, gain = 0.0, 1.0, 1.0
     room = count + 64 + int(0.5 * strand_length(strand, count) / slip)
     for i in range(count):
         strand[i, STEP] = 0.0  # steps of another position of the ends say nothing about this one
-    for _ in range(rounds):
-        before = count
+    done = 0
+    while done < rounds:
+        done += 1
+        before, began = count, strand_length(strand, count)
         strand, count = repair(field, strand, count, slip, room)
         changed = count != before
         most = refresh(field, strand, count, spread, flat, stride, delta)
@@ -169,6 +181,11 @@ def pull(
         damping = max(0.1, 0.5 * damping) if longer else min(1.0, 1.5 * damping)
         if not changed and most <= precision:
             break
+        # what has slipped off is followed, as long as that shortens the strand
+        fell = began - strand_length(strand, count)
+        if done == rounds and fell > FALLS * stride and more > 0:
+            more -= 1
+            rounds += 1
     strand, count = repair(field, strand, count, slip, room)
     refresh(field, strand, count, spread, flat, stride, 1e30)  # new nodes only
     return strand, count, most
@@ -269,7 +286,9 @@ def lift(field: Field, strand: Floats, count: int, slip: float, stride: float) -
                 across = math.sqrt(max(force * force - along * along, 0.0))
                 held = pressed > HELD_SHARP * force and pressed > (strand[i, CONE] - LOOSE) * across
             else:
-                held = pressed > HELD * force and strand[i, CONE] * along <= LOOSE * force
+                held = pressed > HELD * force and (
+                    strand[i, CONE] == 0.0 or strand[i, CONE] * along <= -LOOSE * force
+                )
         if h <= (0.125 * slip if held else stride):
             count = remove(strand, count, i)
             lifted = max(lifted, h)
@@ -408,20 +427,34 @@ def slide(
 @kernel
 def put_back(strand: Floats, was: Floats) -> None:
     """Descent: each contact that now makes the strand longer than it would where it was goes back
-    there. Where solids meet in creases, or contacts are nearer to one another than they step, a
-    Newton step need not shorten anything, and what it folds would be mended by more and more
-    nodes."""
+    there, and then a part of its step if that alone makes the strand shorter. Where solids meet in
+    creases, or contacts are nearer to one another than they step, a Newton step need not shorten
+    anything, and what it folds would be mended by more and more nodes."""
+    back, step = np.zeros(len(was), dtype=np.bool_), np.empty((len(was), 3))
     for k in range(len(was)):
         i = k + 1
         here = gap(strand, i - 1, i) + gap(strand, i, i + 1)
-        there = 0.0
-        for j in (i - 1, i + 1):
-            there += math.sqrt(
-                (strand[j, X] - was[k, 0]) ** 2
-                + (strand[j, Y] - was[k, 1]) ** 2
-                + (strand[j, Z] - was[k, 2]) ** 2
-            )
-        if here > there:
+        x, y, z = strand[i, X], strand[i, Y], strand[i, Z]
+        strand[i, X], strand[i, Y], strand[i, Z] = was[k, 0], was[k, 1], was[k, 2]
+        if here <= gap(strand, i - 1, i) + gap(strand, i, i + 1):
+            strand[i, X], strand[i, Y], strand[i, Z] = x, y, z
+        else:
+            back[k] = True
+            step[k, 0], step[k, 1], step[k, 2] = x - was[k, 0], y - was[k, 1], z - was[k, 2]
+    for k in range(len(was)):
+        if not back[k]:
+            continue
+        i, share = k + 1, 1.0
+        there = gap(strand, i - 1, i) + gap(strand, i, i + 1)
+        for _ in range(HALVINGS):
+            share *= 0.5
+            strand[i, X] = was[k, 0] + share * step[k, 0]
+            strand[i, Y] = was[k, 1] + share * step[k, 1]
+            strand[i, Z] = was[k, 2] + share * step[k, 2]
+            if gap(strand, i - 1, i) + gap(strand, i, i + 1) < there:
+                back[k] = False
+                break
+        if back[k]:
             strand[i, X], strand[i, Y], strand[i, Z] = was[k, 0], was[k, 1], was[k, 2]
 
 
