@@ -41,7 +41,7 @@ def good(done: Execution) -> bool:
     s = done.summary
     return (
         s["exceedance_s"] == 0.0
-        and s["as_planned"] == len(done.arrivals)
+        and s["arrivals_as_planned"] == len(done.arrivals)
         and s["home"]
         and s["tether_free"]
         and s["visited"] + len(s["left_out"]) == len(done.problem.goals)
@@ -50,8 +50,8 @@ def good(done: Execution) -> bool:
 
 def table(name: str, runs: list[Execution]) -> None:
     over = [100 * (d.summary["path"] / d.summary["planned_path"] - 1) for d in runs]
-    planning = [e.planning_s for d in runs for e in d.entries if e.done != "kept"]
-    kinds = [e.done for d in runs for e in d.entries]
+    planning = [e.planning_s for d in runs for e in d.entries if e.response != "kept"]
+    kinds = [e.response for d in runs for e in d.entries]
     row(
         name, f"{sum(map(good, runs))} of {len(runs)}",
         f"{sum(d.summary['exceedance_s'] == 0.0 for d in runs)}",

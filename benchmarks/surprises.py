@@ -35,6 +35,8 @@ KINDS = (
     "goal_in_reach", "goal_out_of_reach", "cancel_goal", "shorter_tether", "push_across",
 )  # fmt: skip
 
+RESPONSES = "local", "replan", "home", "kept"
+
 SIDES = 96
 """Of the polygon that stands in for a circle in the judge's visibility graph."""
 
@@ -174,14 +176,14 @@ def faults(done: Execution) -> list[str]:
     s, problem = done.summary, done.problem
     out = []
     if s["defects"]:
-        out.append("defect: " + next(e.reason for e in done.entries if e.done == "defect"))
+        out.append("defect: " + next(e.reason for e in done.entries if e.response == "defect"))
     if not s["home"]:
         out.append("not home")
     elif not s["tether_free"]:
         out.append("tether not free")
     if s["exceedance_s"] > 0.0:
         out.append(f"too long for {s['exceedance_s']:.3g} s")
-    if s["as_planned"] != len(done.arrivals):
+    if s["arrivals_as_planned"] != len(done.arrivals):
         out.append("not as planned")
     last = max((e.time for e in done.entries), default=0.0)
     xy = np.array([[r.x, r.y] for r in done.rows if r.time > last]).reshape(-1, 2)
@@ -239,7 +241,7 @@ def main() -> None:
         row(
             kind, len(runs), sum(not f for _, f in runs),
             sum(d.summary["visited"] for d, _ in runs), sum(len(d.left_out) for d, _ in runs),
-            *(sum(e.done == done for e in entries) for done in ("local", "replan", "home", "kept")),
+            *(sum(e.response == what for e in entries) for what in RESPONSES),
             f"{np.median(spent):.2f}; {max(spent):.2f}",
         )  # fmt: skip
     print()

@@ -117,7 +117,7 @@ def write_text(path: str | Path, text: str) -> None:
         raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
 
 
-def folder_made(folder: str | Path) -> Path:
+def make_folder(folder: str | Path) -> Path:
     """The folder, made if need be.
 
     Raises
@@ -146,7 +146,7 @@ def output_folder(folder: str | Path | None) -> Iterator[None]:
         yield
         return
     there = Path(folder).exists()
-    place = folder_made(folder)
+    place = make_folder(folder)
     try:
         yield
     except BaseException:

@@ -290,10 +290,10 @@ class Problem(Drawn, FileModel):
         ),
     ] = ()
     tether_length: Annotated[
-        Positive, Field(description="most that the tether may be long, in the problem's units")
+        Positive, Field(description="maximum length of the taut tether, in the problem's units")
     ]
     clearance: Annotated[
-        NonNegative, Field(description="kept to all obstacles, in the problem's units")
+        NonNegative, Field(description="distance kept from all obstacles, in the problem's units")
     ] = 0.0
     bounds: Annotated[
         Annotated[

@@ -125,7 +125,7 @@ class Solution(Drawn, FileModel):
     start_tether: Annotated[
         tuple[PathPoint, ...],
         Field(
-            description="the tether at the start where the robot was out already, in "
+            description="the tether at the start if the robot was already out, in "
             "the problem's units"
         ),
     ] = ()

@@ -348,7 +348,7 @@ def _check(
             raise InputError(f"world: {name}: expected more than 0 and at most 1e11, got {value:g}")
     if not 0.0 < radii[0] <= radii[1]:
         raise InputError(
-            f"world: radii: expected 0 < least <= most, got {radii[0]:g} and {radii[1]:g}"
+            f"world: radii: expected 0 < minimum <= maximum, got {radii[0]:g} and {radii[1]:g}"
         )
 
 

@@ -225,7 +225,10 @@ def test_solvers_that_crash_hang_or_eat_cost_one_row_each(tmp_path, monkeypatch)
         (('label = "short"', 'label = "greedy"'), "'greedy' appears twice; give each a label"),
         (("[worlds]", "[worlds]\nfamily = 'reef'"), "family: unknown 'reef'"),
         (("seeds = [0, 1]", "seeds = [0, 1"), "line"),
-        (("obstacles = 6", "radii = [30, 10]"), "radii: expected least <= most, got 30 and 10"),
+        (
+            ("obstacles = 6", "radii = [30, 10]"),
+            "radii: expected minimum <= maximum, got 30 and 10",
+        ),
         (("count = 2", "count = 100000"), "800000 trials; expected at most 500000"),
         (("count = 2", "count = 10000000000"), "line 9: worlds.count"),
         (

@@ -69,7 +69,7 @@ def test_an_obstacle_on_the_way_is_gone_round(world, leg):
     run = execute(problem, solution, FAST, surprises=events({"time": 1.0, "appear": circle}))
     check(run, 8)
     (entry,) = run.entries
-    assert entry.done in ("local", "replan")
+    assert entry.response in ("local", "replan")
     field = Circle(**circle)
     places = np.array([[r.x, r.y] for r in run.rows])
     assert field.signed_distance(places).min() > -0.3
@@ -80,7 +80,7 @@ def test_an_obstacle_elsewhere_changes_nothing(world):
     away = {"center": [-900.0, -900.0], "radius": 5.0}
     run = execute(problem, solution, FAST, surprises=events({"time": 50.0, "appear": away}))
     check(run, 8)
-    assert [e.done for e in run.entries] == ["kept"]
+    assert [e.response for e in run.entries] == ["kept"]
     assert run.summary["path"] == pytest.approx(solution.length, rel=2e-3)
 
 
@@ -185,7 +185,7 @@ def test_a_dynamic_vehicle_in_a_current_carries_it_out_too():
     )  # fmt: skip
     s = run.summary
     assert s["visited"] == len(problem.goals)
-    assert s["as_planned"] == len(problem.goals) + 1
+    assert s["arrivals_as_planned"] == len(problem.goals) + 1
     assert s["exceedance_s"] == 0.0
 
 
@@ -315,14 +315,14 @@ def test_without_repair_nothing_is_mended_and_nothing_forgotten():
         CORNER, solve(CORNER), ExecutionOptions(speed=1.0, repair=False), surprises=events(wall)
     )
     assert set(run.left_out) == {0, 1}
-    assert {e.done for e in run.entries} == {"ignored"}
+    assert {e.response for e in run.entries} == {"ignored"}
 
 
 def test_events_after_the_end_are_said_to_be():
     what = {"time": 1e6, "add_goal": [5, 5]}
     run = execute(CORNER, solve(CORNER), FAST, surprises=events(what))
     assert "after the end" in run.left_out[2]
-    assert run.entries[-1].done == "ignored"
+    assert run.entries[-1].response == "ignored"
 
 
 def test_a_resolution_that_obstacles_slip_through_is_refused():
@@ -399,3 +399,14 @@ def test_a_tether_far_longer_than_its_new_limit_still_comes_home(world):
     assert run.summary["home"]
     assert run.summary["tether_free"]
     assert all("out of reach" in why for why in run.left_out.values())
+
+
+def test_a_goal_that_was_left_out_may_still_be_cancelled():
+    problem = Problem(base=(0, 0), goals=[(4, 0), (0, 4), (-4, 0)], tether_length=6)
+    events = Surprises.model_validate({"events": [
+        {"time": 0.5, "appear": {"center": (0.0, 4.0), "radius": 0.5}},
+        {"time": 2.0, "cancel_goal": 1},
+    ], "schema_version": 1})  # fmt: skip
+    run = execute(problem, solve(problem), surprises=events)
+    assert run.left_out == {}
+    assert run.cancelled == {1}

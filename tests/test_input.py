@@ -57,7 +57,7 @@ def test_a_name_is_drawn_as_it_is_in_every_picture(name, tmp_path):
     code = main(["solve", str(file), "-o", str(tour), "--quiet", "--plot", str(tmp_path / "a.svg"),
                  "--plot-trace", str(tmp_path / "b.svg")])  # fmt: skip
     assert code == 0
-    for k, more in enumerate([["--roadmap", "taut"], ["--classes", "0"], [str(tour)]]):
+    for k, more in enumerate([["--roadmap", "taut"], ["--tethers-to", "0"], [str(tour)]]):
         assert main(["plot", str(file), *more, "-o", str(tmp_path / f"{k}.png")]) == 0
     assert main(["execute", str(file), str(tour), "-o", str(tmp_path / "run"), "--quiet"]) == 0
     page = tmp_path / "page.html"

@@ -127,7 +127,7 @@ def test_advance_passes_corners_and_stops_after_its_step():
 
 def test_waypoints_inside_solids_are_named_or_moved_out():
     inside = [(-2, 1, 0), (0.1, 0, 0), (0, 0.2, 0)]
-    with pytest.raises(InputError, match="waypoints 1, 2 lie inside"):
+    with pytest.raises(InputError, match="waypoints #1, #2 lie inside"):
         fly("predictive", inside, 6.0)
     run = simulate(mission(inside, 6.0), scene=POST, snap=True)
     assert run.summary["visited"] == 3

@@ -81,14 +81,14 @@ class Table(NamedTuple):
     vertex: Ints
 
 
-class State(NamedTuple):
+class Proposal(NamedTuple):
     """What a proposal changes: order of the clusters (legs + 1,); via, the point by way of which
-    each leg goes, or -1 (legs,); the vertices at its stops (legs,), and those of the best valid
+    each leg goes, or -1 (legs,); the vertices at its visits (legs,), and those of the best valid
     state; room for words: stack (3, letters), turns (obstacles + 1,)."""
 
     order: Ints
     via: Ints
-    stops: Ints
+    visits: Ints
     stack: Ints
     turns: Ints
     best: Ints
@@ -147,9 +147,9 @@ def _anneal(run: SolverRun, rng: np.random.Generator, chosen: Params) -> None:
         trie, vertex,
     )  # fmt: skip
     longest = (goals + 1) * 2 * int((detours.row[:, 1:] - detours.row[:, :-1]).max(initial=0)) + 1
-    state = State(
+    state = Proposal(
         order, via,
-        stops=np.zeros(goals + 1, dtype=np.int64),
+        visits=np.zeros(goals + 1, dtype=np.int64),
         stack=np.zeros((3, longest), dtype=np.int64),
         turns=np.zeros(detours.far.shape[2] + 1, dtype=np.int64),
         best=np.zeros(goals + 1, dtype=np.int64),
@@ -213,10 +213,16 @@ def _push(letter: int, size: int, stack: Ints, trie: Ints) -> int:
 
 
 @kernel
-def evaluate(state: State, table: Table) -> tuple[float, int, int]:
-    """Length, entangled obstacles, and goals in a class the tether does not admit; `state.stops`
+def evaluate(state: Proposal, table: Table) -> tuple[float, int, int]:
+    """Length, entangled obstacles, and goals in a class the tether does not admit; `state.visits`
     takes the vertices."""
-    order, via, stops, stack, turns = state.order, state.via, state.stops, state.stack, state.turns
+    order, via, visits, stack, turns = (
+        state.order,
+        state.via,
+        state.visits,
+        state.stack,
+        state.turns,
+    )
     planar, height, letters, row = table.planar, table.height, table.letters, table.row
     trie, vertex = table.trie, table.vertex
     length = 0.0
@@ -238,7 +244,7 @@ def evaluate(state: State, table: Table) -> tuple[float, int, int]:
         if k < legs - 1:
             node = 0 if size == 0 else stack[1, size - 1]
             v = -1 if node < 0 else vertex[node, b]
-            stops[k + 1] = v
+            visits[k + 1] = v
             if v < 0:
                 missed += 1
     # as `netsp.hsignature.entangled`, on the second half of the stack
@@ -272,7 +278,7 @@ def evaluate(state: State, table: Table) -> tuple[float, int, int]:
 
 @kernel
 def anneal(
-    state: State,
+    state: Proposal,
     best_length: float,
     count: int,
     theta: float,
@@ -283,7 +289,7 @@ def anneal(
 ) -> tuple[float, int, float]:
     """Make `count` proposals at temperature θ, in place; returns length and entanglement of the
     present state and the length of the best valid one, whose vertices are in `state.best`."""
-    order, via, stops, best = state.order, state.via, state.stops, state.best
+    order, via, visits, best = state.order, state.via, state.visits, state.best
     planar, far, near = table.planar, table.far, table.near
     legs = len(order) - 1
     obstacles = far.shape[2]
@@ -322,8 +328,8 @@ def anneal(
             length, entangled, missed, cost = new_length, new_entangled, new_missed, new_cost
             if entangled == 0 and missed == 0 and length < best_length:
                 best_length = length
-                for m in range(len(stops)):
-                    best[m] = stops[m]
+                for m in range(len(visits)):
+                    best[m] = visits[m]
         elif leg >= 0:
             via[leg] = kept[0]
         else:

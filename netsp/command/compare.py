@@ -71,7 +71,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument(
         "--scheduler", metavar="ADDRESS", help="run on the Dask cluster at tcp://host:port"
     )
-    p.add_argument("--quiet", action="store_true", help="no progress")
+    p.add_argument("--quiet", action="store_true", help="no progress, no summary")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -91,7 +91,7 @@ def run(args: argparse.Namespace) -> int:
         )
     except KeyboardInterrupt:
         bar.end()
-        messages.error(f"interrupted; {args.output} holds what is done, the same command goes on")
+        messages.error(f"interrupted; {args.output} holds what is done; the same command resumes")
         return EXIT_INTERRUPTED
     bar.end()
     if not args.quiet:

@@ -32,7 +32,7 @@ def compile_messages(stream: TextIO) -> Iterator[None]:
                 return
             kernel = record.data["dispatcher"].py_func
             if kernel.__module__.startswith("netsp."):
-                once = " (once on this machine; `netsp warm-up` does it ahead)"
+                once = " (once per machine; `netsp warm-up` does it ahead of time)"
                 name = kernel.__module__.removeprefix("netsp.")
                 print(
                     f"compiling {name}.{kernel.__name__} …{once if self.last < 0.0 else ''}",

@@ -68,7 +68,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
         help="random seed of gusts and solvers; default 0",
     )
     p.add_argument("-o", "--output", metavar="RUN", help="folder for logs, summary and run.png")
-    p.add_argument("--quiet", action="store_true", help="no progress")
+    p.add_argument("--quiet", action="store_true", help="no progress, no summary")
 
 
 def run(args: argparse.Namespace) -> int:

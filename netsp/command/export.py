@@ -94,7 +94,7 @@ def run(args: argparse.Namespace) -> int:
     goals = sum(p.goal is not None and p.goal >= 0 for p in points)
     seconds = predicted_s(points, settings)
     print(
-        f"{args.output}: {len(points)} waypoints, {goals} of them goals, "
+        f"{args.output}: {len(points)} waypoints, {goals} of them at goals, "
         "all in the class of the plan; "
         f"about {seconds:.0f} s at {settings.speed:g} {problem.units}/s, stops included",
         file=sys.stderr,
@@ -110,7 +110,7 @@ def run(args: argparse.Namespace) -> int:
         shallow = sum(p.position[2] > -SHALLOWEST for p in points)
         if shallow:
             messages.note(
-                f"{counted(shallow, 'waypoint')} above {SHALLOWEST} m depth set to {SHALLOWEST} m"
+                f"{counted(shallow, 'waypoint')} shallower than {SHALLOWEST} m moved to that depth"
             )
         messages.note("home is assumed to be at the surface above the base; do not set it by hand")
     return 0

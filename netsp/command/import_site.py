@@ -28,7 +28,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
         "--clearance",
         type=length,
         metavar="C",
-        help="clearance to obstacles (m); default: from the file, or 0",
+        help="clearance from obstacles (m); default: from the file, or 0",
     )
     p.add_argument(
         "--radius",

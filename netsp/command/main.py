@@ -1,8 +1,8 @@
 """The command line. Data goes to stdout or `-o`, progress and messages to stderr.
 
-Exit codes: 0 done, 1 internal error, 2 bad input, 3 proven infeasible, 4 limit reached without a
-solution, 5 verification failed, 130 interrupted before any result. Heavy modules are imported by
-the commands that need them, so that `--help` is instant.
+Exit codes: 0 done, 1 a defect of netsp, 2 bad input, 3 proven infeasible, 4 no solution within the
+limit or goals left out, 5 verification failed, 130 interrupted before any result. Heavy modules are
+imported by the commands that need them, so that `--help` is instant.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return error.exit_code
     except MemoryError:
         messages.error(
-            "out of memory; lower tether_length, --max-classes or the size of what is asked"
+            "out of memory; lower tether_length, --max-classes or ask for something smaller"
         )
         return EXIT_NOT_ALL
     except KeyboardInterrupt:

@@ -54,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
             s = run.summary
             print(
                 f"{name:<6} inspection {s['inspection_s']:.1f} s, with tether recovery "
-                f"{s['total_s']['tether']:.1f} s, tether at most {s['longest_tether']:.2f} of "
+                f"{s['total_s']['tether']:.1f} s, longest tether {s['longest_tether']:.2f} of "
                 f"{s['tether_length']:g} m, {s['visited']} of {s['waypoints']} visited",
                 file=sys.stderr,
             )

@@ -45,7 +45,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument("--samples", type=positive, metavar="N", help="prm: milestones; default 1000")
     p.add_argument("--seed", type=natural, default=0, metavar="N", help="prm: random seed")
     p.add_argument(
-        "--classes", metavar="GOAL", help="draw all taut tethers to this goal (name or #index)"
+        "--tethers-to", metavar="GOAL", help="draw all taut tethers to this goal (name or #index)"
     )
     p.set_defaults(shortcut=False, max_classes=None, classes_rule=None)
 
@@ -62,16 +62,16 @@ def run(args: argparse.Namespace) -> int:
     from netsp.problem import Problem
 
     style.check_format(args.output)
-    if args.classes is not None:
+    if args.tethers_to is not None:
         if args.solution or args.roadmap:
             raise InputError(
-                "--classes: draws a problem alone; leave out the solution and --roadmap"
+                "--tethers-to: draws a problem alone; give neither a solution nor --roadmap"
             )
         problem = Problem.load(args.problem)
-        plotting.save_classes(problem, _goal_number(problem, args.classes), args.output)
+        plotting.save_classes(problem, _goal_number(problem, args.tethers_to), args.output)
     elif args.roadmap:
         if args.solution:
-            raise InputError("--roadmap: draws a problem alone; leave out the solution")
+            raise InputError("--roadmap: draws a problem alone; give no solution")
         options = roadmap_options(args)
         if args.roadmap == "prm":
             options["seed"] = args.seed
@@ -107,6 +107,6 @@ def _goal_number(problem: Problem, text: str) -> int:
     if number.isdecimal() and len(number) < 10 and int(number) < len(names):
         return int(number)
     raise InputError(
-        f"--classes: no goal {text!r}; expected #0 to #{len(names) - 1}"
+        f"--tethers-to: no goal {text!r}; expected #0 to #{len(names) - 1}"
         + (f" or a name such as {next(n for n in names if n)!r}" if any(names) else "")
     )

@@ -68,7 +68,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
         metavar="RUN",
         help="folder for log.csv, summary.json, run.png and (with plotly) run.html",
     )
-    p.add_argument("--quiet", action="store_true", help="no progress")
+    p.add_argument("--quiet", action="store_true", help="no progress, no summary")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -150,10 +150,10 @@ def show_mission(mission: Mission, units: str) -> Callable[[LogRow, Planner], No
         del planner
         if round(row.time / STEP) % 20:
             return
-        done = int(20 * row.target / count)
+        done = int(20 * row.waypoint / count)
         seen = f"  seen {100 * row.coverage:.0f} %" if mission.camera is not None else ""
         print(
-            f"\r[{'#' * done:.<20}] {row.time:7.1f} s  waypoint {row.target}/{count}  "
+            f"\r[{'#' * done:.<20}] {row.time:7.1f} s  waypoint {row.waypoint}/{count}  "
             f"{row.mode:<8} tether {row.tether:.2f} of {mission.tether_length:g} {units}{seen}   ",
             end="", file=sys.stderr, flush=True,
         )  # fmt: skip

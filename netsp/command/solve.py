@@ -72,7 +72,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
         "--time-limit",
         type=seconds,
         metavar="S",
-        help="seconds for the whole run; default no limit",
+        help="seconds for roadmap, legs and solver together; default no limit",
     )
     p.add_argument(
         "--iteration-limit",

@@ -38,7 +38,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
     )
     p.add_argument(
         "--radii", type=length, nargs=2, default=(10.0, 30.0), metavar="R",
-        help="smallest and largest radius; default 10 30",
+        help="minimum and maximum radius; default 10 30",
     )  # fmt: skip
     p.add_argument(
         "-o", "--output", metavar="FILE", help="write the problem to this file (default: stdout)"

@@ -40,7 +40,7 @@ class Worlds(Model):
     ] = None
     side: Annotated[Positive, Field(description="of the square, in units of length")] = 500.0
     radii: Annotated[
-        tuple[Positive, Positive], Field(description="least and largest radius of obstacles")
+        tuple[Positive, Positive], Field(description="minimum and maximum radius of obstacles")
     ] = (10.0, 30.0)
 
     @model_validator(mode="after")
@@ -49,12 +49,12 @@ class Worlds(Model):
             raise ValueError(f"family: unknown {self.family!r}; expected one of {_list(FAMILIES)}")
         if self.radii[0] > self.radii[1]:
             raise ValueError(
-                f"radii: expected least <= most, got {self.radii[0]:g} and {self.radii[1]:g}"
+                f"radii: expected minimum <= maximum, got {self.radii[0]:g} and {self.radii[1]:g}"
             )
         return self
 
 
-class Roadmap(Model):
+class StudyRoadmap(Model):
     """A roadmap by name, with options; `label` tells it apart in the results."""
 
     name: Annotated[str, Field(description="taut, prm or one of another package")] = "taut"
@@ -72,7 +72,7 @@ class Roadmap(Model):
         return self
 
 
-class Solver(Model):
+class StudySolver(Model):
     """A solver by name, with options and limits of its own; `label` tells it apart."""
 
     name: Annotated[str, Field(description="one of netsp or of another package")]
@@ -124,10 +124,10 @@ class Study(Model):
     ]
     worlds: Annotated[Worlds, Field(description="which random worlds")] = Worlds()
     roadmaps: Annotated[
-        Annotated[tuple[Roadmap, ...], Field(min_length=1)], Field(description="tried each")
-    ] = (Roadmap(),)
+        Annotated[tuple[StudyRoadmap, ...], Field(min_length=1)], Field(description="tried each")
+    ] = (StudyRoadmap(),)
     solvers: Annotated[
-        Annotated[tuple[Solver, ...], Field(min_length=1)], Field(description="tried each")
+        Annotated[tuple[StudySolver, ...], Field(min_length=1)], Field(description="tried each")
     ]
     seeds: Annotated[
         Annotated[tuple[Natural, ...], Field(min_length=1)], Field(description="of the solvers")
@@ -193,7 +193,13 @@ class Study(Model):
                                 yield self._trial(world, goals, tether, roadmap, solver, seed)
 
     def _trial(
-        self, world: int, goals: int, tether: float, roadmap: Roadmap, solver: Solver, seed: int
+        self,
+        world: int,
+        goals: int,
+        tether: float,
+        roadmap: StudyRoadmap,
+        solver: StudySolver,
+        seed: int,
     ) -> Trial:
         recipe = self.worlds.model_dump(mode="json", exclude={"count", "first"})
         return Trial(

@@ -49,11 +49,11 @@ class Event(Model):
     vanish : int, str or None
         An obstacle that is not there after all.
     move : Move or None
-        An obstacle that is elsewhere.
+        An obstacle that moves.
     add_goal : Goal or None
-        A goal more.
+        Another goal.
     cancel_goal : int, str or None
-        A goal less.
+        A goal that need not be visited any more.
     push : (x, y, z) or None
         How far the robot is carried off, in the problem's units.
     tether_length : float or None
@@ -67,8 +67,8 @@ class Event(Model):
     vanish: Annotated[
         Which | None, Field(description="name or index from 0 of an obstacle that is gone")
     ] = None
-    move: Annotated[Move | None, Field(description="an obstacle that is elsewhere")] = None
-    add_goal: Annotated[GoalLike | None, Field(description="a goal more")] = None
+    move: Annotated[Move | None, Field(description="an obstacle that moves")] = None
+    add_goal: Annotated[GoalLike | None, Field(description="another goal")] = None
     cancel_goal: Annotated[
         Which | None, Field(description="name or index from 0 of a goal that need not be visited")
     ] = None
@@ -77,7 +77,7 @@ class Event(Model):
         Field(description="(x, y, z) by which the robot is displaced, in the problem's units"),
     ] = None
     tether_length: Annotated[
-        Positive | None, Field(description="of the tether from now on, in the problem's units")
+        Positive | None, Field(description="tether length from now on, in the problem's units")
     ] = None
 
     @model_validator(mode="after")

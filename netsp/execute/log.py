@@ -138,8 +138,8 @@ class Entry:
         Seconds since the start.
     event : str
         What happened.
-    done : str
-        What was done.
+    response : str
+        What was done about it.
     reason : str
         Why.
     planning_s : float
@@ -148,7 +148,7 @@ class Entry:
 
     time: float
     event: str
-    done: str
+    response: str
     reason: str
     planning_s: float = 0.0
 
@@ -208,7 +208,7 @@ class Execution(Drawn):
         s = self.summary
         return (
             f"<Execution of {self.problem.name!r}: {counted(s['visited'], 'goal')} in "
-            f"{s['time_s']:.1f} s, tether at most {s['longest_tether']:.4g} of "
+            f"{s['time_s']:.1f} s, longest tether {s['longest_tether']:.4g} of "
             f"{s['tether_length']:g}>"
         )
 
@@ -228,7 +228,7 @@ class Execution(Drawn):
             "path": self.walked,
             "planned_path": self.solution.length,
             "visited": len(goals),
-            "as_planned": sum(a.as_planned for a in self.arrivals),
+            "arrivals_as_planned": sum(a.as_planned for a in self.arrivals),
             "left_out": [{"goal": g, "reason": why} for g, why in sorted(self.left_out.items())],
             "cancelled": sorted(self.cancelled),
             "longest_tether": max((r.tether for r in self.rows), default=0.0),
@@ -237,8 +237,8 @@ class Execution(Drawn):
             "shortening_s": float(np.array(steps)[shortening].sum()) if self.rows else 0.0,
             "home": bool(self.arrivals and self.arrivals[-1].goal == HOME),
             "tether_free": self.free,
-            "defects": sum(e.done == "defect" for e in self.entries),
-            "repairs": sum(e.done in ("local", "replan", "home") for e in self.entries),
+            "defects": sum(e.response == "defect" for e in self.entries),
+            "repairs": sum(e.response in ("local", "replan", "home") for e in self.entries),
             "planning_worst_s": max((e.planning_s for e in self.entries), default=0.0),
             "wall_s": self.wall_s,
         }
@@ -262,10 +262,10 @@ def describe_execution(done: Execution) -> str:
     every_goal = not (s["cancelled"] or s["left_out"])
     lines = [
         f"run      {s['problem']}: {s['status']} after {s['time_s']:.1f} s",
-        f"visited  {counted(s['visited'], 'goal')}{_class_of(s['as_planned'], done.arrivals)}",
+        f"visited  {counted(s['visited'], 'goal')}{_class_of(done.arrivals)}",
         f"path     {s['path']:.6g} {units}"
         + (f", {_beside(s['path'] / planned)}" if planned and every_goal else ""),
-        f"tether   at most {s['longest_tether']:.6g} of {s['tether_length']:g} {units}, over the "
+        f"tether   longest {s['longest_tether']:.6g} of {s['tether_length']:g} {units}, over the "
         f"limit for {s['exceedance_s']:.1f} s, "
         + (
             "recovered free at the base" if s["tether_free"] and s["home"] else "not recovered free"
@@ -273,20 +273,21 @@ def describe_execution(done: Execution) -> str:
     ]
     for e in done.entries:
         lines += [
-            f"event    {e.event} at {e.time:.1f} s: {e.done}, planned in {e.planning_s:.2f} s",
+            f"event    {e.event} at {e.time:.1f} s: {e.response}, planned in {e.planning_s:.2f} s",
             f"         {e.reason}",
         ]
     lines += [
         f"left out {done.problem.goal_label(x['goal'])}: {x['reason']}" for x in s["left_out"]
     ]
+    lines += [f"cancelled {done.problem.goal_label(g)}" for g in s["cancelled"]]
     return "\n".join(lines)
 
 
-def _class_of(as_planned: int, arrivals: list[Arrival]) -> str:
+def _class_of(arrivals: list[Arrival]) -> str:
     """In how many of the arrivals, home among them, the tether was as planned."""
-    if as_planned == len(arrivals):
+    others = sum(not a.as_planned for a in arrivals)
+    if not others:
         return ", the tether always in the planned class"
-    others = len(arrivals) - as_planned
     return f", the tether in another class than planned at {others} of {len(arrivals)} arrivals"
 
 

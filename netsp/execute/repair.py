@@ -97,8 +97,8 @@ def broken(problem: Problem, tether: Floats, legs: list[Leg]) -> tuple[str | Non
             return f"no tether of the planned class reaches {_label(problem, leg)}", legs
         if needs > problem.tether_length + tethers.margin:
             return (
-                f"the tether is too short at {_label(problem, leg)}: {needs:.6g} of "
-                f"{problem.tether_length:g}"
+                f"the tether would be over the limit at {_label(problem, leg)}: {needs:.6g} of "
+                f"{problem.tether_length:g} {problem.units}"
             ), legs
         now.append(Leg(leg.goal, leg.path, word, needs))
     return ("the tether would not be free at the base", legs) if word else (None, now)
@@ -125,7 +125,7 @@ def _in_the_way(problem: Problem, path: Floats) -> int | None:
     return None
 
 
-def made_ready() -> None:
+def make_ready() -> None:
     """Have everything loaded that a repair needs, and compiled on a machine that never did: it
     would take its time from planning."""
     tiny = Problem(
@@ -199,7 +199,7 @@ def reachable(problem: Problem, left: list[int]) -> tuple[list[int], list[tuple[
     beyond = [k for k in range(len(order)) if needs[k] > problem.tether_length + paths.margin]
     for k in beyond:
         why = explain_unreached(plain, paths.outline, [k + 1])
-        left_out.append((order[k], why.replace(plain.goal_label(k), problem.goal_label(order[k]))))
+        left_out.append((order[k], why.removeprefix(f"{plain.goal_label(k)} ")))
     return [g for k, g in enumerate(order) if k not in beyond], left_out
 
 

@@ -13,7 +13,7 @@ from netsp.execute.aside import aside
 from netsp.execute.events import Event, Surprises, changed, index_of
 from netsp.execute.log import Arrival, Entry, Execution, ExecutionOptions, ExecutionRow
 from netsp.execute.plan import HOME, Leg, legs_of
-from netsp.execute.repair import Repair, broken, made_ready, reachable, repair
+from netsp.execute.repair import Repair, broken, make_ready, reachable, repair
 from netsp.fields import LARGEST, checked_argument, checked_instance
 from netsp.geometry import polylines
 from netsp.hsignature import signature
@@ -31,7 +31,7 @@ HOLD_STEP = 0.1
 """Seconds between two rows of the log while the robot holds its place."""
 
 LEG_ALLOWANCE = 3.0
-"""A leg is given up when it takes this many times as long as it should, and a minute."""
+"""A goal is left out when its leg takes this many times as long as it should, and a minute."""
 
 
 class _Run:
@@ -104,7 +104,7 @@ class _Run:
         if len(self.path) == 1 and float(np.linalg.norm(self.vehicle.position - end)) <= near:
             self._arrive()
         elif self.leg_s > 60.0 + LEG_ALLOWANCE * self.legs[0].length / self.options.speed:
-            self._lose(self.legs[0].goal, "not reached in time")
+            self._leave_out(self.legs[0].goal, "not reached in time")
 
     def _arrive(self) -> None:
         leg = self.legs.pop(0)
@@ -121,10 +121,10 @@ class _Run:
         if self.legs:
             self.path, self.fresh = self.legs[0].path, True
 
-    def _lose(self, goal: int, why: str) -> None:
+    def _leave_out(self, goal: int, why: str) -> None:
         if goal == HOME:
             self.legs = []
-            self._enter_log("left out", "given up", f"the base was {why}", 0.0)
+            self._enter_log("left out", "ignored", f"the base was {why}", 0.0)
             return
         self.out.left_out[goal] = why
         if not self.options.repair:
@@ -155,18 +155,22 @@ class _Run:
             before = self.problem
             self._enter_changed(event)
             if event.kind == "add_goal":
-                left, must = [*left, len(before.goals)], "a goal was added"
+                new = len(before.goals)
+                left, must = [*left, new], f"{self.problem.goal_label(new)} was added"
             elif event.cancel_goal is not None:
                 gone = index_of(event.cancel_goal, list(before.goals), "cancel_goal")
                 if gone in left:
-                    left, must = [g for g in left if g != gone], "a goal was cancelled"
-                    if self.options.repair:
-                        self.out.cancelled.add(gone)
+                    left = [g for g in left if g != gone]
+                    must = f"{before.goal_label(gone)} was cancelled"
+                if self.options.repair and (gone in self.left or gone in self.out.left_out):
+                    self.out.left_out.pop(gone, None)
+                    self.out.cancelled.add(gone)
         if event.tether_length is not None and self.tether.length > event.tether_length:
             self.shorten = True
         back = self._in_reach_again() if self.options.repair else []
         if back:
-            left, must = [*left, *back], "goals are within reach again"
+            names = ", ".join(map(self.problem.goal_label, back))
+            left, must = [*left, *back], f"within reach again: {names}"
             for goal in back:
                 del self.out.left_out[goal]
         if must is None:
@@ -270,8 +274,8 @@ class _Run:
             self.now = min(self.now + HOLD_STEP, until)
         self.mode = mode
 
-    def _enter_log(self, event: str, done: str, reason: str, spent: float) -> None:
-        self.out.entries.append(Entry(round(self.now, 6), event, done, reason, spent))
+    def _enter_log(self, event: str, response: str, reason: str, spent: float) -> None:
+        self.out.entries.append(Entry(round(self.now, 6), event, response, reason, spent))
 
 
 def execute(
@@ -344,7 +348,7 @@ def execute(
             f"thinnest obstacle, got {options.delta!r}"
         )
     if surprises.events and options.repair:
-        made_ready()
+        make_ready()
     begin = time.perf_counter()
     run = _Run(problem, solution, options)
     coming = sorted(surprises.events, key=lambda e: e.time)
@@ -363,12 +367,12 @@ def execute(
         run.out.interrupted = True
     run.out.tethers.append((round(run.now, 6), run.tether.nodes.copy()))
     # a corner may have held it back for the few rounds of an update
-    run.out.free = is_free(run.model.refine(run.tether), run.delta)
+    run.out.free = tether_is_free(run.model.refine(run.tether), run.delta)
     run.out.wall_s = time.perf_counter() - begin
     return run.out
 
 
-def is_free(tether: Tether, delta: float) -> bool:
-    """Whether a tether can be taken in: straight to the robot, resting on nothing."""
+def tether_is_free(tether: Tether, delta: float) -> bool:
+    """Whether a tether can be recovered: straight to the robot, resting on nothing."""
     straight = float(np.linalg.norm(tether.robot - tether.anchor))
     return len(tether.nodes) == 2 and tether.length - straight <= 1e-6 * delta

@@ -11,12 +11,12 @@ from pathlib import Path
 from typing import Any
 
 from netsp.execute.log import Execution
-from netsp.files import cell, folder_made, write_text
+from netsp.files import cell, make_folder, write_text
 
 
 def write_execution(done: Execution, folder: str | Path) -> None:
     """log.csv, visits.csv, events.csv, tethers.json, summary.json, and the problem and solution."""
-    place = folder_made(folder)
+    place = make_folder(folder)
     write_text(place / "log.csv", _table([asdict(r) for r in done.rows]))
     visits = [
         {**asdict(a), "word": " ".join(map(str, a.word)), "planned": " ".join(map(str, a.planned)),

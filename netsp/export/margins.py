@@ -20,7 +20,7 @@ def warnings(
     if longest is not None and problem.tether_length - longest.tether_length < slack:
         left = problem.tether_length - longest.tether_length
         out.append(
-            f"only {left:.2f} {problem.units} of tether are left at "
+            f"only {left:.2f} {problem.units} of tether is left at "
             f"{problem.goal_label(longest.goal)}, less than the margin of {slack:g}: plan with a "
             "shorter tether_length, or set another margin"
         )

@@ -269,13 +269,13 @@ def _geojson(
             "geometry": {"type": shape, "coordinates": coordinates},
         }  # fmt: skip
 
-    stops = {p.goal: (n, p) for n, p in enumerate(q for q in points if q.goal not in (None, HOME))}
+    visits = {p.goal: (n, p) for n, p in enumerate(q for q in points if q.goal not in (None, HOME))}
     features = [
         feature("base", "Point", lonlat(problem.base[:2], problem.base[2]),
                 tether_length=problem.tether_length, clearance=problem.clearance)
     ]  # fmt: skip
     for k, goal in enumerate(problem.goals):
-        visit, point = stops.get(k, (None, None))
+        visit, point = visits.get(k, (None, None))
         features.append(
             feature(
                 "goal", "Point", lonlat(goal.position[:2], goal.position[2]), name=goal.name,

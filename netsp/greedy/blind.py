@@ -69,16 +69,16 @@ def _nearest_neighbour(run: SolverRun) -> Trajectory | None:
         left.remove(here)
         order.append(here)
     run.iterations = 1
-    stops = [0, *order, 0]
+    visits = [0, *order, 0]
     words: list[Word] = [()]
-    for a, b in pairwise(stops):
+    for a, b in pairwise(visits):
         words.append(concatenate(words[-1], detours.word(a, b)))
     tour = graph.vertices_of(order, words[1:-1])
     if not words[-1] and tour is not None:
         # it happens to keep all promises; the walk is the same, for its legs are taut
         run.update_incumbent([0, *tour])
         return None
-    legs = [detours.path(a, b) for a, b in pairwise(stops)]
+    legs = [detours.path(a, b) for a, b in pairwise(visits)]
     path = np.vstack([legs[0], *(leg[1:] for leg in legs[1:])])
-    length = sum(detours.length(a, b) for a, b in pairwise(stops))
+    length = sum(detours.length(a, b) for a, b in pairwise(visits))
     return Trajectory(tuple(order), tuple(words[1:-1]), words[-1], path, length)

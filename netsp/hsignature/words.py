@@ -88,7 +88,7 @@ def invert(word: Iterable[int]) -> Word:
 def is_looping(word: Word) -> bool:
     """Whether a signed letter occurs twice in a reduced word.
 
-    The tether then passes the same gap twice in the same sense, so it is wound around something.
+    The tether then passes the same gap twice in the same sense, so it wraps something.
     ``(1, -2, -1)`` does not loop, ``(1, 2, 1)`` does. This is the non-looping constraint of
     McCammon & Hollinger 2017, section IV-A, in the form of the authors' later code.
 

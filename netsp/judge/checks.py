@@ -20,7 +20,7 @@ from netsp.judge.stringpull import PLACE_TOLERANCE, StringPuller, reduce_sleeve
 from netsp.problem import Circle, Problem
 from netsp.solution import Solution, Status
 
-STAND_OFF = 3e-8
+STAND_OFF_ALLOWANCE = 3e-8
 """As a share of the problem's size, what standing off from a boundary may add to a length."""
 
 LENGTH_TOLERANCE = 1e-3
@@ -131,8 +131,8 @@ class _Judge:
         near = [float(o.signed_distance(xy).min()) - problem.clearance for o in problem.obstacles]
         if min(near, default=np.inf) < self.place:
             # the offline geometry stands off from boundaries, which moves the ends of its paths
-            self.tiny += STAND_OFF * problem.scale
-        self.stops: list[int] = []
+            self.tiny += STAND_OFF_ALLOWANCE * problem.scale
+        self.visits: list[int] = []
 
     def run(self) -> list[Check]:
         checks = [self._belongs()]
@@ -170,7 +170,7 @@ class _Judge:
         """The path starts at the problem's state, with a tether of the state's word."""
         name, state = "starts at the state", self.problem.state
         if state is None or self.out < 2 or len(self.path) < self.out + 1:
-            return Check(name, False, "problem and solution disagree on whether there is one")
+            return Check(name, False, "only one of problem and solution has a starting state")
         tether = self.path[: self.out]
         miss = max(
             np.linalg.norm(self.path[k] - np.array(state.position))
@@ -201,7 +201,7 @@ class _Judge:
         unknown = sorted(set(order) - set(goals))
         if missing or repeated or unknown:
             parts = [
-                f"{what} {', '.join(map(str, which))}"
+                f"{what}: {', '.join(map(self._goal, which))}"
                 for what, which in (
                     ("missing", missing),
                     ("repeated", repeated),
@@ -209,12 +209,16 @@ class _Judge:
                 )
                 if which
             ]
-            return Check("names every goal once", False, "goals " + "; ".join(parts))
+            return Check("names every goal once", False, "; ".join(parts))
         return Check("names every goal once", True, f"{len(order)} goals")
 
+    def _goal(self, k: int) -> str:
+        """A goal that the solution names; the problem may have no such."""
+        return self.problem.goal_label(k) if k < len(self.problem.goals) else f"goal #{k}"
+
     def _visited(self) -> Check:
-        """Find for each stop the path vertex at its goal, in order; several vertices may lie there,
-        so the first with the stated word is taken."""
+        """Find for each visit the path vertex at its goal, in order; several may lie there, so the
+        first with the stated word is taken."""
         rays = self.problem.representative_points
         at = 0
         word: Word = ()
@@ -236,7 +240,7 @@ class _Judge:
             words = [concatenate(word, crossings(self.path[at : k + 1], rays)) for k in candidates]
             pick = next((i for i, w in enumerate(words) if w == reduce(visit.signature)), 0)
             at, word = int(candidates[pick]), words[pick]
-            self.stops.append(at)
+            self.visits.append(at)
         return Check("visits every goal in order", True, f"{len(self.path)} path points")
 
     def _clear(self) -> Check:
@@ -294,7 +298,7 @@ class _Judge:
         rays = self.problem.representative_points
         word: Word = ()
         before = 0
-        for visit, stop in zip(self.solution.tour, self.stops, strict=True):
+        for visit, stop in zip(self.solution.tour, self.visits, strict=True):
             word = concatenate(word, crossings(self.path[before : stop + 1], rays))
             before = stop
             if word != tuple(visit.signature):
@@ -304,12 +308,16 @@ class _Judge:
                     f"at {self.problem.goal_label(visit.goal)} the path writes {list(word)}, "
                     f"the solution says {list(visit.signature)}",
                 )
-        return Check("tether word at every goal", True, f"{len(self.stops)} words agree")
+        return Check("tether word at every goal", True, f"{len(self.visits)} words agree")
 
     def _empty(self) -> Check:
         word = reduce(crossings(self.path, self.problem.representative_points))
         if self.solution.entangled and not word:
-            stated = ", ".join(map(str, self.solution.entangled))
+            known = range(len(self.problem.obstacles))
+            stated = ", ".join(
+                self.problem.obstacle_name(k) if k in known else f"#{k}"
+                for k in self.solution.entangled
+            )
             return Check(
                 "total word is empty",
                 False,
@@ -337,7 +345,7 @@ class _Judge:
         pulled_total = 0.0
         fits: tuple[float, str] = (-np.inf, "")
         wrong: tuple[float, str] = (-np.inf, "")
-        stops = [*((v.goal + 1, s) for v, s in zip(self.solution.tour, self.stops, strict=True))]
+        stops = [*((v.goal + 1, s) for v, s in zip(self.solution.tour, self.visits, strict=True))]
         stops.append((0, len(self.path) - 1))
         for k, (point, stop) in enumerate(stops):
             leg = [c for piece in pieces[before:stop] for c in piece]
@@ -381,7 +389,7 @@ class _Judge:
     def _length(self) -> Check:
         stated = float(self.solution.length or 0.0)
         drawn = float(np.linalg.norm(np.diff(self.path[self.out :], axis=0), axis=1).sum())
-        tiny = self.tiny * (len(self.stops) + 1)
+        tiny = self.tiny * (len(self.visits) + 1)
         ok = (
             self.pulled_total <= stated * (1.0 + 1e-7) + tiny
             and stated <= drawn * (1.0 + 1e-7) + tiny

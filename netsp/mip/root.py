@@ -77,7 +77,7 @@ class Pace:
         """At first, and whenever enough rounds have passed."""
         return self.rounds % self.every == 0
 
-    def looked(self, *, idle: bool) -> None:
+    def note_look(self, *, idle: bool) -> None:
         """Looks that bring nothing become seldom."""
         self.rounds = 1
         self.every = min(2 * self.every, PRICE_SELDOM) if idle else PRICE_EVERY
@@ -214,7 +214,7 @@ class Root:
         risen = (run.bound or 0.0) - before
         # where vertices were forgotten the legs are counted anew
         brought = len(self.lp.legs) - legs if self.point is not None else legs
-        pace.looked(idle=brought < HARDLY * legs and risen < WORTH * (run.length - before))
+        pace.note_look(idle=brought < HARDLY * legs and risen < WORTH * (run.length - before))
         return priced, risen > RISEN * abs(before)
 
     def measure(self) -> None:

@@ -31,7 +31,7 @@ class LogRow:
         Position, metres, up.
     yaw : float
         Heading, radians.
-    target : int
+    waypoint : int
         The waypoint that is next.
     mode : str
         As of `netsp.online.planner.Command`.
@@ -50,7 +50,7 @@ class LogRow:
     y: float
     z: float
     yaw: float
-    target: int
+    waypoint: int
     mode: str
     tether: float
     coverage: float
@@ -89,7 +89,7 @@ class Run(Drawn):
         s = self.summary
         return (
             f"<Run of {s['mission']!r} by {self.planner}: {s['visited']} of {s['waypoints']} "
-            f"waypoints in {s['inspection_s']:.1f} s, tether at most {s['longest_tether']:.4g} "
+            f"waypoints in {s['inspection_s']:.1f} s, longest tether {s['longest_tether']:.4g} "
             f"of {s['tether_length']:g}>"
         )
 
@@ -169,7 +169,9 @@ def describe_run(run: Run, units: str) -> str:
             f"{1e3 * s['control_worst_s']:.0f} ms; "
             f"{s['inspection_s'] / s['wall_s']:.0f} x real time"
         )
-    lines += [f"left out {left['waypoint']}: {left['reason']}" for left in s["left_out"][:5]]
+    lines += [
+        f"left out waypoint #{left['waypoint']}: {left['reason']}" for left in s["left_out"][:5]
+    ]
     if len(s["left_out"]) > 5:
         lines.append(f"         and {len(s['left_out']) - 5} more")
     return "\n".join(lines)

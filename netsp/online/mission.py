@@ -24,21 +24,21 @@ class Camera(Model):
     range : float
         Metres.
     field_of_view : float
-        Degrees to either side.
+        Full angle, degrees.
     tilt : float
-        Degrees that it turns up or down at most.
+        Maximum angle that it turns up or down, degrees.
     patch : float
         Metres; pieces of surface that coverage is counted in.
     """
 
-    range: Annotated[Positive, Field(description="farthest that is seen, m")] = 2.0
+    range: Annotated[Positive, Field(description="range of sight, m")] = 2.0
     field_of_view: Annotated[
         Annotated[float, Field(gt=0.0, lt=180.0)],
-        Field(description="full angle of the cone, degrees"),
+        Field(description="full angle of the square field of view, degrees"),
     ] = 70.0
     tilt: Annotated[
         Annotated[float, Field(ge=0.0, le=90.0)],
-        Field(description="steepest angle between line of sight and surface normal, degrees"),
+        Field(description="maximum angle that it turns up or down, degrees"),
     ] = 90.0
     patch: Annotated[Positive, Field(description="edge of the patches that are counted, m")] = 0.1
 
@@ -92,14 +92,16 @@ class Mission(FileModel):
     scene: Annotated[str, Field(description="scene file, relative to this one")]
     anchor: Annotated[Point3, Field(description="(x, y, z) where the tether is fixed, m")]
     start: Annotated[
-        Point3, Field(description="(x, y, z) of the robot at first, in sight of the anchor, m")
+        Point3, Field(description="(x, y, z) where the robot starts, in sight of the anchor, m")
     ]
     waypoints: Annotated[
         Annotated[tuple[Point3, ...], Field(min_length=1)],
         Field(description="(x, y, z) to reach in this order, m"),
     ]
-    tether_length: Annotated[Positive, Field(description="most that the tether may be long, m")]
-    clearance: Annotated[NonNegative, Field(description="that paths keep to all solids, m")] = 0.2
+    tether_length: Annotated[Positive, Field(description="maximum length of the taut tether, m")]
+    clearance: Annotated[
+        NonNegative, Field(description="distance that paths keep from all solids, m")
+    ] = 0.2
     reach: Annotated[
         Positive, Field(description="distance at which a waypoint counts as reached, m")
     ] = 0.1
@@ -164,7 +166,7 @@ class Mission(FileModel):
             return self
         if not snap:
             raise InputError(
-                f"waypoints {', '.join(map(str, inside[:10]))}"
+                f"waypoints {', '.join(f'#{k}' for k in inside[:10])}"
                 f"{' …' if len(inside) > 10 else ''} lie inside a solid; expected points in the "
                 "water, or snap"
             )

@@ -32,7 +32,7 @@ FRAME = 2
 """Steps between two pictures of the camera."""
 
 STUCK = 600.0
-"""Seconds at one waypoint after which it is given up."""
+"""Seconds at one waypoint after which it is left out."""
 
 
 def grid_of(mission: Mission, scene: Scene, field: DistanceField) -> Grid:
@@ -176,7 +176,18 @@ MOST_STEPS, MOST_NODES = 5_000_000, 200_000
 
 
 def check_names(planner: object, vehicle: object, tether: object) -> None:
-    """InputError for a name that no record has; before a scene is read, which takes longer."""
+    """Refuse a name that no record has, before a scene is read, which takes longer.
+
+    Parameters
+    ----------
+    planner, vehicle, tether : str or callable
+        As of `simulate`.
+
+    Raises
+    ------
+    InputError
+        No record has that name.
+    """
     for known, name in ((PLANNERS, planner), (VEHICLES, vehicle), (TETHERS, tether)):
         if not callable(name):
             known.named(name)
@@ -298,14 +309,14 @@ def simulate(
             if since[1] != chosen.index:
                 since = (world.now, chosen.index)
             elif world.now - since[0] > STUCK:
-                chosen.give_up(f"not reached in {STUCK:g} s")
+                chosen.leave_out(f"not reached in {STUCK:g} s")
                 continue
             fresh = before != chosen.index or command.replan_s > 0.0 or not world.now
             passed, moved = world.go(command.path, fresh)
             if moved:
                 chosen.passed(passed)
             else:
-                chosen.give_up("the path to it leads through a solid")
+                chosen.leave_out("the path to it leads through a solid")
     except KeyboardInterrupt:
         interrupted = True
     wall = time.perf_counter() - begin

@@ -23,9 +23,9 @@ def save_execution(done: Execution, file: str | Path) -> None:
     draw_tether(done, ax=right)
     s, units = done.summary, done.problem.units
     figure.suptitle(
-        f"{done.problem.name}: {counted(s['visited'], 'goal')} in {s['time_s']:.0f} s, "
-        f"path {s['path']:.5g} {units}, "
-        f"tether at most {s['longest_tether']:.5g} of {s['tether_length']:g} {units}"
+        f"{done.problem.name}: {s['visited']} of {counted(len(done.problem.goals), 'goal')} in "
+        f"{s['time_s']:.0f} s, path {s['path']:.5g} {units}, "
+        f"longest tether {s['longest_tether']:.5g} of {s['tether_length']:g} {units}"
     )
     style.save(figure, file, dpi=120)
 
@@ -76,7 +76,7 @@ def draw_tether(done: Execution, *, ax: Any = None) -> Any:
     ax.plot(t, [r.limit for r in done.rows], color=style.LIMIT, lw=1.0, ls="--", label="limit")
     for e in done.entries:
         ax.axvline(e.time, color=style.EVENT, lw=1.0)
-        ax.annotate(f"{e.event}: {e.done}", (e.time, 0), xytext=(3, 4), rotation=90,
+        ax.annotate(f"{e.event}: {e.response}", (e.time, 0), xytext=(3, 4), rotation=90,
                     textcoords="offset points", fontsize=8, color=style.EDGE)  # fmt: skip
     ax.set(xlabel="time (s)", ylabel=f"length ({done.problem.units})", ylim=(0, None))
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.1), ncols=2, fontsize=8, frameon=False)

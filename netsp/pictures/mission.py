@@ -40,7 +40,7 @@ def title_of(run: Run) -> str:
     s = run.summary
     return (
         f"{s['planner']}: {s['visited']} of {s['waypoints']} in {s['inspection_s']:.0f} s, "
-        f"tether at most {s['longest_tether']:.2f} of {s['tether_length']:g} m"
+        f"longest tether {s['longest_tether']:.2f} of {s['tether_length']:g} m"
     )
 
 
@@ -109,7 +109,8 @@ def draw_coverage(runs: Sequence[Run], *, ax: Any = None) -> Any:
         ax.plot(t, [100 * r.coverage for r in run.log], color=colour, lw=1.3)
         ax.plot(t, [100 * r.coverage_through for r in run.log], color=colour, lw=0.9, ls=":")
     ax.set(xlabel="time (s)", ylabel="seen (%)", ylim=(0, 100))
-    ax.set_title("dotted: without occlusion", fontsize=8)
+    if any(r.coverage != r.coverage_through for run in runs for r in run.log):
+        ax.set_title("dotted: without occlusion", fontsize=8)
     return ax
 
 

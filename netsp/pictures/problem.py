@@ -114,7 +114,7 @@ def save_trace(rows: Sequence[Progress], title: str, units: str, path: str | Pat
     axes = figure.subplots(2 if tangled else 1, 1, sharex=True, squeeze=False)[:, 0]
     top = axes[0]
     for field, label, look in (
-        ("current", "present state", {"color": style.OBSTACLE, "lw": 0.7}),
+        ("current", "current path", {"color": style.OBSTACLE, "lw": 0.7}),
         ("incumbent", "best tour", {"color": style.PATH, "lw": 1.6, "drawstyle": "steps-post"}),
         ("bound", "lower bound", {"color": style.TETHER, "lw": 1.2, "drawstyle": "steps-post"}),
     ):
@@ -247,8 +247,8 @@ def draw_map(
         label="base",
     )  # fmt: skip
     ax.set_title(_title(problem, solution), fontsize=10, loc="left")
-    ax.set_xlabel(f"x [{problem.units}]")
-    ax.set_ylabel(f"y [{problem.units}]")
+    ax.set_xlabel(f"x ({problem.units})")
+    ax.set_ylabel(f"y ({problem.units})")
     ax.tick_params(labelsize=8)
     _frame(ax, problem, solution)
     return ax
@@ -295,9 +295,10 @@ def _title(problem: Problem, solution: Solution | None) -> str:
     kind = "non-entangling tour"
     if solution.status is Status.INVALID:
         kind, proof = "tour", f"entangles {len(solution.entangled)} obstacles (pink)"
+    over = ", over the limit" if longest > problem.tether_length * (1.0 + 1e-9) else ""
     return (
         f"{problem.name}: {kind} of {solution.length:.6g} {problem.units}, {proof}\n"
-        f"longest tether {longest:.4g} of {problem.tether_length:g} {problem.units}; "
+        f"longest tether {longest:.4g} of {problem.tether_length:g} {problem.units}{over}; "
         f"numbers give the order of visits"
     )
 

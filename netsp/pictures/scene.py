@@ -96,7 +96,7 @@ def _figure(
         draw_lines(panel, path, nodes, (a, b))
         panel.set(xlim=(low[a], high[a]), ylim=(low[b], high[b]), aspect="equal")
         panel.set_title(name, fontsize=9)
-        panel.set(xlabel=names[a], ylabel=names[b])
+        panel.set(xlabel=f"{names[a]} ({unit})", ylabel=f"{names[b]} ({unit})")
     figure.suptitle(title)
     handles, labels = ax.get_legend_handles_labels()
     if handles:

@@ -95,13 +95,13 @@ def _head(rows: list[TrialRow], source: str) -> str:
     redrawn = len({str(r["world"]) for r in rows if r.get("redrawn")})
     versions = {str(sorted(r.get("versions", {}).items())) for r in rows if r.get("versions")}
     shown: dict[str, str] = next((r["versions"] for r in rows if r.get("versions")), {})
+    again = f", {redrawn} of them drawn again because a first draw did not fit" if redrawn else ""
+    finished = " to ".join(sorted({pick(r["finished"] for r in rows) for pick in (min, max)}))
     return (
         f"<h1>{html.escape(rows[0]['study_name'])}</h1>"
         f"<p>{len(rows)} trials of {html.escape(source)} ({html.escape(statuses)}), "
-        f"{len({r.get('problem_sha256') for r in rows})} problems; {redrawn} of them drawn again "
-        "because a first draw did not fit. "
-        f"Finished {html.escape(min(r['finished'] for r in rows))} to "
-        f"{html.escape(max(r['finished'] for r in rows))}.</p>"
+        f"{len({r.get('problem_sha256') for r in rows})} problems{again}. Finished "
+        f"{html.escape(finished)}.</p>"
         f'<p class="note">Study {html.escape(rows[0]["study"][:16])}; '
         f"{html.escape(', '.join(sorted({r['machine'] for r in rows})))}; "
         f"{html.escape(', '.join(f'{k} {v}' for k, v in shown.items()))}"
@@ -153,7 +153,7 @@ def _proofs_table(by_cell: dict[Cell, list[TrialRow]]) -> str:
             for tether in tethers:
                 rows = own.get((goals, tether), [])
                 proven = [r["total_s"] for r in rows if r["status"] == "optimal"]
-                mean = f"{sum(proven) / len(proven):.3g} s, " if proven else ""
+                mean = f"{sum(proven) / len(proven):.3g} s " if proven else ""
                 line.append(f"{mean}({len(proven)}/{len(rows)})" if rows else "")
             body.append(line)
         out.append(

@@ -67,7 +67,9 @@ def report_tour(source: str | Path, problem_file: str | Path | None, output: str
     run = place if place.is_dir() else None
     if run is not None:
         if (run / "mission.json").exists() and not (run / "solution.json").exists():
-            raise InputError(f"{source}: a run of `netsp simulate`; its page is run.html in there")
+            raise InputError(
+                f"{source}: is a run of `netsp simulate`; its page is {source}/run.html"
+            )
         problem_file = problem_file or run / "problem.json"
         place = run / "solution.json"
     solution = Solution.load(place)
@@ -237,18 +239,20 @@ def _next(problem: Problem, goal: int) -> str:
 
 def _summary(problem: Problem, solution: Solution, run: Path | None) -> str:
     units = html.escape(problem.units)
-    gap = f", at most {100 * (solution.gap or 0.0):.2g} % above the shortest"
-    if solution.gap is None or solution.status is Status.OPTIMAL:
-        gap = ""
+    proof = solution.status.value
+    if solution.status is Status.OPTIMAL:
+        proof = "proven optimal"
+    elif solution.gap is not None:
+        proof += f", at most {100 * solution.gap:.2g} % above the shortest"
     lines = [
         f"{html.escape(problem.summary)}. The plan is {solution.length:.6g} "
-        f"{units} long ({solution.status.value} by {html.escape(solution.solver)}{gap})."
+        f"{units} long ({proof}; solver {html.escape(solution.solver)})."
     ]
     if run is not None:
         s = _json(run / "summary.json")
         lines.append(
             f"Carried out in {s['time_s']:.5g} s over {s['path']:.6g} {units}: "
-            f"{counted(s['visited'], 'goal')} visited, the tether at most "
+            f"{counted(s['visited'], 'goal')} visited, longest tether "
             f"{s['longest_tether']:.5g} {units}, over the limit for {s['exceedance_s']:.3g} s, "
             f"{'recovered free' if s['tether_free'] else 'not recovered free'} at the end."
         )
@@ -291,18 +295,26 @@ def _map(problem: Problem, solution: Solution, view: _View, fates: dict[int, str
         colour = {"left out": style.LEFT_OUT, "cancelled": style.CANCELLED}.get(
             fates.get(k, ""), style.VISITED
         )
-        told = f" {fates[k]}" if k in fates else ""
+        fate = f" {fates[k]}" if k in fates else ""
         shapes.append(f'<circle cx="{x}" cy="{y}" r="5" fill="{colour}"><title>'
-                      f"{html.escape(problem.goal_label(k))}{told}</title></circle>"
+                      f"{html.escape(problem.goal_label(k))}{fate}</title></circle>"
                       f'<text x="{x + 7}" y="{y - 6}" font-size="12">{label}'
-                      f'<tspan fill="{style.EDGE}"> {html.escape(goal.name or "")}{told}</tspan>'
+                      f'<tspan fill="{style.EDGE}"> {html.escape(goal.name or "")}{fate}</tspan>'
                       "</text>")  # fmt: skip
     x, y = view.point(problem.base)
-    shapes.append(f'<rect x="{x - 6}" y="{y - 6}" width="12" height="12" fill="{style.BASE}">'
-                  "<title>base</title></rect>")  # fmt: skip
+    shapes.append(f'<polygon points="{_star(x, y)}" fill="{style.BASE}"><title>base</title>'
+                  "</polygon>")  # fmt: skip
     shapes.append(f'<circle id="robot" r="6" fill="{style.ROBOT}" stroke="{style.BASE}"/>')
     return (f'<svg id="map" viewBox="0 0 {WIDTH:g} {view.height:.1f}" role="img" '
             f'aria-label="map">{"".join(shapes)}</svg>')  # fmt: skip
+
+
+def _star(x: float, y: float) -> str:
+    """Corners of a star, the mark of the base in all pictures."""
+    angle = np.pi * (np.arange(10) / 5.0 - 0.5)
+    radius = np.where(np.arange(10) % 2, 4.0, 10.0)
+    corners = zip(x + radius * np.cos(angle), y + radius * np.sin(angle), strict=True)
+    return " ".join(f"{a:.2f},{b:.2f}" for a, b in corners)
 
 
 def _goals(problem: Problem, solution: Solution, run: Path | None, fates: dict[int, str]) -> str:
@@ -353,15 +365,18 @@ def _measures(problem: Problem, solution: Solution) -> str:
     def names(which: tuple[int, ...] | None) -> str:
         return ", ".join(problem.obstacle_name(i) for i in which or ()) or "none"
 
+    def verdict(broken: tuple[int, ...]) -> str:
+        return f"fails at {names(broken)}" if broken else "holds"
+
     turns = "all zero" if not any(m.winding or ()) else str(m.winding)
     rows = [
-        ("word of the whole tour", str(list(m.signature)) if m.signature else "empty"),
+        ("word", str(list(m.signature)) if m.signature else "empty"),
         ("entangled obstacles", names(m.entangled)),
         ("winding numbers", turns),
-        ("crossings of the path with itself", str(m.self_crossings)),
-        ("obstacles in the convex hull of the path", names(m.convex_hull)),
-        ("against linear homotopy", names(m.linear_homotopy)),
-        ("against local visibility homotopy", names(m.local_visibility)),
+        ("self-crossings", str(m.self_crossings)),
+        ("obstacle-free convex hull", verdict(m.convex_hull)),
+        ("obstacle-free linear homotopy", verdict(m.linear_homotopy)),
+        ("local visibility homotopy", verdict(m.local_visibility)),
     ]
     body = "".join(
         f'<tr><td>{k}</td><td style="text-align:left">{html.escape(v)}</td></tr>' for k, v in rows
@@ -422,13 +437,13 @@ def _events(run: Path | None) -> str:
     if not events:
         return "<p>Nothing unforeseen happened.</p>"
     columns = {
-        "time": "time (s)", "event": "event", "done": "response", "reason": "reason",
+        "time": "time (s)", "event": "event", "response": "response", "reason": "reason",
         "planning_s": "planning (s)",
     }  # fmt: skip
     top = "<tr>" + "".join(f"<th>{n}</th>" for n in columns.values()) + "</tr>"
     body = "".join(
         f"<tr><td>{float(e['time']):.1f}</td><td>{html.escape(e['event'])}</td>"
-        f"<td>{html.escape(e['done'])}</td>"
+        f"<td>{html.escape(e['response'])}</td>"
         f'<td style="text-align:left">{html.escape(e["reason"])}</td>'
         f"<td>{float(e['planning_s']):.2f}</td></tr>"
         for e in events

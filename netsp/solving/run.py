@@ -75,7 +75,7 @@ class SolverRun:
 
     @contextmanager
     def until_stopped(self, *, blind: bool = False) -> Iterator[None]:
-        """SolverRun the body until it is done, a limit is reached, also while legs are measured, or
+        """Run the body until it is done, a limit is reached, also while legs are measured, or
         Ctrl-C is pressed. Where it has no tour yet by then, it gets the nearest one that there is,
         unless it is blind: then its own is all that it may show."""
         try:

@@ -17,8 +17,8 @@ class CautiousPlanner(Planner):
 
     def plan(self, robot, tether):
         """Decide about the waypoint that is next; whether anything had to be thought about."""
-        away = np.linalg.norm(self.target - np.array(self.mission.anchor))
+        away = np.linalg.norm(self.waypoint - np.array(self.mission.anchor))
         if away > SHARE * self.mission.tether_length:
-            self.give_up("too far from the anchor for a cautious planner")
+            self.leave_out("too far from the anchor for a cautious planner")
             return True
         return super().plan(robot, tether)

@@ -19,7 +19,7 @@ from netsp.online.tether import GeodesicTether, ReactTether, Tether
 Tethers = GeodesicTether | ReactTether
 
 MOST_HOLDS = 20
-"""Steps that a planner may fail at one waypoint before it is given up."""
+"""Steps that a planner may fail at one waypoint before it is left out."""
 
 NORMAL, RECOVERY, HOLD, DONE = "normal", "recovery", "hold", "done"
 
@@ -86,7 +86,7 @@ class Planner:
     path : ndarray, shape (k, 3)
         The path that is followed.
     left_out : list of (int, str)
-        Waypoints given up, with the reason.
+        Waypoints left out, with the reason.
     defects : list of str
         What went wrong in planning that never should, one text each time.
     reached : list of int
@@ -110,19 +110,19 @@ class Planner:
     refine = "none"
 
     @property
-    def target(self) -> Floats:
+    def waypoint(self) -> Floats:
         """(3,) the waypoint that is next."""
         return np.array(self.mission.waypoints[self.index])
 
     @property
     def done(self) -> bool:
-        """Whether all waypoints are visited or given up."""
+        """Whether all waypoints are visited or left out."""
         return self.index >= len(self.mission.waypoints)
 
     def step(self, robot: Floats, tether: Tether) -> Command:
         """What to do now.
 
-        Never raises: where no plan is found the robot holds its place or gives the waypoint up,
+        Never raises: where no plan is found the robot holds its place or leaves the waypoint out,
         with the reason.
 
         Parameters
@@ -141,9 +141,9 @@ class Planner:
         if self.done:
             return Command(np.array([robot]), DONE)
         begin = time.process_time()
-        planned, given_up = False, -1
-        while not self.done and given_up < len(self.left_out):
-            given_up = len(self.left_out)
+        planned, before = False, -1
+        while not self.done and before < len(self.left_out):
+            before = len(self.left_out)
             try:
                 planned = self.plan(robot, tether) or planned
             except Exception as error:  # a vehicle in the water must not be left without a command
@@ -154,11 +154,11 @@ class Planner:
         return Command(self.path if len(self.path) else np.array([robot]), self.mode, spent)
 
     def _hold(self, robot: Floats, error: Exception, spent: float) -> Command:
-        """Stay, and try again at the next step; give the waypoint up after a while."""
+        """Stay, and try again at the next step; leave the waypoint out after a while."""
         self._held += 1
         self.defects.append(f"{type(error).__name__}: {error}")
         if self._held > MOST_HOLDS:
-            self.give_up(f"a defect of netsp ended planning ({self.defects[-1]})")
+            self.leave_out(f"a defect of netsp ended planning ({self.defects[-1]})")
         return Command(np.array([robot]), HOLD, spent)
 
     def warm_up(self, robot: Floats, tether: Tether) -> None:
@@ -207,13 +207,13 @@ class Planner:
         bool
             Whether a path had to be sought.
         """
-        straight = np.array([robot, self.target])
+        straight = np.array([robot, self.waypoint])
         if self.is_free(straight):
             self.path = straight[1:]
             return False
         path = self.paths(robot[None]).path(0)
         if path is None:
-            self.give_up("no free path to it")
+            self.leave_out("no free path to it")
         else:
             self.path = self.refined(self.pulled(path))[1:]
         return True
@@ -232,9 +232,9 @@ class Planner:
             A path from each of them.
         """
         if self.options.paths == "tree":
-            return ShortestTree(self.grid, self.target, points)
+            return ShortestTree(self.grid, self.waypoint, points)
         seed = 1000 * self.options.seed + self.index
-        return SampledPaths(self.options.paths, self.grid, self.target, points, seed)
+        return SampledPaths(self.options.paths, self.grid, self.waypoint, points, seed)
 
     def refined(self, path: Floats) -> Floats:
         """A path made safer and smoother, as the options have it.
@@ -293,7 +293,7 @@ class Planner:
         reach = self.mission.reach
         if self.done:
             return
-        if len(self.path) <= 1 and np.linalg.norm(self.target - robot) <= reach:
+        if len(self.path) <= 1 and np.linalg.norm(self.waypoint - robot) <= reach:
             self.reached.append(self.index)
             self._next()
 
@@ -302,7 +302,7 @@ class Planner:
         self.path, self.mode, self._held = np.zeros((0, 3)), NORMAL, 0
 
     def passed(self, count: int) -> None:
-        """The robot has passed points of the path; the last one stays the target.
+        """The robot has passed points of the path; the last one stays ahead.
 
         Parameters
         ----------
@@ -311,7 +311,7 @@ class Planner:
         """
         self.path = self.path[min(count, max(0, len(self.path) - 1)) :]
 
-    def give_up(self, reason: str) -> None:
+    def leave_out(self, reason: str) -> None:
         """Leave the waypoint that is next out.
 
         Parameters

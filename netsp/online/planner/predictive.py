@@ -49,19 +49,19 @@ class PredictivePlanner(Planner):
             return False
         self._planned = self.index
         limit = self.mission.tether_length * (1.0 - MARGIN)
-        target = self.target
-        for end in (target, self._near_enough(robot, target)):
+        waypoint = self.waypoint
+        for end in (waypoint, self._near_enough(robot, waypoint)):
             straight = np.array([robot, end])
             if self.is_free(straight) and self._fits(tether, straight, limit):
                 self.path, self.mode = straight[1:], NORMAL
                 return True
         path = self._shortest_feasible(robot, tether, limit)
         if path is None:
-            own = self._own_tether(target)
-            self.give_up(
+            own = self._own_tether(waypoint)
+            self.leave_out(
                 "no free path to it" if own is None else
-                f"out of reach: its shortest tether is {own:.3g} of "
-                f"{self.mission.tether_length:g}"
+                f"out of reach: it needs {own:.2f} m of tether, the limit is "
+                f"{self.mission.tether_length:g} m"
             )  # fmt: skip
             return True
         better = self.refined(path)
@@ -80,12 +80,12 @@ class PredictivePlanner(Planner):
         self._warned = self.index
         return True
 
-    def _near_enough(self, robot: Floats, target: Floats) -> Floats:
+    def _near_enough(self, robot: Floats, waypoint: Floats) -> Floats:
         """Where on the straight path the waypoint counts as visited: the tether may fit there only.
         A fifth of the reach is left for a vehicle that does not stop on the spot."""
-        path = target - robot
+        path = waypoint - robot
         far = float(np.linalg.norm(path))
-        return target - path * min(1.0, 0.8 * self.mission.reach / max(far, 1e-12))
+        return waypoint - path * min(1.0, 0.8 * self.mission.reach / max(far, 1e-12))
 
     @property
     def _model(self) -> GeodesicTether:
@@ -118,11 +118,11 @@ class PredictivePlanner(Planner):
         """The shortest path on which the tether fits: on from the robot, or back along the tether
         to a pivot and on from there. One tree serves all pivots.
 
-        What a pivot decides is the class of the tether at the target, and with it its length there.
-        Pivots in a row that lead to one class are taken together; classes over the limit need no
-        more. For the others the path is pulled taut as a whole, the part back along the tether too:
-        there is none shorter in its class. Where the tether is over the limit on that path, as much
-        of the part back along the tether as need be is left as it is.
+        What a pivot decides is the class of the tether at the waypoint, and with it its length
+        there. Pivots in a row that lead to one class are taken together; classes over the limit
+        need no more. For the others the path is pulled taut as a whole, the part back along the
+        tether too: there is none shorter in its class. Where the tether is over the limit on that
+        path, as much of the part back along the tether as need be is left as it is.
         """
         # the tether back from the robot, finely, off the surfaces; some of its points are pivots
         nodes = tether.nodes[::-1]
@@ -211,7 +211,7 @@ class PredictivePlanner(Planner):
                 break
         return length > limit
 
-    def _own_tether(self, target: Floats) -> float | None:
+    def _own_tether(self, waypoint: Floats) -> float | None:
         """Length of the shortest tether from the anchor to a place."""
         tree = self.paths(np.array([self.mission.anchor]))
         path = tree.path(0)

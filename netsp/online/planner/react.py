@@ -90,7 +90,7 @@ class ReactPlanner(Planner):
         self._soft = self.index
         onward = tree.path(0)
         if onward is None:
-            return self.target[None]
+            return self.waypoint[None]
         return self.refined(self.pulled(onward))[1:]
 
     def _augmented(self, back: Floats, tree: Paths, n: int) -> float:

@@ -24,7 +24,7 @@ from netsp.files import MOST_BYTES
 from netsp.online.scene.closest import nearest_sites, sweep, windings
 from netsp.online.scene.field import VoxelGrid
 
-Progress = Callable[[str, float], None] | None
+OnStage = Callable[[str, float], None] | None
 
 DEFAULT_VOXELS = 200
 """Voxels along the longest side when no size is given."""
@@ -47,7 +47,7 @@ def of_mesh(
     scale: float = 1.0,
     voxel: float | None = None,
     memory_limit: float = 4.0,
-    on_progress: Progress = None,
+    on_progress: OnStage = None,
 ) -> VoxelGrid:
     """The distance grid of a mesh file in any format that trimesh reads (STL, OBJ, PLY, …).
 
@@ -70,7 +70,7 @@ def of_triangles(
     *,
     voxel: float | None = None,
     memory_limit: float = 4.0,
-    on_progress: Progress = None,
+    on_progress: OnStage = None,
     source: str = "mesh",
 ) -> VoxelGrid:
     """The distance grid of triangles: vertices (n, 3), faces (m, 3)."""
@@ -132,7 +132,7 @@ def of_cloud_file(
     scale: float = 1.0,
     voxel: float | None = None,
     memory_limit: float = 4.0,
-    on_progress: Progress = None,
+    on_progress: OnStage = None,
 ) -> VoxelGrid:
     """The distance grid of a cloud file: .npz or .npy (an array (n, 3), in .npz named `points`),
     .csv, .txt or .xyz (three columns), or .ply. InputError as for `of_mesh`."""
@@ -147,7 +147,7 @@ def of_cloud(
     *,
     voxel: float | None = None,
     memory_limit: float = 4.0,
-    on_progress: Progress = None,
+    on_progress: OnStage = None,
     source: str = "cloud",
 ) -> VoxelGrid:
     """The distance grid of a cloud (n, 3) that lies on the surface of something solid.
@@ -207,7 +207,7 @@ def of_cloud(
 
 def _closest(
     sites: Floats, points: bool, origin: Floats, size: float, counts: tuple[int, int, int],
-    on_progress: Progress,
+    on_progress: OnStage,
 ) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.int32]]:  # fmt: skip
     """Distances of all grid points to the nearest site, and which it is."""
     _tell(on_progress, "distances", 0.0)
@@ -389,6 +389,6 @@ def _trimesh() -> Any:
     return trimesh
 
 
-def _tell(on_progress: Progress, stage: str, fraction: float) -> None:
+def _tell(on_progress: OnStage, stage: str, fraction: float) -> None:
     if on_progress is not None:
         on_progress(stage, fraction if math.isfinite(fraction) else 0.0)

@@ -167,7 +167,7 @@ def pull(
     while done < rounds:
         done += 1
         before, began = count, strand_length(strand, count)
-        strand, count = repair(field, strand, count, slip, room)
+        strand, count = mend(field, strand, count, slip, room)
         changed = count != before
         most = refresh(field, strand, count, spread, flat, stride, delta)
         before = count
@@ -186,13 +186,13 @@ def pull(
         if done == rounds and fell > FALLS * stride and more > 0:
             more -= 1
             rounds += 1
-    strand, count = repair(field, strand, count, slip, room)
+    strand, count = mend(field, strand, count, slip, room)
     refresh(field, strand, count, spread, flat, stride, 1e30)  # new nodes only
     return strand, count, most
 
 
 @kernel
-def repair(field: Field, strand: Floats, count: int, slip: float, room: int) -> tuple[Floats, int]:
+def mend(field: Field, strand: Floats, count: int, slip: float, room: int) -> tuple[Floats, int]:
     """Look again along every edge that may have gone too deep; where it has, its deepest point
     becomes a node on the surface.
 
