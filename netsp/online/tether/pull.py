@@ -30,6 +30,7 @@ from netsp.online.tether.strand import (
     NX,
     NY,
     NZ,
+    PART,
     SHARP,
     STALE,
     STEP,
@@ -287,7 +288,9 @@ def lift(field: Field, strand: Floats, count: int, slip: float, stride: float) -
                 held = pressed > HELD_SHARP * force and pressed > (strand[i, CONE] - LOOSE) * across
             else:
                 held = pressed > HELD * force and (
-                    strand[i, CONE] == 0.0 or strand[i, CONE] * along <= -LOOSE * force
+                    strand[i, CONE] == 0.0
+                    or strand[i, CONE] * along
+                    <= (-LOOSE if strand[i, PART] >= 0.0 else LOOSE) * force
                 )
         if h <= (0.125 * slip if held else stride):
             count = remove(strand, count, i)
@@ -442,9 +445,9 @@ def put_back(strand: Floats, was: Floats) -> None:
             back[k] = True
             step[k, 0], step[k, 1], step[k, 2] = x - was[k, 0], y - was[k, 1], z - was[k, 2]
     for k in range(len(was)):
-        if not back[k]:
-            continue
         i, share = k + 1, 1.0
+        if not back[k] or strand[i, PART] < 0.0:
+            continue  # normals of voxels are too rough for it
         there = gap(strand, i - 1, i) + gap(strand, i, i + 1)
         for _ in range(HALVINGS):
             share *= 0.5
