@@ -80,7 +80,7 @@ by a factor that shows from one step to the next."""
 
 FALLS, MORE_ROUNDS = 0.05, 60
 """A strand that a round makes shorter by so many strides has come off something: it gets up to so
-many rounds more."""
+many rounds more. Not where delta is finer than the voxels: there it crumples over them instead."""
 
 HALVINGS = 4
 """How often a step that went too far is halved."""
@@ -139,7 +139,7 @@ def pull_end(
         moved(strand, count, end, f * motion)
         strand, count, residual = pull(
             field, strand, count, delta, spread, flat, last_rounds if left == 0.0 else 2, precision,
-            MORE_ROUNDS if left == 0.0 else 0,
+            MORE_ROUNDS if left == 0.0 and spread <= delta else 0,
         )  # fmt: skip
     return strand, count, residual
 
