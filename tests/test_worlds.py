@@ -88,7 +88,7 @@ def test_netsp_world_writes_a_problem_that_solve_reads(tmp_path, capsys):
     ("args", "said"),
     [
         (["--family", "reef"], "family: unknown 'reef'; expected one of icra2017, rss2016"),
-        (["--radii", "30", "10"], "radii: expected 0 < least <= most, got 30 and 10"),
+        (["--radii", "30", "10"], "radii: expected 0 < minimum <= maximum, got 30 and 10"),
         (["--obstacles", "900"], "900 circles do not fit"),
         (["--goals", "100000000"], "goals: expected 1 to 10000"),
         (["--tether", "1e300"], "tether_length: expected more than 0 and at most 1e11"),
