@@ -81,7 +81,7 @@ class Table(NamedTuple):
     vertex: Ints
 
 
-class Proposal(NamedTuple):
+class State(NamedTuple):
     """What a proposal changes: order of the clusters (legs + 1,); via, the point by way of which
     each leg goes, or -1 (legs,); the vertices at its visits (legs,), and those of the best valid
     state; room for words: stack (3, letters), turns (obstacles + 1,)."""
@@ -147,7 +147,7 @@ def _anneal(run: SolverRun, rng: np.random.Generator, chosen: Params) -> None:
         trie, vertex,
     )  # fmt: skip
     longest = (goals + 1) * 2 * int((detours.row[:, 1:] - detours.row[:, :-1]).max(initial=0)) + 1
-    state = Proposal(
+    state = State(
         order, via,
         visits=np.zeros(goals + 1, dtype=np.int64),
         stack=np.zeros((3, longest), dtype=np.int64),
@@ -213,7 +213,7 @@ def _push(letter: int, size: int, stack: Ints, trie: Ints) -> int:
 
 
 @kernel
-def evaluate(state: Proposal, table: Table) -> tuple[float, int, int]:
+def evaluate(state: State, table: Table) -> tuple[float, int, int]:
     """Length, entangled obstacles, and goals in a class the tether does not admit; `state.visits`
     takes the vertices."""
     order, via, visits, stack, turns = (
@@ -278,7 +278,7 @@ def evaluate(state: Proposal, table: Table) -> tuple[float, int, int]:
 
 @kernel
 def anneal(
-    state: Proposal,
+    state: State,
     best_length: float,
     count: int,
     theta: float,
