@@ -10,7 +10,6 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import partial
-from pathlib import Path
 from typing import Any, TextIO
 
 EVERY = 2.0
@@ -49,14 +48,6 @@ def compile_messages(stream: TextIO) -> Iterator[None]:
         yield
     finally:
         event.unregister("numba:compile", listener)
-
-
-def forget() -> None:
-    """Delete what earlier versions of netsp have compiled beside the source: numba cannot read an
-    index that names a module which is no more, and stops with ModuleNotFoundError."""
-    for kept in Path(__file__).resolve().parent.parent.rglob("__pycache__/*.nb[ic]"):
-        with suppress(OSError):  # not ours to write: then it is not ours to read either
-            kept.unlink()
 
 
 def steps() -> Iterator[tuple[str, Callable[[], object]]]:

@@ -16,10 +16,9 @@ def arguments(p: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Compile, and return the exit code."""
-    from netsp.command.compiling import compile_messages, forget, steps
+    from netsp.command.compiling import compile_messages, steps
     from netsp.compiled.tiers import everything_compiled
 
-    forget()
     messages = contextlib.nullcontext() if args.quiet else compile_messages(sys.stderr)
     with messages, everything_compiled():
         for name, step in steps():
