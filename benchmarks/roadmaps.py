@@ -30,12 +30,12 @@ def taut(tether: float, worlds: int = 10) -> None:
     from netsp.roadmap.taut import TautRoadmap
     from tests.worlds import random_world
 
-    TautRoadmap(random_world(0, goals=3, tether=200.0)).travel_graph().costs  # noqa: B018
+    TautRoadmap(random_world(0, goals=3, tether=200.0)).to_travel_graph().costs  # noqa: B018
     times, sizes = [], []
     for seed in range(worlds):
         problem = random_world(seed, goals=20, tether=tether)
         begin = time.perf_counter()
-        graph = TautRoadmap(problem).travel_graph()
+        graph = TautRoadmap(problem).to_travel_graph()
         graph.costs  # noqa: B018
         times.append(time.perf_counter() - begin)
         sizes.append(len(graph))
@@ -73,7 +73,7 @@ def prm(worlds: int = 5) -> None:
     for seed in range(worlds):
         problem = random_world(seed, goals=20, tether=300.0)
         begin = time.perf_counter()
-        graph = PrmRoadmap(problem, seed=seed).travel_graph()
+        graph = PrmRoadmap(problem, seed=seed).to_travel_graph()
         built = time.perf_counter()
         graph.costs  # noqa: B018
         builds.append(built - begin)
@@ -175,7 +175,7 @@ def main() -> None:
     if args.convergence:
         convergence()
         return
-    head("what", "median s", "min", "max", "runs", "note", name="roadmap-speed")
+    head("what", "median s", "min", "max", "samples", "note", name="roadmap-speed")
     taut(350.0)
     taut(500.0, worlds=3)
     many()

@@ -153,7 +153,7 @@ def heuristics(goals: int = 20, tether: float = 350.0) -> None:
 def anneal_speed() -> None:
     """Proposals per second at 20 goals."""
     print("\n### Proposals per second, 20 goals, tether 350\n")
-    head("solver", "median", "min", "max", "runs", name="proposals")
+    head("solver", "median", "min", "max", "worlds", name="proposals")
     for solver, count in (("anneal", 20_000_000), ("anneal-2016", 200_000)):
         rates = []
         for seed in WORLDS:

@@ -34,7 +34,7 @@ def roadmap(tether: float, goals: int = 20, worlds: int = 10) -> tuple[list[floa
     def build(seed: int) -> tuple[float, int]:
         problem = random_world(seed, goals=goals, tether=tether)
         begin = time.perf_counter()
-        graph = TautRoadmap(problem).travel_graph()
+        graph = TautRoadmap(problem).to_travel_graph()
         graph.costs  # noqa: B018
         return time.perf_counter() - begin, len(graph)
 
@@ -52,7 +52,7 @@ def times_row(name: str, values: list[float], note: str = "") -> None:
 def main() -> None:
     """Run everything."""
     heading("The spine")
-    head("what", "median s", "min", "max", "runs", "note")
+    head("what", "median s", "min", "max", "samples", "note")
     times_row("`netsp --help`", command("--help"))
     with tempfile.TemporaryDirectory() as folder:
         wharf = str(ROOT / "problems" / "wharf.json")

@@ -165,7 +165,7 @@ def fig_five() -> None:
 def fig_three() -> None:
     """Annealing for 200,000 iterations."""
     rows, origin = load("rss2016-fig3")
-    head("goals", "solver", "runs", "% over the optimum: median (mean)", "entangled",
+    head("goals", "solver", "trials", "% over the optimum: median (mean)", "entangled",
          name="rss2016-fig3", **origin)  # fmt: skip
     for goals in (5, 10):
         for solver in ("anneal-2016", "anneal"):

@@ -64,7 +64,7 @@ def test_for_obstacles_that_are_slits_the_bound_is_the_length(seed):
         tether_length=18,
     )  # fmt: skip
     roadmap = TautRoadmap(p)
-    graph = roadmap.travel_graph()
+    graph = roadmap.to_travel_graph()
     low = slit_lengths(build_slits(p), roadmap.outline.places, roadmap.cluster, roadmap.signatures)
     held = np.isfinite(graph.costs)
     assert len(graph) > 6

@@ -125,7 +125,7 @@ def test_components_are_told_apart():
 
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_at_the_time_limit_there_is_a_tour_a_bound_and_no_process_left(backend):
-    graph = TautRoadmap(random_world(0, goals=20, tether=350.0)).travel_graph()
+    graph = TautRoadmap(random_world(0, goals=20, tether=350.0)).to_travel_graph()
     graph.costs  # noqa: B018 - not part of what is timed
     begin = time.monotonic()
     result = solve(graph, time=0.6, params={"backend": backend, "search_rounds": 2})
@@ -138,7 +138,7 @@ def test_at_the_time_limit_there_is_a_tour_a_bound_and_no_process_left(backend):
 
 
 def test_ctrl_c_gives_the_best_tour_so_far():
-    graph = TautRoadmap(random_world(0, goals=15, tether=300.0)).travel_graph()
+    graph = TautRoadmap(random_world(0, goals=15, tether=300.0)).to_travel_graph()
 
     def interrupt(row):
         if row.stage == "root":
@@ -165,7 +165,7 @@ def test_same_seed_same_answer(seed):
 
 
 def test_the_backends_agree_on_a_real_graph():
-    graph = TautRoadmap(random_world(3, goals=8, tether=280.0)).travel_graph()
+    graph = TautRoadmap(random_world(3, goals=8, tether=280.0)).to_travel_graph()
     a, b = (solve(graph, params={"backend": k}) for k in BACKENDS)
     assert a.status is b.status is Status.OPTIMAL
     assert a.length == pytest.approx(b.length, rel=2e-6)

@@ -160,7 +160,7 @@ def fails(graph): raise ZeroDivisionError("division by zero")
 def leaves(graph): sys.exit(7)
 class Plain:
     def __init__(self, problem): self.problem = problem
-    def travel_graph(self):
+    def to_travel_graph(self):
         from netsp import travel_graph
         return travel_graph(self.problem)
 """

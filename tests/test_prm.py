@@ -101,18 +101,18 @@ def test_no_length_over_the_roadmap_beats_the_exact_one(seed):
     keys = [(int(c), w) for c, w in zip(sampled.cluster, sampled.signatures, strict=True)]
     assert set(keys) <= set(place)
     index = [place[k] for k in keys]
-    true = exact.travel_graph().costs[np.ix_(index, index)]
-    found = sampled.travel_graph().costs
+    true = exact.to_travel_graph().costs[np.ix_(index, index)]
+    found = sampled.to_travel_graph().costs
     same = sampled.cluster[:, None] == sampled.cluster[None, :]
     assert (found[~same] >= true[~same] * (1 - 1e-9) - 1e-9).all()
     assert np.array_equal(found, found.T)
     short = PrmRoadmap(problem, samples=400, seed=seed, shortcut=True)
-    assert np.allclose(short.travel_graph().costs[~same], true[~same], rtol=1e-9)
+    assert np.allclose(short.to_travel_graph().costs[~same], true[~same], rtol=1e-9)
 
 
 @pytest.mark.parametrize("roadmap", ["taut", "prm"])
 def test_lower_bounds_of_legs_are_below_the_legs(world, roadmap):
-    graph = (TautRoadmap(world) if roadmap == "taut" else PrmRoadmap(world)).travel_graph()
+    graph = (TautRoadmap(world) if roadmap == "taut" else PrmRoadmap(world)).to_travel_graph()
     bounds = graph.lower_bounds()
     costs = graph.costs
     finite = np.isfinite(costs)
@@ -125,7 +125,7 @@ def test_lower_bounds_of_legs_are_below_the_legs(world, roadmap):
 
 
 def test_costs_among_some_vertices_are_those_of_the_whole(world):
-    part, whole = (TautRoadmap(world).travel_graph() for _ in range(2))
+    part, whole = (TautRoadmap(world).to_travel_graph() for _ in range(2))
     some = np.array([0, 1, 4, 7])
     assert np.array_equal(part.costs_among(some), whole.costs[np.ix_(some, some)])
     assert np.array_equal(whole.costs_among(some), whole.costs[np.ix_(some, some)])

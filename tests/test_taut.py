@@ -99,7 +99,7 @@ def test_legs_agree_with_brute_force(problem):
         return
     brute = BruteForce(problem, 32)
     found = brute.lengths(1, 2 * problem.tether_length)
-    costs = roadmap.travel_graph().costs
+    costs = roadmap.to_travel_graph().costs
     error = 4.0 * problem.tether_length * (math.pi / 32) ** 2
     for u in np.flatnonzero(roadmap.cluster == 1):
         for v in np.flatnonzero(roadmap.cluster == 2):
@@ -111,7 +111,7 @@ def test_legs_agree_with_brute_force(problem):
 def test_laws_of_a_random_world(seed):
     problem = random_world(seed, goals=8, tether=330.0)
     roadmap = TautRoadmap(problem)
-    graph = roadmap.travel_graph()
+    graph = roadmap.to_travel_graph()
     costs = graph.costs
     n = len(graph)
     # each class once
@@ -139,7 +139,7 @@ def test_a_materialised_leg_has_its_word_its_length_and_enough_tether(seed):
     """Facts 2 and 3 of the design: tether along a leg is never longer than at its worse end."""
     problem = random_world(seed, goals=8, tether=330.0)
     roadmap = TautRoadmap(problem)
-    graph = roadmap.travel_graph()
+    graph = roadmap.to_travel_graph()
     rays = problem.representative_points
     rng = np.random.default_rng(seed)
     for _ in range(25):
@@ -162,7 +162,7 @@ def test_tether_along_a_leg_stays_below_its_worse_end(seed):
     """Sample points of a leg become goals; their class there must have a taut tether that short."""
     problem = random_world(seed, goals=3, tether=300.0, circles=10)
     roadmap = TautRoadmap(problem)
-    graph = roadmap.travel_graph()
+    graph = roadmap.to_travel_graph()
     rays = problem.representative_points
     rng = np.random.default_rng(seed)
     for _ in range(6):
@@ -225,7 +225,7 @@ def test_three_dimensional_lengths_are_the_hypotenuse_of_the_plan_and_the_height
     for (k, d), (key, e) in zip(classes(a).items(), classes(b).items(), strict=True):
         assert k == key
         assert d == pytest.approx(e, rel=1e-12)
-    ca, cb = a.travel_graph().costs, b.travel_graph().costs
+    ca, cb = a.to_travel_graph().costs, b.to_travel_graph().costs
     z = deep.points[:, 2][b.cluster]
     finite = np.isfinite(ca)
     assert np.allclose(np.hypot(ca, z[:, None] - z[None, :])[finite], cb[finite], rtol=1e-12)
@@ -442,7 +442,7 @@ def test_every_pair_of_classes_has_a_leg_in_an_aligned_grid():
         base=(-2, -2), goals=[(1.5, 1.5), (4.5, 4.5), (3, 1.5), (0, 4.5)], obstacles=grid,
         tether_length=12,
     )  # fmt: skip
-    graph = TautRoadmap(problem).travel_graph()
+    graph = TautRoadmap(problem).to_travel_graph()
     same = graph.cluster[:, None] == graph.cluster[None, :]
     assert np.isfinite(graph.costs[~same]).all()
 
@@ -450,7 +450,7 @@ def test_every_pair_of_classes_has_a_leg_in_an_aligned_grid():
 @pytest.mark.parametrize("seed", range(10))
 def test_every_pair_of_classes_has_a_leg_in_random_worlds(seed):
     """Long legs write and take back letters of rays that other obstacles cut; none may get lost."""
-    graph = TautRoadmap(random_world(seed, goals=20, tether=350.0)).travel_graph()
+    graph = TautRoadmap(random_world(seed, goals=20, tether=350.0)).to_travel_graph()
     same = graph.cluster[:, None] == graph.cluster[None, :]
     assert np.isfinite(graph.costs[~same]).all()
 
@@ -479,7 +479,7 @@ def test_goals_exactly_on_a_grown_boundary(angle, center, radius, clearance, off
         clearance=clearance,
     )  # fmt: skip
     roadmap = TautRoadmap(problem)
-    costs = roadmap.travel_graph().costs
+    costs = roadmap.to_travel_graph().costs
     same = roadmap.cluster[:, None] == roadmap.cluster[None, :]
     assert np.isfinite(costs[~same]).all()
     d = np.hypot(*(base - middle))
@@ -555,7 +555,7 @@ def test_a_far_origin_changes_nothing():
 
 
 def test_time_up_while_measuring_legs_says_where_it_stood():
-    graph = TautRoadmap(random_world(0, goals=20, tether=400.0)).travel_graph()
+    graph = TautRoadmap(random_world(0, goals=20, tether=400.0)).to_travel_graph()
     said = "time limit reached while measuring the legs"
     with graph.on_clock(Clock(1e-9)), pytest.raises(LimitReachedError, match=said):
         graph.costs  # noqa: B018

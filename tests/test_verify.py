@@ -161,7 +161,7 @@ def test_pulled_lengths_bracket_the_exact_ones_for_every_class(seed):
     roadmap = TautRoadmap(problem)
     puller = StringPuller(problem, reach=320.0)
     for v in range(1, len(roadmap.cluster)):
-        path = roadmap.travel_graph().path(0, v)
+        path = roadmap.to_travel_graph().path(0, v)
         sleeve = reduce_sleeve([c for piece in puller.crossings(path) for c in piece])
         pulled = puller.pull(path[0], path[-1], sleeve)
         assert pulled.low <= roadmap.planar[v] * (1 + 1e-9)
@@ -177,7 +177,7 @@ def test_the_two_opinions_on_homotopy_agree(problem):
         roadmap = TautRoadmap(problem)
     except InfeasibleError:
         return
-    graph = roadmap.travel_graph()
+    graph = roadmap.to_travel_graph()
     puller = StringPuller(problem, reach=problem.tether_length)
     members = graph.members(1)[:5]
     for u in members:

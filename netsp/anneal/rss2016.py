@@ -1,10 +1,10 @@
 """`anneal-2016`: simulated annealing over free paths, priced by what they entangle.
 
-McCammon & Hollinger 2016, section III. A state is an order of the goals and a path for each leg:
-the shortest path (the paper's A*) or one through a sub-goal. Goal-swapping exchanges two goals and
-plans the legs at them anew; path-inversion plans one leg through a sub-goal on the far side of an
-obstacle. Cost (3): ``C(T) = k (E + 1) L`` with E the number of obstacles that the trajectory
-entangles, read off its reduced word.
+McCammon & Hollinger 2016, section III. A configuration (the paper's state) is an order of the
+goals and a path for each leg: the shortest path (the paper's A*) or one through a sub-goal.
+Goal-swapping exchanges two goals and plans the legs at them anew; path-inversion plans one leg
+through a sub-goal on the far side of an obstacle. Cost (3): ``C(T) = k (E + 1) L`` with E the
+number of obstacles that the trajectory entangles, read off its reduced word.
 
 Where the paper is silent or assumes too much:
 
@@ -13,7 +13,7 @@ Where the paper is silent or assumes too much:
 - the paper's tether has no end. Ours has: a goal reached in a class that the tether does not admit
   counts like an entanglement, so that with a long tether the cost is the paper's.
 - the trajectory returned is the best *valid* one met, each leg pulled taut in its class (the leg
-  of the travel graph), not the last state.
+  of the travel graph), not the last configuration.
 """
 
 from __future__ import annotations
@@ -81,10 +81,10 @@ class Table(NamedTuple):
     vertex: Ints
 
 
-class State(NamedTuple):
+class Configuration(NamedTuple):
     """What a proposal changes: order of the clusters (legs + 1,); via, the point by way of which
-    each leg goes, or -1 (legs,); the vertices at its visits (legs,), and those of the best valid
-    state; room for words: stack (3, letters), turns (obstacles + 1,)."""
+    each leg goes, or -1 (legs,); the vertices at its visits (legs,), and those of the best
+    valid configuration; room for words: stack (3, letters), turns (obstacles + 1,)."""
 
     order: Ints
     via: Ints
@@ -147,14 +147,14 @@ def _anneal(run: SolverRun, rng: np.random.Generator, chosen: Params) -> None:
         trie, vertex,
     )  # fmt: skip
     longest = (goals + 1) * 2 * int((detours.row[:, 1:] - detours.row[:, :-1]).max(initial=0)) + 1
-    state = State(
+    now = Configuration(
         order, via,
         visits=np.zeros(goals + 1, dtype=np.int64),
         stack=np.zeros((3, longest), dtype=np.int64),
         turns=np.zeros(detours.far.shape[2] + 1, dtype=np.int64),
         best=np.zeros(goals + 1, dtype=np.int64),
     )  # fmt: skip
-    length, entangled, _ = evaluate(state, table)
+    length, entangled, _ = evaluate(now, table)
     schedule = Schedule(chosen, run, length / (goals + 1), default=PROPOSALS_PER_GOAL * goals)
     chunk = int(max(1, min(CHUNK, run.iteration_limit / REPORTS)))
     chance = seeded(rng)
@@ -165,11 +165,11 @@ def _anneal(run: SolverRun, rng: np.random.Generator, chosen: Params) -> None:
         count = schedule.chunk(chunk)
         before = best_length
         length, entangled, best_length = anneal(
-            state, best_length, count, schedule.temperature, chosen.k, chosen.swaps, table, chance
+            now, best_length, count, schedule.temperature, chosen.k, chosen.swaps, table, chance
         )
         run.iterations += count
         if best_length < before:
-            run.update_incumbent(state.best.tolist())
+            run.update_incumbent(now.best.tolist())
         run.report("anneal", current=length, entangled=int(entangled))
 
 
@@ -213,15 +213,15 @@ def _push(letter: int, size: int, stack: Ints, trie: Ints) -> int:
 
 
 @kernel
-def evaluate(state: State, table: Table) -> tuple[float, int, int]:
-    """Length, entangled obstacles, and goals in a class the tether does not admit; `state.visits`
+def evaluate(now: Configuration, table: Table) -> tuple[float, int, int]:
+    """Length, entangled obstacles, and goals in a class the tether does not admit; `now.visits`
     takes the vertices."""
     order, via, visits, stack, turns = (
-        state.order,
-        state.via,
-        state.visits,
-        state.stack,
-        state.turns,
+        now.order,
+        now.via,
+        now.visits,
+        now.stack,
+        now.turns,
     )
     planar, height, letters, row = table.planar, table.height, table.letters, table.row
     trie, vertex = table.trie, table.vertex
@@ -278,7 +278,7 @@ def evaluate(state: State, table: Table) -> tuple[float, int, int]:
 
 @kernel
 def anneal(
-    state: State,
+    now: Configuration,
     best_length: float,
     count: int,
     theta: float,
@@ -288,12 +288,12 @@ def anneal(
     chance: npt.NDArray[np.uint64],
 ) -> tuple[float, int, float]:
     """Make `count` proposals at temperature θ, in place; returns length and entanglement of the
-    present state and the length of the best valid one, whose vertices are in `state.best`."""
-    order, via, visits, best = state.order, state.via, state.visits, state.best
+    present configuration and the length of the best valid one, whose vertices are in `now.best`."""
+    order, via, visits, best = now.order, now.via, now.visits, now.best
     planar, far, near = table.planar, table.far, table.near
     legs = len(order) - 1
     obstacles = far.shape[2]
-    length, entangled, missed = evaluate(state, table)
+    length, entangled, missed = evaluate(now, table)
     cost = k * (entangled + missed + 1) * length
     kept = np.empty(4, dtype=np.int64)
     for _ in range(count):
@@ -322,7 +322,7 @@ def anneal(
             via[leg] = turned
         else:
             continue
-        new_length, new_entangled, new_missed = evaluate(state, table)
+        new_length, new_entangled, new_missed = evaluate(now, table)
         new_cost = k * (new_entangled + new_missed + 1) * new_length
         if metropolis(new_cost - cost, theta, chance):
             length, entangled, missed, cost = new_length, new_entangled, new_missed, new_cost

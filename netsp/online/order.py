@@ -153,9 +153,9 @@ def reorder(
     best, after = tuple(range(len(mission.waypoints))), before
     tour = [points[v] for v in result.tour[1:]]
     rest = [n for n in range(len(mission.waypoints)) if n not in tour]
-    for candidate in (tour, tour[::-1]):
+    for direction, candidate in (("forward", tour), ("in reverse", tour[::-1])):
         order = (*candidate, *rest)
-        tell("flying the new order")
+        tell(f"flying the new order {direction}")
         run = simulate(_in_order(mission, order), scene=scene, field=field)
         _not_interrupted(run)
         if _better(run, after):

@@ -126,7 +126,7 @@ class PrmRoadmap:
         self.shortcut = shortcut
         self._taut = TautLegs(self.paths, self.cluster, self.signatures, planar)
 
-    def travel_graph(self) -> TravelGraph:
+    def to_travel_graph(self) -> TravelGraph:
         """The travel graph over this roadmap. Tethers are the taut ones of their classes; that
         they fit was decided by the length along the roadmap, which is no shorter."""
         return TravelGraph(

@@ -81,7 +81,7 @@ class TautRoadmap:
         self.tethers: Floats = np.hypot(self.planar, self._z[self.cluster] - self._z[0])
         self.legs = TautLegs(self.paths, self.cluster, self.signatures, self.planar, found.tree)
 
-    def travel_graph(self) -> TravelGraph:
+    def to_travel_graph(self) -> TravelGraph:
         """The travel graph over this roadmap; legs are computed when first asked for."""
         return TravelGraph(
             self.cluster,

@@ -99,10 +99,10 @@ def travel_graph(problem: Problem, roadmap: str = DEFAULT_ROADMAP, **options: An
         return graph_from_state(problem, **options)
     built = build_roadmap(problem, roadmap, **options)
     if ROADMAPS.named(roadmap).ours:
-        graph: TravelGraph = built.travel_graph()
+        graph: TravelGraph = built.to_travel_graph()
         return graph
     with foreign(f"roadmap {roadmap!r} failed"):
-        graph = built.travel_graph()
+        graph = built.to_travel_graph()
     if not isinstance(graph, TravelGraph):
         raise InputError(f"roadmap {roadmap!r}: expected a TravelGraph from it, got {shown(graph)}")
     return graph

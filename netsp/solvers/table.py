@@ -47,7 +47,7 @@ class RoadmapKind:
     name : str
         What it is called on the command line, in files and in messages.
     build : str
-        ``module:attribute`` of a class over a problem with `travel_graph()`.
+        ``module:attribute`` of a class over a problem with `to_travel_graph()`.
     seeded : bool
         Its samples are drawn with the run's seed.
     """

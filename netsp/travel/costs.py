@@ -43,23 +43,25 @@ def checked_costs(costs: npt.ArrayLike, clusters: npt.ArrayLike) -> tuple[Floats
     """The matrix with inf within clusters, and the clusters, or InputError with what is wrong."""
     try:
         c = np.array(costs, dtype=float)
-        labels = np.array(clusters, dtype=float)
+        numbers = np.array(clusters, dtype=float)
     except (TypeError, ValueError, OverflowError) as error:
         raise InputError(f"costs, clusters: expected numbers: {error}") from None
     if c.ndim != 2 or c.shape[0] != c.shape[1] or len(c) == 0:
         raise InputError(f"costs: expected a square matrix, got shape {c.shape}")
     n = len(c)
-    if labels.shape != (n,):
-        raise InputError(f"clusters: expected {n} labels, one per row of costs, got {labels.shape}")
-    good = np.isfinite(labels) & (labels >= 0) & (labels == np.floor(labels))
-    if not good.all():
-        raise InputError(f"clusters: expected whole numbers from 0 on, got {labels[~good][0]:g}")
-    if labels.max() >= n:
+    if numbers.shape != (n,):
         raise InputError(
-            f"clusters: {n} vertices cannot fill clusters 0 to {labels.max():g}; expected numbers "
+            f"clusters: expected {n} numbers, one per row of costs, got {numbers.shape}"
+        )
+    good = np.isfinite(numbers) & (numbers >= 0) & (numbers == np.floor(numbers))
+    if not good.all():
+        raise InputError(f"clusters: expected whole numbers from 0 on, got {numbers[~good][0]:g}")
+    if numbers.max() >= n:
+        raise InputError(
+            f"clusters: {n} vertices cannot fill clusters 0 to {numbers.max():g}; expected numbers "
             "without gaps"
         )
-    cluster = labels.astype(np.int64)
+    cluster = numbers.astype(np.int64)
     if cluster[0] != 0 or (cluster == 0).sum() != 1:
         raise InputError(
             "clusters: vertex 0, where the tour starts, must be alone in cluster 0; cluster 0 is "

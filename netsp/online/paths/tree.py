@@ -25,8 +25,8 @@ MOST_CELLS = 20_000_000
 """So many cells take about 0.3 GiB."""
 
 
-ROUNDS, LOOSE = 60, 0.005
-"""A path need not be taut to the last millimetre: rounds, and precision in units of delta."""
+ROUNDS = 60
+"""A path need not be taut to the last millimetre."""
 
 STAGES = 15
 """How many paths are offered between one that is not pulled and one that is taut."""
@@ -353,7 +353,7 @@ def _shortcut(grown: DistanceField, line: Floats, step: float) -> Floats:
 
 
 def _relaxed(grown: DistanceField, line: Floats, delta: float, rounds: int) -> Floats:
-    return GeodesicTether(grown, delta, precision=LOOSE * delta).relaxed(line, rounds).nodes
+    return GeodesicTether(grown, delta).relaxed(line, rounds).nodes
 
 
 @kernel
