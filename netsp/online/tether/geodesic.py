@@ -19,7 +19,7 @@ import numpy.typing as npt
 from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.online.scene.field import DistanceField, finite_point
-from netsp.online.tether.pull import drive, follow, pull
+from netsp.online.tether.pull import Settings, drive, follow, pull
 from netsp.online.tether.resolution import THINNEST
 from netsp.online.tether.strand import strand_length
 from netsp.online.tether.tether import Tether, strand_of
@@ -70,13 +70,14 @@ class GeodesicTether:
             raise InputError(f"delta: expected a positive length, got {self.delta!r}")
 
     @cached_property
-    def _settings(self) -> tuple[float, float, float, int, float]:
+    def _settings(self) -> Settings:
         precision = self.precision if self.precision is not None else 5e-3 * self.delta
         voxel = self.field.voxel
         # normals of voxels are true at the scale of a voxel only, and never to better than a few
         # per cent
         spread = 0.1 * self.delta if voxel is None else max(0.1 * self.delta, voxel)
-        return self.delta, spread, 1e-6 if voxel is None else 0.02, self.rounds, precision
+        flat = 1e-6 if voxel is None else 0.02
+        return Settings(self.delta, spread, flat, self.rounds, precision)
 
     def start(self, anchor: npt.ArrayLike, robot: npt.ArrayLike) -> Tether:
         """A tether along the line of sight.
@@ -153,10 +154,8 @@ class GeodesicTether:
         return self._taut(strand_of(path), rounds)
 
     def _taut(self, strand: Floats, rounds: int | None = None) -> Tether:
-        delta, spread, flat, usual, precision = self._settings
         strand, count, residual = pull(
-            self.field.arrays, strand, len(strand), delta, spread, flat, rounds or usual, precision,
-            0,
+            self.field.arrays, strand, len(strand), self._settings, rounds or self.rounds, 0
         )  # fmt: skip
         return _state(strand, count, residual)
 
@@ -192,7 +191,7 @@ class GeodesicTether:
             name = "robot" if last else "anchor"
             x, y, z = finite_point(target, name)
             strand, residual, length, depth = follow(
-                self.field.arrays, strand, last, x, y, z, *self._settings
+                self.field.arrays, strand, last, x, y, z, self._settings
             )
             if depth > 0.25 * self.delta:
                 self.field.free_point(target, name, 0.25 * self.delta)
@@ -222,7 +221,7 @@ class GeodesicTether:
         if not np.isfinite(points).all():
             raise InputError("path: expected finite coordinates")
         strand, count, residual, lengths = drive(
-            self.field.arrays, tether.strand.copy(), len(tether.strand), points, *self._settings
+            self.field.arrays, tether.strand.copy(), len(tether.strand), points, self._settings
         )
         return _state(strand, count, residual), lengths
 

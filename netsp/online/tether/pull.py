@@ -15,6 +15,7 @@ away on cylinders and straight edges, where the rulings do not bend.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -90,6 +91,18 @@ CONVEX = 0.5
 strand reaches half way round."""
 
 
+class Settings(NamedTuple):
+    """Of the model: delta (m); spread (m), how far around it a contact's normals are asked; flat,
+    the sine between normals that are taken for one; rounds of an update; precision (m), the motion
+    below which nothing is done."""
+
+    delta: float
+    spread: float
+    flat: float
+    rounds: int
+    precision: float
+
+
 @kernel
 def pull_end(
     field: Field,
@@ -99,14 +112,11 @@ def pull_end(
     x: float,
     y: float,
     z: float,
-    delta: float,
-    spread: float,
-    flat: float,
-    rounds: int,
-    precision: float,
+    settings: Settings,
 ) -> tuple[Floats, int, float]:
     """Move one end (the robot's if `last`) to (x, y, z) and pull taut. Returns (strand, count,
     residual): the strand may have been copied to grow; residual is the last round's motion."""
+    delta = settings.delta
     stride, slip = STRIDE * delta, SLIP * delta
     end = count - 1 if last else 0
     left = 2.0
@@ -114,7 +124,7 @@ def pull_end(
     ox, oy, oz = strand[end, X], strand[end, Y], strand[end, Z]
     path = math.sqrt((x - ox) ** 2 + (y - oy) ** 2 + (z - oz) ** 2)
     # the last round's count grows with the path: a node moves by at most a stride in each
-    last_rounds = rounds + min(2000, int(path / stride))
+    last_rounds = settings.rounds + min(2000, int(path / stride))
     while left > 0.0:
         end = count - 1 if last else 0
         next_to = end - 1 if last else 1
@@ -138,8 +148,8 @@ def pull_end(
             strand[end, Z] += f * dz
         moved(strand, count, end, f * motion)
         strand, count, residual = pull(
-            field, strand, count, delta, spread, flat, last_rounds if left == 0.0 else 2, precision,
-            MORE_ROUNDS if left == 0.0 and spread <= delta else 0,
+            field, strand, count, settings, last_rounds if left == 0.0 else 2,
+            MORE_ROUNDS if left == 0.0 and settings.spread <= delta else 0,
         )  # fmt: skip
     return strand, count, residual
 
@@ -149,16 +159,14 @@ def pull(
     field: Field,
     strand: Floats,
     count: int,
-    delta: float,
-    spread: float,
-    flat: float,
+    settings: Settings,
     rounds: int,
-    precision: float,
     more: int,
 ) -> tuple[Floats, int, float]:
     """Rounds of: put edges back that went too deep, drop nodes that hold nothing, slide the others
-    to where the strand is shortest; until no node moves by more than `precision`. Up to `more`
+    to where the strand is shortest; until no node moves by more than the precision. Up to `more`
     rounds are added for a strand that has come off something."""
+    delta, precision = settings.delta, settings.precision
     slip, stride = SLIP * delta, STRIDE * delta
     most, damping, gain = 0.0, 1.0, 1.0
     room = count + 64 + int(0.5 * strand_length(strand, count) / slip)
@@ -170,7 +178,7 @@ def pull(
         before, began = count, strand_length(strand, count)
         strand, count = mend(field, strand, count, slip, room)
         changed = count != before
-        most = refresh(field, strand, count, spread, flat, stride, delta)
+        most = refresh(field, strand, count, settings, delta)
         before = count
         count, lifted = lift(field, strand, count, slip, stride)
         changed = changed or lifted > 0.0 or count != before
@@ -188,7 +196,7 @@ def pull(
             more -= 1
             rounds += 1
     strand, count = mend(field, strand, count, slip, room)
-    refresh(field, strand, count, spread, flat, stride, 1e30)  # new nodes only
+    refresh(field, strand, count, settings, 1e30)  # new nodes only
     return strand, count, most
 
 
@@ -240,17 +248,18 @@ def refresh(
     field: Field,
     strand: Floats,
     count: int,
-    spread: float,
-    flat: float,
-    stride: float,
-    delta: float,
+    settings: Settings,
+    reach: float,
 ) -> float:
-    """Take the frames of contacts that have moved; the largest correction of a position."""
+    """Take the frames of contacts that have moved by more than a part of `reach`; the largest
+    correction of a position."""
     most = 0.0
     for i in range(1, count - 1):
         # a node that was let go stays in the air until it lands (STALE is infinite then)
-        if strand[i, STALE] > 0.15 * delta and (rests(strand, i) or strand[i, STALE] == math.inf):
-            by = take_frame(field, strand, i, spread, flat, stride)
+        if strand[i, STALE] > 0.15 * reach and (rests(strand, i) or strand[i, STALE] == math.inf):
+            by = take_frame(
+                field, strand, i, settings.spread, settings.flat, STRIDE * settings.delta
+            )
             moved(strand, count, i, by)
             strand[i, STALE] = 0.0
             most = max(most, by)
@@ -469,20 +478,14 @@ def follow(
     x: float,
     y: float,
     z: float,
-    delta: float,
-    spread: float,
-    flat: float,
-    rounds: int,
-    precision: float,
+    settings: Settings,
 ) -> tuple[Floats, float, float, float]:
     """`pull_end` on a copy, with what its callers ask next. Returns (strand, residual, length,
     depth): depth is how deep the target lies inside a solid; then nothing is done."""
     depth = -distance(field, x, y, z)
-    if depth > 0.25 * delta:
+    if depth > 0.25 * settings.delta:
         return strand, 0.0, 0.0, depth
-    strand, count, residual = pull_end(
-        field, strand.copy(), len(strand), last, x, y, z, delta, spread, flat, rounds, precision
-    )
+    strand, count, residual = pull_end(field, strand.copy(), len(strand), last, x, y, z, settings)
     return strand[:count].copy(), residual, strand_length(strand, count), depth
 
 
@@ -492,19 +495,14 @@ def drive(
     strand: Floats,
     count: int,
     path: Floats,
-    delta: float,
-    spread: float,
-    flat: float,
-    rounds: int,
-    precision: float,
+    settings: Settings,
 ) -> tuple[Floats, int, float, Floats]:
     """Take the robot along a path (k, 3). Returns (strand, count, residual, lengths after each
     point)."""
     lengths, residual = np.empty(len(path)), 0.0
     for k in range(len(path)):
         strand, count, residual = pull_end(
-            field, strand, count, True, path[k, 0], path[k, 1], path[k, 2],
-            delta, spread, flat, rounds, precision,
+            field, strand, count, True, path[k, 0], path[k, 1], path[k, 2], settings
         )  # fmt: skip
         lengths[k] = strand_length(strand, count)
     return strand, count, residual, lengths
