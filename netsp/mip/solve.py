@@ -19,7 +19,7 @@ from netsp.lns import Search
 from netsp.mip.overgoals import bound_over_goals
 from netsp.mip.program import IntegerProgram, Point
 from netsp.mip.root import Root, Warm, tour_legs
-from netsp.mip.subtours import component_cuts, follow, tour_from
+from netsp.mip.subtours import component_cuts, heaviest_walk, tour_from
 from netsp.solving.legcosts import LegCosts
 from netsp.solving.limits import Limits
 from netsp.solving.run import Stop
@@ -220,7 +220,7 @@ class MipRun(SearchingRun):
                 self.update_incumbent(costs.vertices[cycles[0]].tolist())
             order = [int(cluster[v]) for cycle in cycles for v in cycle]
         else:
-            order = follow(point.legs, point.y, cluster)
+            order = heaviest_walk(point.legs, point.y, cluster)
         if sorted(order) != list(range(self.graph.goal_count + 1)):
             return
         search = Search(

@@ -182,7 +182,7 @@ def tour_from(x: Floats, legs: Ints, y: Floats) -> list[list[int]]:
     return cycles
 
 
-def follow(legs: Ints, y: Floats, cluster: Ints) -> list[int]:
+def heaviest_walk(legs: Ints, y: Floats, cluster: Ints) -> list[int]:
     """Clusters by walking from the base along the heaviest leg to one not yet visited."""
     m = int(cluster.max())
     weight = np.zeros((m + 1, m + 1))

@@ -19,7 +19,7 @@ import numpy.typing as npt
 from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.online.scene.field import DistanceField, finite_point
-from netsp.online.tether.pull import Settings, drive, follow, pull
+from netsp.online.tether.pull import PullSettings, drive, follow, pull
 from netsp.online.tether.resolution import THINNEST
 from netsp.online.tether.strand import strand_length
 from netsp.online.tether.tether import Tether, strand_of
@@ -70,14 +70,14 @@ class GeodesicTether:
             raise InputError(f"delta: expected a positive length, got {self.delta!r}")
 
     @cached_property
-    def _settings(self) -> Settings:
+    def _settings(self) -> PullSettings:
         precision = self.precision if self.precision is not None else 5e-3 * self.delta
         voxel = self.field.voxel
         # normals of voxels are true at the scale of a voxel only, and never to better than a few
         # per cent
         spread = 0.1 * self.delta if voxel is None else max(0.1 * self.delta, voxel)
         flat = 1e-6 if voxel is None else 0.02
-        return Settings(self.delta, spread, flat, self.rounds, precision)
+        return PullSettings(self.delta, spread, flat, self.rounds, precision)
 
     def start(self, anchor: npt.ArrayLike, robot: npt.ArrayLike) -> Tether:
         """A tether along the line of sight.

@@ -43,7 +43,7 @@ from netsp.online.tether.strand import (
     insert,
     let_go,
     look_along,
-    moved,
+    note_motion,
     path_out,
     remove,
     rests,
@@ -91,7 +91,7 @@ CONVEX = 0.5
 strand reaches half way round."""
 
 
-class Settings(NamedTuple):
+class PullSettings(NamedTuple):
     """Of the model: delta (m); spread (m), how far around it a contact's normals are asked; flat,
     the sine between normals that are taken for one; rounds of an update; precision (m), the motion
     below which nothing is done."""
@@ -112,7 +112,7 @@ def pull_end(
     x: float,
     y: float,
     z: float,
-    settings: Settings,
+    settings: PullSettings,
 ) -> tuple[Floats, int, float]:
     """Move one end (the robot's if `last`) to (x, y, z) and pull taut. Returns (strand, count,
     residual): the strand may have been copied to grow; residual is the last round's motion."""
@@ -146,7 +146,7 @@ def pull_end(
             strand[end, X] += f * dx
             strand[end, Y] += f * dy
             strand[end, Z] += f * dz
-        moved(strand, count, end, f * motion)
+        note_motion(strand, count, end, f * motion)
         strand, count, residual = pull(
             field, strand, count, settings, last_rounds if left == 0.0 else 2,
             MORE_ROUNDS if left == 0.0 and settings.spread <= delta else 0,
@@ -159,7 +159,7 @@ def pull(
     field: Field,
     strand: Floats,
     count: int,
-    settings: Settings,
+    settings: PullSettings,
     rounds: int,
     more: int,
 ) -> tuple[Floats, int, float]:
@@ -248,7 +248,7 @@ def refresh(
     field: Field,
     strand: Floats,
     count: int,
-    settings: Settings,
+    settings: PullSettings,
     reach: float,
 ) -> float:
     """Take the frames of contacts that have moved by more than a part of `reach`; the largest
@@ -260,7 +260,7 @@ def refresh(
             by = take_frame(
                 field, strand, i, settings.spread, settings.flat, STRIDE * settings.delta
             )
-            moved(strand, count, i, by)
+            note_motion(strand, count, i, by)
             strand[i, STALE] = 0.0
             most = max(most, by)
     return most
@@ -327,10 +327,10 @@ def lift(field: Field, strand: Floats, count: int, slip: float, stride: float) -
             px, py, pz = px + f * hx, py + f * hy, pz + f * hz
             d = distance(field, px, py, pz)
             let_go(strand, i)
-            moved(strand, count, i, f * h)
+            note_motion(strand, count, i, f * h)
             if d < 0.0:
                 px, py, pz = to_surface(field, px, py, pz, 1e-3 * stride)
-                moved(strand, count, i, math.inf)
+                note_motion(strand, count, i, math.inf)
             strand[i, X], strand[i, Y], strand[i, Z] = px, py, pz
         i += 1
     return count, lifted
@@ -431,7 +431,7 @@ def slide(
             strand[i, X], strand[i, Y], strand[i, Z] = to_surface(
                 field, strand[i, X], strand[i, Y], strand[i, Z], 1e-3 * stride
             )
-        moved(strand, count, i, abs(by))
+        note_motion(strand, count, i, abs(by))
     put_back(strand, was)
     return max(gain, f) * most, max(f, 1e-3)
 
@@ -478,7 +478,7 @@ def follow(
     x: float,
     y: float,
     z: float,
-    settings: Settings,
+    settings: PullSettings,
 ) -> tuple[Floats, float, float, float]:
     """`pull_end` on a copy, with what its callers ask next. Returns (strand, residual, length,
     depth): depth is how deep the target lies inside a solid; then nothing is done."""
@@ -495,7 +495,7 @@ def drive(
     strand: Floats,
     count: int,
     path: Floats,
-    settings: Settings,
+    settings: PullSettings,
 ) -> tuple[Floats, int, float, Floats]:
     """Take the robot along a path (k, 3). Returns (strand, count, residual, lengths after each
     point)."""

@@ -113,7 +113,7 @@ def strand_length(strand: Floats, count: int) -> float:
 
 
 @kernel
-def moved(strand: Floats, count: int, i: int, by: float) -> None:
+def note_motion(strand: Floats, count: int, i: int, by: float) -> None:
     """Book a motion of node i against the edges beside it."""
     strand[i, STALE] += by
     if i > 0:
