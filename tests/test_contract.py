@@ -317,7 +317,7 @@ def good_costs():
         (lambda c, k: (-c, k), "costs[0][1] is -1; expected no negative cost"),
         (lambda c, k: (c * np.nan, k), "costs[0][1] is not a number"),
         (lambda c, k: (c[:3], k), "expected a square matrix, got shape (3, 4)"),
-        (lambda c, k: (c, k[:3]), "expected 4 labels"),
+        (lambda c, k: (c, k[:3]), "expected 4 numbers"),
         (lambda c, k: (c, np.where(k > 0, k + 1, 0)), "cluster 1 has no vertex"),
         (lambda c, k: (c, k * 1e9), "4 vertices cannot fill clusters 0 to 2e+09"),
         (lambda c, k: (c, [0, 1, 2, np.inf]), "expected whole numbers from 0 on"),

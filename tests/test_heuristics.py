@@ -178,7 +178,7 @@ def test_entanglement_and_vertices_of_2016_are_those_of_the_words(problem, seed)
             detours.near, trie, vertex,
         )  # fmt: skip
         turns = np.zeros(n + 1, dtype=np.int64)
-        state = rss2016.State(order, via, stops, stack, turns, np.zeros_like(stops))
+        state = rss2016.Configuration(order, via, stops, stack, turns, np.zeros_like(stops))
         length, held, missed = rss2016.evaluate(state, table)
         words = [()]
         for leg in legs:
