@@ -29,8 +29,8 @@ POST = Scene(solids=[{"post": {"center": [0, 0], "radius": 0.5}}], bounds=(-4, -
 
 def mission(waypoints, length, **more):
     return Mission(
-        scene="-", anchor=(-2, 0, 0), start=(-2, 0.5, 0), waypoints=waypoints, tether_length=length,
-        **{"clearance": 0.2, "delta": 0.1, **more},
+        scene="-", anchor=(-2, 0, 0), waypoints=waypoints, tether_length=length,
+        **{"start": (-2, 0.5, 0), "clearance": 0.2, "delta": 0.1, **more},
     )  # fmt: skip
 
 
@@ -293,3 +293,54 @@ def test_lengths_in_a_grid_are_those_of_dijkstra_over_all_neighbours(shape, shar
             along, at = along + np.linalg.norm(STEPS[step]), at + STEPS[step]
             assert free[tuple(at)]
         assert not np.isfinite(length) or along == pytest.approx(length)
+
+
+@pytest.mark.parametrize(("planner", "length"), [("predictive", 3.6), ("react", 6.0)])
+def test_after_the_last_waypoint_the_robot_goes_home_and_the_tether_is_free(planner, length):
+    run = fly(planner, ring(1.6), length)
+    home = run.summary["home"]
+    assert home["reached"]
+    assert home["tether_free"]
+    assert home["seconds"] > 0.0
+    assert math.dist(run.tether.robot, run.mission.start) <= run.mission.reach
+    assert run.tether.length < 0.6
+    assert run.log[-1].mode == "done"
+    assert run.log[-2].mode == "home"
+
+
+def test_going_straight_home_leaves_the_turns_in_the_tether():
+    """One turn about a post of perimeter pi: what is left is not much less."""
+    run = fly("none", ring(1.0), 20.0)
+    assert run.summary["home"]["reached"]
+    assert not run.summary["home"]["tether_free"]
+    assert run.summary["home"]["left"] > 3.0
+
+
+def test_inspection_ends_at_the_last_waypoint():
+    """The way home counts for the tether, not for the time of inspection."""
+    run = fly("predictive", ring(1), 8.0)
+    rows = [r for r in run.log if r.waypoint >= len(run.mission.waypoints)]
+    assert run.summary["inspection_s"] == rows[0].time < run.log[-1].time
+    there_and_back = run.summary["inspection_s"] + run.summary["home"]["seconds"]
+    assert there_and_back == pytest.approx(run.log[-1].time)
+
+
+def test_a_start_out_of_sight_of_the_anchor_is_reached_along_the_shortest_path():
+    """Anchor and start on opposite sides of the post: the tether begins around it, and that is what
+    it comes back to."""
+    there = mission([(2, 1, 0), (0, 2, 0), (-2, 1, 0)], 8.0, start=(2, 0.1, 0))
+    run = simulate(there, scene=POST)
+    far = math.hypot(2, 0.1)
+    arc = math.pi - math.atan2(0.1, 2) - math.acos(0.5 / 2) - math.acos(0.5 / far)
+    taut = math.sqrt(4 - 0.25) + 0.5 * arc + math.sqrt(far**2 - 0.25)
+    assert run.log[0].tether == pytest.approx(taut, abs=0.005)
+    assert run.summary["visited"] == 3
+    assert run.summary["home"]["tether_free"]
+    assert run.tether.length == pytest.approx(taut, abs=run.mission.reach)
+
+
+def test_anchor_and_start_in_different_parts_of_the_water_are_refused():
+    wall = {"box": {"center": [0, 0, 0], "size": [0.4, 18, 18]}}
+    scene = Scene(solids=[wall], bounds=(-4, -4, -1, 4, 4, 1))
+    with pytest.raises(InputError, match="start: no path in the water"):
+        simulate(mission([(2, 1, 0)], 8.0, start=(2, 0, 0)), scene=scene)

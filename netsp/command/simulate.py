@@ -124,7 +124,8 @@ def run(args: argparse.Namespace) -> int:
         draw_runs(runs, scene, Path(args.output))
     if any(r.summary["defects"] for r in runs):
         return EXIT_DEFECT
-    complete = runs[0].summary["status"] == "done" and not runs[0].summary["left_out"]
+    s = runs[0].summary
+    complete = s["status"] == "done" and not s["left_out"] and s["home"]["tether_free"]
     return 0 if complete else EXIT_NOT_ALL
 
 
@@ -153,7 +154,8 @@ def show_mission(mission: Mission, units: str) -> Callable[[LogRow, Planner], No
         done = int(20 * row.waypoint / count)
         seen = f"  seen {100 * row.coverage:.0f} %" if mission.camera is not None else ""
         print(
-            f"\r[{'#' * done:.<20}] {row.time:7.1f} s  waypoint {row.waypoint}/{count}  "
+            f"\r[{'#' * done:.<20}] {row.time:7.1f} s  "
+            f"waypoint {min(row.waypoint, count)}/{count}  "
             f"{row.mode:<8} tether {row.tether:.2f} of {mission.tether_length:g} {units}{seen}   ",
             end="", file=sys.stderr, flush=True,
         )  # fmt: skip

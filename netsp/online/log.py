@@ -148,8 +148,9 @@ def describe_run(run: Run, units: str) -> str:
     lines = [
         f"mission  {s['mission']}, planner {s['planner']}: {s['status']}",
         f"visited  {s['visited']} of {s['waypoints']} waypoints",
-        f"time     {s['inspection_s']:.1f} s, and back along the tether "
-        f"{s['recovery_s']['tether']:.1f} s",
+        f"time     {s['inspection_s']:.1f} s, and {s['home']['seconds']:.1f} s "
+        f"{'home' if s['home']['reached'] else 'on the way home'}",
+        f"home     {_home(s['home'], units)}",
         f"tether   longest {s['longest_tether']:.3f} of {s['tether_length']:g} {units}, "
         f"over the limit for {s['exceedance_s']:.1f} s",
         f"planning {s['replans']} times, median {1e3 * s['replan_median_s']:.1f} ms, worst "
@@ -159,7 +160,7 @@ def describe_run(run: Run, units: str) -> str:
         lines.append(f"defect   planning failed {s['defects']} times; please report the mission")
     if s["coverage"] is not None:
         lines.insert(
-            4,
+            5,
             f"seen     {100 * s['coverage']:.1f} % of the surface "
             f"({100 * s['coverage_through']:.1f} % if nothing stood in between)",
         )
@@ -175,3 +176,11 @@ def describe_run(run: Run, units: str) -> str:
     if len(s["left_out"]) > 5:
         lines.append(f"         and {len(s['left_out']) - 5} more")
     return "\n".join(lines)
+
+
+def _home(home: dict[str, Any], units: str) -> str:
+    if not home["reached"]:
+        return f"not reached{': ' if home['reason'] else ''}{home['reason'] or ''}"
+    if home["tether_free"]:
+        return "reached, tether free"
+    return f"reached, tether NOT free: {home['left']:.2f} {units} left"

@@ -8,6 +8,7 @@ from typing import Annotated, ClassVar, Literal, Self
 import numpy as np
 from pydantic import ConfigDict, Field
 
+from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.fields import Name, NonNegative, Point3, Positive
 from netsp.files import FileModel, read_text
@@ -53,7 +54,7 @@ class Mission(FileModel):
     anchor : (x, y, z)
         Where the tether is fixed, metres.
     start : (x, y, z)
-        Where the robot is at first, in sight of the anchor, metres.
+        Where the robot starts, and where it comes home to, metres.
     waypoints : tuple of (x, y, z)
         To be visited in this order, metres.
     tether_length : float
@@ -92,7 +93,7 @@ class Mission(FileModel):
     scene: Annotated[str, Field(description="scene file, relative to this one")]
     anchor: Annotated[Point3, Field(description="(x, y, z) where the tether is fixed, m")]
     start: Annotated[
-        Point3, Field(description="(x, y, z) where the robot starts, in sight of the anchor, m")
+        Point3, Field(description="(x, y, z) where the robot starts and comes home to, m")
     ]
     waypoints: Annotated[
         Annotated[tuple[Point3, ...], Field(min_length=1)],
@@ -139,6 +140,11 @@ class Mission(FileModel):
         """
         mission = cls.from_json(read_text(path), source=str(path))
         return mission.model_copy(update={"scene": str(Path(path).parent / mission.scene)})
+
+    @property
+    def places(self) -> Floats:
+        """(n, 3) where the waypoints are, metres."""
+        return np.array(self.waypoints)
 
     def checked_waypoints(self, field: DistanceField, *, snap: bool = False) -> Self:
         """The mission with every waypoint outside of solids.

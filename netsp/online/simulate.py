@@ -15,9 +15,10 @@ from netsp.geometry import polylines
 from netsp.online.coverage import Coverage, patches_of
 from netsp.online.log import LogRow, Run
 from netsp.online.mission import Mission
-from netsp.online.paths.tree import Grid
+from netsp.online.paths.tree import Grid, ShortestTree
+from netsp.online.paths.tree import taut as taut_path
 from netsp.online.planner import PLANNERS, Command, Planner, PlannerOptions, make_planner
-from netsp.online.planner.base import DONE, Tethers
+from netsp.online.planner.base import DONE, FREE, Tethers
 from netsp.online.scene.field import DistanceField
 from netsp.online.scene.scene import Scene
 from netsp.online.scene.surfaces import extent
@@ -65,6 +66,49 @@ def grid_of(mission: Mission, scene: Scene, field: DistanceField) -> Grid:
         room = 5.0 * mission.cell + mission.clearance
         low, high = low - room, high + room
     return Grid(field, low, high, mission.cell, mission.clearance)
+
+
+def first_tether(mission: Mission, field: DistanceField, model: Tethers, grid: Grid) -> Tether:
+    """The tether when a mission begins: straight, or along the shortest path from the anchor to a
+    start that it does not see.
+
+    Parameters
+    ----------
+    mission : Mission
+        Its anchor and start count.
+    field : DistanceField
+        The scene's field.
+    model : TetherModel
+        The model of the tether.
+    grid : Grid
+        That paths are sought on.
+
+    Returns
+    -------
+    Tether
+        The tether.
+
+    Raises
+    ------
+    InputError
+        Anchor or start inside a solid, or in different parts of the water.
+    """
+    anchor = field.free_point(mission.anchor, "anchor")
+    start = field.free_point(mission.start, "start")
+    if field.line_of_sight(anchor, start, depth=0.125 * mission.delta):
+        return model.start(anchor, start)
+    path = ShortestTree(grid, start, anchor[None]).path(0)
+    if path is None:
+        raise InputError(
+            f"start: no path in the water leads from the anchor {_shown(anchor)} to "
+            f"{_shown(start)} at the clearance {mission.clearance:g}"
+        )
+    path = taut_path(field, path, 0.0, mission.delta)
+    return model.drive(model.start(anchor, anchor), path[1:])[0]
+
+
+def _shown(point: Floats) -> str:
+    return f"({', '.join(f'{v:g}' for v in point)})"
 
 
 @dataclass
@@ -126,7 +170,7 @@ class Simulation:
         """
         x, y, z = (float(v) for v in self.vehicle.position)
         seen = self.coverage
-        if seen is not None and len(self.log) % FRAME == 0:
+        if seen is not None and len(self.log) % FRAME == 0 and not planner.homeward:
             seen.look(self.vehicle.position, self.vehicle.yaw)
         row = LogRow(
             round(self.now, 6), x, y, z, self.vehicle.yaw, planner.index, command.mode,
@@ -136,7 +180,7 @@ class Simulation:
         self.log.append(row)
         return row
 
-    def go(self, path: Floats, fresh: bool) -> tuple[int, bool]:
+    def go(self, path: Floats, fresh: bool, homeward: bool = False) -> tuple[int, bool]:
         """Take one step along a path; a vehicle that runs into a solid is stopped where it was.
 
         Parameters
@@ -145,6 +189,8 @@ class Simulation:
             Points to pass, metres.
         fresh : bool
             Whether the path does not continue the one before.
+        homeward : bool
+            Whether the inspection is over: the camera then no longer asks for a heading.
 
         Returns
         -------
@@ -154,7 +200,7 @@ class Simulation:
             Whether the vehicle could move.
         """
         robot, yaw = self.vehicle.position, self.vehicle.yaw
-        if self.coverage is not None:
+        if self.coverage is not None and not homeward:
             yaw = self.coverage.heading(robot, yaw)
         points, passed = self.vehicle.go(path, STEP, yaw, self.water(self.now), fresh)
         self.now += STEP
@@ -265,8 +311,8 @@ def simulate(
     Raises
     ------
     InputError
-        Before the first step: unknown names, waypoints inside solids, anchor and start not in sight
-        of one another, a tether that is shorter than the path between them.
+        Before the first step: unknown names, waypoints inside solids, anchor and start in different
+        parts of the water, a tether that is shorter than the path between them.
     """
     check_names(planner, vehicle, tether)
     _check_size(mission)
@@ -274,7 +320,8 @@ def simulate(
     field = field or scene.field()
     mission = mission.checked_waypoints(field, snap=snap)
     tethers = GeodesicTether(field, mission.delta)
-    taut = tethers.start(mission.anchor, mission.start)
+    grid = grid_of(mission, scene, field)
+    taut = first_tether(mission, field, tethers, grid)
     if taut.length > mission.tether_length:
         raise InputError(
             f"tether_length: {mission.tether_length:g} is shorter than the path from anchor to "
@@ -282,9 +329,8 @@ def simulate(
         )
     robot = make_vehicle(vehicle, np.array(mission.start), mission.speed)
     believed = None if tether == "geodesic" else make_tether(tether, field, mission.delta)
-    chosen = make_planner(
-        planner, mission, field, believed or tethers, grid_of(mission, scene, field), options
-    )
+    chosen = make_planner(planner, mission, field, believed or tethers, grid, options)
+    chosen.laid = taut
     coverage = None
     if mission.camera is not None:
         places = np.array([mission.anchor, mission.start, *mission.waypoints])
@@ -294,7 +340,7 @@ def simulate(
     chosen.warm_up(robot.position, taut)
     world = Simulation(mission, field, robot, tethers, taut, water, coverage, believed)
     if believed is not None:
-        world.believed = believed.start(mission.anchor, mission.start)
+        world.believed = first_tether(mission, field, believed, grid)
     since, interrupted = (0.0, -1), False
     begin = time.perf_counter()
     try:
@@ -312,7 +358,7 @@ def simulate(
                 chosen.leave_out(f"not reached in {STUCK:g} s")
                 continue
             fresh = before != chosen.index or command.replan_s > 0.0 or not world.now
-            passed, moved = world.go(command.path, fresh)
+            passed, moved = world.go(command.path, fresh, chosen.homeward)
             if moved:
                 chosen.passed(passed)
             else:
@@ -337,7 +383,9 @@ def summarise(
 
     `exceedance_s` is the time with the tether over the limit. `recovery_s` is the time to come back
     to the anchor afterwards, by retracing the tether, or the whole path (the paper does not say
-    which).
+    which). Both, `path` and what was seen are of the inspection; `home` tells of the leg back to
+    the start that follows it: whether it was `reached` with the tether free, how much longer the
+    tether is there than when the mission began (`left`, m), and how long it took.
 
     Parameters
     ----------
@@ -357,14 +405,20 @@ def summarise(
     dict
         The numbers by name.
     """
-    log, tether = world.log, world.tether
+    log = world.log
+    # the rows of the inspection: up to the one in which the way home begins
+    last = next(
+        (n for n, r in enumerate(log) if r.waypoint >= len(mission.waypoints)), len(log) - 1
+    )
+    inspected = log[: last + 1]
     lengths = np.array([r.tether for r in log])
-    places = np.array([[r.x, r.y, r.z] for r in log])
+    places = np.array([[r.x, r.y, r.z] for r in inspected])
     planned = [r.replan_s for r in log if r.replan_s > 0.0]
     walked = polylines.length(places)
-    inspection = log[-1].time if log else 0.0
+    inspection = inspected[-1].time if log else 0.0
     control = world.vehicle.control_s
-    by_tether, by_path = tether.length / mission.speed, walked / mission.speed
+    by_tether = inspected[-1].tether / mission.speed if log else 0.0
+    by_path = walked / mission.speed
     return {
         "mission": mission.name,
         "planner": planner.name,
@@ -379,6 +433,7 @@ def summarise(
         "visited": len(planner.reached),
         "waypoints": len(mission.waypoints),
         "left_out": [{"waypoint": k, "reason": why} for k, why in planner.left_out],
+        "home": _home(planner, world, inspection),
         "defects": len(planner.defects),
         "replans": len(planned),
         "replan_median_s": float(np.median(planned)) if planned else 0.0,
@@ -388,4 +443,19 @@ def summarise(
         "control_median_s": float(np.median(control)) if control else 0.0,
         "control_worst_s": max(control, default=0.0),
         "wall_s": wall,
+    }
+
+
+def _home(planner: Planner, world: Simulation, since: float) -> dict[str, Any]:
+    """How the mission ended: `left` is asked once the tether has come to rest."""
+    assert planner.laid is not None
+    model, delta = world.tethers, world.tethers.delta
+    as_laid = model.refine(model.update(planner.laid, world.vehicle.position)).length
+    left = max(0.0, model.refine(world.tether).length - as_laid)
+    return {
+        "reached": planner.home,
+        "tether_free": planner.home and left <= FREE * delta,
+        "left": left,
+        "seconds": world.now - since,
+        "reason": planner.not_home,
     }

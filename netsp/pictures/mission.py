@@ -15,6 +15,7 @@ from netsp.errors import InputError
 from netsp.online.log import Run
 from netsp.online.scene.scene import Scene
 from netsp.online.scene.surfaces import extent
+from netsp.online.simulate import first_tether, grid_of
 from netsp.online.tether import GeodesicTether, Tether
 from netsp.pictures import style
 from netsp.pictures.scene import (
@@ -117,8 +118,10 @@ def draw_coverage(runs: Sequence[Run], *, ax: Any = None) -> Any:
 def tethers_along(run: Run, scene: Scene, moments: npt.NDArray[np.int64]) -> list[Tether]:
     """The tether at some rows of the log, ascending: the run is driven again."""
     mission = run.mission
-    model = GeodesicTether(scene.field(), mission.delta)
-    state, path, out, at = model.start(mission.anchor, mission.start), path_of(run), [], 0
+    field = scene.field()
+    model = GeodesicTether(field, mission.delta)
+    state = first_tether(mission, field, model, grid_of(mission, scene, field))
+    path, out, at = path_of(run), [], 0
     for row in moments:
         state = model.drive(state, path[at : int(row) + 1])[0]
         out.append(state)

@@ -13,15 +13,18 @@ from netsp.online.mission import Mission
 from netsp.online.paths.refine import refined
 from netsp.online.paths.sampled import SampledPaths
 from netsp.online.paths.tree import Grid, Paths, ShortestTree, taut
-from netsp.online.scene.field import DistanceField
+from netsp.online.scene.field import DistanceField, pushed_out
 from netsp.online.tether import GeodesicTether, ReactTether, Tether
 
 Tethers = GeodesicTether | ReactTether
 
+FREE = 0.1
+"""A tether so many delta longer than as it was laid when the mission began is not free."""
+
 MOST_HOLDS = 20
 """Steps that a planner may fail at one waypoint before it is left out."""
 
-NORMAL, RECOVERY, HOLD, DONE = "normal", "recovery", "hold", "done"
+NORMAL, RECOVERY, HOME, HOLD, DONE = "normal", "recovery", "home", "hold", "done"
 
 
 @dataclass(frozen=True)
@@ -32,7 +35,7 @@ class Command:
     ----------
     path : ndarray, shape (k, 3)
         Points to pass in this order, the first one next; metres.
-    mode : {"normal", "recovery", "hold", "done"}
+    mode : {"normal", "recovery", "home", "hold", "done"}
         What the robot is doing.
     replan_s : float
         Seconds of CPU that planning took in this step.
@@ -79,8 +82,10 @@ class Planner:
         The grid that paths are sought on.
     options : PlannerOptions
         How paths are found.
+    laid : Tether
+        The tether when the mission began.
     index : int
-        The waypoint that is next.
+        The waypoint that is next; their number on the way home.
     mode : str
         As of `Command`.
     path : ndarray, shape (k, 3)
@@ -91,6 +96,10 @@ class Planner:
         What went wrong in planning that never should, one text each time.
     reached : list of int
         Waypoints visited.
+    home : bool
+        Whether the robot is back at the start.
+    not_home : str or None
+        Why it has given up getting there.
     """
 
     mission: Mission
@@ -98,12 +107,15 @@ class Planner:
     tethers: Tethers
     grid: Grid
     options: PlannerOptions = field(default_factory=PlannerOptions)
+    laid: Tether | None = None
     index: int = 0
     mode: str = NORMAL
     path: Floats = field(default_factory=lambda: np.zeros((0, 3)))
     left_out: list[tuple[int, str]] = field(default_factory=list)
     defects: list[str] = field(default_factory=list)
     reached: list[int] = field(default_factory=list)
+    home: bool = False
+    not_home: str | None = None
     _held: int = 0
 
     name = "none"
@@ -111,13 +123,18 @@ class Planner:
 
     @property
     def waypoint(self) -> Floats:
-        """(3,) the waypoint that is next."""
-        return np.array(self.mission.waypoints[self.index])
+        """(3,) the waypoint that is next; on the way home the start."""
+        return np.array(self.mission.start) if self.homeward else self.mission.places[self.index]
+
+    @property
+    def homeward(self) -> bool:
+        """Whether all waypoints are visited or left out: what is left is the way home."""
+        return self.index >= len(self.mission.waypoints)
 
     @property
     def done(self) -> bool:
-        """Whether all waypoints are visited or left out."""
-        return self.index >= len(self.mission.waypoints)
+        """Whether the robot is home, or has given up getting there."""
+        return self.index > len(self.mission.waypoints)
 
     def step(self, robot: Floats, tether: Tether) -> Command:
         """What to do now.
@@ -145,7 +162,8 @@ class Planner:
         while not self.done and before < len(self.left_out):
             before = len(self.left_out)
             try:
-                planned = self.plan(robot, tether) or planned
+                plan = self.plan_home if self.homeward else self.plan
+                planned = plan(robot, tether) or planned
             except Exception as error:  # a vehicle in the water must not be left without a command
                 return self._hold(robot, error, time.process_time() - begin)
         spent = time.process_time() - begin if planned else 0.0
@@ -193,6 +211,49 @@ class Planner:
         """
         del tether
         return False if len(self.path) else self.go_on(robot)
+
+    def plan_home(self, robot: Floats, tether: Tether) -> bool:
+        """Set `path` and `mode` for the way home, after the last waypoint; here, straight to the
+        start whatever the tether.
+
+        Parameters
+        ----------
+        robot : ndarray, shape (3,)
+            Position of the robot, metres.
+        tether : Tether
+            The tether as the model has it.
+
+        Returns
+        -------
+        bool
+            Whether anything had to be planned.
+        """
+        del tether
+        if len(self.path):
+            return False
+        planned = self.go_on(robot)
+        self.mode = HOME
+        return planned
+
+    def back_along(self, tether: Tether) -> Floats:
+        """The way back along a tether to the anchor, and on to the start as the tether was laid
+        there: whoever goes it has the tether free at its end.
+
+        Parameters
+        ----------
+        tether : Tether
+            The tether as the model has it.
+
+        Returns
+        -------
+        ndarray, shape (k, 3)
+            From the robot to the start, at the clearance where there is room, metres.
+        """
+        assert self.laid is not None
+        line = np.vstack([tether.nodes[::-1], self.laid.nodes[1:]])
+        path = polylines.points_along(line, self.mission.cell)
+        path[1:-1] = pushed_out(self.scene, path[1:-1], self.mission.clearance)
+        return path
 
     def go_on(self, robot: Floats) -> bool:
         """Go straight to the waypoint, or along the shortest path round what is between.
@@ -294,7 +355,10 @@ class Planner:
         if self.done:
             return
         if len(self.path) <= 1 and np.linalg.norm(self.waypoint - robot) <= reach:
-            self.reached.append(self.index)
+            if self.homeward:
+                self.home = True
+            else:
+                self.reached.append(self.index)
             self._next()
 
     def _next(self) -> None:
@@ -312,12 +376,15 @@ class Planner:
         self.path = self.path[min(count, max(0, len(self.path) - 1)) :]
 
     def leave_out(self, reason: str) -> None:
-        """Leave the waypoint that is next out.
+        """Leave the waypoint that is next out; on the way home, end the mission where the robot is.
 
         Parameters
         ----------
         reason : str
             Why; it is logged.
         """
-        self.left_out.append((self.index, reason))
+        if self.homeward:
+            self.not_home = reason
+        else:
+            self.left_out.append((self.index, reason))
         self._next()

@@ -16,7 +16,7 @@ import numpy as np
 from netsp.arrays import Floats
 from netsp.geometry import polylines
 from netsp.online.paths.tree import ever_tauter, homotopic, roughly_taut, taut
-from netsp.online.planner.base import NORMAL, RECOVERY, Planner
+from netsp.online.planner.base import FREE, HOME, NORMAL, RECOVERY, Planner
 from netsp.online.scene.field import pushed_out
 from netsp.online.tether import GeodesicTether, Tether
 
@@ -161,18 +161,46 @@ class PredictivePlanner(Planner):
             if self._fits(tether, path, limit):
                 best, least = path, length
                 continue
-            # the less of the retreat is saved, the sooner the tether fits
-            paths = list(self._ever_tauter(np.vstack([back[: last + 1], on[1:]])))
-            while paths:
-                middle = len(paths) // 2
-                if self._fits(tether, paths[middle], limit):
-                    length = polylines.length(paths[middle])
-                    if length < least:
-                        best, least = paths[middle], length
-                    paths = paths[middle + 1 :]
-                else:
-                    paths = paths[:middle]
+            found = self._tautest(tether, np.vstack([back[: last + 1], on[1:]]), limit)
+            if found is not None and polylines.length(found) < least:
+                best, least = found, polylines.length(found)
         return best
+
+    def _tautest(self, tether: Tether, line: Floats, limit: float) -> Floats | None:
+        """Of ever less pulled paths in the class of a line the tautest on which the tether fits:
+        the less of a retreat is saved, the sooner it does."""
+        best = None
+        paths = list(self._ever_tauter(line))
+        while paths:
+            middle = len(paths) // 2
+            if self._fits(tether, paths[middle], limit):
+                best, paths = paths[middle], paths[middle + 1 :]
+            else:
+                paths = paths[:middle]
+        return best
+
+    def plan_home(self, robot: Floats, tether: Tether) -> bool:
+        """The shortest path home on which the tether fits and at whose end it is free: that of the
+        class back along the tether, pulled as far as both hold."""
+        del robot
+        if len(self.path):
+            return False
+        limit = self.mission.tether_length * (1.0 - MARGIN)
+        line = self.back_along(tether)
+        path = self.pulled(line)
+        if not self._fits(tether, path, limit):
+            found = self._tautest(tether, line, limit)
+            path = line if found is None else found
+        if path is not line and not self._comes_free(tether, path):
+            path = line
+        self.path, self.mode = path[1:], HOME
+        return True
+
+    def _comes_free(self, tether: Tether, path: Floats) -> bool:
+        """Whether the tether lies at the end of a path as at the start of the mission."""
+        assert self.laid is not None
+        end = self._model.refine(self._model.drive(tether, path[1:])[0])
+        return end.length <= self.laid.length + FREE * self.mission.delta
 
     def _roughly_pulled(self, path: Floats) -> Floats:
         return roughly_taut(self.scene, path, self.mission.clearance, self.mission.delta)

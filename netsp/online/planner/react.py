@@ -22,7 +22,7 @@ import numpy as np
 from netsp.arrays import Floats
 from netsp.geometry import polylines
 from netsp.online.paths.tree import Paths
-from netsp.online.planner.base import NORMAL, RECOVERY, Planner
+from netsp.online.planner.base import HOME, NORMAL, RECOVERY, Planner
 from netsp.online.scene.field import pushed_out
 from netsp.online.tether import Tether
 
@@ -58,6 +58,14 @@ class ReactPlanner(Planner):
             self.mode = RECOVERY
             return True
         return False if len(self.path) else self.go_on(robot)
+
+    def plan_home(self, robot: Floats, tether: Tether) -> bool:
+        """Tether recovery as the paper means it: back along the whole tether."""
+        del robot
+        if len(self.path):
+            return False
+        self.path, self.mode = self.back_along(tether)[1:], HOME
+        return True
 
     def warm_up(self, robot: Floats, tether: Tether) -> None:
         """See `Planner`."""
