@@ -54,7 +54,7 @@ def test_legs_never_cost_more_than_by_the_anchor_and_never_less_than_straight(ri
     field = scene.field()
     graph, points, reached = waypoint_graph(mission, field, grid_of(mission, scene, field))
     costs, home = graph.costs, graph.costs_to_base
-    places = np.array([mission.anchor, *mission.waypoints])
+    places = np.array([mission.anchor, *mission.places])
     assert len(reached) == 36
     for v in range(1, len(graph)):
         far = np.linalg.norm(places[points[v] + 1] - places[0])

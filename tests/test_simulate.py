@@ -344,3 +344,41 @@ def test_anchor_and_start_in_different_parts_of_the_water_are_refused():
     scene = Scene(solids=[wall], bounds=(-4, -4, -1, 4, 4, 1))
     with pytest.raises(InputError, match="start: no path in the water"):
         simulate(mission([(2, 1, 0)], 8.0, start=(2, 0, 0)), scene=scene)
+
+
+@pytest.mark.parametrize("vehicle", ["kinematic", "bluerov2"])
+def test_the_robot_turns_to_a_waypoints_heading_and_stays_there_as_long_as_asked(vehicle):
+    there = {"position": (-1, 1.5, 0), "heading": 120.0, "dwell": 4.0}
+    plain = simulate(mission([(-1, 1.5, 0)], 8.0), scene=POST, vehicle=vehicle)
+    run = simulate(mission([there], 8.0), scene=POST, vehicle=vehicle)
+    stays = [r for r in run.log if r.mode == "dwell"]
+    assert stays[-1].time - stays[0].time >= 3.9
+    headed = [r for r in stays if abs(math.degrees(r.yaw) - 120.0) <= 5.0]
+    assert headed[-1].time - headed[0].time >= 3.9
+    assert all(math.dist((r.x, r.y, r.z), there["position"]) < 0.2 for r in stays)
+    longer = run.summary["inspection_s"] - plain.summary["inspection_s"]
+    assert 4.0 <= longer <= 12.0
+    assert run.summary["home"]["tether_free"]
+
+
+def test_waypoints_with_and_without_more_to_do_are_written_as_they_are_read():
+    mixed = mission([(1, 2, 0), {"position": [1, 3, 0], "heading": -90, "dwell": 2}], 8.0)
+    data = json.loads(mixed.model_dump_json())
+    assert data["waypoints"] == [[1, 2, 0], {"position": [1, 3, 0], "heading": -90, "dwell": 2}]
+    assert Mission.model_validate(data) == mixed
+
+
+@pytest.mark.parametrize(
+    ("waypoint", "message"),
+    [
+        ({"position": [0, 0, 0], "dwell": -1}, "dwell"),
+        ({"position": [0, 0, 0], "heading": 400}, "heading"),
+        ({"position": [0, 0, 0], "heading": "north"}, "heading"),
+        ({"heading": 40}, "position"),
+        ({"position": [0, 0, 0], "stay": 3}, "stay"),
+        ("here", "position"),
+    ],
+)
+def test_a_bad_waypoint_is_told_in_one_line(waypoint, message):
+    with pytest.raises(InputError, match=rf"waypoints\[0\].*{message}"):
+        mission([waypoint], 8.0)

@@ -3,18 +3,28 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
-from pydantic import ConfigDict, Field
+from pydantic import (
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    SerializerFunctionWrapHandler,
+    WithJsonSchema,
+    model_serializer,
+)
 
 from netsp.arrays import Floats
 from netsp.errors import InputError
-from netsp.fields import Name, NonNegative, Point3, Positive
+from netsp.fields import POINT3_SCHEMA, Name, NonNegative, Point3, Positive
 from netsp.files import FileModel, read_text
 from netsp.models import Model
 from netsp.online.scene.field import DistanceField, pushed_out
 from netsp.online.scene.scene import Scene
+
+MOST_DWELL = 86400.0
+"""Seconds; a day at one waypoint is taken for a mistake of units."""
 
 
 class Camera(Model):
@@ -44,6 +54,72 @@ class Camera(Model):
     patch: Annotated[Positive, Field(description="edge of the patches that are counted, m")] = 0.1
 
 
+class MissionWaypoint(Model):
+    """A place to visit, and what to do there.
+
+    Attributes
+    ----------
+    position : (x, y, z)
+        Metres.
+    heading : float or None
+        Degrees from the x axis towards the y axis, to be turned to before the robot goes on.
+    dwell : float
+        Seconds to stay there, at that heading.
+    """
+
+    position: Annotated[Point3, Field(description="(x, y, z) to reach, m")]
+    heading: Annotated[
+        Annotated[float, Field(ge=-360.0, le=360.0)] | None,
+        Field(description="to turn to there, degrees from the x axis towards y; null for any"),
+    ] = None
+    dwell: Annotated[
+        Annotated[NonNegative, Field(le=MOST_DWELL)],
+        Field(description="seconds to stay there, at that heading"),
+    ] = 0.0
+
+    @model_serializer(mode="wrap")
+    def _plain(self, handler: SerializerFunctionWrapHandler) -> Any:
+        """A bare position where there is nothing else to say."""
+        return self.position if self.heading is None and not self.dwell else handler(self)
+
+
+def _waypoint(value: Any) -> Any:
+    return value if isinstance(value, dict | MissionWaypoint) else {"position": value}
+
+
+WaypointLike = Annotated[
+    MissionWaypoint,
+    BeforeValidator(_waypoint),
+    WithJsonSchema(
+        {
+            "anyOf": [
+                POINT3_SCHEMA,
+                {
+                    "type": "object",
+                    "properties": {
+                        "position": {**POINT3_SCHEMA, "description": "(x, y, z) to reach, m"},
+                        "heading": {
+                            "anyOf": [
+                                {"type": "number", "minimum": -360, "maximum": 360},
+                                {"type": "null"},
+                            ],
+                            "default": None,
+                            "description": "to turn to there, degrees from the x axis towards y",
+                        },
+                        "dwell": {
+                            "type": "number", "minimum": 0, "maximum": MOST_DWELL, "default": 0,
+                            "description": "seconds to stay there, at that heading",
+                        },
+                    },
+                    "required": ["position"],
+                    "additionalProperties": False,
+                },
+            ]
+        }
+    ),
+]  # fmt: skip
+
+
 class Mission(FileModel):
     """Waypoints to visit in their order.
 
@@ -55,8 +131,8 @@ class Mission(FileModel):
         Where the tether is fixed, metres.
     start : (x, y, z)
         Where the robot starts, and where it comes home to, metres.
-    waypoints : tuple of (x, y, z)
-        To be visited in this order, metres.
+    waypoints : tuple of MissionWaypoint
+        To be visited in this order; a bare ``[x, y, z]`` is accepted.
     tether_length : float
         Metres of taut tether that must never be exceeded.
     clearance : float
@@ -96,8 +172,8 @@ class Mission(FileModel):
         Point3, Field(description="(x, y, z) where the robot starts and comes home to, m")
     ]
     waypoints: Annotated[
-        Annotated[tuple[Point3, ...], Field(min_length=1)],
-        Field(description="(x, y, z) to reach in this order, m"),
+        Annotated[tuple[WaypointLike, ...], Field(min_length=1)],
+        Field(description="(x, y, z) to reach in this order, m, or objects with more to do there"),
     ]
     tether_length: Annotated[Positive, Field(description="maximum length of the taut tether, m")]
     clearance: Annotated[
@@ -144,7 +220,12 @@ class Mission(FileModel):
     @property
     def places(self) -> Floats:
         """(n, 3) where the waypoints are, metres."""
-        return np.array(self.waypoints)
+        return np.array([w.position for w in self.waypoints])
+
+    @property
+    def every_place(self) -> Floats:
+        """(n + 2, 3) anchor, start and waypoints, metres."""
+        return np.vstack([self.anchor, self.start, self.places])
 
     def checked_waypoints(self, field: DistanceField, *, snap: bool = False) -> Self:
         """The mission with every waypoint outside of solids.
@@ -166,7 +247,7 @@ class Mission(FileModel):
         InputError
             Waypoints inside solids, with their numbers, without `snap`.
         """
-        points = np.array(self.waypoints)
+        points = self.places
         inside = np.flatnonzero(field.distance(points) < 0.0)
         if not len(inside):
             return self
@@ -177,7 +258,11 @@ class Mission(FileModel):
                 "water, or snap"
             )
         points[inside] = pushed_out(field, points[inside], self.clearance)
-        return self.model_copy(update={"waypoints": tuple(map(tuple, points.tolist()))})
+        moved = tuple(
+            w.model_copy(update={"position": tuple(p)})
+            for w, p in zip(self.waypoints, points.tolist(), strict=True)
+        )
+        return self.model_copy(update={"waypoints": moved})
 
     def load_scene(self) -> Scene:
         """The scene it takes place in.

@@ -211,7 +211,7 @@ def waypoint_graph(
     grid = scene_grid
     model = GeodesicTether(field, mission.delta)
     anchor, limit = np.array(mission.anchor), SHARE * mission.tether_length
-    points = np.array(mission.waypoints)
+    points = mission.places
     tree = ShortestTree(grid, anchor, points)  # type: ignore[arg-type]
     found = _Classes([], [])
     for n in range(len(points)):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -14,16 +15,17 @@ from netsp.errors import InputError
 from netsp.geometry import polylines
 from netsp.online.coverage import Coverage, patches_of
 from netsp.online.log import LogRow, Run
-from netsp.online.mission import Mission
+from netsp.online.mission import Mission, MissionWaypoint
 from netsp.online.paths.tree import Grid, ShortestTree
 from netsp.online.paths.tree import taut as taut_path
 from netsp.online.planner import PLANNERS, Command, Planner, PlannerOptions, make_planner
-from netsp.online.planner.base import DONE, FREE, Tethers
+from netsp.online.planner.base import DONE, DWELL, FREE, HOME, Tethers
 from netsp.online.scene.field import DistanceField
 from netsp.online.scene.scene import Scene
 from netsp.online.scene.surfaces import extent
 from netsp.online.tether import TETHERS, GeodesicTether, Tether, make_tether
 from netsp.online.vehicle import VEHICLES, Vehicle, make_vehicle
+from netsp.online.vehicle.kinematic import turned
 from netsp.online.water import Water
 
 STEP = 0.1
@@ -31,6 +33,9 @@ STEP = 0.1
 
 FRAME = 2
 """Steps between two pictures of the camera."""
+
+HEADING_REACH, TURN_TIME = math.radians(5.0), 30.0
+"""A heading this near counts as taken, and so many seconds are given to turn to it."""
 
 STUCK = 600.0
 """Seconds at one waypoint after which it is left out."""
@@ -61,7 +66,7 @@ def grid_of(mission: Mission, scene: Scene, field: DistanceField) -> Grid:
     if scene.bounds is not None:
         low, high = np.array(scene.bounds[:3]), np.array(scene.bounds[3:])
     else:
-        places = np.array([mission.anchor, mission.start, *mission.waypoints])
+        places = mission.every_place
         low, high = extent(scene, places)
         room = 5.0 * mission.cell + mission.clearance
         low, high = low - room, high + room
@@ -170,7 +175,7 @@ class Simulation:
         """
         x, y, z = (float(v) for v in self.vehicle.position)
         seen = self.coverage
-        if seen is not None and len(self.log) % FRAME == 0 and not planner.homeward:
+        if seen is not None and len(self.log) % FRAME == 0 and command.mode != HOME:
             seen.look(self.vehicle.position, self.vehicle.yaw)
         row = LogRow(
             round(self.now, 6), x, y, z, self.vehicle.yaw, planner.index, command.mode,
@@ -180,7 +185,9 @@ class Simulation:
         self.log.append(row)
         return row
 
-    def go(self, path: Floats, fresh: bool, homeward: bool = False) -> tuple[int, bool]:
+    def go(
+        self, path: Floats, fresh: bool, homeward: bool = False, heading: float | None = None
+    ) -> tuple[int, bool]:
         """Take one step along a path; a vehicle that runs into a solid is stopped where it was.
 
         Parameters
@@ -191,6 +198,8 @@ class Simulation:
             Whether the path does not continue the one before.
         homeward : bool
             Whether the inspection is over: the camera then no longer asks for a heading.
+        heading : float, optional
+            To turn to, radians, whatever the camera asks for.
 
         Returns
         -------
@@ -200,7 +209,9 @@ class Simulation:
             Whether the vehicle could move.
         """
         robot, yaw = self.vehicle.position, self.vehicle.yaw
-        if self.coverage is not None and not homeward:
+        if heading is not None:
+            yaw = heading
+        elif self.coverage is not None and not homeward:
             yaw = self.coverage.heading(robot, yaw)
         points, passed = self.vehicle.go(path, STEP, yaw, self.water(self.now), fresh)
         self.now += STEP
@@ -241,18 +252,24 @@ def check_names(planner: object, vehicle: object, tether: object) -> None:
 
 def _check_size(mission: Mission) -> None:
     """InputError for a mission that would take for ever."""
-    places = np.array([mission.start, *mission.waypoints])
+    places = mission.every_place[1:]
     far = float(np.abs(places - np.array(mission.anchor)).max())
     if far > FARTHEST * mission.tether_length:
         raise InputError(
             f"waypoints: one is {far:g} from the anchor; expected at most {FARTHEST:g} times the "
             f"tether_length {mission.tether_length:g}: mixed units?"
         )
-    path = polylines.length(places)
-    if path / (mission.speed * STEP) > MOST_STEPS:
+    steps = polylines.length(places) / (mission.speed * STEP)
+    if steps > MOST_STEPS:
         raise InputError(
-            f"speed: {mission.speed:g} takes {path / (mission.speed * STEP):.2g} steps of {STEP:g} "
-            f"s for the waypoints; expected at most {MOST_STEPS:g}"
+            f"speed: {mission.speed:g} takes {steps:.2g} steps of {STEP:g} s for the waypoints; "
+            f"expected at most {MOST_STEPS:g}"
+        )
+    stays = sum(w.dwell for w in mission.waypoints) / STEP
+    if stays > MOST_STEPS:
+        raise InputError(
+            f"waypoints: dwell takes {stays:.2g} steps of {STEP:g} s in all; expected at most "
+            f"{MOST_STEPS:g}"
         )
     if mission.tether_length / mission.delta > MOST_NODES:
         raise InputError(
@@ -333,8 +350,9 @@ def simulate(
     chosen.laid = taut
     coverage = None
     if mission.camera is not None:
-        places = np.array([mission.anchor, mission.start, *mission.waypoints])
-        patches = patches_of(scene, field, mission.camera.patch, places, mission.inspect)
+        patches = patches_of(
+            scene, field, mission.camera.patch, mission.every_place, mission.inspect
+        )
         coverage = Coverage(patches, field, mission.camera)
     water = Water(mission.current, mission.gusts, seed)
     chosen.warm_up(robot.position, taut)
@@ -352,6 +370,8 @@ def simulate(
                 on_step(row, chosen)
             if command.mode == DONE:
                 break
+            if chosen.reached and chosen.index > before and chosen.reached[-1] == before:
+                stay(world, chosen, mission.waypoints[before], on_step)
             if since[1] != chosen.index:
                 since = (world.now, chosen.index)
             elif world.now - since[0] > STUCK:
@@ -374,6 +394,39 @@ def simulate(
         world.tether,
         summary,
     )
+
+
+def stay(
+    world: Simulation,
+    planner: Planner,
+    waypoint: MissionWaypoint,
+    on_step: Callable[[LogRow, Planner], None] | None = None,
+) -> None:
+    """At a waypoint: turn to its heading, for `TURN_TIME` at most, then stay as long as it asks.
+
+    Parameters
+    ----------
+    world : Simulation
+        It is moved on.
+    planner : Planner
+        Already on its way to what is next.
+    waypoint : MissionWaypoint
+        The waypoint.
+    on_step : callable, optional
+        As of `simulate`.
+    """
+    heading = None if waypoint.heading is None else math.radians(waypoint.heading)
+    if heading is None and waypoint.dwell == 0.0:
+        return
+    here, since, arrived = world.vehicle.position, world.now, None
+    while arrived is None or world.now < arrived + waypoint.dwell - 1e-9:
+        world.go(here[None], world.now == since, heading=heading)
+        row = world.note(planner, Command(here[None], DWELL))
+        if on_step is not None:
+            on_step(row, planner)
+        off = 0.0 if heading is None else abs(turned(heading - world.vehicle.yaw))
+        if arrived is None and (off <= HEADING_REACH or world.now - since >= TURN_TIME):
+            arrived = world.now
 
 
 def summarise(
@@ -406,10 +459,11 @@ def summarise(
         The numbers by name.
     """
     log = world.log
-    # the rows of the inspection: up to the one in which the way home begins
-    last = next(
-        (n for n, r in enumerate(log) if r.waypoint >= len(mission.waypoints)), len(log) - 1
-    )
+    # the inspection ends with the row in which the last waypoint is behind the robot
+    before = [
+        n for n, r in enumerate(log) if r.waypoint < len(mission.waypoints) or r.mode == DWELL
+    ]
+    last = before[-1] + 1 if before else 0
     inspected = log[: last + 1]
     lengths = np.array([r.tether for r in log])
     places = np.array([[r.x, r.y, r.z] for r in inspected])

@@ -24,7 +24,9 @@ FREE = 0.1
 MOST_HOLDS = 20
 """Steps that a planner may fail at one waypoint before it is left out."""
 
-NORMAL, RECOVERY, HOME, HOLD, DONE = "normal", "recovery", "home", "hold", "done"
+NORMAL, RECOVERY, DWELL, HOME, HOLD, DONE = (
+    "normal", "recovery", "dwell", "home", "hold", "done",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -35,7 +37,7 @@ class Command:
     ----------
     path : ndarray, shape (k, 3)
         Points to pass in this order, the first one next; metres.
-    mode : {"normal", "recovery", "home", "hold", "done"}
+    mode : {"normal", "recovery", "dwell", "home", "hold", "done"}
         What the robot is doing.
     replan_s : float
         Seconds of CPU that planning took in this step.
