@@ -58,7 +58,7 @@ def steps() -> Iterator[tuple[str, Callable[[], object]]]:
     from netsp.execute import execute
     from netsp.judge import verify
     from netsp.online import ReactTether, Scene
-    from netsp.online.mission import Mission
+    from netsp.online.mission import Mission, TetherPhysics
     from netsp.online.simulate import simulate
     from netsp.problem import Problem
     from netsp.solvers.solve import solve
@@ -101,13 +101,17 @@ def steps() -> Iterator[tuple[str, Callable[[], object]]]:
     ring = np.column_stack([np.cos(angle), np.sin(angle), 0.1 * angle])
     mission = Mission.model_validate(
         {"schema_version": 1, "scene": "-", "anchor": (-2, 0, 0), "start": (-1.9, 0, 0),
-         "tether_length": 4.5, "waypoints": ring.tolist(), "camera": {"range": 2.0}, "speed": 0.5}
+         "tether_length": 4.5, "waypoints": ring.tolist(), "camera": {"range": 2.0}, "speed": 0.5,
+         "tether": {"slack": 0.01, "diameter": 0.01, "pulls_vehicle": True},
+         "current": (0.1, 0, 0)}
     )  # fmt: skip
+    plain = mission.model_copy(update={"tether": TetherPhysics()})
     for planner, vehicle in (("predictive", "kinematic"), ("react", "bluerov2")):
         yield (
             f"missions, {planner}, {vehicle}",
-            partial(simulate, mission, planner, vehicle=vehicle, scene=scene),
+            partial(simulate, plain, planner, vehicle=vehicle, scene=scene),
         )
+    yield "a tether in a current", partial(simulate, mission, vehicle="bluerov2", scene=scene)
 
     def paper() -> None:
         model = ReactTether(scene.field(), 0.1)

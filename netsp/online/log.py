@@ -37,6 +37,10 @@ class LogRow:
         As of `netsp.online.planner.Command`.
     tether : float
         Length of the taut tether, metres.
+    payout : float
+        Length that must be out, with slack and sag: what the limit is about, metres.
+    turning : float
+        Sum of the angles by which the tether turns at its contacts, radians.
     coverage : float
         Share of the surface seen.
     coverage_through : float
@@ -53,6 +57,8 @@ class LogRow:
     waypoint: int
     mode: str
     tether: float
+    payout: float
+    turning: float
     coverage: float
     coverage_through: float
     replan_s: float
@@ -156,6 +162,14 @@ def describe_run(run: Run, units: str) -> str:
         f"planning {s['replans']} times, median {1e3 * s['replan_median_s']:.1f} ms, worst "
         f"{1e3 * s['replan_worst_s']:.0f} ms",
     ]
+    if s["longest_payout"] > s["longest_tether"] * (1.0 + 1e-9):
+        lines.insert(4, f"payout   at most {s['longest_payout']:.3f} {units}, with slack and sag")
+    if s["friction"] is not None:
+        lines.append(
+            f"friction multiplies the tension by {s['friction']['most_tension_ratio']:.2f} at most "
+            f"(turning {s['friction']['most_turning_deg']:.0f}°), over the limit for "
+            f"{s['friction']['over_s']:.1f} s"
+        )
     if s["defects"]:
         lines.append(f"defect   planning failed {s['defects']} times; please report the mission")
     if s["coverage"] is not None:

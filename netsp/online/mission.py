@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self
 
@@ -22,6 +23,10 @@ from netsp.files import FileModel, read_text
 from netsp.models import Model
 from netsp.online.scene.field import DistanceField, pushed_out
 from netsp.online.scene.scene import Scene
+from netsp.online.tether.load import Load
+
+SEA_WATER = 1025.0
+"""kg / m^3."""
 
 MOST_DWELL = 86400.0
 """Seconds; a day at one waypoint is taken for a mistake of units."""
@@ -52,6 +57,79 @@ class Camera(Model):
         Field(description="maximum angle that it turns up or down, degrees"),
     ] = 90.0
     patch: Annotated[Positive, Field(description="edge of the patches that are counted, m")] = 0.1
+
+
+class TetherPhysics(Model):
+    """What a tether needs beyond its taut length; all of it is nothing by default. See
+    `netsp.online.tether.load` for the formulas and their sources.
+
+    Attributes
+    ----------
+    slack : float
+        Share of the taut length that is out beyond it.
+    diameter : float
+        Metres; with 0 the water does not act on the tether.
+    drag_coefficient : float
+        Of a cylinder across the flow.
+    tension : float
+        Newtons, that the tether is held with at the anchor.
+    friction : float
+        Coefficient of friction at contacts.
+    max_tension_ratio : float or None
+        Most that friction may multiply the tension by, from anchor to robot; None for no limit.
+    pulls_vehicle : bool
+        Whether tension and drag act on a vehicle with dynamics.
+    """
+
+    slack: Annotated[
+        Annotated[NonNegative, Field(le=1.0)],
+        Field(description="share of the taut length that is out beyond it"),
+    ] = 0.0
+    diameter: Annotated[
+        Annotated[NonNegative, Field(le=1.0)],
+        Field(description="of the tether, m; with 0 the water does not act on it"),
+    ] = 0.0
+    drag_coefficient: Annotated[NonNegative, Field(description="of a cylinder across the flow")] = (
+        1.2
+    )
+    tension: Annotated[
+        Positive, Field(description="that the tether is held with at the anchor, N")
+    ] = 10.0
+    friction: Annotated[
+        Annotated[NonNegative, Field(le=10.0)],
+        Field(description="coefficient of friction at contacts"),
+    ] = 0.0
+    max_tension_ratio: Annotated[
+        Annotated[float, Field(gt=1.0, le=1e6)] | None,
+        Field(description="most that friction may multiply the tension by; null for no limit"),
+    ] = None
+    pulls_vehicle: Annotated[
+        bool, Field(description="whether tension and drag act on a vehicle with dynamics")
+    ] = False
+
+    def load(self, water: Floats) -> Load:
+        """What acts on the tether in moving water.
+
+        Parameters
+        ----------
+        water : ndarray, shape (3,)
+            Its velocity, m/s.
+
+        Returns
+        -------
+        Load
+            For `netsp.online.tether.load`.
+        """
+        drag = 0.5 * SEA_WATER * self.drag_coefficient * self.diameter
+        x, y, z = (float(v) for v in water)
+        return Load(self.slack, drag, x, y, z, self.tension)
+
+    @property
+    def max_turning(self) -> float:
+        """Sum of turning angles (rad) at which friction reaches its limit."""
+        if self.max_tension_ratio is None or self.friction == 0.0:
+            return math.inf
+        return math.log(self.max_tension_ratio) / self.friction
 
 
 class MissionWaypoint(Model):
@@ -149,6 +227,8 @@ class Mission(FileModel):
         A steady current, m/s; a kinematic vehicle does not feel it.
     gusts : float
         Standard deviation of what comes and goes on top, m/s.
+    tether : TetherPhysics
+        What the tether needs beyond its taut length; by default nothing.
     delta : float
         Resolution of the tether, metres.
     cell : float
@@ -192,6 +272,9 @@ class Mission(FileModel):
     gusts: Annotated[
         NonNegative, Field(description="standard deviation of the current about its mean, m/s")
     ] = 0.0
+    tether: Annotated[
+        TetherPhysics, Field(description="slack, drag and friction of the tether; none by default")
+    ] = TetherPhysics()
     delta: Annotated[Positive, Field(description="resolution of the tether, m")] = 0.1
     cell: Annotated[Positive, Field(description="of the grid on which paths are sought, m")] = 0.2
 

@@ -24,6 +24,7 @@ from netsp.online.scene.field import DistanceField
 from netsp.online.scene.scene import Scene
 from netsp.online.scene.surfaces import extent
 from netsp.online.tether import TETHERS, GeodesicTether, Tether, make_tether
+from netsp.online.tether.load import Load, payout, pull_on_robot, turning
 from netsp.online.vehicle import VEHICLES, Vehicle, make_vehicle
 from netsp.online.vehicle.kinematic import turned
 from netsp.online.water import Water
@@ -157,6 +158,21 @@ class Simulation:
     believed: Tether | None = None
     now: float = 0.0
     log: list[LogRow] = field(default_factory=list)
+    _was: Floats | None = None
+
+    def _pull(self) -> dict[str, Floats]:
+        """The tether's force on a vehicle that is to feel it."""
+        physics = self.mission.tether
+        if not physics.pulls_vehicle:
+            return {}
+        here, delta = self.vehicle.position, self.tethers.delta
+        velocity = np.zeros(3) if self._was is None else (here - self._was) / STEP
+        return {"pull": pull_on_robot(self.tether, self.load, physics.friction, velocity, delta)}
+
+    @property
+    def load(self) -> Load:
+        """What acts on the tether now."""
+        return self.mission.tether.load(self.water(self.now))
 
     def note(self, planner: Planner, command: Command) -> LogRow:
         """Write down where things are.
@@ -179,7 +195,9 @@ class Simulation:
             seen.look(self.vehicle.position, self.vehicle.yaw)
         row = LogRow(
             round(self.now, 6), x, y, z, self.vehicle.yaw, planner.index, command.mode,
-            self.tether.length, seen.share if seen else 0.0, seen.share_through if seen else 0.0,
+            self.tether.length, payout(self.tether, self.load),
+            turning(self.tether, self.tethers.delta),
+            seen.share if seen else 0.0, seen.share_through if seen else 0.0,
             command.replan_s,
         )  # fmt: skip
         self.log.append(row)
@@ -209,11 +227,13 @@ class Simulation:
             Whether the vehicle could move.
         """
         robot, yaw = self.vehicle.position, self.vehicle.yaw
+        pull = self._pull()
+        self._was = robot
         if heading is not None:
             yaw = heading
         elif self.coverage is not None and not homeward:
             yaw = self.coverage.heading(robot, yaw)
-        points, passed = self.vehicle.go(path, STEP, yaw, self.water(self.now), fresh)
+        points, passed = self.vehicle.go(path, STEP, yaw, self.water(self.now), fresh, **pull)
         self.now += STEP
         if self.scene.distance(np.array(points)).min() < -0.2 * self.tethers.delta:
             self.vehicle.stop_at(robot)
@@ -230,6 +250,10 @@ FARTHEST = 1000.0
 
 MOST_STEPS, MOST_NODES = 5_000_000, 200_000
 """Steps of a run, and nodes of a tether, beyond which a mission is taken for a mistake of units."""
+
+
+MOST_SAG_RATIO = 20.0
+"""Drag on a whole tether over its tension, beyond which a current is taken for a mistake."""
 
 
 def check_names(planner: object, vehicle: object, tether: object) -> None:
@@ -270,6 +294,15 @@ def _check_size(mission: Mission) -> None:
         raise InputError(
             f"waypoints: dwell takes {stays:.2g} steps of {STEP:g} s in all; expected at most "
             f"{MOST_STEPS:g}"
+        )
+    load = mission.tether.load(np.array(mission.current))
+    speed = float(np.linalg.norm(mission.current)) + 3.0 * mission.gusts
+    sag = load.drag * speed**2 * mission.tether_length / load.tension
+    if sag > MOST_SAG_RATIO:
+        raise InputError(
+            f"current: {speed:g} m/s pulls on {mission.tether_length:g} m of tether with {sag:.3g} "
+            f"times its tension of {load.tension:g} N; expected at most {MOST_SAG_RATIO:g}: mixed "
+            "units?"
         )
     if mission.tether_length / mission.delta > MOST_NODES:
         raise InputError(
@@ -434,11 +467,14 @@ def summarise(
 ) -> dict[str, Any]:
     """The numbers of a run, as the papers give them.
 
-    `exceedance_s` is the time with the tether over the limit. `recovery_s` is the time to come back
-    to the anchor afterwards, by retracing the tether, or the whole path (the paper does not say
-    which). Both, `path` and what was seen are of the inspection; `home` tells of the leg back to
-    the start that follows it: whether it was `reached` with the tether free, how much longer the
-    tether is there than when the mission began (`left`, m), and how long it took.
+    `exceedance_s` is the time in which more tether must be out than there is: the taut length and
+    what slack and sag add to it (`longest_payout`). `stops` tells of each waypoint visited, with
+    the sum of turning angles and the factor e^(mu theta) that friction multiplies the tension by.
+    `recovery_s` is the time to come back to the anchor afterwards, by retracing the tether, or the
+    whole path (the paper does not say which). Both, `path` and what was seen are of the inspection;
+    `home` tells of the leg back to the start that follows it: whether it was `reached` with the
+    tether free, how much longer the tether is there than when the mission began (`left`, m), and
+    how long it took.
 
     Parameters
     ----------
@@ -466,6 +502,8 @@ def summarise(
     last = before[-1] + 1 if before else 0
     inspected = log[: last + 1]
     lengths = np.array([r.tether for r in log])
+    payouts = np.array([r.payout for r in log])
+    turnings = np.array([r.turning for r in log])
     places = np.array([[r.x, r.y, r.z] for r in inspected])
     planned = [r.replan_s for r in log if r.replan_s > 0.0]
     walked = polylines.length(places)
@@ -483,10 +521,13 @@ def summarise(
         "path": walked,
         "tether_length": mission.tether_length,
         "longest_tether": float(lengths.max(initial=0.0)),
-        "exceedance_s": float((lengths > mission.tether_length * (1 + 1e-9)).sum() * STEP),
+        "longest_payout": float(payouts.max(initial=0.0)),
+        "exceedance_s": float((payouts > mission.tether_length * (1 + 1e-9)).sum() * STEP),
+        "friction": _friction(mission, turnings),
         "visited": len(planner.reached),
         "waypoints": len(mission.waypoints),
         "left_out": [{"waypoint": k, "reason": why} for k, why in planner.left_out],
+        "stops": _stops(mission, planner, log),
         "home": _home(planner, world, inspection),
         "defects": len(planner.defects),
         "replans": len(planned),
@@ -512,4 +553,40 @@ def _home(planner: Planner, world: Simulation, since: float) -> dict[str, Any]:
         "left": left,
         "seconds": world.now - since,
         "reason": planner.not_home,
+    }
+
+
+def _stops(mission: Mission, planner: Planner, log: list[LogRow]) -> list[dict[str, Any]]:
+    """The tether at each waypoint visited."""
+    arrival: dict[int, LogRow] = {}
+    passed, visited = 0, set(planner.reached)
+    for row in log:
+        for index in range(passed, row.waypoint):
+            if index in visited:
+                arrival[index] = row
+        passed = max(passed, row.waypoint)
+    mu = mission.tether.friction
+    return [
+        {
+            "waypoint": k,
+            "tether": r.tether,
+            "payout": r.payout,
+            "turning_deg": math.degrees(r.turning),
+            "tension_ratio": math.exp(mu * r.turning),
+        }
+        for k, r in arrival.items()
+    ]
+
+
+def _friction(mission: Mission, turnings: Floats) -> dict[str, float] | None:
+    """Turning and tension ratio where they were greatest, and seconds over the limit; None without
+    friction."""
+    physics = mission.tether
+    if physics.friction == 0.0:
+        return None
+    most = float(turnings.max(initial=0.0))
+    return {
+        "most_turning_deg": math.degrees(most),
+        "most_tension_ratio": math.exp(physics.friction * most),
+        "over_s": float((turnings > physics.max_turning * (1 + 1e-9)).sum() * STEP),
     }

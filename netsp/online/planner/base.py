@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import time
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -15,6 +17,7 @@ from netsp.online.paths.sampled import SampledPaths
 from netsp.online.paths.tree import Grid, Paths, ShortestTree, taut
 from netsp.online.scene.field import DistanceField, pushed_out
 from netsp.online.tether import GeodesicTether, ReactTether, Tether
+from netsp.online.tether.load import Load, payout, payout_along
 
 Tethers = GeodesicTether | ReactTether
 
@@ -122,6 +125,43 @@ class Planner:
 
     name = "none"
     refine = "none"
+
+    @cached_property
+    def load(self) -> Load:
+        """What acts on the tether: the steady current, and gusts of three standard deviations on
+        top of it."""
+        current = np.array(self.mission.current)
+        speed = float(np.linalg.norm(current))
+        if speed > 0.0:
+            current = current * (1.0 + 3.0 * self.mission.gusts / speed)
+        else:
+            current = np.array([3.0 * self.mission.gusts, 0.0, 0.0])
+        return self.mission.tether.load(current)
+
+    @property
+    def loaded(self) -> bool:
+        """Whether the tether needs more than its taut length, or may turn by so much only."""
+        physics = self.mission.tether
+        return physics.slack > 0.0 or physics.diameter > 0.0 or math.isfinite(physics.max_turning)
+
+    def payout(self, tether: Tether) -> float:
+        """Length that must be out for a tether to lie as it does: what the limit is about.
+
+        Parameters
+        ----------
+        tether : Tether
+            As the model has it.
+
+        Returns
+        -------
+        float
+            Metres.
+        """
+        if not self.loaded:
+            return tether.length
+        if isinstance(self.tethers, GeodesicTether):
+            return payout(tether, self.load)
+        return payout_along(tether.nodes, self.load)
 
     @property
     def waypoint(self) -> Floats:

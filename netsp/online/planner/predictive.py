@@ -19,6 +19,7 @@ from netsp.online.paths.tree import ever_tauter, homotopic, roughly_taut, taut
 from netsp.online.planner.base import FREE, HOME, NORMAL, RECOVERY, Planner
 from netsp.online.scene.field import pushed_out
 from netsp.online.tether import GeodesicTether, Tether
+from netsp.online.tether.load import payout_along, turning
 
 MARGIN = 0.004
 """Share of the tether that is kept in reserve for what the simulation does not know."""
@@ -74,7 +75,7 @@ class PredictivePlanner(Planner):
         """Whether half of the reserve is used up, as in a current: said once for each waypoint."""
         if (
             self._warned == self.index
-            or tether.length <= (1.0 - 0.5 * MARGIN) * self.mission.tether_length
+            or self.payout(tether) <= (1.0 - 0.5 * MARGIN) * self.mission.tether_length
         ):
             return False
         self._warned = self.index
@@ -100,8 +101,11 @@ class PredictivePlanner(Planner):
         """Whether the tether stays within the limit all along a path.
 
         A taut tether gets longer by at most the path of its end. So as far as what is left of the
-        limit the robot may go at once, and where little is left in small steps.
+        limit the robot may go at once, and where little is left in small steps. What slack and sag
+        add has no such bound: a contact that is lost joins two spans. Then all steps are small.
         """
+        if self.loaded:
+            return self._fits_under_load(tether, path, limit)
         most = max(limit, tether.length + 1e-6)
         fine = max(0.5 * self.mission.delta, 0.02)
         state, s, length = tether, 0.0, polylines.length(path)
@@ -113,6 +117,15 @@ class PredictivePlanner(Planner):
                 return False
             s = until
         return True
+
+    def _fits_under_load(self, tether: Tether, path: Floats, limit: float) -> bool:
+        """Whether what must be out, and the sum of turning angles, stay within their limits."""
+        points = polylines.dense(path, max(0.5 * self.mission.delta, 0.02))[1:]
+        _, payouts, turnings = self._model.drive_under(tether, points, self.load)
+        most = max(self.mission.tether.max_turning, turning(tether, self.mission.delta) + 1e-6)
+        return bool(
+            payouts.max() <= max(limit, self.payout(tether) + 1e-6) and turnings.max() <= most
+        )
 
     def _shortest_feasible(self, robot: Floats, tether: Tether, limit: float) -> Floats | None:
         """The shortest path on which the tether fits: on from the robot, or back along the tether
@@ -228,6 +241,7 @@ class PredictivePlanner(Planner):
         """Whether a tether that lies along a line is over the limit even when it is taut, as far as
         that can be foreseen: what a pull takes away becomes ever less."""
         tether = self._model.relaxed(line, PULL)
+        limit /= 1.0 + self.mission.tether.slack
         length, less = tether.length, np.inf
         for _ in range(PULLS):
             if length <= limit:
@@ -240,11 +254,11 @@ class PredictivePlanner(Planner):
         return length > limit
 
     def _own_tether(self, waypoint: Floats) -> float | None:
-        """Length of the shortest tether from the anchor to a place."""
+        """What the shortest tether from the anchor to a place must be out."""
         tree = self.paths(np.array([self.mission.anchor]))
         path = tree.path(0)
         return (
             None
             if path is None
-            else polylines.length(taut(self.scene, path, 0.0, self.mission.delta))
+            else payout_along(taut(self.scene, path, 0.0, self.mission.delta), self.load)
         )

@@ -53,7 +53,7 @@ class ReactPlanner(Planner):
                 return False
         if self.mode == RECOVERY:
             self.path, self.mode = self.path[:0], NORMAL
-        if tether.length > self.mission.tether_length and self._soft != self.index:
+        if self.payout(tether) > self.mission.tether_length and self._soft != self.index:
             self.path = self._search(tether)
             self.mode = RECOVERY
             return True
@@ -109,4 +109,5 @@ class ReactPlanner(Planner):
             return np.inf
         path = np.vstack([back[:n:-1], onward]) if n + 1 < len(back) else onward
         start = self.tethers.start(path[0], path[0])
-        return self.tethers.drive(start, polylines.dense(path, 0.5 * self.mission.cell))[0].length
+        driven = self.tethers.drive(start, polylines.dense(path, 0.5 * self.mission.cell))[0]
+        return self.payout(driven)

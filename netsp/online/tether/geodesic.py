@@ -19,6 +19,7 @@ import numpy.typing as npt
 from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.online.scene.field import DistanceField, finite_point
+from netsp.online.tether.load import Load, drive_under
 from netsp.online.tether.pull import PullSettings, drive, follow, pull
 from netsp.online.tether.resolution import THINNEST
 from netsp.online.tether.strand import strand_length
@@ -224,6 +225,36 @@ class GeodesicTether:
             self.field.arrays, tether.strand.copy(), len(tether.strand), points, self._settings
         )
         return _state(strand, count, residual), lengths
+
+    def drive_under(
+        self, tether: Tether, path: npt.ArrayLike, load: Load
+    ) -> tuple[Tether, Floats, Floats]:
+        """As `drive`, with what must be out under a load.
+
+        Parameters
+        ----------
+        tether : Tether
+            Before; it is not changed.
+        path : array_like, shape (k, 3)
+            Points that the robot passes, metres.
+        load : Load
+            What acts on the tether.
+
+        Returns
+        -------
+        tether : Tether
+            At the last point.
+        payouts : ndarray, shape (k,)
+            Length that must be out at each point, metres.
+        turnings : ndarray, shape (k,)
+            Sum of turning angles at each point, radians.
+        """
+        points = np.ascontiguousarray(path, dtype=float).reshape(-1, 3)
+        strand, count, residual, payouts, turnings = drive_under(
+            self.field.arrays, tether.strand.copy(), len(tether.strand), points, self._settings,
+            load,
+        )  # fmt: skip
+        return _state(strand, count, residual), payouts, turnings
 
     def refine(self, tether: Tether) -> Tether:
         """The same tether, every contact looked at afresh, pulled until nothing moves.

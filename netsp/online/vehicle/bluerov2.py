@@ -51,8 +51,9 @@ class BlueRov2:
         return float(self.state[3])
 
     def go(
-        self, path: Floats, seconds: float, yaw: float, water: Floats, fresh: bool
-    ) -> tuple[list[Floats], int]:
+        self, path: Floats, seconds: float, yaw: float, water: Floats, fresh: bool,
+        pull: Floats | None = None,
+    ) -> tuple[list[Floats], int]:  # fmt: skip
         """See `netsp.online.vehicle.Vehicle`. Control steps take 0.1 s."""
         points, behind = [], 0
         if fresh:
@@ -69,10 +70,16 @@ class BlueRov2:
             expected = step(self.state, force, self._drift, DT)
             self.control_s.append(time.perf_counter() - begin)
             for _ in range(FINE):
-                self.state = step(self.state, force, water, DT / FINE)
+                both = force if pull is None else force + self._in_frame(pull)
+                self.state = step(self.state, both, water, DT / FINE)
             self._drift += TRUST * (self.state[:3] - expected[:3]) / DT
             points.append(self.position)
         return points, behind
+
+    def _in_frame(self, pull: Floats) -> Floats:
+        """A force (3,) of the world as an input (4,) of the vehicle."""
+        c, s = math.cos(self.state[3]), math.sin(self.state[3])
+        return np.array([c * pull[0] + s * pull[1], -s * pull[0] + c * pull[1], pull[2], 0.0])
 
     def stop_at(self, place: Floats) -> None:
         """See `netsp.online.vehicle.Vehicle`."""

@@ -6,8 +6,8 @@ its weight. Equations of motion: Fossen, "Handbook of Marine Craft Hydrodynamics
 Control", 2011, in velocities relative to the water, which holds for a current that changes slowly.
 
 State: x, y, z (m, z up), yaw, and in the vehicle's frame surge, sway, heave (m/s, through the
-water) and yaw rate. Input: three forces (N) and the yaw moment (N m). The tether's pull and its
-drag are not modelled, as in the REACT paper.
+water) and yaw rate. Input: three forces (N) and the yaw moment (N m), to which the pull of the
+tether may be added (`netsp.online.tether.load.pull_on_robot`; the REACT paper leaves it out).
 """
 
 from __future__ import annotations

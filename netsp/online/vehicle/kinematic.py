@@ -37,8 +37,9 @@ class Vehicle(Protocol):
         """rad."""
 
     def go(
-        self, path: Floats, seconds: float, yaw: float, water: Floats, fresh: bool
-    ) -> tuple[list[Floats], int]:
+        self, path: Floats, seconds: float, yaw: float, water: Floats, fresh: bool,
+        pull: Floats | None = None,
+    ) -> tuple[list[Floats], int]:  # fmt: skip
         """Follow a path for some seconds, turning to a heading, in moving water.
 
         Parameters
@@ -53,6 +54,8 @@ class Vehicle(Protocol):
             Velocity of the water, m/s.
         fresh : bool
             Whether the path does not continue the one before.
+        pull : ndarray, shape (3,), optional
+            Force of the tether, N; only missions that ask for it hand it over.
 
         Returns
         -------
@@ -90,8 +93,9 @@ class KinematicVehicle:
         self.control_s: list[float] = []
 
     def go(
-        self, path: Floats, seconds: float, yaw: float, water: Floats, fresh: bool
-    ) -> tuple[list[Floats], int]:
+        self, path: Floats, seconds: float, yaw: float, water: Floats, fresh: bool,
+        pull: Floats | None = None,
+    ) -> tuple[list[Floats], int]:  # fmt: skip
         """Follow a path for some seconds; see `Vehicle.go`.
 
         Parameters
@@ -106,6 +110,8 @@ class KinematicVehicle:
             Velocity of the water, m/s; it has no effect.
         fresh : bool
             Whether the path does not continue the one before.
+        pull : ndarray, shape (3,), optional
+            Force of the tether, N; it has no effect.
 
         Returns
         -------
@@ -114,7 +120,7 @@ class KinematicVehicle:
         count : int
             How many points of the path are behind it.
         """
-        del water, fresh
+        del water, fresh, pull
         self.yaw += float(np.clip(turned(yaw - self.yaw), -TURN * seconds, TURN * seconds))
         points, passed = advance(self.position, path, self.speed * seconds)
         self.position = points[-1]
