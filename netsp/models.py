@@ -130,6 +130,10 @@ def explain(error: ValidationError) -> str:
         message = f"expected a number > {context['gt']:g}, {got}"
     elif kind == "greater_than_equal":
         message = f"expected a number >= {context['ge']:g}, {got}"
+    elif kind == "less_than_equal":
+        message = f"expected a number <= {context['le']:g}, {got}"
+    elif kind in ("model_type", "model_attributes_type", "dict_type"):
+        message = f"expected an object, {got}"
     else:
         message = f"{_decapitalise(first['msg'])}, {got}"
     extra = [e["loc"][-1] for e in errors if e["type"] == "extra_forbidden"]

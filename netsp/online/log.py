@@ -185,6 +185,11 @@ def describe_run(run: Run, units: str) -> str:
             f"{s['inspection_s'] / s['wall_s']:.0f} x real time"
         )
     lines += [
+        f"stalled  at {stall['time']:.1f} s, on the way "
+        + ("home" if stall["waypoint"] == s["waypoints"] else f"to waypoint #{stall['waypoint']}")
+        for stall in s["stalls"][:5]
+    ]
+    lines += [
         f"left out waypoint #{left['waypoint']}: {left['reason']}" for left in s["left_out"][:5]
     ]
     if len(s["left_out"]) > 5:

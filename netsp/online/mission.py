@@ -132,6 +132,27 @@ class TetherPhysics(Model):
         return math.log(self.max_tension_ratio) / self.friction
 
 
+class PositionSensor(Model):
+    """How the robot's position is known: by default exactly and at once.
+
+    Attributes
+    ----------
+    noise : float
+        Standard deviation along each axis, metres.
+    delay : float
+        Age of a position when it arrives, seconds.
+    """
+
+    noise: Annotated[
+        Annotated[NonNegative, Field(le=100.0)],
+        Field(description="standard deviation along each axis, m"),
+    ] = 0.0
+    delay: Annotated[
+        Annotated[NonNegative, Field(le=60.0)],
+        Field(description="age of a position when it arrives, s"),
+    ] = 0.0
+
+
 class MissionWaypoint(Model):
     """A place to visit, and what to do there.
 
@@ -227,6 +248,8 @@ class Mission(FileModel):
         A steady current, m/s; a kinematic vehicle does not feel it.
     gusts : float
         Standard deviation of what comes and goes on top, m/s.
+    sensor : PositionSensor
+        How the planner knows where the robot is; by default exactly.
     tether : TetherPhysics
         What the tether needs beyond its taut length; by default nothing.
     delta : float
@@ -272,6 +295,9 @@ class Mission(FileModel):
     gusts: Annotated[
         NonNegative, Field(description="standard deviation of the current about its mean, m/s")
     ] = 0.0
+    sensor: Annotated[
+        PositionSensor, Field(description="noise and delay of positions; none by default")
+    ] = PositionSensor()
     tether: Annotated[
         TetherPhysics, Field(description="slack, drag and friction of the tether; none by default")
     ] = TetherPhysics()

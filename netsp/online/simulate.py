@@ -19,10 +19,11 @@ from netsp.online.mission import Mission, MissionWaypoint
 from netsp.online.paths.tree import Grid, ShortestTree
 from netsp.online.paths.tree import taut as taut_path
 from netsp.online.planner import PLANNERS, Command, Planner, PlannerOptions, make_planner
-from netsp.online.planner.base import DONE, DWELL, FREE, HOME, Tethers
+from netsp.online.planner.base import DONE, DWELL, FREE, HOLD, HOME, Tethers
 from netsp.online.scene.field import DistanceField
 from netsp.online.scene.scene import Scene
 from netsp.online.scene.surfaces import extent
+from netsp.online.sensing import Positions
 from netsp.online.tether import TETHERS, GeodesicTether, Tether, make_tether
 from netsp.online.tether.load import Load, payout, pull_on_robot, turning
 from netsp.online.vehicle import VEHICLES, Vehicle, make_vehicle
@@ -37,6 +38,12 @@ FRAME = 2
 
 HEADING_REACH, TURN_TIME = math.radians(5.0), 30.0
 """A heading this near counts as taken, and so many seconds are given to turn to it."""
+
+LEAST_COURSE = 0.05
+"""m/s: slower motion through the water asks for no heading."""
+
+STALL, PROGRESS = 30.0, 0.05
+"""A robot has stalled when in so many seconds it has not come so many metres nearer."""
 
 STUCK = 600.0
 """Seconds at one waypoint after which it is left out."""
@@ -141,6 +148,10 @@ class Simulation:
         Another model, that the planner believes in.
     believed : Tether, optional
         Its tether.
+    positions : Positions, optional
+        What the planner is told of the robot's position.
+    thought : ndarray, shape (3,), optional
+        Where it thinks that the robot is, metres.
     now : float
         Seconds since the start.
     log : list of LogRow
@@ -156,9 +167,20 @@ class Simulation:
     coverage: Coverage | None = None
     model: Tethers | None = None
     believed: Tether | None = None
+    positions: Positions | None = None
+    thought: Floats | None = None
     now: float = 0.0
     log: list[LogRow] = field(default_factory=list)
     _was: Floats | None = None
+
+    def _course(self, path: Floats, yaw: float) -> float:
+        """Heading (rad) along the way through the water: a vehicle is fastest ahead."""
+        leg = path[0] - self.vehicle.position
+        far = float(np.linalg.norm(leg))
+        if far < 1e-6:
+            return yaw
+        x, y, _ = leg * (self.mission.speed / far) - self.water(self.now)
+        return math.atan2(y, x) if math.hypot(x, y) > LEAST_COURSE else yaw
 
     def _pull(self) -> dict[str, Floats]:
         """The tether's force on a vehicle that is to feel it."""
@@ -233,6 +255,8 @@ class Simulation:
             yaw = heading
         elif self.coverage is not None and not homeward:
             yaw = self.coverage.heading(robot, yaw)
+        elif self.coverage is None:
+            yaw = self._course(path, yaw)
         points, passed = self.vehicle.go(path, STEP, yaw, self.water(self.now), fresh, **pull)
         self.now += STEP
         if self.scene.distance(np.array(points)).min() < -0.2 * self.tethers.delta:
@@ -240,9 +264,19 @@ class Simulation:
             return passed, False
         for point in points:
             self.tether = self.tethers.update(self.tether, point)
-            if self.model is not None and self.believed is not None:
+        told = points
+        if self.positions is not None and not self.positions.exact:
+            self.thought = self.positions(self.vehicle.position)
+            told = [self.thought]
+        if self.model is not None and self.believed is not None:
+            for point in told:
                 self.believed = self.model.update(self.believed, point)
         return passed, True
+
+    @property
+    def robot(self) -> Floats:
+        """(3,) where the planner thinks that the robot is."""
+        return self.vehicle.position if self.thought is None else self.thought
 
 
 FARTHEST = 1000.0
@@ -389,15 +423,19 @@ def simulate(
         coverage = Coverage(patches, field, mission.camera)
     water = Water(mission.current, mission.gusts, seed)
     chosen.warm_up(robot.position, taut)
+    positions = Positions(mission.sensor, field, robot.position, STEP, seed)
+    if believed is None and not positions.exact:
+        believed = tethers
     world = Simulation(mission, field, robot, tethers, taut, water, coverage, believed)
+    world.positions = positions
     if believed is not None:
         world.believed = first_tether(mission, field, believed, grid)
-    since, interrupted = (0.0, -1), False
+    since, interrupted, stalls = (0.0, -1), False, Stalls()
     begin = time.perf_counter()
     try:
         while True:
             before = chosen.index
-            command = chosen.step(robot.position, world.believed or world.tether)
+            command = chosen.step(world.robot, world.believed or world.tether)
             row = world.note(chosen, command)
             if on_step is not None:
                 on_step(row, chosen)
@@ -410,6 +448,9 @@ def simulate(
             elif world.now - since[0] > STUCK:
                 chosen.leave_out(f"not reached in {STUCK:g} s")
                 continue
+            if stalls.seen(world, chosen, command):
+                chosen.leave_out(stalls.reason)
+                continue
             fresh = before != chosen.index or command.replan_s > 0.0 or not world.now
             passed, moved = world.go(command.path, fresh, chosen.homeward)
             if moved:
@@ -420,6 +461,7 @@ def simulate(
         interrupted = True
     wall = time.perf_counter() - begin
     summary = summarise(mission, chosen, world, wall, interrupted)
+    summary["stalls"] = stalls.found
     return Run(
         mission,
         planner if isinstance(planner, str) else chosen.name,
@@ -427,6 +469,55 @@ def simulate(
         world.tether,
         summary,
     )
+
+
+@dataclass
+class Stalls:
+    """Watches whether the robot gets on: in a strong current it may not.
+
+    Parameters
+    ----------
+    found : list of dict
+        Time (s), waypoint and place of each stall.
+    reason : str
+        Of the last one, in a line.
+    """
+
+    found: list[dict[str, Any]] = field(default_factory=list)
+    reason: str = ""
+    _index: int = -1
+    _least: float = math.inf
+    _since: float = 0.0
+
+    def seen(self, world: Simulation, planner: Planner, command: Command) -> bool:
+        """Whether what is left of the path has not become shorter for `STALL` seconds.
+
+        Parameters
+        ----------
+        world : Simulation
+            As it is.
+        planner : Planner
+            Its waypoint counts.
+        command : Command
+            Its path counts; a path that has been planned anew starts the clock again.
+
+        Returns
+        -------
+        bool
+            Whether the robot has stalled; it is then noted.
+        """
+        here = world.vehicle.position
+        left = polylines.length(np.vstack([here, command.path]))
+        if planner.index != self._index or command.replan_s > 0.0 or left < self._least - PROGRESS:
+            self._index, self._least, self._since = planner.index, left, world.now
+            return False
+        if world.now - self._since < STALL or command.mode == HOLD:
+            return False
+        water = float(np.linalg.norm(world.water(world.now)))
+        self.reason = f"stalled: no progress in {STALL:g} s, in water of {water:.2f} m/s"
+        self.found.append({"time": world.now, "waypoint": planner.index, "position": here.tolist()})
+        self._index = -1
+        return True
 
 
 def stay(

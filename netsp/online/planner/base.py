@@ -138,6 +138,13 @@ class Planner:
             current = np.array([3.0 * self.mission.gusts, 0.0, 0.0])
         return self.mission.tether.load(current)
 
+    @cached_property
+    def reserve(self) -> float:
+        """Metres of tether to be kept for what positions are wrong by: three standard deviations,
+        and what the robot goes until it is known."""
+        sensor = self.mission.sensor
+        return 3.0 * sensor.noise + sensor.delay * self.mission.speed
+
     @property
     def loaded(self) -> bool:
         """Whether the tether needs more than its taut length, or may turn by so much only."""

@@ -49,7 +49,7 @@ class PredictivePlanner(Planner):
         if self._planned == self.index and len(self.path) and not self._surprised(tether):
             return False
         self._planned = self.index
-        limit = self.mission.tether_length * (1.0 - MARGIN)
+        limit = self.limit
         waypoint = self.waypoint
         for end in (waypoint, self._near_enough(robot, waypoint)):
             straight = np.array([robot, end])
@@ -71,11 +71,17 @@ class PredictivePlanner(Planner):
         self.path, self.mode = path[1:], RECOVERY
         return True
 
+    @property
+    def limit(self) -> float:
+        """Metres of tether that plans may use."""
+        return self.mission.tether_length * (1.0 - MARGIN) - self.reserve
+
     def _surprised(self, tether: Tether) -> bool:
         """Whether half of the reserve is used up, as in a current: said once for each waypoint."""
         if (
             self._warned == self.index
-            or self.payout(tether) <= (1.0 - 0.5 * MARGIN) * self.mission.tether_length
+            or self.payout(tether) + 0.5 * self.reserve
+            <= (1.0 - 0.5 * MARGIN) * self.mission.tether_length
         ):
             return False
         self._warned = self.index
@@ -95,7 +101,7 @@ class PredictivePlanner(Planner):
 
     def warm_up(self, robot: Floats, tether: Tether) -> None:
         """See `Planner`."""
-        self._shortest_feasible(robot, tether, self.mission.tether_length)
+        self._shortest_feasible(robot, tether, self.limit)
 
     def _fits(self, tether: Tether, path: Floats, limit: float) -> bool:
         """Whether the tether stays within the limit all along a path.
@@ -198,7 +204,7 @@ class PredictivePlanner(Planner):
         del robot
         if len(self.path):
             return False
-        limit = self.mission.tether_length * (1.0 - MARGIN)
+        limit = self.limit
         line = self.back_along(tether)
         path = self.pulled(line)
         if not self._fits(tether, path, limit):

@@ -38,7 +38,7 @@ class BlueRov2:
         self._drift = np.zeros(3)
         # what is compiled is loaded before the first step
         self._control.force(self.state, np.tile(self.state, (HORIZON, 1)), self._drift)
-        self._control.forces = np.zeros((HORIZON, 4))
+        self._control = PredictiveControl()
 
     @property
     def position(self) -> Floats:

@@ -3,7 +3,7 @@
 Diehl, Bock and Schloeder, "A real-time iteration scheme for nonlinear optimization in optimal
 feedback control", SIAM J. Control Optim. 43(5), 2005: the model is linearised along the last
 solution, moved on by one step, and the quadratic program that comes of it is solved once. States
-are eliminated; what is left are 80 inputs between bounds, and Bertsekas' projected Newton method
+are eliminated; what is left are 100 thrusts between bounds, and Bertsekas' projected Newton method
 ("Projected Newton methods for optimization problems with simple constraints", SIAM J. Control
 Optim. 20(2), 1982) is done in a few steps. Compiled whole, it takes half a millisecond; OSQP took
 two and its library crashed beside that of HiGHS.
@@ -15,28 +15,27 @@ import numpy as np
 
 from netsp.arrays import Floats
 from netsp.compiled.kernel import kernel
-from netsp.online.vehicle.dynamics import MOST, linearised, step
+from netsp.online.vehicle.dynamics import ALLOCATION, THRUST, linearised, step
 
 HORIZON, DT = 20, 0.1
 """Steps ahead, and seconds of each."""
 
 STATE_COST = np.array([200.0, 200.0, 200.0, 10.0, 5.0, 5.0, 5.0, 1.0])
-FORCE_COST = np.array([2e-3, 2e-3, 2e-3, 2e-2])
-CHANGE_COST = np.array([2e-3, 2e-3, 2e-3, 2e-2])
-"""Weights of what is squared: errors in m, rad, m/s and rad/s, inputs in N and N m, and their
-changes from step to step."""
+THRUST_COST, CHANGE_COST = 4e-3, 4e-3
+"""Weights of what is squared: errors in m, rad, m/s and rad/s, thrusts in N, and their changes from
+step to step."""
 
 NEWTON_STEPS = 30
 
 
 class PredictiveControl:
-    """Controller with the inputs (HORIZON, 4) of its last solution."""
+    """Controller with the thrusts (HORIZON, 5) of its last solution, N."""
 
     def __init__(self) -> None:
-        self.forces = np.zeros((HORIZON, 4))
+        self.thrusts = np.zeros((HORIZON, 5))
 
     def force(self, state: Floats, aims: Floats, water: Floats) -> Floats:
-        """The input (4,) for the next step.
+        """The input (4,) for the next step, that thrusters within their limits give.
 
         Parameters
         ----------
@@ -47,56 +46,58 @@ class PredictiveControl:
         water
             (3,) what the water is thought to do.
         """
-        self.forces = improved(self.forces, state, aims, water)
-        return np.asarray(self.forces[0])
+        self.thrusts = improved(self.thrusts, state, aims, water, ALLOCATION)
+        return np.asarray(ALLOCATION @ self.thrusts[0])
 
 
 @kernel
-def improved(last: Floats, state: Floats, aims: Floats, water: Floats) -> Floats:
-    """The inputs after one iteration, from those (n, 4) of the step before."""
-    n = len(last)
-    guess = np.empty((n, 4))
+def improved(
+    last: Floats, state: Floats, aims: Floats, water: Floats, allocation: Floats
+) -> Floats:
+    """The thrusts after one iteration, from those (n, m) of the step before."""
+    n, m = last.shape
+    guess = np.empty((n, m))
     guess[:-1] = last[1:]
     guess[-1] = last[-1]
+    forces = np.dot(guess, allocation.T.copy())
     states = np.empty((n + 1, 8))
     states[0] = state
     for k in range(n):
-        states[k + 1] = step(states[k], guess[k], water, DT)
-    by_state, by_force, _ = linearised(states, guess, water, DT)
-    # how the states answer to changes of the inputs: row block k is the state after step k
-    answer = np.zeros((8 * n, 4 * n))
+        states[k + 1] = step(states[k], forces[k], water, DT)
+    by_state, by_force, _ = linearised(states, forces, water, DT)
+    # how the states answer to changes of the thrusts: row block k is the state after step k
+    answer = np.zeros((8 * n, m * n))
     for k in range(n):
         if k > 0:
-            answer[8 * k : 8 * k + 8, : 4 * k] = np.dot(
-                by_state[k], np.ascontiguousarray(answer[8 * k - 8 : 8 * k, : 4 * k])
+            answer[8 * k : 8 * k + 8, : m * k] = np.dot(
+                by_state[k], np.ascontiguousarray(answer[8 * k - 8 : 8 * k, : m * k])
             )
-        answer[8 * k : 8 * k + 8, 4 * k : 4 * k + 4] = by_force[k]
+        answer[8 * k : 8 * k + 8, m * k : m * k + m] = np.dot(by_force[k], allocation)
     weighted = answer.copy()
-    wish = np.zeros(4 * n)
+    wish = np.zeros(m * n)
     for k in range(n):
         for i in range(8):
             weighted[8 * k + i] *= STATE_COST[i]
             wish += weighted[8 * k + i] * (states[k + 1, i] - aims[k, i])
     hessian = np.dot(answer.T.copy(), weighted)
-    low, high = np.empty(4 * n), np.empty(4 * n)
+    low, high = np.empty(m * n), np.empty(m * n)
     for k in range(n):
-        for i in range(4):
-            j = 4 * k + i
-            hessian[j, j] += FORCE_COST[i] + CHANGE_COST[i]
+        for i in range(m):
+            j = m * k + i
+            hessian[j, j] += THRUST_COST + CHANGE_COST
             before = guess[k - 1, i] if k > 0 else last[0, i]
-            wish[j] += FORCE_COST[i] * guess[k, i] + CHANGE_COST[i] * (guess[k, i] - before)
+            wish[j] += THRUST_COST * guess[k, i] + CHANGE_COST * (guess[k, i] - before)
             if k + 1 < n:
-                hessian[j, j] += CHANGE_COST[i]
-                hessian[j, j + 4] -= CHANGE_COST[i]
-                hessian[j + 4, j] -= CHANGE_COST[i]
-                wish[j] -= CHANGE_COST[i] * (guess[k + 1, i] - guess[k, i])
-            low[j], high[j] = -MOST[i] - guess[k, i], MOST[i] - guess[k, i]
+                hessian[j, j] += CHANGE_COST
+                hessian[j, j + m] -= CHANGE_COST
+                hessian[j + m, j] -= CHANGE_COST
+                wish[j] -= CHANGE_COST * (guess[k + 1, i] - guess[k, i])
+            low[j], high[j] = -THRUST - guess[k, i], THRUST - guess[k, i]
     change = within(hessian, wish, low, high, NEWTON_STEPS)
-    out = np.empty((n, 4))
+    out = np.empty((n, m))
     for k in range(n):
-        for i in range(4):
-            value = guess[k, i] + change[4 * k + i]
-            out[k, i] = min(max(value, -MOST[i]), MOST[i])
+        for i in range(m):
+            out[k, i] = min(max(guess[k, i] + change[m * k + i], -THRUST), THRUST)
     return out
 
 

@@ -25,12 +25,26 @@ INERTIA = np.array([13.5 + 6.36, 13.5 + 7.12, 13.5 + 18.68, 0.37 + 0.222])
 """Mass and added mass: kg, kg, kg, kg m^2."""
 
 LINEAR = np.array([13.7, 0.0, 33.0, 0.0])
-QUADRATIC = np.array([141.0, 217.0, 190.0, 1.5])
-"""Damping."""
+QUADRATIC = np.array([41.1, 217.0, 190.0, 1.5])
+"""Damping. Of von Benzon et al. all but the quadratic damping in surge: their 141 kg/m, found at
+low speed, would let four thrusters push the vehicle to 0.85 m/s. Blue Robotics states 1.5 m/s for
+it, which is what 41.1 kg/m gives."""
 
-MOST = np.array([80.0, 80.0, 80.0, 14.0])
-"""Limits of the input. Four vectored and two vertical T200 thrusters could do a little more along
-one axis; the four share what they have between surge, sway and yaw."""
+THRUST = 40.0
+"""N: most that a T200 gives either way (Blue Robotics: at 16 V 51 N ahead and 40 N astern)."""
+
+_C, _ARM = math.sqrt(0.5), math.sqrt(0.5) * (0.156 + 0.111)
+ALLOCATION = np.array(
+    [
+        [_C, _C, _C, _C, 0.0],
+        [_C, -_C, -_C, _C, 0.0],
+        [0.0, 0.0, 0.0, 0.0, 2.0],
+        [_ARM, -_ARM, _ARM, -_ARM, 0.0],
+    ]
+)
+"""Input (4,) of thrusts (5,): front right, front left, back right and back left at 45 degrees,
+0.156 m before or behind and 0.111 m beside the middle (von Benzon et al.), and the vertical two,
+which push alike in a vehicle that stays upright."""
 
 
 @kernel
