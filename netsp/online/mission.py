@@ -254,8 +254,9 @@ class Mission(FileModel):
         What the tether needs beyond its taut length; by default nothing.
     delta : float
         Resolution of the tether, metres.
-    cell : float
-        Of the grid that paths are sought on, metres.
+    cell : float or None
+        Of the grid that paths are sought on, metres; None for 0.2 m, or as much more as two million
+        cells ask for.
 
     Raises
     ------
@@ -302,7 +303,13 @@ class Mission(FileModel):
         TetherPhysics, Field(description="slack, drag and friction of the tether; none by default")
     ] = TetherPhysics()
     delta: Annotated[Positive, Field(description="resolution of the tether, m")] = 0.1
-    cell: Annotated[Positive, Field(description="of the grid on which paths are sought, m")] = 0.2
+    cell: Annotated[
+        Positive | None,
+        Field(
+            description="of the grid on which paths are sought, m; null for 0.2, or more where the "
+            "site is large"
+        ),
+    ] = None
 
     @classmethod
     def load(cls, path: str | Path) -> Self:

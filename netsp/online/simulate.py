@@ -33,6 +33,10 @@ from netsp.online.water import Water
 STEP = 0.1
 """Seconds between two decisions of the planner."""
 
+CELL, MOST_CELLS = 0.2, 2_000_000
+"""Cells of the grid that paths are sought on, metres, where a mission does not say; larger ones
+where there would be more than so many, so that planning takes no longer than a second."""
+
 FRAME = 2
 """Steps between two pictures of the camera."""
 
@@ -71,14 +75,16 @@ def grid_of(mission: Mission, scene: Scene, field: DistanceField) -> Grid:
     InputError
         It would take too much memory; says which cell would not.
     """
+    cell = mission.cell or CELL
     if scene.bounds is not None:
         low, high = np.array(scene.bounds[:3]), np.array(scene.bounds[3:])
     else:
-        places = mission.every_place
-        low, high = extent(scene, places)
-        room = 5.0 * mission.cell + mission.clearance
+        low, high = extent(scene, mission.every_place)
+        room = 5.0 * cell + mission.clearance
         low, high = low - room, high + room
-    return Grid(field, low, high, mission.cell, mission.clearance)
+    if mission.cell is None:
+        cell = max(CELL, float(np.prod(np.maximum(high - low, CELL)) / MOST_CELLS) ** (1.0 / 3.0))
+    return Grid(field, low, high, cell, mission.clearance)
 
 
 def first_tether(mission: Mission, field: DistanceField, model: Tethers, grid: Grid) -> Tether:

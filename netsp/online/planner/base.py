@@ -12,14 +12,18 @@ import numpy as np
 from netsp.arrays import Floats
 from netsp.geometry import polylines
 from netsp.online.mission import Mission
+from netsp.online.paths.beside import beside
 from netsp.online.paths.refine import refined
 from netsp.online.paths.sampled import SampledPaths
 from netsp.online.paths.tree import Grid, Paths, ShortestTree, taut
-from netsp.online.scene.field import DistanceField, pushed_out
+from netsp.online.scene.field import DistanceField
 from netsp.online.tether import GeodesicTether, ReactTether, Tether
 from netsp.online.tether.load import Load, payout, payout_along
 
 Tethers = GeodesicTether | ReactTether
+
+NARROW = 0.1
+"""Metres between points of the way back along a tether: nothing that thin stands in the water."""
 
 FREE = 0.1
 """A tether so many delta longer than as it was laid when the mission began is not free."""
@@ -203,7 +207,7 @@ class Planner:
         Command
             Where to go.
         """
-        self._advance(robot)
+        self._advance(robot, tether)
         if self.done:
             return Command(np.array([robot]), DONE)
         begin = time.process_time()
@@ -284,6 +288,23 @@ class Planner:
         self.mode = HOME
         return planned
 
+    def ends_here(self, tether: Tether) -> bool:
+        """Whether the mission may end now that the robot is home; else the way home is planned
+        again.
+
+        Parameters
+        ----------
+        tether : Tether
+            The tether as the model has it.
+
+        Returns
+        -------
+        bool
+            Whether it may; here always.
+        """
+        del tether
+        return True
+
     def back_along(self, tether: Tether) -> Floats:
         """The way back along a tether to the anchor, and on to the start as the tether was laid
         there: whoever goes it has the tether free at its end.
@@ -300,9 +321,8 @@ class Planner:
         """
         assert self.laid is not None
         line = np.vstack([tether.nodes[::-1], self.laid.nodes[1:]])
-        path = polylines.points_along(line, self.mission.cell)
-        path[1:-1] = pushed_out(self.scene, path[1:-1], self.mission.clearance)
-        return path
+        fine = min(self.grid.cell, NARROW)
+        return beside(self.scene, polylines.points_along(line, fine), self.mission.clearance)
 
     def go_on(self, robot: Floats) -> bool:
         """Go straight to the waypoint, or along the shortest path round what is between.
@@ -363,7 +383,7 @@ class Planner:
         if name == "none":
             return path
         rng = np.random.default_rng([self.options.seed, self.index])
-        even = polylines.points_along(path, self.mission.cell)
+        even = polylines.points_along(path, self.grid.cell)
         return refined(name, self.scene, even, self.mission.clearance, rng)
 
     def pulled(self, path: Floats) -> Floats:
@@ -398,13 +418,16 @@ class Planner:
         room = min(self.mission.clearance, ends) - 1e-3
         return self.scene.grown(max(0.0, room)).line_of_sight(path[0], path[1], depth=1e-3)
 
-    def _advance(self, robot: Floats) -> None:
+    def _advance(self, robot: Floats, tether: Tether) -> None:
         """Past the waypoint, when it is reached at the end of the path."""
         reach = self.mission.reach
         if self.done:
             return
         if len(self.path) <= 1 and np.linalg.norm(self.waypoint - robot) <= reach:
             if self.homeward:
+                if not self.ends_here(tether):
+                    self.path = self.path[:0]
+                    return
                 self.home = True
             else:
                 self.reached.append(self.index)

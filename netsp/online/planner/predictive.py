@@ -30,6 +30,10 @@ PIVOTS = 24
 ROUGH = 0.9
 """Pulled taut, a path is seldom shorter than this share of what it is roughly pulled."""
 
+EVERY, MOST_HOMES = 20, 3
+"""Steps between two looks whether the tether still comes free on the way home, and how often the
+robot goes back from there along a tether that is not."""
+
 PULL, PULLS, FORESEEN = 10, 10, 2.0
 """Rounds of a pull, how many pulls at most until a tether counts as taut, and how many times what
 a geometric series would still take away is allowed for."""
@@ -41,6 +45,9 @@ class PredictivePlanner(Planner):
 
     _planned: int = field(default=-1)
     _warned: int = field(default=-1)
+    _asked: int = 0
+    _homes: int = 0
+    _sure: bool = False
 
     name = "predictive"
 
@@ -146,7 +153,7 @@ class PredictivePlanner(Planner):
         # the tether back from the robot, finely, off the surfaces; some of its points are pivots
         nodes = tether.nodes[::-1]
         along = polylines.along(nodes)
-        back = polylines.points_along(nodes, self.mission.cell)
+        back = polylines.points_along(nodes, self.grid.cell)
         places = np.linspace(0.0, along[-1], len(back))
         back[1:] = pushed_out(self.scene, back[1:], self.mission.clearance)
         pivots = np.unique(np.linspace(0, len(back) - 1, PIVOTS + 1).round().astype(int))
@@ -201,8 +208,7 @@ class PredictivePlanner(Planner):
     def plan_home(self, robot: Floats, tether: Tether) -> bool:
         """The shortest path home on which the tether fits and at whose end it is free: that of the
         class back along the tether, pulled as far as both hold."""
-        del robot
-        if len(self.path):
+        if len(self.path) and not self._led_astray(robot, tether):
             return False
         limit = self.limit
         line = self.back_along(tether)
@@ -210,15 +216,35 @@ class PredictivePlanner(Planner):
         if not self._fits(tether, path, limit):
             found = self._tautest(tether, line, limit)
             path = line if found is None else found
-        if path is not line and not self._comes_free(tether, path):
-            path = line
+        self._sure = self._comes_free(tether, path)
+        if not self._sure and path is not line:
+            path, self._sure = line, self._comes_free(tether, line)
         self.path, self.mode = path[1:], HOME
         return True
+
+    def _led_astray(self, robot: Floats, tether: Tether) -> bool:
+        """Whether on what is left of the way home the tether no longer comes free, as when a
+        vehicle that cuts corners has taken it past something. Asked now and then."""
+        self._asked += 1
+        if self._asked % EVERY or not self._sure:
+            return False
+        return not self._comes_free(tether, np.vstack([robot, self.path]))
+
+    def ends_here(self, tether: Tether) -> bool:
+        """At home with the tether not free, the robot goes back along it and comes home again."""
+        assert self.laid is not None
+        here = self._model.update(self.laid, tether.robot)
+        length = self._model.refine(tether).length
+        if length <= here.length + FREE * self.mission.delta or self._homes >= MOST_HOMES:
+            return True
+        self._homes += 1
+        return False
 
     def _comes_free(self, tether: Tether, path: Floats) -> bool:
         """Whether the tether lies at the end of a path as at the start of the mission."""
         assert self.laid is not None
-        end = self._model.refine(self._model.drive(tether, path[1:])[0])
+        points = polylines.dense(path, self.grid.cell)[1:]
+        end = self._model.refine(self._model.drive(tether, points)[0])
         return end.length <= self.laid.length + FREE * self.mission.delta
 
     def _roughly_pulled(self, path: Floats) -> Floats:

@@ -76,7 +76,7 @@ class ReactPlanner(Planner):
     def _search(self, tether: Tether) -> Floats:
         """Algorithm 3: pivots backwards along the tether, the first that will do."""
         limit = self.mission.tether_length
-        back = polylines.points_along(tether.nodes[::-1], max(self.mission.cell, 0.25))
+        back = polylines.points_along(tether.nodes[::-1], max(self.grid.cell, 0.25))
         tree = self.paths(pushed_out(self.scene, back, 1e-3))
         lengths = [self._augmented(back, tree, n) for n in range(len(back))]
         for n, length in enumerate(lengths):
@@ -109,5 +109,5 @@ class ReactPlanner(Planner):
             return np.inf
         path = np.vstack([back[:n:-1], onward]) if n + 1 < len(back) else onward
         start = self.tethers.start(path[0], path[0])
-        driven = self.tethers.drive(start, polylines.dense(path, 0.5 * self.mission.cell))[0]
+        driven = self.tethers.drive(start, polylines.dense(path, 0.5 * self.grid.cell))[0]
         return self.payout(driven)
