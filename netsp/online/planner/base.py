@@ -68,11 +68,15 @@ class PlannerOptions:
         the others, whose paths keep the clearance from the start.
     seed : int
         Of what is random in either.
+    looks : int
+        How often `predictive` simulates the tether ahead for one plan; then the best path so far is
+        taken, and the first if there is none yet.
     """
 
     paths: str = "tree"
     refine: str | None = None
     seed: int = 0
+    looks: int = 10
 
 
 @dataclass

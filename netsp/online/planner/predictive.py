@@ -15,9 +15,9 @@ import numpy as np
 
 from netsp.arrays import Floats
 from netsp.geometry import polylines
+from netsp.online.paths.beside import beside
 from netsp.online.paths.tree import ever_tauter, homotopic, roughly_taut, taut
 from netsp.online.planner.base import FREE, HOME, NORMAL, RECOVERY, Planner
-from netsp.online.scene.field import pushed_out
 from netsp.online.tether import GeodesicTether, Tether
 from netsp.online.tether.load import payout_along, turning
 
@@ -48,6 +48,7 @@ class PredictivePlanner(Planner):
     _asked: int = 0
     _homes: int = 0
     _sure: bool = False
+    _looks: int = 0
 
     name = "predictive"
 
@@ -117,6 +118,7 @@ class PredictivePlanner(Planner):
         limit the robot may go at once, and where little is left in small steps. What slack and sag
         add has no such bound: a contact that is lost joins two spans. Then all steps are small.
         """
+        self._looks += 1
         if self.loaded:
             return self._fits_under_load(tether, path, limit)
         most = max(limit, tether.length + 1e-6)
@@ -155,7 +157,7 @@ class PredictivePlanner(Planner):
         along = polylines.along(nodes)
         back = polylines.points_along(nodes, self.grid.cell)
         places = np.linspace(0.0, along[-1], len(back))
-        back[1:] = pushed_out(self.scene, back[1:], self.mission.clearance)
+        back = beside(self.scene, back, self.mission.clearance)
         pivots = np.unique(np.linspace(0, len(back) - 1, PIVOTS + 1).round().astype(int))
         tree = self.paths(back[pivots])
         onward = {int(i): tree.path(n) for n, i in enumerate(pivots)}
@@ -165,6 +167,7 @@ class PredictivePlanner(Planner):
             passed = int(np.searchsorted(along, places[i] - 1e-9, side="right"))
             return np.vstack([tether.nodes[: max(1, len(nodes) - passed)], back[i]])
 
+        self._looks = 0
         whole: list[tuple[float, Floats, int]] = []
         for last in self._classes(back, onward):
             on = onward[last]
@@ -174,7 +177,7 @@ class PredictivePlanner(Planner):
         best: Floats | None = None
         least = np.inf
         for length, rough, last in sorted(whole, key=lambda w: w[0]):
-            if ROUGH * length >= least:
+            if ROUGH * length >= least or (best is not None and self._looked_enough):
                 break
             on = onward[last]
             assert on is not None
@@ -187,17 +190,26 @@ class PredictivePlanner(Planner):
             if self._fits(tether, path, limit):
                 best, least = path, length
                 continue
-            found = self._tautest(tether, np.vstack([back[: last + 1], on[1:]]), limit)
-            if found is not None and polylines.length(found) < least:
+            found = self._tautest(tether, np.vstack([back[: last + 1], on[1:]]), limit, least)
+            if found is not None:
                 best, least = found, polylines.length(found)
         return best
 
-    def _tautest(self, tether: Tether, line: Floats, limit: float) -> Floats | None:
+    @property
+    def _looked_enough(self) -> bool:
+        """Whether the best path so far is to be taken. Looks are counted and not seconds, so that a
+        plan is the same on every machine."""
+        return self._looks >= self.options.looks
+
+    def _tautest(
+        self, tether: Tether, line: Floats, limit: float, least: float = np.inf
+    ) -> Floats | None:
         """Of ever less pulled paths in the class of a line the tautest on which the tether fits:
-        the less of a retreat is saved, the sooner it does."""
+        the less of a retreat is saved, the sooner it does. None where none is shorter than
+        `least`."""
         best = None
-        paths = list(self._ever_tauter(line))
-        while paths:
+        paths = [p for p in self._ever_tauter(line) if polylines.length(p) < least]
+        while paths and not (self._looked_enough and (best is not None or least < np.inf)):
             middle = len(paths) // 2
             if self._fits(tether, paths[middle], limit):
                 best, paths = paths[middle], paths[middle + 1 :]
