@@ -1,6 +1,6 @@
 """Sites of our own, each inspected by every planner, and by the BlueROV2 in a current.
 
-    python benchmarks/sites.py [--sites jetty ring …] [--quick] [--keep]
+    python benchmarks/sites.py [--sites jetty ring …] [--quick] [--react] [--keep]
 
 The tether of each is a tenth longer than the longest of the shortest tethers to its waypoints, so
 that no waypoint is out of reach and none may be gone to by any other class without a price. The
@@ -213,11 +213,12 @@ def shipped(name: str) -> tuple[Mission, Scene]:
     return there.model_copy(update={"camera": None}), there.load_scene()
 
 
-def flights(quick: bool = False) -> Iterator[tuple[str, str, dict[str, Any]]]:
+def flights(quick: bool = False, react: bool = False) -> Iterator[tuple[str, str, dict[str, Any]]]:
     """(planner, vehicle, changes)."""
     yield "predictive", "kinematic", {}
-    if not quick:
+    if react:
         yield "react", "kinematic", {}
+    if not quick:
         yield "none", "kinematic", {}
     yield "predictive", "bluerov2", {"current": CURRENT}
 
@@ -234,13 +235,16 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--sites", nargs="*", default=[*SITES, "basin", "pipes", "jacket"])
     parser.add_argument("--quick", action="store_true", help="predictive only")
+    parser.add_argument(
+        "--react", action="store_true", help="the paper's planner, too: a quarter of an hour a site"
+    )
     args = parser.parse_args()
     heading("Sites")
     head("site", "tether m", "planner, vehicle", "visited", "longest m", "over s", "inspection s",
          "home s", "tether free", "worst replan ms", name="sites")  # fmt: skip
     for name in args.sites:
         mission, scene = mission_of(name) if name in SITES else shipped(name)
-        for planner, vehicle, changes in flights(args.quick):
+        for planner, vehicle, changes in flights(args.quick, args.react):
             s = flown(mission, scene, planner, vehicle, changes)
             home = s["home"]
             row(

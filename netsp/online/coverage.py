@@ -20,7 +20,7 @@ from netsp.online.scene.field import DistanceField
 from netsp.online.scene.sampling import Field, lowest_along
 from netsp.online.scene.scene import Scene
 from netsp.online.scene.shapes import HalfSpace
-from netsp.online.scene.surfaces import drawn_points, extent, mesh_of, surface_of
+from netsp.online.scene.surfaces import drawn_points, extent, surface_of
 
 MOST_PATCHES = 200_000
 
@@ -52,7 +52,7 @@ def patches_of(
 ) -> Patches:  # fmt: skip
     """The surface of a scene in triangles with sides of at most `size`, without what lies inside
     another solid. places : (k, 3); what has no end is taken as far as they reach. inspect : names
-    of the solids to be seen; default all but half spaces.
+    of the solids to be seen; default all but half spaces and the sea floor.
 
     Raises
     ------
@@ -61,8 +61,8 @@ def patches_of(
     """
     low, high = extent(scene, places)
     solids = scene.all_solids()
-    named = {s.name for s in solids} | ({"mesh"} if scene.mesh else set())
-    named |= {"cloud"} if scene.cloud else set()
+    named = {s.name for s in solids}
+    named |= {n for n in ("mesh", "cloud", "floor") if getattr(scene, n) is not None}
     for name in inspect or ():
         if name not in named:
             raise InputError(f"inspect: expected names of solids, got {name!r}")
@@ -73,8 +73,8 @@ def patches_of(
         for s in solids
         if not isinstance(s.shape, HalfSpace) and (inspect is None or s.name in inspect)
     ]
-    if scene.mesh is not None and (inspect is None or "mesh" in inspect):
-        own.append((mesh_of(scene), field))
+    chosen_meshes = ("mesh",) if inspect is None else inspect  # no floor unless it is asked for
+    own += [(triangles, field) for name, triangles in scene.meshes() if name in chosen_meshes]
     for (vertices, faces), alone in own:
         triangles = divided(vertices[faces], size)
         cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])

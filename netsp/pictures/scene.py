@@ -15,7 +15,7 @@ from netsp.files import write_text
 from netsp.geometry import polylines
 from netsp.online.scene.scene import Scene
 from netsp.online.scene.shapes import HalfSpace
-from netsp.online.scene.surfaces import Triangles, drawn_points, extent, mesh_of, surface_of
+from netsp.online.scene.surfaces import Triangles, drawn_points, extent, surface_of
 from netsp.online.tether import Tether
 from netsp.pictures import style
 
@@ -63,9 +63,7 @@ def parts_of(scene: Scene, low: Floats, high: Floats) -> list[tuple[str, Triangl
         if isinstance(solid.shape, HalfSpace) and len(scene.all_solids()) > 1:
             continue
         out.append((solid.name or f"solids[{k}]", surface_of(solid.shape, low, high)))
-    if scene.mesh is not None:
-        out.append(("mesh", mesh_of(scene)))
-    return out
+    return out + scene.meshes()
 
 
 def _figure(

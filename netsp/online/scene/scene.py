@@ -10,14 +10,15 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
+import numpy.typing as npt
 from pydantic import ConfigDict, Field, model_validator
 
 from netsp.arrays import Floats
 from netsp.errors import InputError
-from netsp.fields import Name, NonNegative, Number, Positive
+from netsp.fields import Name, NonNegative, Number, Point2, Positive
 from netsp.files import FileModel, read_text
 from netsp.models import Model
-from netsp.online.scene.field import DistanceField
+from netsp.online.scene.field import DistanceField, VoxelGrid
 from netsp.online.scene.shapes import (
     Box,
     Capsule,
@@ -79,12 +80,48 @@ class Source(Model):
     """
 
     file: Annotated[
-        str, Field(description="mesh (STL, OBJ, PLY) or cloud, relative to the scene file")
+        str,
+        Field(
+            description="mesh (STL, OBJ, PLY, GLB) or cloud (npz, npy, csv, xyz, PLY, LAS, LAZ), "
+            "relative to the scene file"
+        ),
     ]
     scale: Annotated[Positive, Field(description="factor from the file's units to metres")] = 1.0
     voxel: Annotated[
         Positive | None, Field(description="edge of the voxels, m; null for a choice by size")
     ] = None
+
+
+class Floor(Model):
+    """A sea floor from a bathymetry grid beside the scene's file.
+
+    Attributes
+    ----------
+    file
+        GeoTIFF or ASC in metres, relative to the scene file.
+    scale
+        Metres per unit of the file.
+    voxel
+        Metres; as of `Source`.
+    origin
+        (x, y) on the file's map that is (0, 0) of the scene.
+    depths
+        Whether its values count downwards.
+    """
+
+    file: Annotated[
+        str, Field(description="bathymetry grid (GeoTIFF, ASC), relative to the scene file")
+    ]
+    scale: Annotated[Positive, Field(description="factor from the file's units to metres")] = 1.0
+    voxel: Annotated[
+        Positive | None, Field(description="edge of the voxels, m; null for a choice by size")
+    ] = None
+    origin: Annotated[
+        Point2, Field(description="(x, y) of the file's map that is (0, 0) here, its units")
+    ] = (0.0, 0.0)
+    depths: Annotated[
+        bool, Field(description="whether values are depths, which count downwards")
+    ] = False
 
 
 class Scene(FileModel):
@@ -98,6 +135,8 @@ class Scene(FileModel):
         A file, turned into voxels (`netsp.online.scene.voxels`).
     cloud : Source or None
         A file, turned into voxels.
+    floor : Floor or None
+        A bathymetry grid, turned into voxels, together with the mesh if there is one.
     problem : str or None
         An NE-TSP problem file, whose obstacles, grown by its clearance, stand from the sea floor to
         the surface.
@@ -124,6 +163,7 @@ class Scene(FileModel):
         None
     )
     cloud: Annotated[Source | None, Field(description="points on surfaces; null for none")] = None
+    floor: Annotated[Floor | None, Field(description="the sea floor; null for none")] = None
     problem: Annotated[
         str | None,
         Field(description="problem file whose obstacles stand upright in the water; null for none"),
@@ -170,7 +210,7 @@ class Scene(FileModel):
         folder = Path(path).parent
         changes: dict[str, Any] = {
             key: given.model_copy(update={"file": str(folder / given.file)})
-            for key in ("mesh", "cloud")
+            for key in ("mesh", "cloud", "floor")
             if (given := getattr(scene, key)) is not None
         }
         if scene.problem is not None:
@@ -254,29 +294,76 @@ class Scene(FileModel):
             Nothing in the scene, unreadable files, a grid that is too large.
         """
         solids = self.all_solids()
-        if not solids and self.mesh is None and self.cloud is None:
-            raise InputError(f"{self.name}: the scene is empty; expected solids, mesh or cloud")
-        kind, rows, outline = encode(solids)
-        grid = None
-        for source, what in ((self.mesh, "mesh"), (self.cloud, "cloud")):
-            if source is None:
-                continue
-            from netsp.online.scene import voxels
-
-            if grid is not None:
-                raise InputError(f"{self.name}: mesh, cloud: expected one of them, got both")
-            read = voxels.of_mesh if what == "mesh" else voxels.of_cloud_file
-            grid = read(
-                source.file,
-                scale=source.scale,
-                voxel=voxel or source.voxel,
-                memory_limit=memory_limit,
-                on_progress=on_progress,
+        if not solids and self.mesh is None and self.cloud is None and self.floor is None:
+            raise InputError(
+                f"{self.name}: the scene is empty; expected solids, mesh, cloud or floor"
             )
+        kind, rows, outline = encode(solids)
+        grid = self._voxels(voxel, memory_limit, on_progress)
         boxes = [b for s in solids if (b := s.shape.box()) is not None]
         return DistanceField.build(
             kind, rows, outline, boxes, grid, self.tether_radius, _thickness(solids)
         )
+
+    def _voxels(
+        self,
+        voxel: float | None,
+        memory_limit: float,
+        on_progress: Callable[[str, float], None] | None,
+    ) -> VoxelGrid | None:
+        """Distances to what no solid describes; None where there is none of it."""
+        if self.mesh is None and self.cloud is None and self.floor is None:
+            return None
+        from netsp.online.scene import voxels
+
+        if self.cloud is not None:
+            others = [n for n in ("mesh", "floor") if getattr(self, n) is not None]
+            if others:
+                raise InputError(f"{self.name}: {others[0]}, cloud: expected one of them, got both")
+            return voxels.of_cloud_file(
+                self.cloud.file, scale=self.cloud.scale, voxel=voxel or self.cloud.voxel,
+                memory_limit=memory_limit, on_progress=on_progress,
+            )  # fmt: skip
+        if self.floor is None:
+            assert self.mesh is not None
+            return voxels.of_mesh(
+                self.mesh.file, scale=self.mesh.scale, voxel=voxel or self.mesh.voxel,
+                memory_limit=memory_limit, on_progress=on_progress,
+            )  # fmt: skip
+        return voxels.of_meshes(
+            [triangles for _, triangles in self.meshes()],
+            memory_limit=memory_limit, on_progress=on_progress, source=self.name,
+            voxel=voxel or self.floor.voxel or (self.mesh.voxel if self.mesh else None),
+        )  # fmt: skip
+
+    def meshes(self) -> list[tuple[str, tuple[Floats, npt.NDArray[np.int64]]]]:
+        """Mesh and sea floor as triangles.
+
+        Returns
+        -------
+        list of (str, (ndarray, ndarray))
+            ``mesh`` or ``floor``, with vertices (n, 3), metres, and faces (m, 3).
+
+        Raises
+        ------
+        InputError
+            A file cannot be read.
+        """
+        out = []
+        if self.mesh is not None:
+            from netsp.online.scene.voxels import read_mesh
+
+            vertices, faces = read_mesh(self.mesh.file)
+            out.append(("mesh", (vertices * self.mesh.scale, faces)))
+        if self.floor is not None:
+            from netsp.online.scene.floor import floor_mesh
+
+            floor = self.floor
+            triangles = floor_mesh(
+                floor.file, scale=floor.scale, origin=floor.origin, depths=floor.depths
+            )
+            out.append(("floor", triangles))
+        return out
 
 
 def _thickness(solids: tuple[Solid, ...]) -> list[tuple[str, float]]:

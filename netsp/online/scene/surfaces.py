@@ -148,8 +148,7 @@ def extent(scene: Scene, *points: Floats) -> tuple[Floats, Floats]:
             flat.append(box)
         elif box is not None:
             boxes.append(box)
-    if scene.mesh is not None:
-        boxes.append(mesh_of(scene)[0])
+    boxes += [vertices for _, (vertices, _) in scene.meshes()]
     if scene.cloud is not None:
         boxes.append(drawn_points(scene))
     if not boxes and not flat and scene.bounds is not None:
@@ -168,15 +167,6 @@ def extent(scene: Scene, *points: Floats) -> tuple[Floats, Floats]:
     low, high = everything.min(0), everything.max(0)
     room = 0.03 * float((high - low).max()) + 1e-9
     return low - room, high + room
-
-
-def mesh_of(scene: Scene) -> Triangles:
-    """The triangles of the scene's mesh file."""
-    from netsp.online.scene.voxels import read_mesh
-
-    assert scene.mesh is not None
-    vertices, faces = read_mesh(scene.mesh.file)
-    return vertices * scene.mesh.scale, faces
 
 
 def drawn_points(scene: Scene) -> Floats:

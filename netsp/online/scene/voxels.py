@@ -49,7 +49,7 @@ def of_mesh(
     memory_limit: float = 4.0,
     on_progress: OnStage = None,
 ) -> VoxelGrid:
-    """The distance grid of a mesh file in any format that trimesh reads (STL, OBJ, PLY, …).
+    """The distance grid of a mesh file in any format that trimesh reads (STL, OBJ, PLY, GLB, …).
 
     Raises
     ------
@@ -61,6 +61,23 @@ def of_mesh(
     return of_triangles(
         vertices * scale, faces, voxel=voxel, memory_limit=memory_limit,
         on_progress=on_progress, source=str(path),
+    )  # fmt: skip
+
+
+def of_meshes(
+    parts: list[tuple[Floats, npt.NDArray[np.int64]]],
+    *,
+    voxel: float | None = None,
+    memory_limit: float = 4.0,
+    on_progress: OnStage = None,
+    source: str = "mesh",
+) -> VoxelGrid:
+    """The distance grid of several meshes together: vertices (n, 3) and faces (m, 3) of each."""
+    first = np.cumsum([0, *(len(v) for v, _ in parts)])
+    return of_triangles(
+        np.vstack([v for v, _ in parts]),
+        np.vstack([f + n for (_, f), n in zip(parts, first, strict=False)]),
+        voxel=voxel, memory_limit=memory_limit, on_progress=on_progress, source=source,
     )  # fmt: skip
 
 
@@ -135,7 +152,7 @@ def of_cloud_file(
     on_progress: OnStage = None,
 ) -> VoxelGrid:
     """The distance grid of a cloud file: .npz or .npy (an array (n, 3), in .npz named `points`),
-    .csv, .txt or .xyz (three columns), or .ply. InputError as for `of_mesh`."""
+    .csv, .txt or .xyz (three columns), .ply, .las or .laz. InputError as for `of_mesh`."""
     return of_cloud(
         read_cloud(path) * scale, voxel=voxel, memory_limit=memory_limit, on_progress=on_progress,
         source=str(path),
@@ -335,11 +352,14 @@ def read_cloud(path: str | Path) -> Floats:
             if rows and not _numeric(rows[0]):
                 rows = rows[1:]
             points = np.array([[float(v) for v in row] for row in rows]).reshape(-1, 3)
+        elif kind in (".las", ".laz"):
+            points = np.asarray(_laspy().read(str(path)).xyz, dtype=float)
         elif kind == ".ply":
             points = np.asarray(_trimesh().load(str(path)).vertices, dtype=float)
         else:
             raise InputError(
-                f"{path}: expected a cloud in .npz, .npy, .csv, .txt, .xyz or .ply, got {kind!r}"
+                f"{path}: expected a cloud in .npz, .npy, .csv, .txt, .xyz, .ply, .las or .laz, "
+                f"got {kind!r}"
             )
     except InputError:
         raise
@@ -387,6 +407,14 @@ def _trimesh() -> Any:
     except ImportError:
         raise InputError("meshes need trimesh: pip install 'netsp[online]'") from None
     return trimesh
+
+
+def _laspy() -> Any:
+    try:
+        import laspy
+    except ImportError:
+        raise InputError("LAS clouds need laspy: pip install 'netsp[online]'") from None
+    return laspy
 
 
 def _tell(on_progress: OnStage, stage: str, fraction: float) -> None:
