@@ -219,3 +219,15 @@ def test_bad_physics_is_told_in_one_line(physics, message):
 def test_an_absurd_current_is_refused_before_the_run():
     with pytest.raises(InputError, match="current: 300 m/s pulls on"):
         fly("predictive", TetherPhysics(diameter=DIAMETER), 8.0, current=(300, 0, 0))
+
+
+def test_waypoints_close_together_are_flown_under_load_without_a_defect():
+    """Steps shorter than those of the look-ahead."""
+    points = [(-2 + 0.01 * k, 0.7, 0) for k in range(8)]
+    mission = Mission(
+        scene="-", anchor=(-2, 0, 0), start=(-2, 0.5, 0), waypoints=points, tether_length=6.0,
+        reach=0.002, tether=TetherPhysics(slack=0.1),
+    )  # fmt: skip
+    run = simulate(mission, scene=POST)
+    assert run.summary["defects"] == 0
+    assert run.summary["visited"] == 8

@@ -135,7 +135,7 @@ class PredictivePlanner(Planner):
 
     def _fits_under_load(self, tether: Tether, path: Floats, limit: float) -> bool:
         """Whether what must be out, and the sum of turning angles, stay within their limits."""
-        points = polylines.dense(path, max(0.5 * self.mission.delta, 0.02))[1:]
+        points = polylines.dense(path, max(0.5 * self.mission.delta, 0.02))
         _, payouts, turnings = self._model.drive_under(tether, points, self.load)
         most = max(self.mission.tether.max_turning, turning(tether, self.mission.delta) + 1e-6)
         return bool(
@@ -223,6 +223,13 @@ class PredictivePlanner(Planner):
         if len(self.path) and not self._led_astray(robot, tether):
             return False
         limit = self.limit
+        # the shortest path of all will do where it happens to free the tether
+        direct = self.paths(robot[None]).path(0)
+        direct = None if direct is None else self.pulled(direct)
+        good = direct is not None and self._comes_free(tether, direct)
+        if direct is not None and good and self._fits(tether, direct, limit):
+            self.path, self.mode, self._sure = direct[1:], HOME, True
+            return True
         line = self.back_along(tether)
         path = self.pulled(line)
         if not self._fits(tether, path, limit):
@@ -255,7 +262,7 @@ class PredictivePlanner(Planner):
     def _comes_free(self, tether: Tether, path: Floats) -> bool:
         """Whether the tether lies at the end of a path as at the start of the mission."""
         assert self.laid is not None
-        points = polylines.dense(path, self.grid.cell)[1:]
+        points = polylines.dense(path, self.grid.cell)
         end = self._model.refine(self._model.drive(tether, points)[0])
         return end.length <= self.laid.length + FREE * self.mission.delta
 
