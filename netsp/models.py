@@ -136,8 +136,15 @@ def explain(error: ValidationError) -> str:
         message = f"expected an object, {got}"
     else:
         message = f"{_decapitalise(first['msg'])}, {got}"
+    # items that are wrong are missing in pydantic's count of a list, too
+    short = {e["loc"] for e in errors if e["type"] == "too_short"}
+    counted = [
+        e for e in errors
+        if e["loc"] not in short
+        or not any(o["loc"][: len(e["loc"])] == e["loc"] != o["loc"] for o in errors)
+    ]  # fmt: skip
     extra = [e["loc"][-1] for e in errors if e["type"] == "extra_forbidden"]
-    others = len(errors) - 1
+    others = len(counted) - 1
     if kind == "missing" and extra:  # as like as not the same field, misspelt
         message, others = f"{message}; unknown field {shown(extra[0])}", others - 1
     more = f" (and {others} more)" if others else ""

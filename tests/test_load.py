@@ -217,8 +217,16 @@ def test_bad_physics_is_told_in_one_line(physics, message):
 
 
 def test_an_absurd_current_is_refused_before_the_run():
-    with pytest.raises(InputError, match="current: 300 m/s pulls on"):
-        fly("predictive", TetherPhysics(diameter=DIAMETER), 8.0, current=(300, 0, 0))
+    with pytest.raises(InputError, match="current: 15 m/s pulls on"):
+        fly("predictive", TetherPhysics(diameter=DIAMETER), 8.0, current=(15, 0, 0))
+    with pytest.raises(InputError, match="current, gusts: water of 300 m/s; expected at most 20"):
+        fly("none", TetherPhysics(), 8.0, current=(300, 0, 0))
+
+
+def test_where_no_waypoint_is_in_reach_the_robot_is_home_without_a_defect():
+    run = fly("predictive", TetherPhysics(slack=1.0), 1.2)
+    assert run.summary["visited"] == run.summary["defects"] == 0
+    assert run.summary["home"]["tether_free"]
 
 
 def test_waypoints_close_together_are_flown_under_load_without_a_defect():

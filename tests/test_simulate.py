@@ -169,7 +169,13 @@ def test_simulate_writes_log_summary_and_picture(tmp_path, capsys):
         ([], {"rope": 3}, "rope: unknown field"),
         ([], {"tether": 3}, "tether: expected an object, got 3"),
         ([], {"sensor": {"noise": -1}}, "sensor.noise: expected a number >= 0, got -1"),
-        ([], {"current": [90, 0, 0], "tether": {"diameter": 0.01}}, "current: 90 m/s pulls on"),
+        ([], {"current": [9, 0, 0], "tether": {"diameter": 0.01}}, "current: 9 m/s pulls on"),
+        ([], {"sensor": {"delay": 60}}, "sensor: noise 0 and delay 60 ask for 18.8 m of tether"),
+        (
+            [],
+            {"waypoints": [{"position": [0, 0, 0], "stay": 3}]},
+            r"waypoints\[0\].stay: unknown field$",
+        ),
     ],
 )
 def test_bad_missions_are_named(args, change, message, tmp_path, capsys):
@@ -378,6 +384,7 @@ def test_waypoints_with_and_without_more_to_do_are_written_as_they_are_read():
         ({"position": [0, 0, 0], "dwell": -1}, "dwell"),
         ({"position": [0, 0, 0], "heading": 400}, "heading"),
         ({"position": [0, 0, 0], "heading": "north"}, "heading"),
+        ({"position": [0, 0, 0], "heading": True}, "heading"),
         ({"heading": 40}, "position"),
         ({"position": [0, 0, 0], "stay": 3}, "stay"),
         ("here", "position"),

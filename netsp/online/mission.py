@@ -18,7 +18,7 @@ from pydantic import (
 
 from netsp.arrays import Floats
 from netsp.errors import InputError
-from netsp.fields import POINT3_SCHEMA, Name, NonNegative, Point3, Positive
+from netsp.fields import POINT3_SCHEMA, Name, NonNegative, Number, Point3, Positive
 from netsp.files import FileModel, read_text
 from netsp.models import Model
 from netsp.online.scene.field import DistanceField, pushed_out
@@ -100,7 +100,7 @@ class TetherPhysics(Model):
         Field(description="coefficient of friction at contacts"),
     ] = 0.0
     max_tension_ratio: Annotated[
-        Annotated[float, Field(gt=1.0, le=1e6)] | None,
+        Annotated[Number, Field(gt=1.0, le=1e6)] | None,
         Field(description="most that friction may multiply the tension by; null for no limit"),
     ] = None
     pulls_vehicle: Annotated[
@@ -168,7 +168,7 @@ class MissionWaypoint(Model):
 
     position: Annotated[Point3, Field(description="(x, y, z) to reach, m")]
     heading: Annotated[
-        Annotated[float, Field(ge=-360.0, le=360.0)] | None,
+        Annotated[Number, Field(ge=-360.0, le=360.0)] | None,
         Field(description="to turn to there, degrees from the x axis towards y; null for any"),
     ] = None
     dwell: Annotated[

@@ -292,6 +292,9 @@ MOST_STEPS, MOST_NODES = 5_000_000, 200_000
 """Steps of a run, and nodes of a tether, beyond which a mission is taken for a mistake of units."""
 
 
+MOST_CURRENT = 20.0
+"""m/s: no sea is faster; rather a mistake of units."""
+
 MOST_SAG_RATIO = 20.0
 """Drag on a whole tether over its tension, beyond which a current is taken for a mistake."""
 
@@ -335,8 +338,21 @@ def _check_size(mission: Mission) -> None:
             f"waypoints: dwell takes {stays:.2g} steps of {STEP:g} s in all; expected at most "
             f"{MOST_STEPS:g}"
         )
+    sensor = mission.sensor
+    reserve = 3.0 * sensor.noise + sensor.delay * mission.speed
+    if reserve > 0.5 * mission.tether_length:
+        raise InputError(
+            f"sensor: noise {sensor.noise:g} and delay {sensor.delay:g} ask for {reserve:.3g} m of "
+            f"tether in reserve; expected at most half of the tether_length "
+            f"{mission.tether_length:g}"
+        )
     load = mission.tether.load(np.array(mission.current))
     speed = float(np.linalg.norm(mission.current)) + 3.0 * mission.gusts
+    if speed > MOST_CURRENT:
+        raise InputError(
+            f"current, gusts: water of {speed:g} m/s; expected at most {MOST_CURRENT:g}: mixed "
+            "units?"
+        )
     sag = load.drag * speed**2 * mission.tether_length / load.tension
     if sag > MOST_SAG_RATIO:
         raise InputError(

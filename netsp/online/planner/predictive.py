@@ -70,7 +70,7 @@ class PredictivePlanner(Planner):
             self.leave_out(
                 "no free path to it" if own is None else
                 f"out of reach: it needs {own:.2f} m of tether, the limit is "
-                f"{self.mission.tether_length:g} m"
+                f"{self.mission.tether_length:g} m{self._kept_back}"
             )  # fmt: skip
             return True
         better = self.refined(path)
@@ -83,6 +83,10 @@ class PredictivePlanner(Planner):
     def limit(self) -> float:
         """Metres of tether that plans may use."""
         return self.mission.tether_length * (1.0 - MARGIN) - self.reserve
+
+    @property
+    def _kept_back(self) -> str:
+        return f", of which {self.reserve:.2f} m are kept in reserve" if self.reserve else ""
 
     def _surprised(self, tether: Tether) -> bool:
         """Whether half of the reserve is used up, as in a current: said once for each waypoint."""
@@ -136,6 +140,8 @@ class PredictivePlanner(Planner):
     def _fits_under_load(self, tether: Tether, path: Floats, limit: float) -> bool:
         """Whether what must be out, and the sum of turning angles, stay within their limits."""
         points = polylines.dense(path, max(0.5 * self.mission.delta, 0.02))
+        if not len(points):
+            return True
         _, payouts, turnings = self._model.drive_under(tether, points, self.load)
         most = max(self.mission.tether.max_turning, turning(tether, self.mission.delta) + 1e-6)
         return bool(

@@ -18,6 +18,9 @@ LEAD = 0.25
 FINE = 5
 """Integration steps of the simulated vehicle in one control step."""
 
+TOP_SPEED = 1.5
+"""m/s, ahead, as Blue Robotics states."""
+
 TRUST = 0.3
 """Share of what a step drifted more than expected that is put down to the water."""
 
@@ -31,7 +34,7 @@ class BlueRov2:
     def __init__(self, place: Floats, speed: float) -> None:
         self.state = np.zeros(8)
         self.state[:3] = place
-        self.speed = speed
+        self.speed = min(speed, TOP_SPEED)
         self.control_s: list[float] = []
         self._control = PredictiveControl()
         self._carrot = np.array(place, dtype=float)
