@@ -41,7 +41,8 @@ def title_of(run: Run) -> str:
     s = run.summary
     return (
         f"{s['planner']}: {s['visited']} of {s['waypoints']} in {s['inspection_s']:.0f} s, "
-        f"longest tether {s['longest_tether']:.2f} of {s['tether_length']:g} m"
+        f"longest tether {s['longest_tether']:.2f} of {s['tether_length']:g} m; "
+        + ("tether free at home" if s["home"]["tether_free"] else "tether not free at the end")
     )
 
 
@@ -73,8 +74,8 @@ def save_runs(runs: Sequence[Run], scene: Scene, file: str | Path) -> None:
 
 
 def draw_tether(runs: Sequence[Run], *, ax: Any = None, units: str = "m") -> Any:
-    """The length of the taut tether over time, on axes of the caller or on new ones; returns the
-    axes. Of one run the times of tether recovery are marked."""
+    """The length of the taut tether over time, with slack and sag where there are any, on axes of
+    the caller or on new ones; returns the axes. Of one run tether recovery is marked."""
     from matplotlib.figure import Figure
 
     if ax is None:
@@ -87,10 +88,11 @@ def draw_tether(runs: Sequence[Run], *, ax: Any = None, units: str = "m") -> Any
                 t, 0, 1, where=[r.mode == "recovery" for r in run.log], color=style.RECOVERY,
                 transform=ax.get_xaxis_transform(), label="tether recovery",
             )  # fmt: skip
-        ax.plot(t, [r.tether for r in run.log], color=colour, lw=1.3, label=run.planner)
+        ax.plot(t, [r.payout for r in run.log], color=colour, lw=1.3, label=run.planner)
     ax.axhline(runs[0].mission.tether_length, color=style.LIMIT, lw=1.0, ls="--", label="limit")
-    ax.set(xlabel="time (s)", ylabel=f"taut tether ({units})", ylim=(0, None))
-    ax.legend(loc="lower right", fontsize=8)
+    what = "payout" if any(r.payout > r.tether for run in runs for r in run.log) else "taut tether"
+    ax.set(xlabel="time (s)", ylabel=f"{what} ({units})", ylim=(0, None))
+    ax.legend(loc="best", fontsize=8)
     return ax
 
 
