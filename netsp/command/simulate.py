@@ -76,10 +76,11 @@ def run(args: argparse.Namespace) -> int:
     from netsp.command.compiling import compile_messages
     from netsp.command.plot_scene import tell, warn_of_thin
     from netsp.files import output_folder
+    from netsp.online.limits import check_names
     from netsp.online.log import describe_run, write_run
     from netsp.online.mission import Mission
     from netsp.online.planner import PLANNERS, PlannerOptions
-    from netsp.online.simulate import check_names, simulate
+    from netsp.online.simulate import simulate
     from netsp.online.tether import GeodesicTether
 
     mission = Mission.load(args.mission)
@@ -143,7 +144,7 @@ def draw_runs(runs: list[Run], scene: Scene, folder: Path) -> None:
 
 def show_mission(mission: Mission, units: str) -> Callable[[LogRow, Planner], None]:
     """Shows how a mission goes, in one line."""
-    from netsp.online.simulate import STEP
+    from netsp.online.simulation import STEP
 
     count = len(mission.waypoints)
 

@@ -79,7 +79,7 @@ class Run(Drawn):
     tether : Tether
         At the end.
     summary : dict
-        The numbers (`netsp.online.simulate.summarise`).
+        The numbers (`netsp.online.summary.summarise`).
     """
 
     picture: ClassVar[str] = "netsp.pictures.mission:draw_run"

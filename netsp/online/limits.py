@@ -1,0 +1,94 @@
+"""What a mission may ask for: names that exist, and sizes that end."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from netsp.errors import InputError
+from netsp.geometry import polylines
+from netsp.online.mission import Mission
+from netsp.online.planner import PLANNERS
+from netsp.online.simulation import STEP
+from netsp.online.tether import TETHERS
+from netsp.online.vehicle import VEHICLES
+
+FARTHEST = 1000.0
+"""A waypoint may be so many tether lengths from the anchor."""
+
+MOST_STEPS, MOST_NODES = 5_000_000, 200_000
+"""Steps of a run, and nodes of a tether, beyond which a mission is taken for a mistake of units."""
+
+
+MOST_CURRENT = 20.0
+"""m/s: no sea is faster; rather a mistake of units."""
+
+MOST_SAG_RATIO = 20.0
+"""Drag on a whole tether over its tension, beyond which a current is taken for a mistake."""
+
+
+def check_names(planner: object, vehicle: object, tether: object) -> None:
+    """Refuse a name that no record has, before a scene is read, which takes longer.
+
+    Parameters
+    ----------
+    planner, vehicle, tether : str or callable
+        As of `simulate`.
+
+    Raises
+    ------
+    InputError
+        No record has that name.
+    """
+    for known, name in ((PLANNERS, planner), (VEHICLES, vehicle), (TETHERS, tether)):
+        if not callable(name):
+            known.named(name)
+
+
+def check_size(mission: Mission) -> None:
+    """InputError for a mission that would take for ever."""
+    places = mission.every_place[1:]
+    far = float(np.abs(places - np.array(mission.anchor)).max())
+    if far > FARTHEST * mission.tether_length:
+        raise InputError(
+            f"waypoints: one is {far:g} from the anchor; expected at most {FARTHEST:g} times the "
+            f"tether_length {mission.tether_length:g}: mixed units?"
+        )
+    steps = polylines.length(places) / (mission.speed * STEP)
+    if steps > MOST_STEPS:
+        raise InputError(
+            f"speed: {mission.speed:g} takes {steps:.2g} steps of {STEP:g} s for the waypoints; "
+            f"expected at most {MOST_STEPS:g}"
+        )
+    stays = sum(w.dwell for w in mission.waypoints) / STEP
+    if stays > MOST_STEPS:
+        raise InputError(
+            f"waypoints: dwell takes {stays:.2g} steps of {STEP:g} s in all; expected at most "
+            f"{MOST_STEPS:g}"
+        )
+    sensor = mission.sensor
+    reserve = 3.0 * sensor.noise + sensor.delay * mission.speed
+    if reserve > 0.5 * mission.tether_length:
+        raise InputError(
+            f"sensor: noise {sensor.noise:g} and delay {sensor.delay:g} ask for {reserve:.3g} m of "
+            f"tether in reserve; expected at most half of the tether_length "
+            f"{mission.tether_length:g}"
+        )
+    load = mission.tether.load(np.array(mission.current))
+    speed = float(np.linalg.norm(mission.current)) + 3.0 * mission.gusts
+    if speed > MOST_CURRENT:
+        raise InputError(
+            f"current, gusts: water of {speed:g} m/s; expected at most {MOST_CURRENT:g}: mixed "
+            "units?"
+        )
+    sag = load.drag * speed**2 * mission.tether_length / load.tension
+    if sag > MOST_SAG_RATIO:
+        raise InputError(
+            f"current: {speed:g} m/s pulls on {mission.tether_length:g} m of tether with {sag:.3g} "
+            f"times its tension of {load.tension:g} N; expected at most {MOST_SAG_RATIO:g}: mixed "
+            "units?"
+        )
+    if mission.tether_length / mission.delta > MOST_NODES:
+        raise InputError(
+            f"delta: {mission.delta:g} makes {mission.tether_length / mission.delta:.2g} nodes of "
+            f"a tether; expected at most {MOST_NODES:g}"
+        )

@@ -1,0 +1,185 @@
+"""A robot on a tether in a scene, moved on step by step."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from netsp.arrays import Floats
+from netsp.online.coverage import Coverage
+from netsp.online.log import LogRow
+from netsp.online.mission import Mission
+from netsp.online.planner import Command, Planner
+from netsp.online.planner.base import HOME, Tethers
+from netsp.online.scene.field import DistanceField
+from netsp.online.sensing import Positions
+from netsp.online.tether import GeodesicTether, Tether
+from netsp.online.tether.load import Load, payout, pull_on_robot, turning
+from netsp.online.vehicle import Vehicle
+
+STEP = 0.1
+"""Seconds between two decisions of the planner."""
+
+FRAME = 2
+"""Steps between two pictures of the camera."""
+
+LEAST_COURSE = 0.05
+"""m/s: slower motion through the water asks for no heading."""
+
+
+@dataclass
+class Simulation:
+    """A robot on a tether in a scene, moved on step by step.
+
+    Parameters
+    ----------
+    mission : Mission
+        What is flown.
+    scene : DistanceField
+        The map.
+    vehicle : Vehicle
+        The robot.
+    tethers : GeodesicTether
+        The model of the taut tether.
+    tether : Tether
+        The taut tether, by the geodesic model.
+    water : callable
+        Velocity of the water (3,), m/s, at a time in seconds.
+    coverage : Coverage, optional
+        What the camera has seen.
+    model : TetherModel, optional
+        Another model, that the planner believes in.
+    believed : Tether, optional
+        Its tether.
+    positions : Positions, optional
+        What the planner is told of the robot's position.
+    thought : ndarray, shape (3,), optional
+        Where it thinks that the robot is, metres.
+    now : float
+        Seconds since the start.
+    log : list of LogRow
+        One row per step.
+    """
+
+    mission: Mission
+    scene: DistanceField
+    vehicle: Vehicle
+    tethers: GeodesicTether
+    tether: Tether
+    water: Callable[[float], Floats]
+    coverage: Coverage | None = None
+    model: Tethers | None = None
+    believed: Tether | None = None
+    positions: Positions | None = None
+    thought: Floats | None = None
+    now: float = 0.0
+    log: list[LogRow] = field(default_factory=list)
+    _was: Floats | None = None
+
+    def _course(self, path: Floats, yaw: float) -> float:
+        """Heading (rad) along the way through the water: a vehicle is fastest ahead."""
+        leg = path[0] - self.vehicle.position
+        far = float(np.linalg.norm(leg))
+        if far < 1e-6:
+            return yaw
+        x, y, _ = leg * (self.mission.speed / far) - self.water(self.now)
+        return math.atan2(y, x) if math.hypot(x, y) > LEAST_COURSE else yaw
+
+    def _pull(self) -> dict[str, Floats]:
+        """The tether's force on a vehicle that is to feel it."""
+        physics = self.mission.tether
+        if not physics.pulls_vehicle:
+            return {}
+        here, delta = self.vehicle.position, self.tethers.delta
+        velocity = np.zeros(3) if self._was is None else (here - self._was) / STEP
+        return {"pull": pull_on_robot(self.tether, self.load, physics.friction, velocity, delta)}
+
+    @property
+    def load(self) -> Load:
+        """What acts on the tether now."""
+        return self.mission.tether.load(self.water(self.now))
+
+    def note(self, planner: Planner, command: Command) -> LogRow:
+        """Write down where things are.
+
+        Parameters
+        ----------
+        planner : Planner
+            Its waypoint and mode are logged.
+        command : Command
+            What it asked for.
+
+        Returns
+        -------
+        LogRow
+            The row.
+        """
+        x, y, z = (float(v) for v in self.vehicle.position)
+        seen = self.coverage
+        if seen is not None and len(self.log) % FRAME == 0 and command.mode != HOME:
+            seen.look(self.vehicle.position, self.vehicle.yaw)
+        row = LogRow(
+            round(self.now, 6), x, y, z, self.vehicle.yaw, planner.index, command.mode,
+            self.tether.length, payout(self.tether, self.load),
+            turning(self.tether, self.tethers.delta),
+            seen.share if seen else 0.0, seen.share_through if seen else 0.0,
+            command.replan_s,
+        )  # fmt: skip
+        self.log.append(row)
+        return row
+
+    def go(
+        self, path: Floats, fresh: bool, homeward: bool = False, heading: float | None = None
+    ) -> tuple[int, bool]:
+        """Take one step along a path; a vehicle that runs into a solid is stopped where it was.
+
+        Parameters
+        ----------
+        path : ndarray, shape (k, 3)
+            Points to pass, metres.
+        fresh : bool
+            Whether the path does not continue the one before.
+        homeward : bool
+            Whether the inspection is over: the camera then no longer asks for a heading.
+        heading : float, optional
+            To turn to, radians, whatever the camera asks for.
+
+        Returns
+        -------
+        count : int
+            How many points of the path are behind the robot.
+        moved : bool
+            Whether the vehicle could move.
+        """
+        robot, yaw = self.vehicle.position, self.vehicle.yaw
+        pull = self._pull()
+        self._was = robot
+        if heading is not None:
+            yaw = heading
+        elif self.coverage is not None and not homeward:
+            yaw = self.coverage.heading(robot, yaw)
+        elif self.coverage is None:
+            yaw = self._course(path, yaw)
+        points, passed = self.vehicle.go(path, STEP, yaw, self.water(self.now), fresh, **pull)
+        self.now += STEP
+        if self.scene.distance(np.array(points)).min() < -0.2 * self.tethers.delta:
+            self.vehicle.stop_at(robot)
+            return passed, False
+        for point in points:
+            self.tether = self.tethers.update(self.tether, point)
+        told = points
+        if self.positions is not None and not self.positions.exact:
+            self.thought = self.positions(self.vehicle.position)
+            told = [self.thought]
+        if self.model is not None and self.believed is not None:
+            for point in told:
+                self.believed = self.model.update(self.believed, point)
+        return passed, True
+
+    @property
+    def robot(self) -> Floats:
+        """(3,) where the planner thinks that the robot is."""
+        return self.vehicle.position if self.thought is None else self.thought
