@@ -30,6 +30,9 @@ PIVOTS = 24
 ROUGH = 0.9
 """Pulled taut, a path is seldom shorter than this share of what it is roughly pulled."""
 
+COMING_TO_REST = 60
+"""Rounds that a tether gets to come free at home."""
+
 EVERY, MOST_HOMES = 20, 3
 """Steps between two looks whether the tether still comes free on the way home, and how often the
 robot goes back from there along a tether that is not."""
@@ -259,7 +262,7 @@ class PredictivePlanner(Planner):
         """At home with the tether not free, the robot goes back along it and comes home again."""
         assert self.laid is not None
         here = self._model.update(self.laid, tether.robot)
-        length = self._model.refine(tether).length
+        length = self._model.relaxed(tether.nodes, COMING_TO_REST).length
         if length <= here.length + FREE * self.mission.delta or self._homes >= MOST_HOMES:
             return True
         self._homes += 1
@@ -268,8 +271,8 @@ class PredictivePlanner(Planner):
     def _comes_free(self, tether: Tether, path: Floats) -> bool:
         """Whether the tether lies at the end of a path as at the start of the mission."""
         assert self.laid is not None
-        points = polylines.dense(path, self.grid.cell)
-        end = self._model.refine(self._model.drive(tether, points)[0])
+        points = polylines.dense(path, 5.0 * self.grid.cell)
+        end = self._model.relaxed(self._model.drive(tether, points)[0].nodes, COMING_TO_REST)
         return end.length <= self.laid.length + FREE * self.mission.delta
 
     def _roughly_pulled(self, path: Floats) -> Floats:
