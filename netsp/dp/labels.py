@@ -10,6 +10,8 @@ known about the last k.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import numpy.typing as npt
 
@@ -20,11 +22,42 @@ from netsp.dp.memory import CHUNK
 LOW = (1 << CHUNK) - 1
 
 
+class Graph(NamedTuple):
+    """Legs (V, V), the goal of each vertex (V,), and where the vertices of each goal begin."""
+
+    costs: Floats
+    goal: Ints
+    start: Ints
+
+
+class Memories(NamedTuple):
+    """Bits that the memory at each goal has, and what becomes of one on the way to another goal
+    (`translate`)."""
+
+    bits: Ints
+    tables: npt.NDArray[np.int32]
+
+
+class Labels(NamedTuple):
+    """Labels of a layer: those of vertex v are pointer[v] to pointer[v + 1] - 1, cheapest first."""
+
+    pointer: Ints
+    cost: Floats
+    memory: npt.NDArray[np.int32]
+
+
+class Bounds(NamedTuple):
+    """What labels are kept for: onward (n + 1, V), the least of the visits still to make; limit
+    (V,), most that a label may cost before the price is taken off; cut, most that a walk may."""
+
+    onward: Floats
+    limit: Floats
+    cut: float
+
+
 @kernel
 def completions(
-    costs: Floats,
-    goal: Ints,
-    start: Ints,
+    graph: Graph,
     prices: Floats,
     alive: Bools,
     least: Floats,
@@ -43,6 +76,7 @@ def completions(
     stop
         Of a clock; the tables are unfinished when it is set.
     """
+    costs, goal, start = graph.costs, graph.goal, graph.start
     count = len(goal)
     n = len(start) - 2
     second = np.full((n + 1, count), np.inf)
@@ -100,35 +134,22 @@ def translate(tables: npt.NDArray[np.int32], g: int, h: int, memory: int) -> int
 
 @kernel
 def extend(
-    costs: Floats,
-    start: Ints,
+    graph: Graph,
     first: int,
     last: int,
-    bits: Ints,
-    tables: npt.NDArray[np.int32],
-    pointer: Ints,
-    cost: Floats,
-    memory: npt.NDArray[np.int32],
-    onward: Floats,
-    limit: Floats,
-    cut: float,
+    memories: Memories,
+    labels: Labels,
+    bounds: Bounds,
     prices: Floats,
     stop: Ints,
 ) -> tuple[Ints, Floats, npt.NDArray[np.int32]]:
-    """Labels of the next layer at goals first to last - 1, from those of this layer.
-
-    Parameters
-    ----------
-    pointer, cost, memory
-        Labels of vertex v are pointer[v] to pointer[v + 1] - 1, cheapest first.
-    onward
-        (n + 1, V) of the visits still to make.
-    limit
-        (V,) most that a label may cost before the price is taken off. A label is kept if none costs
-        less and remembers no more.
-    stop
-        Of a clock; labels are missing when it is set.
-    """
+    """Labels of the next layer at goals first to last - 1, from those of this layer: a label is
+    kept if none costs less and remembers no more. Some are missing when the clock's `stop` is
+    set."""
+    costs, start = graph.costs, graph.start
+    bits, tables = memories.bits, memories.tables
+    pointer, cost, memory = labels.pointer, labels.cost, labels.memory
+    onward, limit, cut = bounds.onward, bounds.limit, bounds.cut
     n = len(start) - 2
     room, used_up = 1024, 0
     out_cost, out_memory = np.empty(room), np.empty(room, dtype=np.int32)
@@ -213,15 +234,13 @@ def extend(
 def join(
     goal: Ints,
     prices: Floats,
-    a_pointer: Ints,
-    a_cost: Floats,
-    a_memory: npt.NDArray[np.int32],
-    b_pointer: Ints,
-    b_cost: Floats,
-    b_memory: npt.NDArray[np.int32],
+    a: Labels,
+    b: Labels,
 ) -> Floats:
     """(V,) cost of the best walk through v, from walks that end there and such read backwards: they
     may remember no goal in common but that of v."""
+    a_pointer, a_cost, a_memory = a.pointer, a.cost, a.memory
+    b_pointer, b_cost, b_memory = b.pointer, b.cost, b.memory
     count = len(goal)
     out = np.full(count, np.inf)
     for v in range(1, count):
@@ -242,18 +261,17 @@ def join(
 
 @kernel
 def step_back(
-    costs: Floats,
-    goal: Ints,
+    graph: Graph,
     prices: Floats,
     tables: npt.NDArray[np.int32],
     v: int,
     at_cost: float,
     at_memory: int,
-    pointer: Ints,
-    cost: Floats,
-    memory: npt.NDArray[np.int32],
+    labels: Labels,
 ) -> tuple[int, int]:
     """(vertex, label) of the layer before that a label at v came from."""
+    costs, goal = graph.costs, graph.goal
+    pointer, cost, memory = labels.pointer, labels.cost, labels.memory
     off, from_vertex, from_label = np.inf, -1, -1
     h = goal[v]
     for u in range(1, len(goal)):

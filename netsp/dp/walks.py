@@ -19,11 +19,10 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
 from netsp.arrays import Bools, Floats, Ints
 from netsp.clock import NEVER, Flag
-from netsp.dp.labels import completions, extend, join, step_back
+from netsp.dp.labels import Bounds, Graph, Labels, Memories, completions, extend, join, step_back
 from netsp.dp.memory import Memory
 
 ROUNDING = 1e-12
@@ -34,8 +33,6 @@ THREADS = 2
 
 REMEMBERED = 6
 """Goals that each goal remembers at first."""
-
-Labels = tuple[Ints, Floats, npt.NDArray[np.int32]]
 
 
 @dataclass(frozen=True)
@@ -118,11 +115,11 @@ class Walks:
         prices
             (n + 1,) of a visit to each goal.
         """
-        n, goal, start = self.n, self.goal, self.start
+        n, goal = self.n, self.goal
         cut = cutoff - float(prices[1:].sum()) + self.rounding(prices)
         least = np.empty((n + 1, len(goal)))
         onward = np.empty((n + 1, n + 1, len(goal)))
-        completions(self.values, goal, start, prices, self.alive, least, onward, self.stop)
+        completions(self._graph, prices, self.alive, least, onward, self.stop)
         check()
         layers = self._layers(prices, cut, least, onward, check)
         pointer, cost, _ = layers[n]
@@ -135,7 +132,7 @@ class Walks:
             return None
         rows = self._trace(last, layers, prices)
         for k in range(1, (n + 1) // 2 + 1):
-            through = join(goal, prices, *layers[k], *layers[n + 1 - k])
+            through = join(goal, prices, layers[k], layers[n + 1 - k])
             self.alive[k] &= through <= cut
             self.alive[n + 1 - k] = self.alive[k]
         bound = float(ends[last]) + float(prices[1:].sum()) - self.rounding(prices)
@@ -149,16 +146,16 @@ class Walks:
     def _layers(
         self, prices: Floats, cut: float, least: Floats, onward: Floats, check: Callable[[], None]
     ) -> list[Labels]:
-        n, goal, start = self.n, self.goal, self.start
-        bits, tables = self.memory.bits, self.memory.tables()
+        n, goal = self.n, self.goal
+        memories = Memories(self.memory.bits, self.memory.tables())
         none = np.zeros(0, dtype=np.int32)
-        layers: list[Labels] = [(np.zeros(len(goal) + 1, dtype=np.int64), np.zeros(0), none)]
+        layers = [Labels(np.zeros(len(goal) + 1, dtype=np.int64), np.zeros(0), none)]
         with np.errstate(invalid="ignore"):  # inf - inf: neither cut nor way to complete
             limits = np.where(self.alive[1:], cut - least[:0:-1], -np.inf)
         first = self.values[0]
         kept = np.isfinite(first) & (first <= limits[0])
         layers.append(
-            (
+            Labels(
                 np.concatenate([[0], np.cumsum(kept)]),
                 (first - prices[goal])[kept],
                 np.ones(int(kept.sum()), dtype=np.int32),
@@ -170,15 +167,19 @@ class Walks:
                 check()
 
                 def part(p: tuple[int, int], k: int = k) -> Labels:
-                    labels: Labels = extend(
-                        self.values, start, p[0], p[1], bits, tables, *layers[k - 1],
-                        onward[n + 1 - k], limits[k - 1], cut, prices, self.stop,
-                    )  # fmt: skip
-                    return labels
+                    bounds = Bounds(onward[n + 1 - k], limits[k - 1], cut)
+                    labels = layers[k - 1]
+                    return Labels(
+                        *extend(self._graph, *p, memories, labels, bounds, prices, self.stop)
+                    )
 
                 layers.append(_together(list(pool.map(part, parts))))
         check()
         return layers
+
+    @property
+    def _graph(self) -> Graph:
+        return Graph(self.values, self.goal, self.start)
 
     def _parts(self) -> list[tuple[int, int]]:
         """Ranges of goals with about as many vertices each."""
@@ -194,8 +195,7 @@ class Walks:
         for k in range(self.n - 1, 0, -1):
             _, cost, memory = layers[k + 1]
             out[k - 1], label = step_back(
-                self.values, self.goal, prices, tables, out[k], cost[label], memory[label],
-                *layers[k],
+                self._graph, prices, tables, out[k], cost[label], memory[label], layers[k]
             )  # fmt: skip
         return out
 
@@ -213,7 +213,7 @@ def _together(parts: list[Labels]) -> Labels:
         pointers.append(pointer[:-1] + offset)
         offset += len(cost)
     pointers.append(np.array([offset]))
-    return (
+    return Labels(
         np.concatenate(pointers),
         np.concatenate([cost for _, cost, _ in parts]),
         np.concatenate([memory for _, _, memory in parts]),

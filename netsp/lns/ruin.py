@@ -13,6 +13,8 @@ behind[k + 1, l]``, every class of every other goal chosen anew.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import numpy.typing as npt
 
@@ -28,6 +30,19 @@ REMOVED = 10
 
 BLINK = 0.01
 """Chance that a place is overlooked (same paper, section 3.3)."""
+
+
+class Tables(NamedTuple):
+    """Of an instance: where the vertices of each cluster begin; legs; least legs between clusters
+    (m + 1, m + 1); which clusters are near which; the nearest clusters of each (m + 1, k), nearest
+    first. The kernels that are called most take what they need of it one by one: handing a tuple of
+    arrays on costs them more than the work."""
+
+    start: Ints
+    costs: Floats
+    nearest: Floats
+    near: Bools
+    rank: Ints
 
 
 @kernel
@@ -136,9 +151,7 @@ def insert_best(
 @kernel
 def descend(
     order: Ints,
-    start: Ints,
-    costs: Floats,
-    near: Bools,
+    tables: Tables,
     ahead: Floats,
     behind: Floats,
     chance: npt.NDArray[np.uint64],
@@ -146,6 +159,7 @@ def descend(
 ) -> float:
     """Take every cluster out and put it back where it costs least, until nothing improves; returns
     the length."""
+    start, costs, near = tables.start, tables.costs, tables.near
     n = len(order)
     work = np.empty(n + 1, dtype=np.int64)
     length = tour_length(order, start, costs, ahead, behind)
@@ -190,15 +204,14 @@ def tour_length(order: Ints, start: Ints, costs: Floats, ahead: Floats, behind: 
 @kernel
 def two_opt(
     order: Ints,
-    start: Ints,
-    costs: Floats,
-    nearest: Floats,
+    tables: Tables,
     ahead: Floats,
     behind: Floats,
     stop: Ints,
 ) -> float:
     """Reverse stretches of the order as long as that shortens the tour; candidates are those whose
     two new legs could be shorter than the two old ones; returns the length."""
+    start, costs, nearest = tables.start, tables.costs, tables.nearest
     n = len(order)
     work = np.empty(n, dtype=np.int64)
     tour = np.empty(n, dtype=np.int64)
@@ -254,25 +267,13 @@ def ruin_and_recreate(
     best_length: float,
     count: int,
     theta: float,
-    start: Ints,
-    costs: Floats,
-    nearest: Floats,
-    near: Bools,
-    rank: Ints,
+    tables: Tables,
     chance: npt.NDArray[np.uint64],
 ) -> tuple[float, float]:
     """Make `count` rounds at temperature θ, in place; returns the lengths of the present order and
-    of the best, which is kept in `best`.
-
-    Parameters
-    ----------
-    nearest
-        (m + 1, m + 1) least legs between clusters.
-    near
-        Which clusters are near which.
-    rank
-        (m + 1, k) the nearest clusters of each, nearest first.
-    """
+    of the best, which is kept in `best`."""
+    start, costs, nearest = tables.start, tables.costs, tables.nearest
+    near, rank = tables.near, tables.rank
     n = len(order)
     largest = 0
     for c in range(n):

@@ -11,7 +11,7 @@ from netsp.arrays import Ints
 from netsp.clock import NEVER, Clock
 from netsp.compiled.chance import seeded
 from netsp.lns.layers import Instance, best_classes
-from netsp.lns.ruin import descend, ruin_and_recreate, two_opt
+from netsp.lns.ruin import Tables, descend, ruin_and_recreate, two_opt
 
 HOT, COLD = 0.1, 1e-3
 """First and last temperature of ruin and recreate, in mean legs of the tour."""
@@ -94,31 +94,22 @@ class Search:
         self.length = np.inf
         self.best_order, self.best_length = self.order.copy(), np.inf
 
+    @property
+    def _tables(self) -> Tables:
+        i = self.instance
+        return Tables(i.start, i.costs, i.cluster_costs, i.near, i.rank)
+
     def settle(self) -> None:
         """Descend to an order that no move of one cluster and no reversal improves."""
-        i = self.instance
         n = len(self.order)
         before = np.inf
         while True:
             self.length = descend(
-                self.order,
-                i.start,
-                i.costs,
-                i.near,
-                self._ahead,
-                self._behind,
-                self.chance,
-                self._stop,
+                self.order, self._tables, self._ahead, self._behind, self.chance, self._stop
             )
             if n > 3:
                 self.length = two_opt(
-                    self.order,
-                    i.start,
-                    i.costs,
-                    i.cluster_costs,
-                    self._ahead,
-                    self._behind,
-                    self._stop,
+                    self.order, self._tables, self._ahead, self._behind, self._stop
                 )
             if not self.length < before * (1.0 - 1e-12):
                 break
@@ -145,7 +136,6 @@ class Search:
         tell : callable, optional
             Called after every chunk with the number of rounds it had.
         """
-        i = self.instance
         n = len(self.order)
         done, chunk = 0, 1
         leg = self.length / n
@@ -158,7 +148,7 @@ class Search:
             begin = clock.elapsed
             self.length, self.best_length = ruin_and_recreate(
                 self.order, self.best_order, self.length, self.best_length, count, theta,
-                i.start, i.costs, i.cluster_costs, i.near, i.rank, self.chance,
+                self._tables, self.chance,
             )  # fmt: skip
             done += count
             if clock.elapsed - begin < CHUNK_SECONDS and chunk < max(1, rounds / STEPS):

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -137,6 +138,26 @@ def divided(triangles: Floats, size: float) -> Floats:
     return np.concatenate(done) if done else np.zeros((0, 3, 3))
 
 
+class Surface(NamedTuple):
+    """Patches for the kernel: centres and normals (n, 3), and shares of the area (n,)."""
+
+    centres: Floats
+    normals: Floats
+    shares: Floats
+
+
+class View(NamedTuple):
+    """A camera at a place (3,), its heading and pitch (rad), the tangent of half the field of view,
+    which is a square pyramid, its range, and how far off a patch sight of it is asked for (m)."""
+
+    eye: Floats
+    yaw: float
+    pitch: float
+    half: float
+    reach: float
+    off: float
+
+
 class Coverage:
     """What has been seen so far.
 
@@ -163,9 +184,12 @@ class Coverage:
         pitch = min(max(math.atan2(near[2], math.hypot(near[0], near[1])), -most), most)
         half = math.tan(math.radians(0.5 * self.camera.field_of_view))
         open_, through = mark(
-            self.field.arrays, self.patches.centres, self.patches.normals, self._shares, self.seen,
-            self.seen_through, eye, yaw, pitch, half, self.camera.range, 0.1 * self.camera.patch,
-        )  # fmt: skip
+            self.field.arrays,
+            Surface(self.patches.centres, self.patches.normals, self._shares),
+            self.seen,
+            self.seen_through,
+            View(eye, yaw, pitch, half, self.camera.range, 0.1 * self.camera.patch),
+        )
         self.share += open_
         self.share_through += through
         if len(self.patches.sides):
@@ -206,27 +230,16 @@ def nearest(centres: Floats, eye: Floats) -> int:
 @kernel
 def mark(
     field: Field,
-    centres: Floats,
-    normals: Floats,
-    shares: Floats,
+    surface: Surface,
     seen: Bools,
     seen_through: Bools,
-    eye: Floats,
-    yaw: float,
-    pitch: float,
-    half: float,
-    reach: float,
-    off: float,
+    view: View,
 ) -> tuple[float, float]:
-    """Mark the patches that are in view, no farther than `reach`.
-
-    Returns the shares that were new, with and without regard to what stands in between.
-
-    Parameters
-    ----------
-    half
-        Tangent of half the field of view, which is a square pyramid.
-    """
+    """Mark the patches that are in view. Returns the shares that were new, with and without regard
+    to what stands in between."""
+    centres, normals, shares = surface.centres, surface.normals, surface.shares
+    eye, yaw, pitch, half = view.eye, view.yaw, view.pitch, view.half
+    reach, off = view.reach, view.off
     new, new_through = 0.0, 0.0
     cy, sy, cp, sp = math.cos(yaw), math.sin(yaw), math.cos(pitch), math.sin(pitch)
     for i in range(len(centres)):
