@@ -30,14 +30,6 @@ class Graph(NamedTuple):
     start: Ints
 
 
-class Memories(NamedTuple):
-    """Bits that the memory at each goal has, and what becomes of one on the way to another goal
-    (`translate`)."""
-
-    bits: Ints
-    tables: npt.NDArray[np.int32]
-
-
 class Labels(NamedTuple):
     """Labels of a layer: those of vertex v are pointer[v] to pointer[v + 1] - 1, cheapest first."""
 
@@ -137,7 +129,8 @@ def extend(
     graph: Graph,
     first: int,
     last: int,
-    memories: Memories,
+    bits: Ints,
+    tables: npt.NDArray[np.int32],
     labels: Labels,
     bounds: Bounds,
     prices: Floats,
@@ -145,9 +138,9 @@ def extend(
 ) -> tuple[Ints, Floats, npt.NDArray[np.int32]]:
     """Labels of the next layer at goals first to last - 1, from those of this layer: a label is
     kept if none costs less and remembers no more. Some are missing when the clock's `stop` is
-    set."""
+    set. (The tables of `translate` come by themselves: out of a tuple, every call of it would count
+    references, which is a twelfth of the time.)"""
     costs, start = graph.costs, graph.start
-    bits, tables = memories.bits, memories.tables
     pointer, cost, memory = labels.pointer, labels.cost, labels.memory
     onward, limit, cut = bounds.onward, bounds.limit, bounds.cut
     n = len(start) - 2

@@ -22,7 +22,7 @@ import numpy as np
 
 from netsp.arrays import Bools, Floats, Ints
 from netsp.clock import NEVER, Flag
-from netsp.dp.labels import Bounds, Graph, Labels, Memories, completions, extend, join, step_back
+from netsp.dp.labels import Bounds, Graph, Labels, completions, extend, join, step_back
 from netsp.dp.memory import Memory
 
 ROUNDING = 1e-12
@@ -147,7 +147,7 @@ class Walks:
         self, prices: Floats, cut: float, least: Floats, onward: Floats, check: Callable[[], None]
     ) -> list[Labels]:
         n, goal = self.n, self.goal
-        memories = Memories(self.memory.bits, self.memory.tables())
+        bits, tables = self.memory.bits, self.memory.tables()
         none = np.zeros(0, dtype=np.int32)
         layers = [Labels(np.zeros(len(goal) + 1, dtype=np.int64), np.zeros(0), none)]
         with np.errstate(invalid="ignore"):  # inf - inf: neither cut nor way to complete
@@ -170,7 +170,7 @@ class Walks:
                     bounds = Bounds(onward[n + 1 - k], limits[k - 1], cut)
                     labels = layers[k - 1]
                     return Labels(
-                        *extend(self._graph, *p, memories, labels, bounds, prices, self.stop)
+                        *extend(self._graph, *p, bits, tables, labels, bounds, prices, self.stop)
                     )
 
                 layers.append(_together(list(pool.map(part, parts))))
