@@ -239,3 +239,14 @@ def test_waypoints_close_together_are_flown_under_load_without_a_defect():
     run = simulate(mission, scene=POST)
     assert run.summary["defects"] == 0
     assert run.summary["visited"] == 8
+
+
+@given(angle=st.floats(0, 2 * math.pi), gust=st.floats(0, 2 * math.pi))
+@settings(deadline=None)
+def test_a_plan_allows_for_gusts_from_any_side(angle, gust):
+    """Of every direction: a span along the current, too, sags no more in a gust than planned."""
+    steady, strength = np.array([0.3, 0.0, 0.0]), 0.15
+    planned = load_of(steady)._replace(gusts=strength)
+    met = load_of(steady + strength * np.array([math.cos(gust), math.sin(gust), 0.0]))
+    line = [(0, 0, 0), (8 * math.cos(angle), 8 * math.sin(angle), 0)]
+    assert payout_along(line, met) <= payout_along(line, planned) * (1 + 1e-12)

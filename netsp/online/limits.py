@@ -18,7 +18,6 @@ FARTHEST = 1000.0
 MOST_STEPS, MOST_NODES = 5_000_000, 200_000
 """Steps of a run, and nodes of a tether, beyond which a mission is taken for a mistake of units."""
 
-
 MOST_CURRENT = 20.0
 """m/s: no sea is faster; rather a mistake of units."""
 
@@ -66,7 +65,7 @@ def check_size(mission: Mission) -> None:
             f"{MOST_STEPS:g}"
         )
     sensor = mission.sensor
-    reserve = 3.0 * sensor.noise + sensor.delay * mission.speed
+    reserve = sensor.reserve(mission.speed)
     if reserve > 0.5 * mission.tether_length:
         raise InputError(
             f"sensor: noise {sensor.noise:g} and delay {sensor.delay:g} ask for {reserve:.3g} m of "

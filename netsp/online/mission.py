@@ -152,6 +152,22 @@ class PositionSensor(Model):
         Field(description="age of a position when it arrives, s"),
     ] = 0.0
 
+    def reserve(self, speed: float) -> float:
+        """How far from where it is thought the robot may be: three standard deviations, and what it
+        travels until it is known.
+
+        Parameters
+        ----------
+        speed : float
+            Of the robot, m/s.
+
+        Returns
+        -------
+        float
+            Metres.
+        """
+        return 3.0 * self.noise + self.delay * speed
+
 
 class MissionWaypoint(Model):
     """A place to visit, and what to do there.

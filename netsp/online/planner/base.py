@@ -136,22 +136,15 @@ class Planner:
 
     @cached_property
     def load(self) -> Load:
-        """What acts on the tether: the steady current, and gusts of three standard deviations on
-        top of it."""
-        current = np.array(self.mission.current)
-        speed = float(np.linalg.norm(current))
-        if speed > 0.0:
-            current = current * (1.0 + 3.0 * self.mission.gusts / speed)
-        else:
-            current = np.array([3.0 * self.mission.gusts, 0.0, 0.0])
-        return self.mission.tether.load(current)
+        """What acts on the tether: the steady current, and gusts of three standard deviations from
+        any side."""
+        load = self.mission.tether.load(np.array(self.mission.current))
+        return load._replace(gusts=3.0 * self.mission.gusts)
 
     @cached_property
     def reserve(self) -> float:
-        """Metres of tether to be kept for what positions are wrong by: three standard deviations,
-        and what the robot goes until it is known."""
-        sensor = self.mission.sensor
-        return 3.0 * sensor.noise + sensor.delay * self.mission.speed
+        """Metres of tether to be kept for what positions are wrong by."""
+        return self.mission.sensor.reserve(self.mission.speed)
 
     @property
     def loaded(self) -> bool:

@@ -37,7 +37,8 @@ SHORT = 0.3
 
 class Load(NamedTuple):
     """What acts on a tether: slack (share of its length), drag (N s^2 / m^3: of a metre at 1 m/s
-    across), the water's velocity (m/s), and the tension at the anchor (N)."""
+    across), the water's velocity (m/s), the tension at the anchor (N), and how much faster the
+    water may be in any direction (m/s)."""
 
     slack: float
     drag: float
@@ -45,9 +46,7 @@ class Load(NamedTuple):
     y: float
     z: float
     tension: float
-
-
-NONE = Load(0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+    gusts: float = 0.0
 
 
 @kernel
@@ -56,8 +55,8 @@ def span_length(c: float, dx: float, dy: float, dz: float, load: Load) -> float:
     if c <= 0.0 or load.drag == 0.0:
         return c
     along = (load.x * dx + load.y * dy + load.z * dz) / c
-    across = max(load.x**2 + load.y**2 + load.z**2 - along * along, 0.0)
-    q = min(load.drag * across * c / load.tension, MOST_SAG)
+    across = math.sqrt(max(load.x**2 + load.y**2 + load.z**2 - along * along, 0.0)) + load.gusts
+    q = min(load.drag * across * across * c / load.tension, MOST_SAG)
     if q < 1e-3:
         return c * (1.0 + q * q / 24.0)
     return 2.0 * c / q * math.sinh(0.5 * q)
