@@ -116,6 +116,14 @@ def test_a_floor_and_a_mesh_make_one_scene(tmp_path):
     assert main(["plot", str(tmp_path / "s.json"), "-o", str(tmp_path / "s.png")]) == 0
 
 
+def test_a_scene_that_is_nothing_but_a_floor_is_drawn(tmp_path):
+    write_asc(tmp_path / "z.asc", hill())
+    scene = {"schema_version": 1, "name": "sea bed", "floor": {"file": "z.asc"}}
+    (tmp_path / "s.json").write_text(json.dumps(scene))
+    assert main(["plot", str(tmp_path / "s.json"), "-o", str(tmp_path / "s.png")]) == 0
+    assert (tmp_path / "s.png").stat().st_size > 10_000
+
+
 @pytest.mark.parametrize(
     ("make", "message"),
     [

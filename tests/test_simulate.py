@@ -16,6 +16,7 @@ from netsp import InputError
 from netsp.command.main import main
 from netsp.geometry import polylines
 from netsp.online import Scene
+from netsp.online.log import describe_run
 from netsp.online.mission import Mission, PositionSensor
 from netsp.online.paths.tree import STEPS, Grid, ShortestTree, grow, states_of, taut
 from netsp.online.planner import PLANNERS
@@ -459,3 +460,15 @@ def test_a_vehicle_without_a_camera_heads_where_it_is_fastest():
     assert run.summary["visited"] == 1
     assert run.summary["stalls"] == []
     assert run.summary["home"]["tether_free"]
+
+
+def test_an_inspection_that_is_interrupted_is_not_on_its_way_home():
+    def stop(row, planner):
+        if row.time > 3.0:
+            raise KeyboardInterrupt
+
+    run = simulate(mission(ring(1), 8.0), scene=POST, on_step=stop)
+    assert run.summary["status"] == "interrupted"
+    assert run.summary["home"]["seconds"] == 0.0
+    assert not run.summary["home"]["reached"]
+    assert "on the way home" not in describe_run(run, "m")

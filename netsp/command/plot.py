@@ -96,7 +96,9 @@ def _is_scene(path: str) -> bool:
     data = parse_json_object(read_text(path), path)
     if kind_of(data) not in (None, "problem", "scene"):
         raise InputError(f"{path}: this is a {kind_of(data)}; expected a problem or a scene")
-    return "goals" not in data and bool({"solids", "mesh", "cloud", "problem"} & data.keys())
+    return "goals" not in data and bool(
+        {"solids", "mesh", "cloud", "floor", "problem"} & data.keys()
+    )
 
 
 def _goal_number(problem: Problem, text: str) -> int:

@@ -154,8 +154,7 @@ def describe_run(run: Run, units: str) -> str:
     lines = [
         f"mission  {s['mission']}, planner {s['planner']}: {s['status']}",
         f"visited  {s['visited']} of {s['waypoints']} waypoints",
-        f"time     {s['inspection_s']:.1f} s, and {s['home']['seconds']:.1f} s "
-        f"{'home' if s['home']['reached'] else 'on the way home'}",
+        f"time     {s['inspection_s']:.1f} s{_way_home(s['home'])}",
         f"home     {_home(s['home'], units)}",
         f"tether   longest {s['longest_tether']:.3f} of {s['tether_length']:g} {units}, "
         f"over the limit for {s['exceedance_s']:.1f} s",
@@ -195,6 +194,12 @@ def describe_run(run: Run, units: str) -> str:
     if len(s["left_out"]) > 5:
         lines.append(f"         and {len(s['left_out']) - 5} more")
     return "\n".join(lines)
+
+
+def _way_home(home: dict[str, Any]) -> str:
+    if not home["seconds"]:
+        return ""
+    return f", and {home['seconds']:.1f} s {'home' if home['reached'] else 'on the way home'}"
 
 
 def _home(home: dict[str, Any], units: str) -> str:

@@ -105,7 +105,7 @@ def _home(planner: Planner, world: Simulation, since: float) -> dict[str, Any]:
         "reached": planner.home,
         "tether_free": planner.home and left <= FREE * delta,
         "left": left,
-        "seconds": world.now - since,
+        "seconds": world.now - since if planner.homeward else 0.0,
         "reason": planner.not_home,
     }
 

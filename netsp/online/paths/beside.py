@@ -9,7 +9,7 @@ from netsp.compiled.kernel import kernel
 from netsp.online.scene.field import DistanceField
 from netsp.online.scene.sampling import Field, lowest_along
 
-STEP, STENCIL, SWEEPS = 0.05, 0.1, 80
+CLIMB, STENCIL, SWEEPS = 0.05, 0.1, 80
 """Metres that a point goes at once, and over which the distance's rise is taken; and how often."""
 
 GAIN = 0.02
@@ -49,7 +49,7 @@ def beside(field: DistanceField, line: Floats, clearance: float) -> Floats:
         around = field.distance((path[short, None] + arms).reshape(-1, 3)).reshape(-1, 6)
         rise = around[:, :3] - around[:, 3:]
         rise /= np.maximum(np.linalg.norm(rise, axis=1), 1e-12)[:, None]
-        step = np.minimum(STEP, clearance - d[short])
+        step = np.minimum(CLIMB, clearance - d[short])
         moved = path.copy()
         moved[short] += step[:, None] * rise
         better = field.distance(moved[short]) >= d[short] + GAIN * step
