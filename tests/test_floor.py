@@ -9,7 +9,8 @@ from netsp import InputError
 from netsp.command.main import main
 from netsp.online import GeodesicTether, Scene
 from netsp.online.scene.floor import floor_mesh
-from netsp.online.scene.voxels import of_mesh, read_cloud
+from netsp.online.scene.readers import read_cloud
+from netsp.online.scene.voxels import of_mesh
 
 rasterio = pytest.importorskip("rasterio", reason="rasterio (extra geo) is not installed")
 

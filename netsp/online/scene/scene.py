@@ -351,7 +351,7 @@ class Scene(FileModel):
         """
         out = []
         if self.mesh is not None:
-            from netsp.online.scene.voxels import read_mesh
+            from netsp.online.scene.readers import read_mesh
 
             vertices, faces = read_mesh(self.mesh.file)
             out.append(("mesh", (vertices * self.mesh.scale, faces)))

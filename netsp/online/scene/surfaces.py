@@ -171,7 +171,7 @@ def extent(scene: Scene, *points: Floats) -> tuple[Floats, Floats]:
 
 def drawn_points(scene: Scene) -> Floats:
     """Some of the points of the scene's cloud."""
-    from netsp.online.scene.voxels import read_cloud
+    from netsp.online.scene.readers import read_cloud
 
     assert scene.cloud is not None
     points = read_cloud(scene.cloud.file) * scene.cloud.scale
