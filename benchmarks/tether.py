@@ -323,7 +323,7 @@ def main() -> None:
         for voxel in (0.1, 0.05):
             begin = time.perf_counter()
             grid = of_cloud_file(args.cloud, scale=args.scale, voxel=voxel)
-            row(voxel, "x".join(map(str, grid.values.shape)), f"{time.perf_counter() - begin:.2f}",
+            row(voxel, "x".join(map(str, grid.counts)), f"{time.perf_counter() - begin:.2f}",
                 "; ".join(grid.notes))  # fmt: skip
         print()
         if args.tour:

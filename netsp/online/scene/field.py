@@ -15,6 +15,7 @@ import numpy.typing as npt
 from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.online.scene import packing
+from netsp.online.scene.grid import VoxelGrid
 from netsp.online.scene.sampling import Field, lowest_along, sample_many
 
 ASK_ALL = 6
@@ -23,7 +24,10 @@ ASK_ALL = 6
 CELLS = 40
 """Cells along the longest side of the coarse grid that tells which solids may be nearest."""
 
-FILE_VERSION = 2
+FILE_VERSION = 3
+
+MOST_LOOKS = 2_000
+"""Solid voxels in blocks whose surroundings tell how much of a scene is thin."""
 
 
 def finite_point(value: npt.ArrayLike, name: str) -> tuple[float, float, float]:
@@ -35,31 +39,6 @@ def finite_point(value: npt.ArrayLike, name: str) -> tuple[float, float, float]:
     if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(z)):
         raise InputError(f"{name}: expected three finite coordinates, got {value!r}")
     return x, y, z
-
-
-@dataclass(frozen=True)
-class VoxelGrid:
-    """Distances at the points of a regular grid, linear in between.
-
-    Attributes
-    ----------
-    values
-        (nx, ny, nz) metres, negative inside.
-    origin
-        (3,) of the first point.
-    size
-        Metres between points.
-    solid
-        (2, 3) bounding box of what is solid, well within the grid.
-    notes
-        What was assumed when it was built.
-    """
-
-    values: npt.NDArray[np.float32]
-    origin: Floats
-    size: float
-    solid: Floats
-    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,13 +104,12 @@ class DistanceField:
             room = 0.25 * float((high - low).max()) + 1e-9
             low, high = low - room, high + room
             data = packing.with_lookup(data, low, high, float((high - low).max()) / CELLS)
-        voxels = np.empty((0, 0, 0), dtype=np.float32)
+        voxels = np.empty(0, dtype=np.float32)
         if grid is not None:
-            voxels = np.ascontiguousarray(grid.values, dtype=np.float32)
-            data = packing.with_voxels(data, grid.origin, grid.size, grid.solid)
+            data, voxels = packing.with_voxels(data, grid), grid.values
         return cls(
             Field(data, voxels, float(offset)),
-            grid.size if grid is not None else None,
+            grid.voxel if grid is not None else None,
             grid.notes if grid is not None else (),
             tuple(thickness),
         )
@@ -275,15 +253,25 @@ class DistanceField:
         """Share of solid voxels that no ball of this diameter inside the solid covers."""
         from scipy.ndimage import distance_transform_edt
 
-        grid, size = self.arrays.grid - self.arrays.offset, self._size
-        solid = grid < 0.0
-        if not solid.any():
+        size, reach = self._size, 0.5 * thickness + 1.74 * self._size
+        depth = 0.5 * thickness - 0.87 * size
+        data = self.arrays.data
+        if not data[packing.BLOCKS]:
+            counts = data[packing.SHAPE : packing.SHAPE + 3].astype(int)
+            grid = self.arrays.grid.reshape(counts) - self.arrays.offset
+            solid, deep = grid < 0.0, grid <= -depth
+            if not deep.any():
+                return float(solid.any())
+            far = distance_transform_edt(~deep) * size
+            return float((far[solid] > reach).mean())
+        some = packing.block_points(data, self.arrays.grid, self.arrays.offset, MOST_LOOKS)
+        if not len(some):
             return 0.0
-        deep = grid <= -0.5 * thickness + 0.87 * size
-        if not deep.any():
-            return 1.0
-        far = distance_transform_edt(~deep) * size
-        return float((far[solid] > 0.5 * thickness + 1.74 * size).mean())
+        steps = np.linspace(-reach, reach, 9)
+        ball = np.stack(np.meshgrid(steps, steps, steps), axis=-1).reshape(-1, 3)
+        ball = ball[np.linalg.norm(ball, axis=1) <= reach]
+        deepest = np.array([self.distance(p + ball).min() for p in some])
+        return float((deepest > -depth).mean())
 
     @cached_property
     def _size(self) -> float:

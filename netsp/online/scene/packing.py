@@ -18,14 +18,18 @@ import numpy.typing as npt
 
 from netsp.arrays import Floats, Ints
 from netsp.compiled.kernel import kernel
+from netsp.online.scene.grid import SIDE, VoxelGrid
 from netsp.online.scene.solids import PRISM, solid_distance
 
-COUNT, CELLS, VOXELS, NEAR, PLACE = 0, 1, 2, 3, 10
+COUNT, CELLS, VOXELS, NEAR, PLACE, SHAPE, BLOCKS, FINE = 0, 1, 2, 3, 10, 20, 23, 24
 """Places in the header: number of solids; where the look-up begins (0: there is none, all solids
 are asked); 1 where there are voxels; of the look-up the origin (3), size of a cell and counts (3);
-of the voxels the origin (3), size and bounding box of all that is solid (6)."""
+of the voxels the origin (3), size and bounding box of all that is solid (6), counts (3), where the
+table of blocks begins (0: there is none), size of a voxel in a block.
 
-ROWS, ROW = 20, 17
+The table has for each cell between grid points 0, or where its block begins among the voxels."""
+
+ROWS, ROW = 25, 17
 """Where the rows begin, and the length of each: kind and 16 numbers."""
 
 
@@ -57,12 +61,35 @@ def with_lookup(data: Floats, low: Floats, high: Floats, size: float) -> Floats:
     return np.concatenate([data, begin + len(cells) + cells, items])
 
 
-def with_voxels(data: Floats, origin: Floats, size: float, solid: Floats) -> Floats:
-    """The same for a field with voxels, whose solid part lies in the box (2, 3)."""
+def with_voxels(data: Floats, grid: VoxelGrid) -> Floats:
+    """The same for a field with voxels."""
     data = data.copy()
     data[VOXELS] = 1.0
-    data[PLACE : PLACE + 10] = [*origin, size, *np.ravel(solid)]
-    return data
+    data[PLACE : PLACE + 10] = [*grid.origin, grid.size, *np.ravel(grid.solid)]
+    data[SHAPE : SHAPE + 3] = grid.counts
+    data[FINE] = grid.voxel
+    if grid.table is None:
+        return data
+    data[BLOCKS] = len(data)
+    begins = np.prod(grid.counts) + SIDE**3 * grid.table.astype(float)
+    return np.concatenate([data, np.where(grid.table < 0, 0.0, begins).ravel()])
+
+
+def block_points(data: Floats, voxels: npt.NDArray[np.float32], offset: float, most: int) -> Floats:
+    """(n, 3) of points in blocks where the distance is below an offset, at most so many: as many of
+    each of some blocks, evenly chosen."""
+    counts = data[SHAPE : SHAPE + 3].astype(int) - 1
+    begin = int(data[BLOCKS])
+    table = data[begin : begin + int(np.prod(counts))].reshape(counts)
+    cells = np.argwhere(table > 0.0)
+    cells = cells[np.argsort(table[tuple(cells.T)])]
+    values = voxels[int(np.prod(counts + 1)) :].reshape(-1, SIDE, SIDE, SIDE)
+    some = np.arange(0, len(cells), max(1, len(cells) // most))
+    at = np.argwhere(values[some] < offset)
+    at = at[:: max(1, len(at) // most)]
+    return np.asarray(
+        data[PLACE : PLACE + 3] + data[FINE] * (SIDE * cells[some[at[:, 0]]] + at[:, 1:])
+    )
 
 
 @kernel

@@ -14,7 +14,19 @@ import numpy.typing as npt
 
 from netsp.arrays import Floats
 from netsp.compiled.kernel import kernel
-from netsp.online.scene.packing import CELLS, COUNT, NEAR, PLACE, ROW, ROWS, VOXELS
+from netsp.online.scene.grid import SIDE
+from netsp.online.scene.packing import (
+    BLOCKS,
+    CELLS,
+    COUNT,
+    FINE,
+    NEAR,
+    PLACE,
+    ROW,
+    ROWS,
+    SHAPE,
+    VOXELS,
+)
 from netsp.online.scene.solids import solid_distance
 
 
@@ -26,7 +38,7 @@ class Field(NamedTuple):
     data
         Solids, and where they and the voxels are (`netsp.online.scene.packing`).
     grid
-        Distances at grid points, (nx, ny, nz), empty without voxels.
+        Distances at grid points and in blocks, in one row; empty without voxels.
     offset
         Subtracted from every distance (the tether's radius).
     """
@@ -87,65 +99,88 @@ def _solids(data: Floats, x: float, y: float, z: float) -> tuple[float, float, f
 
 
 @kernel
-def _cell(
-    grid: npt.NDArray[np.float32], data: Floats, x: float, y: float, z: float
-) -> tuple[int, int, int, float, float, float, bool]:
-    """Cell and the fractions within it; whether the point lies in the grid, to within rounding."""
-    nx, ny, nz = grid.shape
-    u, v, w = (
-        (x - data[PLACE]) / data[PLACE + 3],
-        (y - data[PLACE + 1]) / data[PLACE + 3],
-        (z - data[PLACE + 2]) / data[PLACE + 3],
-    )
-    e = 1e-6
-    inside = -e <= u <= nx - 1 + e and -e <= v <= ny - 1 + e and -e <= w <= nz - 1 + e
-    if not inside:
-        return 0, 0, 0, 0.0, 0.0, 0.0, False
-    i, j, k = min(int(u), nx - 2), min(int(v), ny - 2), min(int(w), nz - 2)
-    return i, j, k, u - i, v - j, w - k, True
-
-
-@kernel
-def _border(
-    grid: npt.NDArray[np.float32], data: Floats, x: float, y: float, z: float
-) -> tuple[float, float, float]:
-    """The point of the grid nearest to one outside of it."""
-    nx, ny, nz = grid.shape
-    h = data[PLACE + 3]
-    return (
-        min(max(x, data[PLACE]), data[PLACE] + (nx - 1) * h),
-        min(max(y, data[PLACE + 1]), data[PLACE + 1] + (ny - 1) * h),
-        min(max(z, data[PLACE + 2]), data[PLACE + 2] + (nz - 1) * h),
-    )
-
-
-@kernel
 def _voxel_distance(
     grid: npt.NDArray[np.float32], data: Floats, x: float, y: float, z: float
 ) -> float:
-    i, j, k, u, v, w, inside = _cell(grid, data, x, y, z)
-    if not inside:
-        # all solids lie in the grid, a box: seen from its nearest point c, they are behind it, so
-        # no distance is below hypot(|p - c|, d(c)), nor below that to their bounding box
-        bx, by, bz = _border(grid, data, x, y, z)
-        i, j, k, u, v, w, _ = _cell(grid, data, bx, by, bz)
-        value = max(_trilinear(grid, i, j, k, u, v, w), 0.0)
-        behind = (x - bx) ** 2 + (y - by) ** 2 + (z - bz) ** 2 + value * value
-        dx = max(data[PLACE + 4] - x, 0.0, x - data[PLACE + 7])
-        dy = max(data[PLACE + 5] - y, 0.0, y - data[PLACE + 8])
-        dz = max(data[PLACE + 6] - z, 0.0, z - data[PLACE + 9])
-        return math.sqrt(max(behind, dx * dx + dy * dy + dz * dz))
-    return _trilinear(grid, i, j, k, u, v, w)
+    h = data[PLACE + 3]
+    nx, ny, nz = int(data[SHAPE]), int(data[SHAPE + 1]), int(data[SHAPE + 2])
+    u, v, w = (x - data[PLACE]) / h, (y - data[PLACE + 1]) / h, (z - data[PLACE + 2]) / h
+    e = 1e-6  # rounding
+    if -e <= u <= nx - 1 + e and -e <= v <= ny - 1 + e and -e <= w <= nz - 1 + e:
+        return _between(grid, data, ny, nz, nx, u, v, w)
+    # all solids lie in the grid, a box: seen from its nearest point c, they are behind it, so
+    # no distance is below hypot(|p - c|, d(c)), nor below that to their bounding box
+    bu, bv, bw = min(max(u, 0.0), nx - 1.0), min(max(v, 0.0), ny - 1.0), min(max(w, 0.0), nz - 1.0)
+    value = max(_between(grid, data, ny, nz, nx, bu, bv, bw), 0.0)
+    behind = h * h * ((u - bu) ** 2 + (v - bv) ** 2 + (w - bw) ** 2) + value * value
+    dx = max(data[PLACE + 4] - x, 0.0, x - data[PLACE + 7])
+    dy = max(data[PLACE + 5] - y, 0.0, y - data[PLACE + 8])
+    dz = max(data[PLACE + 6] - z, 0.0, z - data[PLACE + 9])
+    return math.sqrt(max(behind, dx * dx + dy * dy + dz * dz))
 
 
 @kernel
-def _trilinear(
-    grid: npt.NDArray[np.float32], i: int, j: int, k: int, u: float, v: float, w: float
+def _between(
+    grid: npt.NDArray[np.float32], data: Floats, ny: int, nz: int, nx: int, u: float, v: float,
+    w: float,
+) -> float:  # fmt: skip
+    """Linear between the points around (u, v, w), in steps of the grid, or of a block."""
+    i, j, k = min(int(u), nx - 2), min(int(v), ny - 2), min(int(w), nz - 2)
+    u, v, w = u - i, v - j, w - k
+    at, across, along = (i * ny + j) * nz + k, ny * nz, nz
+    if data[BLOCKS] > 0.0:
+        begin = data[int(data[BLOCKS]) + (i * (ny - 1) + j) * (nz - 1) + k]
+        if begin > 0.0:
+            u, v, w = SIDE * u, SIDE * v, SIDE * w
+            p, q, r = min(int(u), SIDE - 1), min(int(v), SIDE - 1), min(int(w), SIDE - 1)
+            u, v, w = u - p, v - q, w - r
+            if p == SIDE - 1 or q == SIDE - 1 or r == SIDE - 1:
+                p, q, r = SIDE * i + p, SIDE * j + q, SIDE * k + r
+                return _across_blocks(grid, data, ny, nz, (p, q, r), u, v, w)
+            across, along = SIDE * SIDE, SIDE
+            at = int(begin) + p * across + q * along + r
+    return _linear(grid, at, across, along, u, v, w)
+
+
+@kernel
+def _across_blocks(
+    grid: npt.NDArray[np.float32], data: Floats, ny: int, nz: int, at: tuple[int, int, int],
+    u: float, v: float, w: float,
+) -> float:  # fmt: skip
+    """Linear between points of more than one block."""
+    i, j, k = at
+    value = 0.0
+    for n in range(8):
+        p, q, r = n // 4, n // 2 % 2, n % 2
+        share = (u if p else 1.0 - u) * (v if q else 1.0 - v) * (w if r else 1.0 - w)
+        if share > 0.0:
+            value += share * _fine_point(grid, data, ny, nz, i + p, j + q, k + r)
+    return value
+
+
+@kernel
+def _fine_point(
+    grid: npt.NDArray[np.float32], data: Floats, ny: int, nz: int, i: int, j: int, k: int
 ) -> float:
-    a = (1.0 - w) * grid[i, j, k] + w * grid[i, j, k + 1]
-    b = (1.0 - w) * grid[i, j + 1, k] + w * grid[i, j + 1, k + 1]
-    c = (1.0 - w) * grid[i + 1, j, k] + w * grid[i + 1, j, k + 1]
-    d = (1.0 - w) * grid[i + 1, j + 1, k] + w * grid[i + 1, j + 1, k + 1]
+    """Of a block; where its cell is none, linear between the cell's corners."""
+    p, q, r = i // SIDE, j // SIDE, k // SIDE
+    begin = data[int(data[BLOCKS]) + (p * (ny - 1) + q) * (nz - 1) + r]
+    i, j, k = i - SIDE * p, j - SIDE * q, k - SIDE * r
+    if begin > 0.0:
+        return float(grid[int(begin) + (i * SIDE + j) * SIDE + k])
+    at = (p * ny + q) * nz + r
+    return _linear(grid, at, ny * nz, nz, i / SIDE, j / SIDE, k / SIDE)
+
+
+@kernel
+def _linear(
+    grid: npt.NDArray[np.float32], at: int, across: int, along: int, u: float, v: float, w: float
+) -> float:
+    a = (1.0 - w) * grid[at] + w * grid[at + 1]
+    b = (1.0 - w) * grid[at + along] + w * grid[at + along + 1]
+    at += across
+    c = (1.0 - w) * grid[at] + w * grid[at + 1]
+    d = (1.0 - w) * grid[at + along] + w * grid[at + along + 1]
     return float((1.0 - u) * ((1.0 - v) * a + v * b) + u * ((1.0 - v) * c + v * d))
 
 
@@ -154,7 +189,7 @@ def _voxels(
     grid: npt.NDArray[np.float32], data: Floats, x: float, y: float, z: float
 ) -> tuple[float, float, float, float]:
     # half a voxel to either side: a central difference does not jump at the cells' faces
-    h = 0.5 * data[PLACE + 3]
+    h = 0.5 * data[FINE]
     d = _voxel_distance(grid, data, x, y, z)
     gx = _voxel_distance(grid, data, x + h, y, z) - _voxel_distance(grid, data, x - h, y, z)
     gy = _voxel_distance(grid, data, x, y + h, z) - _voxel_distance(grid, data, x, y - h, z)

@@ -18,7 +18,8 @@ from netsp.errors import InputError
 from netsp.fields import Name, NonNegative, Number, Point2, Positive
 from netsp.files import FileModel, read_text
 from netsp.models import Model
-from netsp.online.scene.field import DistanceField, VoxelGrid
+from netsp.online.scene.field import DistanceField
+from netsp.online.scene.grid import VoxelGrid
 from netsp.online.scene.shapes import (
     Box,
     Capsule,
@@ -330,8 +331,18 @@ class Scene(FileModel):
                 self.mesh.file, scale=self.mesh.scale, voxel=voxel or self.mesh.voxel,
                 memory_limit=memory_limit, on_progress=on_progress,
             )  # fmt: skip
+        parts = dict(self.meshes())
+        # below a sea floor, and beyond its walls, there is nothing to know
+        vertices = parts["floor"][0]
+        top = vertices[: len(vertices) // 2]
+        water = np.array([top.min(0), [*top.max(0)[:2], np.inf]])
+        if self.mesh is not None:
+            water = np.array([
+                np.minimum(water[0], parts["mesh"][0].min(0)),
+                np.maximum(water[1], parts["mesh"][0].max(0)),
+            ])  # fmt: skip
         return voxels.of_meshes(
-            [triangles for _, triangles in self.meshes()],
+            list(parts.values()), region=water,
             memory_limit=memory_limit, on_progress=on_progress, source=self.name,
             voxel=voxel or self.floor.voxel or (self.mesh.voxel if self.mesh else None),
         )  # fmt: skip

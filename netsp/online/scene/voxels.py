@@ -10,7 +10,6 @@ the grid from its border, and what it does not reach is solid.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -18,17 +17,22 @@ import numpy.typing as npt
 
 from netsp.arrays import Floats
 from netsp.errors import InputError
-from netsp.online.scene.closest import nearest_sites, sweep, windings
-from netsp.online.scene.field import VoxelGrid
+from netsp.online.scene.grid import SIDE, VoxelGrid
+from netsp.online.scene.lattice import BYTES_PER_BLOCK, Dense, Lattice, OnStage, sparse_near
 from netsp.online.scene.readers import read_cloud, read_mesh
-
-OnStage = Callable[[str, float], None] | None
+from netsp.online.scene.sites import point_sites, triangle_sites
 
 DEFAULT_VOXELS = 200
 """Voxels along the longest side when no size is given."""
 
 BYTES_PER_VOXEL = 28
 """At the peak of building."""
+
+MOST_DENSE = 40_000_000
+"""Grid points, above which only those near surfaces are held."""
+
+BYTES_PER_CELL, PAD = 48, 4
+"""Of a cell without grid points, and cells between the solid and the border of a sparse grid."""
 
 SHEET = 2.0
 """Voxels to either side of what has no thickness of its own. With one, interpolation between the
@@ -68,6 +72,7 @@ def of_meshes(
     voxel: float | None = None,
     memory_limit: float = 4.0,
     on_progress: OnStage = None,
+    region: Floats | None = None,
     source: str = "mesh",
 ) -> VoxelGrid:
     """The distance grid of several meshes together: vertices (n, 3) and faces (m, 3) of each."""
@@ -76,6 +81,7 @@ def of_meshes(
         np.vstack([v for v, _ in parts]),
         np.vstack([f + n for (_, f), n in zip(parts, first, strict=False)]),
         voxel=voxel, memory_limit=memory_limit, on_progress=on_progress, source=source,
+        region=region,
     )  # fmt: skip
 
 
@@ -86,6 +92,7 @@ def of_triangles(
     voxel: float | None = None,
     memory_limit: float = 4.0,
     on_progress: OnStage = None,
+    region: Floats | None = None,
     source: str = "mesh",
 ) -> VoxelGrid:
     """The distance grid of triangles: vertices (n, 3), faces (m, 3)."""
@@ -106,19 +113,23 @@ def of_triangles(
         f, turned = _outward(f, v)
     triangles = v[f]
     low, high = triangles.min((0, 1)), triangles.max((0, 1))
-    size, origin, counts = _grid(low, high, voxel, memory_limit, source)
-    notes = []
-    sites = np.column_stack([triangles.reshape(-1, 9), np.zeros(len(triangles))])
-    distances, _ = _closest(sites, False, origin, size, counts, on_progress)
+    sites = triangle_sites(triangles)
+    lattice = _lattice(
+        low, high, voxel, memory_limit, source, sites,
+        shell=SHEET if open_edges else 0.0, triangles=None if open_edges else triangles,
+        region=region,
+    )  # fmt: skip
+    size, notes = lattice.size, []
+    values = lattice.closest(sites, on_progress, whose=False)[0]
     if open_edges:
         shell = SHEET * size
         notes.append(
             f"the mesh is open ({open_edges} edges have one triangle only): taken as a shell, "
             f"{2 * shell:.3g} thick; spaces that water cannot reach count as solid"
         )
-        values = distances - np.float32(shell)
+        values -= np.float32(shell)
     else:
-        around = windings(triangles, origin, size, counts)
+        most = lattice.turn_inside(values, triangles)
         if uneven:
             notes.append(
                 f"faces at {uneven} edges have opposite orientations: taken as solid wherever the "
@@ -126,10 +137,9 @@ def of_triangles(
             )
         if turned:
             notes.append(f"{turned} parts are inside out, or cavities: taken as solid")
-        elif np.abs(around).max(initial=0) > 1:
+        elif most > 1:
             notes.append("parts of the mesh overlap: taken as their union")
-        values = np.where(around != 0, -distances, distances)
-    enclosed = _unreached(values)
+    enclosed = lattice.unreached(values)
     if enclosed.any():
         values[enclosed] = -np.abs(values[enclosed])
         if not open_edges:
@@ -138,7 +148,7 @@ def of_triangles(
         raise InputError(f"{source}: no solid at voxels of {size:.3g}; expected smaller voxels")
     grow = SHEET * size if open_edges else 0.0
     _tell(on_progress, "distances", 1.0)
-    return VoxelGrid(values, origin, size, np.array([low - grow, high + grow]), tuple(notes))
+    return lattice.grid(values, np.array([low - grow, high + grow]), tuple(notes))
 
 
 def of_cloud_file(
@@ -179,33 +189,29 @@ def of_cloud(
         raise InputError(f"{source}: expected at least 4 points, got {len(p)}")
     if not np.isfinite(p).all():
         raise InputError(f"{source}: a point is not finite")
-    from scipy.ndimage import minimum_filter
     from scipy.spatial import cKDTree
 
     low, high = p.min(0), p.max(0)
-    size, origin, counts = _grid(low, high, voxel, memory_limit, source, extra=_spacing(p))
     near, _ = cKDTree(p).query(p, k=min(7, len(p)))
-    ball = max(1.5 * size, float(np.quantile(near[:, -1], 0.95)))
-    sites = np.zeros((len(p), 10))
-    sites[:, :3] = p
-    distances, owner = _closest(sites, True, origin, size, counts, on_progress)
+    ball = max(1.5 * _size(low, high, voxel, source), float(np.quantile(near[:, -1], 0.95)))
+    sites = point_sites(p)
+    lattice = _lattice(low, high, voxel, memory_limit, source, sites, shell=0.0, extra=_spacing(p))
+    size = lattice.size
+    distances, owner = lattice.closest(sites, on_progress)
     _tell(on_progress, "flood", 0.5)
     values = distances - np.float32(ball)
-    filled = _unreached(values) | (values <= 0.0)
+    filled = lattice.unreached(values) | (values <= 0.0)
     # the distance to the water's edge: balls about grid points in the water that just touch it
     edge = ~filled & (values <= 1.8 * size)
     if not edge.any() or not filled.any():
         raise InputError(f"{source}: no solid at voxels of {size:.3g}; expected smaller voxels")
-    at = np.argwhere(edge)
-    weighted = np.zeros((len(at), 10))
-    weighted[:, :3] = origin + size * at
-    weighted[:, 9] = values[edge]
-    to_water, _ = _closest(weighted, True, origin, size, counts, None)
+    at, which = lattice.positions(edge)
+    weighted = point_sites(at, values[which])
+    to_water = lattice.closest(weighted, whose=False)[0]
     out = np.where(filled, ball - to_water, distances).astype(np.float32)
     notes = [f"gaps of up to {2 * ball:.3g} between points are closed"]
     # points around which nothing is solid
-    cell = np.clip(np.rint((p - origin) / size).astype(int), 0, np.array(counts) - 1)
-    loose = minimum_filter(out, size=5)[tuple(cell.T)] > -size
+    loose = lattice.least_around(out, p, 2) > -size
     grow = 0.0
     if loose.any():
         half = SHEET * size
@@ -217,64 +223,53 @@ def of_cloud(
                 f"{2 * half:.3g} thick"
             )
     _tell(on_progress, "distances", 1.0)
-    return VoxelGrid(out, origin, size, np.array([low - grow, high + grow]), tuple(notes))
+    return lattice.grid(out, np.array([low - grow, high + grow]), tuple(notes))
 
 
-def _closest(
-    sites: Floats, points: bool, origin: Floats, size: float, counts: tuple[int, int, int],
-    on_progress: OnStage,
-) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.int32]]:  # fmt: skip
-    """Distances of all grid points to the nearest site, and which it is."""
-    _tell(on_progress, "distances", 0.0)
-    distances = np.full(counts, np.float32(np.inf))
-    owner = np.full(counts, -1, dtype=np.int32)
-    nearest_sites(sites, points, origin, size, distances, owner)
-    turns = 8
-    for turn in range(turns):
-        sweep(sites, points, origin, size, distances, owner, turn % 8)
-        _tell(on_progress, "distances", (turn + 1) / (turns + 1))
-    return distances, owner
-
-
-def _unreached(values: npt.NDArray[np.float32]) -> npt.NDArray[np.bool_]:
-    """Grid points outside of the solid that water from the border does not reach."""
-    from scipy.ndimage import label
-
-    water = values > 0.0
-    parts, count = label(water)
-    if count <= 1:
-        return np.zeros(values.shape, dtype=bool)
-    border = np.zeros(count + 1, dtype=bool)
-    for face in (parts[0], parts[-1], parts[:, 0], parts[:, -1], parts[:, :, 0], parts[:, :, -1]):
-        border[np.unique(face)] = True
-    border[0] = True
-    return np.asarray(~border[parts])
-
-
-def _grid(
+def _lattice(
     low: Floats, high: Floats, voxel: float | None, memory_limit: float, source: str,
-    extra: float = 0.0,
-) -> tuple[float, Floats, tuple[int, int, int]]:  # fmt: skip
-    """Voxel size, origin and counts; InputError when the grid would be too large."""
+    sites: Floats, *, shell: float, extra: float = 0.0,
+    triangles: Floats | None = None, region: Floats | None = None,
+) -> Lattice:  # fmt: skip
+    """The points at which the grid is built; `shell` in voxels, `extra` room in metres.
+
+    InputError when there would be too many.
+    """
+    size = _size(low, high, voxel, source)
+    pad = MARGIN * size + 2.0 * extra
+    counts = np.ceil((high - low + 2.0 * pad) / size) + 1
+    # off by an odd fraction of a voxel: no row of the grid runs along an edge of the mesh
+    off = size * np.array([0.0123457, 0.0271828, 0.0314159])
+    if np.prod(counts) <= MOST_DENSE and np.prod(counts) * BYTES_PER_VOXEL <= memory_limit * 2**30:
+        return Dense(low - pad + off, size, (int(counts[0]), int(counts[1]), int(counts[2])))
+    side = SIDE * size
+    pad = PAD * side + 2.0 * extra
+    cells = np.ceil((high - low + 2.0 * pad) / side)
+    need = float(np.prod(cells + 1)) * BYTES_PER_CELL
+    if need <= memory_limit * 2**30:
+        lattice = sparse_near(
+            low - pad + off, size, (int(cells[0]), int(cells[1]), int(cells[2])), sites,
+            shell * size + extra, triangles, region,
+        )  # fmt: skip
+        need += len(lattice.blocks) * BYTES_PER_BLOCK
+        if need <= memory_limit * 2**30:
+            return lattice
+    # blocks lie along surfaces, cells fill the box
+    better = size * math.sqrt(need / (memory_limit * 2**30)) * 1.05
+    raise InputError(
+        f"{source}: voxels of {size:.3g} need {need / 2**30:.3g} GiB, more than "
+        f"{memory_limit:g}; expected voxels of {better:.2g} or more"
+    )
+
+
+def _size(low: Floats, high: Floats, voxel: float | None, source: str) -> float:
+    """Edge of a voxel, metres."""
     if voxel is not None and not 0.0 < voxel < math.inf:
         raise InputError(f"{source}: voxel: expected a positive length, got {voxel!r}")
     side = float((high - low).max())
     if side <= 0.0:
         raise InputError(f"{source}: all points are the same")
-    size = voxel if voxel is not None else side / DEFAULT_VOXELS
-    pad = MARGIN * size + 2.0 * extra
-    shape = np.ceil((high - low + 2.0 * pad) / size) + 1
-    need = float(np.prod(shape)) * BYTES_PER_VOXEL / 2**30
-    if need > memory_limit:
-        better = size * (need / memory_limit) ** (1.0 / 3.0) * 1.02
-        raise InputError(
-            f"{source}: voxels of {size:.3g} need {need:.3g} GiB (a grid of "
-            f"{' x '.join(f'{n:.0f}' for n in shape)}), more than {memory_limit:g}; expected "
-            f"voxels of {better:.2g} or more"
-        )
-    # off by an odd fraction of a voxel: no row of the grid runs along an edge of the mesh
-    origin = low - pad + size * np.array([0.0123457, 0.0271828, 0.0314159])
-    return size, origin, (int(shape[0]), int(shape[1]), int(shape[2]))
+    return voxel if voxel is not None else side / DEFAULT_VOXELS
 
 
 def _edges(faces: npt.NDArray[np.int64], vertices: Floats) -> tuple[int, int]:

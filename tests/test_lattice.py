@@ -1,0 +1,215 @@
+"""Grids with points near surfaces only say what full grids say."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+
+from netsp import InputError
+from netsp.online.scene import lattice, voxels
+from netsp.online.scene.field import DistanceField
+from netsp.online.scene.grid import SIDE
+from netsp.online.scene.sites import site_distance, triangle_sites
+from netsp.online.tether import TETHERS
+
+VOXEL = 0.07
+
+
+def field(grid):
+    return DistanceField.build([], [], np.empty((0, 4)), [], grid, 0.0)
+
+
+def boxes(seed, count=5):
+    """Boxes of any size and attitude, some across others."""
+    rng = np.random.default_rng(seed)
+    parts = []
+    for _ in range(count):
+        part = trimesh.creation.box(rng.uniform(0.3, 3.0, 3))
+        part.apply_transform(trimesh.transformations.random_rotation_matrix(rng.random(3)))
+        part.apply_translation(rng.uniform(-2.5, 2.5, 3))
+        parts.append(part)
+    return trimesh.util.concatenate(parts)
+
+
+def hollow():
+    inner = trimesh.creation.icosphere(subdivisions=3, radius=1.2)
+    inner.invert()
+    return trimesh.util.concatenate([trimesh.creation.icosphere(subdivisions=3, radius=2.0), inner])
+
+
+def torn(seed):
+    mesh = boxes(seed)
+    mesh.update_faces(np.arange(len(mesh.faces)) % 7 != 0)
+    return mesh
+
+
+@pytest.fixture
+def sparse(monkeypatch):
+    """Whatever is built meanwhile is sparse, in slabs of a few blocks."""
+
+    def only(build):
+        with monkeypatch.context() as patch:
+            patch.setattr(voxels, "MOST_DENSE", 0)
+            patch.setattr(lattice, "SLAB", 150)
+            return build()
+
+    return only
+
+
+def around(mesh, count, seed=0):
+    low, high = mesh.bounds
+    return np.random.default_rng(seed).uniform(low - 1.0, high + 1.0, (count, 3))
+
+
+@pytest.mark.parametrize(
+    "mesh",
+    [boxes(1), boxes(2), torn(3), hollow()],
+    ids=["boxes", "more boxes", "torn", "hollow"],
+)
+def test_near_surfaces_a_sparse_grid_says_what_a_full_one_says(mesh, sparse):
+    def build():
+        return voxels.of_triangles(mesh.vertices, mesh.faces, voxel=VOXEL)
+
+    full, part = build(), sparse(build)
+    assert full.table is None
+    assert part.table is not None
+    assert full.notes == part.notes
+    assert part.voxel == pytest.approx(VOXEL)
+    p = around(mesh, 100_000)
+    a, b = field(full).distance(p), field(part).distance(p)
+    near = (a > -2.0 * VOXEL) & (a < 0.6 * SIDE * VOXEL)
+    assert near.sum() > 5_000
+    assert np.abs(a - b)[near].max() < 0.01 * VOXEL
+    assert ((a < 0.0) == (b < 0.0)).all()
+
+
+def test_a_sparse_grid_of_a_cloud_has_the_surface_of_a_full_one(sparse):
+    mesh = boxes(4)
+    points = trimesh.sample.sample_surface(mesh, 15_000, seed=1)[0]
+
+    def build():
+        return voxels.of_cloud(points, voxel=VOXEL)
+
+    p = around(mesh, 100_000)
+    full, part = field(build()), field(sparse(build))
+    a, b = full.distance(p), part.distance(p)
+    near = np.abs(a) < 0.3
+    assert np.abs(a - b)[near].max() < 0.2 * VOXEL
+    assert np.abs(a - b)[near].mean() < 1e-3 * VOXEL
+
+
+def test_a_sparse_sheet_of_points_is_as_thick_as_a_full_one(sparse):
+    u, v = np.meshgrid(np.linspace(-1, 1, 60), np.linspace(-1, 1, 60))
+    points = np.column_stack([u.ravel(), v.ravel(), 0 * u.ravel()])
+    grid = sparse(lambda: voxels.of_cloud(points, voxel=0.05))
+    assert any("sheet" in n for n in grid.notes)
+    assert field(grid).distance([[0, 0, 0.3], [0, 0, -0.3]]) == pytest.approx(0.2, abs=0.01)
+
+
+def test_far_from_surfaces_a_sparse_grid_is_never_above_the_distance(sparse):
+    # a small ball and a needle curve the distance as much as anything can
+    ball = trimesh.creation.icosphere(subdivisions=1, radius=0.15)
+    needle = trimesh.creation.box([0.1, 0.1, 6.0])
+    needle.apply_translation([3.0, 0.0, 0.0])
+    mesh = trimesh.util.concatenate([ball, needle])
+    grid = sparse(lambda: voxels.of_triangles(mesh.vertices, mesh.faces, voxel=VOXEL))
+    sites = triangle_sites(np.asarray(mesh.triangles))
+    p = around(mesh, 4000)
+    true = np.array([min(site_distance(sites, s, *q) for s in range(len(sites))) for q in p])
+    said = field(grid).distance(p)
+    outside = said > 0.0
+    # linear reading between voxels, too, is above a curved distance: by h² / (4 d)
+    above = VOXEL**2 / (4.0 * np.maximum(true, VOXEL))
+    assert (said <= true + above)[outside].all()
+    inner = np.abs(p - mesh.bounds.mean(0)).max(1) < 3.0
+    assert (true - said)[outside & inner].max() < 0.6 * SIDE * VOXEL
+    assert np.median((true - said)[outside & inner]) < 0.1 * SIDE * VOXEL
+
+
+def test_a_sparse_grid_does_not_jump_anywhere(sparse):
+    mesh = boxes(5)
+    grid = sparse(lambda: voxels.of_triangles(mesh.vertices, mesh.faces, voxel=VOXEL))
+    p = around(mesh, 60_000)
+    for axis in range(3):
+        # onto faces of cells, from both sides
+        q = p.copy()
+        steps = np.rint((q[:, axis] - grid.origin[axis]) / grid.size)
+        q[:, axis] = grid.origin[axis] + grid.size * steps
+        step = np.zeros(3)
+        step[axis] = 1e-7
+        low, high = grid.origin, grid.origin + grid.size * (np.array(grid.counts) - 1)
+        q = q[((q > low + 1e-3) & (q < high - 1e-3)).all(1)]
+        assert len(q) > 20_000
+        jump = np.abs(field(grid).distance(q + step) - field(grid).distance(q - step))
+        assert jump.max() < 1e-5
+
+
+def test_a_tether_is_as_long_in_a_sparse_grid_as_in_a_full_one(sparse):
+    mesh = boxes(6, 7)
+
+    def build():
+        return voxels.of_triangles(mesh.vertices, mesh.faces, voxel=0.05)
+
+    t = np.linspace(0.0, 1.0, 200)[:, None]
+    ring = np.hstack([6.5 * np.cos(9.0 * t), 6.5 * np.sin(9.0 * t), 3.0 * np.sin(7.0 * t)])
+    lengths = []
+    for grid in (build(), sparse(build)):
+        model = TETHERS["geodesic"](field(grid), delta=0.15)
+        lengths.append(model.drive(model.start(ring[0], ring[0]), ring)[1])
+    assert max(lengths[0]) > 1.1 * np.linalg.norm(ring - ring[0], axis=1).max()
+    # a tether that is about to slip off may do so an update sooner or later
+    apart = np.abs(lengths[0] - lengths[1])
+    assert np.median(apart) < 1e-3
+    assert np.mean(apart < 0.005 * lengths[0] + 1e-3) > 0.9
+    assert apart[-1] < 2e-3
+
+
+def test_a_thin_plate_is_told_in_a_sparse_grid_too(sparse):
+    plate, block = trimesh.creation.box([4.0, 4.0, 0.2]), trimesh.creation.box([2.0, 2.0, 2.0])
+    block.apply_translation([6.0, 0.0, 0.0])
+    for mesh, thin in ((plate, True), (block, False)):
+        grid = sparse(lambda mesh=mesh: voxels.of_triangles(mesh.vertices, mesh.faces, voxel=0.05))
+        assert bool(field(grid).thinner_than(0.5)) == thin
+
+
+def test_blocks_are_only_where_they_are_wanted(sparse):
+    mesh = trimesh.creation.box([4.0, 4.0, 4.0])
+    region = np.array([[-9.0, -9.0, 0.0], [9.0, 9.0, 9.0]])
+    grids = [
+        sparse(lambda r=r: voxels.of_triangles(mesh.vertices, mesh.faces, voxel=VOXEL, region=r))
+        for r in (None, region)
+    ]
+    everywhere, above = (field(g) for g in grids)
+    assert len(grids[1].values) < 0.75 * len(grids[0].values)
+    p = around(mesh, 20_000)
+    up = p[p[:, 2] > 0.1]
+    assert np.abs(everywhere.distance(up) - above.distance(up)).max() < 0.01 * VOXEL
+    # below it is coarser and right
+    below = p[p[:, 2] < -0.1]
+    deep = np.abs(everywhere.distance(below)) > 0.6 * SIDE * VOXEL
+    a, b = everywhere.distance(below)[deep], above.distance(below)[deep]
+    assert ((a < 0.0) == (b < 0.0)).all()
+
+
+def test_a_sparse_field_is_kept_in_a_file(sparse, tmp_path):
+    mesh = boxes(7)
+    one = field(sparse(lambda: voxels.of_triangles(mesh.vertices, mesh.faces, voxel=VOXEL)))
+    one.save(tmp_path / "field.npz")
+    other = DistanceField.load(tmp_path / "field.npz")
+    p = around(mesh, 1000)
+    assert (one.distance(p) == other.distance(p)).all()
+    assert other.voxel == one.voxel
+
+
+def test_more_memory_than_allowed_is_refused_with_voxels_that_fit(sparse):
+    ball = trimesh.creation.icosphere(subdivisions=2)
+
+    def build(voxel):
+        return voxels.of_triangles(ball.vertices, ball.faces, voxel=voxel, memory_limit=0.05)
+
+    with pytest.raises(InputError, match="GiB") as error:
+        sparse(lambda: build(0.004))
+    better = float(str(error.value).split("voxels of ")[-1].split(" or")[0])
+    assert 0.004 < better < 0.05
+    assert sparse(lambda: build(better)).table is not None
