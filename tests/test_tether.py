@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
@@ -332,3 +333,46 @@ def test_a_strand_handed_over_inside_a_cloud_never_grows_without_end(tmp_path):
             tether = model.relaxed(path, rounds)
             assert len(tether.strand) <= len(path) + 64 + long / (2 * 0.0125)
             assert 0.0 <= tether.residual <= tether.length
+
+
+def tilted_boxes(seed):
+    """A union of tilted boxes, a third of them plates of 0.25 m."""
+    rng = np.random.default_rng(seed)
+    parts = []
+    for _ in range(rng.integers(3, 9)):
+        size = rng.uniform(0.4, 3.0, 3)
+        if rng.random() < 1 / 3:
+            size[rng.integers(3)] = 0.25
+        part = trimesh.creation.box(size)
+        part.apply_transform(trimesh.transformations.random_rotation_matrix(rng.random(3)))
+        part.apply_translation(rng.uniform(-2.5, 2.5, 3))
+        parts.append(part)
+    return trimesh.util.concatenate(parts)
+
+
+@pytest.mark.parametrize("seed", [30, 32])
+def test_a_tether_does_not_hang_on_the_tips_of_corners(seed):
+    """After three still updates it is no longer than one of half the delta, laid where it lies."""
+    mesh = tilted_boxes(seed)
+    grid = of_triangles(mesh.vertices, mesh.faces, voxel=0.05)
+    field = DistanceField.build([], [], np.empty((0, 4)), [], grid, 0.0)
+    tethers, finer = GeodesicTether(field, 0.1), GeodesicTether(field, 0.05)
+    rng = np.random.default_rng([seed, 1])
+    here, path = np.full(3, -4.5), []
+    ahead = rng.normal(size=3)
+    while len(path) < 600:
+        ahead = ahead / np.linalg.norm(ahead) + 0.5 * rng.normal(size=3)
+        there = here + 0.5 * rng.uniform(0.2, 1.0) * ahead / np.linalg.norm(ahead)
+        inside = (np.abs(there) <= 4.5).all()
+        if inside and field.line_of_sight(here, there) and field.distance(there) > 1e-3:
+            here = there
+            path.append(here)
+        else:
+            ahead = rng.normal(size=3)
+    tether, above = tethers.start([-4.5] * 3, [-4.5] * 3), []
+    for begin in range(0, len(path), 10):
+        tether, _ = tethers.drive(tether, path[begin : begin + 10])
+        for _ in range(3):
+            tether = tethers.update(tether, tether.robot)
+        above.append(tether.length / finer.refine(tether).length - 1.0)
+    assert max(above) < 0.005

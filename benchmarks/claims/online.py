@@ -24,6 +24,19 @@ def large() -> tuple[str, bool]:
     return f"{memory:.2f} GiB, {cpu:.0f} s CPU", memory <= 2.0 and cpu <= 95.0 * ALLOWANCE
 
 
+def meshes() -> tuple[str, bool]:
+    """Tethers among random meshes, above their own refinement and a string of beads; those of the
+    meshes that hung before are among them."""
+    import strings
+
+    finer, string = [], []
+    for seed in (30, 32, 34, 45, 200, 201):
+        a, b = strings.compared(seed, drives=60, every=20)
+        finer, string = finer + a, string + b
+    worst, by_string = 100.0 * max(finer), 100.0 * max(string)
+    return f"{worst:.2f} %, {by_string:.2f} % of {len(finer)}", max(worst, by_string) <= 0.5
+
+
 def closed_forms() -> tuple[str, bool]:
     import tether
 
@@ -219,6 +232,7 @@ def claims() -> Iterator[Claim]:
     yield Claim("tether: closed forms; way back", "0.01 %; 1 mm", closed_forms)
     yield Claim("tether: prisms; classes", "0.01 %; none wrong", prisms)
     yield Claim("site of 100 x 100 x 30 m at 5 cm", "2 GiB; 95 s CPU (x 3)", large, timed=True)
+    yield Claim("tether: above the taut one among meshes", "0.5 %", meshes)
     yield Claim("tether: drives past thin poles", "none through one", drives)
     yield Claim("BlueROV2 in a current: over the limit; visited", "0.0 s; all", windy)
     for name in ("jetty", "hull", "ring", "linked rings", "comb", "tunnel"):

@@ -86,6 +86,13 @@ many rounds more. Not where delta is finer than the voxels: there it crumples ov
 HALVINGS = 4
 """How often a step that went too far is halved."""
 
+PASSING = 2
+"""Rounds of a pull on the way, where the end of the strand moves on at once."""
+
+TURNING, CLOSE, TIP = 0.95, 5.0, 4
+"""Cosine of the angle by which a strand turns sharply, strides between contacts that it turns about
+together, and how many of them a tip may have at most."""
+
 CONVEX = 0.5
 """Most of a contact's stiffness that convexity may take away: on a sphere all of it goes where the
 strand reaches half way round."""
@@ -148,7 +155,7 @@ def pull_end(
             strand[end, Z] += f * dz
         note_motion(strand, count, end, f * motion)
         strand, count, residual = pull(
-            field, strand, count, settings, last_rounds if left == 0.0 else 2,
+            field, strand, count, settings, last_rounds if left == 0.0 else PASSING,
             MORE_ROUNDS if left == 0.0 and settings.spread <= delta else 0,
         )  # fmt: skip
     return strand, count, residual
@@ -172,7 +179,7 @@ def pull(
     room = count + 64 + int(0.5 * strand_length(strand, count) / slip)
     for i in range(count):
         strand[i, STEP] = 0.0  # steps of another position of the ends say nothing about this one
-    done = 0
+    done, thorough, length = 0, rounds > PASSING, math.inf
     while done < rounds:
         done += 1
         before, began = count, strand_length(strand, count)
@@ -188,10 +195,22 @@ def pull(
         # shorter steps where the full one overshoots
         longer = strand_length(strand, count) > was + 1e-3 * precision
         damping = max(0.1, 0.5 * damping) if longer else min(1.0, 1.5 * damping)
-        if not changed and most <= precision:
+        still = not changed and most <= precision
+        fell = began - strand_length(strand, count)
+        if thorough and (still or (done == rounds and fell <= FALLS * stride)):
+            worth = WORTH * precision
+            strand, count = mend(field, strand, count, slip, room)
+            # once more only if the last time has come to something
+            least, length = length, strand_length(strand, count)
+            came_off = False
+            if length < least - worth:
+                strand, count, came_off = nudge(field, strand, count, slip, stride, room, worth)
+            if came_off:
+                rounds = max(rounds, done + 2)
+                continue
+        if still:
             break
         # what has slipped off is followed, as long as that shortens the strand
-        fell = began - strand_length(strand, count)
         if done == rounds and fell > FALLS * stride and more > 0:
             more -= 1
             rounds += 1
@@ -434,6 +453,72 @@ def slide(
         note_motion(strand, count, i, abs(by))
     put_back(strand, was)
     return max(gain, f) * most, max(f, 1e-3)
+
+
+@kernel
+def nudge(
+    field: Field, strand: Floats, count: int, slip: float, stride: float, room: int, worth: float
+) -> tuple[Floats, int, bool]:
+    """Take the contacts that the strand turns about sharply sideways by a stride, where that makes
+    it shorter by what it is worth. Returns (strand, count, whether anything was).
+
+    Over the tip of a corner each contact by itself is held, and a strand that is taut to both sides
+    of the tip lies on a saddle: only all of them together, and across, get off it.
+    """
+    i = 1
+    while i < count - 1:
+        j = i
+        while j + 1 < count - 1 and gap(strand, j, j + 1) <= CLOSE * stride:
+            j += 1
+        wx, wy, wz, turned = across(strand, i, j)
+        sharp = False
+        for k in range(i, j + 1):
+            sharp = sharp or strand[k, PART] < 0.0 or strand[k, SHARP] + abs(strand[k, CONE]) > 0.0
+        if turned and sharp and j < i + TIP:
+            before, kept = strand_length(strand, count), strand[:count].copy()
+            for side in (1.0, -1.0):
+                for k in range(i, j + 1):
+                    f = side * stride
+                    strand[k, X], strand[k, Y], strand[k, Z] = to_surface(
+                        field, strand[k, X] + f * wx, strand[k, Y] + f * wy,
+                        strand[k, Z] + f * wz, 1e-3 * stride,
+                    )  # fmt: skip
+                    note_motion(strand, count, k, math.inf)
+                strand, grown = mend(field, strand, count, slip, room)
+                if strand_length(strand, grown) < before - worth:
+                    return strand, grown, True
+                strand[:count] = kept
+        i = j + 1
+    return strand, count, False
+
+
+@kernel
+def across(strand: Floats, i: int, j: int) -> tuple[float, float, float, bool]:
+    """The unit vector across the strand, and along the surface, where it rests on nodes i to j; and
+    whether it turns there by more than `TURNING`."""
+    la, lb = gap(strand, i - 1, i), gap(strand, j, j + 1)
+    if la == 0.0 or lb == 0.0:
+        return 0.0, 0.0, 0.0, False
+    ax, ay, az = (
+        (strand[i, X] - strand[i - 1, X]) / la,
+        (strand[i, Y] - strand[i - 1, Y]) / la,
+        (strand[i, Z] - strand[i - 1, Z]) / la,
+    )
+    bx, by, bz = (
+        (strand[j + 1, X] - strand[j, X]) / lb,
+        (strand[j + 1, Y] - strand[j, Y]) / lb,
+        (strand[j + 1, Z] - strand[j, Z]) / lb,
+    )
+    if ax * bx + ay * by + az * bz > TURNING:
+        return 0.0, 0.0, 0.0, False
+    # out of the surface, and on along it
+    nx, ny, nz = ax - bx, ay - by, az - bz
+    tx, ty, tz = ax + bx, ay + by, az + bz
+    wx, wy, wz = ny * tz - nz * ty, nz * tx - nx * tz, nx * ty - ny * tx
+    length = math.sqrt(wx * wx + wy * wy + wz * wz)
+    if length < 1e-6:
+        return 0.0, 0.0, 0.0, False
+    return wx / length, wy / length, wz / length, True
 
 
 @kernel

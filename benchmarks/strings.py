@@ -1,0 +1,161 @@
+"""Tethers among random meshes, against their own refinement and an independent string.
+
+    python benchmarks/strings.py [--meshes 200] [--drives 100] [--keep]
+
+Each mesh is a union of tilted boxes, some of them thin. A robot wanders between them; after every
+drive it stays for three updates, and the tether's length is compared with two others in its class:
+
+- the same model's, at half the delta, pulled until nothing moves;
+- a string of beads in the same distance field: each bead goes to where its neighbours pull it and
+  is put back on the surface if that is inside (projected successive over-relaxation), with ever
+  more beads where the string turns.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+
+import numpy as np
+import trimesh
+from table import head, heading, row
+from tether import wander
+
+from netsp.compiled.kernel import kernel
+from netsp.geometry import polylines
+from netsp.online import GeodesicTether
+from netsp.online.scene.field import DistanceField, pushed_out
+from netsp.online.scene.sampling import Field, sample
+from netsp.online.scene.voxels import of_triangles
+
+DELTA, VOXEL, THINNEST = 0.1, 0.05, 0.25
+
+LEAST, MOST = -0.0005, 0.005
+"""What a tether may be below and above the others."""
+
+BOUNDS = np.array([[-4.5] * 3, [4.5] * 3])
+LEGS = 10
+"""Steps of a drive."""
+
+
+def boxes(seed: int) -> trimesh.Trimesh:
+    """A union of tilted boxes, a third of them plates."""
+    rng = np.random.default_rng(seed)
+    parts = []
+    for _ in range(rng.integers(3, 9)):
+        size = rng.uniform(0.4, 3.0, 3)
+        if rng.random() < 1 / 3:
+            size[rng.integers(3)] = THINNEST
+        part = trimesh.creation.box(size)
+        part.apply_transform(trimesh.transformations.random_rotation_matrix(rng.random(3)))
+        part.apply_translation(rng.uniform(-2.5, 2.5, 3))
+        parts.append(part)
+    return trimesh.util.concatenate(parts)
+
+
+@kernel
+def beads_pulled(field: Field, beads: np.ndarray, rounds: int, omega: float, most: float) -> float:
+    """Pull a string of beads (n, 3) in place; how far any bead moved in the last round."""
+    n = len(beads)
+    spans = np.empty(n - 1)
+    for i in range(n - 1):
+        spans[i] = max(np.sqrt(((beads[i + 1] - beads[i]) ** 2).sum()), 1e-9)
+    moved = 0.0
+    for _ in range(rounds):
+        moved = 0.0
+        for i in range(1, n - 1):
+            a, b = 1.0 / spans[i - 1], 1.0 / spans[i]
+            new, square = np.empty(3), 0.0
+            for k in range(3):
+                goal = (a * beads[i - 1, k] + b * beads[i + 1, k]) / (a + b)
+                new[k] = omega * (goal - beads[i, k])
+                square += new[k] ** 2
+            scale = min(1.0, most / max(np.sqrt(square), 1e-12))
+            x, y, z = (
+                beads[i, 0] + scale * new[0],
+                beads[i, 1] + scale * new[1],
+                beads[i, 2] + scale * new[2],
+            )
+            for _push in range(3):
+                d, gx, gy, gz, _ = sample(field, x, y, z)
+                if d >= 0.0:
+                    break
+                x, y, z = x - d * gx, y - d * gy, z - d * gz
+            moved = max(
+                moved,
+                np.sqrt((x - beads[i, 0]) ** 2 + (y - beads[i, 1]) ** 2 + (z - beads[i, 2]) ** 2),
+            )
+            beads[i, 0], beads[i, 1], beads[i, 2] = x, y, z
+    return moved
+
+
+def string_length(field: DistanceField, nodes: np.ndarray) -> float:
+    """Length of the string of beads that begins where the tether lies. No span may cut a corner by
+    more than a millimetre: a string would creep over an edge by the chords between its beads."""
+    beads = polylines.points_along(nodes, 0.1)
+    for _ in range(600):
+        for _again in range(8):
+            middles = 0.5 * (beads[:-1] + beads[1:])
+            inside = np.flatnonzero(field.distance(middles) < -1e-3)
+            if not len(inside):
+                break
+            added = pushed_out(field, middles[inside], 0.0)
+            beads = np.insert(beads, inside + 1, added, axis=0)
+        if beads_pulled(field.arrays, beads, 25, 1.5, 0.002) < 2e-6:
+            break
+    return polylines.length(beads)
+
+
+def compared(seed: int, drives: int, every: int) -> tuple[list[float], list[float]]:
+    """Shares by which the tether is above its refinement, and above the string."""
+    mesh = boxes(seed)
+    field = DistanceField.build(
+        [], [], np.empty((0, 4)), [], of_triangles(mesh.vertices, mesh.faces, voxel=VOXEL), 0.0
+    )
+    coarse, fine = GeodesicTether(field, DELTA), GeodesicTether(field, 0.5 * DELTA)
+    rng = np.random.default_rng([seed, 1])
+    start = BOUNDS[0]
+    path = wander(rng, field, start, drives * LEGS, 0.5, *BOUNDS, flat=1.0)
+    tether = coarse.start(start, start)
+    finer, string = [], []
+    for k in range(drives):
+        tether, _ = coarse.drive(tether, path[LEGS * k : LEGS * (k + 1)])
+        for _ in range(3):
+            tether = coarse.update(tether, tether.robot)
+        finer.append(tether.length / fine.refine(tether).length - 1.0)
+        if k % every == every - 1:
+            string.append(tether.length / string_length(field, tether.nodes) - 1.0)
+    return finer, string
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--meshes", type=int, default=200)
+    parser.add_argument("--drives", type=int, default=100)
+    parser.add_argument("--every", type=int, default=20, help="drives between two strings")
+    parser.add_argument("--first", type=int, default=0)
+    args = parser.parse_args()
+    heading("Tethers among random meshes")
+    begin = time.perf_counter()
+    finer: list[float] = []
+    string: list[float] = []
+    for seed in range(args.first, args.first + args.meshes):
+        a, b = compared(seed, args.drives, args.every)
+        finer += a
+        string += b
+        bad = [f"{k}: {100 * v:.2f}" for k, v in enumerate(a) if not LEAST < v < MOST]
+        if bad:
+            print(f"mesh {seed}: {', '.join(bad)}", file=sys.stderr, flush=True)
+    print()
+    head("against", "stops", "median %", "worst above %", "above 0.5 %", "worst below %",
+         "below 0.05 %", name="tether-strings")  # fmt: skip
+    for name, found in (("its refinement", finer), ("a string of beads", string)):
+        s = 100.0 * np.array(found)
+        row(name, len(s), f"{np.median(s):.4f}", f"{s.max():.3f}", int((s > 100.0 * MOST).sum()),
+            f"{s.min():.3f}", int((s < 100.0 * LEAST).sum()))  # fmt: skip
+    print(f"\n{time.perf_counter() - begin:.0f} s")
+
+
+if __name__ == "__main__":
+    main()
