@@ -20,7 +20,7 @@ from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.online.scene.field import DistanceField, finite_point
 from netsp.online.tether.load import Load, drive_under
-from netsp.online.tether.pull import PullSettings, drive, follow, pull
+from netsp.online.tether.pull import MORE_ROUNDS, MOST_NUDGE, PullSettings, drive, follow, pull
 from netsp.online.tether.resolution import THINNEST
 from netsp.online.tether.strand import strand_length
 from netsp.online.tether.tether import Tether, strand_of
@@ -155,8 +155,10 @@ class GeodesicTether:
         return self._taut(strand_of(path), rounds)
 
     def _taut(self, strand: Floats, rounds: int | None = None) -> Tether:
+        rounds = rounds or self.rounds
         strand, count, residual = pull(
-            self.field.arrays, strand, len(strand), self._settings, rounds or self.rounds, 0
+            self.field.arrays, strand, len(strand), self._settings, rounds, 0,
+            MOST_NUDGE if rounds >= MORE_ROUNDS else 1,
         )  # fmt: skip
         return _state(strand, count, residual)
 

@@ -89,9 +89,13 @@ HALVINGS = 4
 PASSING = 2
 """Rounds of a pull on the way, where the end of the strand moves on at once."""
 
-TURNING, CLOSE, TIP = 0.95, 5.0, 4
+TURNING, CLOSE, TIP = 0.95, 8.0, 4
 """Cosine of the angle by which a strand turns sharply, strides between contacts that it turns about
 together, and how many of them a tip may have at most."""
+
+MOST_NUDGE = 6
+"""Strides that such contacts are taken sideways at most: a strand whose ends stand still. One whose
+ends move is taken by one, and has another chance at once."""
 
 CONVEX = 0.5
 """Most of a contact's stiffness that convexity may take away: on a sphere all of it goes where the
@@ -157,6 +161,7 @@ def pull_end(
         strand, count, residual = pull(
             field, strand, count, settings, last_rounds if left == 0.0 else PASSING,
             MORE_ROUNDS if left == 0.0 and settings.spread <= delta else 0,
+            MOST_NUDGE if path <= 0.1 * stride else 1,
         )  # fmt: skip
     return strand, count, residual
 
@@ -169,10 +174,12 @@ def pull(
     settings: PullSettings,
     rounds: int,
     more: int,
+    strides: int,
 ) -> tuple[Floats, int, float]:
     """Rounds of: put edges back that went too deep, drop nodes that hold nothing, slide the others
     to where the strand is shortest; until no node moves by more than the precision. Up to `more`
-    rounds are added for a strand that has come off something."""
+    rounds are added for a strand that has come off something; what hangs is taken sideways by up to
+    so many strides."""
     delta, precision = settings.delta, settings.precision
     slip, stride = SLIP * delta, STRIDE * delta
     most, damping, gain = 0.0, 1.0, 1.0
@@ -204,7 +211,9 @@ def pull(
             least, length = length, strand_length(strand, count)
             came_off = False
             if length < least - worth:
-                strand, count, came_off = nudge(field, strand, count, slip, stride, room, worth)
+                strand, count, came_off = nudge(
+                    field, strand, count, slip, stride, room, worth, strides
+                )
             if came_off:
                 rounds = max(rounds, done + 2)
                 continue
@@ -457,13 +466,15 @@ def slide(
 
 @kernel
 def nudge(
-    field: Field, strand: Floats, count: int, slip: float, stride: float, room: int, worth: float
-) -> tuple[Floats, int, bool]:
-    """Take the contacts that the strand turns about sharply sideways by a stride, where that makes
-    it shorter by what it is worth. Returns (strand, count, whether anything was).
+    field: Field, strand: Floats, count: int, slip: float, stride: float, room: int, worth: float,
+    strides: int,
+) -> tuple[Floats, int, bool]:  # fmt: skip
+    """Take the contacts that the strand turns about sharply sideways, by up to so many strides,
+    where that makes it shorter by what it is worth. Returns (strand, count, whether anything was).
 
     Over the tip of a corner each contact by itself is held, and a strand that is taut to both sides
-    of the tip lies on a saddle: only all of them together, and across, get off it.
+    of the tip lies on a saddle: only all of them together, and across, get off it. And an edge in
+    voxels is uneven: in its notches, millimetres deep, a strand would stay.
     """
     i = 1
     while i < count - 1:
@@ -477,16 +488,22 @@ def nudge(
         if turned and sharp and j < i + TIP:
             before, kept = strand_length(strand, count), strand[:count].copy()
             for side in (1.0, -1.0):
-                for k in range(i, j + 1):
-                    f = side * stride
-                    strand[k, X], strand[k, Y], strand[k, Z] = to_surface(
-                        field, strand[k, X] + f * wx, strand[k, Y] + f * wy,
-                        strand[k, Z] + f * wz, 1e-3 * stride,
-                    )  # fmt: skip
-                    note_motion(strand, count, k, math.inf)
-                strand, grown = mend(field, strand, count, slip, room)
-                if strand_length(strand, grown) < before - worth:
-                    return strand, grown, True
+                grown, vx, vy, vz = count, side * wx, side * wy, side * wz
+                for _ in range(strides):
+                    for k in range(i, j + 1):
+                        strand[k, X], strand[k, Y], strand[k, Z] = to_surface(
+                            field, strand[k, X] + stride * vx, strand[k, Y] + stride * vy,
+                            strand[k, Z] + stride * vz, 1e-3 * stride,
+                        )  # fmt: skip
+                        note_motion(strand, grown, k, math.inf)
+                    strand, grown = mend(field, strand, grown, slip, room)
+                    if strand_length(strand, grown) < before - worth:
+                        return strand, grown, True
+                    ux, uy, uz, turned = across(strand, i, j)
+                    if grown != count or not turned:
+                        break
+                    same = 1.0 if ux * vx + uy * vy + uz * vz > 0.0 else -1.0
+                    vx, vy, vz = same * ux, same * uy, same * uz
                 strand[:count] = kept
         i = j + 1
     return strand, count, False
