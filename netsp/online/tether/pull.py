@@ -484,7 +484,10 @@ def nudge(
         wx, wy, wz, turned = across(strand, i, j)
         sharp = False
         for k in range(i, j + 1):
-            sharp = sharp or strand[k, PART] < 0.0 or strand[k, SHARP] + abs(strand[k, CONE]) > 0.0
+            # voxels are uneven everywhere: round parts of them are left to strands that stand still
+            uneven = strand[k, PART] < 0.0 and strides > 1
+            edge = strand[k, SHARP] + abs(strand[k, CONE]) > 0.0
+            sharp = sharp or uneven or edge or not rests(strand, k)
         if turned and sharp and j < i + TIP:
             before, kept = strand_length(strand, count), strand[:count].copy()
             for side in (1.0, -1.0):
