@@ -21,6 +21,7 @@ import numpy as np
 
 from netsp.arrays import Floats
 from netsp.compiled.kernel import kernel
+from netsp.online.scene.packing import VOXELS
 from netsp.online.scene.sampling import Field, distance
 from netsp.online.tether.strand import (
     CONE,
@@ -476,7 +477,7 @@ def nudge(
     of the tip lies on a saddle: only all of them together, and across, get off it. And an edge in
     voxels is uneven: in its notches, millimetres deep, a strand would stay.
     """
-    i = 1
+    i = 1 if field.data[VOXELS] > 0.0 else count  # exact edges and corners need none of it
     while i < count - 1:
         j = i
         while j + 1 < count - 1 and gap(strand, j, j + 1) <= CLOSE * stride:
