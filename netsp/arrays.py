@@ -8,6 +8,9 @@ import numpy.typing as npt
 Floats = npt.NDArray[np.float64]
 """Lengths, coordinates, costs."""
 
+Singles = npt.NDArray[np.float32]
+"""Of what is held by the million, such as distances at grid points."""
+
 Ints = npt.NDArray[np.int64]
 """Indices, letters, counts."""
 

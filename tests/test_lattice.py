@@ -158,9 +158,10 @@ def test_a_tether_is_as_long_in_a_sparse_grid_as_in_a_full_one(sparse):
         model = TETHERS["geodesic"](field(grid), delta=0.15)
         lengths.append(model.drive(model.start(ring[0], ring[0]), ring)[1])
     assert max(lengths[0]) > 1.1 * np.linalg.norm(ring - ring[0], axis=1).max()
-    # a tether that is about to slip off may do so an update sooner or later
+    # the points of the two grids lie elsewhere; a tether that is about to slip off may do so an
+    # update sooner or later
     apart = np.abs(lengths[0] - lengths[1])
-    assert np.median(apart) < 1e-3
+    assert np.median(apart / np.maximum(lengths[0], 1.0)) < 2e-4
     assert np.mean(apart < 0.01 * lengths[0] + 1e-3) > 0.9
     assert apart[-1] < 2e-3
 

@@ -16,9 +16,9 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from netsp.arrays import Floats, Ints
+from netsp.arrays import Floats, Ints, Singles
 from netsp.compiled.kernel import kernel
-from netsp.online.scene.closest import Owners, Singles, yz_crossing
+from netsp.online.scene.closest import Owners, yz_crossing
 from netsp.online.scene.grid import SIDE
 from netsp.online.scene.sites import extent, site_distance
 

@@ -7,11 +7,10 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from netsp.arrays import Floats
+from netsp.arrays import Floats, Singles
 from netsp.compiled.kernel import kernel
 from netsp.online.scene.sites import extent, site_distance
 
-Singles = npt.NDArray[np.float32]
 Owners = npt.NDArray[np.int32]
 
 

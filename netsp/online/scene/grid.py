@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from netsp.arrays import Floats
+from netsp.arrays import Floats, Singles
 
 SIDE = 8
 """Voxels along a side of a block."""
@@ -36,7 +36,7 @@ class VoxelGrid:
         (nx - 1, ny - 1, nz - 1) which block a cell has, -1 where it has none; None without blocks.
     """
 
-    values: npt.NDArray[np.float32]
+    values: Singles
     counts: tuple[int, ...]
     origin: Floats
     size: float

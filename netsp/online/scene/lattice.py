@@ -11,12 +11,12 @@ import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from netsp.arrays import Bools, Floats, Ints
+from netsp.arrays import Bools, Floats, Ints, Singles
 from netsp.online.scene import blocks as compiled
 from netsp.online.scene.blocks import REACHED, WATER
 from netsp.online.scene.closest import Owners, nearest_sites, sweep, windings
@@ -28,45 +28,11 @@ OUTSIDE, INSIDE = 1.25, 0.9
 """Sides of a cell: cells with a corner nearer to a surface are blocks. Inside solids: no surface
 passes through a cell whose corners are all deeper than half of its diagonal, sqrt(3) / 2."""
 
-BYTES_PER_BLOCK = 2700
-"""At the peak of building: of 8³ points five bytes each."""
+WORKERS = min(4, os.cpu_count() or 1)
+"""More would hold more slabs at a time, and the memory is for one site, not for one core."""
 
-SLAB, HALO = 40_000, 2
-"""Blocks whose distances are computed at a time, and cells to either side that take part."""
-
-Values = npt.NDArray[np.float32]
-
-
-class Lattice(Protocol):
-    """The points at which a grid is built, in one row."""
-
-    size: float
-
-    def closest(
-        self, sites: Floats, on_progress: OnStage = None, *, whose: bool = True
-    ) -> tuple[Values, Owners]:
-        """Distance to the nearest site and, if wanted, which it is, at each point."""
-        ...
-
-    def turn_inside(self, values: Values, triangles: Floats) -> int:
-        """Negate the values where a mesh (m, 3, 3) winds around; how often it does at most."""
-        ...
-
-    def unreached(self, values: Values) -> Bools:
-        """Points outside of the solid that water from the border does not reach."""
-        ...
-
-    def positions(self, chosen: Bools) -> tuple[Floats, Ints]:
-        """(m, 3) of the points that are chosen, each place once, and which they are."""
-        ...
-
-    def least_around(self, values: Values, points: Floats, reach: int) -> Values:
-        """(m,) least value up to some voxels around each of some places (m, 3)."""
-        ...
-
-    def grid(self, values: Values, solid: Floats, notes: tuple[str, ...]) -> VoxelGrid:
-        """The grid that has the values."""
-        ...
+SLAB, HALO = 80_000 // WORKERS, 2
+"""Blocks whose distances each computes at a time, and cells to either side that take part."""
 
 
 @dataclass
@@ -89,19 +55,19 @@ class Dense:
 
     def closest(
         self, sites: Floats, on_progress: OnStage = None, *, whose: bool = True
-    ) -> tuple[Values, Owners]:
-        """As of `Lattice`."""
+    ) -> tuple[Singles, Owners]:
+        """Distance to the nearest site and, if wanted, which it is, at each point."""
         distances, owner = _closest(sites, self.origin, self.size, self.counts, on_progress)
         return distances.ravel(), owner.ravel()
 
-    def turn_inside(self, values: Values, triangles: Floats) -> int:
-        """As of `Lattice`."""
+    def turn_inside(self, values: Singles, triangles: Floats) -> int:
+        """Negate the values where a mesh (m, 3, 3) winds around; how often it does at most."""
         around = windings(triangles, self.origin, self.size, self.counts).ravel()
         np.negative(values, out=values, where=around != 0)
         return int(np.abs(around).max(initial=0))
 
-    def unreached(self, values: Values) -> Bools:
-        """As of `Lattice`."""
+    def unreached(self, values: Singles) -> Bools:
+        """Points outside of the solid that water from the border does not reach."""
         from scipy.ndimage import label
 
         parts, count = label(values.reshape(self.counts) > 0.0)
@@ -115,12 +81,12 @@ class Dense:
         return np.asarray(~border[parts]).ravel()
 
     def positions(self, chosen: Bools) -> tuple[Floats, Ints]:
-        """As of `Lattice`."""
+        """(m, 3) of the points that are chosen, each place once, and which they are."""
         at = np.argwhere(chosen.reshape(self.counts))
         return self.origin + self.size * at, np.flatnonzero(chosen)
 
-    def least_around(self, values: Values, points: Floats, reach: int) -> Values:
-        """As of `Lattice`."""
+    def least_around(self, values: Singles, points: Floats, reach: int) -> Singles:
+        """(m,) least value up to some voxels around each of some places (m, 3)."""
         from scipy.ndimage import minimum_filter
 
         cell = np.rint((points - self.origin) / self.size).astype(int)
@@ -128,8 +94,8 @@ class Dense:
         least = minimum_filter(values.reshape(self.counts), size=2 * reach + 1)
         return np.asarray(least[tuple(cell.T)])
 
-    def grid(self, values: Values, solid: Floats, notes: tuple[str, ...]) -> VoxelGrid:
-        """As of `Lattice`."""
+    def grid(self, values: Singles, solid: Floats, notes: tuple[str, ...]) -> VoxelGrid:
+        """The grid that has the values."""
         return VoxelGrid(values, self.counts, self.origin, self.size, solid, notes)
 
 
@@ -149,7 +115,7 @@ class Sparse:
     """
 
     def __init__(
-        self, origin: Floats, size: float, near: Bools, known: tuple[Floats, Values, Owners]
+        self, origin: Floats, size: float, near: Bools, known: tuple[Floats, Singles, Owners]
     ) -> None:
         self.origin, self.size, self.known = origin, size, known
         self.counts = (near.shape[0] + 1, near.shape[1] + 1, near.shape[2] + 1)
@@ -165,8 +131,8 @@ class Sparse:
 
     def closest(
         self, sites: Floats, on_progress: OnStage = None, *, whose: bool = True
-    ) -> tuple[Values, Owners]:
-        """As of `Lattice`; slab by slab, so that what is in between needs little memory."""
+    ) -> tuple[Singles, Owners]:
+        """As of `Dense`; slab by slab, so that what is in between needs little memory."""
         total = self.first + len(self.blocks) * SIDE**3
         distances = np.empty(total, dtype=np.float32)
         owner = np.empty(total if whose else 0, dtype=np.int32)
@@ -186,11 +152,11 @@ class Sparse:
                 self._parts(owner)[1][rows] = s[inner]
             return len(d[inner])
 
-        done, pool = 0, ThreadPoolExecutor(os.cpu_count())
+        done, pool = 0, ThreadPoolExecutor(WORKERS)
         try:
             for count in pool.map(fill, self._slabs()):
                 done += count
-                _tell(on_progress, done / (len(self.blocks) + 1))
+                tell(on_progress, "distances", done / (len(self.blocks) + 1))
         finally:
             pool.shutdown(cancel_futures=True)
         return distances, owner
@@ -205,7 +171,7 @@ class Sparse:
     def _slab(
         self, slab: tuple[int, int], sites: Floats, reach: tuple[Floats, Floats],
         corners: Owners,
-    ) -> tuple[Values, Owners, slice]:  # fmt: skip
+    ) -> tuple[Singles, Owners, slice]:  # fmt: skip
         """Distances and owners of the blocks of a slab and around it, and which are its own."""
         low, high = slab
         cuts = np.array([low - HALO, low, high, high + HALO])
@@ -232,16 +198,16 @@ class Sparse:
             )
         return distances, owner, slice(first - begin, last - begin)
 
-    def turn_inside(self, values: Values, triangles: Floats) -> int:
-        """As of `Lattice`."""
+    def turn_inside(self, values: Singles, triangles: Floats) -> int:
+        """As of `Dense`."""
         corners, fine = self._parts(values)
         around = windings(triangles, self.origin, SIDE * self.size, self.counts)
         np.negative(corners, out=corners, where=around != 0)
         place = (self.origin, self.size, 0)
         return int(compiled.turn_inside(fine, triangles, place, self.blocks, self.table))
 
-    def unreached(self, values: Values) -> Bools:
-        """As of `Lattice`."""
+    def unreached(self, values: Singles) -> Bools:
+        """As of `Dense`."""
         water = values > 0.0
         corners, fine = self._parts(water.view(np.uint8))
         cells = corners[:-1, :-1, :-1].copy()
@@ -253,20 +219,20 @@ class Sparse:
         return np.equal(water.view(np.uint8), WATER, out=water)
 
     def positions(self, chosen: Bools) -> tuple[Floats, Ints]:
-        """As of `Lattice`; corners of cells that are no blocks are left out."""
+        """As of `Dense`; corners of cells that are no blocks are left out."""
         fine = self._parts(chosen)[1].reshape(-1, SIDE, SIDE, SIDE)
         at = np.argwhere(fine)
         places = self.origin + self.size * (SIDE * self.blocks[at[:, 0]] + at[:, 1:])
         return places, np.flatnonzero(fine) + self.first
 
-    def least_around(self, values: Values, points: Floats, reach: int) -> Values:
-        """As of `Lattice`."""
+    def least_around(self, values: Singles, points: Floats, reach: int) -> Singles:
+        """As of `Dense`."""
         cell = np.rint((points - self.origin) / self.size).astype(np.int64)
         corners, fine = self._parts(values)
         return np.asarray(compiled.least_in_blocks(corners, fine, self.table, cell, reach))
 
-    def grid(self, values: Values, solid: Floats, notes: tuple[str, ...]) -> VoxelGrid:
-        """As of `Lattice`."""
+    def grid(self, values: Singles, solid: Floats, notes: tuple[str, ...]) -> VoxelGrid:
+        """As of `Dense`."""
         side = SIDE * self.size
         compiled.understate(values, side, OUTSIDE)
         compiled.meet_corners(*self._parts(values), self.blocks, self.table)
@@ -321,21 +287,36 @@ def sparse_near(
     return Sparse(origin, size, cell, (sites, distances, owner))
 
 
+Lattice = Dense | Sparse
+"""The points at which a grid is built, in one row."""
+
+
+def tell(on_progress: OnStage, stage: str, fraction: float) -> None:
+    """Hand on how far a stage has come, if anybody asks.
+
+    Parameters
+    ----------
+    on_progress : callable or None
+        Takes both.
+    stage : str
+        Its name.
+    fraction : float
+        From 0 to 1.
+    """
+    if on_progress is not None:
+        on_progress(stage, fraction)
+
+
 def _closest(
     sites: Floats, origin: Floats, size: float, counts: tuple[int, ...],
     on_progress: OnStage,
-) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.int32]]:  # fmt: skip
+) -> tuple[Singles, Owners]:  # fmt: skip
     """Distances of all points of a grid to the nearest site, and which it is."""
-    _tell(on_progress, 0.0)
+    tell(on_progress, "distances", 0.0)
     distances = np.full(counts, np.float32(np.inf))
     owner = np.full(counts, -1, dtype=np.int32)
     nearest_sites(sites, origin, size, distances, owner)
     for turn in range(8):
         sweep(sites, origin, size, distances, owner, turn)
-        _tell(on_progress, (turn + 1) / 9)
+        tell(on_progress, "distances", (turn + 1) / 9)
     return distances, owner
-
-
-def _tell(on_progress: OnStage, fraction: float) -> None:
-    if on_progress is not None:
-        on_progress("distances", fraction)

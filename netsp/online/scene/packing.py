@@ -16,7 +16,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from netsp.arrays import Floats, Ints
+from netsp.arrays import Floats, Ints, Singles
 from netsp.compiled.kernel import kernel
 from netsp.online.scene.grid import SIDE, VoxelGrid
 from netsp.online.scene.solids import PRISM, solid_distance
@@ -75,7 +75,7 @@ def with_voxels(data: Floats, grid: VoxelGrid) -> Floats:
     return np.concatenate([data, np.where(grid.table < 0, 0.0, begins).ravel()])
 
 
-def block_points(data: Floats, voxels: npt.NDArray[np.float32], offset: float, most: int) -> Floats:
+def block_points(data: Floats, voxels: Singles, offset: float, most: int) -> Floats:
     """(n, 3) of points in blocks where the distance is below an offset, at most so many: as many of
     each of some blocks, evenly chosen."""
     counts = data[SHAPE : SHAPE + 3].astype(int) - 1

@@ -10,9 +10,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from netsp.arrays import Floats
+from netsp.arrays import Floats, Singles
 from netsp.compiled.kernel import kernel
 from netsp.online.scene.grid import SIDE
 from netsp.online.scene.packing import (
@@ -44,7 +43,7 @@ class Field(NamedTuple):
     """
 
     data: Floats
-    grid: npt.NDArray[np.float32]
+    grid: Singles
     offset: float
 
 
@@ -99,19 +98,17 @@ def _solids(data: Floats, x: float, y: float, z: float) -> tuple[float, float, f
 
 
 @kernel
-def _voxel_distance(
-    grid: npt.NDArray[np.float32], data: Floats, x: float, y: float, z: float
-) -> float:
+def _voxel_distance(grid: Singles, data: Floats, x: float, y: float, z: float) -> float:
     h = data[PLACE + 3]
     nx, ny, nz = int(data[SHAPE]), int(data[SHAPE + 1]), int(data[SHAPE + 2])
     u, v, w = (x - data[PLACE]) / h, (y - data[PLACE + 1]) / h, (z - data[PLACE + 2]) / h
     e = 1e-6  # rounding
     if -e <= u <= nx - 1 + e and -e <= v <= ny - 1 + e and -e <= w <= nz - 1 + e:
-        return _between(grid, data, ny, nz, nx, u, v, w)
+        return _between(grid, data, nx, ny, nz, u, v, w)
     # all solids lie in the grid, a box: seen from its nearest point c, they are behind it, so
     # no distance is below hypot(|p - c|, d(c)), nor below that to their bounding box
     bu, bv, bw = min(max(u, 0.0), nx - 1.0), min(max(v, 0.0), ny - 1.0), min(max(w, 0.0), nz - 1.0)
-    value = max(_between(grid, data, ny, nz, nx, bu, bv, bw), 0.0)
+    value = max(_between(grid, data, nx, ny, nz, bu, bv, bw), 0.0)
     behind = h * h * ((u - bu) ** 2 + (v - bv) ** 2 + (w - bw) ** 2) + value * value
     dx = max(data[PLACE + 4] - x, 0.0, x - data[PLACE + 7])
     dy = max(data[PLACE + 5] - y, 0.0, y - data[PLACE + 8])
@@ -121,7 +118,7 @@ def _voxel_distance(
 
 @kernel
 def _between(
-    grid: npt.NDArray[np.float32], data: Floats, ny: int, nz: int, nx: int, u: float, v: float,
+    grid: Singles, data: Floats, nx: int, ny: int, nz: int, u: float, v: float,
     w: float,
 ) -> float:  # fmt: skip
     """Linear between the points around (u, v, w), in steps of the grid, or of a block."""
@@ -144,7 +141,7 @@ def _between(
 
 @kernel
 def _across_blocks(
-    grid: npt.NDArray[np.float32], data: Floats, ny: int, nz: int, at: tuple[int, int, int],
+    grid: Singles, data: Floats, ny: int, nz: int, at: tuple[int, int, int],
     u: float, v: float, w: float,
 ) -> float:  # fmt: skip
     """Linear between points of more than one block."""
@@ -159,9 +156,7 @@ def _across_blocks(
 
 
 @kernel
-def _fine_point(
-    grid: npt.NDArray[np.float32], data: Floats, ny: int, nz: int, i: int, j: int, k: int
-) -> float:
+def _fine_point(grid: Singles, data: Floats, ny: int, nz: int, i: int, j: int, k: int) -> float:
     """Of a block; where its cell is none, linear between the cell's corners."""
     p, q, r = i // SIDE, j // SIDE, k // SIDE
     begin = data[int(data[BLOCKS]) + (p * (ny - 1) + q) * (nz - 1) + r]
@@ -173,9 +168,7 @@ def _fine_point(
 
 
 @kernel
-def _linear(
-    grid: npt.NDArray[np.float32], at: int, across: int, along: int, u: float, v: float, w: float
-) -> float:
+def _linear(grid: Singles, at: int, across: int, along: int, u: float, v: float, w: float) -> float:
     a = (1.0 - w) * grid[at] + w * grid[at + 1]
     b = (1.0 - w) * grid[at + along] + w * grid[at + along + 1]
     at += across
@@ -186,7 +179,7 @@ def _linear(
 
 @kernel
 def _voxels(
-    grid: npt.NDArray[np.float32], data: Floats, x: float, y: float, z: float
+    grid: Singles, data: Floats, x: float, y: float, z: float
 ) -> tuple[float, float, float, float]:
     # half a voxel to either side: a central difference does not jump at the cells' faces
     h = 0.5 * data[FINE]

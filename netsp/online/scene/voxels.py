@@ -18,7 +18,7 @@ import numpy.typing as npt
 from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.online.scene.grid import SIDE, VoxelGrid
-from netsp.online.scene.lattice import BYTES_PER_BLOCK, Dense, Lattice, OnStage, sparse_near
+from netsp.online.scene.lattice import Dense, Lattice, OnStage, sparse_near, tell
 from netsp.online.scene.readers import read_cloud, read_mesh
 from netsp.online.scene.sites import point_sites, triangle_sites
 
@@ -30,6 +30,9 @@ BYTES_PER_VOXEL = 28
 
 MOST_DENSE = 40_000_000
 """Grid points, above which only those near surfaces are held."""
+
+MESH_BLOCK, CLOUD_BLOCK = 2700, 14_000
+"""Bytes per block of a sparse grid at the peak of building."""
 
 BYTES_PER_CELL, PAD = 48, 4
 """Of a cell without grid points, and cells between the solid and the border of a sparse grid."""
@@ -147,7 +150,7 @@ def of_triangles(
     if not (values < 0.0).any():
         raise InputError(f"{source}: no solid at voxels of {size:.3g}; expected smaller voxels")
     grow = SHEET * size if open_edges else 0.0
-    _tell(on_progress, "distances", 1.0)
+    tell(on_progress, "distances", 1.0)
     return lattice.grid(values, np.array([low - grow, high + grow]), tuple(notes))
 
 
@@ -195,10 +198,20 @@ def of_cloud(
     near, _ = cKDTree(p).query(p, k=min(7, len(p)))
     ball = max(1.5 * _size(low, high, voxel, source), float(np.quantile(near[:, -1], 0.95)))
     sites = point_sites(p)
-    lattice = _lattice(low, high, voxel, memory_limit, source, sites, shell=0.0, extra=_spacing(p))
+    lattice = _lattice(
+        low,
+        high,
+        voxel,
+        memory_limit,
+        source,
+        sites,
+        shell=0.0,
+        extra=_spacing(p),
+        block=CLOUD_BLOCK,
+    )
     size = lattice.size
     distances, owner = lattice.closest(sites, on_progress)
-    _tell(on_progress, "flood", 0.5)
+    tell(on_progress, "flood", 0.5)
     values = distances - np.float32(ball)
     filled = lattice.unreached(values) | (values <= 0.0)
     # the distance to the water's edge: balls about grid points in the water that just touch it
@@ -222,16 +235,17 @@ def of_cloud(
                 f"{100 * loose.mean():.0f} % of the points enclose nothing: taken as a sheet, "
                 f"{2 * half:.3g} thick"
             )
-    _tell(on_progress, "distances", 1.0)
+    tell(on_progress, "distances", 1.0)
     return lattice.grid(out, np.array([low - grow, high + grow]), tuple(notes))
 
 
 def _lattice(
     low: Floats, high: Floats, voxel: float | None, memory_limit: float, source: str,
-    sites: Floats, *, shell: float, extra: float = 0.0,
+    sites: Floats, *, shell: float, extra: float = 0.0, block: int = MESH_BLOCK,
     triangles: Floats | None = None, region: Floats | None = None,
 ) -> Lattice:  # fmt: skip
-    """The points at which the grid is built; `shell` in voxels, `extra` room in metres.
+    """The points at which the grid is built; `shell` in voxels, `extra` room in metres,
+    `block` the bytes of one at the peak.
 
     InputError when there would be too many.
     """
@@ -251,7 +265,7 @@ def _lattice(
             low - pad + off, size, (int(cells[0]), int(cells[1]), int(cells[2])), sites,
             shell * size + extra, triangles, region,
         )  # fmt: skip
-        need += len(lattice.blocks) * BYTES_PER_BLOCK
+        need += len(lattice.blocks) * block
         if need <= memory_limit * 2**30:
             return lattice
     # blocks lie along surfaces, cells fill the box
@@ -312,8 +326,3 @@ def _spacing(points: Floats) -> float:
     some = points[:: max(1, len(points) // 2000)]
     far, _ = cKDTree(points).query(some, k=min(7, len(points)))
     return float(np.quantile(far[:, -1], 0.95))
-
-
-def _tell(on_progress: OnStage, stage: str, fraction: float) -> None:
-    if on_progress is not None:
-        on_progress(stage, fraction if math.isfinite(fraction) else 0.0)

@@ -20,10 +20,11 @@ from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.online.scene.field import DistanceField, finite_point
 from netsp.online.tether.load import Load, drive_under
-from netsp.online.tether.pull import MORE_ROUNDS, MOST_NUDGE, PullSettings, drive, follow, pull
+from netsp.online.tether.pull import MORE_ROUNDS, PullSettings, drive, follow, pull
 from netsp.online.tether.resolution import THINNEST
 from netsp.online.tether.strand import strand_length
 from netsp.online.tether.tether import Tether, strand_of
+from netsp.online.tether.tips import MOST_NUDGE
 
 
 @dataclass(frozen=True)

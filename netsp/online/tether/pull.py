@@ -21,8 +21,8 @@ import numpy as np
 
 from netsp.arrays import Floats
 from netsp.compiled.kernel import kernel
-from netsp.online.scene.packing import VOXELS
 from netsp.online.scene.sampling import Field, distance
+from netsp.online.tether.mend import mend
 from netsp.online.tether.strand import (
     CONE,
     CURVE,
@@ -36,16 +36,12 @@ from netsp.online.tether.strand import (
     SHARP,
     STALE,
     STEP,
-    USED,
     X,
     Y,
     Z,
     gap,
-    insert,
     let_go,
-    look_along,
     note_motion,
-    path_out,
     remove,
     rests,
     strand_length,
@@ -53,6 +49,7 @@ from netsp.online.tether.strand import (
     take_frame,
     to_surface,
 )
+from netsp.online.tether.tips import MOST_NUDGE, nudge
 
 SLIP, STRIDE = 0.125, 0.2
 """In units of delta; see above."""
@@ -89,14 +86,6 @@ HALVINGS = 4
 
 PASSING = 2
 """Rounds of a pull on the way, where the end of the strand moves on at once."""
-
-TURNING, CLOSE, TIP = 0.95, 8.0, 4
-"""Cosine of the angle by which a strand turns sharply, strides between contacts that it turns about
-together, and how many of them a tip may have at most."""
-
-MOST_NUDGE = 6
-"""Strides that such contacts are taken sideways at most: a strand whose ends stand still. One whose
-ends move is taken by one, and has another chance at once."""
 
 CONVEX = 0.5
 """Most of a contact's stiffness that convexity may take away: on a sphere all of it goes where the
@@ -175,12 +164,12 @@ def pull(
     settings: PullSettings,
     rounds: int,
     more: int,
-    strides: int,
+    steps: int,
 ) -> tuple[Floats, int, float]:
     """Rounds of: put edges back that went too deep, drop nodes that hold nothing, slide the others
     to where the strand is shortest; until no node moves by more than the precision. Up to `more`
-    rounds are added for a strand that has come off something; what hangs is taken sideways by up to
-    so many strides."""
+    rounds are added for a strand that has come off something; what hangs is taken sideways in up to
+    so many steps."""
     delta, precision = settings.delta, settings.precision
     slip, stride = SLIP * delta, STRIDE * delta
     most, damping, gain = 0.0, 1.0, 1.0
@@ -213,7 +202,7 @@ def pull(
             came_off = False
             if length < least - worth:
                 strand, count, came_off = nudge(
-                    field, strand, count, slip, stride, room, worth, strides
+                    field, strand, count, slip, stride, room, worth, steps
                 )
             if came_off:
                 rounds = max(rounds, done + 2)
@@ -227,49 +216,6 @@ def pull(
     strand, count = mend(field, strand, count, slip, room)
     refresh(field, strand, count, settings, 1e30)  # new nodes only
     return strand, count, most
-
-
-@kernel
-def mend(field: Field, strand: Floats, count: int, slip: float, room: int) -> tuple[Floats, int]:
-    """Look again along every edge that may have gone too deep; where it has, its deepest point
-    becomes a node on the surface.
-
-    Parameters
-    ----------
-    room
-        Most nodes that the strand may have. One for every two slips of its length is more than any
-        surface asks for; a strand that is handed over inside a solid could ask for more in every
-        round.
-    """
-    i, budget = 0, min(64 + 2 * count, room - count)
-    while i < count - 1:
-        if strand[i, USED] > 1.0:
-            low, where = look_along(field, strand, i, slip)
-            if low < -slip and budget > 0:
-                mx, my, mz = path_out(field, strand, i, where, slip)
-                if is_there(strand, count, i, mx, my, mz, 0.1 * slip):
-                    i += 1  # nothing is gained by a node upon another
-                    continue
-                strand, count = insert(strand, count, i + 1, mx, my, mz)
-                budget -= 1
-                continue
-        i += 1
-    return strand, count
-
-
-@kernel
-def is_there(
-    strand: Floats, count: int, i: int, x: float, y: float, z: float, reach: float
-) -> bool:
-    """Whether a node about edge i is nearer to a point than `reach`. Not only its ends are asked:
-    in the crease between two solids, out of the one is into the other, and nodes would be put to
-    and fro between the same two places without end."""
-    for j in range(max(0, i - 2), min(count, i + 4)):
-        if (strand[j, X] - x) ** 2 + (strand[j, Y] - y) ** 2 + (
-            strand[j, Z] - z
-        ) ** 2 < reach * reach:
-            return True
-    return False
 
 
 @kernel
@@ -463,83 +409,6 @@ def slide(
         note_motion(strand, count, i, abs(by))
     put_back(strand, was)
     return max(gain, f) * most, max(f, 1e-3)
-
-
-@kernel
-def nudge(
-    field: Field, strand: Floats, count: int, slip: float, stride: float, room: int, worth: float,
-    strides: int,
-) -> tuple[Floats, int, bool]:  # fmt: skip
-    """Take the contacts that the strand turns about sharply sideways, by up to so many strides,
-    where that makes it shorter by what it is worth. Returns (strand, count, whether anything was).
-
-    Over the tip of a corner each contact by itself is held, and a strand that is taut to both sides
-    of the tip lies on a saddle: only all of them together, and across, get off it. And an edge in
-    voxels is uneven: in its notches, millimetres deep, a strand would stay.
-    """
-    i = 1 if field.data[VOXELS] > 0.0 else count  # exact edges and corners need none of it
-    while i < count - 1:
-        j = i
-        while j + 1 < count - 1 and gap(strand, j, j + 1) <= CLOSE * stride:
-            j += 1
-        wx, wy, wz, turned = across(strand, i, j)
-        sharp = False
-        for k in range(i, j + 1):
-            # voxels are uneven everywhere: round parts of them are left to strands that stand still
-            uneven = strand[k, PART] < 0.0 and strides > 1
-            edge = strand[k, SHARP] + abs(strand[k, CONE]) > 0.0
-            sharp = sharp or uneven or edge or not rests(strand, k)
-        if turned and sharp and j < i + TIP:
-            before, kept = strand_length(strand, count), strand[:count].copy()
-            for side in (1.0, -1.0):
-                grown, vx, vy, vz = count, side * wx, side * wy, side * wz
-                for _ in range(strides):
-                    for k in range(i, j + 1):
-                        strand[k, X], strand[k, Y], strand[k, Z] = to_surface(
-                            field, strand[k, X] + stride * vx, strand[k, Y] + stride * vy,
-                            strand[k, Z] + stride * vz, 1e-3 * stride,
-                        )  # fmt: skip
-                        note_motion(strand, grown, k, math.inf)
-                    strand, grown = mend(field, strand, grown, slip, room)
-                    if strand_length(strand, grown) < before - worth:
-                        return strand, grown, True
-                    ux, uy, uz, turned = across(strand, i, j)
-                    if grown != count or not turned:
-                        break
-                    same = 1.0 if ux * vx + uy * vy + uz * vz > 0.0 else -1.0
-                    vx, vy, vz = same * ux, same * uy, same * uz
-                strand[:count] = kept
-        i = j + 1
-    return strand, count, False
-
-
-@kernel
-def across(strand: Floats, i: int, j: int) -> tuple[float, float, float, bool]:
-    """The unit vector across the strand, and along the surface, where it rests on nodes i to j; and
-    whether it turns there by more than `TURNING`."""
-    la, lb = gap(strand, i - 1, i), gap(strand, j, j + 1)
-    if la == 0.0 or lb == 0.0:
-        return 0.0, 0.0, 0.0, False
-    ax, ay, az = (
-        (strand[i, X] - strand[i - 1, X]) / la,
-        (strand[i, Y] - strand[i - 1, Y]) / la,
-        (strand[i, Z] - strand[i - 1, Z]) / la,
-    )
-    bx, by, bz = (
-        (strand[j + 1, X] - strand[j, X]) / lb,
-        (strand[j + 1, Y] - strand[j, Y]) / lb,
-        (strand[j + 1, Z] - strand[j, Z]) / lb,
-    )
-    if ax * bx + ay * by + az * bz > TURNING:
-        return 0.0, 0.0, 0.0, False
-    # out of the surface, and on along it
-    nx, ny, nz = ax - bx, ay - by, az - bz
-    tx, ty, tz = ax + bx, ay + by, az + bz
-    wx, wy, wz = ny * tz - nz * ty, nz * tx - nx * tz, nx * ty - ny * tx
-    length = math.sqrt(wx * wx + wy * wy + wz * wz)
-    if length < 1e-6:
-        return 0.0, 0.0, 0.0, False
-    return wx / length, wy / length, wz / length, True
 
 
 @kernel
