@@ -97,6 +97,14 @@ def _point3(value: Any, most: float = LARGEST) -> tuple[float, ...]:
     return xyz if len(xyz) == 3 else (*xyz, 0.0)
 
 
+def _track_point(value: Any) -> tuple[float, ...]:
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
+    if not isinstance(value, Sequence) or isinstance(value, str) or len(value) != 4:
+        raise ValueError(f"expected [t, x, y, z], got {shown(value)}")
+    return tuple(checked_number(v) for v in value)
+
+
 Name = Annotated[str, BeforeValidator(_name)]
 
 # Validators of two parameters stand behind a lambda: pydantic would hand its own information about
@@ -134,6 +142,14 @@ Point3 = Annotated[
     BeforeValidator(lambda v: _point3(v)),
     WithJsonSchema(POINT3_SCHEMA),
 ]
+
+
+TrackPoint = Annotated[
+    tuple[float, float, float, float],
+    BeforeValidator(lambda v: _track_point(v)),
+    WithJsonSchema({"type": "array", "items": {"type": "number"}, "minItems": 4, "maxItems": 4}),
+]
+"""A time in seconds, and where something is then."""
 
 
 PathPoint = Annotated[

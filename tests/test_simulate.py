@@ -233,7 +233,7 @@ def test_a_dynamic_vehicle_in_a_current_keeps_the_tether_too(planner):
         assert run.summary["exceedance_s"] == 0.0
 
 
-@pytest.mark.parametrize("name", ["basin", "pipes", "jacket"])
+@pytest.mark.parametrize("name", ["basin", "pipes", "jacket", "ship"])
 def test_shipped_missions_are_flown_within_their_tether(name):
     flown = Mission.load(MISSIONS / f"{name}.json")
     flown = flown.model_copy(update={"waypoints": flown.waypoints[:60], "camera": None})

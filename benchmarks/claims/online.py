@@ -129,6 +129,20 @@ def mission(name: str, replan_s: float) -> Iterator[Claim]:
     )
 
 
+def from_a_ship() -> tuple[str, bool]:
+    """The shipped mission whose anchor moves, by both vehicles."""
+    from netsp.online.mission import Mission
+    from netsp.online.simulate import simulate
+
+    there = Mission.load(ROOT / "missions" / "ship.json")
+    shown, good = [], True
+    for vehicle in ("kinematic", "bluerov2"):
+        text, well = safe_and_home(simulate(there, vehicle=vehicle).summary)
+        shown.append(f"{vehicle} {text}")
+        good = good and well
+    return "; ".join(shown), good
+
+
 def flights() -> tuple[str, bool]:
     """Predicted over flown times of recorded flights of exported missions."""
     import flown
@@ -235,6 +249,7 @@ def claims() -> Iterator[Claim]:
     yield Claim("tether: above the taut one among meshes", "0.5 %", meshes)
     yield Claim("tether: drives past thin poles", "none through one", drives)
     yield Claim("BlueROV2 in a current: over the limit; visited", "0.0 s; all", windy)
+    yield Claim("ship: over the limit; visited; tether", SAFE, from_a_ship)
     for name in ("jetty", "hull", "ring", "linked rings", "comb", "tunnel"):
         yield site(name)
     yield Claim("external tour, 30 waypoints: over the limit; visited", "0.0 s; all", external)

@@ -10,6 +10,7 @@ from netsp.online.mission import Mission
 from netsp.online.planner import PLANNERS
 from netsp.online.simulation import STEP
 from netsp.online.tether import TETHERS
+from netsp.online.track import Track
 from netsp.online.vehicle import VEHICLES
 
 FARTHEST = 1000.0
@@ -46,13 +47,25 @@ def check_names(planner: object, vehicle: object, tether: object) -> None:
 def check_size(mission: Mission) -> None:
     """InputError for a mission that would take for ever."""
     places = mission.every_place[1:]
+    track = Track.of(mission)
+    if track is not None:
+        k = int(track.speeds.argmax())
+        if track.speed >= mission.speed:
+            raise InputError(
+                f"track[{k}]: the anchor moves at {track.speed:.3g} m/s, the robot at "
+                f"{mission.speed:g}: it would outrun the tether; expected a slower one"
+            )
+        if track.end / STEP > MOST_STEPS:
+            raise InputError(
+                f"track: its {track.end:g} s take more than {MOST_STEPS:g} steps of {STEP:g} s"
+            )
     far = float(np.abs(places - np.array(mission.anchor)).max())
     if far > FARTHEST * mission.tether_length:
         raise InputError(
             f"waypoints: one is {far:g} from the anchor; expected at most {FARTHEST:g} times the "
             f"tether_length {mission.tether_length:g}: mixed units?"
         )
-    steps = polylines.length(places) / (mission.speed * STEP)
+    steps = polylines.length(places[: len(mission.waypoints) + 1]) / (mission.speed * STEP)
     if steps > MOST_STEPS:
         raise InputError(
             f"speed: {mission.speed:g} takes {steps:.2g} steps of {STEP:g} s for the waypoints; "

@@ -169,6 +169,8 @@ def describe_run(run: Run, units: str) -> str:
             f"(turning {s['friction']['most_turning_deg']:.0f}°), over the limit for "
             f"{s['friction']['over_s']:.1f} s"
         )
+    if s["waited_s"]:
+        lines.append(f"waited   {s['waited_s']:.1f} s for the anchor to come nearer")
     if s["defects"]:
         lines.append(f"defect   planning failed {s['defects']} times; please report the mission")
     if s["coverage"] is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self
 
@@ -13,12 +14,13 @@ from pydantic import (
     Field,
     SerializerFunctionWrapHandler,
     WithJsonSchema,
+    field_validator,
     model_serializer,
 )
 
 from netsp.arrays import Floats
 from netsp.errors import InputError
-from netsp.fields import POINT3_SCHEMA, Name, NonNegative, Number, Point3, Positive
+from netsp.fields import POINT3_SCHEMA, Name, NonNegative, Number, Point3, Positive, TrackPoint
 from netsp.files import FileModel, read_text
 from netsp.models import Model
 from netsp.online.scene.field import DistanceField, pushed_out
@@ -27,6 +29,9 @@ from netsp.online.tether.load import Load
 
 SEA_WATER = 1025.0
 """kg / m^3."""
+
+TURN_TIME = 30.0
+"""Seconds that are given to turn to a heading."""
 
 MOST_DWELL = 86400.0
 """Seconds; a day at one waypoint is taken for a mistake of units."""
@@ -192,6 +197,11 @@ class MissionWaypoint(Model):
         Field(description="seconds to stay there, at that heading"),
     ] = 0.0
 
+    @property
+    def longest_stay(self) -> float:
+        """Seconds that the robot may spend there."""
+        return self.dwell + (0.0 if self.heading is None else TURN_TIME)
+
     @model_serializer(mode="wrap")
     def _plain(self, handler: SerializerFunctionWrapHandler) -> Any:
         """A bare position where there is nothing else to say."""
@@ -244,8 +254,12 @@ class Mission(FileModel):
         Scene file, relative to the mission file.
     anchor : (x, y, z)
         Where the tether is fixed, metres.
+    track : tuple of (t, x, y, z)
+        Where the anchor goes, on a ship or a second vehicle: seconds since the start, ascending,
+        and metres; straight and steady from `anchor` at 0 s on. By default it stays.
     start : (x, y, z)
-        Where the robot starts, and where it comes home to, metres.
+        Where the robot starts, and where it comes home to, metres; with a track, as far from the
+        anchor at the end as at the start where there is room for it, else at the anchor.
     waypoints : tuple of MissionWaypoint
         To be visited in this order; a bare ``[x, y, z]`` is accepted.
     tether_length : float
@@ -291,6 +305,10 @@ class Mission(FileModel):
     start: Annotated[
         Point3, Field(description="(x, y, z) where the robot starts and comes home to, m")
     ]
+    track: Annotated[
+        tuple[TrackPoint, ...],
+        Field(description="(t, x, y, z) of a moving anchor after 0 s, s and m; none: it stays"),
+    ] = ()
     waypoints: Annotated[
         Annotated[tuple[WaypointLike, ...], Field(min_length=1)],
         Field(description="(x, y, z) to reach in this order, m, or objects with more to do there"),
@@ -349,6 +367,18 @@ class Mission(FileModel):
         mission = cls.from_json(read_text(path), source=str(path))
         return mission.model_copy(update={"scene": str(Path(path).parent / mission.scene)})
 
+    @field_validator("track")
+    @classmethod
+    def _in_order(cls, rows: tuple[TrackPoint, ...]) -> tuple[TrackPoint, ...]:
+        times = [0.0, *(row[0] for row in rows)]
+        for k, (before, after) in enumerate(pairwise(times)):
+            if after <= before:
+                raise ValueError(
+                    f"expected ascending times after 0 s, got {after:g} s in row {k} after "
+                    f"{before:g} s"
+                )
+        return rows
+
     @property
     def places(self) -> Floats:
         """(n, 3) where the waypoints are, metres."""
@@ -356,8 +386,9 @@ class Mission(FileModel):
 
     @property
     def every_place(self) -> Floats:
-        """(n + 2, 3) anchor, start and waypoints, metres."""
-        return np.vstack([self.anchor, self.start, self.places])
+        """(n, 3) anchor, start, waypoints, and where a moving anchor goes, metres."""
+        track = np.array(self.track).reshape(-1, 4)[:, 1:]
+        return np.vstack([self.anchor, self.start, self.places, track])
 
     def checked_waypoints(self, field: DistanceField, *, snap: bool = False) -> Self:
         """The mission with every waypoint outside of solids.

@@ -130,8 +130,10 @@ def reorder(
     Raises
     ------
     InputError
-        As of `simulate`.
+        As of `simulate`; a mission whose anchor moves.
     """
+    if mission.track:
+        raise InputError("track: a moving anchor has no one best order; expected a mission without")
     tell = on_progress or (lambda _: None)
     scene = mission.load_scene()
     field = scene.field()

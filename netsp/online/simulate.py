@@ -14,11 +14,11 @@ from netsp.errors import InputError
 from netsp.online.coverage import Coverage, patches_of
 from netsp.online.limits import check_names, check_size
 from netsp.online.log import LogRow, Run
-from netsp.online.mission import Mission, MissionWaypoint
+from netsp.online.mission import TURN_TIME, Mission, MissionWaypoint
 from netsp.online.paths.tree import Grid, ShortestTree
 from netsp.online.paths.tree import taut as taut_path
 from netsp.online.planner import Command, Planner, PlannerOptions, make_planner
-from netsp.online.planner.base import DONE, DWELL, Tethers
+from netsp.online.planner.base import DONE, DWELL, WAIT, Tethers
 from netsp.online.scene.field import DistanceField
 from netsp.online.scene.scene import Scene
 from netsp.online.scene.surfaces import extent
@@ -27,6 +27,7 @@ from netsp.online.simulation import STEP, Simulation
 from netsp.online.stalls import Stalls
 from netsp.online.summary import summarise
 from netsp.online.tether import GeodesicTether, Tether, make_tether
+from netsp.online.track import Track
 from netsp.online.vehicle import make_vehicle
 from netsp.online.vehicle.kinematic import turned
 from netsp.online.water import Water
@@ -35,8 +36,8 @@ CELL, MOST_CELLS = 0.2, 2_000_000
 """Cells of the grid that paths are sought on, metres, where a mission does not say; larger ones
 where there would be more than so many, so that planning takes no longer than a second."""
 
-HEADING_REACH, TURN_TIME = math.radians(5.0), 30.0
-"""A heading this near counts as taken, and so many seconds are given to turn to it."""
+HEADING_REACH = math.radians(5.0)
+"""A heading this near counts as taken."""
 
 STUCK = 600.0
 """Seconds at one waypoint after which it is left out."""
@@ -174,12 +175,17 @@ def simulate(
     """
     check_names(planner, vehicle, tether)
     check_size(mission)
+    track = Track.of(mission)
+    if track is not None and tether != "geodesic":
+        raise InputError(f"track: tether model {tether!r} cannot follow it; expected geodesic")
     scene = scene or mission.load_scene()
     field = field or scene.field()
     mission = mission.checked_waypoints(field, snap=snap)
     tethers = GeodesicTether(field, mission.delta)
     grid = grid_of(mission, scene, field)
     taut = first_tether(mission, field, tethers, grid)
+    if track is not None:
+        track.check(field, mission.delta)
     if taut.length > mission.tether_length:
         raise InputError(
             f"tether_length: {mission.tether_length:g} is shorter than the path from anchor to "
@@ -201,14 +207,14 @@ def simulate(
     if believed is None and not positions.exact:
         believed = tethers
     world = Simulation(mission, field, robot, tethers, taut, water, coverage, believed)
-    world.positions = positions
+    world.positions, world.track = positions, track
     if believed is not None:
         world.believed = first_tether(mission, field, believed, grid)
     since, interrupted, stalls = (0.0, -1), False, Stalls()
     begin = time.perf_counter()
     try:
         while True:
-            before = chosen.index
+            before, chosen.now = chosen.index, world.now
             command = chosen.step(world.robot, world.believed or world.tether)
             row = world.note(chosen, command)
             if on_step is not None:
@@ -217,7 +223,10 @@ def simulate(
                 break
             if chosen.reached and chosen.index > before and chosen.reached[-1] == before:
                 stay(world, chosen, mission.waypoints[before], on_step)
-            if since[1] != chosen.index:
+                if chosen.anchor_moves and world.now > row.time:
+                    chosen.path = chosen.path[:0]  # it was planned for another moment
+                    continue
+            if since[1] != chosen.index or command.mode == WAIT:
                 since = (world.now, chosen.index)
             elif world.now - since[0] > STUCK:
                 chosen.leave_out(f"not reached in {STUCK:g} s")

@@ -13,11 +13,12 @@ from netsp.online.coverage import Coverage
 from netsp.online.log import LogRow
 from netsp.online.mission import Mission
 from netsp.online.planner import Command, Planner
-from netsp.online.planner.base import HOME, Tethers
+from netsp.online.planner.base import DEEPEST, HOME, Tethers
 from netsp.online.scene.field import DistanceField
 from netsp.online.sensing import Positions
 from netsp.online.tether import GeodesicTether, Tether
 from netsp.online.tether.load import Load, payout, pull_on_robot, turning
+from netsp.online.track import Track
 from netsp.online.vehicle import Vehicle
 
 STEP = 0.1
@@ -58,6 +59,8 @@ class Simulation:
         What the planner is told of the robot's position.
     thought : ndarray, shape (3,), optional
         Where it thinks that the robot is, metres.
+    track : Track, optional
+        Where the anchor goes.
     now : float
         Seconds since the start.
     log : list of LogRow
@@ -75,6 +78,7 @@ class Simulation:
     believed: Tether | None = None
     positions: Positions | None = None
     thought: Floats | None = None
+    track: Track | None = None
     now: float = 0.0
     log: list[LogRow] = field(default_factory=list)
     _was: Floats | None = None
@@ -154,7 +158,7 @@ class Simulation:
         moved : bool
             Whether the vehicle could move.
         """
-        robot, yaw = self.vehicle.position, self.vehicle.yaw
+        robot, yaw, moved = self.vehicle.position, self.vehicle.yaw, True
         pull = self._pull()
         self._was = robot
         if heading is not None:
@@ -165,19 +169,28 @@ class Simulation:
             yaw = self._course(path, yaw)
         points, passed = self.vehicle.go(path, STEP, yaw, self.water(self.now), fresh, **pull)
         self.now += STEP
-        if self.scene.distance(np.array(points)).min() < -0.2 * self.tethers.delta:
+        anchor = None if self.track is None else self.track(self.now)
+        if self.scene.distance(np.array(points)).min() < -DEEPEST * self.tethers.delta:
             self.vehicle.stop_at(robot)
-            return passed, False
+            points, passed, moved = [robot], 0, False
         for point in points:
-            self.tether = self.tethers.update(self.tether, point)
+            self.tether = self.tethers.update(self.tether, point, anchor)
         told = points
         if self.positions is not None and not self.positions.exact:
             self.thought = self.positions(self.vehicle.position)
             told = [self.thought]
         if self.model is not None and self.believed is not None:
             for point in told:
-                self.believed = self.model.update(self.believed, point)
-        return passed, True
+                self.believed = self._believed_after(point, anchor)
+        return passed, moved
+
+    def _believed_after(self, point: Floats, anchor: Floats | None) -> Tether:
+        """Another model's tether; anchors move in the geodesic one only."""
+        assert self.model is not None
+        assert self.believed is not None
+        if isinstance(self.model, GeodesicTether):
+            return self.model.update(self.believed, point, anchor)
+        return self.model.update(self.believed, point)
 
     @property
     def robot(self) -> Floats:

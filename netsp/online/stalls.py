@@ -10,7 +10,7 @@ import numpy as np
 
 from netsp.geometry import polylines
 from netsp.online.planner import Command, Planner
-from netsp.online.planner.base import HOLD
+from netsp.online.planner.base import HOLD, WAIT
 from netsp.online.simulation import Simulation
 
 STALL, PROGRESS = 30.0, 0.05
@@ -54,7 +54,10 @@ class Stalls:
         """
         here = world.vehicle.position
         left = polylines.length(np.vstack([here, command.path]))
-        if planner.index != self._index or command.replan_s > 0.0 or left < self._least - PROGRESS:
+        # home may move away as fast as the robot comes after it
+        chasing = command.mode == WAIT or (planner.homeward and planner.anchor_moves)
+        planned = planner.index != self._index or command.replan_s > 0.0
+        if chasing or planned or left < self._least - PROGRESS:
             self._index, self._least, self._since = planner.index, left, world.now
             return False
         if world.now - self._since < STALL or command.mode == HOLD:

@@ -12,7 +12,7 @@ from netsp.geometry import polylines
 from netsp.online.log import LogRow
 from netsp.online.mission import Mission
 from netsp.online.planner import Planner
-from netsp.online.planner.base import DWELL, FREE
+from netsp.online.planner.base import DWELL, FREE, WAIT
 from netsp.online.simulation import STEP, Simulation
 
 
@@ -22,7 +22,8 @@ def summarise(
     """The numbers of a run, as the papers give them.
 
     `exceedance_s` is the time in which more tether must be out than there is: the taut length and
-    what slack and sag add to it (`longest_payout`). `stops` tells of each waypoint visited, with
+    what slack and sag add to it (`longest_payout`). `waited_s` is the
+    time in which the robot waited for a moving anchor. `stops` tells of each waypoint visited, with
     the sum of turning angles and the factor e^(mu theta) that friction multiplies the tension by.
     `recovery_s` is the time to come back to the anchor afterwards, by retracing the tether, or the
     whole path (the paper does not say which). Both, `path` and what was seen are of the inspection;
@@ -82,6 +83,7 @@ def summarise(
         "waypoints": len(mission.waypoints),
         "left_out": [{"waypoint": k, "reason": why} for k, why in planner.left_out],
         "stops": _stops(mission, planner, log),
+        "waited_s": STEP * sum(r.mode == WAIT for r in log),
         "home": _home(planner, world, inspection),
         "defects": len(planner.defects),
         "replans": len(planned),
@@ -97,9 +99,8 @@ def summarise(
 
 def _home(planner: Planner, world: Simulation, since: float) -> dict[str, Any]:
     """How the mission ended: `left` is asked once the tether has come to rest."""
-    assert planner.laid is not None
     model, delta = world.tethers, world.tethers.delta
-    as_laid = model.refine(model.update(planner.laid, world.vehicle.position)).length
+    as_laid = model.refine(model.update(planner.laid_now, world.vehicle.position)).length
     left = max(0.0, model.refine(world.tether).length - as_laid)
     return {
         "reached": planner.home,

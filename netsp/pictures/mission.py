@@ -17,6 +17,7 @@ from netsp.online.scene.scene import Scene
 from netsp.online.scene.surfaces import extent
 from netsp.online.simulate import first_tether, grid_of
 from netsp.online.tether import GeodesicTether, Tether
+from netsp.online.track import Track
 from netsp.pictures import style
 from netsp.pictures.scene import (
     draw_space,
@@ -67,6 +68,10 @@ def save_runs(runs: Sequence[Run], scene: Scene, file: str | Path) -> None:
     axes = right.subplots(len(runs), 1, subplot_kw={"projection": "3d"}, squeeze=False)[:, 0]
     for run, ax in zip(runs, axes, strict=True):
         draw_space(scene, path_of(run), run.tether.nodes, ax=ax)
+        track = Track.of(run.mission)
+        if track is not None:
+            gone = track.between(0.0, run.log[-1].time)
+            ax.plot(*gone.T, color=style.BASE, lw=1.2, ls="--", label="anchor's track")
         ax.set_title(title_of(run), fontsize=9)
         ax.legend(loc="upper left", fontsize=7)
     figure.suptitle(runs[0].mission.name)
@@ -124,8 +129,13 @@ def tethers_along(run: Run, scene: Scene, moments: npt.NDArray[np.int64]) -> lis
     model = GeodesicTether(field, mission.delta)
     state = first_tether(mission, field, model, grid_of(mission, scene, field))
     path, out, at = path_of(run), [], 0
+    track = Track.of(mission)
     for row in moments:
-        state = model.drive(state, path[at : int(row) + 1])[0]
+        if track is None:
+            state = model.drive(state, path[at : int(row) + 1])[0]
+        else:
+            for k in range(at, int(row) + 1):
+                state = model.update(state, path[k], track(run.log[k].time))
         out.append(state)
         at = int(row) + 1
     return out
@@ -157,22 +167,22 @@ def save_page(runs: Sequence[Run], scene: Scene, file: str | Path) -> None:
             trace = mesh_trace(name, vertices, faces)
             trace.showlegend = False
             figure.add_trace(trace, row=1, col=k + 1)
-        figure.add_trace(point_trace("anchor", np.array(run.mission.anchor), style.BASE), 1, k + 1)
         stamps = np.array([r.time for r in run.log])
         rows = np.minimum(np.searchsorted(stamps, times), len(stamps) - 1)
         tethers = tethers_along(run, scene, rows)
         for f, (row, tether) in enumerate(zip(rows, tethers, strict=True)):
             thin = path[: row + 1 : max(1, len(path) // 1500)]
-            trio = [
+            moving = [
                 line_trace("path", thin, style.PATH, 3),
                 line_trace("tether", tether.nodes, style.TETHER, 6),
                 point_trace("robot", path[row], style.ROBOT),
+                point_trace("anchor", tether.anchor, style.BASE),
             ]
             if f == 0:
-                for trace in trio:
+                for trace in moving:
                     numbers.append(len(figure.data))
                     figure.add_trace(trace, row=1, col=k + 1)
-            changing[f] += trio
+            changing[f] += moving
     figure.frames = [
         go.Frame(data=traces, traces=numbers, name=f"{t:.0f}")
         for t, traces in zip(times, changing, strict=True)

@@ -19,6 +19,7 @@ from netsp.online.paths.tree import Grid, Paths, ShortestTree, taut
 from netsp.online.scene.field import DistanceField
 from netsp.online.tether import GeodesicTether, ReactTether, Tether
 from netsp.online.tether.load import Load, payout, payout_along
+from netsp.online.track import Track
 
 Tethers = GeodesicTether | ReactTether
 
@@ -28,11 +29,14 @@ NARROW = 0.1
 FREE = 0.1
 """A tether so many delta longer than as it was laid when the mission began is not free."""
 
+DEEPEST = 0.2
+"""So many delta inside a solid, a robot has met it."""
+
 MOST_HOLDS = 20
 """Steps that a planner may fail at one waypoint before it is left out."""
 
-NORMAL, RECOVERY, DWELL, HOME, HOLD, DONE = (
-    "normal", "recovery", "dwell", "home", "hold", "done",
+NORMAL, RECOVERY, WAIT, DWELL, HOME, HOLD, DONE = (
+    "normal", "recovery", "wait", "dwell", "home", "hold", "done",
 )  # fmt: skip
 
 
@@ -44,7 +48,7 @@ class Command:
     ----------
     path : ndarray, shape (k, 3)
         Points to pass in this order, the first one next; metres.
-    mode : {"normal", "recovery", "dwell", "home", "hold", "done"}
+    mode : {"normal", "recovery", "wait", "dwell", "home", "hold", "done"}
         What the robot is doing.
     replan_s : float
         Seconds of CPU that planning took in this step.
@@ -113,6 +117,8 @@ class Planner:
         Whether the robot is back at the start.
     not_home : str or None
         Why it has given up getting there.
+    now : float
+        Seconds since the start; whoever runs the mission keeps it up to date.
     """
 
     mission: Mission
@@ -129,6 +135,7 @@ class Planner:
     reached: list[int] = field(default_factory=list)
     home: bool = False
     not_home: str | None = None
+    now: float = 0.0
     _held: int = 0
 
     name = "none"
@@ -173,8 +180,39 @@ class Planner:
 
     @property
     def waypoint(self) -> Floats:
-        """(3,) the waypoint that is next; on the way home the start."""
-        return np.array(self.mission.start) if self.homeward else self.mission.places[self.index]
+        """(3,) the waypoint that is next; on the way home where that is."""
+        return self.home_now if self.homeward else self.mission.places[self.index]
+
+    @cached_property
+    def track(self) -> Track | None:
+        """Where a moving anchor goes."""
+        return Track.of(self.mission)
+
+    @property
+    def anchor_moves(self) -> bool:
+        """Whether the anchor is on its way."""
+        return self.track is not None and self.now < self.track.end
+
+    @property
+    def home_now(self) -> Floats:
+        """(3,) the start; of a moving anchor as far from it as when the mission began, where that
+        is in the water and in sight of it, else the anchor."""
+        start = np.array(self.mission.start)
+        if self.track is None:
+            return start
+        anchor = self.track(self.now)
+        home = anchor + start - np.array(self.mission.anchor)
+        room = min(self.mission.clearance, float(self.scene.distance(start)))
+        free = self.scene.distance(home) >= room and self.scene.line_of_sight(anchor, home)
+        return home if free else anchor
+
+    @property
+    def laid_now(self) -> Tether:
+        """The tether as it is to lie at home."""
+        assert self.laid is not None
+        if self.track is None:
+            return self.laid
+        return self.tethers.start(self.track(self.now), self.home_now)
 
     @property
     def homeward(self) -> bool:
@@ -205,6 +243,7 @@ class Planner:
             Where to go.
         """
         self._advance(robot, tether)
+        self._follow_home(robot)
         if self.done:
             return Command(np.array([robot]), DONE)
         begin = time.process_time()
@@ -316,8 +355,7 @@ class Planner:
         ndarray, shape (k, 3)
             From the robot to the start, at the clearance where there is room, metres.
         """
-        assert self.laid is not None
-        line = np.vstack([tether.nodes[::-1], self.laid.nodes[1:]])
+        line = np.vstack([tether.nodes[::-1], self.laid_now.nodes[1:]])
         fine = min(self.grid.cell, NARROW)
         return beside(self.scene, polylines.points_along(line, fine), self.mission.clearance)
 
@@ -418,9 +456,9 @@ class Planner:
     def _advance(self, robot: Floats, tether: Tether) -> None:
         """Past the waypoint, when it is reached at the end of the path."""
         reach = self.mission.reach
-        if self.done:
+        if self.done or self.mode == WAIT or len(self.path) > 1:
             return
-        if len(self.path) <= 1 and np.linalg.norm(self.waypoint - robot) <= reach:
+        if np.linalg.norm(self.waypoint - robot) <= reach:
             if self.homeward:
                 if not self.ends_here(tether):
                     self.path = self.path[:0]
@@ -429,6 +467,13 @@ class Planner:
             else:
                 self.reached.append(self.index)
             self._next()
+
+    def _follow_home(self, robot: Floats) -> None:
+        """The way home ends where that is now; it is planned anew where it cannot be led on."""
+        if not self.homeward or self.track is None or not len(self.path):
+            return
+        last = np.array([self.path[-2] if len(self.path) > 1 else robot, self.waypoint])
+        self.path = np.vstack([self.path[:-1], last[1:]]) if self.is_free(last) else self.path[:0]
 
     def _next(self) -> None:
         self.index += 1

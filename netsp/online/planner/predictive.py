@@ -8,6 +8,7 @@ shortest tether fits (but for the clearance that the robot keeps, and the margin
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
@@ -17,7 +18,7 @@ from netsp.arrays import Floats
 from netsp.geometry import polylines
 from netsp.online.paths.beside import beside
 from netsp.online.paths.tree import ever_tauter, homotopic, roughly_taut, taut
-from netsp.online.planner.base import FREE, HOME, NORMAL, RECOVERY, Planner
+from netsp.online.planner.base import DEEPEST, FREE, HOME, NORMAL, RECOVERY, WAIT, Planner
 from netsp.online.tether import GeodesicTether, Tether
 from netsp.online.tether.load import payout_along, turning
 
@@ -32,6 +33,11 @@ ROUGH = 0.9
 
 COMING_TO_REST = 60
 """Rounds that a tether gets to come free at home."""
+
+CHECK, LAG, TICK = 2.0, 3.0, 0.1
+"""While the anchor moves: seconds between two looks whether the tether still lasts; seconds of the
+anchor's way that are kept in reserve, for a robot that is late; shortest time between two places of
+a look ahead."""
 
 EVERY, MOST_HOMES = 20, 3
 """Steps between two looks whether the tether still comes free on the way home, and how often the
@@ -52,14 +58,20 @@ class PredictivePlanner(Planner):
     _homes: int = 0
     _sure: bool = False
     _looks: int = 0
+    _checked: float = 0.0
 
     name = "predictive"
 
     def plan(self, robot: Floats, tether: Tether) -> bool:
         """One path per waypoint, planned when the robot sets out for it."""
-        if self._planned == self.index and len(self.path) and not self._surprised(tether):
+        if (
+            self._planned == self.index
+            and len(self.path)
+            and not self._surprised(tether)
+            and not self._overtaken(robot, tether)
+        ):
             return False
-        self._planned = self.index
+        self._planned, self._checked = self.index, self.now
         limit = self.limit
         waypoint = self.waypoint
         for end in (waypoint, self._near_enough(robot, waypoint)):
@@ -68,8 +80,11 @@ class PredictivePlanner(Planner):
                 self.path, self.mode = straight[1:], NORMAL
                 return True
         path = self._shortest_feasible(robot, tether, limit)
+        if path is None and self.anchor_moves:
+            self._wait(robot, tether, limit)
+            return True
         if path is None:
-            own = self._own_tether(waypoint)
+            own = self._own_tether(tether.anchor)
             self.leave_out(
                 "no free path to it" if own is None else
                 f"out of reach: it needs {own:.2f} m of tether, the limit is "
@@ -85,7 +100,12 @@ class PredictivePlanner(Planner):
     @property
     def limit(self) -> float:
         """Metres of tether that plans may use."""
-        return self.mission.tether_length * (1.0 - MARGIN) - self.reserve
+        return self.mission.tether_length * (1.0 - MARGIN) - self.reserve - self._anchors_way
+
+    @property
+    def _anchors_way(self) -> float:
+        """Metres of tether kept back for a moving anchor."""
+        return LAG * self.track.speed if self.track is not None and self.anchor_moves else 0.0
 
     @property
     def _kept_back(self) -> str:
@@ -101,6 +121,25 @@ class PredictivePlanner(Planner):
             return False
         self._warned = self.index
         return True
+
+    def _overtaken(self, robot: Floats, tether: Tether) -> bool:
+        """Whether a moving anchor asks for another plan: asked now and then, of a robot that waits
+        always, of others when the tether no longer lasts for what is left of the path."""
+        if self.mode == WAIT and not self.anchor_moves:
+            return True
+        if not self.anchor_moves or self.now < self._checked + CHECK:
+            return False
+        self._checked = self.now
+        limit = self.limit + 0.5 * self._anchors_way
+        return self.mode == WAIT or not self._fits(tether, np.vstack([robot, self.path]), limit)
+
+    def _wait(self, robot: Floats, tether: Tether, limit: float) -> None:
+        """For an anchor that comes nearer: where the robot is, as long as the tether lasts there,
+        else back along the tether, which is shorter by more than the anchor can take it along."""
+        self.path, self.mode = robot[None], WAIT
+        if not self._fits(tether, np.array([robot, robot]), limit, 2.0 * CHECK):
+            way = 2.0 * CHECK * self.mission.speed
+            self.path = polylines.part(self.back_along(tether), 0.0, way)[1:]
 
     def _near_enough(self, robot: Floats, waypoint: Floats) -> Floats:
         """Where on the straight path the waypoint counts as visited: the tether may fit there only.
@@ -118,7 +157,9 @@ class PredictivePlanner(Planner):
         """See `Planner`."""
         self._shortest_feasible(robot, tether, self.limit)
 
-    def _fits(self, tether: Tether, path: Floats, limit: float) -> bool:
+    def _fits(
+        self, tether: Tether, path: Floats, limit: float, staying: float | None = None
+    ) -> bool:
         """Whether the tether stays within the limit all along a path.
 
         A taut tether gets longer by at most the path of its end. So as far as what is left of the
@@ -126,6 +167,12 @@ class PredictivePlanner(Planner):
         add has no such bound: a contact that is lost joins two spans. Then all steps are small.
         """
         self._looks += 1
+        if self._meets_solid(path):
+            return False
+        if self.anchor_moves:
+            if staying is None:
+                staying = 0.0 if self.homeward else self.mission.waypoints[self.index].longest_stay
+            return self._fits_by_the_clock(tether, path, limit, staying)
         if self.loaded:
             return self._fits_under_load(tether, path, limit)
         most = max(limit, tether.length + 1e-6)
@@ -140,16 +187,53 @@ class PredictivePlanner(Planner):
             s = until
         return True
 
+    def _meets_solid(self, path: Floats) -> bool:
+        """Whether a path, pulled over points of a tether that lies in a crease, say, leads into a
+        solid: as deep as ends a flight."""
+        points = polylines.dense(path, self.mission.delta)
+        depth = DEEPEST * self.mission.delta
+        return bool(len(points) and self.scene.distance(points).min() < -depth)
+
     def _fits_under_load(self, tether: Tether, path: Floats, limit: float) -> bool:
         """Whether what must be out, and the sum of turning angles, stay within their limits."""
         points = polylines.dense(path, max(0.5 * self.mission.delta, 0.02))
         if not len(points):
             return True
         _, payouts, turnings = self._model.drive_under(tether, points, self.load)
-        most = max(self.mission.tether.max_turning, turning(tether, self.mission.delta) + 1e-6)
         return bool(
-            payouts.max() <= max(limit, self.payout(tether) + 1e-6) and turnings.max() <= most
+            payouts.max() <= max(limit, self.payout(tether) + 1e-6)
+            and turnings.max() <= self._most_turning(tether)
         )
+
+    def _fits_by_the_clock(
+        self, tether: Tether, path: Floats, limit: float, staying: float
+    ) -> bool:
+        """As `_fits`, with both ends of the tether on their way, and for the time that the robot
+        then stays. A taut tether gets longer by at most what both travel."""
+        track, speed = self.track, self.mission.speed
+        assert track is not None
+        most, turns = max(limit, self.payout(tether) + 1e-6), self._most_turning(tether)
+        far = polylines.length(path)
+        whole, at, out = far / speed + staying, 0.0, self.payout(tether)
+        while at < whole - 1e-9:
+            step = TICK if self.loaded else max(TICK, (most - out) / (speed + track.speed))
+            until = min(whole, at + step)
+            for place in track.between(self.now + at, self.now + until)[1:]:
+                tether = self._model.update(tether, tether.robot, place)
+            if speed * at < far:
+                part = polylines.part(path, speed * at, min(far, speed * until))
+                tether, _ = self._model.drive(tether, part[1:])
+            at, out = until, self.payout(tether)
+            if out > most or turning(tether, self.mission.delta) > turns:
+                return False
+        return True
+
+    def _most_turning(self, tether: Tether) -> float:
+        """Sum of turning angles that plans may use, radians: what it is now if that is more."""
+        most = self.mission.tether.max_turning
+        if math.isinf(most):
+            return most
+        return max(most, turning(tether, self.mission.delta) + 1e-6)
 
     def _shortest_feasible(self, robot: Floats, tether: Tether, limit: float) -> Floats | None:
         """The shortest path on which the tether fits: on from the robot, or back along the tether
@@ -190,7 +274,8 @@ class PredictivePlanner(Planner):
                 break
             on = onward[last]
             assert on is not None
-            if self._over_the_limit(np.vstack([taken_back(last), on[1:]]), limit):
+            nearer = self._nearer_by(length)
+            if self._over_the_limit(np.vstack([taken_back(last), on[1:]]), limit + nearer):
                 continue
             path = self.pulled(rough)
             length = polylines.length(path)
@@ -203,6 +288,12 @@ class PredictivePlanner(Planner):
             if found is not None:
                 best, least = found, polylines.length(found)
         return best
+
+    def _nearer_by(self, way: float) -> float:
+        """Metres that the anchor may have come nearer when the robot has gone a way."""
+        if self.track is None or not self.anchor_moves:
+            return 0.0
+        return self.track.travelled(self.now, self.now + way / self.mission.speed)
 
     @property
     def _looked_enough(self) -> bool:
@@ -229,8 +320,13 @@ class PredictivePlanner(Planner):
     def plan_home(self, robot: Floats, tether: Tether) -> bool:
         """The shortest path home on which the tether fits and at whose end it is free: that of the
         class back along the tether, pulled as far as both hold."""
-        if len(self.path) and not self._led_astray(robot, tether):
+        if (
+            len(self.path)
+            and not self._led_astray(robot, tether)
+            and not self._overtaken(robot, tether)
+        ):
             return False
+        self._checked = self.now
         limit = self.limit
         # the shortest path of all will do where it happens to free the tether
         direct = self.paths(robot[None]).path(0)
@@ -260,8 +356,7 @@ class PredictivePlanner(Planner):
 
     def ends_here(self, tether: Tether) -> bool:
         """At home with the tether not free, the robot goes back along it and comes home again."""
-        assert self.laid is not None
-        here = self._model.update(self.laid, tether.robot)
+        here = self._model.update(self.laid_now, tether.robot)
         length = self._model.relaxed(tether.nodes, COMING_TO_REST).length
         if length <= here.length + FREE * self.mission.delta or self._homes >= MOST_HOMES:
             return True
@@ -270,10 +365,9 @@ class PredictivePlanner(Planner):
 
     def _comes_free(self, tether: Tether, path: Floats) -> bool:
         """Whether the tether lies at the end of a path as at the start of the mission."""
-        assert self.laid is not None
         points = polylines.dense(path, 5.0 * self.grid.cell)
         end = self._model.relaxed(self._model.drive(tether, points)[0].nodes, COMING_TO_REST)
-        return end.length <= self.laid.length + FREE * self.mission.delta
+        return end.length <= self.laid_now.length + FREE * self.mission.delta
 
     def _roughly_pulled(self, path: Floats) -> Floats:
         return roughly_taut(self.scene, path, self.mission.clearance, self.mission.delta)
@@ -313,9 +407,9 @@ class PredictivePlanner(Planner):
                 break
         return length > limit
 
-    def _own_tether(self, waypoint: Floats) -> float | None:
-        """What the shortest tether from the anchor to a place must be out."""
-        tree = self.paths(np.array([self.mission.anchor]))
+    def _own_tether(self, anchor: Floats) -> float | None:
+        """What the shortest tether from the anchor to the waypoint must be out."""
+        tree = self.paths(anchor[None])
         path = tree.path(0)
         return (
             None
