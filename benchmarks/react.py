@@ -14,7 +14,8 @@ import numpy as np
 from table import head, heading, row
 
 from netsp.online import Scene
-from netsp.online.mission import Camera, Mission
+from netsp.online.equipment import Camera
+from netsp.online.mission import Mission
 from netsp.online.planner import PlannerOptions
 from netsp.online.simulate import simulate
 

@@ -8,7 +8,7 @@ import pytest
 from netsp import InputError
 from netsp.online import Scene
 from netsp.online.coverage import Coverage, divided, patches_of
-from netsp.online.mission import Camera
+from netsp.online.equipment import Camera
 
 BALL = {"name": "ball", "sphere": {"center": [0, 0, 0], "radius": 1.0}}
 PLACES = np.array([[-5.0, -5, -5], [5, 5, 5]])

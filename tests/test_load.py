@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 from netsp import InputError
 from netsp.online import GeodesicTether
-from netsp.online.mission import Mission, TetherPhysics
+from netsp.online.equipment import TetherPhysics
+from netsp.online.mission import Mission
 from netsp.online.simulate import simulate
 from netsp.online.tether.load import payout, payout_along, pull_on_robot, turning
 from tests.test_simulate import POST, ring

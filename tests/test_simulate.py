@@ -16,8 +16,9 @@ from netsp import InputError
 from netsp.command.main import main
 from netsp.geometry import polylines
 from netsp.online import Scene
+from netsp.online.equipment import PositionSensor
 from netsp.online.log import describe_run
-from netsp.online.mission import Mission, PositionSensor
+from netsp.online.mission import Mission
 from netsp.online.paths.tree import STEPS, Grid, ShortestTree, grow, states_of, taut
 from netsp.online.planner import PLANNERS
 from netsp.online.scene.field import pushed_out

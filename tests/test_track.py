@@ -116,7 +116,9 @@ def test_the_dynamic_vehicle_follows_a_ship_in_a_current():
 def test_home_is_beside_the_ship_where_there_is_room_and_else_the_ship():
     run = fly(AMONG[:1], [(60, 8, -6, 0)])
     last = run.log[-1]
-    assert np.allclose((last.x, last.y, last.z), run.tether.anchor + np.array([0.0, 1.0, 0.0]), atol=0.1)
+    assert np.allclose(
+        (last.x, last.y, last.z), run.tether.anchor + np.array([0.0, 1.0, 0.0]), atol=0.1
+    )
     beside = fly(AMONG[:1], [(20, 0, -4.3, 0)])  # a metre on there is a pile
     last = beside.log[-1]
     assert np.allclose((last.x, last.y, last.z), (0, -4.3, 0), atol=0.1)

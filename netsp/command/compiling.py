@@ -58,7 +58,8 @@ def steps() -> Iterator[tuple[str, Callable[[], object]]]:
     from netsp.execute import execute
     from netsp.judge import verify
     from netsp.online import ReactTether, Scene
-    from netsp.online.mission import Mission, TetherPhysics
+    from netsp.online.equipment import TetherPhysics
+    from netsp.online.mission import Mission
     from netsp.online.simulate import simulate
     from netsp.problem import Problem
     from netsp.solvers.solve import solve

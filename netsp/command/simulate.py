@@ -61,6 +61,10 @@ def arguments(p: argparse.ArgumentParser) -> None:
         help="random seed of gusts and of sampling planners; default 0",
     )
     p.add_argument("--compare", metavar="NAME", help="also fly with this planner, for comparison")
+    p.add_argument(
+        "--surprise", metavar="FILE",
+        help="surprise file (JSON): solids that appear, vanish or move",
+    )  # fmt: skip
     p.add_argument("--snap", action="store_true", help="move waypoints out of solids")
     p.add_argument(
         "-o",
@@ -81,6 +85,7 @@ def run(args: argparse.Namespace) -> int:
     from netsp.online.mission import Mission
     from netsp.online.planner import PLANNERS, PlannerOptions
     from netsp.online.simulate import simulate
+    from netsp.online.surprises import SceneSurprises
     from netsp.online.tether import GeodesicTether
 
     mission = Mission.load(args.mission)
@@ -93,11 +98,14 @@ def run(args: argparse.Namespace) -> int:
     check_names(args.planner, args.vehicle, args.tether_model)
     if args.compare is not None and args.compare not in PLANNERS:
         raise InputError(f"--compare: expected {', '.join(PLANNERS)}, got {args.compare!r}")
+    surprises = SceneSurprises.load(args.surprise) if args.surprise else None
     show = not args.quiet and sys.stderr.isatty()
     runs = []
     messages = nullcontext() if args.quiet else compile_messages(sys.stderr)
     with output_folder(args.output), messages:
         scene = mission.load_scene()
+        if surprises is not None:
+            surprises.check(scene, args.surprise)
         field = scene.field(on_progress=tell)
         if not args.quiet:
             warn_of_thin(GeodesicTether(field, mission.delta), "lower the mission's delta")
@@ -106,6 +114,7 @@ def run(args: argparse.Namespace) -> int:
                 mission, planner, vehicle=args.vehicle, tether=args.tether_model,
                 options=PlannerOptions(args.paths, args.refine, args.seed),
                 scene=scene, field=field, snap=args.snap, seed=args.seed,
+                surprises=surprises,
                 on_step=show_mission(mission, scene.units) if show else None,
             )  # fmt: skip
             runs.append(run)
@@ -122,7 +131,8 @@ def run(args: argparse.Namespace) -> int:
         write_run(runs[0], args.output)
         if len(runs) > 1:
             write_run(runs[1], Path(args.output) / runs[1].planner)
-        draw_runs(runs, scene, Path(args.output))
+        there = scene if surprises is None else surprises.after(scene)
+        draw_runs(runs, there, Path(args.output))
     if any(r.summary["defects"] for r in runs):
         return EXIT_DEFECT
     s = runs[0].summary

@@ -42,3 +42,13 @@ def part(path: Floats, start: float, end: float) -> Floats:
     s = along(path)
     ends = np.column_stack([np.interp([start, end], s, path[:, k]) for k in range(path.shape[1])])
     return np.vstack([ends[:1], path[(s > start) & (s < end)], ends[1:]])
+
+
+def distance(path: Floats, point: Floats) -> float:
+    """Least distance of a point from a path (n, 3)."""
+    if len(path) == 1:
+        return float(np.linalg.norm(path[0] - point))
+    begin, step = path[:-1], np.diff(path, axis=0)
+    along = ((point - begin) * step).sum(1) / np.maximum((step * step).sum(1), 1e-300)
+    nearest = begin + np.clip(along, 0.0, 1.0)[:, None] * step
+    return float(np.linalg.norm(nearest - point, axis=1).min())

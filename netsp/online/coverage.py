@@ -16,7 +16,7 @@ import numpy as np
 from netsp.arrays import Bools, Floats, Ints
 from netsp.compiled.kernel import kernel
 from netsp.errors import InputError
-from netsp.online.mission import Camera
+from netsp.online.equipment import Camera
 from netsp.online.scene.field import DistanceField
 from netsp.online.scene.sampling import Field, lowest_along
 from netsp.online.scene.scene import Scene

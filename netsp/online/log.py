@@ -169,6 +169,15 @@ def describe_run(run: Run, units: str) -> str:
             f"(turning {s['friction']['most_turning_deg']:.0f}°), over the limit for "
             f"{s['friction']['over_s']:.1f} s"
         )
+    if s["surprises"] is not None:
+        found = s["surprises"]
+        lines.append(
+            f"surprise {found['happened']} events happened"
+            + (f", {found['held_back']} had no room" if found["held_back"] else "")
+            + (f"; the sensor found {found['found']} solids" if found["found"] else "")
+        )
+    if s["contacts"]:
+        lines.append(f"contact  with solids: {s['contacts']} times")
     if s["waited_s"]:
         lines.append(f"waited   {s['waited_s']:.1f} s for the anchor to come nearer")
     if s["defects"]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from netsp.arrays import Floats
-from netsp.online.mission import PositionSensor
+from netsp.online.equipment import PositionSensor
 from netsp.online.scene.field import DistanceField, pushed_out
 
 TRUST = 0.25

@@ -26,6 +26,8 @@ from netsp.online.sensing import Positions
 from netsp.online.simulation import STEP, Simulation
 from netsp.online.stalls import Stalls
 from netsp.online.summary import summarise
+from netsp.online.surprises import SceneSurprises
+from netsp.online.surroundings import Surroundings
 from netsp.online.tether import GeodesicTether, Tether, make_tether
 from netsp.online.track import Track
 from netsp.online.vehicle import make_vehicle
@@ -130,6 +132,7 @@ def simulate(
     scene: Scene | None = None,
     field: DistanceField | None = None,
     snap: bool = False,
+    surprises: SceneSurprises | None = None,
     seed: int = 0,
     on_step: Callable[[LogRow, Planner], None] | None = None,
 ) -> Run:
@@ -156,8 +159,10 @@ def simulate(
         When it is at hand.
     snap : bool
         Move waypoints out of solids.
+    surprises : SceneSurprises, optional
+        In what the water differs from the map, and when.
     seed : int
-        Of the gusts.
+        Of the gusts, and of the sensors' noise.
     on_step : callable, optional
         Called with every row and the planner; a KeyboardInterrupt ends the run, and what was done
         till then is returned.
@@ -176,6 +181,8 @@ def simulate(
     check_names(planner, vehicle, tether)
     check_size(mission)
     track = Track.of(mission)
+    if surprises is not None and tether != "geodesic":
+        raise InputError(f"surprises: tether model {tether!r} has one map only; expected geodesic")
     if track is not None and tether != "geodesic":
         raise InputError(f"track: tether model {tether!r} cannot follow it; expected geodesic")
     scene = scene or mission.load_scene()
@@ -184,6 +191,8 @@ def simulate(
     tethers = GeodesicTether(field, mission.delta)
     grid = grid_of(mission, scene, field)
     taut = first_tether(mission, field, tethers, grid)
+    if surprises is not None:
+        surprises.check(scene)
     if track is not None:
         track.check(field, mission.delta)
     if taut.length > mission.tether_length:
@@ -210,11 +219,19 @@ def simulate(
     world.positions, world.track = positions, track
     if believed is not None:
         world.believed = first_tether(mission, field, believed, grid)
+    around = None
+    if surprises is not None:
+        around = Surroundings(
+            mission, scene, scene.voxels(), surprises, np.vstack([taut.nodes, robot.position]), seed
+        )
+        world.model, world.believed = tethers, taut
     since, interrupted, stalls = (0.0, -1), False, Stalls()
     begin = time.perf_counter()
     try:
         while True:
             before, chosen.now = chosen.index, world.now
+            if around is not None:
+                around.go_on(world, chosen)
             command = chosen.step(world.robot, world.believed or world.tether)
             row = world.note(chosen, command)
             if on_step is not None:
@@ -245,6 +262,7 @@ def simulate(
     wall = time.perf_counter() - begin
     summary = summarise(mission, chosen, world, wall, interrupted)
     summary["stalls"] = stalls.found
+    summary["surprises"] = None if around is None else around.told()
     return Run(
         mission,
         planner if isinstance(planner, str) else chosen.name,

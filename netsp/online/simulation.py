@@ -14,7 +14,7 @@ from netsp.online.log import LogRow
 from netsp.online.mission import Mission
 from netsp.online.planner import Command, Planner
 from netsp.online.planner.base import DEEPEST, HOME, Tethers
-from netsp.online.scene.field import DistanceField
+from netsp.online.scene.field import DistanceField, pushed_out
 from netsp.online.sensing import Positions
 from netsp.online.tether import GeodesicTether, Tether
 from netsp.online.tether.load import Load, payout, pull_on_robot, turning
@@ -63,6 +63,8 @@ class Simulation:
         Where the anchor goes.
     now : float
         Seconds since the start.
+    contacts : int
+        How often the robot has met a solid.
     log : list of LogRow
         One row per step.
     """
@@ -80,6 +82,7 @@ class Simulation:
     thought: Floats | None = None
     track: Track | None = None
     now: float = 0.0
+    contacts: int = 0
     log: list[LogRow] = field(default_factory=list)
     _was: Floats | None = None
 
@@ -173,6 +176,7 @@ class Simulation:
         if self.scene.distance(np.array(points)).min() < -DEEPEST * self.tethers.delta:
             self.vehicle.stop_at(robot)
             points, passed, moved = [robot], 0, False
+            self.contacts += 1
         for point in points:
             self.tether = self.tethers.update(self.tether, point, anchor)
         told = points
@@ -189,6 +193,8 @@ class Simulation:
         assert self.model is not None
         assert self.believed is not None
         if isinstance(self.model, GeodesicTether):
+            # a map that is wrong may have a solid where the robot is
+            point = pushed_out(self.model.field, point[None], 0.0)[0]
             return self.model.update(self.believed, point, anchor)
         return self.model.update(self.believed, point)
 

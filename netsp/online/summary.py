@@ -25,6 +25,7 @@ def summarise(
     what slack and sag add to it (`longest_payout`). `waited_s` is the
     time in which the robot waited for a moving anchor. `stops` tells of each waypoint visited, with
     the sum of turning angles and the factor e^(mu theta) that friction multiplies the tension by.
+    `contacts` counts how often the robot met a solid.
     `recovery_s` is the time to come back to the anchor afterwards, by retracing the tether, or the
     whole path (the paper does not say which). Both, `path` and what was seen are of the inspection;
     `home` tells of the leg back to the start that follows it: whether it was `reached` with the
@@ -81,6 +82,7 @@ def summarise(
         "friction": _friction(mission, turnings),
         "visited": len(planner.reached),
         "waypoints": len(mission.waypoints),
+        "contacts": world.contacts,
         "left_out": [{"waypoint": k, "reason": why} for k, why in planner.left_out],
         "stops": _stops(mission, planner, log),
         "waited_s": STEP * sum(r.mode == WAIT for r in log),

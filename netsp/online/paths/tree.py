@@ -7,6 +7,7 @@ need be (26 directions); pulled taut as a tether it is the shortest of its class
 from __future__ import annotations
 
 from collections.abc import Iterator
+from copy import copy
 from typing import Protocol
 
 import numpy as np
@@ -74,7 +75,26 @@ class Grid:
         self.free = free_cells(
             field.arrays, self.low, cell, (int(shape[0]), int(shape[1]), int(shape[2])), clearance
         )
-        self.states = states_of(self.free)
+        self._states: npt.NDArray[np.uint8] | None = None
+
+    def over(self, field: DistanceField, box: Floats) -> Grid:
+        """The same cells in a scene that is another within a box (2, 3)."""
+        room = self.clearance + self.cell
+        first, last = self.index(box[0] - room), self.index(box[1] + room) + 1
+        nx, ny, nz = (int(s) for s in last - first)
+        new = copy(self)
+        new.field, new.free, new._states = field, self.free.copy(), None
+        new.free[tuple(slice(a, b) for a, b in zip(first, last, strict=True))] = free_cells(
+            field.arrays, self.low + self.cell * first, self.cell, (nx, ny, nz), self.clearance
+        )
+        return new
+
+    @property
+    def states(self) -> npt.NDArray[np.uint8]:
+        """Of `states_of`."""
+        if self._states is None:
+            self._states = states_of(self.free)
+        return self._states
 
     def index(self, points: npt.ArrayLike) -> npt.NDArray[np.int64]:
         """Cells (..., 3) of points (..., 3), the nearest within the box."""

@@ -32,6 +32,9 @@ FREE = 0.1
 DEEPEST = 0.2
 """So many delta inside a solid, a robot has met it."""
 
+ROOM = 0.7
+"""Of the clearance, that a path must keep when the map changes."""
+
 MOST_HOLDS = 20
 """Steps that a planner may fail at one waypoint before it is left out."""
 
@@ -119,6 +122,10 @@ class Planner:
         Why it has given up getting there.
     now : float
         Seconds since the start; whoever runs the mission keeps it up to date.
+    caught : float
+        Metres of tether that are out beyond what the map explains.
+    trail : ndarray, shape (n, 3)
+        The way that the tether was laid along, where it is known.
     """
 
     mission: Mission
@@ -136,6 +143,8 @@ class Planner:
     home: bool = False
     not_home: str | None = None
     now: float = 0.0
+    caught: float = 0.0
+    trail: Floats = field(default_factory=lambda: np.zeros((0, 3)))
     _held: int = 0
 
     name = "none"
@@ -259,6 +268,46 @@ class Planner:
         if self.done:
             return Command(np.array([robot]), DONE, spent)
         return Command(self.path if len(self.path) else np.array([robot]), self.mode, spent)
+
+    def take_map(
+        self, scene: DistanceField, tethers: Tethers, box: Floats, robot: Floats, tether: Tether
+    ) -> None:
+        """Go by another map from now on. A path that no longer keeps off solids is forgotten.
+
+        Parameters
+        ----------
+        scene : DistanceField
+            The map.
+        tethers : TetherModel
+            The tether model in it.
+        box : ndarray, shape (2, 3)
+            Within which it is another, metres.
+        robot : ndarray, shape (3,)
+            Position of the robot, metres.
+        tether : Tether
+            The tether in it.
+        """
+        del tether
+        self.scene, self.tethers, self.grid = scene, tethers, self.grid.over(scene, box)
+        if not len(self.path):
+            return
+        line = polylines.dense(np.vstack([robot, self.path]), 0.5 * self.grid.cell)
+        room = min(self.mission.clearance, float(scene.distance(robot)))
+        if len(line) and scene.distance(line).min() < ROOM * room:
+            self.path = self.path[:0]
+
+    def hear_of_payout(self, more: float, trail: Floats) -> None:
+        """How much more tether is out than the map explains.
+
+        Parameters
+        ----------
+        more : float
+            Metres; something that is not on the map has caught the tether.
+        trail : ndarray, shape (n, 3)
+            The way from the anchor to the robot on which the tether was laid: whoever goes back
+            along it frees the tether of whatever has caught it.
+        """
+        self.caught, self.trail = more, trail
 
     def _hold(self, robot: Floats, error: Exception, spent: float) -> Command:
         """Stay, and try again at the next step; leave the waypoint out after a while."""

@@ -18,7 +18,18 @@ from netsp.arrays import Floats
 from netsp.geometry import polylines
 from netsp.online.paths.beside import beside
 from netsp.online.paths.tree import ever_tauter, homotopic, roughly_taut, taut
-from netsp.online.planner.base import DEEPEST, FREE, HOME, NORMAL, RECOVERY, WAIT, Planner
+from netsp.online.planner.base import (
+    DEEPEST,
+    FREE,
+    HOME,
+    NARROW,
+    NORMAL,
+    RECOVERY,
+    WAIT,
+    Planner,
+    Tethers,
+)
+from netsp.online.scene.field import DistanceField
 from netsp.online.tether import GeodesicTether, Tether
 from netsp.online.tether.load import payout_along, turning
 
@@ -38,6 +49,10 @@ CHECK, LAG, TICK = 2.0, 3.0, 0.1
 """While the anchor moves: seconds between two looks whether the tether still lasts; seconds of the
 anchor's way that are kept in reserve, for a robot that is late; shortest time between two places of
 a look ahead."""
+
+UNKNOWN, CAUGHT = 0.2, 0.1
+"""Metres of tether kept in reserve where the map may be wrong, and how much more of it than planned
+for makes another plan."""
 
 EVERY, MOST_HOMES = 20, 3
 """Steps between two looks whether the tether still comes free on the way home, and how often the
@@ -59,6 +74,7 @@ class PredictivePlanner(Planner):
     _sure: bool = False
     _looks: int = 0
     _checked: float = 0.0
+    _caught_before: float = 0.0
 
     name = "predictive"
 
@@ -100,7 +116,13 @@ class PredictivePlanner(Planner):
     @property
     def limit(self) -> float:
         """Metres of tether that plans may use."""
-        return self.mission.tether_length * (1.0 - MARGIN) - self.reserve - self._anchors_way
+        return self.mission.tether_length * (1.0 - MARGIN) - self._kept
+
+    @property
+    def _kept(self) -> float:
+        """Metres of tether kept back: for positions, a moving anchor, what is not on the map."""
+        unknown = 0.0 if self.mission.range_sensor is None else UNKNOWN
+        return self.reserve + self._anchors_way + self.caught + unknown
 
     @property
     def _anchors_way(self) -> float:
@@ -109,7 +131,7 @@ class PredictivePlanner(Planner):
 
     @property
     def _kept_back(self) -> str:
-        return f", of which {self.reserve:.2f} m are kept in reserve" if self.reserve else ""
+        return f", of which {self._kept:.2f} m are kept in reserve" if self._kept else ""
 
     def _surprised(self, tether: Tether) -> bool:
         """Whether half of the reserve is used up, as in a current: said once for each waypoint."""
@@ -147,6 +169,23 @@ class PredictivePlanner(Planner):
         path = waypoint - robot
         far = float(np.linalg.norm(path))
         return waypoint - path * min(1.0, 0.8 * self.mission.reach / max(far, 1e-12))
+
+    def take_map(
+        self, scene: DistanceField, tethers: Tethers, box: Floats, robot: Floats, tether: Tether
+    ) -> None:
+        """See `Planner`; a path on which the tether no longer fits is forgotten, too."""
+        super().take_map(scene, tethers, box, robot, tether)
+        self._sure = False
+        if len(self.path) and not self._fits(tether, np.vstack([robot, self.path]), self.limit):
+            self.path = self.path[:0]
+
+    def hear_of_payout(self, more: float, trail: Floats) -> None:
+        """See `Planner`; a path that was planned for less tether is forgotten."""
+        if more > self._caught_before + CAUGHT:
+            self._caught_before = more
+            self.path = self.path[:0]
+        self._caught_before = min(self._caught_before, more)
+        super().hear_of_payout(more, trail)
 
     @property
     def _model(self) -> GeodesicTether:
@@ -327,6 +366,12 @@ class PredictivePlanner(Planner):
         ):
             return False
         self._checked = self.now
+        if self.caught > CAUGHT:
+            back = polylines.points_along(self.trail[::-1], min(self.grid.cell, NARROW))
+            back = np.vstack([back, self.laid_now.nodes[1:]])
+            if self.scene.distance(back).min() > DEEPEST * self.mission.delta:
+                self.path, self.mode, self._sure = back[1:], HOME, False
+                return True
         limit = self.limit
         # the shortest path of all will do where it happens to free the tether
         direct = self.paths(robot[None]).path(0)
@@ -356,6 +401,9 @@ class PredictivePlanner(Planner):
 
     def ends_here(self, tether: Tether) -> bool:
         """At home with the tether not free, the robot goes back along it and comes home again."""
+        if self.caught > CAUGHT and self._homes < MOST_HOMES:
+            self._homes += 1
+            return False
         here = self._model.update(self.laid_now, tether.robot)
         length = self._model.relaxed(tether.nodes, COMING_TO_REST).length
         if length <= here.length + FREE * self.mission.delta or self._homes >= MOST_HOMES:

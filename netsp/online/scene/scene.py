@@ -299,20 +299,58 @@ class Scene(FileModel):
             raise InputError(
                 f"{self.name}: the scene is empty; expected solids, mesh, cloud or floor"
             )
+        grid = self.voxels(voxel=voxel, memory_limit=memory_limit, on_progress=on_progress)
+        return self.field_with(solids, grid)
+
+    def field_with(self, solids: tuple[Solid, ...], grid: VoxelGrid | None) -> DistanceField:
+        """The field of other solids about the same voxels.
+
+        Parameters
+        ----------
+        solids : tuple of Solid
+            Instead of the scene's.
+        grid : VoxelGrid or None
+            Of `voxels`.
+
+        Returns
+        -------
+        DistanceField
+            The field.
+        """
         kind, rows, outline = encode(solids)
-        grid = self._voxels(voxel, memory_limit, on_progress)
         boxes = [b for s in solids if (b := s.shape.box()) is not None]
         return DistanceField.build(
             kind, rows, outline, boxes, grid, self.tether_radius, _thickness(solids)
         )
 
-    def _voxels(
+    def voxels(
         self,
-        voxel: float | None,
-        memory_limit: float,
-        on_progress: Callable[[str, float], None] | None,
+        *,
+        voxel: float | None = None,
+        memory_limit: float = 4.0,
+        on_progress: Callable[[str, float], None] | None = None,
     ) -> VoxelGrid | None:
-        """Distances to what no solid describes; None where there is none of it."""
+        """Distances to what no solid describes.
+
+        Parameters
+        ----------
+        voxel : float, optional
+            As of `field`.
+        memory_limit : float
+            As of `field`.
+        on_progress : callable, optional
+            As of `field`.
+
+        Returns
+        -------
+        VoxelGrid or None
+            None where there is none of it.
+
+        Raises
+        ------
+        InputError
+            Unreadable files, a grid that is too large.
+        """
         if self.mesh is None and self.cloud is None and self.floor is None:
             return None
         from netsp.online.scene import voxels
