@@ -214,3 +214,19 @@ def test_more_memory_than_allowed_is_refused_with_voxels_that_fit(sparse):
     better = float(str(error.value).split("voxels of ")[-1].split(" or")[0])
     assert 0.004 < better < 0.05
     assert sparse(lambda: build(better)).table is not None
+
+
+@pytest.mark.parametrize("kind", ["full", "sparse"])
+def test_the_voxels_of_a_field_make_the_same_field_again(kind, sparse):
+    mesh = boxes(5)
+
+    def build():
+        return voxels.of_triangles(mesh.vertices, mesh.faces, voxel=VOXEL)
+
+    grid = sparse(build) if kind == "sparse" else build()
+    one = field(grid)
+    again = one.voxels
+    assert again.counts == tuple(grid.counts)
+    assert again.voxel == pytest.approx(grid.voxel)
+    p = around(mesh, 2000)
+    assert np.array_equal(field(again).distance(p), one.distance(p))

@@ -222,7 +222,7 @@ def simulate(
     around = None
     if surprises is not None:
         around = Surroundings(
-            mission, scene, scene.voxels(), surprises, np.vstack([taut.nodes, robot.position]), seed
+            mission, scene, field.voxels, surprises, np.vstack([taut.nodes, robot.position]), seed
         )
         world.model, world.believed = tethers, taut
     since, interrupted, stalls = (0.0, -1), False, Stalls()

@@ -32,9 +32,9 @@ THROUGH, PASSED = 0.1, 5
 """Metres that a ray goes on inside a solid of the map, and how many such rays of one look show that
 it is not there."""
 
-RECALL, EXPLAINED = 50, 0.03
-"""Steps between two moments at which the tether is remembered, and metres within which a tether
-explains what is out."""
+RECALL, MOST_MOMENTS, EXPLAINED = 50, 40, 0.03
+"""Steps between two moments at which the tether is remembered, and how many of these at most (of
+more, every other one is forgotten); metres within which a tether explains what is out."""
 
 TRAIL, TAKEN_UP = 0.1, 0.9
 """Metres between points of the robot's trail, and how near to the last but one, as a share of them,
@@ -63,23 +63,23 @@ class Sighting:
         Sum of the errors of what they measured, metres.
     mapped : Solid or None
         As it is on the map.
+    placed_by : int
+        Rays that its place on the map is the mean of.
     """
 
     solid: Solid
     count: int = 0
     off: Floats = field(default_factory=lambda: np.zeros(3))
     mapped: Solid | None = None
+    placed_by: int = 0
 
     def place(self) -> bool:
         """Put it on the map where the rays say; whether that is another place than before."""
-        known = 0 if self.mapped is None else self.placed_by
-        if self.count < max(MET, 4 * known):
+        if self.count < max(MET, 4 * self.placed_by):
             return False
         x, y, z = (self.off / self.count).tolist()
         self.mapped, self.placed_by = moved(self.solid, (x, y, z)), self.count
         return True
-
-    placed_by: int = 0
 
 
 class Surroundings:
@@ -146,6 +146,8 @@ class Surroundings:
             elif self._steps % RECALL == 0:
                 self.moments.append((world.believed.nodes.copy(), len(self.trail)))
                 self.times.append(world.now)
+                if len(self.moments) > MOST_MOMENTS:
+                    self.moments, self.times = self.moments[1::2], self.times[1::2]
             planner.hear_of_payout(max(0.0, more), self.trail)
 
     def _leave_trail(self, here: Floats) -> None:

@@ -294,6 +294,11 @@ class DistanceField:
         return DistanceField(arrays, self.voxel, self.notes, self.thickness)
 
     @property
+    def voxels(self) -> VoxelGrid | None:
+        """The voxels, to be had in another field; None where all is exact."""
+        return packing.voxels_of(self.arrays.data, self.arrays.grid, self.notes)
+
+    @property
     def box(self) -> Floats | None:
         """(2, 3) bounding box of the voxels' solid part; None without voxels."""
         if self.voxel is None:

@@ -75,6 +75,22 @@ def with_voxels(data: Floats, grid: VoxelGrid) -> Floats:
     return np.concatenate([data, np.where(grid.table < 0, 0.0, begins).ravel()])
 
 
+def voxels_of(data: Floats, values: Singles, notes: tuple[str, ...]) -> VoxelGrid | None:
+    """What `with_voxels` was given; None where there are no voxels."""
+    if data[VOXELS] == 0.0:
+        return None
+    nx, ny, nz = data[SHAPE : SHAPE + 3].astype(int).tolist()
+    table = None
+    if data[BLOCKS]:
+        begin, cells = int(data[BLOCKS]), (nx - 1, ny - 1, nz - 1)
+        begins = data[begin : begin + int(np.prod(cells))].reshape(cells)
+        blocks = (begins - nx * ny * nz) / SIDE**3
+        table = np.where(begins > 0.0, blocks, -1.0).astype(np.int32)
+    box = data[PLACE + 4 : PLACE + 10].reshape(2, 3).copy()
+    place, size = data[PLACE : PLACE + 3].copy(), float(data[PLACE + 3])
+    return VoxelGrid(values, (nx, ny, nz), place, size, box, notes, table)
+
+
 def block_points(data: Floats, voxels: Singles, offset: float, most: int) -> Floats:
     """(n, 3) of points in blocks where the distance is below an offset, at most so many: as many of
     each of some blocks, evenly chosen."""
