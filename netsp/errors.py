@@ -101,3 +101,23 @@ class VerificationError(NetspError):
     """A solution failed its independent check."""
 
     exit_code = EXIT_NOT_VERIFIED
+
+
+def interrupted(error: BaseException) -> bool:
+    """Whether an error is Ctrl-C.
+
+    Python says SystemError ("returned a result with an exception set") where the signal comes just
+    as a compiled function returns.
+
+    Parameters
+    ----------
+    error : BaseException
+        What was raised.
+
+    Returns
+    -------
+    bool
+        Whether it is, or comes of, a KeyboardInterrupt.
+    """
+    cause = error.__cause__ if isinstance(error, SystemError) else error
+    return isinstance(cause, KeyboardInterrupt)

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from netsp import InputError
 from netsp.command.main import main
+from netsp.errors import interrupted
 from netsp.online import Scene
 from netsp.online.log import describe_run
 from netsp.online.mission import Mission
@@ -140,6 +141,65 @@ def test_a_solid_waits_until_there_is_room_for_it():
     run = fly([{"time": 0, "appear": on_the_tether}], {}, waypoints=[(-2.5, -5, 0)])
     assert run.summary["surprises"] == {"happened": 0, "held_back": 1, "found": 0}
     assert "had no room" in describe_run(run, "m")
+
+
+@pytest.mark.parametrize(
+    ("place", "track"),
+    [((-3, -6, 0), []), ((-3, -5, 0), []), ((5, -6, 0), [(60, 10, -6, 0)])],
+    ids=["anchor", "home", "the anchor's way"],
+)
+def test_nothing_appears_on_anchor_or_home_or_in_the_anchors_way(place, track):
+    ball = {"sphere": {"center": place, "radius": 0.4}}
+    run = fly([{"time": 2, "appear": ball}], track=track, waypoints=[(0, -4.5, -1)])
+    assert kept(run)
+    assert run.summary["surprises"]["held_back"] == 1
+
+
+def test_a_solid_with_a_name_is_on_the_map_once_however_often_it_moves():
+    moves = [
+        {"time": t, "move": {"solid": "pile 6 0", "by": [0.05 * (-1) ** t, 0, 0]}}
+        for t in range(1, 40)
+    ]
+    run = fly(moves, {})
+    assert kept(run)
+    assert run.summary["surprises"]["found"] <= 1
+
+
+def test_a_scene_may_become_empty_and_is_drawn(tmp_path):
+    post = {"name": "p", "post": {"center": [0, 0], "radius": 1}}
+    mission = {
+        "schema_version": 1, "scene": "scene.json", "anchor": [-3, 0, 0], "start": [-3, 1, 0],
+        "waypoints": [[3, 0, 0]], "tether_length": 9,
+    }  # fmt: skip
+    files = {
+        "scene": {"schema_version": 1, "solids": [post]},
+        "m": mission,
+        "s": {"schema_version": 1, "events": [{"time": 3, "vanish": "p"}]},
+    }
+    for name, data in files.items():
+        (tmp_path / f"{name}.json").write_text(json.dumps(data))
+    out = tmp_path / "run"
+    args = [str(tmp_path / "m.json"), "--surprise", str(tmp_path / "s.json"), "-o", str(out)]
+    assert main(["simulate", *args, "--quiet"]) == 0
+    assert (out / "run.png").stat().st_size > 10_000
+
+
+def test_an_interrupt_that_python_calls_a_system_error_is_one():
+    error = SystemError("returned a result with an exception set")
+    assert not interrupted(error)
+    error.__cause__ = KeyboardInterrupt()
+    assert interrupted(error)
+    assert interrupted(KeyboardInterrupt())
+    assert not interrupted(ValueError())
+
+    def stop(row, planner):
+        if row.time > 3.0:
+            raise error
+
+    mission = Mission(
+        scene="-", anchor=(-3, -6, 0), start=(-3, -5, 0), waypoints=AMONG, tether_length=18
+    )
+    assert simulate(mission, scene=PILES, on_step=stop).summary["status"] == "interrupted"
 
 
 def test_a_ship_over_unknown_ground():

@@ -24,6 +24,7 @@ from netsp.errors import (
     EXIT_NOT_ALL,
     InputError,
     NetspError,
+    interrupted,
 )
 
 
@@ -50,7 +51,9 @@ def main(argv: Sequence[str] | None = None) -> int:
             "out of memory; lower tether_length, --max-classes or ask for something smaller"
         )
         return EXIT_NOT_ALL
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, SystemError) as error:
+        if not interrupted(error):
+            raise
         messages.error("interrupted before there was anything to write")
         return EXIT_INTERRUPTED
     except BrokenPipeError:

@@ -131,8 +131,7 @@ def run(args: argparse.Namespace) -> int:
         write_run(runs[0], args.output)
         if len(runs) > 1:
             write_run(runs[1], Path(args.output) / runs[1].planner)
-        there = scene if surprises is None else surprises.after(scene)
-        draw_runs(runs, there, Path(args.output))
+        draw_runs(runs, runs[0].scene or scene, Path(args.output))
     if any(r.summary["defects"] for r in runs):
         return EXIT_DEFECT
     s = runs[0].summary

@@ -12,6 +12,7 @@ from typing import Any, ClassVar
 from netsp.drawn import Drawn
 from netsp.errors import InputError
 from netsp.online.mission import Mission
+from netsp.online.scene.scene import Scene
 from netsp.online.tether import Tether
 
 
@@ -80,6 +81,10 @@ class Run(Drawn):
         At the end.
     summary : dict
         The numbers (`netsp.online.summary.summarise`).
+    scene : Scene or None
+        As it was at the end, where it has changed.
+    tethers : tuple of (int, Tether)
+        Row of the log and tether now and then, where the scene has changed.
     """
 
     picture: ClassVar[str] = "netsp.pictures.mission:draw_run"
@@ -89,6 +94,8 @@ class Run(Drawn):
     log: tuple[LogRow, ...]
     tether: Tether
     summary: dict[str, Any]
+    scene: Scene | None = None
+    tethers: tuple[tuple[int, Tether], ...] = ()
 
     def __repr__(self) -> str:
         """In a line."""

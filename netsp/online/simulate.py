@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from netsp.arrays import Floats
-from netsp.errors import InputError
+from netsp.errors import InputError, interrupted
 from netsp.online.coverage import Coverage, patches_of
 from netsp.online.limits import check_names, check_size
 from netsp.online.log import LogRow, Run
@@ -224,8 +224,8 @@ def simulate(
         around = Surroundings(
             mission, scene, field.voxels, surprises, np.vstack([taut.nodes, robot.position]), seed
         )
-        world.model, world.believed = tethers, taut
-    since, interrupted, stalls = (0.0, -1), False, Stalls()
+        world.model, world.believed, world.tethers_seen = tethers, taut, [(0, taut)]
+    since, stopped, stalls = (0.0, -1), False, Stalls()
     begin = time.perf_counter()
     try:
         while True:
@@ -257,10 +257,12 @@ def simulate(
                 chosen.passed(passed)
             else:
                 chosen.leave_out("the path to it leads through a solid")
-    except KeyboardInterrupt:
-        interrupted = True
+    except (KeyboardInterrupt, SystemError) as error:
+        if not interrupted(error):
+            raise
+        stopped = True
     wall = time.perf_counter() - begin
-    summary = summarise(mission, chosen, world, wall, interrupted)
+    summary = summarise(mission, chosen, world, wall, stopped)
     summary["stalls"] = stalls.found
     summary["surprises"] = None if around is None else around.told()
     return Run(
@@ -269,6 +271,8 @@ def simulate(
         tuple(world.log),
         world.tether,
         summary,
+        None if around is None else around.scene_now,
+        tuple(world.tethers_seen),
     )
 
 

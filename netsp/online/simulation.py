@@ -24,6 +24,9 @@ from netsp.online.vehicle import Vehicle
 STEP = 0.1
 """Seconds between two decisions of the planner."""
 
+SEEN = 10
+"""Steps between two tethers that are kept for pictures."""
+
 FRAME = 2
 """Steps between two pictures of the camera."""
 
@@ -63,6 +66,8 @@ class Simulation:
         Where the anchor goes.
     now : float
         Seconds since the start.
+    tethers_seen : list of (int, Tether)
+        Row of the log and tether now and then, where the scene changes; else empty.
     contacts : int
         How often the robot has met a solid.
     log : list of LogRow
@@ -83,6 +88,7 @@ class Simulation:
     track: Track | None = None
     now: float = 0.0
     contacts: int = 0
+    tethers_seen: list[tuple[int, Tether]] = field(default_factory=list)
     log: list[LogRow] = field(default_factory=list)
     _was: Floats | None = None
 
@@ -135,6 +141,8 @@ class Simulation:
             seen.share if seen else 0.0, seen.share_through if seen else 0.0,
             command.replan_s,
         )  # fmt: skip
+        if self.tethers_seen and len(self.log) % SEEN == 0:
+            self.tethers_seen.append((len(self.log), self.tether))
         self.log.append(row)
         return row
 

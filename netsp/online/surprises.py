@@ -75,24 +75,6 @@ class SceneSurprises(FileModel):
         """
         return sorted(self.events, key=lambda e: e.time)
 
-    def after(self, scene: Scene) -> Scene:
-        """The scene when all of it has happened.
-
-        Parameters
-        ----------
-        scene : Scene
-            The map.
-
-        Returns
-        -------
-        Scene
-            With other solids.
-        """
-        solids = scene.all_solids()
-        for event in self.in_order():
-            solids = changed(solids, event)
-        return scene.model_copy(update={"solids": solids, "problem": None})
-
     def check(self, scene: Scene, source: str = "") -> None:
         """Refuse events that a scene cannot have.
 

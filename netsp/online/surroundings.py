@@ -110,6 +110,7 @@ class Surroundings:
         self.ranging = None if sensor is None else Ranging(sensor, seed)
         self.solids = self.mapped = scene.all_solids()
         self.sightings: list[Sighting] = []
+        self.found: set[str | int] = set()
         self.due = surprises.in_order()
         self.happened: list[tuple[float, SceneEvent]] = []
         self.trail = np.array(places)
@@ -158,8 +159,9 @@ class Surroundings:
             self.trail = np.vstack([self.trail, here])
 
     def _happen(self, world: Simulation) -> bool:
-        """What is due happens, but for solids that would stand on the tether, or nearer to the
-        robot than its clearance and a second of its way: these wait until it is gone."""
+        """What is due happens, but for solids that would stand on the tether, on home or in the
+        anchor's way, or nearer to the robot than its clearance and a second of its way: these wait
+        until there is room."""
         waiting, before = [], self.solids
         for event in self.due:
             solids = changed(self.solids, event) if event.time <= world.now else None
@@ -183,9 +185,18 @@ class Surroundings:
         if not new:
             return True
         alone = self.scene.field_with(tuple(new), None)
-        nodes = world.tether.nodes
+        nodes, home = world.tether.nodes, np.array(self.mission.start)
+        if world.track is not None:
+            ahead = world.track.between(world.now, max(world.now, world.track.end))
+            home = ahead + home - np.array(self.mission.anchor)
+            if (
+                alone.distance(polylines.dense(ahead, 0.5)).min(initial=1.0)
+                < self.mission.clearance
+            ):
+                return False
         return bool(
-            alone.distance(world.vehicle.position) > self.mission.clearance + self.mission.speed
+            np.min(alone.distance(home)) > self.mission.clearance
+            and alone.distance(world.vehicle.position) > self.mission.clearance + self.mission.speed
             and alone.distance(polylines.dense(nodes, 0.5 * self.mission.delta)).min(initial=1.0)
             > self.mission.delta
         )
@@ -226,7 +237,12 @@ class Surroundings:
             sighting.off = sighting.off + (rays[met][some] * off[met][some, None]).sum(0)
             before = sighting.mapped
             if sighting.place() and sighting.mapped is not None:
-                kept = tuple(s for s in self.mapped if s is not before)
+                # whatever has a name is there once
+                name = solid.name
+                kept = tuple(
+                    s for s in self.mapped if s is not before and (name is None or s.name != name)
+                )
+                self.found.add(id(solid) if name is None else name)
                 self.mapped, found = (*kept, sighting.mapped), True
         return found
 
@@ -282,11 +298,12 @@ class Surroundings:
             tether = model.drive(model.relaxed(line[[0, 0]], 1), line[1:])[0]
             off = abs(payout(tether, world.load) - out)
             if best is None or off < least - EXPLAINED:
-                best, least, trail = tether, off, line
+                best, least, chosen, trail = tether, off, n, line
             if least <= EXPLAINED:
                 break
         assert best is not None
-        self.trail, self.moments, self.times, self._since = trail, [], [], world.now
+        if chosen:
+            self.trail, self.moments, self.times, self._since = trail, [], [], world.now
         return best
 
     def _anchors_way(self, world: Simulation, n: int) -> Floats:
@@ -295,6 +312,11 @@ class Surroundings:
             return self.trail[:0]
         since = self._since if n == 0 else self.times[n - 1]
         return world.track.between(since, world.now)[::-1]
+
+    @property
+    def scene_now(self) -> Scene:
+        """The scene with the solids that are there now."""
+        return self.scene.model_copy(update={"solids": self.solids, "problem": None})
 
     def told(self) -> dict[str, int]:
         """What a summary says of it.
@@ -308,5 +330,5 @@ class Surroundings:
         return {
             "happened": len(self.happened),
             "held_back": len(self.due),
-            "found": sum(s.mapped is not None for s in self.sightings),
+            "found": len(self.found),
         }

@@ -123,7 +123,11 @@ def draw_coverage(runs: Sequence[Run], *, ax: Any = None) -> Any:
 
 
 def tethers_along(run: Run, scene: Scene, moments: npt.NDArray[np.int64]) -> list[Tether]:
-    """The tether at some rows of the log, ascending: the run is driven again."""
+    """The tether at some rows of the log, ascending: the run is driven again,
+    unless its tethers were kept because the scene has changed."""
+    if run.tethers:
+        rows = np.array([row for row, _ in run.tethers])
+        return [run.tethers[k][1] for k in np.searchsorted(rows, moments, side="right") - 1]
     mission = run.mission
     field = scene.field()
     model = GeodesicTether(field, mission.delta)

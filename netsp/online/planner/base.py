@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from netsp.arrays import Floats
+from netsp.errors import interrupted
 from netsp.geometry import polylines
 from netsp.online.mission import Mission
 from netsp.online.paths.beside import beside
@@ -263,6 +264,8 @@ class Planner:
                 plan = self.plan_home if self.homeward else self.plan
                 planned = plan(robot, tether) or planned
             except Exception as error:  # a vehicle in the water must not be left without a command
+                if interrupted(error):
+                    raise KeyboardInterrupt from error
                 return self._hold(robot, error, time.process_time() - begin)
         spent = time.process_time() - begin if planned else 0.0
         if self.done:
