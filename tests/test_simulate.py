@@ -19,7 +19,7 @@ from netsp.online import Scene
 from netsp.online.equipment import PositionSensor
 from netsp.online.log import describe_run
 from netsp.online.mission import Mission
-from netsp.online.paths.tree import STEPS, Grid, ShortestTree, grow, states_of, taut
+from netsp.online.paths.tree import STEPS, Grid, ShortestTree, grow, states_of, taut, way
 from netsp.online.planner import PLANNERS
 from netsp.online.scene.field import pushed_out
 from netsp.online.sensing import Positions
@@ -297,14 +297,18 @@ def test_lengths_in_a_grid_are_those_of_dijkstra_over_all_neighbours(shape, shar
         to = number[tuple((cells + 1 + step).T)]
         graph[np.flatnonzero(to >= 0), to[to >= 0]] = np.linalg.norm(step)
     expected = dijkstra(graph.tocsr(), indices=int(number[tuple(np.add(root, 1))]))
-    lengths, toward = grow(states_of(free), np.array(root), cells)
-    assert lengths == pytest.approx(expected, abs=1e-9)
-    for cell, length in zip(cells, lengths, strict=True):
-        along, at = 0.0, cell
-        while np.isfinite(length) and (step := int(toward[tuple(at)])) < 26:
-            along, at = along + np.linalg.norm(STEPS[step]), at + STEPS[step]
-            assert free[tuple(at)]
-        assert not np.isfinite(length) or along == pytest.approx(length)
+    for wanted in (cells, np.full((1, 3), -1)):
+        toward = grow(states_of(free), np.array(root), wanted)
+        for cell, length in zip(cells, expected, strict=True):
+            if toward[tuple(cell)] < 0:
+                assert not np.isfinite(length)
+                continue
+            cells_on_the_way = way(toward, cell)
+            assert free[tuple(cells_on_the_way.T)].all()
+            assert tuple(cells_on_the_way[-1]) == root
+            steps = np.diff(cells_on_the_way, axis=0)
+            assert abs(steps).max(initial=0) <= 1
+            assert np.linalg.norm(steps, axis=1).sum() == pytest.approx(length)
 
 
 @pytest.mark.parametrize(("planner", "length"), [("predictive", 3.6), ("react", 6.0)])

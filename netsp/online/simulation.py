@@ -13,7 +13,8 @@ from netsp.online.coverage import Coverage
 from netsp.online.log import LogRow
 from netsp.online.mission import Mission
 from netsp.online.planner import Command, Planner
-from netsp.online.planner.base import DEEPEST, HOME, Tethers
+from netsp.online.planner.ahead import DEEPEST
+from netsp.online.planner.base import HOME, Tethers
 from netsp.online.scene.field import DistanceField, pushed_out
 from netsp.online.sensing import Positions
 from netsp.online.tether import GeodesicTether, Tether

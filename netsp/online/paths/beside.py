@@ -9,8 +9,12 @@ from netsp.compiled.kernel import kernel
 from netsp.online.scene.field import DistanceField
 from netsp.online.scene.sampling import Field, lowest_along
 
-CLIMB, STENCIL, SWEEPS = 0.05, 0.1, 80
-"""Metres that a point goes at once, and over which the distance's rise is taken; and how often."""
+CLIMB, STENCIL, SWEEPS = 1 / 6, 1 / 3, 80
+"""Of the clearance, what a point goes at once, and over what the distance's rise is taken; and how
+often."""
+
+LEAST = 0.05
+"""Metres of clearance that steps are as long as for where there is less, or none."""
 
 GAIN = 0.02
 """A step that brings less than this share of its length is not taken."""
@@ -38,8 +42,8 @@ def beside(field: DistanceField, line: Floats, clearance: float) -> Floats:
     ndarray, shape (n, 3)
         The path, metres; its ends are those of the line.
     """
-    path = np.array(line, dtype=float)
-    arms = STENCIL * np.vstack([np.eye(3), -np.eye(3)])
+    path, scale = np.array(line, dtype=float), max(clearance, LEAST)
+    arms = STENCIL * scale * np.vstack([np.eye(3), -np.eye(3)])
     for _ in range(SWEEPS):
         d = field.distance(path)
         short = d < clearance - 1e-6
@@ -49,7 +53,7 @@ def beside(field: DistanceField, line: Floats, clearance: float) -> Floats:
         around = field.distance((path[short, None] + arms).reshape(-1, 3)).reshape(-1, 6)
         rise = around[:, :3] - around[:, 3:]
         rise /= np.maximum(np.linalg.norm(rise, axis=1), 1e-12)[:, None]
-        step = np.minimum(CLIMB, clearance - d[short])
+        step = np.minimum(CLIMB * scale, clearance - d[short])
         moved = path.copy()
         moved[short] += step[:, None] * rise
         better = field.distance(moved[short]) >= d[short] + GAIN * step

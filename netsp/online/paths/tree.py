@@ -6,7 +6,7 @@ need be (26 directions); pulled taut as a tether it is the shortest of its class
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from copy import copy
 from typing import Protocol
 
@@ -25,6 +25,9 @@ from netsp.online.tether.geodesic import GeodesicTether
 MOST_CELLS = 20_000_000
 """So many cells take about 0.3 GiB."""
 
+
+KEPT = 200_000_000
+"""Bytes of trees that are kept, one for each cell and target."""
 
 ROUNDS = 60
 """A path need not be taut to the last millimetre."""
@@ -76,6 +79,34 @@ class Grid:
             field.arrays, self.low, cell, (int(shape[0]), int(shape[1]), int(shape[2])), clearance
         )
         self._states: npt.NDArray[np.uint8] | None = None
+        self._kept: dict[tuple[int, ...], npt.NDArray[np.int8]] = {}
+
+    def prepare(self, targets: Sequence[Floats], memory: int = KEPT) -> int:
+        """Keep the trees to some targets (3,), as many as go into the memory (bytes): which path
+        is shortest depends on the map alone, so it need not be asked while the robot waits. How
+        many are kept."""
+        for target in targets:
+            root = self.free_near(target)
+            if root is None or tuple(root) in self._kept:
+                continue
+            if (len(self._kept) + 1) * self.free.size > memory:
+                break
+            nowhere = np.full((1, 3), -1)
+            self._kept[tuple(root)] = grow(self.states, root, nowhere)
+        return len(self._kept)
+
+    def toward(self, root: Ints, wanted: Ints) -> npt.NDArray[np.int8]:
+        """The step that leads on to the root, of the wanted cells (n, 3) and those on their way:
+        see `grow`."""
+        kept = self._kept.get(tuple(root))
+        if kept is not None:
+            if all(
+                kept[tuple(cell)] < 0 or self.free[tuple(way(kept, cell).T)].all()
+                for cell in wanted
+            ):
+                return kept
+            del self._kept[tuple(root)]  # something stands in its way since
+        return grow(self.states, root, wanted)
 
     def over(self, field: DistanceField, box: Floats) -> Grid:
         """The same cells in a scene that is another within a box (2, 3)."""
@@ -87,6 +118,10 @@ class Grid:
         new.free[tuple(slice(a, b) for a, b in zip(first, last, strict=True))] = free_cells(
             field.arrays, self.low + self.cell * first, self.cell, (nx, ny, nz), self.clearance
         )
+        if (new.free & ~self.free).any():
+            new._kept = {}  # there may be shorter paths now; else those that are still free are
+        else:
+            new._kept = dict(self._kept)
         return new
 
     @property
@@ -140,44 +175,26 @@ class ShortestTree:
     target
         (3,) where they end.
     points
-        (n, 3) where they start; the tree grows until it has them all.
-
-    Attributes
-    ----------
-    lengths
-        (n,) lengths of the paths along the grid, inf where there is none.
+        (n, 3) where they start; the tree grows until it has them all, if `Grid.prepare` has not
+        kept it.
     """
 
     def __init__(self, grid: Grid, target: npt.ArrayLike, points: npt.ArrayLike) -> None:
         self.grid, self.target = grid, np.asarray(target, dtype=float)
         self.points = np.asarray(points, dtype=float).reshape(-1, 3)
         root = grid.free_near(self.target)
-        cells = [grid.free_near(p) for p in self.points]
-        self._cells = cells
-        self.lengths = np.full(len(self.points), np.inf)
-        if root is None:
-            return
-        wanted = np.array([c for c in cells if c is not None], dtype=np.int64).reshape(-1, 3)
-        lengths, self._next = grow(grid.states, root, wanted)
-        k = 0
-        for n, c in enumerate(cells):
-            if c is not None:
-                ends = np.linalg.norm(grid.centre(c) - self.points[n]) + np.linalg.norm(
-                    grid.centre(root) - self.target
-                )
-                self.lengths[n] = lengths[k] * grid.cell + ends
-                k += 1
+        self._cells = [None if root is None else grid.free_near(p) for p in self.points]
+        if root is not None:
+            wanted = np.array([c for c in self._cells if c is not None], dtype=np.int64)
+            self._toward = grid.toward(root, wanted.reshape(-1, 3))
 
     def path(self, n: int) -> Floats | None:
         """(k, 3) from point n to the target along the grid; None if there is none."""
         cell = self._cells[n]
-        if cell is None or not np.isfinite(self.lengths[n]):
+        if cell is None or self._toward[tuple(cell)] < 0:
             return None
-        at, cells = np.array(cell), [np.array(cell)]
-        while (step := int(self._next[tuple(at)])) < 26:
-            at = at + STEPS[step]
-            cells.append(at)
-        return np.vstack([self.points[n], self.grid.centre(np.array(cells)), self.target])
+        cells = way(self._toward, cell)
+        return np.vstack([self.points[n], self.grid.centre(cells), self.target])
 
 
 STEPS = np.array([s for s in np.ndindex(3, 3, 3) if s != (1, 1, 1)], dtype=np.int64) - 1
@@ -245,9 +262,7 @@ def states_of(free: Bools) -> npt.NDArray[np.uint8]:
 
 
 @kernel
-def grow(
-    states: npt.NDArray[np.uint8], root: Ints, wanted: Ints
-) -> tuple[Floats, npt.NDArray[np.int8]]:
+def grow(states: npt.NDArray[np.uint8], root: Ints, wanted: Ints) -> npt.NDArray[np.int8]:
     """Shortest paths to the root from cells around it, until all wanted cells are settled.
 
     Cells wait in buckets by the whole part of their length. No step is shorter than 1, so what is
@@ -260,14 +275,13 @@ def grow(
     states
         Of `states_of`.
     root, wanted
-        (3,), (n, 3) cells.
+        (3,), (n, 3) cells; one of (-1, -1, -1) is never settled.
 
     Returns
     -------
-    lengths
-        (n,) in cells, of the wanted; inf where there is no path.
     toward
-        (nx, ny, nz) the step that leads on to the root, 26 at the root, -1 where it is not known.
+        (nx, ny, nz) the step that leads on to the root, 26 at the root, -1 where it is not known,
+        as of wanted cells from which no path leads there.
     """
     row = states.shape[2]
     plane = states.shape[1] * row
@@ -319,10 +333,22 @@ def grow(
                     first[bucket] = count
                     count += 1
         floor += 1
-    found = np.empty(len(wanted))
-    for w in range(len(wanted)):
-        found[w] = lengths[cells[w]] if toward[cells[w]] >= 0 else np.inf
-    return found, toward.reshape(states.shape)[1:-1, 1:-1, 1:-1]
+    return toward.reshape(states.shape)[1:-1, 1:-1, 1:-1]
+
+
+@kernel
+def way(toward: npt.NDArray[np.int8], start: Ints) -> Ints:
+    """Cells (k, 3) from one that the tree has to its root, both ends among them."""
+    out, count = np.empty((64, 3), dtype=np.int64), 1
+    out[0] = start
+    while True:
+        step = toward[out[count - 1, 0], out[count - 1, 1], out[count - 1, 2]]
+        if step >= 26:
+            return out[:count].copy()
+        if count == len(out):
+            out = more_int_rows(out)
+        out[count] = out[count - 1] + STEPS[step]
+        count += 1
 
 
 def taut(field: DistanceField, path: Floats, clearance: float, delta: float) -> Floats:

@@ -20,18 +20,13 @@ from netsp.online.paths.tree import Grid, Paths, ShortestTree, taut
 from netsp.online.scene.field import DistanceField
 from netsp.online.tether import GeodesicTether, ReactTether, Tether
 from netsp.online.tether.load import Load, payout, payout_along
+from netsp.online.tether.resolution import THINNEST
 from netsp.online.track import Track
 
 Tethers = GeodesicTether | ReactTether
 
-NARROW = 0.1
-"""Metres between points of the way back along a tether: nothing that thin stands in the water."""
-
 FREE = 0.1
 """A tether so many delta longer than as it was laid when the mission began is not free."""
-
-DEEPEST = 0.2
-"""So many delta inside a solid, a robot has met it."""
 
 ROOM = 0.7
 """Of the clearance, that a path must keep when the map changes."""
@@ -331,9 +326,17 @@ class Planner:
             The tether as the model has it.
         """
         del tether
+        self.prepare()
         path = self.paths(robot[None]).path(0)
         if path is not None:
             self.pulled(path)
+
+    def prepare(self) -> None:
+        """Find the shortest paths to all waypoints, and home, from everywhere, before the mission:
+        they depend on the map alone."""
+        if self.options.paths == "tree":
+            home = [] if self.track is not None else [np.array(self.mission.start)]
+            self.grid.prepare([*self.mission.places, *home])
 
     def plan(self, robot: Floats, tether: Tether) -> bool:
         """Set `path` and `mode`; here, on to the waypoint whatever the tether.
@@ -408,8 +411,13 @@ class Planner:
             From the robot to the start, at the clearance where there is room, metres.
         """
         line = np.vstack([tether.nodes[::-1], self.laid_now.nodes[1:]])
-        fine = min(self.grid.cell, NARROW)
-        return beside(self.scene, polylines.points_along(line, fine), self.mission.clearance)
+        return beside(self.scene, polylines.points_along(line, self.fine), self.mission.clearance)
+
+    @property
+    def fine(self) -> float:
+        """Metres between points of the way back along a tether: the model may lose a solid of twice
+        that thickness."""
+        return min(self.grid.cell, 0.5 * THINNEST * self.mission.delta)
 
     def go_on(self, robot: Floats) -> bool:
         """Go straight to the waypoint, or along the shortest path round what is between.

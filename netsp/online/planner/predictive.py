@@ -8,7 +8,6 @@ shortest tether fits (but for the clearance that the robot keeps, and the margin
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
@@ -18,11 +17,10 @@ from netsp.arrays import Floats
 from netsp.geometry import polylines
 from netsp.online.paths.beside import beside
 from netsp.online.paths.tree import ever_tauter, homotopic, roughly_taut, taut
+from netsp.online.planner.ahead import DEEPEST, Ahead
 from netsp.online.planner.base import (
-    DEEPEST,
     FREE,
     HOME,
-    NARROW,
     NORMAL,
     RECOVERY,
     WAIT,
@@ -31,7 +29,7 @@ from netsp.online.planner.base import (
 )
 from netsp.online.scene.field import DistanceField
 from netsp.online.tether import GeodesicTether, Tether
-from netsp.online.tether.load import payout_along, turning
+from netsp.online.tether.load import payout_along
 
 MARGIN = 0.004
 """Share of the tether that is kept in reserve for what the simulation does not know."""
@@ -45,10 +43,9 @@ ROUGH = 0.9
 COMING_TO_REST = 60
 """Rounds that a tether gets to come free at home."""
 
-CHECK, LAG, TICK = 2.0, 3.0, 0.1
-"""While the anchor moves: seconds between two looks whether the tether still lasts; seconds of the
-anchor's way that are kept in reserve, for a robot that is late; shortest time between two places of
-a look ahead."""
+CHECK, LAG = 2.0, 3.0
+"""While the anchor moves: seconds between two looks whether the tether still lasts, and seconds of
+the anchor's way that are kept in reserve, for a robot that is late."""
 
 UNKNOWN, CAUGHT = 0.2, 0.1
 """Metres of tether kept in reserve where the map may be wrong, and how much more of it than planned
@@ -89,12 +86,10 @@ class PredictivePlanner(Planner):
             return False
         self._planned, self._checked = self.index, self.now
         limit = self.limit
-        waypoint = self.waypoint
-        for end in (waypoint, self._near_enough(robot, waypoint)):
-            straight = np.array([robot, end])
-            if self.is_free(straight) and self._fits(tether, straight, limit):
-                self.path, self.mode = straight[1:], NORMAL
-                return True
+        straight = self._straight(robot, tether, limit)
+        if straight is not None:
+            self.path, self.mode = straight[1:], NORMAL
+            return True
         path = self._shortest_feasible(robot, tether, limit)
         if path is None and self.anchor_moves:
             self._wait(robot, tether, limit)
@@ -194,85 +189,45 @@ class PredictivePlanner(Planner):
 
     def warm_up(self, robot: Floats, tether: Tether) -> None:
         """See `Planner`."""
+        self.prepare()
         self._shortest_feasible(robot, tether, self.limit)
+
+    @property
+    def _ahead(self) -> Ahead:
+        """Looks ahead by the map and the clock of now."""
+        return Ahead(
+            self.mission,
+            self._model,
+            self.load if self.loaded else None,
+            self.track if self.anchor_moves else None,
+            self.now,
+        )
+
+    @property
+    def _stay(self) -> float:
+        """Seconds at the end of the path that is planned."""
+        return 0.0 if self.homeward else self.mission.waypoints[self.index].longest_stay
 
     def _fits(
         self, tether: Tether, path: Floats, limit: float, staying: float | None = None
     ) -> bool:
-        """Whether the tether stays within the limit all along a path.
-
-        A taut tether gets longer by at most the path of its end. So as far as what is left of the
-        limit the robot may go at once, and where little is left in small steps. What slack and sag
-        add has no such bound: a contact that is lost joins two spans. Then all steps are small.
-        """
+        """Whether the tether stays within the limit all along a path, and at its end."""
         self._looks += 1
-        if self._meets_solid(path):
-            return False
-        if self.anchor_moves:
-            if staying is None:
-                staying = 0.0 if self.homeward else self.mission.waypoints[self.index].longest_stay
-            return self._fits_by_the_clock(tether, path, limit, staying)
-        if self.loaded:
-            return self._fits_under_load(tether, path, limit)
-        most = max(limit, tether.length + 1e-6)
-        fine = max(0.5 * self.mission.delta, 0.02)
-        state, s, length = tether, 0.0, polylines.length(path)
-        while s < length:
-            until = min(length, s + max(fine, most - state.length))
-            points = polylines.part(path, s, until)[1:]
-            state, lengths = self.tethers.drive(state, points)
-            if lengths.max() > most:
-                return False
-            s = until
-        return True
+        return self._ahead.fits(tether, path, limit, self._stay if staying is None else staying)
 
-    def _meets_solid(self, path: Floats) -> bool:
-        """Whether a path, pulled over points of a tether that lies in a crease, say, leads into a
-        solid: as deep as ends a flight."""
-        points = polylines.dense(path, self.mission.delta)
-        depth = DEEPEST * self.mission.delta
-        return bool(len(points) and self.scene.distance(points).min() < -depth)
-
-    def _fits_under_load(self, tether: Tether, path: Floats, limit: float) -> bool:
-        """Whether what must be out, and the sum of turning angles, stay within their limits."""
-        points = polylines.dense(path, max(0.5 * self.mission.delta, 0.02))
-        if not len(points):
-            return True
-        _, payouts, turnings = self._model.drive_under(tether, points, self.load)
-        return bool(
-            payouts.max() <= max(limit, self.payout(tether) + 1e-6)
-            and turnings.max() <= self._most_turning(tether)
-        )
-
-    def _fits_by_the_clock(
-        self, tether: Tether, path: Floats, limit: float, staying: float
-    ) -> bool:
-        """As `_fits`, with both ends of the tether on their way, and for the time that the robot
-        then stays. A taut tether gets longer by at most what both travel."""
-        track, speed = self.track, self.mission.speed
-        assert track is not None
-        most, turns = max(limit, self.payout(tether) + 1e-6), self._most_turning(tether)
-        far = polylines.length(path)
-        whole, at, out = far / speed + staying, 0.0, self.payout(tether)
-        while at < whole - 1e-9:
-            step = TICK if self.loaded else max(TICK, (most - out) / (speed + track.speed))
-            until = min(whole, at + step)
-            for place in track.between(self.now + at, self.now + until)[1:]:
-                tether = self._model.update(tether, tether.robot, place)
-            if speed * at < far:
-                part = polylines.part(path, speed * at, min(far, speed * until))
-                tether, _ = self._model.drive(tether, part[1:])
-            at, out = until, self.payout(tether)
-            if out > most or turning(tether, self.mission.delta) > turns:
-                return False
-        return True
-
-    def _most_turning(self, tether: Tether) -> float:
-        """Sum of turning angles that plans may use, radians: what it is now if that is more."""
-        most = self.mission.tether.max_turning
-        if math.isinf(most):
-            return most
-        return max(most, turning(tether, self.mission.delta) + 1e-6)
+    def _straight(self, robot: Floats, tether: Tether, limit: float) -> Floats | None:
+        """The straight path to the waypoint, or to where it counts as visited, if the tether fits
+        there only."""
+        far = None
+        for end in (self.waypoint, self._near_enough(robot, self.waypoint)):
+            path = np.array([robot, end])
+            if not self.is_free(path):
+                continue
+            if far is None or self.anchor_moves:
+                far, _ = self._ahead.follow(tether, path, limit, self._stay)
+            if polylines.length(path) <= far:
+                return path
+        return None
 
     def _shortest_feasible(self, robot: Floats, tether: Tether, limit: float) -> Floats | None:
         """The shortest path on which the tether fits: on from the robot, or back along the tether
@@ -314,7 +269,8 @@ class PredictivePlanner(Planner):
             on = onward[last]
             assert on is not None
             nearer = self._nearer_by(length)
-            if self._over_the_limit(np.vstack([taken_back(last), on[1:]]), limit + nearer):
+            lasts = (limit + nearer) / (1.0 + self.mission.tether.slack)
+            if self._longer_than(np.vstack([taken_back(last), on[1:]]), lasts):
                 continue
             path = self.pulled(rough)
             length = polylines.length(path)
@@ -367,29 +323,43 @@ class PredictivePlanner(Planner):
             return False
         self._checked = self.now
         if self.caught > CAUGHT:
-            back = polylines.points_along(self.trail[::-1], min(self.grid.cell, NARROW))
+            back = polylines.points_along(self.trail[::-1], self.fine)
             back = np.vstack([back, self.laid_now.nodes[1:]])
             if self.scene.distance(back).min() > DEEPEST * self.mission.delta:
                 self.path, self.mode, self._sure = back[1:], HOME, False
                 return True
-        limit = self.limit
-        # the shortest path of all will do where it happens to free the tether
-        direct = self.paths(robot[None]).path(0)
-        direct = None if direct is None else self.pulled(direct)
-        good = direct is not None and self._comes_free(tether, direct)
-        if direct is not None and good and self._fits(tether, direct, limit):
-            self.path, self.mode, self._sure = direct[1:], HOME, True
-            return True
-        line = self.back_along(tether)
-        path = self.pulled(line)
-        if not self._fits(tether, path, limit):
-            found = self._tautest(tether, line, limit)
-            path = line if found is None else found
-        self._sure = self._comes_free(tether, path)
-        if not self._sure and path is not line:
-            path, self._sure = line, self._comes_free(tether, line)
+        path = self._direct_home(robot, tether)
+        self._sure = path is not None
+        if path is None:
+            path = self._home_along(tether)
         self.path, self.mode = path[1:], HOME
         return True
+
+    def _direct_home(self, robot: Floats, tether: Tether) -> Floats | None:
+        """The shortest path of all, if it happens to free the tether."""
+        path = self.paths(robot[None]).path(0)
+        if path is None:
+            return None
+        path = self.pulled(path)
+        if self._longer_than(np.vstack([tether.nodes, path[1:]]), self._free_length):
+            return None
+        far, end = self._ahead.follow(tether, path, self.limit, 0.0)
+        return path if np.isinf(far) and self._is_free(end) else None
+
+    def _home_along(self, tether: Tether) -> Floats:
+        """Back along the tether, pulled as far as it fits and comes free."""
+        line = self.back_along(tether)
+        path = self.pulled(line)
+        far, end = self._ahead.follow(tether, path, self.limit, 0.0)
+        if np.isinf(far):
+            self._sure = self._is_free(end)
+        else:
+            found = self._tautest(tether, line, self.limit)
+            path = line if found is None else found
+            self._sure = self._comes_free(tether, path)
+        if not self._sure and path is not line:
+            path, self._sure = line, self._comes_free(tether, line)
+        return path
 
     def _led_astray(self, robot: Floats, tether: Tether) -> bool:
         """Whether on what is left of the way home the tether no longer comes free, as when a
@@ -414,8 +384,16 @@ class PredictivePlanner(Planner):
     def _comes_free(self, tether: Tether, path: Floats) -> bool:
         """Whether the tether lies at the end of a path as at the start of the mission."""
         points = polylines.dense(path, 5.0 * self.grid.cell)
-        end = self._model.relaxed(self._model.drive(tether, points)[0].nodes, COMING_TO_REST)
-        return end.length <= self.laid_now.length + FREE * self.mission.delta
+        return self._is_free(self._model.drive(tether, points)[0])
+
+    def _is_free(self, tether: Tether) -> bool:
+        """Whether a tether at home comes to lie as at the start of the mission."""
+        return self._model.relaxed(tether.nodes, COMING_TO_REST).length <= self._free_length
+
+    @property
+    def _free_length(self) -> float:
+        """A tether that is no longer is free at home, metres."""
+        return self.laid_now.length + FREE * self.mission.delta
 
     def _roughly_pulled(self, path: Floats) -> Floats:
         return roughly_taut(self.scene, path, self.mission.clearance, self.mission.delta)
@@ -439,11 +417,10 @@ class PredictivePlanner(Planner):
                 out.append(i)
         return out
 
-    def _over_the_limit(self, line: Floats, limit: float) -> bool:
-        """Whether a tether that lies along a line is over the limit even when it is taut, as far as
-        that can be foreseen: what a pull takes away becomes ever less."""
+    def _longer_than(self, line: Floats, limit: float) -> bool:
+        """Whether a tether that lies along a line is longer even when it is taut, as far as that
+        can be foreseen: what a pull takes away becomes ever less."""
         tether = self._model.relaxed(line, PULL)
-        limit /= 1.0 + self.mission.tether.slack
         length, less = tether.length, np.inf
         for _ in range(PULLS):
             if length <= limit:
