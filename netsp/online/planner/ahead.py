@@ -14,6 +14,9 @@ from netsp.online.tether import GeodesicTether, Tether
 from netsp.online.tether.load import Load, payout, turning
 from netsp.online.track import Track
 
+MARGIN = 0.004
+"""Share of the tether that is kept in reserve for what the simulation does not know."""
+
 DEEPEST = 0.2
 """So many delta inside a solid, a robot has met it."""
 
@@ -95,8 +98,10 @@ class Ahead:
 
     @property
     def _fine(self) -> float:
-        """Metres between two places where little of the limit is left."""
-        return max(0.5 * self.mission.delta, 0.02)
+        """Metres between two places where little of the limit is left. Between them a tether may be
+        longer by half of that, here at most half of the margin."""
+        delta = self.mission.delta
+        return max(0.5 * delta, min(MARGIN * self.mission.tether_length, 2.0 * delta))
 
     def _meets_solid(self, path: Floats) -> bool:
         """Whether a path, pulled over points of a tether that lies in a crease, say, leads into a

@@ -17,7 +17,7 @@ from netsp.arrays import Floats
 from netsp.geometry import polylines
 from netsp.online.paths.beside import beside
 from netsp.online.paths.tree import ever_tauter, homotopic, roughly_taut, taut
-from netsp.online.planner.ahead import DEEPEST, Ahead
+from netsp.online.planner.ahead import DEEPEST, MARGIN, Ahead
 from netsp.online.planner.base import (
     FREE,
     HOME,
@@ -30,9 +30,6 @@ from netsp.online.planner.base import (
 from netsp.online.scene.field import DistanceField
 from netsp.online.tether import GeodesicTether, Tether
 from netsp.online.tether.load import payout_along
-
-MARGIN = 0.004
-"""Share of the tether that is kept in reserve for what the simulation does not know."""
 
 PIVOTS = 24
 """At most so many places along the tether to turn at."""

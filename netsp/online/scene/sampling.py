@@ -26,7 +26,15 @@ from netsp.online.scene.packing import (
     SHAPE,
     VOXELS,
 )
-from netsp.online.scene.solids import solid_distance
+from netsp.online.scene.solids import (
+    BOX,
+    CAPSULE,
+    CYLINDER,
+    box_gap,
+    capsule_gap,
+    cylinder_gap,
+    solid_distance,
+)
 
 
 class Field(NamedTuple):
@@ -52,8 +60,11 @@ def sample(field: Field, x: float, y: float, z: float) -> tuple[float, float, fl
     """(d, gx, gy, gz, solid): distance, its unit gradient, and which solid is nearest (-1: the
     voxels)."""
     data = field.data
-    d, gx, gy, gz, at = _solids(data, x, y, z)
-    which = (at - ROWS) // ROW if at > 0 else -1
+    d, at = _nearest(data, x, y, z)
+    gx, gy, gz, which = 0.0, 0.0, 1.0, -1
+    if at > 0:
+        d, gx, gy, gz = solid_distance(data, at, x, y, z)
+        which = (at - ROWS) // ROW
     if data[VOXELS] > 0.0:
         e, ex, ey, ez = _voxels(field.grid, data, x, y, z)
         if e < d:
@@ -65,36 +76,42 @@ def sample(field: Field, x: float, y: float, z: float) -> tuple[float, float, fl
 def distance(field: Field, x: float, y: float, z: float) -> float:
     """Distance alone."""
     data = field.data
-    d = _solids(data, x, y, z)[0]
+    d, _ = _nearest(data, x, y, z)
     if data[VOXELS] > 0.0:
         d = min(d, _voxel_distance(field.grid, data, x, y, z))
     return d - field.offset
 
 
 @kernel
-def _solids(data: Floats, x: float, y: float, z: float) -> tuple[float, float, float, float, int]:
-    """(d, gx, gy, gz, row of the nearest solid, 0 where there is none)."""
-    d, gx, gy, gz, which = math.inf, 0.0, 0.0, 1.0, 0
+def _nearest(data: Floats, x: float, y: float, z: float) -> tuple[float, int]:
+    """(distance, row) of the nearest solid; infinite, 0 where there is none."""
+    begin, end, looked_up = 0, int(data[COUNT]), False
     if data[CELLS] > 0.0:
         size = data[NEAR + 3]
-        i = math.floor((x - data[NEAR]) / size)
-        j = math.floor((y - data[NEAR + 1]) / size)
-        k = math.floor((z - data[NEAR + 2]) / size)
-        nx, ny, nz = int(data[NEAR + 4]), int(data[NEAR + 5]), int(data[NEAR + 6])
-        if 0 <= i < nx and 0 <= j < ny and 0 <= k < nz:
-            cell = int(data[CELLS]) + (i * ny + j) * nz + k
-            for item in range(int(data[cell]), int(data[cell + 1])):
-                at = int(data[item])
-                e, ex, ey, ez = solid_distance(data, at, x, y, z)
-                if e < d:
-                    d, gx, gy, gz, which = e, ex, ey, ez, at
-            return d, gx, gy, gz, which
-    for n in range(int(data[COUNT])):
-        at = ROWS + ROW * n
-        e, ex, ey, ez = solid_distance(data, at, x, y, z)
+        u = (x - data[NEAR]) / size
+        v = (y - data[NEAR + 1]) / size
+        w = (z - data[NEAR + 2]) / size
+        if 0.0 <= u < data[NEAR + 4] and 0.0 <= v < data[NEAR + 5] and 0.0 <= w < data[NEAR + 6]:
+            ny, nz = int(data[NEAR + 5]), int(data[NEAR + 6])
+            cell = int(data[CELLS]) + (int(u) * ny + int(v)) * nz + int(w)
+            begin, end, looked_up = int(data[cell]), int(data[cell + 1]), True
+    d, which = math.inf, 0
+    for item in range(begin, end):
+        at = int(data[item]) if looked_up else ROWS + ROW * item
+        kind = int(data[at])
+        # asked here and not in a function of its own: only so it is compiled into the loop, and
+        # takes two thirds of the time (195 to 117 ns among five candidates)
+        if kind == CAPSULE:
+            e = capsule_gap(data, at + 1, x, y, z)
+        elif kind == CYLINDER:
+            e = cylinder_gap(data, at + 1, x, y, z)
+        elif kind == BOX:
+            e = box_gap(data, at + 1, x, y, z)
+        else:
+            e = solid_distance(data, at, x, y, z)[0]
         if e < d:
-            d, gx, gy, gz, which = e, ex, ey, ez, at
-    return d, gx, gy, gz, which
+            d, which = e, at
+    return d, which
 
 
 @kernel

@@ -41,6 +41,51 @@ def solid_distance(
 
 
 @kernel
+def capsule_gap(data: Floats, r: int, x: float, y: float, z: float) -> float:
+    """The distance of `_capsule` alone."""
+    px, py, pz = _three(data, r)
+    qx, qy, qz = _three(data, r + 3)
+    ax, ay, az = qx - px, qy - py, qz - pz
+    vx, vy, vz = x - px, y - py, z - pz
+    aa = ax * ax + ay * ay + az * az
+    if aa > 0.0:
+        t = min(1.0, max(0.0, (vx * ax + vy * ay + vz * az) / aa))
+        vx, vy, vz = vx - t * ax, vy - t * ay, vz - t * az
+    length = math.sqrt(vx * vx + vy * vy + vz * vz)
+    return float(length - data[r + 6])
+
+
+@kernel
+def cylinder_gap(data: Floats, r: int, x: float, y: float, z: float) -> float:
+    """The distance of `_cylinder` alone."""
+    px, py, pz = _three(data, r)
+    ux, uy, uz = _three(data, r + 3)
+    vx, vy, vz = x - px, y - py, z - pz
+    t = vx * ux + vy * uy + vz * uz
+    qx, qy, qz = vx - t * ux, vy - t * uy, vz - t * uz
+    side = math.sqrt(qx * qx + qy * qy + qz * qz) - data[r + 6]
+    end = t - data[r + 7] if t > 0.5 * data[r + 7] else -t
+    if side > 0.0 and end > 0.0:
+        return math.hypot(side, end)
+    return float(max(side, end))
+
+
+@kernel
+def box_gap(data: Floats, r: int, x: float, y: float, z: float) -> float:
+    """The distance of `_box` alone."""
+    px, py, pz = _three(data, r)
+    vx, vy, vz = x - px, y - py, z - pz
+    best, squares = -math.inf, 0.0
+    for k in range(3):
+        ux, uy, uz = _three(data, r + 6 + 3 * k)
+        out = abs(vx * ux + vy * uy + vz * uz) - data[r + 3 + k]
+        best = max(best, out)
+        if out > 0.0:
+            squares += out * out
+    return math.sqrt(squares) if squares > 0.0 else best
+
+
+@kernel
 def _three(data: Floats, at: int) -> tuple[float, float, float]:
     """A point or vector of a row."""
     return data[at], data[at + 1], data[at + 2]
