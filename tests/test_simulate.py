@@ -114,11 +114,36 @@ def test_ways_of_the_tree_are_shortest_and_pull_taut_to_the_truth():
     grid = Grid(field, (-4, -4, -1), (4, 4, 1), 0.1, 0.0)
     tree = ShortestTree(grid, (2, 0.05, 0), [(-2, 0.05, 0), (2, 1, 0)])
     straight = 0.95
-    assert straight <= tree.lengths[1] <= straight + 0.3  # ends lie beside the centres of cells
+    length = polylines.length(tree.path(1))
+    assert straight <= length <= straight + 0.3  # ends lie beside the centres of cells
     path = taut(field, tree.path(0), 0.0, 0.05)
     exact = 2 * math.sqrt(4 - 0.25) + 0.5 * (math.pi - 2 * math.acos(0.25))
     assert polylines.length(path) == pytest.approx(exact, rel=0.02)
-    assert tree.lengths[0] >= polylines.length(path)
+    assert polylines.length(tree.path(0)) >= polylines.length(path)
+
+
+def test_trees_that_are_kept_lead_as_those_that_are_grown_whatever_comes_and_goes():
+    goal, points = (2.0, 0.05, 0.0), [(-2, 0.05, 0), (2, 1, 0), (0.1, -1.5, 0.3)]
+    box = np.array([[-0.6, -0.6, -1.1], [0.6, 0.6, 1.1]])
+    elsewhere = Scene(solids=[{"post": {"center": [99, 99], "radius": 0.5}}])
+    empty, far = elsewhere.field(), np.full((2, 3), 3.0)
+    for first, second, where in ((empty, POST.field(), box), (POST.field(), empty, box),
+                                 (POST.field(), POST.field(), far)):  # fmt: skip
+        kept = Grid(first, (-4, -4, -1), (4, 4, 1), 0.1, 0.0)
+        assert kept.prepare([goal]) == 1
+        for grid, field in ((kept, first), (kept.over(second, where), second)):
+            fresh = Grid(field, (-4, -4, -1), (4, 4, 1), 0.1, 0.0)
+            tree, other = (ShortestTree(g, goal, points) for g in (grid, fresh))
+            for n in range(len(points)):
+                a, b = tree.path(n), other.path(n)
+                assert field.distance(a).min() >= 0.0
+                assert polylines.length(a) == pytest.approx(polylines.length(b))
+
+
+def test_no_more_trees_are_kept_than_go_into_the_memory():
+    grid = Grid(POST.field(), (-4, -4, -1), (4, 4, 1), 0.1, 0.0)
+    goals = [(2.0, 0.05 * k, 0.0) for k in range(1, 20, 4)]
+    assert grid.prepare(goals, memory=2 * grid.free.size) == 2
 
 
 def test_advance_passes_corners_and_stops_after_its_step():

@@ -399,7 +399,7 @@ def _shortcut(grown: DistanceField, line: Floats, step: float) -> Floats:
 
 
 def _relaxed(grown: DistanceField, line: Floats, delta: float, rounds: int) -> Floats:
-    return GeodesicTether(grown, delta).relaxed(line, rounds).nodes
+    return GeodesicTether(grown, delta).pulled(line, rounds)
 
 
 @kernel

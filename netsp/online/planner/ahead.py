@@ -98,10 +98,8 @@ class Ahead:
 
     @property
     def _fine(self) -> float:
-        """Metres between two places where little of the limit is left. Between them a tether may be
-        longer by half of that, here at most half of the margin."""
-        delta = self.mission.delta
-        return max(0.5 * delta, min(MARGIN * self.mission.tether_length, 2.0 * delta))
+        """Metres between two places where little of the limit is left."""
+        return max(0.5 * self.mission.delta, 0.02)
 
     def _meets_solid(self, path: Floats) -> bool:
         """Whether a path, pulled over points of a tether that lies in a crease, say, leads into a

@@ -31,6 +31,7 @@ from netsp.online.scene.solids import (
     CAPSULE,
     CYLINDER,
     box_gap,
+    capsule,
     capsule_gap,
     cylinder_gap,
     solid_distance,
@@ -63,7 +64,10 @@ def sample(field: Field, x: float, y: float, z: float) -> tuple[float, float, fl
     d, at = _nearest(data, x, y, z)
     gx, gy, gz, which = 0.0, 0.0, 1.0, -1
     if at > 0:
-        d, gx, gy, gz = solid_distance(data, at, x, y, z)
+        if int(data[at]) == CAPSULE:  # as in `_nearest`
+            d, gx, gy, gz = capsule(data, at + 1, x, y, z)
+        else:
+            d, gx, gy, gz = solid_distance(data, at, x, y, z)
         which = (at - ROWS) // ROW
     if data[VOXELS] > 0.0:
         e, ex, ey, ez = _voxels(field.grid, data, x, y, z)

@@ -24,7 +24,7 @@ def solid_distance(
     """(d, gx, gy, gz) at a point, of the solid with its kind at data[at] and its row behind."""
     kind, r = int(data[at]), at + 1
     if kind == CAPSULE:
-        return _capsule(data, r, x, y, z)
+        return capsule(data, r, x, y, z)
     if kind == CYLINDER:
         return _cylinder(data, r, x, y, z)
     if kind == BOX:
@@ -42,7 +42,7 @@ def solid_distance(
 
 @kernel
 def capsule_gap(data: Floats, r: int, x: float, y: float, z: float) -> float:
-    """The distance of `_capsule` alone."""
+    """The distance of `capsule` alone."""
     px, py, pz = _three(data, r)
     qx, qy, qz = _three(data, r + 3)
     ax, ay, az = qx - px, qy - py, qz - pz
@@ -101,7 +101,7 @@ def _round(vx: float, vy: float, vz: float, radius: float) -> tuple[float, float
 
 
 @kernel
-def _capsule(
+def capsule(
     data: Floats, r: int, x: float, y: float, z: float
 ) -> tuple[float, float, float, float]:
     """All points within a radius of a segment: its ends (3, 3), radius."""

@@ -19,8 +19,10 @@ import numpy.typing as npt
 from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.online.scene.field import DistanceField, finite_point
+from netsp.online.tether.drive import drive, follow
 from netsp.online.tether.load import Load, drive_under
-from netsp.online.tether.pull import MORE_ROUNDS, PullSettings, drive, follow, pull
+from netsp.online.tether.measure import cut_off
+from netsp.online.tether.pull import MORE_ROUNDS, PullSettings, pull
 from netsp.online.tether.resolution import THINNEST
 from netsp.online.tether.strand import strand_length
 from netsp.online.tether.tether import Tether, strand_of
@@ -155,13 +157,32 @@ class GeodesicTether:
         """
         return self._taut(strand_of(path), rounds)
 
+    def pulled(self, path: npt.ArrayLike, rounds: int) -> Floats:
+        """The nodes of `relaxed` alone: its length is not measured.
+
+        Parameters
+        ----------
+        path : array_like, shape (k, 3)
+            From the anchor to the robot, metres; not checked.
+        rounds : int
+            Rounds of pulling.
+
+        Returns
+        -------
+        ndarray, shape (n, 3)
+            The path, pulled, metres.
+        """
+        strand, count, _ = self._pull(strand_of(path), rounds)
+        return strand[:count, :3].copy()
+
     def _taut(self, strand: Floats, rounds: int | None = None) -> Tether:
-        rounds = rounds or self.rounds
-        strand, count, residual = pull(
+        return self._state(*self._pull(strand, rounds or self.rounds))
+
+    def _pull(self, strand: Floats, rounds: int) -> tuple[Floats, int, float]:
+        return pull(
             self.field.arrays, strand, len(strand), self._settings, rounds, 0,
             MOST_NUDGE if rounds >= MORE_ROUNDS else 1,
         )  # fmt: skip
-        return _state(strand, count, residual)
 
     def update(
         self, tether: Tether, robot: npt.ArrayLike, anchor: npt.ArrayLike | None = None
@@ -227,7 +248,8 @@ class GeodesicTether:
         strand, count, residual, lengths = drive(
             self.field.arrays, tether.strand.copy(), len(tether.strand), points, self._settings
         )
-        return _state(strand, count, residual), lengths
+        last = lengths[-1] if len(lengths) else None
+        return self._state(strand, count, residual, last), lengths
 
     def drive_under(
         self, tether: Tether, path: npt.ArrayLike, load: Load
@@ -257,7 +279,7 @@ class GeodesicTether:
             self.field.arrays, tether.strand.copy(), len(tether.strand), points, self._settings,
             load,
         )  # fmt: skip
-        return _state(strand, count, residual), payouts, turnings
+        return self._state(strand, count, residual), payouts, turnings
 
     def refine(self, tether: Tether) -> Tether:
         """The same tether, every contact looked at afresh, pulled until nothing moves.
@@ -277,14 +299,18 @@ class GeodesicTether:
         """
         return self.relaxed(tether.nodes, rounds=5000)
 
+    def _state(
+        self, strand: Floats, count: int, residual: float, length: float | None = None
+    ) -> Tether:
+        if length is None:
+            more = cut_off(self.field.arrays, strand, count, self._settings)
+            length = strand_length(strand, count) + more
+        return Tether(strand[:count].copy(), float(length), float(residual))
+
     @property
     def warnings(self) -> tuple[str, ...]:
         """What in the scene is too thin for this delta."""
         return self.field.thinner_than(THINNEST * self.delta)
-
-
-def _state(strand: Floats, count: int, residual: float) -> Tether:
-    return Tether(strand[:count].copy(), float(strand_length(strand, count)), float(residual))
 
 
 def _show(point: Floats) -> str:

@@ -23,8 +23,9 @@ import numpy.typing as npt
 from netsp.arrays import Floats
 from netsp.compiled.kernel import kernel
 from netsp.online.scene.sampling import Field
+from netsp.online.tether.measure import cut_off
 from netsp.online.tether.pull import PullSettings, pull_end
-from netsp.online.tether.strand import EXTRA, X, Y, Z, gap, rests
+from netsp.online.tether.strand import EXTRA, X, Y, Z, gap, rests, strand_length
 from netsp.online.tether.tether import Tether
 
 MOST_SAG = 40.0
@@ -113,13 +114,14 @@ def drive_under(
     settings: PullSettings,
     load: Load,
 ) -> tuple[Floats, int, float, Floats, Floats]:
-    """`pull.drive` with payout and turning after each point instead of the length."""
+    """`drive.drive` with payout and turning after each point instead of the length."""
     payouts, turnings, residual = np.empty(len(path)), np.empty(len(path)), 0.0
     for k in range(len(path)):
         strand, count, residual = pull_end(
             field, strand, count, True, path[k, 0], path[k, 1], path[k, 2], settings
         )
-        payouts[k] = payout_of(strand, count, load)
+        more = cut_off(field, strand, count, settings)
+        payouts[k] = payout_of(strand, count, load) + (1.0 + load.slack) * more
         turnings[k] = turning_of(strand, count, SHORT * settings.delta)
     return strand, count, residual, payouts, turnings
 
@@ -141,7 +143,8 @@ def payout(tether: Tether, load: Load) -> float:
     """
     if load.slack == 0.0 and load.drag == 0.0:
         return tether.length
-    return float(payout_of(tether.strand, len(tether.strand), load))
+    more = tether.length - strand_length(tether.strand, len(tether.strand))
+    return float(payout_of(tether.strand, len(tether.strand), load) + (1.0 + load.slack) * more)
 
 
 def turning(tether: Tether, delta: float) -> float:

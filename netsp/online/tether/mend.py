@@ -9,22 +9,28 @@ from netsp.online.tether.strand import USED, X, Y, Z, insert, look_along, path_o
 
 
 @kernel
-def mend(field: Field, strand: Floats, count: int, slip: float, room: int) -> tuple[Floats, int]:
+def mend(
+    field: Field, strand: Floats, count: int, slip: float, room: int, deep: float
+) -> tuple[Floats, int]:
     """Look again along every edge that may have gone too deep; where it has, its deepest point
     becomes a node on the surface.
 
     Parameters
     ----------
+    slip
+        Metres: how far apart the samples are, and from which depth an edge is looked at again.
     room
         Most nodes that the strand may have. One for every two slips of its length is more than any
         surface asks for; a strand that is handed over inside a solid could ask for more in every
         round.
+    deep
+        Metres from which an edge is too deep: `slip`, or less; then all edges are looked at.
     """
     i, budget = 0, min(64 + 2 * count, room - count)
     while i < count - 1:
-        if strand[i, USED] > 1.0:
+        if strand[i, USED] > 1.0 or deep < slip:
             low, where = look_along(field, strand, i, slip)
-            if low < -slip and budget > 0:
+            if low < -deep and budget > 0:
                 mx, my, mz = path_out(field, strand, i, where, slip)
                 if is_there(strand, count, i, mx, my, mz, 0.1 * slip):
                     i += 1  # nothing is gained by a node upon another

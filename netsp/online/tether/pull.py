@@ -180,7 +180,7 @@ def pull(
     while done < rounds:
         done += 1
         before, began = count, strand_length(strand, count)
-        strand, count = mend(field, strand, count, slip, room)
+        strand, count = mend(field, strand, count, slip, room, slip)
         changed = count != before
         most = refresh(field, strand, count, settings, delta)
         before = count
@@ -196,7 +196,7 @@ def pull(
         fell = began - strand_length(strand, count)
         if thorough and (still or (done == rounds and fell <= FALLS * stride)):
             worth = WORTH * precision
-            strand, count = mend(field, strand, count, slip, room)
+            strand, count = mend(field, strand, count, slip, room, slip)
             # once more only if the last time has come to something
             least, length = length, strand_length(strand, count)
             came_off = False
@@ -213,7 +213,7 @@ def pull(
         if done == rounds and fell > FALLS * stride and more > 0:
             more -= 1
             rounds += 1
-    strand, count = mend(field, strand, count, slip, room)
+    strand, count = mend(field, strand, count, slip, room, slip)
     refresh(field, strand, count, settings, 1e30)  # new nodes only
     return strand, count, most
 
@@ -443,41 +443,3 @@ def put_back(strand: Floats, was: Floats) -> None:
                 break
         if back[k]:
             strand[i, X], strand[i, Y], strand[i, Z] = was[k, 0], was[k, 1], was[k, 2]
-
-
-@kernel
-def follow(
-    field: Field,
-    strand: Floats,
-    last: bool,
-    x: float,
-    y: float,
-    z: float,
-    settings: PullSettings,
-) -> tuple[Floats, float, float, float]:
-    """`pull_end` on a copy, with what its callers ask next. Returns (strand, residual, length,
-    depth): depth is how deep the target lies inside a solid; then nothing is done."""
-    depth = -distance(field, x, y, z)
-    if depth > 0.25 * settings.delta:
-        return strand, 0.0, 0.0, depth
-    strand, count, residual = pull_end(field, strand.copy(), len(strand), last, x, y, z, settings)
-    return strand[:count].copy(), residual, strand_length(strand, count), depth
-
-
-@kernel
-def drive(
-    field: Field,
-    strand: Floats,
-    count: int,
-    path: Floats,
-    settings: PullSettings,
-) -> tuple[Floats, int, float, Floats]:
-    """Take the robot along a path (k, 3). Returns (strand, count, residual, lengths after each
-    point)."""
-    lengths, residual = np.empty(len(path)), 0.0
-    for k in range(len(path)):
-        strand, count, residual = pull_end(
-            field, strand, count, True, path[k, 0], path[k, 1], path[k, 2], settings
-        )  # fmt: skip
-        lengths[k] = strand_length(strand, count)
-    return strand, count, residual, lengths

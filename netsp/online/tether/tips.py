@@ -64,7 +64,7 @@ def nudge(
                 for _ in range(steps):
                     if not sidestep(field, strand, grown, i, j, vx, vy, vz, stride):
                         break
-                    strand, grown = mend(field, strand, grown, slip, room)
+                    strand, grown = mend(field, strand, grown, slip, room, slip)
                     if strand_length(strand, grown) < before - worth:
                         return strand, grown, True
                     ux, uy, uz, turned = across(strand, i, j)
