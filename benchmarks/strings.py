@@ -16,6 +16,7 @@ from __future__ import annotations
 import argparse
 import sys
 import time
+from collections.abc import Iterator
 
 import numpy as np
 import trimesh
@@ -28,6 +29,7 @@ from netsp.online import GeodesicTether
 from netsp.online.scene.field import DistanceField, pushed_out
 from netsp.online.scene.sampling import Field, sample
 from netsp.online.scene.voxels import of_triangles
+from netsp.online.tether import Tether
 
 DELTA, VOXEL, THINNEST = 0.1, 0.05, 0.25
 
@@ -113,24 +115,31 @@ def string_length(field: DistanceField, nodes: np.ndarray) -> float:
     return polylines.length(beads)
 
 
-def compared(seed: int, drives: int, every: int) -> tuple[list[float], list[float]]:
-    """Shares by which the tether is above its refinement, and above the string."""
+def stops(seed: int, drives: int) -> Iterator[tuple[DistanceField, Tether]]:
+    """The field of a mesh, and the tether after each drive and three still updates."""
     mesh = boxes(seed)
     field = DistanceField.build(
         [], [], np.empty((0, 4)), [], of_triangles(mesh.vertices, mesh.faces, voxel=VOXEL), 0.0
     )
-    coarse, fine = GeodesicTether(field, DELTA), GeodesicTether(field, 0.5 * DELTA)
+    model = GeodesicTether(field, DELTA)
     rng = np.random.default_rng([seed, 1])
     start = BOUNDS[0]
     path = wander(rng, field, start, drives * LEGS, 0.5, *BOUNDS, flat=1.0)
-    tether = coarse.start(start, start)
-    finer, string = [], []
+    tether = model.start(start, start)
     for k in range(drives):
-        tether, _ = coarse.drive(tether, path[LEGS * k : LEGS * (k + 1)])
+        tether, _ = model.drive(tether, path[LEGS * k : LEGS * (k + 1)])
         for _ in range(3):
-            tether = coarse.update(tether, tether.robot)
-        finer.append(tether.length / fine.refine(tether).length - 1.0)
-        if k % every == every - 1:
+            tether = model.update(tether, tether.robot)
+        yield field, tether
+
+
+def compared(seed: int, drives: int, every: int) -> tuple[list[float], list[float]]:
+    """Shares by which the tether is above its refinement, and above the string: at every so many
+    stops, and wherever it is not what it may be beside its refinement."""
+    finer, string = [], []
+    for k, (field, tether) in enumerate(stops(seed, drives)):
+        finer.append(tether.length / GeodesicTether(field, 0.5 * DELTA).refine(tether).length - 1.0)
+        if k % every == every - 1 or not LEAST < finer[-1] < MOST:
             string.append(tether.length / string_length(field, tether.nodes) - 1.0)
     return finer, string
 
