@@ -31,6 +31,10 @@ TURNS, ENOUGH = 6, 1e-4
 """How often at most the copy is mended and pulled, and below which share of the length that is not
 worth it: the nodes are put where edges are deepest, not where the copy is shortest."""
 
+CRUMPLED = 1.1
+"""A strand whose copy is longer by more than this lies crumpled over voxels, far from rest: about
+its length nothing is to be said."""
+
 
 @kernel
 def cut_off(field: Field, strand: Floats, count: int, settings: PullSettings) -> float:
@@ -40,13 +44,13 @@ def cut_off(field: Field, strand: Floats, count: int, settings: PullSettings) ->
         return 0.0
     slip = SLIP * settings.delta
     length, least = strand_length(strand, count), math.inf
-    room = 4 * count + 64
+    room = 2 * count + 64
     copy, n = np.zeros((count + 16, WIDTH)), count
     copy[:count] = strand[:count]
     for _ in range(TURNS):
         copy, n = mend(field, copy, n, slip, room, CUT * slip)
         least = min(least, strand_length(copy, n))
-        if least <= (1.0 + ENOUGH) * length:
+        if least <= (1.0 + ENOUGH) * length or least > CRUMPLED * length or n >= room:
             break
         copy, n, _ = pull(field, copy, n, settings, PASSING, 0, 1)
-    return max(0.0, least - length)
+    return max(0.0, least - length) if least <= CRUMPLED * length else 0.0
