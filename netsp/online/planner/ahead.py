@@ -17,6 +17,9 @@ from netsp.online.track import Track
 MARGIN = 0.004
 """Share of the tether that is kept in reserve for what the simulation does not know."""
 
+SURE = 0.95
+"""Of the limit, a length below which nothing that is added to it reaches the limit."""
+
 DEEPEST = 0.2
 """So many delta inside a solid, a robot has met it."""
 
@@ -90,7 +93,8 @@ class Ahead:
         s, length = 0.0, polylines.length(path)
         while s < length:
             until = min(length, s + max(self._fine, most - tether.length))
-            tether, lengths = self.model.drive(tether, polylines.part(path, s, until)[1:])
+            part = polylines.part(path, s, until)[1:]
+            tether, lengths = self.model.drive(tether, part, floor=SURE * most)
             if lengths.max() > most:
                 return s, tether
             s = until

@@ -39,13 +39,17 @@ def drive(
     count: int,
     path: Floats,
     settings: PullSettings,
+    floor: float,
 ) -> tuple[Floats, int, float, Floats]:
     """Take the robot along a path (k, 3). Returns (strand, count, residual, lengths after each
-    point)."""
+    point). What corners cut off is added at the last point, and where the length is at least
+    `floor`."""
     lengths, residual = np.empty(len(path)), 0.0
     for k in range(len(path)):
         strand, count, residual = pull_end(
             field, strand, count, True, path[k, 0], path[k, 1], path[k, 2], settings
         )
-        lengths[k] = strand_length(strand, count) + cut_off(field, strand, count, settings)
+        lengths[k] = strand_length(strand, count)
+        if lengths[k] >= floor or k == len(path) - 1:
+            lengths[k] += cut_off(field, strand, count, settings)
     return strand, count, residual, lengths

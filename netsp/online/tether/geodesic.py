@@ -222,7 +222,9 @@ class GeodesicTether:
                 self.field.free_point(target, name, 0.25 * self.delta)
         return Tether(strand, length, residual)
 
-    def drive(self, tether: Tether, path: npt.ArrayLike) -> tuple[Tether, Floats]:
+    def drive(
+        self, tether: Tether, path: npt.ArrayLike, floor: float = 0.0
+    ) -> tuple[Tether, Floats]:
         """The tether after the robot has followed a path: look-ahead in one call.
 
         Points inside solids are the caller's to avoid: the tether follows to them as well as it
@@ -234,6 +236,10 @@ class GeodesicTether:
             Before; it is not changed.
         path : array_like, shape (k, 3)
             Points that the robot passes, metres.
+        floor : float
+            Metres. What edges cut off of the corners of voxels (about a hundredth at most) is added
+            to lengths from this one on, and to the last: for callers who ask whether a tether stays
+            below a limit.
 
         Returns
         -------
@@ -246,8 +252,9 @@ class GeodesicTether:
         if not np.isfinite(points).all():
             raise InputError("path: expected finite coordinates")
         strand, count, residual, lengths = drive(
-            self.field.arrays, tether.strand.copy(), len(tether.strand), points, self._settings
-        )
+            self.field.arrays, tether.strand.copy(), len(tether.strand), points, self._settings,
+            floor,
+        )  # fmt: skip
         last = lengths[-1] if len(lengths) else None
         return self._state(strand, count, residual, last), lengths
 

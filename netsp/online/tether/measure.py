@@ -44,13 +44,14 @@ def cut_off(field: Field, strand: Floats, count: int, settings: PullSettings) ->
         return 0.0
     slip = SLIP * settings.delta
     length, least = strand_length(strand, count), math.inf
-    room = 2 * count + 64
+    room = 4 * count + 64
     copy, n = np.zeros((count + 16, WIDTH)), count
     copy[:count] = strand[:count]
     for _ in range(TURNS):
         copy, n = mend(field, copy, n, slip, room, CUT * slip)
-        least = min(least, strand_length(copy, n))
-        if least <= (1.0 + ENOUGH) * length or least > CRUMPLED * length or n >= room:
+        before, least = least, min(least, strand_length(copy, n))
+        worth = ENOUGH * length
+        if least <= length + worth or least > before - worth or least > CRUMPLED * length:
             break
         copy, n, _ = pull(field, copy, n, settings, PASSING, 0, 1)
     return max(0.0, least - length) if least <= CRUMPLED * length else 0.0
