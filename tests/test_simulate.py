@@ -3,6 +3,7 @@
 import csv
 import json
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +22,7 @@ from netsp.online.log import describe_run
 from netsp.online.mission import Mission
 from netsp.online.paths.tree import STEPS, Grid, ShortestTree, grow, states_of, taut, way
 from netsp.online.planner import PLANNERS
+from netsp.online.planner.predictive import PredictivePlanner
 from netsp.online.scene.field import pushed_out
 from netsp.online.sensing import Positions
 from netsp.online.simulate import simulate
@@ -120,6 +122,36 @@ def test_ways_of_the_tree_are_shortest_and_pull_taut_to_the_truth():
     exact = 2 * math.sqrt(4 - 0.25) + 0.5 * (math.pi - 2 * math.acos(0.25))
     assert polylines.length(path) == pytest.approx(exact, rel=0.02)
     assert polylines.length(tree.path(0)) >= polylines.length(path)
+
+
+class Blind(PredictivePlanner):
+    """Finds classes, but never a path."""
+
+    def _shortest_feasible(self, robot, tether, limit):
+        super()._shortest_feasible(robot, tether, limit)
+
+    def _straight(self, robot, tether, limit):
+        return None
+
+
+def test_where_no_path_is_found_the_way_by_the_anchor_is_as_good_as_a_proof():
+    goals = ring(1.0)
+    run = fly(Blind, goals, 3.6)
+    assert run.summary["visited"] == len(goals)
+    assert run.summary["exceedance_s"] == 0.0
+    assert run.summary["home"]["tether_free"]
+
+
+def test_a_waypoint_is_left_out_with_the_length_of_its_shortest_tether():
+    """Behind the post: two straight pieces and an arc."""
+    run = fly("predictive", [(2, 0, 0), (-1, 1, 0)], 3.9)
+    exact = 2 * math.sqrt(4 - 0.25) + 0.5 * (math.pi - 2 * math.acos(0.25))
+    (left,) = run.summary["left_out"]
+    assert left["waypoint"] == 0
+    told = re.match(
+        r"out of reach: it needs ([\d.]+) m of tether, the limit is 3.9", left["reason"]
+    )
+    assert float(told[1]) == pytest.approx(exact, abs=0.01)
 
 
 def test_trees_that_are_kept_lead_as_those_that_are_grown_whatever_comes_and_goes():

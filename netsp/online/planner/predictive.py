@@ -1,9 +1,8 @@
 """`predictive`: simulates the tether along the coming path before the robot moves.
 
-So the limit is never exceeded on the path that was planned. A waypoint is left out only when no
-path to it is found on which the tether fits; since going back to the anchor along the tether and
-then the shortest path is among those that are tried, that does not happen to a waypoint whose own
-shortest tether fits (but for the clearance that the robot keeps, and the margin).
+So the limit is never exceeded on the path that was planned. A waypoint is left out only when the
+shortest tether to it in every class found is over the limit, or when even the way back to the
+anchor and along that tether does not keep to it; which of both, and by how much, is told.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ import numpy as np
 from netsp.arrays import Floats
 from netsp.geometry import polylines
 from netsp.online.paths.beside import beside
-from netsp.online.paths.tree import ever_tauter, homotopic, roughly_taut, taut
+from netsp.online.paths.tree import ever_tauter, homotopic, roughly_taut
 from netsp.online.planner.ahead import DEEPEST, MARGIN, Ahead
 from netsp.online.planner.base import (
     FREE,
@@ -29,7 +28,6 @@ from netsp.online.planner.base import (
 )
 from netsp.online.scene.field import DistanceField
 from netsp.online.tether import GeodesicTether, Tether
-from netsp.online.tether.load import payout_along
 
 PIVOTS = 24
 """At most so many places along the tether to turn at."""
@@ -56,6 +54,9 @@ PULL, PULLS, FORESEEN = 10, 10, 2.0
 """Rounds of a pull, how many pulls at most until a tether counts as taut, and how many times what
 a geometric series would still take away is allowed for."""
 
+FAR_OVER = 1.1
+"""Times the limit: a tether that is longer after all these pulls is not pulled any further."""
+
 
 @dataclass
 class PredictivePlanner(Planner):
@@ -69,6 +70,7 @@ class PredictivePlanner(Planner):
     _looks: int = 0
     _checked: float = 0.0
     _caught_before: float = 0.0
+    _lines: list[Floats] = field(default_factory=list)
 
     name = "predictive"
 
@@ -92,12 +94,8 @@ class PredictivePlanner(Planner):
             self._wait(robot, tether, limit)
             return True
         if path is None:
-            own = self._own_tether(tether.anchor)
-            self.leave_out(
-                "no free path to it" if own is None else
-                f"out of reach: it needs {own:.2f} m of tether, the limit is "
-                f"{self.mission.tether_length:g} m{self._kept_back}"
-            )  # fmt: skip
+            path = self._by_the_anchor(tether, limit)
+        if path is None:
             return True
         better = self.refined(path)
         if better is not path and self._fits(tether, better, limit):
@@ -251,11 +249,12 @@ class PredictivePlanner(Planner):
             passed = int(np.searchsorted(along, places[i] - 1e-9, side="right"))
             return np.vstack([tether.nodes[: max(1, len(nodes) - passed)], back[i]])
 
-        self._looks = 0
+        self._looks, self._lines = 0, []
         whole: list[tuple[float, Floats, int]] = []
         for last in self._classes(back, onward):
             on = onward[last]
             assert on is not None
+            self._lines.append(np.vstack([taken_back(last), on[1:]]))
             rough = self._roughly_pulled(np.vstack([back[: last + 1], on[1:]]))
             whole.append((polylines.length(rough), rough, last))
         best: Floats | None = None
@@ -429,12 +428,37 @@ class PredictivePlanner(Planner):
                 break
         return length > limit
 
-    def _own_tether(self, anchor: Floats) -> float | None:
-        """What the shortest tether from the anchor to the waypoint must be out."""
-        tree = self.paths(anchor[None])
-        path = tree.path(0)
-        return (
-            None
-            if path is None
-            else payout_along(taut(self.scene, path, 0.0, self.mission.delta), self.load)
+    def _by_the_anchor(self, tether: Tether, limit: float) -> Floats | None:
+        """Where no path was found: back to the anchor, and on beside the shortest tether that the
+        waypoint has in any class found. None where that does not fit either: the waypoint is then
+        left out, with the reason."""
+        own = self._shortest_tether(limit)
+        if own is None:
+            self.leave_out("no free path to it")
+            return None
+        needs, near = self.payout(own), 0.8 * self.mission.reach
+        if needs - near <= limit:
+            path = np.vstack([self._beside(tether.nodes[::-1]), self._beside(own.nodes)[1:]])
+            for short in (0.0, near):
+                part = polylines.part(path, 0.0, polylines.length(path) - short)
+                if self._fits(tether, part, limit):
+                    return part
+        limits = f"the limit is {self.mission.tether_length:g} m{self._kept_back}"
+        self.leave_out(
+            f"out of reach: it needs {needs:.2f} m of tether, {limits}"
+            if needs - near > limit
+            else f"no path found on which the tether fits, though {needs:.2f} m would do; {limits}"
         )
+        return None
+
+    def _shortest_tether(self, limit: float) -> Tether | None:
+        """The shortest tether at the waypoint, of all classes that the last search has found."""
+        found: list[Tether] = []
+        for line in self._lines:
+            roughly = self._model.relaxed(line, PULLS * PULL)
+            far_over = roughly.length > FAR_OVER * limit and bool(found)
+            found.append(roughly if far_over else self._model.refine(roughly))
+        return min(found, key=lambda t: t.length, default=None)
+
+    def _beside(self, line: Floats) -> Floats:
+        return beside(self.scene, polylines.points_along(line, self.fine), self.mission.clearance)
