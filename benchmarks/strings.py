@@ -41,6 +41,10 @@ MOST_BEADS = 1500
 LEGS = 10
 """Steps of a drive."""
 
+MOST_DOUBTS = 3
+"""Stops of a mesh, besides those at which strings are pulled anyway, at which one is because the
+tether is not as long as its refinement."""
+
 
 def boxes(seed: int) -> trimesh.Trimesh:
     """A union of tilted boxes, a third of them plates."""
@@ -136,10 +140,14 @@ def stops(seed: int, drives: int) -> Iterator[tuple[DistanceField, Tether]]:
 def compared(seed: int, drives: int, every: int) -> tuple[list[float], list[float]]:
     """Shares by which the tether is above its refinement, and above the string: at every so many
     stops, and wherever it is not what it may be beside its refinement."""
-    finer, string = [], []
+    finer: list[float] = []
+    string: list[float] = []
+    doubts = 0
     for k, (field, tether) in enumerate(stops(seed, drives)):
         finer.append(tether.length / GeodesicTether(field, 0.5 * DELTA).refine(tether).length - 1.0)
-        if k % every == every - 1 or not LEAST < finer[-1] < MOST:
+        doubtful = not LEAST < finer[-1] < MOST and doubts < MOST_DOUBTS
+        doubts += doubtful
+        if k % every == every - 1 or doubtful:
             string.append(tether.length / string_length(field, tether.nodes) - 1.0)
     return finer, string
 
