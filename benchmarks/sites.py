@@ -27,6 +27,9 @@ from netsp.online.simulate import grid_of, simulate
 SHARE = 1.1
 """Tether over the longest of the shortest."""
 
+ENOUGH = 1.01
+"""Over the longest that a planner has out that ignores the tether: so much it needs."""
+
 CURRENT = (0.25, 0.15, 0.0)
 """0.3 m/s, for the BlueROV2."""
 
@@ -230,15 +233,37 @@ def flown(mission: Mission, scene: Scene, planner: str, vehicle: str, changes) -
     ).summary
 
 
+def where_none_will_do(mission: Mission, scene: Scene) -> tuple[dict[str, Any], dict[str, Any]]:
+    """The summaries of `none`, and of `predictive` with as long a tether as `none` takes."""
+    endless = mission.model_copy(update={"tether_length": 1e3})
+    none = flown(endless, scene, "none", "kinematic", {})
+    enough = {"tether_length": round(ENOUGH * none["longest_tether"], 2)}
+    return none, flown(mission, scene, "predictive", "kinematic", enough)
+
+
 def main() -> None:
     """Run what was asked for."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--sites", nargs="*", default=[*SITES, "basin", "pipes", "jacket"])
+    parser.add_argument("--where-none-will-do", action="store_true",
+                        help="only: with as long a tether as `none` takes")  # fmt: skip
     parser.add_argument("--quick", action="store_true", help="predictive only")
     parser.add_argument(
         "--react", action="store_true", help="the paper's planner, too: a quarter of an hour a site"
     )
     args = parser.parse_args()
+    if args.where_none_will_do:
+        heading("Where a planner that ignores the tether would do")
+        head("site", "tether m", "inspection s: none", "predictive", "home s: none", "predictive",
+             "left m: none", "predictive", name="sites-none")  # fmt: skip
+        for name in args.sites:
+            mission, scene = mission_of(name) if name in SITES else shipped(name)
+            none, ours = where_none_will_do(mission, scene)
+            row(name, f"{ENOUGH * none['longest_tether']:.2f}", f"{none['inspection_s']:.1f}",
+                f"{ours['inspection_s']:.1f}", f"{none['home']['seconds']:.1f}",
+                f"{ours['home']['seconds']:.1f}", f"{none['home']['left']:.1f}",
+                f"{ours['home']['left']:.1f}")  # fmt: skip
+        return
     heading("Sites")
     head("site", "tether m", "planner, vehicle", "visited", "longest m", "over s", "inspection s",
          "home s", "tether free", "worst replan ms", name="sites")  # fmt: skip

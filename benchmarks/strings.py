@@ -41,7 +41,7 @@ MOST_BEADS = 1500
 LEGS = 10
 """Steps of a drive."""
 
-MOST_DOUBTS = 3
+MOST_DOUBTS = 1
 """Stops of a mesh, besides those at which strings are pulled anyway, at which one is because the
 tether is not as long as its refinement."""
 

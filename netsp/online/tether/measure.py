@@ -27,9 +27,10 @@ from netsp.online.tether.strand import WIDTH, strand_length
 CUT = 1.0 / 6.0
 """Of a slip, the depth from which an edge counts as cutting a corner."""
 
-TURNS, ENOUGH = 6, 1e-4
-"""How often at most the copy is mended and pulled, and below which share of the length that is not
-worth it: the nodes are put where edges are deepest, not where the copy is shortest."""
+TURNS, PATIENCE, ENOUGH = 8, 2, 1e-4
+"""How often at most the copy is mended and pulled, because nodes are put where edges are deepest
+and not where the copy is shortest; how often in a row in vain; and what share of the length counts
+as that."""
 
 CRUMPLED = 1.1
 """A strand whose copy is longer by more than this lies crumpled over voxels, far from rest: about
@@ -47,11 +48,12 @@ def cut_off(field: Field, strand: Floats, count: int, settings: PullSettings) ->
     room = 4 * count + 64
     copy, n = np.zeros((count + 16, WIDTH)), count
     copy[:count] = strand[:count]
+    in_vain, worth = 0, ENOUGH * length
     for _ in range(TURNS):
         copy, n = mend(field, copy, n, slip, room, CUT * slip)
         before, least = least, min(least, strand_length(copy, n))
-        worth = ENOUGH * length
-        if least <= length + worth or least > before - worth or least > CRUMPLED * length:
+        in_vain = in_vain + 1 if least > before - worth else 0
+        if least <= length + worth or in_vain > PATIENCE or least > CRUMPLED * length:
             break
         copy, n, _ = pull(field, copy, n, settings, PASSING, 0, 1)
     return max(0.0, least - length) if least <= CRUMPLED * length else 0.0
