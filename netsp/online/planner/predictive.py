@@ -250,6 +250,15 @@ class PredictivePlanner(Planner):
             return np.vstack([tether.nodes[: max(1, len(nodes) - passed)], back[i]])
 
         self._looks, self._lines = 0, []
+        direct = onward[0]
+        if direct is not None:
+            # the shortest path of all: where the tether fits on it, nothing else need be tried
+            direct = self.pulled(direct)
+            line = np.vstack([tether.nodes, direct[1:]])
+            if not self._longer_than(line, self._lasts(limit, direct)) and self._fits(
+                tether, direct, limit
+            ):
+                return direct
         whole: list[tuple[float, Floats, int]] = []
         for last in self._classes(back, onward):
             on = onward[last]
@@ -264,9 +273,7 @@ class PredictivePlanner(Planner):
                 break
             on = onward[last]
             assert on is not None
-            nearer = self._nearer_by(length)
-            lasts = (limit + nearer) / (1.0 + self.mission.tether.slack)
-            if self._longer_than(np.vstack([taken_back(last), on[1:]]), lasts):
+            if self._longer_than(np.vstack([taken_back(last), on[1:]]), self._lasts(limit, rough)):
                 continue
             path = self.pulled(rough)
             length = polylines.length(path)
@@ -280,11 +287,13 @@ class PredictivePlanner(Planner):
                 best, least = found, polylines.length(found)
         return best
 
-    def _nearer_by(self, way: float) -> float:
-        """Metres that the anchor may have come nearer when the robot has gone a way."""
-        if self.track is None or not self.anchor_moves:
-            return 0.0
-        return self.track.travelled(self.now, self.now + way / self.mission.speed)
+    def _lasts(self, limit: float, path: Floats) -> float:
+        """Metres that a taut tether may have at the end of a path: the limit less slack, and what
+        the anchor may have come nearer by then."""
+        if self.track is not None and self.anchor_moves:
+            way = polylines.length(path) / self.mission.speed
+            limit += self.track.travelled(self.now, self.now + way)
+        return limit / (1.0 + self.mission.tether.slack)
 
     @property
     def _looked_enough(self) -> bool:
