@@ -254,10 +254,9 @@ class PredictivePlanner(Planner):
         if direct is not None:
             # the shortest path of all: where the tether fits on it, nothing else need be tried
             direct = self.pulled(direct)
-            line = np.vstack([tether.nodes, direct[1:]])
-            if not self._longer_than(line, self._lasts(limit, direct)) and self._fits(
-                tether, direct, limit
-            ):
+            self._lines.append(np.vstack([tether.nodes, direct[1:]]))
+            lasts = self._lasts(limit, direct)
+            if not self._longer_than(self._lines[-1], lasts) and self._fits(tether, direct, limit):
                 return direct
         whole: list[tuple[float, Floats, int]] = []
         for last in self._classes(back, onward):
