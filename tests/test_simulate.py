@@ -128,7 +128,7 @@ class Blind(PredictivePlanner):
     """Finds classes, but never a path."""
 
     def _shortest_feasible(self, robot, tether, limit):
-        super()._shortest_feasible(robot, tether, limit)
+        return None, super()._shortest_feasible(robot, tether, limit)[1]
 
     def _straight(self, robot, tether, limit):
         return None

@@ -89,7 +89,7 @@ class PredictivePlanner(Planner):
         if straight is not None:
             self.path, self.mode = straight[1:], NORMAL
             return True
-        path = self._shortest_feasible(robot, tether, limit)
+        path, mode = self._shortest_feasible(robot, tether, limit)
         if path is None and self.anchor_moves:
             self._wait(robot, tether, limit)
             return True
@@ -100,7 +100,7 @@ class PredictivePlanner(Planner):
         better = self.refined(path)
         if better is not path and self._fits(tether, better, limit):
             path = better
-        self.path, self.mode = path[1:], RECOVERY
+        self.path, self.mode = path[1:], mode
         return True
 
     @property
@@ -224,9 +224,11 @@ class PredictivePlanner(Planner):
                 return path
         return None
 
-    def _shortest_feasible(self, robot: Floats, tether: Tether, limit: float) -> Floats | None:
+    def _shortest_feasible(
+        self, robot: Floats, tether: Tether, limit: float
+    ) -> tuple[Floats | None, str]:
         """The shortest path on which the tether fits: on from the robot, or back along the tether
-        to a pivot and on from there. One tree serves all pivots.
+        to a pivot and on from there; and as what it counts. One tree serves all pivots.
 
         What a pivot decides is the class of the tether at the waypoint, and with it its length
         there. Pivots in a row that lead to one class are taken together; classes over the limit
@@ -257,7 +259,7 @@ class PredictivePlanner(Planner):
             self._lines.append(np.vstack([tether.nodes, direct[1:]]))
             lasts = self._lasts(limit, direct)
             if not self._longer_than(self._lines[-1], lasts) and self._fits(tether, direct, limit):
-                return direct
+                return direct, NORMAL
         whole: list[tuple[float, Floats, int]] = []
         for last in self._classes(back, onward):
             on = onward[last]
@@ -284,7 +286,7 @@ class PredictivePlanner(Planner):
             found = self._tautest(tether, np.vstack([back[: last + 1], on[1:]]), limit, least)
             if found is not None:
                 best, least = found, polylines.length(found)
-        return best
+        return best, RECOVERY
 
     def _lasts(self, limit: float, path: Floats) -> float:
         """Metres that a taut tether may have at the end of a path: the limit less slack, and what
