@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -58,6 +59,15 @@ FAR_OVER = 1.1
 """Times the limit: a tether that is longer after all these pulls is not pulled any further."""
 
 
+class Candidate(NamedTuple):
+    """A homotopy class of the tether at the waypoint: a tether in it (k, 3), a path that brings it
+    there (m, 3), and that path roughly pulled (n, 3)."""
+
+    tether: Floats
+    path: Floats
+    rough: Floats
+
+
 @dataclass
 class PredictivePlanner(Planner):
     """`Planner` with look-ahead."""
@@ -70,7 +80,7 @@ class PredictivePlanner(Planner):
     _looks: int = 0
     _checked: float = 0.0
     _caught_before: float = 0.0
-    _lines: list[Floats] = field(default_factory=list)
+    _candidates: list[Candidate] = field(default_factory=list)
 
     name = "predictive"
 
@@ -251,50 +261,50 @@ class PredictivePlanner(Planner):
             passed = int(np.searchsorted(along, places[i] - 1e-9, side="right"))
             return np.vstack([tether.nodes[: max(1, len(nodes) - passed)], back[i]])
 
-        self._looks, self._lines = 0, []
-        direct = onward[0]
-        if direct is not None:
+        self._looks, self._candidates = 0, []
+        if onward[0] is not None:
             # the shortest path of all: where the tether fits on it, nothing else need be tried
-            direct = self.pulled(direct)
-            self._lines.append(np.vstack([tether.nodes, direct[1:]]))
-            lasts = self._lasts(limit, direct)
-            if not self._longer_than(self._lines[-1], lasts) and self._fits(tether, direct, limit):
-                return direct, NORMAL
-        whole: list[tuple[float, Floats, int]] = []
+            path = self.pulled(onward[0])
+            direct = Candidate(np.vstack([tether.nodes, path[1:]]), path, path)
+            self._candidates.append(direct)
+            if not self._over_at_its_end(direct, limit) and self._fits(tether, path, limit):
+                return path, NORMAL
+        classes = []
         for last in self._classes(back, onward):
             on = onward[last]
             assert on is not None
-            self._lines.append(np.vstack([taken_back(last), on[1:]]))
-            rough = self._roughly_pulled(np.vstack([back[: last + 1], on[1:]]))
-            whole.append((polylines.length(rough), rough, last))
+            path = np.vstack([back[: last + 1], on[1:]])
+            there = np.vstack([taken_back(last), on[1:]])
+            classes.append(Candidate(there, path, self._roughly_pulled(path)))
+        self._candidates += classes
         best: Floats | None = None
         least = np.inf
-        for length, rough, last in sorted(whole, key=lambda w: w[0]):
-            if ROUGH * length >= least or (best is not None and self._looked_enough):
+        for candidate in sorted(classes, key=lambda c: polylines.length(c.rough)):
+            if ROUGH * polylines.length(candidate.rough) >= least or (
+                best is not None and self._looked_enough
+            ):
                 break
-            on = onward[last]
-            assert on is not None
-            if self._longer_than(np.vstack([taken_back(last), on[1:]]), self._lasts(limit, rough)):
+            if self._over_at_its_end(candidate, limit):
                 continue
-            path = self.pulled(rough)
+            path = self.pulled(candidate.rough)
             length = polylines.length(path)
             if length >= least:
                 continue
             if self._fits(tether, path, limit):
                 best, least = path, length
                 continue
-            found = self._tautest(tether, np.vstack([back[: last + 1], on[1:]]), limit, least)
+            found = self._tautest(tether, candidate.path, limit, least)
             if found is not None:
                 best, least = found, polylines.length(found)
         return best, RECOVERY
 
-    def _lasts(self, limit: float, path: Floats) -> float:
-        """Metres that a taut tether may have at the end of a path: the limit less slack, and what
-        the anchor may have come nearer by then."""
+    def _over_at_its_end(self, candidate: Candidate, limit: float) -> bool:
+        """Whether even the taut tether at the end of a path is over the limit, less slack, however
+        near the anchor may have come by then."""
         if self.track is not None and self.anchor_moves:
-            way = polylines.length(path) / self.mission.speed
+            way = polylines.length(candidate.rough) / self.mission.speed
             limit += self.track.travelled(self.now, self.now + way)
-        return limit / (1.0 + self.mission.tether.slack)
+        return self._longer_than(candidate.tether, limit / (1.0 + self.mission.tether.slack))
 
     @property
     def _looked_enough(self) -> bool:
@@ -464,8 +474,8 @@ class PredictivePlanner(Planner):
     def _shortest_tether(self, limit: float) -> Tether | None:
         """The shortest tether at the waypoint, of all classes that the last search has found."""
         found: list[Tether] = []
-        for line in self._lines:
-            roughly = self._model.relaxed(line, PULLS * PULL)
+        for candidate in self._candidates:
+            roughly = self._model.relaxed(candidate.tether, PULLS * PULL)
             far_over = roughly.length > FAR_OVER * limit and bool(found)
             found.append(roughly if far_over else self._model.refine(roughly))
         return min(found, key=lambda t: t.length, default=None)
