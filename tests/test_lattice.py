@@ -153,17 +153,19 @@ def test_a_tether_is_as_long_in_a_sparse_grid_as_in_a_full_one(sparse):
 
     t = np.linspace(0.0, 1.0, 200)[:, None]
     ring = np.hstack([6.5 * np.cos(9.0 * t), 6.5 * np.sin(9.0 * t), 3.0 * np.sin(7.0 * t)])
+    models = [TETHERS["geodesic"](field(g), delta=0.15) for g in (build(), sparse(build))]
+    # the points of the two grids lie elsewhere: of two tethers driven, one may slip off a box on the
+    # other side. So one is driven, and at its stops it is pulled taut in both
+    tether = models[0].start(ring[0], ring[0])
     lengths = []
-    for grid in (build(), sparse(build)):
-        model = TETHERS["geodesic"](field(grid), delta=0.15)
-        lengths.append(model.drive(model.start(ring[0], ring[0]), ring)[1])
-    assert max(lengths[0]) > 1.1 * np.linalg.norm(ring - ring[0], axis=1).max()
-    # the points of the two grids lie elsewhere; a tether that is about to slip off may do so an
-    # update sooner or later
-    apart = np.abs(lengths[0] - lengths[1])
-    assert np.median(apart / np.maximum(lengths[0], 1.0)) < 2e-4
-    assert np.mean(apart < 0.01 * lengths[0] + 1e-3) > 0.9
-    assert apart[-1] < 2e-3
+    for k in range(0, len(ring), 10):
+        tether, _ = models[0].drive(tether, ring[k : k + 10])
+        lengths.append([model.refine(tether).length for model in models])
+    full, part = np.array(lengths).T
+    assert (full > 1.1 * np.linalg.norm(ring[9::10] - ring[0], axis=1)).mean() > 0.3
+    apart = np.abs(part / full - 1.0)
+    assert np.median(apart) < 2e-4
+    assert np.mean(apart < 0.01) >= 0.9
 
 
 def test_a_thin_plate_is_told_in_a_sparse_grid_too(sparse):
