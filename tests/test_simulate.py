@@ -335,6 +335,31 @@ def test_a_scene_thinner_than_what_holds_a_tether_is_warned_of(tmp_path, capsys)
         assert ("may slip through; lower the mission's delta" in capsys.readouterr().err) == warned
 
 
+@pytest.mark.parametrize(
+    ("posts", "taken"),
+    [([], 0.2), ([{"name": "rod", "post": {"center": [5, 0], "radius": 0.1}}], 0.2 / 1.89)],
+    ids=["mesh alone", "mesh and rod"],
+)
+def test_a_delta_finer_than_the_voxels_is_raised_as_far_as_other_solids_allow(
+    posts, taken, tmp_path, capsys
+):
+    trimesh = pytest.importorskip("trimesh")
+    trimesh.creation.box([1.0, 1.0, 1.0]).export(tmp_path / "box.stl")
+    scene = {"schema_version": 1, "solids": posts, "mesh": {"file": "box.stl", "voxel": 0.2}}
+    (tmp_path / "scene.json").write_text(json.dumps(scene))
+    said = {}
+    for delta in (0.05, 0.3):
+        mission = {
+            "schema_version": 1, "scene": "scene.json", "anchor": [2, 0, 0], "start": [2, 1, 0],
+            "waypoints": [[2, 1.5, 0]], "tether_length": 3, "delta": delta,
+        }  # fmt: skip
+        (tmp_path / "m.json").write_text(json.dumps(mission))
+        assert main(["simulate", str(tmp_path / "m.json"), "-o", str(tmp_path / "run")]) == 0
+        said[delta] = capsys.readouterr().err
+    assert f"delta 0.05 is finer than the voxels of the scene: {taken:g} is taken" in said[0.05]
+    assert "is finer than" not in said[0.3]
+
+
 @settings(max_examples=60, deadline=None)
 @given(
     shape=st.tuples(st.integers(1, 7), st.integers(1, 7), st.integers(1, 7)),

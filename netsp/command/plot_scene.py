@@ -41,8 +41,13 @@ def plot_scene(args: argparse.Namespace) -> int:
     return 0
 
 
-def warn_of_thin(model: GeodesicTether, remedy: str) -> None:
-    """Say it when something in the scene is thinner than what holds a tether for certain."""
+def warn_of_scene(model: GeodesicTether, delta: float, remedy: str) -> None:
+    """Say it when the scene is coarser than the delta asked for, and when something in it is
+    thinner than what holds a tether for certain."""
+    if model.delta > delta:
+        messages.warning(
+            f"delta {delta:g} is finer than the voxels of the scene: {model.delta:g} is taken"
+        )
     if thin := model.warnings:
         more = f" (and {len(thin) - 1} more)" if len(thin) > 1 else ""
         messages.warning(f"{thin[0]}{more}: the tether may slip through; {remedy}")
@@ -52,7 +57,7 @@ def lay(field: DistanceField, path: Floats, model: str, delta: float) -> Tether:
     """The tether after a robot has gone a path from its anchor, the first point, on."""
     chosen = make_tether(model, field, delta)
     if isinstance(chosen, GeodesicTether):
-        warn_of_thin(chosen, "take a smaller --delta")
+        warn_of_scene(chosen, delta, "take a smaller --delta")
     for k in range(len(path) - 1):
         if not field.line_of_sight(path[k], path[k + 1], depth=0.25 * delta):
             raise InputError(

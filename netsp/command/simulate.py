@@ -78,7 +78,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Fly the mission, write what happened, and return the exit code."""
     from netsp.command.compiling import compile_messages
-    from netsp.command.plot_scene import tell, warn_of_thin
+    from netsp.command.plot_scene import tell, warn_of_scene
     from netsp.files import output_folder
     from netsp.online.limits import check_names
     from netsp.online.log import describe_run, write_run
@@ -108,7 +108,9 @@ def run(args: argparse.Namespace) -> int:
             surprises.check(scene, args.surprise)
         field = scene.field(on_progress=tell)
         if not args.quiet:
-            warn_of_thin(GeodesicTether(field, mission.delta), "lower the mission's delta")
+            warn_of_scene(
+                GeodesicTether(field, mission.delta), mission.delta, "lower the mission's delta"
+            )
         for planner in [args.planner, args.compare] if args.compare else [args.planner]:
             run = simulate(
                 mission, planner, vehicle=args.vehicle, tether=args.tether_model,

@@ -42,7 +42,9 @@ class GeodesicTether:
         The scene.
     delta : float
         Resolution, metres. Edges over a surface dip into it by at most delta / 8 (their length is
-        corrected for it), and solids thinner than 1.8 delta may be lost.
+        corrected for it), and solids thinner than 1.8 delta may be lost. A delta finer than the
+        voxels of a scene is taken as their size (or as fine as its other solids need), for voxels
+        know nothing of a surface's shape below that: the tether would cling to their corners.
     precision : float, optional
         Metres; the rounds end when no node has farther to go, or the tether would get shorter by
         less than 0.4 of it. By default delta / 200.
@@ -72,6 +74,9 @@ class GeodesicTether:
     def __post_init__(self) -> None:
         if not 0.0 < self.delta < np.inf:
             raise InputError(f"delta: expected a positive length, got {self.delta!r}")
+        thinnest = min((t for _, t in self.field.thickness), default=np.inf) / (1.05 * THINNEST)
+        coarsest = min(self.field.voxel or 0.0, thinnest)
+        object.__setattr__(self, "delta", max(self.delta, coarsest))
 
     @cached_property
     def _settings(self) -> PullSettings:
