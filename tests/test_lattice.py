@@ -154,8 +154,8 @@ def test_a_tether_is_as_long_in_a_sparse_grid_as_in_a_full_one(sparse):
     t = np.linspace(0.0, 1.0, 200)[:, None]
     ring = np.hstack([6.5 * np.cos(9.0 * t), 6.5 * np.sin(9.0 * t), 3.0 * np.sin(7.0 * t)])
     models = [TETHERS["geodesic"](field(g), delta=0.15) for g in (build(), sparse(build))]
-    # the points of the two grids lie elsewhere: of two tethers driven, one may slip off a box on the
-    # other side. So one is driven, and at its stops it is pulled taut in both
+    # the points of the two grids lie elsewhere: of two tethers driven, one may slip off a box on
+    # the other side. So one is driven, and at its stops it is pulled taut in both
     tether = models[0].start(ring[0], ring[0])
     lengths = []
     for k in range(0, len(ring), 10):
