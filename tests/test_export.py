@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from netsp import Circle, InputError, Polygon, Problem, solve
 from netsp.command.main import main
 from netsp.export import Projection, export, waypoints_of
-from netsp.export.site import read_site
 from netsp.hsignature import reduce, signature
+from netsp.site.read import read_site
 
 pytest.importorskip("pyproj")
 

@@ -19,11 +19,11 @@ from netsp.errors import brief
 from netsp.execute import ExecutionOptions, Surprises, execute
 from netsp.execute.events import changed
 from netsp.export import Projection, export
-from netsp.export.site import read_site
 from netsp.export.write import Settings
 from netsp.files import cell, read_gzip, write_text
 from netsp.online.mission import Mission
 from netsp.pictures.style import literal
+from netsp.site.read import read_site
 
 ROOT = Path(__file__).parent.parent
 SMALL = str(ROOT / "problems" / "known" / "triangle.json")

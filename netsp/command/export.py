@@ -62,7 +62,6 @@ def run(args: argparse.Namespace) -> int:
     """Write the file, warn of what is tight, and return the exit code."""
     check_writable(args.output, inputs=(args.solution, args.problem))
     from netsp.export.margins import warnings
-    from netsp.export.projection import Projection
     from netsp.export.write import (
         MOST_FENCE_POINTS,
         SHALLOWEST,
@@ -74,6 +73,7 @@ def run(args: argparse.Namespace) -> int:
     )
     from netsp.judge import verify
     from netsp.problem import Problem
+    from netsp.site.projection import Projection
     from netsp.solution import Solution
 
     problem, solution = Problem.load(args.problem), Solution.load(args.solution)

@@ -44,9 +44,9 @@ def arguments(p: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Write the problem, and return the exit code."""
     check_writable(args.output, inputs=(args.site,))
-    from netsp.export.projection import Projection
-    from netsp.export.site import read_site
     from netsp.files import write_text
+    from netsp.site.projection import Projection
+    from netsp.site.read import read_site
 
     projection = Projection.parse(args.base, name="--base") if args.base else None
     problem = read_site(

@@ -24,11 +24,11 @@ import numpy as np
 
 from netsp.errors import InputError
 from netsp.execute.plan import HOME
-from netsp.export.projection import Projection
 from netsp.export.waypoints import Waypoint, waypoints_of
 from netsp.fields import checked_argument, checked_instance
 from netsp.files import cell, write_text
 from netsp.problem import Circle, Problem
+from netsp.site.projection import Projection
 from netsp.solution import Solution
 
 SHALLOWEST = 0.1

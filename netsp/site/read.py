@@ -16,10 +16,10 @@ import numpy as np
 from pydantic import ValidationError
 
 from netsp.errors import InputError
-from netsp.export.projection import Projection
 from netsp.files import read_text
 from netsp.models import explain, parse_json_object
 from netsp.problem import Problem
+from netsp.site.projection import Projection
 
 STANDING = {"pile", "platform", "obstruction"}
 
