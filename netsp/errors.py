@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 
 EXIT_DEFECT, EXIT_BAD_INPUT, EXIT_INFEASIBLE = 1, 2, 3
 """A defect of ours (whatever moved is safely home); input that cannot be used; no solution."""
@@ -75,6 +76,26 @@ class InputError(NetspError):
     """Input that cannot be used. The message is one line: field, value, what was expected."""
 
     exit_code = EXIT_BAD_INPUT
+
+
+class SeveralErrors(InputError):
+    """Several complaints about one input, all told at once.
+
+    Parameters
+    ----------
+    complaints : sequence of str
+        One line each.
+
+    Attributes
+    ----------
+    complaints : tuple of str
+        One line each.
+    """
+
+    def __init__(self, complaints: Sequence[str]) -> None:
+        more = f" (and {len(complaints) - 1} more)" if len(complaints) > 1 else ""
+        super().__init__(f"{complaints[0]}{more}")
+        self.complaints = tuple(map(brief, complaints))
 
 
 class InfeasibleError(NetspError):

@@ -32,6 +32,7 @@ from netsp.fields import (
     Integer,
     Name,
     NonNegative,
+    Number,
     Point2,
     Point3,
     Positive,
@@ -40,6 +41,7 @@ from netsp.fields import (
 from netsp.files import FileModel
 from netsp.geometry.polygons import check_polygon, polygon_interior_point, polygon_signed_distance
 from netsp.models import Model, shown
+from netsp.shorthand import Inspection, written_out
 
 if TYPE_CHECKING:
     import shapely
@@ -203,6 +205,7 @@ GoalLike = Annotated[
                     "required": ["position"],
                     "additionalProperties": False,
                 },
+                Inspection.model_json_schema(),
             ]
         }
     ),
@@ -222,6 +225,17 @@ class State(Model):
     ] = ()
 
 
+class Origin(Model):
+    """Where on the earth the base is, and where the y axis points."""
+
+    latitude: Annotated[Number, Field(description="of the base, degrees", ge=-90, le=90)]
+    longitude: Annotated[Number, Field(description="of the base, degrees", ge=-180, le=180)]
+    heading: Annotated[
+        Number,
+        Field(description="degrees clockwise from true north of the y axis", ge=-360, le=360),
+    ] = 0.0
+
+
 def _width(o: Circle | Polygon) -> float:
     """Along the axis where it is widest."""
     if isinstance(o, Circle):
@@ -239,7 +253,8 @@ class Problem(Drawn, FileModel):
     base : (x, y) or (x, y, z)
         Where the tether is anchored and the tour starts and ends; z is up.
     goals : tuple of Goal
-        Points to visit; a bare ``[x, y]`` or ``[x, y, z]`` is accepted.
+        Points to visit; a bare ``[x, y]`` or ``[x, y, z]`` is accepted, and an `Inspection`, which
+        becomes the goals about an obstacle.
     obstacles : tuple of Circle or Polygon
         Vertical projections of circles or simple polygons.
     tether_length : float
@@ -247,13 +262,16 @@ class Problem(Drawn, FileModel):
     clearance : float
         Every obstacle is inflated by this (the vehicle's radius).
     bounds : (xmin, ymin, xmax, ymax) or None
-        Box that robot and tether stay in.
+        Box that robot and tether stay in. Given as the corners of an outline, whatever is outside
+        of it becomes obstacles, from which the clearance is kept.
     state : State or None
         Where the tour starts; None at the base with no tether out. Otherwise the shortest path from
         there through all goals back to the base is sought, with the whole tether recovered. The
         tether may be longer than `tether_length` at the start only.
     units : str
         Name of the unit of length.
+    origin : Origin or None
+        Where on the earth the base is, and where the y axis points; for exports.
 
     Raises
     ------
@@ -307,21 +325,39 @@ class Problem(Drawn, FileModel):
                             "minItems": 4,
                             "maxItems": 4,
                         },
+                        {
+                            "type": "array",
+                            "items": {
+                                "type": "array",
+                                "items": {"type": "number"},
+                                "minItems": 2,
+                                "maxItems": 2,
+                            },
+                            "minItems": 3,
+                        },
                         {"type": "null"},
                     ]
                 }
             ),
         ],
         Field(
-            description="[xmin, ymin, xmax, ymax] of the workspace, in the problem's "
-            "units; null for none"
+            description="[xmin, ymin, xmax, ymax] of the workspace or corners of its outline, "
+            "whose outside becomes obstacles; in the problem's units; null for none"
         ),
     ] = None
     units: Annotated[Name, Field(description="name of the unit of length")] = "m"
+    origin: Annotated[
+        Origin | None, Field(description="where on the earth the base is; null if unknown")
+    ] = None
     state: Annotated[
         State | None,
         Field(description="where the robot is already out, with its tether; null at the base"),
     ] = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _written_out(cls, data: Any) -> Any:
+        return written_out(data) if isinstance(data, dict) else data
 
     @field_validator("bounds", mode="before")
     @classmethod
@@ -564,7 +600,7 @@ class Problem(Drawn, FileModel):
     @property
     def sha256(self) -> str:
         """Hash of what the answer depends on: all values, but no names."""
-        data = self.model_dump(mode="json", exclude={"name": True, "units": True})
+        data = self.model_dump(mode="json", exclude={"name", "units", "origin"})
         if data["state"] is None:  # problems had none before: their hashes stay
             del data["state"]
         for item in (*data["goals"], *data["obstacles"]):

@@ -30,7 +30,8 @@ def arguments(p: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     p.add_argument(
         "--origin", metavar="LAT,LON[,HEADING]",
-        help="position of the base, and compass heading of the y axis in degrees",
+        help="position of the base, and compass heading of the y axis in degrees; "
+        "default: the problem's own origin",
     )  # fmt: skip
     p.add_argument(
         "--acceptance", type=length, default=0.0, metavar="R",

@@ -24,6 +24,7 @@ from netsp.errors import (
     EXIT_NOT_ALL,
     InputError,
     NetspError,
+    SeveralErrors,
     interrupted,
 )
 
@@ -43,6 +44,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         code = int(args.run(args))
         sys.stdout.flush()
         return code
+    except SeveralErrors as error:
+        for complaint in error.complaints[:MOST_COMPLAINTS]:
+            messages.error(complaint)
+        if (more := len(error.complaints) - MOST_COMPLAINTS) > 0:
+            messages.error(f"and {more} more")
+        return error.exit_code
     except NetspError as error:
         messages.error(str(error))
         return error.exit_code
@@ -89,6 +96,9 @@ class _Parser(argparse.ArgumentParser):
     def _print_message(self, message: str, file: Any = None) -> None:
         (file or sys.stderr).write(message)  # argparse swallows the errors of a full disk
 
+
+MOST_COMPLAINTS = 20
+"""Lines about one input; the others are counted."""
 
 VECTORS = ("--origin", "--base", "--current")
 """Flags whose values may begin with a minus and are no numbers to argparse."""

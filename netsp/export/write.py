@@ -93,7 +93,7 @@ def export(
     kind : str
         One of `FORMATS`.
     projection : Projection, optional
-        From the plane to degrees; needed by all but csv.
+        From the plane to degrees; by default that of the problem's origin. Needed by all but csv.
     acceptance : float
         The vehicle's acceptance radius, metres.
     settings : Settings, optional
@@ -119,6 +119,7 @@ def export(
     acceptance = checked_argument("acceptance", acceptance, 0.0)
     if not isinstance(kind, str) or kind not in FORMATS:
         raise InputError(f"format: expected {', '.join(FORMATS)}, got {kind!r}")
+    projection = projection or Projection.of(problem)
     if projection is None and kind != "csv":
         raise InputError(f"origin: format {kind!r} needs latitude and longitude of the base")
     settings = settings or Settings()

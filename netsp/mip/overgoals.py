@@ -28,4 +28,6 @@ def bound_over_goals(graph: TravelGraph, prove: Prove, limits: Limits) -> float:
     clock = Clock.of(limits.time)
     least = graph.between_goals(lambda: clock.up)
     over = TravelGraph.from_costs(least, range(graph.goal_count + 1))
-    return (prove(over, replace(limits, time=clock)).lower_bound or 0.0) * (1.0 - ROUNDING)
+    bound = (prove(over, replace(limits, time=clock)).lower_bound or 0.0) * (1.0 - ROUNDING)
+    graph.bound_in_any_class = max(graph.bound_in_any_class, bound)
+    return bound

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +17,9 @@ from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.fields import checked_argument
 from netsp.models import shown
+
+if TYPE_CHECKING:
+    from netsp.problem import Problem
 
 FARTHEST = 1e7
 """Metres from the base: a quarter of the way around the earth."""
@@ -90,6 +93,25 @@ class Projection:
         if len(numbers) not in (2, 3):
             raise InputError(f"{name}: expected lat,lon or lat,lon,heading, got {text!r}")
         return cls(numbers[0], numbers[1], numbers[2] if len(numbers) == 3 else 0.0, base, name)
+
+    @classmethod
+    def of(cls, problem: Problem) -> Projection | None:
+        """The projection of a problem that knows where on the earth it is.
+
+        Parameters
+        ----------
+        problem : Problem
+            The problem.
+
+        Returns
+        -------
+        Projection or None
+            About its base; None if it has no origin.
+        """
+        if problem.origin is None:
+            return None
+        o = problem.origin
+        return cls(o.latitude, o.longitude, o.heading, problem.base[:2])
 
     @cached_property
     def _transform(self) -> Any:

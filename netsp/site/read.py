@@ -1,202 +1,513 @@
-"""A problem from a map: obstacles and goals of a GeoJSON file.
-
-Obstacles are polygons, and points with `radius_m` or with tags that sea charts give to what stands
-in the water (`seamark:type` pile, platform or obstruction, `seamark:landmark:category` windmotor);
-other points are goals. A `kind` property of base, goal, obstacle or path decides before all that.
-"""
+"""A problem from a map, by the contract of docs/sites.md. All that is wrong is told at once."""
 
 from __future__ import annotations
 
-import json
 import re
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from pydantic import ValidationError
 
-from netsp.errors import InputError
-from netsp.files import read_text
-from netsp.models import explain, parse_json_object
+from netsp.errors import InputError, SeveralErrors, counted
+from netsp.fields import checked_number
+from netsp.models import explain, shown
 from netsp.problem import Problem
+from netsp.site.contract import FIELDS, RADIUS, kind_of, words_of
+from netsp.site.feature import Feature, Map
+from netsp.site.geojson import read_geojson
+from netsp.site.options import UNITS, SiteOptions
 from netsp.site.projection import Projection
+from netsp.site.shapes import circle_of, simple_polygons
+from netsp.site.vector import in_degrees, read_vector
 
-STANDING = {"pile", "platform", "obstruction"}
+if TYPE_CHECKING:
+    import shapely
+
+CHART = (".000",)
+"""Extensions of S-57 charts."""
 
 
 def read_site(
-    file: str | Path, projection: Projection | None, *, tether: float | None = None,
-    clearance: float | None = None, radius: float | None = None, name: str | None = None,
+    file: str | Path, projection: Projection | None = None, *, options: SiteOptions | None = None,
+    name: str | None = None, on_note: Callable[[str], None] | None = None, **more: Any,
 ) -> Problem:  # fmt: skip
-    """The problem of a GeoJSON site, in metres from its base, y to the projection's heading.
+    """The problem of a map, in metres from its base, y to the projection's heading.
 
-    projection : about the base; None takes the file's own base, north up. tether, clearance :
-    default the file's. radius : of obstacles that are points and have none.
+    Parameters
+    ----------
+    file : str or Path
+        GeoJSON, KML, KMZ, shapefile, GeoPackage, DXF, S-57, or what else GDAL reads.
+    projection : Projection, optional
+        About the base; None takes the map's own base, y to its heading or to the north.
+    options : SiteOptions, optional
+        What is said besides; its fields may be given by name instead.
+    name : str, optional
+        Of the problem; default: the file's.
+    on_note : callable, optional
+        Called with what was changed or left out, one line each.
+    **more
+        Fields of `SiteOptions`.
+
+    Returns
+    -------
+    Problem
+        The problem; where the map has a place on the earth, with its origin.
 
     Raises
     ------
     InputError
-        Not GeoJSON, no base, no tether length, no goal, obstacles without radius, or what
-        `Problem` refuses.
+        Not readable, or not a site: `SeveralErrors` where more than one thing is wrong.
     """
-    data = parse_json_object(read_text(file), str(file))
-    features = data.get("features")
-    if data.get("type") != "FeatureCollection" or not isinstance(features, list):
-        raise InputError(f"{file}: expected a GeoJSON FeatureCollection")
-    crs = data.get("crs")
-    if crs is not None and "CRS84" not in json.dumps(crs) and "4326" not in json.dumps(crs):
-        raise InputError(f"{file}: crs: expected WGS 84 as RFC 7946 has it, got {crs}"[:200])
-    found = [_part(f, k, file) for k, f in enumerate(features)]
-    parts = [p for p in found if p is not None]
-    bases = [p for p in parts if p["kind"] == "base"]
-    if len(bases) > 1:
-        raise InputError(f"{file}: expected one base, got {len(bases)}")
-    base = bases[0] if bases else None
-    if projection is None:
+    said = options or SiteOptions(**more)
+    if said.units not in UNITS:
+        raise InputError(f"units: expected one of {', '.join(UNITS)}, got {shown(said.units)}")
+    kinds, fields = words_of(said.maps)
+    found = read_map(file, said.crs)
+    for layer in kinds:
+        if layer not in {k.lower() for k in found.layers}:
+            raise InputError(
+                f"--map: {file} has no layer {layer!r}; it has "
+                f"{', '.join(k or 'no layers' for k in found.layers)}"
+            )
+    site = _Site(file, found, said, kinds, fields, projection)
+    problem = site.problem(name or Path(file).stem)
+    for note in (*found.notes, *site.notes):
+        if on_note is not None:
+            on_note(f"{file}: {note}")
+    return problem
+
+
+def read_map(file: str | Path, crs: str | None = None) -> Map:
+    """A map of any format.
+
+    Parameters
+    ----------
+    file : str or Path
+        The file; its extension tells GeoJSON from the others.
+    crs : str, optional
+        Coordinate system, ``local`` for a plane.
+
+    Returns
+    -------
+    Map
+        What it holds.
+
+    Raises
+    ------
+    InputError
+        Not readable.
+    """
+    if Path(file).suffix.lower() not in (".geojson", ".json"):
+        return read_vector(file, crs)
+    found = read_geojson(file, crs)
+    return found if crs is None else in_degrees(found, crs, file)
+
+
+MOST_OF_A_KIND = 5
+"""Goals out of reach that are told one by one."""
+
+
+@dataclass
+class _Site:
+    """A map on its way to a problem."""
+
+    file: str | Path
+    map: Map
+    said: SiteOptions
+    kinds: dict[str, str]
+    fields: dict[str, str]
+    projection: Projection | None
+    complaints: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+    def problem(self, name: str) -> Problem:
+        """The problem, or all complaints."""
+        self.complaints += self.map.complaints
+        parts = self._parts()
+        base = self._base(parts)
         if base is None:
-            raise InputError(
-                f"{file}: has no base; expected a Point of kind base, or lat,lon given besides"
+            raise self._refused()
+        anchor, own = base
+        tether = self._length(own, "tether_length", self.said.tether)
+        if tether is None:
+            self._complain(
+                "has no tether length; expected tether_length of the base, or one besides "
+                "(--tether)"
             )
-        lon, lat = base["coordinates"][:2]
-        projection = Projection(lat, lon)
-    own = base["properties"] if base is not None else {}
-    tether = tether if tether is not None else own.get("tether_length")
-    if tether is None:
-        raise InputError(
-            f"{file}: has no tether length; expected tether_length of the base, or one besides"
-        )
-
-    def place(c: list[float]) -> tuple[float, ...]:
-        ((x, y),) = projection.to_plane([[c[1], c[0]]])
-        return (float(x), float(y), *(float(v) for v in c[2:3]))
-
-    goals: list[Any] = []
-    obstacles: list[Any] = []
-    sources: dict[str, list[int]] = {"goals": [], "obstacles": []}
-    for k, part in enumerate(found):
-        if part is None:
-            continue
-        label = {"name": str(part["properties"]["name"])} if part["properties"].get("name") else {}
-        if part["kind"] == "goal":
-            goals.append({"position": place(part["coordinates"]), **label})
-            sources["goals"].append(k)
-        elif part["kind"] == "obstacle" and part["shape"] == "Point":
-            r = part["properties"].get("radius_m", radius)
-            if r is None:
-                raise InputError(
-                    f"{file}: features[{k}]: an obstacle without radius_m; expected one, or a "
-                    "radius for all that have none"
-                )
-            obstacles.append({"center": place(part["coordinates"])[:2], "radius": r, **label})
-            sources["obstacles"].append(k)
-        elif part["kind"] == "obstacle":
-            several = len(part["coordinates"]) > 1 and bool(label)
-            for j, rings in enumerate(part["coordinates"], 1):
-                corners = [place(c)[:2] for c in rings[0]]
-                corners = [c for c, d in zip(corners, [*corners[1:], corners[0]], strict=True)
-                           if not np.allclose(c, d, atol=1e-6)]  # fmt: skip
-                own_label = {"name": f"{label['name']} {j}"} if several else label
-                obstacles.append({"polygon": corners, **own_label})
-                sources["obstacles"].append(k)
-    for what, things in (("goals", goals), ("obstacles", obstacles)):
-        names = [t["name"] for t in things if "name" in t]
-        twice = next((n for n in names if names.count(n) > 1), None)
-        if twice is not None:
-            raise InputError(f"{file}: two {what} are named {twice!r}; expected names of their own")
-    if not goals:
-        raise InputError(f"{file}: has no goal: a Point without radius_m")
-    z = base["coordinates"][2:3] if base is not None else []
-    try:
-        return Problem.model_validate(
+        clearance = self._length(own, "clearance", self.said.clearance) or 0.0
+        goals = self._goals(parts["goal"])
+        obstacles = self._obstacles(parts["obstacle"], [anchor, *(g["position"] for g in goals)])
+        goals += self._inspections(obstacles)
+        self._check_names(goals, "goals")
+        self._check_names(obstacles, "obstacles")
+        if not goals and not self.complaints:
+            self._complain(
+                "has no goal: a point without radius_m, a layer of goals (--map goal=LAYER), or "
+                "obstacles to inspect (--inspect)"
+            )
+        if tether is not None:
+            goals = self._within_reach(goals, anchor, tether)
+        bounds = self._bounds(parts["bounds"])
+        if self.complaints:
+            raise self._refused()
+        return self._made(
             {
-                "schema_version": 1, "name": name or Path(file).stem,
-                "base": (*projection.base.tolist(), *z), "goals": goals, "obstacles": obstacles,
-                "tether_length": tether,
-                "clearance": clearance if clearance is not None else own.get("clearance", 0.0),
-            }
+                "schema_version": 1, "name": name, "base": list(anchor),
+                "goals": [_bare(g) for g in goals], "obstacles": [_bare(o) for o in obstacles],
+                "tether_length": tether, "clearance": clearance,
+                **({"bounds": bounds} if bounds else {}), **self._origin(),
+            },
+            goals, obstacles,
         )  # fmt: skip
-    except ValidationError as error:
 
-        def feature(found: re.Match[str]) -> str:  # the file knows of no goals and obstacles
-            return f"features[{sources[found[1]][int(found[2])]}]"
+    def _made(self, data: dict[str, Any], goals: list[Any], obstacles: list[Any]) -> Problem:
+        """A problem; what it complains of is told by the map's own names."""
+        try:
+            return Problem.model_validate(data)
+        except ValidationError as error:
+            wheres = {"goals": goals, "obstacles": obstacles}
 
-        text = re.sub(r"\b(goals|obstacles)\[(\d+)\]", feature, explain(error))
-        raise InputError(f"{file}: {text}") from None
+            def there(found: re.Match[str]) -> str:
+                things, k = wheres[found[1]], int(found[2])
+                return str(things[k]["where"]) if k < len(things) else found[0]
 
+            text = re.sub(r"\b(goals|obstacles)\[(\d+)\]", there, explain(error))
+            raise InputError(f"{self.file}: {text}") from None
 
-KINDS = {
-    "base": ("Point",),
-    "goal": ("Point",),
-    "obstacle": ("Point", "Polygon", "MultiPolygon"),
-    "path": ("LineString", "MultiLineString"),
-}
-"""Which shapes a kind may have."""
+    # What is what
 
+    def _parts(self) -> dict[str, list[Feature]]:
+        chart = Path(self.file).suffix.lower() in CHART
+        parts: dict[str, list[Feature]] = {
+            k: [] for k in ("base", "goal", "obstacle", "bounds", "path", "ignore")
+        }
+        for feature in self.map.features:
+            try:
+                parts[kind_of(feature, self.kinds, chart=chart)].append(feature)
+            except InputError as error:
+                self._complain(str(error))
+        if parts["ignore"]:
+            self.notes.append(f"{counted(len(parts['ignore']), 'feature')} left out")
+        for layer, size in self.map.layers.items():
+            if layer and not size:
+                self.notes.append(f"layer {layer!r} is empty")
+        return parts
 
-def _part(feature: Any, k: int, file: str | Path) -> dict[str, Any] | None:
-    """What a feature is: kind, shape, coordinates, properties; None if it is nowhere."""
-    where = f"{file}: features[{k}]"
-    if not isinstance(feature, dict) or "geometry" not in feature:
-        raise InputError(f"{where}: expected a feature with a geometry")
-    geometry, properties = feature["geometry"], feature.get("properties") or {}
-    if geometry is None:
-        return None  # RFC 7946: a feature without a place
-    if not isinstance(geometry, dict) or not isinstance(properties, dict):
-        raise InputError(f"{where}: expected an object as geometry and as properties")
-    shape, coordinates = geometry.get("type"), geometry.get("coordinates")
-    standing = (
-        "radius_m" in properties
-        or str(properties.get("seamark:type")) in STANDING
-        or properties.get("seamark:landmark:category") == "windmotor"
-    )
-    usual = {
-        "Point": "obstacle" if standing else "goal", "Polygon": "obstacle",
-        "MultiPolygon": "obstacle", "LineString": "path", "MultiLineString": "path",
-    }  # fmt: skip
-    kind = properties.get("kind", usual.get(str(shape)))
-    if not isinstance(kind, str) or kind not in KINDS:
-        raise InputError(
-            f"{where}: expected a {', '.join(usual)} of kind {', '.join(KINDS)}, got {shape!r} of "
-            f"kind {kind!r}"
-        )
-    if shape not in KINDS[kind]:
-        raise InputError(
-            f"{where}: a {kind} cannot be a {shape}; expected {' or '.join(KINDS[kind])}"
-        )
-    if kind != "path":
-        if shape == "Point":
-            _check_place(coordinates, where)
-        else:
-            coordinates = [coordinates] if shape == "Polygon" else coordinates
-            _check_polygons(coordinates, where)
-    return {"kind": kind, "shape": shape, "coordinates": coordinates, "properties": properties}
-
-
-def _check_polygons(polygons: Any, where: str) -> None:
-    """InputError unless they are lists of one closed ring each."""
-    if not isinstance(polygons, list) or not polygons:
-        raise InputError(f"{where}: expected a polygon with an outer ring")
-    for rings in polygons:
-        if not isinstance(rings, list) or not rings or not isinstance(rings[0], list):
-            raise InputError(f"{where}: expected a polygon with an outer ring")
-        if len(rings) > 1:
-            raise InputError(
-                f"{where}: expected a polygon without holes, got {len(rings) - 1}; an obstacle "
-                "with a pool inside must be split"
+    def _base(self, parts: dict[str, list[Feature]]) -> tuple[Any, Feature | None] | None:
+        """Where the tether is fixed, and the feature that says so; sets the projection."""
+        bases = parts["base"]
+        if len(bases) > 1:
+            self._complain(
+                f"expected one base, got {len(bases)}: {', '.join(b.where for b in bases)[:100]}"
             )
-        for place in rings[0]:
-            _check_place(place, where)
-        if len(rings[0]) < 4 or rings[0][0] != rings[0][-1]:
-            raise InputError(f"{where}: expected a closed ring of four positions or more")
+            return None
+        own = bases[0] if bases else None
+        if not self.map.geographic:
+            if own is None:
+                self._complain("has no base; expected a Point of kind base")
+                return None
+            return self._place(own.shape, own), own
+        if self.projection is None:
+            if own is None:
+                self._complain(
+                    "has no base; expected a Point of kind base, or lat,lon given besides (--base)"
+                )
+                return None
+            heading = self._number(own, "heading") or 0.0
+            try:
+                self.projection = Projection(own.shape.y, own.shape.x, heading, name=own.where)
+            except InputError as error:
+                self._complain(str(error))
+                return None
+        x, y = self.projection.base.tolist()
+        z = self._height(own) if own is not None else 0.0
+        return (x, y, z), own
+
+    # Places and lengths
+
+    @property
+    def _unit(self) -> float:
+        return UNITS[self.said.units]
+
+    def _plane(self, shape: shapely.Geometry) -> Any:
+        """A shape in metres in the problem's plane."""
+        import shapely
+
+        flat = shapely.force_2d(shape)
+        if not self.map.geographic:
+            return shapely.transform(flat, lambda c: c * self._unit)
+        projection = self.projection
+        assert projection is not None
+        return shapely.transform(flat, lambda c: projection.to_plane(c[:, ::-1]))
+
+    def _place(self, point: Any, feature: Feature) -> tuple[float, float, float]:
+        at = self._plane(point)
+        return (float(at.x), float(at.y), self._height(feature, point))
+
+    def _height(self, feature: Feature, point: Any = None) -> float:
+        """z in metres: of a depth, else of the point itself."""
+        depth = self._number(feature, "depth")
+        if depth is not None:
+            return -depth * self._unit
+        at = point if point is not None else feature.shape
+        if at.geom_type != "Point" or not at.has_z or at.z != at.z:
+            return 0.0
+        return float(at.z) * self._unit
+
+    def _get(self, feature: Feature, ours: str) -> Any:
+        mapped = self.fields.get(ours)
+        return feature.get(mapped) if mapped is not None else feature.get(*FIELDS[ours])
+
+    def _number(self, feature: Feature, ours: str) -> float | None:
+        value = self._get(feature, ours)
+        if value is None:
+            return None
+        if isinstance(value, str):  # fields of KML and of tables are text
+            try:
+                value = float(value)
+            except ValueError:
+                self._complain(f"{feature.where}: {ours}: expected a number, got {shown(value)}")
+                return None
+        try:
+            return float(checked_number(value))
+        except ValueError as error:
+            self._complain(f"{feature.where}: {ours}: {error}")
+            return None
+
+    def _length(self, base: Feature | None, ours: str, said: float | None) -> float | None:
+        if said is not None or base is None:
+            return said
+        value = self._number(base, ours)
+        return None if value is None else value * self._unit
+
+    def _name(self, feature: Feature) -> str | None:
+        value = self._get(feature, "name")
+        if value is not None:
+            return str(value)
+        return feature.identity or None
+
+    # Goals and obstacles
+
+    def _goals(self, features: list[Feature]) -> list[dict[str, Any]]:
+        goals: list[dict[str, Any]] = []
+        for feature in features:
+            points = getattr(feature.shape, "geoms", [feature.shape])
+            for k, point in enumerate(points, 1):
+                name = self._name(feature)
+                if name is not None and len(points) > 1:
+                    name = f"{name} {k}"
+                place = self._place(point, feature)
+                goals.append({"name": name, "position": place, "where": feature.where})
+        return goals
+
+    def _obstacles(self, features: list[Feature], free: list[Any]) -> list[dict[str, Any]]:
+        """Circles and polygons, in whose holes places that must stay free are."""
+        import shapely
+
+        out: list[dict[str, Any]] = []
+        spots = shapely.MultiPoint([p[:2] for p in free])
+
+        def add(feature: Feature, several: bool, number: int, **more: Any) -> None:
+            name = self._name(feature)
+            if name is not None and several:
+                name = f"{name} {number}"
+            out.append({"name": name, **more, "where": feature.where, "feature": feature})
+
+        for feature in features:
+            if "Point" in feature.shape.geom_type:
+                radius = self._radius(feature)
+                points = getattr(feature.shape, "geoms", [feature.shape])
+                for k, point in enumerate(points, 1) if radius is not None else ():
+                    at = self._plane(point)
+                    add(feature, len(points) > 1, k, center=(at.x, at.y), radius=radius)
+                continue
+            polygons, notes = simple_polygons(
+                self._plane(feature.shape), lambda p: p.intersects(spots)
+            )
+            label = self._name(feature)
+            called = feature.where + (f" ({label})" if label else "")
+            self.notes += [f"{called}: {note}" for note in notes]
+            if not polygons:
+                self._complain(f"{called}: encloses nothing; expected a polygon with an area")
+            for k, polygon in enumerate(polygons, 1):
+                ring = shapely.get_coordinates(polygon.exterior)[:-1]
+                ring = ring[np.hypot(*(ring - np.roll(ring, -1, axis=0)).T) > 1e-6]
+                circle = circle_of(ring)
+                if circle is not None:
+                    add(feature, len(polygons) > 1, k, center=circle[0], radius=circle[1])
+                else:
+                    add(feature, len(polygons) > 1, k, polygon=ring.tolist())
+        return out
+
+    def _radius(self, feature: Feature) -> float | None:
+        metres = "radius" not in self.fields and feature.get(RADIUS[0]) is not None
+        radius = self._number(feature, "radius")
+        if radius is not None:
+            return radius * (1.0 if metres else self._unit)
+        if self.said.radius is None:
+            self._complain(
+                f"{feature.where}: an obstacle without radius_m; expected one, or a radius for all "
+                "that have none (--radius)"
+            )
+        return self.said.radius
+
+    def _inspections(self, obstacles: list[dict[str, Any]]) -> list[dict[str, Any]]:
+        """The goals about obstacles that are to be looked at."""
+        from netsp.shorthand import Inspection
+
+        goals: list[dict[str, Any]] = []
+        for k, o in enumerate(obstacles):
+            feature, look = o["feature"], self.said.looking
+            own = feature.get("viewpoints", "inspect")
+            if own is None and look is None:
+                continue
+            standoff = feature.get("standoff")
+            heights = feature.get("depths")
+            try:
+                asked = Inspection.model_validate(
+                    {
+                        "inspect": o["name"] or f"#{k}",
+                        "viewpoints": _whole(own) if own is not None else look and look.viewpoints,
+                        "standoff": look.standoff
+                        if standoff is None and look is not None
+                        else _real(standoff) * self._unit,
+                        "depths": [h * self._unit for h in _list(heights)]
+                        if heights is not None
+                        else (look.depths if look is not None else (0.0,)),
+                    }
+                )
+            except (ValidationError, ValueError, TypeError) as error:
+                text = explain(error) if isinstance(error, ValidationError) else str(error)
+                self._complain(f"{feature.where}: {text}")
+                continue
+            goals += [{**g, "where": feature.where} for g in asked.goals(o)]
+        return goals
+
+    def _bounds(self, features: list[Feature]) -> list[list[float]] | None:
+        import shapely
+
+        if not features:
+            return None
+        if len(features) > 1:
+            self._complain(
+                f"expected one outline of kind bounds, got {len(features)}: "
+                f"{', '.join(f.where for f in features)[:100]}"
+            )
+            return None
+        polygons, notes = simple_polygons(self._plane(features[0].shape), lambda p: False)
+        self.notes += [f"{features[0].where}: {note}" for note in notes]
+        if len(polygons) != 1:
+            self._complain(
+                f"{features[0].where}: expected bounds in one piece, got {len(polygons)}"
+            )
+            return None
+        ring: list[list[float]] = shapely.get_coordinates(polygons[0].exterior)[:-1].tolist()
+        return ring
+
+    # What is checked of the whole
+
+    def _check_names(self, things: list[dict[str, Any]], what: str) -> None:
+        seen: dict[str, str] = {}
+        for thing in things:
+            name = thing["name"]
+            if name is not None and name in seen:
+                self._complain(
+                    f"two {what} are named {name!r} ({seen[name]}, {thing['where']}); expected "
+                    "names of their own"
+                )
+            if name is not None:
+                seen.setdefault(name, thing["where"])
+
+    def _within_reach(
+        self, goals: list[dict[str, Any]], anchor: Any, tether: float
+    ) -> list[dict[str, Any]]:
+        """Goals that a tether could reach if nothing were in the way; the others are complained of,
+        or left out."""
+        near: list[dict[str, Any]] = []
+        far: list[tuple[float, dict[str, Any]]] = []
+        for goal in goals:
+            away = float(np.linalg.norm(np.array(goal["position"]) - np.array(anchor)))
+            if away <= tether:
+                near.append(goal)
+            else:
+                far.append((away, goal))
+        if self.said.skip_unreachable and near:
+            for away, goal in far:
+                self.notes.append(f"{_label(goal)}: is {_metres(away)} from the base: left out")
+        elif len(far) > MOST_OF_A_KIND:
+            away, goal = max(far, key=lambda f: f[0])
+            self._complain(
+                f"{len(far)} goals are farther from the base than the tether is long "
+                f"({_metres(tether)}), {_label(goal)} {_metres(away)}{self._cause(goal, tether)}"
+            )
+        else:
+            for away, goal in far:
+                self._complain(
+                    f"{_label(goal)}: is {_metres(away)} from the base, and the tether "
+                    f"{_metres(tether)} long{self._cause(goal, tether)}"
+                )
+        return near
+
+    def _cause(self, goal: dict[str, Any], tether: float) -> str:
+        """Why a goal may be so far off."""
+        other = "; leave out what is out of reach with --skip-unreachable"
+        if self.projection is None:
+            return other
+        ((lat, lon),) = self.projection.to_earth([goal["position"][:2]])
+        if abs(lon) <= 90.0:
+            ((x, y),) = self.projection.to_plane([[lon, lat]])
+            if np.hypot(*(np.array([x, y]) - self.projection.base)) <= 10.0 * tether:
+                return ": latitude and longitude look swapped"
+        return other
+
+    def _origin(self) -> dict[str, Any]:
+        p = self.projection
+        if p is None:
+            return {}
+        return {"origin": {"latitude": p.latitude, "longitude": p.longitude, "heading": p.heading}}
+
+    def _complain(self, text: str) -> None:
+        self.complaints.append(f"{self.file}: {text.removeprefix(f'{self.file}: ')}")
+
+    def _refused(self) -> InputError:
+        if len(self.complaints) == 1:
+            return InputError(self.complaints[0])
+        return SeveralErrors(self.complaints)
 
 
-def _check_place(c: Any, where: str) -> None:
-    """InputError unless it is a longitude, a latitude and perhaps a height."""
-    good = isinstance(c, list) and len(c) >= 2 and all(
-        isinstance(v, (int, float)) and not isinstance(v, bool) and -1e12 <= v <= 1e12 for v in c
-    )  # fmt: skip
-    if not good or abs(c[0]) > 180.0 or abs(c[1]) > 90.0:
-        raise InputError(
-            f"{where}: expected [longitude, latitude] within 180 and 90 degrees, got "
-            f"{json.dumps(c)[:60]}"
-        )
+def _bare(thing: dict[str, Any]) -> dict[str, Any]:
+    """Without where it came from, nor a name that it does not have."""
+    return {k: v for k, v in thing.items() if k not in ("where", "feature") and v is not None}
+
+
+def _label(thing: dict[str, Any]) -> str:
+    return str(thing["where"]) + (f" ({thing['name']})" if thing["name"] else "")
+
+
+def _metres(length: float) -> str:
+    return f"{length / 1e3:.4g} km" if length >= 1e4 else f"{length:.4g} m"
+
+
+def _whole(value: Any) -> int:
+    number = _real(value)
+    if number != int(number):
+        raise ValueError(f"viewpoints: expected a whole number, got {shown(value)}")
+    return int(number)
+
+
+def _real(value: Any) -> float:
+    if value is None:
+        raise ValueError("standoff: missing; expected a distance from its surface")
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        raise ValueError(f"expected a number, got {shown(value)}") from None
+
+
+def _list(value: Any) -> list[float]:
+    """Heights of a list, or of text with commas, as tables have them."""
+    values = value.replace(",", " ").split() if isinstance(value, str) else value
+    return [_real(v) for v in (values if isinstance(values, list) else [values])]

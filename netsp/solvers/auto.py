@@ -41,6 +41,12 @@ FEW_GOALS = 24
 ROUNDS_PER_GOAL = 40
 """Rounds of ruin and recreate before and after the root, times the number of goals."""
 
+FEW_CLASSES = 3
+"""Of a goal, where the roadmap had to leave classes out: a tour over them comes first."""
+
+FEW_SHARE = 0.4
+"""Part of the time that this may take."""
+
 SHARE = 0.6
 """Part of the time that the search has where it shares it with the bound from the goals."""
 
@@ -73,11 +79,13 @@ def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | Non
             if not small.trivial():
                 exact.solve(small)
         return small.finish("proven" if small.done else "exact")
+    clock = Clock.of(limits.time)
+    if not graph.complete and graph.roadmapped and graph.goal_count > FEW_GOALS:
+        limits = _from_few(graph, replace(limits, time=clock), chosen.backend)
     if len(graph) <= PROVABLE:
         rounds = max(500, ROUNDS_PER_GOAL * graph.goal_count)
         run = MipRun(graph, limits, search_rounds=rounds)
         return run.solve(chosen.backend, limits.warm_start, walks=graph.goal_count <= FEW_GOALS)
-    clock = Clock.of(limits.time)
     limits = replace(limits, time=clock)
     if graph.goal_count <= FEW_GOALS and graph.roadmapped:
         return _over_shortest(graph, limits, chosen.backend)
@@ -103,6 +111,28 @@ def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | Non
         lower_bound=min(length, bound),
         trace=tuple(rows),
     )
+
+
+def _from_few(graph: TravelGraph, limits: Limits, backend: str) -> Limits:
+    """The limits with a tour to start from, the shortest over few classes. A roadmap that had to
+    leave classes out has long words, whose legs take long: with all that it kept, a search would
+    have little time left."""
+    core = least_tethers(graph.costs_to_base, graph.cluster, FEW_CLASSES)
+    if len(core) == len(graph):
+        return limits
+    given = limits.warm_start
+    clock = Clock.of(limits.time)
+    share = Clock(FEW_SHARE * clock.left, within=clock) if clock.limit is not None else clock
+    found = MipRun(
+        graph.subgraph(core), replace(limits, time=share, warm_start=None),
+        search_rounds=max(500, ROUNDS_PER_GOAL * graph.goal_count),
+    ).solve(backend, None)  # fmt: skip
+    if found.tour is None:
+        return limits
+    tour = [int(core[v]) for v in found.tour]
+    if given is not None and graph.tour_length(given) <= graph.tour_length(tour):
+        return limits
+    return replace(limits, warm_start=tour)
 
 
 def _over_shortest(graph: TravelGraph, limits: Limits, backend: str) -> Result:

@@ -71,12 +71,15 @@ class TravelGraph(Drawn):
         Vertex of the state that tours start from (`netsp.roadmap.from_state`); None for the base.
     start_tether : ndarray, shape (n, 3)
         The tether that is out at the start.
+    bound_in_any_class : float
+        No tour is shorter, whichever classes it takes, kept or left out; 0 while nothing is known.
     """
 
     picture: ClassVar[str] = "netsp.pictures.graph:draw_classes"
 
     start: int | None = None
     start_tether: Floats
+    bound_in_any_class = 0.0
 
     def __init__(
         self,
@@ -479,7 +482,8 @@ class TravelGraph(Drawn):
         Result
             The same, with a bound that holds for the classes that were left out, too.
         """
-        return within_kept(result, self.least_by_way_of(self.least_left_out))
+        otherwise = max(self.least_by_way_of(self.least_left_out), self.bound_in_any_class)
+        return within_kept(result, otherwise)
 
     def least_by_way_of(self, tether: float) -> float:
         """No tour by way of a class with so long a tether is shorter: it goes there and back.

@@ -1,0 +1,225 @@
+"""What a problem file may say in short, written out: structures to inspect, and bounds that are no
+box.
+
+Both are a matter of the file alone: nothing further down knows of them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+from pydantic import Field, ValidationError
+
+from netsp.fields import Integer, Name, Number, Point2, Positive
+from netsp.geometry.polygons import check_polygon
+from netsp.models import Model, explain, shown
+
+if TYPE_CHECKING:
+    import shapely
+
+MOST_VIEWPOINTS = 1000
+"""About one structure at one depth."""
+
+MOST_WALLS = 200
+
+
+class Inspection(Model):
+    """A structure to look at from all sides; it stands for as many goals.
+
+    Attributes
+    ----------
+    inspect : str
+        Name of the obstacle.
+    viewpoints : int
+        At every depth: evenly about a circle, evenly along the outline of a polygon.
+    standoff : float
+        Distance of the viewpoints from its surface.
+    depths : tuple of float
+        Heights z of the viewpoints, negative below the surface.
+    bearing : float
+        Degrees clockwise from the y axis, where the first viewpoint is.
+    """
+
+    inspect: Annotated[Name, Field(description="name of the obstacle to look at from all sides")]
+    viewpoints: Annotated[
+        Integer, Field(description="at every depth", ge=1, le=MOST_VIEWPOINTS)
+    ] = 4
+    standoff: Annotated[
+        Positive, Field(description="distance of viewpoints from its surface, problem's units")
+    ]
+    depths: Annotated[
+        Annotated[tuple[Number, ...], Field(min_length=1)],
+        Field(description="heights z of the viewpoints, in the problem's units"),
+    ] = (0.0,)
+    bearing: Annotated[
+        Number, Field(description="of the first viewpoint, degrees clockwise from the y axis")
+    ] = 0.0
+
+    def goals(self, shape: Mapping[str, Any]) -> list[dict[str, Any]]:
+        """The goals that it stands for.
+
+        Parameters
+        ----------
+        shape : mapping
+            The obstacle as a problem file has it.
+
+        Returns
+        -------
+        list of dict
+            Goals as a problem file has them; the first viewpoint of every depth, the second, …
+        """
+        places = self._about(shape)
+        return [
+            {
+                "name": f"{self.inspect}/{k}" + (f" z{z:g}" if len(self.depths) > 1 else ""),
+                "position": [float(x), float(y), z],
+            }
+            for k, (x, y) in enumerate(places, 1)
+            for z in self.depths
+        ]
+
+    def _about(self, shape: Mapping[str, Any]) -> np.ndarray:
+        """(viewpoints, 2) places about the obstacle."""
+        turns = np.arange(self.viewpoints) / self.viewpoints
+        if "radius" in shape:
+            angle = math.radians(self.bearing) + 2.0 * math.pi * turns
+            away = float(shape["radius"]) + self.standoff
+            # a sine of 1e-16 would be a coordinate that nobody wants to read
+            way = np.round(np.column_stack([np.sin(angle), np.cos(angle)]), 15)
+            return np.asarray(np.array(shape["center"]) + away * way)
+        import shapely
+
+        polygon = shapely.Polygon(shape["polygon"])
+        line = polygon.buffer(self.standoff, quad_segs=64).exterior
+        middle = np.array(polygon.centroid.coords[0])
+        off = shapely.get_coordinates(line) - middle
+        bearings = np.degrees(np.arctan2(off[:, 0], off[:, 1]))
+        first = int(np.argmin(np.abs((bearings - self.bearing + 180.0) % 360.0 - 180.0)))
+        start = line.project(shapely.Point(off[first] + middle))
+        # clockwise, as bearings are counted
+        way = start + (1.0 if not line.is_ccw else -1.0) * turns * line.length
+        return np.array([line.interpolate(s % line.length).coords[0] for s in way])
+
+
+def written_out(data: Mapping[str, Any]) -> Mapping[str, Any]:
+    """The fields of a problem with all shorthand written out.
+
+    Parameters
+    ----------
+    data : mapping
+        The fields of a problem file, not yet validated: what cannot be understood stays as it is.
+
+    Returns
+    -------
+    mapping
+        The same where there is none; else a copy.
+
+    Raises
+    ------
+    ValueError
+        Shorthand that cannot be written out, naming its field.
+    """
+    return _with_goals(_with_walls(data))
+
+
+def _with_goals(data: Mapping[str, Any]) -> Mapping[str, Any]:
+    goals = data.get("goals")
+    if not isinstance(goals, Sequence) or isinstance(goals, str):
+        return data
+    asked = [isinstance(g, Inspection) or (isinstance(g, dict) and "inspect" in g) for g in goals]
+    if not any(asked):
+        return data
+    obstacles = [o.model_dump() if isinstance(o, Model) else o for o in data.get("obstacles") or ()]
+    named = {o["name"]: o for o in obstacles if isinstance(o, dict) and o.get("name") is not None}
+    out: list[Any] = []
+    for k, goal in enumerate(goals):
+        if not asked[k]:
+            out.append(goal)
+            continue
+        try:
+            inspection = Inspection.model_validate(goal)
+        except ValidationError as error:
+            raise ValueError(f"goals[{k}].{explain(error)}") from None
+        obstacle = named.get(inspection.inspect)
+        if obstacle is None:
+            raise ValueError(
+                f"goals[{k}].inspect: expected the name of an obstacle, got "
+                f"{shown(inspection.inspect)}"
+            )
+        try:
+            out += inspection.goals(obstacle)
+        except (KeyError, TypeError, ValueError):
+            return data  # the obstacle is not one: that will be said
+    return {**data, "goals": out}
+
+
+def _with_walls(data: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Bounds of any outline as a box and walls in it: whatever of the box is outside of the outline
+    is an obstacle, which goes on beyond the box, so that nothing gets around it."""
+    bounds = data.get("bounds")
+    if isinstance(bounds, np.ndarray):
+        bounds = bounds.tolist()
+    if (
+        not isinstance(bounds, Sequence)
+        or isinstance(bounds, str)
+        or not all(isinstance(c, Sequence) and not isinstance(c, str) for c in bounds)
+        or not bounds
+    ):
+        return data
+    try:
+        corners = _Outline.model_validate({"corners": bounds}).corners
+        check_polygon(corners)
+    except ValidationError as error:
+        raise ValueError(f"bounds{explain(error).removeprefix('corners')}") from None
+    except ValueError as error:
+        raise ValueError(f"bounds: {error}") from None
+    xy = np.array(corners)
+    low, high = xy.min(0), xy.max(0)
+    walls = _outside(xy, low, high)
+    if len(walls) > MOST_WALLS:
+        raise ValueError(f"bounds: make {len(walls)} walls; expected at most {MOST_WALLS}")
+    taken = {o.get("name") for o in data.get("obstacles") or () if isinstance(o, dict)}
+    names = (f"wall {k}" for k in range(1, 10 * MOST_WALLS))
+    free = (n for n in names if n not in taken)
+    return {
+        **data,
+        "bounds": [*low.tolist(), *high.tolist()],
+        "obstacles": [
+            *(data.get("obstacles") or ()),
+            *({"name": next(free), "polygon": wall} for wall in walls),
+        ],
+    }
+
+
+class _Outline(Model):
+    corners: Annotated[tuple[Point2, ...], Field(min_length=3)]
+
+
+def _outside(xy: np.ndarray, low: np.ndarray, high: np.ndarray) -> list[list[list[float]]]:
+    """Corners of what a box has besides an outline in it that touches its four sides. It falls
+    apart into polygons without holes, each of which is carried on beyond the box."""
+    import shapely
+
+    box = shapely.box(*low, *high)
+    margin = 0.05 * float((high - low).max())
+    least = 1e-9 * float((high - low).max()) ** 2
+    walls: list[list[list[float]]] = []
+    for part in _polygons(box.difference(shapely.Polygon(xy))):
+        if part.area <= least:
+            continue
+        beyond = part.buffer(margin, join_style="mitre").difference(box)
+        # where the strip outside of the box falls apart, or closes a ring, the parts overlap
+        grown = shapely.union_all([part, beyond])
+        pieces = _polygons(grown)
+        whole = len(pieces) == 1 and not pieces[0].interiors
+        for piece in pieces if whole else [part, *_polygons(beyond)]:
+            ring = shapely.get_coordinates(piece.exterior)[:-1]
+            walls.append(ring.tolist())
+    return walls
+
+
+def _polygons(shape: Any) -> list[shapely.Polygon]:
+    return [p for p in getattr(shape, "geoms", [shape]) if p.geom_type == "Polygon"]

@@ -1,0 +1,138 @@
+"""GeoJSON (RFC 7946), read without any other library, so that every complaint names its feature."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from netsp.errors import InputError
+from netsp.files import read_text
+from netsp.models import parse_json_object
+from netsp.site.feature import Feature, Map
+
+SHAPES = {
+    "Point": 0, "MultiPoint": 1, "LineString": 1, "MultiLineString": 2, "Polygon": 2,
+    "MultiPolygon": 3,
+}  # fmt: skip
+"""How deep the positions lie in the lists of coordinates."""
+
+
+def read_geojson(file: str | Path, crs: str | None) -> Map:
+    """A GeoJSON file as a map.
+
+    Parameters
+    ----------
+    file : str or Path
+        The file.
+    crs : str, optional
+        Coordinate system given by the user; None takes degrees, as RFC 7946 has it.
+
+    Returns
+    -------
+    Map
+        In degrees, unless the user says otherwise.
+
+    Raises
+    ------
+    InputError
+        Not GeoJSON, or it names another coordinate system than WGS 84.
+    """
+    data = parse_json_object(read_text(file), str(file))
+    features = data.get("features")
+    if data.get("type") != "FeatureCollection" or not isinstance(features, list):
+        raise InputError(f"{file}: expected a GeoJSON FeatureCollection")
+    own = data.get("crs")
+    if crs is None and own is not None and not _is_wgs84(own):
+        raise InputError(
+            f"{file}: crs: expected WGS 84 as RFC 7946 has it, got {json.dumps(own)[:120]}; give "
+            "another with --crs"
+        )
+    found, complaints = [], []
+    for k, feature in enumerate(features):
+        try:
+            read = _feature(feature, f"features[{k}]", degrees=crs is None)
+        except InputError as error:
+            complaints.append(f"{file}: {error}")
+        else:
+            if read is not None:
+                found.append(read)
+    return Map(tuple(found), True, {"": len(features)}, tuple(complaints))
+
+
+def _is_wgs84(crs: Any) -> bool:
+    text = json.dumps(crs)
+    return "CRS84" in text or "4326" in text
+
+
+def _feature(data: Any, where: str, *, degrees: bool) -> Feature | None:
+    """A feature; None if it is nowhere, which RFC 7946 allows."""
+    import shapely
+    from shapely.geometry import shape
+
+    if not isinstance(data, dict) or "geometry" not in data:
+        raise InputError(f"{where}: expected a feature with a geometry")
+    geometry, properties = data["geometry"], data.get("properties") or {}
+    if geometry is None:
+        return None
+    if not isinstance(geometry, dict) or not isinstance(properties, dict):
+        raise InputError(f"{where}: expected an object as geometry and as properties")
+    kind = geometry.get("type")
+    coordinates: Any = geometry.get("coordinates")
+    if kind not in SHAPES:
+        raise InputError(f"{where}: expected a {', '.join(SHAPES)}, got {kind!r}")
+    _check(coordinates, SHAPES[kind], kind, where, degrees=degrees)
+    if kind.endswith("Polygon"):
+        for rings in coordinates if kind == "MultiPolygon" else [coordinates]:
+            for ring in rings:
+                if len(ring) < 4 or ring[0] != ring[-1]:
+                    raise InputError(f"{where}: expected a closed ring of four positions or more")
+    elif kind.endswith("LineString"):
+        for line in coordinates if kind == "MultiLineString" else [coordinates]:
+            if len(line) < 2:
+                raise InputError(f"{where}: expected a line of two positions or more")
+    try:
+        made = shape({"type": kind, "coordinates": _same_size(coordinates)})
+    except (ValueError, TypeError, shapely.errors.ShapelyError) as error:
+        raise InputError(f"{where}: not a {kind}: {str(error).splitlines()[0]}") from None
+    identity = data.get("id")
+    return Feature(where, "", "" if identity is None else str(identity), properties, made)
+
+
+def _check(coordinates: Any, depth: int, kind: str, where: str, *, degrees: bool) -> None:
+    """Lists as deep as the kind has them, with positions at their ends."""
+    if depth:
+        if not isinstance(coordinates, list) or not coordinates:
+            what = "a polygon with an outer ring" if kind.endswith("Polygon") else f"a {kind}"
+            raise InputError(f"{where}: expected {what}, got {json.dumps(coordinates)[:60]}")
+        for part in coordinates:
+            _check(part, depth - 1, kind, where, degrees=degrees)
+        return
+    c = coordinates
+    good = isinstance(c, list) and len(c) >= 2 and all(
+        isinstance(v, (int, float)) and not isinstance(v, bool) and -1e12 <= v <= 1e12 for v in c
+    )  # fmt: skip
+    if not good or (degrees and (abs(c[0]) > 180.0 or abs(c[1]) > 90.0)):
+        metres = good and "; if these are metres, say in which system with --crs"
+        raise InputError(
+            f"{where}: expected [longitude, latitude] within 180 and 90 degrees, got "
+            f"{json.dumps(c)[:60]}{metres or ''}"
+        )
+
+
+def _same_size(coordinates: Any) -> Any:
+    """Positions of two or three numbers, all alike: shapely takes no mixture."""
+    sizes: set[int] = set()
+
+    def visit(c: Any) -> None:
+        if isinstance(c[0], list):
+            for part in c:
+                visit(part)
+        else:
+            sizes.add(min(len(c), 3))
+
+    def cut(c: Any, size: int) -> Any:
+        return [cut(p, size) for p in c] if isinstance(c[0], list) else c[:size]
+
+    visit(coordinates)
+    return cut(coordinates, min(sizes))
