@@ -262,8 +262,8 @@ class Problem(Drawn, FileModel):
     clearance : float
         Every obstacle is inflated by this (the vehicle's radius).
     bounds : (xmin, ymin, xmax, ymax) or None
-        Box that robot and tether stay in. Given as the corners of an outline, whatever is outside
-        of it becomes obstacles, from which the clearance is kept.
+        Box that the robot's centre and the tether stay in. Given as the corners of an outline, four
+        walls about it become obstacles, from which the clearance is kept.
     state : State or None
         Where the tour starts; None at the base with no tether out. Otherwise the shortest path from
         there through all goals back to the base is sought, with the whole tether recovered. The

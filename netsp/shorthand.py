@@ -6,9 +6,10 @@ Both are a matter of the file alone: nothing further down knows of them.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field, ValidationError
@@ -17,13 +18,11 @@ from netsp.fields import Integer, Name, Number, Point2, Positive
 from netsp.geometry.polygons import check_polygon
 from netsp.models import Model, explain, shown
 
-if TYPE_CHECKING:
-    import shapely
-
 MOST_VIEWPOINTS = 1000
 """About one structure at one depth."""
 
-MOST_WALLS = 200
+MARGIN = 0.05
+"""How far walls go on beyond the box about their outline, in units of its longer side."""
 
 
 class Inspection(Model):
@@ -157,8 +156,8 @@ def _with_goals(data: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 def _with_walls(data: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Bounds of any outline as a box and walls in it: whatever of the box is outside of the outline
-    is an obstacle, which goes on beyond the box, so that nothing gets around it."""
+    """Bounds of any outline as a box and walls about the outline, which go on beyond the box, so
+    that nothing gets around them. Walls are solid: robots keep their clearance from them."""
     bounds = data.get("bounds")
     if isinstance(bounds, np.ndarray):
         bounds = bounds.tolist()
@@ -177,16 +176,12 @@ def _with_walls(data: Mapping[str, Any]) -> Mapping[str, Any]:
     except ValueError as error:
         raise ValueError(f"bounds: {error}") from None
     xy = np.array(corners)
-    low, high = xy.min(0), xy.max(0)
-    walls = _outside(xy, low, high)
-    if len(walls) > MOST_WALLS:
-        raise ValueError(f"bounds: make {len(walls)} walls; expected at most {MOST_WALLS}")
+    box, walls = _outside(xy)
     taken = {o.get("name") for o in data.get("obstacles") or () if isinstance(o, dict)}
-    names = (f"wall {k}" for k in range(1, 10 * MOST_WALLS))
-    free = (n for n in names if n not in taken)
+    free = (n for n in (f"wall {k}" for k in itertools.count(1)) if n not in taken)
     return {
         **data,
-        "bounds": [*low.tolist(), *high.tolist()],
+        "bounds": box.ravel().tolist(),
         "obstacles": [
             *(data.get("obstacles") or ()),
             *({"name": next(free), "polygon": wall} for wall in walls),
@@ -198,28 +193,27 @@ class _Outline(Model):
     corners: Annotated[tuple[Point2, ...], Field(min_length=3)]
 
 
-def _outside(xy: np.ndarray, low: np.ndarray, high: np.ndarray) -> list[list[list[float]]]:
-    """Corners of what a box has besides an outline in it that touches its four sides. It falls
-    apart into polygons without holes, each of which is carried on beyond the box."""
+def _outside(xy: np.ndarray) -> tuple[np.ndarray, list[list[list[float]]]]:
+    """(low, high) corners of a box about an outline, and corners of what lies between them: four
+    polygons, cut where the outline is farthest to every side."""
     import shapely
 
-    box = shapely.box(*low, *high)
-    margin = 0.05 * float((high - low).max())
-    least = 1e-9 * float((high - low).max()) ** 2
-    walls: list[list[list[float]]] = []
-    for part in _polygons(box.difference(shapely.Polygon(xy))):
-        if part.area <= least:
-            continue
-        beyond = part.buffer(margin, join_style="mitre").difference(box)
-        # where the strip outside of the box falls apart, or closes a ring, the parts overlap
-        grown = shapely.union_all([part, beyond])
-        pieces = _polygons(grown)
-        whole = len(pieces) == 1 and not pieces[0].interiors
-        for piece in pieces if whole else [part, *_polygons(beyond)]:
-            ring = shapely.get_coordinates(piece.exterior)[:-1]
-            walls.append(ring.tolist())
-    return walls
-
-
-def _polygons(shape: Any) -> list[shapely.Polygon]:
-    return [p for p in getattr(shape, "geoms", [shape]) if p.geom_type == "Polygon"]
+    low, high = xy.min(0), xy.max(0)
+    margin = MARGIN * float((high - low).max())
+    outer = shapely.box(*(low - margin), *(high + margin))
+    cuts = []
+    for axis in (0, 1):
+        for edge, end in ((low, -margin), (high, margin)):
+            at = xy[int(np.argmin(np.abs(xy[:, axis] - edge[axis])))]
+            beyond = at.copy()
+            beyond[axis] = edge[axis] + end
+            cuts.append(shapely.LineString([at, beyond]))
+    outline = shapely.Polygon(xy)
+    lines = shapely.union_all([outer.exterior, outline.exterior, *cuts])
+    middle = outline.representative_point()
+    walls = [
+        shapely.get_coordinates(face.exterior)[:-1].tolist()
+        for face in shapely.polygonize([lines]).geoms
+        if not face.contains(middle)
+    ]
+    return np.array([low, high]), walls

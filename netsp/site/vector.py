@@ -9,6 +9,11 @@ from __future__ import annotations
 
 import math
 import os
+import tempfile
+import zipfile
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -48,18 +53,24 @@ def read_vector(file: str | Path, crs: str | None) -> Map:
         Not readable, too large, some layers with a place on the earth and some without, or pyogrio
         is not installed.
     """
-    pyogrio = _pyogrio()
     _check_size(file)
+    with _unpacked(file) as plain:
+        return _read(file, plain, crs)
+
+
+def _read(file: str | Path, plain: str | Path, crs: str | None) -> Map:
+    """What stands in a file, which may have been unpacked to another place."""
+    pyogrio = _pyogrio()
     drawing = Path(file).suffix.lower() == ".dxf"
     features: list[Feature] = []
     layers: dict[str, int] = {}
     complaints: list[str] = []
     places: dict[str, bool] = {}
-    for layer, kind in _call(file, pyogrio.list_layers, file):
+    for layer, kind in _call(file, pyogrio.list_layers, plain):
         if kind is None:
             continue  # a table without places
         meta, ids, shapes, columns = _call(
-            file, pyogrio.raw.read, file, layer=layer, return_fids=True, force_2d=False
+            file, pyogrio.raw.read, plain, layer=layer, return_fids=True, force_2d=False
         )
         if len(shapes) > MOST_FEATURES:
             raise InputError(
@@ -186,6 +197,29 @@ def _plain(value: Any) -> Any:
     return value
 
 
+@contextmanager
+def _unpacked(file: str | Path) -> Iterator[str | Path]:
+    """Where a file is to be read: the page in a KMZ apart from it, because GDAL reads no data of
+    places (their schema) in the archive."""
+    if Path(file).suffix.lower() != ".kmz":
+        yield file
+        return
+    try:
+        with zipfile.ZipFile(file) as archive:
+            pages = [e for e in archive.infolist() if e.filename.lower().endswith(".kml")]
+            if not pages:
+                raise InputError(f"{file}: cannot be read as a map: holds no .kml")
+            if pages[0].file_size > MOST_BYTES:
+                raise InputError(f"{file}: unpacks to more than {MOST_BYTES / 2**20:g} MiB")
+            text = archive.read(pages[0])
+    except (zipfile.BadZipFile, zlib.error, OSError, RuntimeError, NotImplementedError) as error:
+        raise InputError(f"{file}: cannot be read as a map: {error}") from None
+    with tempfile.TemporaryDirectory() as folder:
+        page = Path(folder) / "doc.kml"
+        page.write_bytes(text)
+        yield page
+
+
 def _check_size(file: str | Path) -> None:
     try:
         status = os.stat(file)
@@ -208,7 +242,7 @@ def _call(file: str | Path, function: Any, *args: Any, **more: Any) -> Any:
             warnings.simplefilter("ignore")
             return function(*args, **more)
     except Exception as error:
-        first = (str(error) or type(error).__name__).splitlines()[0][:160]
+        first = (str(error) or type(error).__name__).splitlines()[0].split("; It might")[0][:160]
         raise InputError(f"{file}: cannot be read as a map: {first}") from None
 
 
