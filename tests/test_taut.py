@@ -314,6 +314,24 @@ def test_of_too_many_classes_the_shortest_of_every_goal_are_kept():
     assert min(left_out) >= part.least_left_out - 1e-6
 
 
+def test_tethers_that_wind_more_often_before_one_tangent_part_there():
+    """Legs between classes of a roadmap that had to leave classes out, as between those of all."""
+    obstacles = [Circle(center=(0, y), radius=1) for y in (0, 6)]
+    problem = Problem(
+        base=(-4, 0), goals=[(2, 8), (-2, 9), (4, 5)], obstacles=obstacles, tether_length=42
+    )
+    whole = TautRoadmap(problem).to_travel_graph()
+    part = TautRoadmap(problem, max_classes=len(whole) - 4).to_travel_graph()
+    assert whole.complete
+    assert not part.complete
+    place = {(whole.cluster[v], w): v for v, w in enumerate(whole.signatures)}
+    same = [place[part.cluster[v], w] for v, w in enumerate(part.signatures)]
+    rng = np.random.default_rng(0)
+    for u, v in rng.integers(1, len(part), (300, 2)):  # one by one: a search for many looks farther
+        leg = part.costs_among([u, v])[0, 1]
+        assert leg == pytest.approx(whole.costs[same[u], same[v]])
+
+
 @pytest.mark.parametrize("rule", ["none", 3, None])
 def test_an_unknown_rule_of_classes_is_refused(rule):
     with pytest.raises(InputError, match="classes: unknown"):

@@ -120,6 +120,8 @@ COMMANDS = {
         "solve": ("solve", "find the shortest non-entangling tour of a problem"),
         "verify": ("verify", "judge a solution independently of what found it"),
         "plot": ("plot", "draw a problem or a scene, with a solution or a tether"),
+        "base": ("base", "find where to stand, among candidates for the base"),
+        "tether": ("tether", "find how long a tether is needed, and what more of it saves"),
         "world": ("world", "draw a random problem; same seed, same problem on every machine"),
     },
     "carry out": {
@@ -129,7 +131,7 @@ COMMANDS = {
     },
     "hand over": {
         "export": ("export", "write a tour as a mission file of a ground station"),
-        "import": ("import_site", "make a problem from a map (GeoJSON)"),
+        "import": ("import_site", "make a problem from a map"),
     },
     "compare": {
         "compare": ("compare", "solvers side by side over random worlds, resumable"),

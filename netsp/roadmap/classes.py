@@ -72,15 +72,17 @@ class _GrowingTree:
 
     def __init__(self) -> None:
         self.parent, self.length = [-1], [0.0]
-        self._child: dict[tuple[int, int], int] = {}
+        # the length, too: a tether that has gone once more around before it takes a tangent has
+        # another bend there
+        self._child: dict[tuple[int, int, float], int] = {}
 
     def last(self, bends: Bends) -> int:
         """The last bend of a tether, whose bends are in the tree from now on."""
         at = 0
         for tangent, length in bends:
-            found = self._child.get((at, tangent))
+            found = self._child.get((at, tangent, length))
             if found is None:
-                found = self._child[at, tangent] = len(self.parent)
+                found = self._child[at, tangent, length] = len(self.parent)
                 self.parent.append(at)
                 self.length.append(length)
             at = found

@@ -144,11 +144,15 @@ class TautLegs:
         )
         if np.isinf(found).any():
             k = int(np.argmax(np.isinf(found)))
-            u, w = np.argwhere(pair == k)[0]
+            a, b = np.argwhere(pair == k)[0]
+            u, v = (
+                tuple(tethers.letters[tethers.row[i] : tethers.row[i + 1]].tolist())
+                for i in (here[a], there[b])
+            )
             raise NetspError(
                 f"internal: no taut leg found between goal #{g - 1} and goal "
-                f"#{tethers.cluster[there[w]] - 1} for word "
-                f"{self.relative_word(int(here[u]), int(there[w]))}; please report the problem file"
+                f"#{tethers.cluster[there[b]] - 1} for word {concatenate(invert(u), v)}; please "
+                "report the problem file"
             )
         return np.where(pair >= 0, np.append(found, np.inf)[pair], np.inf)
 

@@ -1,0 +1,108 @@
+"""`netsp base`: where to stand."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+
+from netsp.command import messages
+from netsp.command.types import check_writable, natural, positive, seconds
+from netsp.errors import EXIT_INFEASIBLE, EXIT_NOT_ALL
+
+EXAMPLE = "netsp base problems/wharf.json --grid 10,10 --plot base.png"
+
+
+def arguments(p: argparse.ArgumentParser) -> None:
+    """Of the command line."""
+    p.add_argument(
+        "problem", metavar="PROBLEM", help="problem file (JSON); its base does not count"
+    )
+    where = p.add_mutually_exclusive_group(required=True)
+    where.add_argument(
+        "--candidates", metavar="FILE", help="table (CSV) with the columns x, y and perhaps z, name"
+    )
+    where.add_argument("--line", metavar="X1,Y1,X2,Y2,N", help="N places along a line, as a quay")
+    where.add_argument(
+        "--grid", metavar="NX,NY", help="a grid over the bounds, or over what the problem holds"
+    )
+    p.add_argument(
+        "--every", action="store_true", help="solve from every place, also those proven worse"
+    )
+    p.add_argument(
+        "--top", type=positive, default=10, metavar="N", help="places printed; default 10"
+    )
+    p.add_argument(
+        "--time-limit", type=seconds, metavar="S",
+        help="seconds; the best known by then is written; default none",
+    )  # fmt: skip
+    p.add_argument("--seed", type=natural, default=0, metavar="N", help="default 0")
+    p.add_argument(
+        "-o", "--output", metavar="FILE", help="write the ranking: a table (.csv) or JSON"
+    )
+    p.add_argument(
+        "--problem-output", metavar="FILE", help="write the problem with its base at the best place"
+    )
+    p.add_argument("--plot", metavar="FILE", help="draw both maps (.png, .svg or .pdf)")
+    p.add_argument("--quiet", action="store_true", help="no progress")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print the ranking, write what is asked for, and return the exit code."""
+    check_writable(
+        args.output, args.plot, args.problem_output, inputs=(args.problem, args.candidates)
+    )
+    from netsp.files import write_text
+    from netsp.pictures import style
+    from netsp.problem import Problem
+    from netsp.sizing.base import Candidate, best_base
+    from netsp.sizing.candidates import along_line, from_table, over_grid
+
+    if args.plot:
+        style.check_format(args.plot)
+    problem = Problem.load(args.problem)
+    names: list[str | None] | None = None
+    if args.candidates:
+        places, names = from_table(args.candidates)
+    elif args.line:
+        places = along_line(args.line)
+    else:
+        places = over_grid(args.grid, problem)
+
+    def tell(candidate: Candidate, left: int) -> None:
+        found = "no tour" if candidate.length is None else f"tour {candidate.length:.6g}"
+        print(f"{candidate.name}: {found}; {left} may be better", file=sys.stderr)
+
+    search = best_base(
+        problem, places, names=names, every=args.every, time_limit=args.time_limit,
+        seed=args.seed, on_candidate=None if args.quiet else tell,
+    )  # fmt: skip
+    print(f"{'rank':>4}  {'place':<12} {'x':>10} {'y':>10} {'tether':>10} {'tour':>12}  status")
+    for k, c in enumerate(search.candidates[: args.top], 1):
+        tour = f">= {c.lower_bound:.6g}" if c.length is None else f"{c.length:.6g}"
+        status = c.why or (c.status.value if c.status is not None else "proven worse")
+        if c.why:
+            tour = "-"
+        elif c.status is None and not search.proven:
+            status = "not solved"
+        x, y, _ = c.position
+        print(
+            f"{k:>4}  {c.name:<12.12} {x:>10.6g} {y:>10.6g} {c.shortest_tether:>10.6g} "
+            f"{tour:>12}  {status}"
+        )
+    solved = sum(c.length is not None for c in search.candidates)
+    print(
+        f"{len(search.candidates)} places, {sum(c.possible for c in search.candidates)} of them "
+        f"possible, {solved} solved; "
+        + ("the first is proven the best" if search.proven else "the first is not proven the best")
+    )
+    if args.output:
+        search.save(args.output)
+    if args.plot:
+        style.save(search.plot()[0].figure, args.plot)
+        print(f"picture {args.plot}", file=sys.stderr)
+    if search.best_problem is None:
+        messages.warning("no place has a tour")
+        return EXIT_INFEASIBLE if not any(c.possible for c in search.candidates) else EXIT_NOT_ALL
+    if args.problem_output:
+        write_text(args.problem_output, search.best_problem.to_json())
+    return 0 if search.proven else EXIT_NOT_ALL
