@@ -58,6 +58,9 @@ def draw_tether_curve(curve: TetherCurve, *, ax: Axes | None = None) -> Any:
     return ax
 
 
+MOST_NAMES = 24
+"""Places that are named."""
+
 LEVELS = 12
 """Contours of a map."""
 
@@ -76,18 +79,23 @@ def draw_base_search(search: BaseSearch, *, ax: Any = None) -> Any:
     xy = np.array([c.position[:2] for c in search.candidates])
     tether = np.array([c.shortest_tether for c in search.candidates])
     tour = np.array([np.nan if c.length is None else c.length for c in search.candidates])
-    bounds = np.array([c.lower_bound if c.possible else np.nan for c in search.candidates])
-    _map(left, problem, xy, tether, "shortest sufficient tether", limit=problem.tether_length)
-    _map(right, problem, xy, np.where(np.isnan(tour), bounds, tour), "shortest tour")
-    only = np.isnan(tour) & np.isfinite(bounds)
-    right.plot(*xy[only].T, "o", mfc="none", mec=style.EDGE, ms=7, label="bound only: proven worse"
-               if search.proven else "bound only", zorder=4)  # fmt: skip
+    possible = np.array([c.possible for c in search.candidates])
+    _map(left, problem, xy, tether, possible, "shortest sufficient tether")
+    _map(right, problem, xy, tour, possible, "shortest tour")
+    only = np.isnan(tour) & possible
+    right.plot(*xy[only].T, "o", mfc="none", mec=style.EDGE, ms=6, zorder=4,
+               label="proven worse without a tour" if search.proven else "not solved")  # fmt: skip
+    if len(xy) <= MOST_NAMES:
+        for c in search.candidates:
+            left.annotate(c.name, c.position[:2], (4, 4), textcoords="offset points", fontsize=7)
     best = search.best
     for ax in (left, right):
         if best is not None:
             ax.plot(*best.position[:2], "*", color=style.BASE, mec="white", ms=15, zorder=6,
                     label=f"best: {best.name}")  # fmt: skip
-    right.legend(loc="upper right", fontsize=8, framealpha=0.9) if best is not None else None
+    if best is not None:
+        figure.legend(*right.get_legend_handles_labels(), loc="outside lower center", ncols=4,
+                      fontsize=8, frameon=False)  # fmt: skip
     proof = "proven the best" if search.proven else "not proven the best"
     if best is None:
         figure.suptitle(f"{problem.name}: no place has a tour", fontsize=11)
@@ -101,9 +109,7 @@ def draw_base_search(search: BaseSearch, *, ax: Any = None) -> Any:
     return left, right
 
 
-def _map(
-    ax: Axes, problem: Any, xy: Any, values: Any, label: str, limit: float | None = None
-) -> None:
+def _map(ax: Axes, problem: Any, xy: Any, values: Any, possible: Any, label: str) -> None:
     """Values at places, with contours between them where places span the plane."""
     draw_obstacles(ax, problem)
     ok = np.isfinite(values)
@@ -116,11 +122,15 @@ def _map(
     if ok.any():
         dots = ax.scatter(xy[ok, 0], xy[ok, 1], c=values[ok], s=24, cmap="viridis", zorder=5, lw=0)
         ax.figure.colorbar(dots, ax=ax, label=f"{label} ({problem.units})", shrink=0.85)
-    out = ~ok if limit is None else (~ok | (values > limit))
-    ax.plot(*xy[out].T, "x", color=style.LEFT_OUT, ms=5, zorder=5)
+    ax.plot(*xy[~possible].T, "x", color=style.LEFT_OUT, ms=5, zorder=5, label="no tour from here")
     goals = problem.points[1:, :2]
-    ax.plot(*goals.T, "o", mfc=style.GOAL, mec=style.PATH, ms=6, zorder=5)
+    ax.plot(*goals.T, "s", mfc=style.GOAL, mec=style.PATH, ms=6, zorder=5, label="goals")
     ax.set_aspect("equal")
-    ax.set_title(f"{label}; crosses: no tour from there", fontsize=9, loc="left")
+    low, high = ax.get_xlim(), ax.get_ylim()
+    every = np.vstack([xy, goals, np.column_stack([low, high])])
+    room = 0.04 * float(np.ptp(every, axis=0).max())
+    ax.set_xlim(every[:, 0].min() - room, every[:, 0].max() + room)
+    ax.set_ylim(every[:, 1].min() - room, every[:, 1].max() + room)
+    ax.set_title(label, fontsize=9, loc="left")
     ax.set_xlabel(f"x ({problem.units})")
     ax.set_ylabel(f"y ({problem.units})")
