@@ -15,10 +15,10 @@ import numpy as np
 from table import head, heading, row
 
 from netsp import Problem, Status, solve, verify
-from netsp.sizing import best_base, tether_curve
-from netsp.sizing.candidates import over_grid
 from netsp.site import Projection, read_site
 from netsp.site.options import Looking
+from netsp.sizing import best_base, tether_curve
+from netsp.sizing.candidates import over_grid
 from netsp.worlds import reachable_world
 
 PROBLEMS = Path(__file__).parent.parent / "problems"
@@ -89,7 +89,8 @@ def bases() -> None:
         found = best_base(problem, over_grid("10,10", problem))
         took = time.perf_counter() - begin
         solved = [c.length for c in found.candidates if c.length is not None]
-        row(problem.name, len(problem.goals), sum(c.possible for c in found.candidates), len(solved),
+        possible = sum(c.possible for c in found.candidates)
+        row(problem.name, len(problem.goals), possible, len(solved),
             f"{min(solved):.3f}", f"{max(solved):.3f}", "yes" if found.proven else "no",
             f"{took:.1f}")  # fmt: skip
     print()

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from claims import command, offline, online
+from claims import command, offline, online, sites
 from claims.claim import Claim
 
 
@@ -18,4 +18,5 @@ def claims() -> Iterator[Claim]:
     yield from command.starting()
     yield from offline.claims()
     yield from online.claims()
+    yield from sites.claims()
     yield from command.running()

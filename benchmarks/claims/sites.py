@@ -1,0 +1,110 @@
+"""Claims about maps, tether lengths and bases."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+from table import ROOT
+
+from claims.claim import ABSENT, ALLOWANCE, DATA, Claim
+
+
+def examples() -> tuple[str, bool]:
+    """Both example sites: proven, verified, and back from the map that an export writes."""
+    from netsp import Status, solve, verify
+    from netsp.export import export
+    from netsp.site import read_site
+
+    harbour = read_site(ROOT / "examples" / "harbour.kml")
+    tank = read_site(
+        ROOT / "examples" / "tank.dxf", tether=25.0, clearance=0.2, units="mm",
+        maps=[("obstacle", "COLUMNS")],
+    )  # fmt: skip
+    found = [solve(p) for p in (harbour, tank)]
+    good = all(
+        f.status is Status.OPTIMAL and bool(verify(p, f))
+        for p, f in zip((harbour, tank), found, strict=True)
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "again.geojson"
+        export(harbour, found[0], file, "geojson")
+        again = solve(read_site(file))
+    off = abs((again.length or np.inf) / (found[0].length or 1.0) - 1.0)
+    lengths = ", ".join(f"{f.length:.3f} m" for f in found)
+    return f"{lengths}; back from its export {off:.0e} off", good and off < 1e-5
+
+
+def curve() -> tuple[str, bool]:
+    """Steps of tether curves beside solves at each and just below."""
+    from sizing import world
+
+    from netsp import InfeasibleError, Problem, solve
+    from netsp.sizing import tether_curve
+
+    agree = count = 0
+    for problem in (Problem.load(ROOT / "problems" / "wharf.json"), world(8, 4, 330.0)):
+        found = tether_curve(problem)
+        below: float | None = None
+        for step in found.steps:
+            at = problem.model_copy(update={"tether_length": step.tether * (1.0 + 1e-6)})
+            under = problem.model_copy(update={"tether_length": step.tether * (1.0 - 1e-6)})
+            try:
+                length = solve(under).length
+            except InfeasibleError:
+                length = None
+            count += 2
+            agree += bool(np.isclose(solve(at).length or 0.0, step.length, rtol=1e-6))
+            agree += length is below or bool(np.isclose(length or 0.0, below or -1.0, rtol=1e-6))
+            below = step.length
+    return f"{agree} of {count} solves agree", agree == count
+
+
+def base(most: float) -> Callable[[], tuple[str, bool]]:
+    """100 candidates of the wharf and of a world of 20 goals: CPU seconds, and the proof."""
+
+    def measure() -> tuple[str, bool]:
+        from sizing import PROBLEMS, world
+
+        from netsp import Problem
+        from netsp.sizing import best_base
+        from netsp.sizing.candidates import over_grid
+
+        shown, good = [], True
+        for problem in (Problem.load(PROBLEMS / "wharf.json"), world(20, 1, 300.0)):
+            begin = time.process_time()
+            found = best_base(problem, over_grid("10,10", problem))
+            took = time.process_time() - begin
+            shown.append(f"{took:.0f} s" + ("" if found.proven else ", not proven"))
+            good = good and found.proven and took <= ALLOWANCE * most
+        return "; ".join(shown), good
+
+    return measure
+
+
+def farm() -> tuple[str, bool]:
+    """67 turbines with 9 km of tether, 40 s: a verified tour, and a bound that says what it is."""
+    from sizing import farm as site
+
+    from netsp import Status, solve, verify
+
+    if not (DATA / "dudgeon.geojson").is_file():
+        return ABSENT, True
+    problem, left_out = site(DATA, "dudgeon", None, 9000.0)
+    begin = time.perf_counter()
+    found = solve(problem, time_limit=40.0)
+    took = time.perf_counter() - begin
+    honest = found.status in (Status.FEASIBLE, Status.OPTIMAL_OF_KEPT, Status.OPTIMAL)
+    good = honest and bool(verify(problem, found)) and left_out == 0 and len(found.tour) == 67
+    return f"{found.length:.0f} m, {found.status.value}, {took:.0f} s", good and took <= 60.0
+
+
+def claims() -> Iterator[Claim]:
+    """All of this file."""
+    yield Claim("example sites, and back from their export", "proven; 1e-5", examples)
+    yield Claim("curves of tether lengths beside solves", "all agree", curve)
+    yield Claim("where to stand, 100 places", "60 s each, proven", base(60.0), timed=True)
+    yield Claim("a wind farm of 67 goals, 9 km of tether", "a verified tour in 60 s", farm)
