@@ -20,13 +20,14 @@ from pydantic import (
     Discriminator,
     Field,
     Tag,
+    ValidationError,
     WithJsonSchema,
     field_validator,
     model_validator,
 )
 
 from netsp.drawn import Drawn
-from netsp.errors import counted
+from netsp.errors import InputError, counted
 from netsp.fields import (
     POINT3_SCHEMA,
     Integer,
@@ -36,11 +37,12 @@ from netsp.fields import (
     Point2,
     Point3,
     Positive,
+    checked_argument,
     checked_number,
 )
 from netsp.files import FileModel
 from netsp.geometry.polygons import check_polygon, polygon_interior_point, polygon_signed_distance
-from netsp.models import Model, shown
+from netsp.models import Model, explain, shown
 from netsp.shorthand import Inspection, written_out
 
 if TYPE_CHECKING:
@@ -569,6 +571,31 @@ class Problem(Drawn, FileModel):
     def _obstacle_field(self, i: int) -> str:
         name = self.obstacles[i].name
         return f"obstacles[{i}]" + (f" ({name})" if name else "")
+
+    def grown(self, margin: float) -> Problem:
+        """The problem with all obstacles grown by a margin.
+
+        Parameters
+        ----------
+        margin : float
+            Not negative, in the problem's units.
+
+        Returns
+        -------
+        Problem
+            The same with as much more clearance.
+
+        Raises
+        ------
+        InputError
+            The margin is negative, or base or a goal lies inside a grown obstacle.
+        """
+        more = checked_argument("margin", margin, 0.0)
+        try:
+            own = {name: getattr(self, name) for name in Problem.model_fields}
+            return Problem.model_validate({**own, "clearance": self.clearance + more})
+        except ValidationError as error:
+            raise InputError(f"margin {more:g}: {explain(error)}") from None
 
     # JSON in and out
 

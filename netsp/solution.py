@@ -71,6 +71,9 @@ class Solution(Drawn, FileModel):
 
     Attributes
     ----------
+    margin : float
+        All obstacles were grown by it, besides the problem's clearance; path, tethers, bound and
+        status are those among the grown obstacles.
     path : tuple of (x, y, z)
         Closed polyline from the base to the base, or from the problem's state to the base.
     start_tether : tuple of (x, y, z)
@@ -98,6 +101,13 @@ class Solution(Drawn, FileModel):
         KeptClasses | None, Field(description="which homotopy classes the roadmap held")
     ] = None
     seed: Annotated[int | None, Field(description="of all that was random")] = None
+    margin: Annotated[
+        NonNegative,
+        Field(
+            description="all obstacles were grown by it, and all that is said holds among those; "
+            "in the problem's units"
+        ),
+    ] = 0.0
     status: Annotated[Status, Field(description="what is proven")]
     length: Annotated[
         Total | None, Field(description="of the tour, in the problem's units; null without a tour")
@@ -159,6 +169,8 @@ class Solution(Drawn, FileModel):
             del data["start_tether"]
         if self.classes is None:
             del data["classes"]
+        if not self.margin:
+            del data["margin"]
         text = json.dumps(data, indent=1, allow_nan=False, ensure_ascii=False)
         rows = ",\n".join("  " + json.dumps(p, allow_nan=False) for p in path)
         return f'{text[:-2]},\n "path": [\n{rows}\n ]\n}}\n'

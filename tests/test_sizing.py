@@ -1,6 +1,8 @@
 """How long a tether and where to stand, beside solves one by one."""
 
 import json
+import math
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -8,10 +10,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from netsp import Circle, InfeasibleError, InputError, Problem, Status, solve
+from netsp import Circle, InfeasibleError, InputError, Problem, Status, solve, verify
 from netsp.command.main import main
-from netsp.sizing import best_base, tether_curve
+from netsp.roadmap.paths import TautPaths
+from netsp.sizing import best_base, margins, tether_curve
+from netsp.sizing.margins import _complaint
 from netsp.sizing.tether import shortest_tethers
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
+
+from perturbed import violations
 
 from .worlds import random_world
 
@@ -161,3 +169,81 @@ def test_bad_questions_take_one_line(argv, message, tmp_path, capsys):
 
 def test_a_known_status_is_kept():
     assert tether_curve(Problem.load(PROBLEMS / "pool.json")).steps[0].status is Status.OPTIMAL
+
+
+def test_the_margin_of_a_post_is_the_closed_form():
+    """The tether over a post grows with it until it does not fit."""
+
+    def over(radius):
+        side = math.sqrt(9.0 - radius**2)
+        return 2.0 * side + radius * (math.pi - 2.0 * math.acos(radius / 3.0))
+
+    problem = Problem(
+        base=(-3, 0), goals=[(3, 0)], obstacles=[Circle(center=(0, 0), radius=1)],
+        tether_length=over(1.5),
+    )  # fmt: skip
+    found = margins(problem, solve(problem), friction=0.3)
+    assert found.obstacles == pytest.approx(0.5, abs=1e-6)
+    assert "goal #0: its tether does not fit" in found.limited_by
+    assert found.tether == pytest.approx(over(1.5) - over(1.0))
+    assert found.cross_track == pytest.approx(0.0, abs=1e-6)
+    assert found.stops[0].turning == pytest.approx(math.pi - 2.0 * math.acos(1 / 3))
+    assert found.stops[0].tension_ratio == pytest.approx(math.exp(0.3 * found.stops[0].turning))
+
+
+@settings(max_examples=8, deadline=None)
+@given(seed=st.integers(0, 10**6))
+def test_within_its_margin_a_tour_fits_every_world_and_beyond_it_the_grown_one_does_not(seed):
+    problem = random_world(seed, goals=4, tether=330.0)
+    try:
+        solution = solve(problem)
+    except InfeasibleError:
+        return
+    found = margins(problem, solution)
+    assert found.obstacles > 0.0
+    assert violations(problem, solution, found.obstacles, worlds=12, seed=seed) == 0
+    if "as near" not in found.limited_by:
+        assert _complaint(problem, solution, found.obstacles * (1 + 1e-6) + 1e-9) is not None
+
+
+def test_worlds_that_are_off_by_more_than_the_margin_are_seen(monkeypatch):
+    """The check of perturbed worlds can fail: with a tether that is too short for them, it does."""
+    problem = Problem.load(PROBLEMS / "wharf.json")
+    solution = solve(problem)
+    longest = max(v.tether_length for v in solution.tour)
+    assert violations(problem, solution, 0.39, worlds=10, seed=0) == 0
+    short = problem.model_copy(update={"tether_length": longest})
+    monkeypatch.setattr("perturbed.TautPaths", lambda p: TautPaths(p, 2.0 * longest))
+    assert violations(short, solution, 0.39, worlds=10, seed=0) > 0
+
+
+@settings(max_examples=6, deadline=None)
+@given(seed=st.integers(0, 10**6), margin=st.floats(0.5, 6.0))
+def test_a_tour_planned_with_a_margin_has_it_and_is_verified_with_it(seed, margin):
+    problem = random_world(seed, goals=5, tether=330.0)
+    try:
+        planned = solve(problem, margin=margin)
+        plain = solve(problem)
+    except (InfeasibleError, InputError):
+        return
+    assert verify(problem, planned)
+    assert planned.margin == margin
+    assert margins(problem, planned).obstacles >= margin * (1 - 1e-9)
+    assert planned.length >= plain.length * (1 - 1e-9)
+    assert planned.length == pytest.approx(solve(problem.grown(margin)).length)
+    again = type(planned).model_validate_json(planned.to_json())
+    assert again.margin == margin
+    lying = planned.model_copy(update={"margin": 0.5 * margin, "tour": plain.tour})
+    assert not verify(problem, lying) or plain.tour == planned.tour
+
+
+def test_margins_are_printed(tmp_path, capsys):
+    wharf, out = str(PROBLEMS / "wharf.json"), tmp_path / "s.json"
+    assert main(["solve", wharf, "-o", str(out), "--margin", "0.2", "--quiet"]) == 0
+    assert main(["margins", wharf, str(out), "-o", str(tmp_path / "m.json")]) == 0
+    assert "obstacles    may be off by 0.4 m" in capsys.readouterr().out
+    assert json.loads((tmp_path / "m.json").read_text())["stops"][0]["slack"] > 0
+    assert main(["verify", wharf, str(out), "--margins"]) == 0
+    assert "grown by 0.2" in capsys.readouterr().out
+    assert main(["solve", wharf, "-o", str(out), "--margin", "1"]) == 2
+    assert "netsp: margin 1: goals[" in capsys.readouterr().err

@@ -119,6 +119,7 @@ COMMANDS = {
     "plan": {
         "solve": ("solve", "find the shortest non-entangling tour of a problem"),
         "verify": ("verify", "judge a solution independently of what found it"),
+        "margins": ("margins", "find how far the world may be off before a tour does not fit"),
         "plot": ("plot", "draw a problem or a scene, with a solution or a tether"),
         "base": ("base", "find where to stand, among candidates for the base"),
         "tether": ("tether", "find how long a tether is needed, and what more of it saves"),

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from netsp.command.types import (
     check_writable,
     choices,
+    length,
     natural,
     option,
     positive,
@@ -81,6 +82,10 @@ def arguments(p: argparse.ArgumentParser) -> None:
         help="iterations of the solver; default no limit",
     )
     p.add_argument("--seed", type=natural, default=0, metavar="N", help="random seed; default 0")
+    p.add_argument(
+        "--margin", type=length, default=0.0, metavar="R",
+        help="plan so that every obstacle may be off by R; default 0 (docs/sizing.md)",
+    )  # fmt: skip
     p.add_argument("--warm-start", metavar="SOLUTION", help="start from this solution's tour")
     p.add_argument(
         "-o", "--output", metavar="FILE", help="write the solution to this file (default: stdout)"
@@ -140,6 +145,7 @@ def run(args: argparse.Namespace) -> int:
             seed=args.seed,
             params=_params(args),
             warm_start=warm,
+            margin=args.margin,
             on_progress=listen,
         )
     if args.output:

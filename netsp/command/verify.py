@@ -20,6 +20,10 @@ def arguments(p: argparse.ArgumentParser) -> None:
         help="print measures of entanglement; SOLUTION may then be any path "
         "(CSV x,y[,z] or a JSON list of points)",
     )
+    p.add_argument(
+        "--margins", action="store_true",
+        help="print how far the world may be off, too (netsp margins)",
+    )  # fmt: skip
     p.add_argument("--quiet", action="store_true", help="exit code only")
 
 
@@ -53,6 +57,11 @@ def run(args: argparse.Namespace) -> int:
         from netsp.command.measures import describe_tethers
 
         print(f"\n{describe_path(problem, solution.path)}\n\n{describe_tethers(problem, solution)}")
+    if args.margins and verdict and not args.quiet:
+        from netsp.command.margins import describe
+        from netsp.sizing.margins import margins
+
+        print(f"\n{describe(problem, margins(problem, solution))}")
     return 0 if verdict else EXIT_NOT_VERIFIED
 
 

@@ -118,6 +118,9 @@ def verify(problem: Problem, solution: Solution) -> Verification:
 
 class _Judge:
     def __init__(self, problem: Problem, solution: Solution) -> None:
+        self.sha256 = problem.sha256
+        # planned with a margin: what is said holds among obstacles grown by it
+        problem = problem.grown(solution.margin) if solution.margin else problem
         self.problem, self.solution = problem, solution
         # a path that starts in the middle is judged with the tether that is out already before it
         before: Floats = np.array(solution.start_tether, dtype=float).reshape(-1, 3)
@@ -156,14 +159,15 @@ class _Judge:
         return checks
 
     def _belongs(self) -> Check:
-        same = self.problem.sha256 == self.solution.problem.sha256
+        same = self.sha256 == self.solution.problem.sha256
         return Check(
             "belongs to the problem",
             same,
-            f"sha256 {self.problem.sha256[:12]}…"
+            f"sha256 {self.sha256[:12]}…"
+            + (f", obstacles grown by {self.solution.margin:g}" if self.solution.margin else "")
             if same
             else f"solution is for another problem or another version of it "
-            f"({self.solution.problem.sha256[:12]}…, this is {self.problem.sha256[:12]}…)",
+            f"({self.solution.problem.sha256[:12]}…, this is {self.sha256[:12]}…)",
         )
 
     def _starts(self) -> Check:

@@ -1,6 +1,17 @@
-"""What is asked before there is a problem: how long a tether, and where to stand."""
+"""What is asked about a tour before it is flown: how long a tether, where to stand, what margin."""
 
 from netsp.sizing.base import BaseSearch, Candidate, best_base
+from netsp.sizing.margins import Margins, StopMargin, margins
 from netsp.sizing.tether import Step, TetherCurve, tether_curve
 
-__all__ = ["BaseSearch", "Candidate", "Step", "TetherCurve", "best_base", "tether_curve"]
+__all__ = [
+    "BaseSearch",
+    "Candidate",
+    "Margins",
+    "Step",
+    "StopMargin",
+    "TetherCurve",
+    "best_base",
+    "margins",
+    "tether_curve",
+]

@@ -13,7 +13,7 @@ from netsp.errors import InputError
 from netsp.models import shown
 from netsp.problem import Problem
 from netsp.registry import foreign, load
-from netsp.solution import Solution, Timings
+from netsp.solution import ProblemReference, Solution, Timings
 from netsp.solvers.answer import to_solution
 from netsp.solvers.custom import call, read_options, whole_numbers
 from netsp.solvers.table import ROADMAPS, SOLVERS
@@ -206,6 +206,7 @@ def solve(
     seed: int = 0,
     params: Mapping[str, Any] | None = None,
     warm_start: Solution | None = None,
+    margin: float = 0.0,
     on_progress: OnProgress | None = None,
 ) -> Solution:
     """Find the shortest non-entangling tour of a problem.
@@ -231,6 +232,9 @@ def solve(
     warm_start : Solution, optional
         A solution of the same problem to start from, by whatever solver; where a class of it is not
         in this roadmap, the best of its order is taken.
+    margin : float
+        The tour is to bear obstacles that are off by so much (`netsp.sizing.margins`): all are
+        grown by it, in the problem's units.
     on_progress : callable, optional
         Called with a `netsp.travel.result.Progress` now and then.
 
@@ -264,6 +268,15 @@ def solve(
     if warm_start is not None and warm_start.problem.sha256 != problem.sha256:
         raise InputError("warm_start: it is the solution of another problem (sha256 differs)")
     check_solver(solver, params)  # before the long work
+    if margin:
+        found = solve(
+            problem.grown(margin), solver, roadmap=roadmap, roadmap_options=roadmap_options,
+            time_limit=time_limit, iteration_limit=iteration_limit, seed=seed, params=params,
+            warm_start=None if warm_start is None else _for_grown(warm_start, problem, margin),
+            on_progress=on_progress,
+        )  # fmt: skip
+        own = ProblemReference(name=problem.name, sha256=problem.sha256)
+        return found.model_copy(update={"problem": own, "margin": float(margin)})
     clock = Clock(time_limit)
     options: dict[str, Any] = {"time_limit": clock, **(roadmap_options or {})}
     if ROADMAPS.named(roadmap).seeded:
@@ -290,6 +303,12 @@ def solve(
         total_s=round(total, 6),
     )
     return to_solution(problem, graph, result, name_of(solver), seed, timings)
+
+
+def _for_grown(warm: Solution, problem: Problem, margin: float) -> Solution:
+    """A solution to start from as one of the problem with its obstacles grown."""
+    grown = ProblemReference(name=problem.name, sha256=problem.grown(margin).sha256)
+    return warm.model_copy(update={"problem": grown})
 
 
 def check_solver(solver: SolverLike, params: Mapping[str, Any] | None) -> None:

@@ -1,0 +1,60 @@
+"""`netsp margins`: how far the world may be off before a tour does not fit any more."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from typing import TYPE_CHECKING
+
+from netsp.command.types import check_writable, length, load_pair
+
+if TYPE_CHECKING:
+    from netsp.problem import Problem
+    from netsp.sizing.margins import Margins
+
+EXAMPLE = "netsp margins problems/wharf.json solution.json --friction 0.2"
+
+
+def arguments(p: argparse.ArgumentParser) -> None:
+    """Of the command line."""
+    p.add_argument("problem", metavar="PROBLEM", help="problem file (JSON)")
+    p.add_argument("solution", metavar="SOLUTION", help="solution file (JSON)")
+    p.add_argument(
+        "--friction", type=length, default=0.0, metavar="MU",
+        help="coefficient of friction of tether on obstacle, for the tension ratios; default 0",
+    )  # fmt: skip
+    p.add_argument("-o", "--output", metavar="FILE", help="write the margins (JSON)")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print the margins, and return the exit code."""
+    check_writable(args.output, inputs=(args.problem, args.solution))
+    from netsp.files import write_text
+    from netsp.sizing.margins import margins
+
+    problem, solution = load_pair(args.problem, args.solution)
+    found = margins(problem, solution, args.friction)
+    print(describe(problem, found))
+    if args.output:
+        write_text(args.output, found.to_json())
+    return 0
+
+
+def describe(problem: Problem, found: Margins) -> str:
+    """The margins, a line for every stop."""
+    units = problem.units
+    lines = [
+        f"obstacles    may be off by {found.obstacles:.6g} {units}: then {found.limited_by}",
+        f"tether       {found.tether:.6g} {units} may be lost before a goal is",
+        f"cross-track  {found.cross_track:.6g} {units} beside the path are borne",
+        "",
+        f"{'visit':>5}  {'goal':<14} {'tether':>10} {'slack':>10} {'turning':>9} {'tension':>8} "
+        f"{'clearance':>9}",
+    ]
+    for k, s in enumerate(found.stops, 1):
+        lines.append(
+            f"{k:>5}  {s.name:<14.14} {s.tether:>10.6g} {s.slack:>10.6g} "
+            f"{math.degrees(s.turning):>8.1f}° {s.tension_ratio:>8.3g} "
+            f"{s.clearance:>9.4g}"
+        )
+    return "\n".join(lines)
