@@ -1,4 +1,4 @@
-"""Whole wind farms, curves of tether lengths and searches for a base, in tables.
+"""Whole wind farms, curves of tether lengths, searches for a base and margins, in tables.
 
     python benchmarks/sizing.py [--farms FOLDER] [--seconds 60] [--keep]
 
@@ -12,12 +12,13 @@ import time
 from pathlib import Path
 
 import numpy as np
+from perturbed import violations
 from table import head, heading, row
 
 from netsp import Problem, Status, solve, verify
 from netsp.site import Projection, read_site
 from netsp.site.options import Looking
-from netsp.sizing import best_base, tether_curve
+from netsp.sizing import best_base, margins, tether_curve
 from netsp.sizing.candidates import over_grid
 from netsp.worlds import reachable_world
 
@@ -96,6 +97,24 @@ def bases() -> None:
     print()
 
 
+def margined(worlds: int) -> None:
+    print(f"### Margins, {worlds} worlds each whose obstacles are off by no more\n")
+    head("problem", "planned with", "tour", "obstacles may be off by", "tether to lose", "worlds",
+         "do not fit", "s", name="sizing-margins")  # fmt: skip
+    wharf = Problem.load(PROBLEMS / "wharf.json")
+    cases = [(wharf, 0.0), (wharf, 0.3), (Problem.load(PROBLEMS / "pool.json"), 0.0)]
+    cases += [(world(10, seed, 330.0), margin) for seed in (1, 2, 3) for margin in (0.0, 2.0)]
+    for problem, margin in cases:
+        solution = solve(problem, margin=margin)
+        begin = time.perf_counter()
+        found = margins(problem, solution)
+        took = time.perf_counter() - begin
+        bad = violations(problem, solution, found.obstacles, worlds, seed=0)
+        row(problem.name, f"{margin:g}", f"{solution.length:.3f}", f"{found.obstacles:.4f}",
+            f"{found.tether:.3f}", worlds, bad, f"{took:.1f}")  # fmt: skip
+    print()
+
+
 def world(goals: int, seed: int, tether: float) -> Problem:
     """A random world of as many circles as goals, by the recipe of the ICRA 2017 paper."""
     return reachable_world(seed, goals=goals, obstacles=goals, tether_length=tether)[0]
@@ -104,6 +123,7 @@ def world(goals: int, seed: int, tether: float) -> Problem:
 def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--farms", help="folder with the maps of the farms")
+    parser.add_argument("--worlds", type=int, default=1200, help="that are off, for every tour")
     parser.add_argument("--seconds", type=float, default=60.0)
     args = parser.parse_args()
     heading("Sites, tethers and bases")
@@ -111,6 +131,7 @@ def main() -> None:
     np.seterr(all="ignore")
     curves()
     bases()
+    margined(args.worlds)
     if args.farms:
         farms(Path(args.farms), args.seconds)
 

@@ -85,6 +85,26 @@ def base(most: float) -> Callable[[], tuple[str, bool]]:
     return measure
 
 
+def margined() -> tuple[str, bool]:
+    """Worlds whose obstacles are off by a tour's margin, of which none may not fit."""
+    from perturbed import violations
+    from sizing import world
+
+    from netsp import Problem, solve
+    from netsp.sizing import margins
+
+    bad = count = 0
+    for problem, margin in (
+        (Problem.load(ROOT / "problems" / "wharf.json"), 0.3), (world(10, 1, 330.0), 0.0),
+    ):  # fmt: skip
+        solution = solve(problem, margin=margin)
+        found = margins(problem, solution).obstacles
+        assert found >= margin * (1.0 - 1e-9)
+        bad += violations(problem, solution, found, 200, seed=1)
+        count += 200
+    return f"{bad} of {count} worlds", bad == 0
+
+
 def farm() -> tuple[str, bool]:
     """67 turbines with 9 km of tether, 40 s: a verified tour, and a bound that says what it is."""
     from sizing import farm as site
@@ -107,4 +127,5 @@ def claims() -> Iterator[Claim]:
     yield Claim("example sites, and back from their export", "proven; 1e-5", examples)
     yield Claim("curves of tether lengths beside solves", "all agree", curve)
     yield Claim("where to stand, 100 places", "60 s each, proven", base(60.0), timed=True)
+    yield Claim("worlds that are off by a tour's margin and do not fit", "none", margined)
     yield Claim("a wind farm of 67 goals, 9 km of tether", "a verified tour in 60 s", farm)
