@@ -46,21 +46,21 @@ HEAD = (
 class Candidate:
     """A place for the base.
 
-    Attributes
+    Parameters
     ----------
-    position
+    position : tuple of float
         (x, y, z), in the problem's units.
-    name
+    name : str
         For people; its number where it has none.
-    shortest_tether
+    shortest_tether : float
         With less, some goal cannot be reached from here; inf where a goal is cut off.
-    lower_bound
+    lower_bound : float
         No tour from here is shorter; inf where there is none.
-    length
+    length : float or None
         Of the best tour found from here; None where it was not sought.
-    status
+    status : Status or None
         What is proven of that tour; `infeasible` where there is none; None where it was not sought.
-    why
+    why : str
         Why there is no tour from here.
     """
 
@@ -82,15 +82,15 @@ class Candidate:
 class BaseSearch(Drawn):
     """Candidates for the base, the best first.
 
-    Attributes
+    Parameters
     ----------
-    problem
+    problem : Problem
         With the base that it came with.
-    candidates
+    candidates : tuple of Candidate
         Those with a tour by its length, then those that have a bound only, then those without.
-    solution
+    solution : Solution or None
         The tour from the best of them; None if no candidate has one.
-    proven
+    proven : bool
         Whether no other candidate has a shorter tour.
     """
 

@@ -30,21 +30,21 @@ STEPS = 40
 class StopMargin:
     """What is left at one visit.
 
-    Attributes
+    Parameters
     ----------
-    goal
+    goal : int
         Index of the goal, from 0.
-    name
+    name : str
         Of the goal.
-    tether
+    tether : float
         Length of the taut tether.
-    slack
+    slack : float
         What may be lost of the tether before this goal is out of reach in its class.
-    turning
+    turning : float
         Sum of the angles by which the tether bends, radians, in the plane.
-    tension_ratio
+    tension_ratio : float
         Tension at the far end over that at the robot, by the capstan's formula.
-    clearance
+    clearance : float
         From the tether or the goal to the nearest obstacle, as drawn.
     """
 
@@ -61,20 +61,20 @@ class StopMargin:
 class Margins:
     """How far the world may be off before a tour does not fit any more; lengths in problem's units.
 
-    Attributes
+    Parameters
     ----------
-    obstacles
+    obstacles : float
         Every obstacle may be off by so much, moved or grown.
-    limited_by
+    limited_by : str
         What ends that.
-    tether
+    tether : float
         So much of the tether may be lost before a goal is.
-    cross_track
+    cross_track : float
         The robot may be so far beside its path without leaving its class or outstretching the
         tether; what its body needs beyond its centre is in the problem's clearance.
-    friction
+    friction : float
         Coefficient that the tension ratios are for.
-    stops
+    stops : tuple of StopMargin
         In the order of the visits.
     """
 

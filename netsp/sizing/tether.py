@@ -54,19 +54,19 @@ SAME = 1e-9
 class Step:
     """One step of the staircase.
 
-    Attributes
+    Parameters
     ----------
-    tether
+    tether : float
         The least tether length that allows this tour.
-    until
+    until : float
         Tether length from which on another tour is shorter; of the last step the longest asked for.
-    length
+    length : float
         Of the tour.
-    lower_bound
+    lower_bound : float
         No tour with a tether shorter than `until` is shorter.
-    status
+    status : Status
         What is proven of it.
-    order
+    order : tuple of int
         Goals (from 0) in the order of their visits.
     """
 
@@ -87,19 +87,19 @@ class Step:
 class TetherCurve(Drawn):
     """The shortest tour for every tether length up to the longest asked for.
 
-    Attributes
+    Parameters
     ----------
-    name
+    name : str
         Of the problem.
-    units
+    units : str
         Of length.
-    steps
+    steps : tuple of Step
         From the shortest tether up.
-    shortest
+    shortest : float
         The shortest sufficient tether: with less, some goal cannot be reached.
-    needs
+    needs : int
         The goal (from 0) that needs it.
-    whole
+    whole : bool
         Whether the staircase goes down to the shortest sufficient tether; else time ran out.
     """
 
