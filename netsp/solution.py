@@ -74,6 +74,9 @@ class Solution(Drawn, FileModel):
     margin : float
         All obstacles were grown by it, besides the problem's clearance; path, tethers, bound and
         status are those among the grown obstacles.
+    kept_order : bool
+        The goals are visited in the order of the problem; bound, gap and status are those of the
+        tours of that order.
     path : tuple of (x, y, z)
         Closed polyline from the base to the base, or from the problem's state to the base.
     start_tether : tuple of (x, y, z)
@@ -108,6 +111,12 @@ class Solution(Drawn, FileModel):
             "in the problem's units"
         ),
     ] = 0.0
+    kept_order: Annotated[
+        bool,
+        Field(
+            description="the order of the goals was given: bound and status are those of its tours"
+        ),
+    ] = False
     status: Annotated[Status, Field(description="what is proven")]
     length: Annotated[
         Total | None, Field(description="of the tour, in the problem's units; null without a tour")
@@ -171,6 +180,8 @@ class Solution(Drawn, FileModel):
             del data["classes"]
         if not self.margin:
             del data["margin"]
+        if not self.kept_order:
+            del data["kept_order"]
         text = json.dumps(data, indent=1, allow_nan=False, ensure_ascii=False)
         rows = ",\n".join("  " + json.dumps(p, allow_nan=False) for p in path)
         return f'{text[:-2]},\n "path": [\n{rows}\n ]\n}}\n'

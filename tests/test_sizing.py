@@ -1,5 +1,6 @@
 """How long a tether and where to stand, beside solves one by one."""
 
+import itertools
 import json
 import math
 import sys
@@ -10,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from netsp import Circle, InfeasibleError, InputError, Problem, Status, solve, verify
+from netsp import Circle, InfeasibleError, InputError, Problem, Status, solve, travel_graph, verify
 from netsp.command.main import main
 from netsp.roadmap.paths import TautPaths
 from netsp.sizing import best_base, margins, tether_curve
@@ -247,3 +248,42 @@ def test_margins_are_printed(tmp_path, capsys):
     assert "grown by 0.2" in capsys.readouterr().out
     assert main(["solve", wharf, "-o", str(out), "--margin", "1"]) == 2
     assert "netsp: margin 1: goals[" in capsys.readouterr().err
+
+
+@settings(max_examples=10, deadline=None)
+@given(seed=st.integers(0, 10**6), goals=st.integers(1, 5))
+def test_with_the_order_kept_classes_are_the_best_of_all(seed, goals):
+    """Brute force over classes; and over all orders the best is what a free solve finds."""
+    problem = random_world(seed, goals=goals, tether=280.0)
+    try:
+        graph = travel_graph(problem)
+    except InfeasibleError:
+        return
+    kept = solve(problem, keep_order=True)
+    assert verify(problem, kept)
+    assert [v.goal for v in kept.tour] == list(range(goals))
+    assert kept.status is Status.OPTIMAL
+    members = [graph.members(k) for k in range(1, goals + 1)]
+    if math.prod(map(len, members)) <= 20_000:
+        tours = (graph.tour_length([0, *chosen]) for chosen in itertools.product(*members))
+        assert kept.length == pytest.approx(min(tours))
+    if goals <= 4:
+        orders = itertools.permutations(problem.goals)
+        lengths = (
+            solve(problem.model_copy(update={"goals": o}), keep_order=True).length for o in orders
+        )
+        assert min(lengths) == pytest.approx(solve(problem).length)
+    if goals > 2:
+        other = [kept.tour[1], kept.tour[0], *kept.tour[2:]]
+        assert not verify(problem, kept.model_copy(update={"tour": tuple(other)}))
+
+
+def test_the_order_is_kept_on_the_command_line_with_a_margin(tmp_path):
+    wharf, out = str(PROBLEMS / "wharf.json"), tmp_path / "s.json"
+    argv = ["solve", wharf, "-o", str(out), "--keep-order", "--margin", "0.2", "--quiet"]
+    assert main(argv) == 0
+    data = json.loads(out.read_text())
+    assert [v["goal"] for v in data["tour"]] == list(range(8))
+    assert data["kept_order"]
+    assert data["solver"] == "in-order"
+    assert main(["verify", wharf, str(out), "--quiet"]) == 0

@@ -83,6 +83,10 @@ def arguments(p: argparse.ArgumentParser) -> None:
     )
     p.add_argument("--seed", type=natural, default=0, metavar="N", help="random seed; default 0")
     p.add_argument(
+        "--keep-order", action="store_true",
+        help="visit the goals in the order of the file; only their homotopy classes are chosen",
+    )  # fmt: skip
+    p.add_argument(
         "--margin", type=length, default=0.0, metavar="R",
         help="plan so that every obstacle may be off by R; default 0 (docs/sizing.md)",
     )  # fmt: skip
@@ -146,6 +150,7 @@ def run(args: argparse.Namespace) -> int:
             params=_params(args),
             warm_start=warm,
             margin=args.margin,
+            keep_order=args.keep_order,
             on_progress=listen,
         )
     if args.output:

@@ -214,7 +214,10 @@ class _Judge:
                 if which
             ]
             return Check("names every goal once", False, "; ".join(parts))
-        return Check("names every goal once", True, f"{len(order)} goals")
+        if self.solution.kept_order and order != list(goals):
+            return Check("names every goal once", False, "not in the order of the problem")
+        kept = ", in the order of the problem" if self.solution.kept_order else ""
+        return Check("names every goal once", True, f"{len(order)} goals{kept}")
 
     def _goal(self, k: int) -> str:
         """A goal that the solution names; the problem may have no such."""

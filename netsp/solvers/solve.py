@@ -16,6 +16,7 @@ from netsp.registry import foreign, load
 from netsp.solution import ProblemReference, Solution, Timings
 from netsp.solvers.answer import to_solution
 from netsp.solvers.custom import call, read_options, whole_numbers
+from netsp.solvers.in_order import solve_in_order
 from netsp.solvers.table import ROADMAPS, SOLVERS
 from netsp.solving.limits import Limits
 from netsp.solving.params import NoParams, read_params
@@ -207,6 +208,7 @@ def solve(
     params: Mapping[str, Any] | None = None,
     warm_start: Solution | None = None,
     margin: float = 0.0,
+    keep_order: bool = False,
     on_progress: OnProgress | None = None,
 ) -> Solution:
     """Find the shortest non-entangling tour of a problem.
@@ -235,6 +237,9 @@ def solve(
     margin : float
         The tour is to bear obstacles that are off by so much (`netsp.sizing.margins`): all are
         grown by it, in the problem's units.
+    keep_order : bool
+        The goals are visited in the problem's order, and only their classes are chosen; with proof,
+        whatever the solver.
     on_progress : callable, optional
         Called with a `netsp.travel.result.Progress` now and then.
 
@@ -273,7 +278,7 @@ def solve(
             problem.grown(margin), solver, roadmap=roadmap, roadmap_options=roadmap_options,
             time_limit=time_limit, iteration_limit=iteration_limit, seed=seed, params=params,
             warm_start=None if warm_start is None else _for_grown(warm_start, problem, margin),
-            on_progress=on_progress,
+            keep_order=keep_order, on_progress=on_progress,
         )  # fmt: skip
         own = ProblemReference(name=problem.name, sha256=problem.sha256)
         return found.model_copy(update={"problem": own, "margin": float(margin)})
@@ -283,6 +288,13 @@ def solve(
         options.setdefault("seed", seed)
     graph = travel_graph(problem, roadmap, **options)
     built = clock.elapsed
+    if keep_order:
+        listener = graph.progress_listener(on_progress)
+        result = graph.as_asked(solve_in_order(graph, clock, listener))
+        found = to_solution(problem, graph, result, "in-order", seed)
+        return found.model_copy(
+            update={"kept_order": True, "timings": _timings(clock, built, graph)}
+        )
     # what is too large for its time takes long to draw, too
     spare = 0.0 if graph.complete else min(SPARE * (time_limit or 0.0), 1.0)
     result = solve_graph(
@@ -295,14 +307,18 @@ def solve(
         warm_start=_tour_of(warm_start, graph) if warm_start is not None else None,
         on_progress=on_progress,
     )
+    timings = _timings(clock, built, graph)
+    return to_solution(problem, graph, result, name_of(solver), seed, timings)
+
+
+def _timings(clock: Clock, built: float, graph: TravelGraph) -> Timings:
     total = clock.elapsed
-    timings = Timings(
+    return Timings(
         roadmap_s=round(built, 6),
         matrix_s=round(graph.legs_s, 6),
         solve_s=round(max(total - built - graph.legs_s, 0.0), 6),
         total_s=round(total, 6),
     )
-    return to_solution(problem, graph, result, name_of(solver), seed, timings)
 
 
 def _for_grown(warm: Solution, problem: Problem, margin: float) -> Solution:
