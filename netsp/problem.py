@@ -26,6 +26,8 @@ from pydantic import (
     model_validator,
 )
 
+from netsp.arrangement import clusters_of, complaint_of, precedences_of
+from netsp.arrays import Bools, Ints
 from netsp.drawn import Drawn
 from netsp.errors import InputError, counted
 from netsp.fields import (
@@ -182,12 +184,18 @@ Obstacle = Annotated[
 
 
 class Goal(Model):
-    """A point to inspect."""
+    """A point to inspect; of the goals of one choice, one suffices."""
 
     position: Annotated[
         Point3, Field(description="(x, y) or (x, y, z) to visit, in the problem's units; z is up")
     ]
     name: Annotated[Name | None, Field(description="shown in pictures and messages")] = None
+    choice: Annotated[
+        Name | None, Field(description="name of what it is an alternative for; null for none")
+    ] = None
+    after: Annotated[
+        tuple[Name, ...], Field(description="names of goals or choices to be visited before it")
+    ] = ()
 
 
 def _goal(value: Any) -> Any:
@@ -203,8 +211,23 @@ GoalLike = Annotated[
                 POINT3_SCHEMA,
                 {
                     "type": "object",
-                    "properties": {"name": {"type": "string"}, "position": POINT3_SCHEMA},
+                    "properties": {
+                        "name": {"type": "string"},
+                        "position": POINT3_SCHEMA,
+                        "choice": {"type": ["string", "null"]},
+                        "after": {"type": "array", "items": {"type": "string"}},
+                    },
                     "required": ["position"],
+                    "additionalProperties": False,
+                },
+                {
+                    "type": "object",
+                    "properties": {
+                        "name": {"type": "string"},
+                        "any_of": {"type": "array", "minItems": 1},
+                        "after": {"type": "array", "items": {"type": "string"}},
+                    },
+                    "required": ["any_of"],
                     "additionalProperties": False,
                 },
                 Inspection.model_json_schema(),
@@ -255,8 +278,9 @@ class Problem(Drawn, FileModel):
     base : (x, y) or (x, y, z)
         Where the tether is anchored and the tour starts and ends; z is up.
     goals : tuple of Goal
-        Points to visit; a bare ``[x, y]`` or ``[x, y, z]`` is accepted, and an `Inspection`, which
-        becomes the goals about an obstacle.
+        Points to visit; a bare ``[x, y]`` or ``[x, y, z]`` is accepted, an `Inspection`, which
+        becomes the goals about an obstacle, and ``{"any_of": […]}``, which becomes as many goals of
+        one choice.
     obstacles : tuple of Circle or Polygon
         Vertical projections of circles or simple polygons.
     tether_length : float
@@ -378,7 +402,7 @@ class Problem(Drawn, FileModel):
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         self._check_distinct_goals()
-        if complaint := self.size_complaint():
+        if complaint := complaint_of(self.goals) or self.size_complaint():
             raise ValueError(complaint)
         self._check_free()
         self._check_state()
@@ -503,6 +527,21 @@ class Problem(Drawn, FileModel):
         """(1 + m, 3) base, then goals."""
         return np.array([self.base, *(g.position for g in self.goals)], dtype=float)
 
+    @cached_property
+    def clusters(self) -> Ints:
+        """(m,) number of each goal's cluster, from 1; alternatives have the same."""
+        return clusters_of(self.goals)
+
+    @cached_property
+    def precedences(self) -> Bools:
+        """(c + 1, c + 1) whether a cluster must be visited before another; (0, 0) for none."""
+        return precedences_of(self.goals)
+
+    @property
+    def visits(self) -> int:
+        """How many goals a tour visits: one of each choice."""
+        return int(self.clusters.max())
+
     def goal_name(self, k: int) -> str:
         """What tables and pictures call a goal.
 
@@ -603,9 +642,14 @@ class Problem(Drawn, FileModel):
     def summary(self) -> str:
         """How many goals and obstacles, and how long a tether."""
         return (
-            f"{counted(len(self.goals), 'goal')}, {counted(len(self.obstacles), 'obstacle')}, "
+            f"{self._goals_in_words}, {counted(len(self.obstacles), 'obstacle')}, "
             f"tether {self.tether_length:g} {self.units}"
         )
+
+    @property
+    def _goals_in_words(self) -> str:
+        goals = counted(self.visits, "goal")
+        return goals if self.visits == len(self.goals) else f"{goals} of {len(self.goals)} places"
 
     def __repr__(self) -> str:
         """In a line."""
@@ -622,6 +666,9 @@ class Problem(Drawn, FileModel):
             Text of a problem file.
         """
         data = self.model_dump(mode="json", exclude_none=True)
+        for goal in data["goals"]:
+            if not goal["after"]:
+                del goal["after"]
         return json.dumps(data, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
 
     @property
@@ -630,6 +677,12 @@ class Problem(Drawn, FileModel):
         data = self.model_dump(mode="json", exclude={"name", "units", "origin"})
         if data["state"] is None:  # problems had none before: their hashes stay
             del data["state"]
+        for k, goal in enumerate(data["goals"]):  # nor had goals anything to say of each other
+            own = self.clusters[k]
+            if goal.pop("choice") is not None and (self.clusters == own).sum() > 1:
+                goal["cluster"] = int(own)
+            if goal.pop("after"):
+                goal["after"] = np.flatnonzero(self.precedences[:, own]).tolist()
         for item in (*data["goals"], *data["obstacles"]):
             item.pop("name", None)
         text = json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)

@@ -1,7 +1,7 @@
-"""What a problem file may say in short, written out: structures to inspect, and bounds that are no
-box.
+"""What a problem file may say in short, written out: structures to inspect, goals with
+alternatives, and bounds that are no box.
 
-Both are a matter of the file alone: nothing further down knows of them.
+All are a matter of the file alone: nothing further down knows of them.
 """
 
 from __future__ import annotations
@@ -40,6 +40,8 @@ class Inspection(Model):
         Heights z of the viewpoints, negative below the surface.
     bearing : float
         Degrees clockwise from the y axis, where the first viewpoint is.
+    after : tuple of str
+        Names of what is to be visited before any of its goals.
     """
 
     inspect: Annotated[Name, Field(description="name of the obstacle to look at from all sides")]
@@ -56,6 +58,9 @@ class Inspection(Model):
     bearing: Annotated[
         Number, Field(description="of the first viewpoint, degrees clockwise from the y axis")
     ] = 0.0
+    after: Annotated[
+        tuple[Name, ...], Field(description="names of goals or choices to be visited before")
+    ] = ()
 
     def goals(self, shape: Mapping[str, Any]) -> list[dict[str, Any]]:
         """The goals that it stands for.
@@ -75,6 +80,7 @@ class Inspection(Model):
             {
                 "name": f"{self.inspect}/{k}" + (f" z{z:g}" if len(self.depths) > 1 else ""),
                 "position": [float(x), float(y), z],
+                **({"after": list(self.after)} if self.after else {}),
             }
             for k, (x, y) in enumerate(places, 1)
             for z in self.depths
@@ -129,12 +135,17 @@ def _with_goals(data: Mapping[str, Any]) -> Mapping[str, Any]:
     if not isinstance(goals, Sequence) or isinstance(goals, str):
         return data
     asked = [isinstance(g, Inspection) or (isinstance(g, dict) and "inspect" in g) for g in goals]
-    if not any(asked):
+    choices = [isinstance(g, dict) and "any_of" in g for g in goals]
+    if not any(asked) and not any(choices):
         return data
     obstacles = [o.model_dump() if isinstance(o, Model) else o for o in data.get("obstacles") or ()]
     named = {o["name"]: o for o in obstacles if isinstance(o, dict) and o.get("name") is not None}
     out: list[Any] = []
+    inspected: dict[str, list[str]] = {}
     for k, goal in enumerate(goals):
+        if choices[k]:
+            out += _alternatives(goal, k)
+            continue
         if not asked[k]:
             out.append(goal)
             continue
@@ -149,10 +160,44 @@ def _with_goals(data: Mapping[str, Any]) -> Mapping[str, Any]:
                 f"{shown(inspection.inspect)}"
             )
         try:
-            out += inspection.goals(obstacle)
+            made = inspection.goals(obstacle)
         except (KeyError, TypeError, ValueError):
             return data  # the obstacle is not one: that will be said
-    return {**data, "goals": out}
+        inspected.setdefault(inspection.inspect, []).extend(g["name"] for g in made)
+        out += made
+    return {**data, "goals": [_after_all_of(inspected, g) for g in out]}
+
+
+def _alternatives(goal: Mapping[str, Any], k: int) -> list[dict[str, Any]]:
+    """The goals of one choice."""
+    places = goal["any_of"]
+    unknown = sorted(goal.keys() - {"any_of", "name", "after"})
+    if unknown:
+        raise ValueError(f"goals[{k}].{unknown[0]}: unknown field; expected any_of, name, after")
+    if not isinstance(places, Sequence) or isinstance(places, str) or not places:
+        raise ValueError(
+            f"goals[{k}].any_of: expected places, of which one suffices, got {shown(places)}"
+        )
+    name = goal.get("name") or f"choice {k}"
+    out = []
+    for j, place in enumerate(places):
+        one = dict(place) if isinstance(place, dict) else {"position": place}
+        if extra := sorted(one.keys() - {"position", "name"}):
+            raise ValueError(
+                f"goals[{k}].any_of[{j}].{extra[0]}: unknown field; expected position, name"
+            )
+        one = {"name": f"{name}/{j + 1}", **one, "choice": name}
+        out.append({**one, "after": goal["after"]} if goal.get("after") else one)
+    return out
+
+
+def _after_all_of(inspected: Mapping[str, list[str]], goal: Any) -> Any:
+    """A goal that comes after a structure comes after all goals about it."""
+    after = goal.get("after") if isinstance(goal, dict) else None
+    if not isinstance(after, Sequence) or isinstance(after, str):
+        return goal
+    names = (inspected.get(n, [n]) if isinstance(n, str) else [n] for n in after)
+    return {**goal, "after": [n for several in names for n in several]}
 
 
 def _with_walls(data: Mapping[str, Any]) -> Mapping[str, Any]:

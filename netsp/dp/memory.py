@@ -12,7 +12,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from netsp.arrays import Ints
+from netsp.arrangement import UNORDERED
+from netsp.arrays import Bools, Ints
 
 Masks = npt.NDArray[np.int32]
 
@@ -32,27 +33,33 @@ class Memory:
         (n + 1, k) clusters, nearest first, of every cluster.
     size
         So many nearest goals are remembered at first, the goal itself being one (bit 0).
+    before
+        (n + 1, n + 1) which goals come before which (`TravelGraph.before`), (0, 0) for none: a walk
+        that remembers a goal must not go to one that comes before it.
     """
 
-    def __init__(self, near: Ints, size: int) -> None:
+    def __init__(self, near: Ints, size: int, before: Bools = UNORDERED) -> None:
         self.n = len(near) - 1
+        self.before = before if len(before) else np.zeros((self.n + 1, self.n + 1), dtype=bool)
         self.sets: list[list[int]] = [[]]
         for g in range(1, self.n + 1):
             others = [int(h) for h in near[g] if h not in (0, g)]
             self.sets.append([g, *others[: size - 1]])
-        self._tables: Masks | None = None
+        self._tables: dict[bool, Masks] = {}
 
     @property
     def bits(self) -> Ints:
         """(n + 1,) how many goals each remembers."""
         return np.array([1, *(len(s) for s in self.sets[1:])], dtype=np.int64)
 
-    def tables(self) -> Masks:
+    def tables(self, *, backwards: bool = False) -> Masks:
         """(n + 1, n + 1, 3, 2^CHUNK) by goal g left, goal h entered and chunk of the memory at g:
-        that chunk's part of the memory at h, to be joined by "or"; negative if h is remembered."""
-        if self._tables is not None:
-            return self._tables
+        that chunk's part of the memory at h, to be joined by "or"; negative if h is remembered, or
+        a goal that it comes before. Of walks read backwards it is the other way round."""
+        if backwards in self._tables:
+            return self._tables[backwards]
         n = self.n
+        before = self.before.T if backwards else self.before
         bit = np.full((n + 1, n + 1), -1)
         for g in range(1, n + 1):
             bit[g, self.sets[g]] = np.arange(len(self.sets[g]))
@@ -67,18 +74,24 @@ class Memory:
                 tables[g, :, part] |= (image[:, None] * held[None, :]).astype(np.int32)
             for k, remembered in enumerate(self.sets[g]):
                 part, place = divmod(k, CHUNK)
-                tables[g, remembered, part, (chunk >> place) & 1 == 1] = -1
-        self._tables = tables
+                held = (chunk >> place) & 1 == 1
+                tables[g, remembered, part, held] = -1
+                for earlier in np.flatnonzero(before[:, remembered]):
+                    tables[g, earlier, part, held] = -1
+        self._tables[backwards] = tables
         return tables
 
     def widen(self, goals: list[int]) -> bool:
-        """Remember along the cycles of a walk, the short ones first; whether anything changed."""
+        """Remember along the cycles of a walk, the short ones first, and between goals in the wrong
+        order; whether anything changed."""
         last: dict[int, int] = {}
         cycles = []
         for k, g in enumerate(goals):
             if g in last:
                 cycles.append((k - last[g], last[g], k))
             last[g] = k
+            later = (i for h, i in last.items() if self.before[g, h])
+            cycles += [(k - i, i, k) for i in later]
         changed = False
         for _, first, again in sorted(cycles):
             g = goals[first]
@@ -88,5 +101,5 @@ class Memory:
                     self.sets[h].append(g)
                     changed = True
         if changed:
-            self._tables = None
+            self._tables = {}
         return changed

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from netsp.arrangement import keeps
 from netsp.arrays import Floats
 from netsp.dp.walks import Walks
 from netsp.errors import InputError
@@ -115,7 +116,8 @@ def fits(graph: TravelGraph) -> bool:
 
 def bound_by_walks(run: SearchingRun, costs: LegCosts) -> None:
     """Raise the bound of a run and forget vertices, until the proof is done or progress stalls."""
-    walks = Walks(costs.cluster, costs.values, run.clock.flag)
+    before = run.graph.before
+    walks = Walks(costs.cluster, costs.values, run.clock.flag, before)
     prices = first_prices(run, costs)
     direction: Floats = np.zeros(walks.n + 1)
     best, kept, step, vain = -np.inf, prices, STEP, 0
@@ -133,7 +135,8 @@ def bound_by_walks(run: SearchingRun, costs: LegCosts) -> None:
         run.raise_bound(min(walk.bound, cutoff))
         goals = costs.cluster[walk.rows]
         visits = np.bincount(goals, minlength=walks.n + 1)
-        whole = bool((visits[1:] == 1).all())
+        once = bool((visits[1:] == 1).all())
+        whole = once and keeps(goals.tolist(), before)
         if whole:
             measured = costs.exact is None
             costs.measure(np.concatenate([[0], walk.rows]))
@@ -160,8 +163,11 @@ def bound_by_walks(run: SearchingRun, costs: LegCosts) -> None:
             history.clear()
         elif stalls:
             return
-        if walk.labels < MOST_LABELS:
-            walks.memory.widen(goals.tolist())
+        widened = walk.labels < MOST_LABELS and walks.memory.widen(goals.tolist())
+        if once:  # in an order that is not allowed, which prices cannot mend
+            if not widened:
+                return
+            continue
         missed: Floats = np.asarray(1.0 - visits, dtype=np.float64)
         missed[0] = 0.0
         direction = DEFLECTION * missed + (1.0 - DEFLECTION) * direction

@@ -20,6 +20,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from netsp.arrangement import UNORDERED
 from netsp.arrays import Bools, Floats, Ints
 from netsp.clock import NEVER, Flag
 from netsp.dp.labels import Bounds, Graph, Labels, completions, extend, join, step_back
@@ -68,17 +69,26 @@ class Walks:
         `order`, which groups them by goal.
     stop
         Of the clock; `check` must then raise.
+    before
+        Which goals come before which (`TravelGraph.before`).
     """
 
-    def __init__(self, cluster: Ints, values: Floats, stop: Flag = NEVER) -> None:
-        self.stop = stop
+    def __init__(
+        self, cluster: Ints, values: Floats, stop: Flag = NEVER, before: Bools = UNORDERED
+    ) -> None:
+        self.stop, self.ordered = stop, len(before) > 0
         self.n = int(cluster.max())
         self.alive: Bools = np.ones((self.n + 1, len(cluster)), dtype=bool)
         self.alive[0] = False
         self.alive[:, 0] = False
         self._group(cluster)
         self.set_values(values)
-        self.memory = Memory(self._near(), REMEMBERED)
+        self.memory = Memory(self._near(), REMEMBERED, before)
+        if self.ordered:
+            sooner = before.sum(axis=0)[self.goal]
+            later = before.sum(axis=1)[self.goal]
+            k = np.arange(self.n + 1)[:, None]
+            self.alive &= (k > sooner) & (k <= self.n - later)
 
     def _group(self, cluster: Ints) -> None:
         self.cluster = cluster
@@ -117,11 +127,7 @@ class Walks:
         """
         n, goal = self.n, self.goal
         cut = cutoff - float(prices[1:].sum()) + self.rounding(prices)
-        least = np.empty((n + 1, len(goal)))
-        onward = np.empty((n + 1, n + 1, len(goal)))
-        completions(self._graph, prices, self.alive, least, onward, self.stop)
-        check()
-        layers = self._layers(prices, cut, least, onward, check)
+        layers = self._layers(prices, cut, check)
         pointer, cost, _ = layers[n]
         has = pointer[1:] > pointer[:-1]
         ends = np.full(len(goal), np.inf)
@@ -131,10 +137,15 @@ class Walks:
             self.alive[:] = False
             return None
         rows = self._trace(last, layers, prices)
-        for k in range(1, (n + 1) // 2 + 1):
-            through = join(goal, prices, layers[k], layers[n + 1 - k])
-            self.alive[k] &= through <= cut
-            self.alive[n + 1 - k] = self.alive[k]
+        if self.ordered:
+            back = self._layers(prices, cut, check, backwards=True)
+            for k in range(1, n + 1):
+                self.alive[k] &= join(goal, prices, layers[k], back[n + 1 - k]) <= cut
+        else:
+            for k in range(1, (n + 1) // 2 + 1):
+                through = join(goal, prices, layers[k], layers[n + 1 - k])
+                self.alive[k] &= through <= cut
+                self.alive[n + 1 - k] = self.alive[k]
         bound = float(ends[last]) + float(prices[1:].sum()) - self.rounding(prices)
         labels = sum(len(layer[1]) for layer in layers[1:])
         return Walk(bound, self.order[rows], labels)
@@ -144,14 +155,22 @@ class Walks:
         return ROUNDING * (2.0 * float(np.abs(prices).sum()) + (self.n + 1) * self.longest)
 
     def _layers(
-        self, prices: Floats, cut: float, least: Floats, onward: Floats, check: Callable[[], None]
+        self, prices: Floats, cut: float, check: Callable[[], None], *, backwards: bool = False
     ) -> list[Labels]:
+        """Labels of walks from the base on, or from their end backwards."""
         n, goal = self.n, self.goal
-        bits, tables = self.memory.bits, self.memory.tables()
+        # a walk's k-th visit is the (n + 1 - k)-th from its end
+        mirrored = np.concatenate([self.alive[:1], self.alive[:0:-1]])
+        own, rest = (mirrored, self.alive) if backwards else (self.alive, mirrored)
+        least = np.empty((n + 1, len(goal)))
+        onward = np.empty((n + 1, n + 1, len(goal)))
+        completions(self._graph, prices, np.ascontiguousarray(rest), least, onward, self.stop)
+        check()
+        bits, tables = self.memory.bits, self.memory.tables(backwards=backwards)
         none = np.zeros(0, dtype=np.int32)
         layers = [Labels(np.zeros(len(goal) + 1, dtype=np.int64), np.zeros(0), none)]
         with np.errstate(invalid="ignore"):  # inf - inf: neither cut nor way to complete
-            limits = np.where(self.alive[1:], cut - least[:0:-1], -np.inf)
+            limits = np.where(own[1:], cut - least[:0:-1], -np.inf)
         first = self.values[0]
         kept = np.isfinite(first) & (first <= limits[0])
         layers.append(

@@ -7,6 +7,7 @@ plain distances (Shapely).
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -200,21 +201,33 @@ class _Judge:
     def _every_goal(self) -> Check:
         order = [v.goal for v in self.solution.tour]
         goals = range(len(self.problem.goals))
-        missing = sorted(set(goals) - set(order))
+        own = self.problem.clusters
+        taken = {int(own[g]) for g in order if g in goals}
+        missing = [g for g in goals if int(own[g]) not in taken]
+        too_many = [
+            g for g in sorted(set(order) & set(goals))
+            if sum(own[h] == own[g] for h in set(order) & set(goals)) > 1
+        ]  # fmt: skip
         repeated = sorted({g for g in order if order.count(g) > 1})
         unknown = sorted(set(order) - set(goals))
-        if missing or repeated or unknown:
+        if missing or repeated or unknown or too_many:
             parts = [
                 f"{what}: {', '.join(map(self._goal, which))}"
                 for what, which in (
                     ("missing", missing),
                     ("repeated", repeated),
                     ("unknown", unknown),
+                    ("several of one choice", too_many),
                 )
                 if which
             ]
             return Check("names every goal once", False, "; ".join(parts))
-        if self.solution.kept_order and order != list(goals):
+        before = self.problem.precedences
+        for i, j in itertools.combinations(range(len(order) if len(before) else 0), 2):
+            if before[own[order[j]], own[order[i]]]:
+                wrong = f"{self._goal(order[i])} before {self._goal(order[j])}"
+                return Check("names every goal once", False, f"the wrong way round: {wrong}")
+        if self.solution.kept_order and list(own[order]) != sorted(own[order]):
             return Check("names every goal once", False, "not in the order of the problem")
         kept = ", in the order of the problem" if self.solution.kept_order else ""
         return Check("names every goal once", True, f"{len(order)} goals{kept}")

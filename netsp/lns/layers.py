@@ -7,7 +7,8 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from netsp.arrays import Floats, Ints
+from netsp.arrangement import UNORDERED
+from netsp.arrays import Bools, Floats, Ints
 from netsp.compiled.kernel import kernel
 from netsp.travel.graph import TravelGraph
 
@@ -29,9 +30,14 @@ class Instance:
         Leg costs; where there is no leg (inf), a cost that no tour of legs alone can reach is put.
     labels : ndarray of int, shape (V,), optional
         What the vertices are called outside.
+    before : ndarray of bool, optional
+        Which clusters come before which (`TravelGraph.before`).
     """
 
-    def __init__(self, cluster: Ints, costs: Floats, labels: Ints | None = None) -> None:
+    def __init__(
+        self, cluster: Ints, costs: Floats, labels: Ints | None = None, before: Bools = UNORDERED
+    ) -> None:
+        self.before = before
         self.clusters = int(cluster.max()) + 1
         self.order: Ints = np.argsort(cluster, kind="stable").astype(np.int64)
         self.start: Ints = np.searchsorted(
@@ -59,7 +65,7 @@ class Instance:
         Instance
             All its vertices.
         """
-        return cls(graph.cluster, graph.costs)
+        return cls(graph.cluster, graph.costs, before=graph.before)
 
     @classmethod
     def among(cls, graph: TravelGraph, core: Ints) -> Instance:
@@ -79,7 +85,7 @@ class Instance:
         """
         if len(core) == len(graph):
             return cls.of(graph)
-        return cls(graph.cluster[core], graph.costs_among(core), core)
+        return cls(graph.cluster[core], graph.costs_among(core), core, graph.before)
 
     @cached_property
     def cluster_costs(self) -> Floats:

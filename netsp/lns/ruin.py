@@ -35,14 +35,15 @@ BLINK = 0.01
 class Tables(NamedTuple):
     """Of an instance: where the vertices of each cluster begin; legs; least legs between clusters
     (m + 1, m + 1); which clusters are near which; the nearest clusters of each (m + 1, k), nearest
-    first. The kernels that are called most take what they need of it one by one: handing a tuple of
-    arrays on costs them more than the work."""
+    first; which clusters come before which, (0, 0) for none. The kernels that are called most take
+    what they need of it one by one: handing a tuple of arrays on costs them more than the work."""
 
     start: Ints
     costs: Floats
     nearest: Floats
     near: Bools
     rank: Ints
+    before: Bools
 
 
 @kernel
@@ -113,17 +114,26 @@ def insert_best(
     start: Ints,
     costs: Floats,
     near: Bools,
+    before: Bools,
     ahead: Floats,
     behind: Floats,
     blink: float,
     chance: npt.NDArray[np.uint64],
 ) -> tuple[int, float]:
-    """Put a cluster where it costs least, next to one of its near clusters or the base; returns the
-    new size and the length of the tour."""
+    """Put a cluster where it costs least, next to one of its near clusters or the base, and between
+    those that come before and after it; returns the new size and the length of the tour. With
+    precedences closed transitively there is such a place, whatever is still to be put back."""
     best, at = np.inf, -1
     tried = False
-    for k in range(n):
-        close = k == 0 or k == n - 1 or near[c, order[k]]
+    low, high = 0, n - 1
+    for k in range(1, n if len(before) > 0 else 0):
+        if before[order[k], c]:
+            low = k
+        if before[c, order[k]]:
+            high = k - 1
+            break
+    for k in range(low, high + 1):
+        close = k in (low, high) or near[c, order[k]]
         if not close:
             q = order[k + 1] if k + 1 < n else 0
             close = near[c, q]
@@ -159,7 +169,7 @@ def descend(
 ) -> float:
     """Take every cluster out and put it back where it costs least, until nothing improves; returns
     the length."""
-    start, costs, near = tables.start, tables.costs, tables.near
+    start, costs, near, before = tables.start, tables.costs, tables.near, tables.before
     n = len(order)
     work = np.empty(n + 1, dtype=np.int64)
     length = tour_length(order, start, costs, ahead, behind)
@@ -177,7 +187,9 @@ def descend(
             forward(work, size, 1, start, costs, ahead)
             behind[size, 0] = 0.0
             backward(work, size, size - 1, start, costs, behind)
-            size, d = insert_best(c, work, size, start, costs, near, ahead, behind, 0.0, chance)
+            size, d = insert_best(
+                c, work, size, start, costs, near, before, ahead, behind, 0.0, chance
+            )
             if d < length * (1.0 - 1e-12):
                 length = d
                 improved = True
@@ -211,7 +223,7 @@ def two_opt(
 ) -> float:
     """Reverse stretches of the order as long as that shortens the tour; candidates are those whose
     two new legs could be shorter than the two old ones; returns the length."""
-    start, costs, nearest = tables.start, tables.costs, tables.nearest
+    start, costs, nearest, before = tables.start, tables.costs, tables.nearest, tables.before
     n = len(order)
     work = np.empty(n, dtype=np.int64)
     tour = np.empty(n, dtype=np.int64)
@@ -224,6 +236,8 @@ def two_opt(
             if stop[0] != 0:
                 return length
             for j in range(i + 1, n):
+                if len(before) > 0 and _bound_to_any(order, i, j, before):
+                    break
                 after = tour[j + 1] if j + 1 < n else 0
                 c_after = order[j + 1] if j + 1 < n else 0
                 old = costs[tour[i - 1], tour[i]] + costs[tour[j], after]
@@ -240,6 +254,12 @@ def two_opt(
                         order[k] = work[k]
                     trace(order, start, costs, ahead, tour)
     return length
+
+
+@kernel
+def _bound_to_any(order: Ints, i: int, j: int, before: Bools) -> bool:
+    """Whether a cluster from position i on must come before the one at position j."""
+    return bool(before[order[i:j], order[j]].any())
 
 
 @kernel
@@ -273,7 +293,7 @@ def ruin_and_recreate(
     """Make `count` rounds at temperature θ, in place; returns the lengths of the present order and
     of the best, which is kept in `best`."""
     start, costs, nearest = tables.start, tables.costs, tables.nearest
-    near, rank = tables.near, tables.rank
+    near, rank, before = tables.near, tables.rank, tables.before
     n = len(order)
     largest = 0
     for c in range(n):
@@ -336,7 +356,7 @@ def ruin_and_recreate(
         d = 0.0
         for r in range(removed):
             size, d = insert_best(
-                gone[r], work, size, start, costs, near, ahead, behind, BLINK, chance
+                gone[r], work, size, start, costs, near, before, ahead, behind, BLINK, chance
             )
         if d < length - theta * np.log(max(uniform(chance), 1e-300)):
             length = d

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
-from netsp.arrays import Ints
+from netsp.arrays import Bools, Ints
 from netsp.clock import NEVER, Clock
 from netsp.compiled.chance import seeded
 from netsp.lns.layers import Instance, best_classes
@@ -85,7 +85,10 @@ class Search:
     ) -> None:
         self.instance = instance
         self._stop = NEVER if clock is None else clock.flag
-        order = _insertion(instance.cluster_costs) if start_order is None else start_order
+        order = (
+            _insertion(instance.cluster_costs, instance.before)
+            if start_order is None else start_order
+        )  # fmt: skip
         self.order: Ints = np.array(order, dtype=np.int64)
         n = len(self.order)
         largest = int(np.diff(instance.start).max())
@@ -97,7 +100,7 @@ class Search:
     @property
     def _tables(self) -> Tables:
         i = self.instance
-        return Tables(i.start, i.costs, i.cluster_costs, i.near, i.rank)
+        return Tables(i.start, i.costs, i.cluster_costs, i.near, i.rank, i.before)
 
     def settle(self) -> None:
         """Descend to an order that no move of one cluster and no reversal improves."""
@@ -176,7 +179,7 @@ class Search:
             self.best_order[:] = self.order
 
 
-def _insertion(d: npt.NDArray[np.float64]) -> Ints:
+def _insertion(d: npt.NDArray[np.float64], before: Bools) -> Ints:
     """Order of clusters, base first, by farthest insertion on the least legs between clusters."""
     left = list(range(1, len(d)))
     tour = [0]
@@ -186,6 +189,10 @@ def _insertion(d: npt.NDArray[np.float64]) -> Ints:
         t = np.array(tour)
         after = np.roll(t, -1)
         between = d[t, after] if len(t) > 1 else np.zeros(1)
-        tour.insert(int(np.argmin(d[t, k] + d[k, after] - between)) + 1, k)
+        more = d[t, k] + d[k, after] - between
+        if len(before):
+            more[: int(np.flatnonzero(before[t, k]).max(initial=0))] = np.inf
+            more[int(np.flatnonzero(before[k, t]).min(initial=len(t))) :] = np.inf
+        tour.insert(int(np.argmin(more)) + 1, k)
         left.remove(k)
     return np.array(tour, dtype=np.int64)

@@ -60,7 +60,7 @@ def _search(run: SolverRun, rng: np.random.Generator, chosen: Params) -> None:
     graph = run.graph
     run.check()
     core = core_of(run, chosen.classes)
-    instance = Instance(graph.cluster[core], graph.costs_among(core), core)
+    instance = Instance(graph.cluster[core], graph.costs_among(core), core, graph.before)
     by_clock = run.clock.limit is not None and run.iteration_limit == np.inf
     if not by_clock and run.iteration_limit == np.inf:
         run.iteration_limit = ROUNDS_PER_GOAL * graph.goal_count

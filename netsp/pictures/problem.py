@@ -231,8 +231,9 @@ def draw_map(
     for k, goal in enumerate(problem.goals):
         x, y, z = goal.position
         ax.plot(
-            x, y, "o", ms=13 if order else 9, color=style.GOAL, mec=style.PATH, mew=1.4, zorder=5
-        )
+            x, y, "o", ms=13 if order else 9, mec=style.PATH, mew=1.4, zorder=5,
+            color="white" if order and k not in order else style.GOAL,
+        )  # fmt: skip
         visit = str(order.get(k, ""))
         ax.annotate(visit, (x, y), ha="center", va="center", fontsize=7, zorder=6)
         name = goal.name or "" if order else problem.goal_name(k)

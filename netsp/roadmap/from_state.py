@@ -63,6 +63,7 @@ class GraphFromState(TravelGraph):
         )  # fmt: skip
         self.within, self.start, self.surcharge = within, start, surcharge
         self.start_tether = start_tether
+        self.goal, self.before = within.goal, within.before
 
     def as_tour(self, order: tuple[int, ...]) -> tuple[int, ...]:
         """A closed tour with the state right after the base, whichever way round it was found."""
@@ -199,6 +200,10 @@ def graph_from_state(
         classes=roadmap.rule if roadmap.complete else "shortest",
         least_left_out=roadmap.least_left_out,
     )  # fmt: skip
+    if len(problem.precedences):
+        part.before = np.zeros((last + 1, last + 1), dtype=bool)
+        part.before[:last, :last] = problem.precedences
+        part.before[last, 1:last] = True
     start = len(cluster) - 1
     nearest = [part.tethers[part.members(c)].min() for c in range(1, last)]
     some_path = float(part.tethers[start] + 2.0 * sum(nearest))

@@ -207,6 +207,10 @@ def best_base(
     InputError
         Bad candidates, or a problem whose robot is already out.
     """
+    if problem.visits < len(problem.goals) or len(problem.precedences):
+        raise InputError(
+            "goals: the search for a base knows no 'any_of' and no 'after'; expected goals without"
+        )
     if problem.state is not None:
         raise InputError("state: a base is chosen before the robot is out; expected none")
     places = _places(problem, candidates)

@@ -228,7 +228,7 @@ def tether_curve(
         longest = checked_argument("longest", longest, 1e-9)
         problem = problem.model_copy(update={"tether_length": longest})
     clock = Clock(time_limit)
-    shortest = shortest_tethers(problem)
+    shortest = _of_choices(problem, shortest_tethers(problem))
     useful = _useful(problem, float(shortest.max()), solver, clock, seed)
     graph = travel_graph(problem.model_copy(update={"tether_length": useful}), time_limit=clock)
     curve: list[Step] = []
@@ -256,7 +256,7 @@ def tether_curve(
         # a longer tether never makes the shortest tour longer
         bound = min(max(bound, result.lower_bound or 0.0), result.length)
         step = Step(needs, limit, result.length, bound, result.status,
-                    tuple(int(c) - 1 for c in graph.cluster[tour[1:]]))  # fmt: skip
+                    tuple(int(g) - 1 for g in graph.goal[tour[1:]]))  # fmt: skip
         limit = needs
         if curve and step.length <= curve[-1].length * (1.0 + SAME):
             before = curve.pop()
@@ -285,6 +285,15 @@ def shortest_tethers(problem: Problem) -> Floats:
     """
     planar = ContactGraph(build_outline(problem)).lengths([0])[0, 1:]
     return np.asarray(np.hypot(planar, problem.points[1:, 2] - problem.points[0, 2]))
+
+
+def _of_choices(problem: Problem, tethers: Floats) -> Floats:
+    """0 for every goal with an alternative that is nearer."""
+    out = tethers.copy()
+    for c in range(1, problem.visits + 1):
+        members = np.flatnonzero(problem.clusters == c)
+        out[np.setdiff1d(members, members[np.argmin(tethers[members])])] = 0.0
+    return out
 
 
 def _useful(problem: Problem, shortest: float, solver: str, clock: Clock, seed: int) -> float:

@@ -56,7 +56,7 @@ def to_solution(
 def _visits(graph: TravelGraph, tour: Sequence[int]) -> tuple[Visit, ...]:
     return tuple(
         Visit(
-            goal=int(graph.cluster[v]) - 1,
+            goal=int(graph.goal[v]) - 1,
             signature=graph.signatures[v],
             tether_length=float(graph.tethers[v]),
         )

@@ -18,16 +18,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from netsp.clock import Clock
+from netsp.dp.solve import Params as WalkParams
+from netsp.dp.solve import fits as walks_fit
+from netsp.dp.solve import solve as walk
 from netsp.lns.solve import solve as search
 from netsp.mip.overgoals import bound_over_goals
 from netsp.mip.solve import MipRun
 from netsp.mip.solve import solve as prove
+from netsp.solution import Status
 from netsp.solvers import exact
 from netsp.solving.limits import Limits
 from netsp.solving.run import SolverRun
 from netsp.travel.graph import TravelGraph, least_tethers
 from netsp.travel.kept import within_kept
-from netsp.travel.result import Progress, Result
+from netsp.travel.result import Progress, Result, proven
 
 PROVABLE = 10_000
 """Most vertices of a travel graph that `mip` is asked to bound: about 4 GiB of matrices."""
@@ -79,6 +83,8 @@ def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | Non
             if not small.trivial():
                 exact.solve(small)
         return small.finish("proven" if small.done else "exact")
+    if len(graph.before):
+        return _in_part_ordered(graph, limits, chosen.backend)
     clock = Clock.of(limits.time)
     if not graph.complete and graph.roadmapped and graph.goal_count > FEW_GOALS:
         limits = _from_few(graph, replace(limits, time=clock), chosen.backend)
@@ -111,6 +117,31 @@ def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | Non
         lower_bound=min(length, bound),
         trace=tuple(rows),
     )
+
+
+def _in_part_ordered(graph: TravelGraph, limits: Limits, backend: str) -> Result:
+    """With precedences: walks, which remember them, prove where goals are few; with many, a search.
+    The bound of the tours in any order holds, too, and is quickly had."""
+    clock = Clock.of(limits.time)
+    limits = replace(limits, time=clock)
+    few = walks_fit(graph) and graph.goal_count <= FEW_GOALS
+    rounds = ROUNDS_PER_GOAL * graph.goal_count
+    bound = 0.0
+    if len(graph) <= PROVABLE:
+        share = Clock((1.0 - SHARE) * clock.left, within=clock) if clock.limit else clock
+        free = MipRun(
+            graph.unordered(), replace(limits, time=share, warm_start=None, on_progress=None),
+            search_rounds=rounds,
+        ).solve(backend, None)  # fmt: skip
+        bound = free.lower_bound or 0.0
+    found = (
+        walk(graph, WalkParams(rounds), limits) if few else search(graph, limits=limits)
+    )  # fmt: skip
+    if found.length is None:
+        return found
+    bound = min(max(found.lower_bound or 0.0, bound), found.length)
+    status = Status.OPTIMAL if proven(found.length, bound) else found.status
+    return replace(found, lower_bound=bound, status=status)
 
 
 def _from_few(graph: TravelGraph, limits: Limits, backend: str) -> Limits:

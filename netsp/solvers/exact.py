@@ -37,13 +37,17 @@ def solve(run: SolverRun) -> None:
     members = [graph.members(c) for c in range(1, n + 1)]
     # reach[s, v]: the shortest path from the base through the goals of the set s, ending at v
     reach: Floats = np.full((2**n, len(graph)), np.inf)
+    # the set of goals that come before each
+    needed = [sum(1 << b for b in np.flatnonzero(graph.before[1:, c + 1]).tolist())
+              if len(graph.before) else 0 for c in range(n)]  # fmt: skip
     for c in range(n):
-        reach[1 << c, members[c]] = costs[0, members[c]]
+        if not needed[c]:
+            reach[1 << c, members[c]] = costs[0, members[c]]
     for s in range(1, 2**n):
         run.check()
         for c in range(n):
             rest = s & ~(1 << c)
-            if s >> c & 1 and rest:
+            if s >> c & 1 and rest and not needed[c] & ~rest:
                 inside = np.flatnonzero(np.isfinite(reach[rest]))
                 detours = reach[rest, inside, None] + costs[np.ix_(inside, members[c])]
                 reach[s, members[c]] = detours.min(axis=0, initial=np.inf)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from netsp.arrangement import keeps
 from netsp.clock import Clock
 from netsp.errors import InputError
 from netsp.lns.layers import Instance, best_classes
@@ -36,12 +37,17 @@ def solve_in_order(graph: TravelGraph, clock: Clock, on_progress: OnProgress | N
     Raises
     ------
     InputError
-        The tour starts at a state.
+        The tour starts at a state, or the order breaks the precedences.
     LimitReachedError
         The time was up before the legs were measured.
     """
     if graph.start is not None:
         raise InputError("keep_order: a tour from a state is planned afresh; expected none")
+    if not keeps(range(1, graph.goal_count + 1), graph.before):
+        raise InputError(
+            "keep_order: the order of the file breaks an 'after' of its goals; expected one that "
+            "keeps them all"
+        )
     every = np.arange(len(graph))
     ahead = graph.cluster[:, None] - graph.cluster[None, :]
     last = graph.goal_count

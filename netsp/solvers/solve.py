@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from netsp.arrangement import keeps
 from netsp.clock import Clock, TimeLimit
 from netsp.errors import InputError
 from netsp.models import shown
@@ -92,6 +93,15 @@ def travel_graph(problem: Problem, roadmap: str = DEFAULT_ROADMAP, **options: An
     """
     if not isinstance(problem, Problem):
         raise InputError(f"problem: expected a Problem, got {problem!r}")
+    if problem.visits < len(problem.goals):
+        from netsp.roadmap.alternatives import graph_of_choices
+
+        return graph_of_choices(problem, lambda p: travel_graph(p, roadmap, **options))
+    return _graph_of_places(problem, roadmap, options)
+
+
+def _graph_of_places(problem: Problem, roadmap: str, options: dict[str, Any]) -> TravelGraph:
+    """The travel graph whose goals are the problem's."""
     if problem.state is not None:
         if roadmap != "taut":
             raise InputError(f"state: needs roadmap 'taut', got {roadmap!r}")
@@ -101,11 +111,14 @@ def travel_graph(problem: Problem, roadmap: str = DEFAULT_ROADMAP, **options: An
     built = build_roadmap(problem, roadmap, **options)
     if ROADMAPS.named(roadmap).ours:
         graph: TravelGraph = built.to_travel_graph()
-        return graph
-    with foreign(f"roadmap {roadmap!r} failed"):
-        graph = built.to_travel_graph()
-    if not isinstance(graph, TravelGraph):
-        raise InputError(f"roadmap {roadmap!r}: expected a TravelGraph from it, got {shown(graph)}")
+    else:
+        with foreign(f"roadmap {roadmap!r} failed"):
+            graph = built.to_travel_graph()
+        if not isinstance(graph, TravelGraph):
+            raise InputError(
+                f"roadmap {roadmap!r}: expected a TravelGraph from it, got {shown(graph)}"
+            )
+    graph.before = problem.precedences
     return graph
 
 
@@ -182,6 +195,12 @@ def _run(
     if callable(solver):
         return call(solver, name_of(solver), graph, params, limits)
     record = SOLVERS.named(solver)
+    if len(graph.before) and record.ours and not record.ordered:
+        able = ", ".join(r.name for r in SOLVERS.values() if r.ordered)
+        raise InputError(
+            f"solver {solver!r}: cannot keep the order that goals ask for with 'after'; expected "
+            f"one of {able}"
+        )
     if record.ours:
         kind = load(record.params) if record.params else NoParams
         run: Callable[..., Result] = load(record.function)
@@ -378,11 +397,13 @@ def _as_tour(vertices: Sequence[int], graph: TravelGraph) -> tuple[int, ...]:
 def _tour_of(solution: Solution, graph: TravelGraph) -> list[int] | None:
     """The vertices of a solution's tour; if a class of it is not in the graph, the best classes for
     its order; None if it has no tour of all goals."""
-    order = [visit.goal + 1 for visit in solution.tour]
-    if sorted(order) != list(range(1, graph.goal_count + 1)):
+    goals = [visit.goal + 1 for visit in solution.tour]
+    cluster_of = dict(zip(graph.goal.tolist(), graph.cluster.tolist(), strict=True))
+    order = [cluster_of.get(g, 0) for g in goals]
+    if sorted(order) != list(range(1, graph.goal_count + 1)) or not keeps(order, graph.before):
         return None
     words = [tuple(visit.signature) for visit in solution.tour]
-    there = graph.vertices_of(order, words)
+    there = graph.vertices_of(goals, words)
     if there is None and order:
         from netsp.lns import Instance, best_classes
 

@@ -24,6 +24,8 @@ class Solver:
         Needs the paths beneath a travel graph, so no graph made from costs will do.
     blind : bool
         A baseline blind to the tether, whose tours may be `invalid`.
+    ordered : bool
+        Keeps precedences (`TravelGraph.before`).
     """
 
     name: str
@@ -31,6 +33,7 @@ class Solver:
     params: str | None = None
     geometric: bool = False
     blind: bool = False
+    ordered: bool = False
 
     @property
     def ours(self) -> bool:
@@ -68,11 +71,13 @@ SOLVERS: Registry[Solver] = Registry(
     {
         s.name: s
         for s in (
-            Solver("auto", "netsp.solvers.auto:solve", "netsp.solvers.auto:Params"),
+            Solver(
+                "auto", "netsp.solvers.auto:solve", "netsp.solvers.auto:Params", ordered=True
+            ),
             Solver("mip", "netsp.mip.solve:solve", "netsp.mip.solve:Params"),
-            Solver("dp", "netsp.dp.solve:solve", "netsp.dp.solve:Params"),
+            Solver("dp", "netsp.dp.solve:solve", "netsp.dp.solve:Params", ordered=True),
             Solver("reduced-mip", "netsp.mip.reduced:solve", "netsp.mip.reduced:ReducedParams"),
-            Solver("lns", "netsp.lns.solve:solve", "netsp.lns.solve:Params"),
+            Solver("lns", "netsp.lns.solve:solve", "netsp.lns.solve:Params", ordered=True),
             Solver("anneal", "netsp.anneal.icra2017:solve", "netsp.anneal.icra2017:Params"),
             Solver(
                 "anneal-2016", "netsp.anneal.rss2016:solve", "netsp.anneal.rss2016:Params",

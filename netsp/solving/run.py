@@ -118,8 +118,11 @@ class SolverRun:
             return
         core = least_tethers(graph.costs_to_base, graph.cluster, 1)
         if not graph.quick_legs:
-            # out and back to every goal: those legs are the tethers, which are known
+            # out and back to every goal: those legs are the tethers, which are known; a goal has
+            # fewer goals before it than any goal after it
             out = core[1:].tolist()
+            if len(graph.before):
+                out.sort(key=lambda v: int(graph.before[:, graph.cluster[v]].sum()))
             walk = [0, *(w for v in out for w in (v, 0))]
             self.update_incumbent(
                 [0, *out], walk=walk, length=2.0 * float(graph.costs_to_base[out].sum())
@@ -130,8 +133,12 @@ class SolverRun:
             near = graph.costs_among(core) if few else graph.lower_bounds(core)
             tour, left = [0], np.ones(len(core), dtype=bool)
             left[0] = False
+            before = graph.before[np.ix_(graph.cluster[core], graph.cluster[core])] if len(
+                graph.before
+            ) else np.zeros((len(core), len(core)), dtype=bool)  # fmt: skip
             while left.any():
-                k = int(np.argmin(np.where(left, near[tour[-1]], np.inf)))
+                ready = left & ~before[left].any(axis=0)
+                k = int(np.argmin(np.where(ready, near[tour[-1]], np.inf)))
                 tour.append(k)
                 left[k] = False
             self.update_incumbent(core[tour].tolist())

@@ -139,13 +139,17 @@ class SearchingRun(SolverRun):
         tether, the incumbent's, and more."""
         if costs.exact is None:
             if self._core is None or self._core[0] != len(costs):
-                self._core = len(costs), Instance(costs.cluster, costs.values, costs.vertices)
+                whole = Instance(costs.cluster, costs.values, costs.vertices, self.graph.before)
+                self._core = len(costs), whole
             return self._core[1]
         least = least_tethers(costs.values[0], costs.cluster, self.classes_per_goal)
         own = np.searchsorted(costs.vertices, np.array(self.tour or (0,)))
         core = np.unique(np.concatenate([least, own, more]))
         costs.measure(core)
-        return Instance(costs.cluster[core], costs.values[np.ix_(core, core)], costs.vertices[core])
+        return Instance(
+            costs.cluster[core], costs.values[np.ix_(core, core)], costs.vertices[core],
+            self.graph.before,
+        )  # fmt: skip
 
     def search(self, costs: LegCosts, more: Ints | None = None) -> None:
         """Local search, then ruin and recreate, from the incumbent if there is one."""

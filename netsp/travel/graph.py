@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 import numpy.typing as npt
 
+from netsp.arrangement import UNORDERED, keeps
 from netsp.arrays import Bools, Floats, Ints
 from netsp.clock import NEVER, Clock, Flag
 from netsp.drawn import Drawn
@@ -73,6 +74,11 @@ class TravelGraph(Drawn):
         The tether that is out at the start.
     bound_in_any_class : float
         No tour is shorter, whichever classes it takes, kept or left out; 0 while nothing is known.
+    goal : ndarray of int, shape (V,)
+        Number of each vertex's goal, from 1: the cluster, but for goals with alternatives.
+    before : ndarray of bool, shape (c + 1, c + 1)
+        Whether a cluster must be visited before another, transitively closed; shape (0, 0) for
+        none. With any, a tour means what it says only from its first vertex on.
     """
 
     picture: ClassVar[str] = "netsp.pictures.graph:draw_classes"
@@ -101,6 +107,8 @@ class TravelGraph(Drawn):
         self.least_left_out = least_left_out
         self.legs_s = 0.0
         self.start_tether = np.zeros((0, 3))
+        self.goal = self.cluster
+        self.before: Bools = UNORDERED
         self.clock: Clock | None = None
         self._legs = legs
         self._costs: Floats | None = None
@@ -313,13 +321,27 @@ class TravelGraph(Drawn):
             Its vertex k is vertex ``vertices[k]`` of this one.
         """
         chosen = np.asarray(vertices, dtype=np.int64)
-        return TravelGraph(
+        part = TravelGraph(
             self.cluster[chosen],
             [self.signatures[v] for v in chosen],
             self.tethers[chosen],
             _PartOfLegs(self, chosen),
             self.roadmap,
         )
+        part.goal, part.before = self.goal[chosen], self.before
+        return part
+
+    def unordered(self) -> TravelGraph:
+        """The travel graph without its precedences.
+
+        Returns
+        -------
+        TravelGraph
+            What no tour of it falls short of, none of this graph does.
+        """
+        free = self.subgraph(np.arange(len(self)))
+        free.before = UNORDERED
+        return free
 
     @property
     def costs_to_base(self) -> Floats:
@@ -329,12 +351,12 @@ class TravelGraph(Drawn):
         return out
 
     def vertices_of(self, order: Sequence[int], words: Sequence[Word]) -> list[int] | None:
-        """The vertices of clusters with given words.
+        """The vertices of goals with given words.
 
         Parameters
         ----------
         order : sequence of int
-            Clusters.
+            Goals, from 1.
         words : sequence of Word
             The word of the tether at each.
 
@@ -345,8 +367,8 @@ class TravelGraph(Drawn):
         """
         if self._place is None:
             self._place = {
-                (int(c), w): v
-                for v, (c, w) in enumerate(zip(self.cluster, self.signatures, strict=True))
+                (int(g), w): v
+                for v, (g, w) in enumerate(zip(self.goal, self.signatures, strict=True))
             }
         found = [self._place.get((c, tuple(w)), -1) for c, w in zip(order, words, strict=True)]
         return None if -1 in found else found
@@ -432,7 +454,8 @@ class TravelGraph(Drawn):
         return float(among[at[:-1], at[1:]].sum())
 
     def is_tour(self, tour: Sequence[int]) -> bool:
-        """Whether vertices are a tour: from the base, and exactly one of every cluster.
+        """Whether vertices are a tour: from the base, exactly one of every cluster, and in an order
+        that the precedences allow.
 
         Parameters
         ----------
@@ -450,6 +473,7 @@ class TravelGraph(Drawn):
             and t[0] == 0
             and all(0 <= v < len(self) for v in t)
             and sorted(self.cluster[t].tolist()) == list(range(self.goal_count + 1))
+            and keeps(self.cluster[t].tolist(), self.before)
         )
 
     def path(self, u: int, v: int) -> Floats:

@@ -1,0 +1,58 @@
+"""The travel graph of a problem in which goals have alternatives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from netsp.errors import InputError
+from netsp.problem import Problem
+from netsp.roadmap.outline import build_outline
+from netsp.roadmap.shortest import ContactGraph
+from netsp.travel.choices import with_choices
+from netsp.travel.graph import TravelGraph
+
+
+def graph_of_choices(problem: Problem, build: Callable[[Problem], TravelGraph]) -> TravelGraph:
+    """Build over all places in reach, then take alternatives together.
+
+    Parameters
+    ----------
+    problem : Problem
+        Some of its goals are alternatives.
+    build : callable
+        Makes the travel graph of a problem without alternatives.
+
+    Returns
+    -------
+    TravelGraph
+        Its clusters are those of the problem.
+
+    Raises
+    ------
+    InfeasibleError
+        Some goal is out of the tether's reach with all its alternatives.
+    InputError
+        The robot is already out: which alternatives were visited is then known, and the others are
+        to be left out.
+    """
+    if problem.state is not None:
+        raise InputError(
+            "state: alternatives are chosen before the robot is out; expected one of each choice"
+        )
+    planar = ContactGraph(build_outline(problem)).lengths([0])[0, 1:]
+    tethers = np.hypot(planar, problem.points[1:, 2] - problem.points[0, 2])
+    # a hair longer is left to the roadmap to judge
+    within = tethers <= problem.tether_length * (1.0 + 1e-6)
+    clusters = problem.clusters
+    for c in range(1, problem.visits + 1):
+        if not within[clusters == c].any():
+            within |= clusters == c  # out of reach altogether: that will be said
+    kept = np.flatnonzero(within)
+    goals = [problem.goals[k].model_copy(update={"choice": None, "after": ()}) for k in kept]
+    graph = build(problem.model_copy(update={"goals": tuple(goals)}))
+    out = with_choices(graph, np.concatenate([[0], clusters[kept]]))
+    out.goal = np.concatenate([[0], kept + 1])[graph.cluster]
+    out.before = problem.precedences
+    return out

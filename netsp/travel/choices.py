@@ -1,0 +1,85 @@
+"""Goals with alternatives: their vertices are one cluster."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from netsp.arrays import Bools, Floats, Ints
+from netsp.clock import Clock
+from netsp.travel.graph import TravelGraph
+
+
+def with_choices(graph: TravelGraph, clusters: Ints) -> TravelGraph:
+    """A travel graph over places as one over goals, of which some are choices among places.
+
+    Parameters
+    ----------
+    graph : TravelGraph
+        Its clusters are places.
+    clusters : ndarray of int, shape (places + 1,)
+        The goal of each place, the base (0) first.
+
+    Returns
+    -------
+    TravelGraph
+        The same vertices and legs, but none between alternatives.
+    """
+    cluster = clusters[graph.cluster]
+    out = TravelGraph(
+        cluster, graph.signatures, graph.tethers, _LegsOfChoices(graph, cluster), graph.roadmap,
+        between=_between(graph, clusters), classes=graph.classes,
+        least_left_out=graph.least_left_out,
+    )  # fmt: skip
+    out.goal = graph.goal
+    return out
+
+
+class _LegsOfChoices:
+    """The legs of another travel graph, but for those between alternatives."""
+
+    def __init__(self, graph: TravelGraph, cluster: Ints) -> None:
+        self.graph, self.cluster = graph, cluster
+
+    @property
+    def quick(self) -> bool:
+        """As beneath."""
+        return self.graph.quick_legs
+
+    def lengths(
+        self, vertices: Ints, asked: Bools | None = None, clock: Clock | None = None
+    ) -> Floats:
+        with self.graph.on_clock(clock or self.graph.clock):
+            out = np.array(self.graph.costs_among(vertices, asked))
+        own = self.cluster[vertices]
+        out[own[:, None] == own[None, :]] = np.inf
+        return out
+
+    def to_base(self) -> Floats:
+        out = self.graph.costs_to_base
+        out[0] = 0.0
+        return out
+
+    def lower_bounds(
+        self, vertices: Ints, rows: Ints | None = None, clock: Clock | None = None
+    ) -> Floats:
+        with self.graph.on_clock(clock or self.graph.clock):
+            return self.graph.lower_bounds(vertices, rows)
+
+    def path(self, u: int, v: int) -> Floats:
+        return self.graph.path(u, v)
+
+
+def _between(graph: TravelGraph, clusters: Ints) -> Callable[[Callable[[], bool]], Floats]:
+    """Bounds between goals: the least between any of their places."""
+
+    def bounds(up: Callable[[], bool]) -> Floats:
+        places = graph.between_goals(up)
+        out = np.full((int(clusters.max()) + 1,) * 2, np.inf)
+        rows, columns = np.meshgrid(clusters, clusters, indexing="ij")
+        np.minimum.at(out, (rows, columns), places)
+        np.fill_diagonal(out, 0.0)
+        return out
+
+    return bounds
