@@ -46,7 +46,8 @@ def main() -> None:
         found = solve(bound, time_limit=args.seconds)
         took = time.perf_counter() - begin
         row(goals, ties, f"{least:.1f}", f"{found.length:.1f}", found.status.value,
-            f"{100.0 * found.gap:.2f}", f"{took:.1f}", "yes" if verify(bound, found) else "NO")  # fmt: skip
+            f"{100.0 * found.gap:.2f}", f"{took:.1f}",
+            "yes" if verify(bound, found) else "NO")  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -456,3 +456,138 @@ def test_whole_wind_farms_are_read(name):
     found = read_site(file, base, tether=9000.0, radius=4.0, looking=Looking(1, 3.0, (-10.0,)))
     assert len(found.goals) == len(found.obstacles) == (67 if name == "dudgeon" else 80)
     assert found.goals[0].name == f"{found.obstacles[0].name}/1"
+
+
+def image(tmp_path, cells, suffix="pgm", **said):
+    """A map file over an image of cells: 1 occupied, 0 free, -1 unknown; its first row on top."""
+    rasterio = pytest.importorskip("rasterio")
+    values = np.where(cells == 1, 0, np.where(cells == 0, 254, 205)).astype(np.uint8)
+    if suffix == "pgm":  # plain, as any program might write it
+        rows = "\n".join(" ".join(map(str, r)) for r in values)
+        (tmp_path / "map.pgm").write_text(
+            f"P2\n# a comment\n{cells.shape[1]} {cells.shape[0]}\n255\n{rows}\n"
+        )
+    else:
+        with rasterio.open(
+            tmp_path / "map.png", "w", driver="PNG", width=cells.shape[1], height=cells.shape[0],
+            count=1, dtype="uint8",
+        ) as out:  # fmt: skip
+            out.write(values, 1)
+    data = {"image": f"map.{suffix}", "resolution": 0.5, "origin": [-3.0, -2.0, 0.0],
+            "negate": 0, "occupied_thresh": 0.65, "free_thresh": 0.196} | said  # fmt: skip
+    file = tmp_path / "map.yaml"
+    file.write_text("".join(f"{k}: {v}\n" for k, v in data.items()))
+    return file
+
+
+def basin(rng, rows=30, columns=40):
+    """Random blocks and specks; the lower left corner and its surroundings are free."""
+    cells = np.zeros((rows, columns), dtype=int)
+    for _ in range(6):
+        r, c = rng.integers(rows), rng.integers(columns)
+        cells[r : r + rng.integers(1, 7), c : c + rng.integers(1, 7)] = 1
+    cells[rng.random(cells.shape) < 0.01] = 1
+    cells[-5:, :5] = 0
+    return cells
+
+
+@pytest.mark.filterwarnings("ignore::Warning")
+@settings(max_examples=25, deadline=None)
+@given(
+    seed=st.integers(0, 10**6), suffix=st.sampled_from(["pgm", "png"]),
+    turn=st.sampled_from([0.0, 0.3]), share=st.floats(0.3, 3.0),
+)  # fmt: skip
+def test_polygons_hold_every_occupied_cell_and_little_more(
+    tmp_path_factory, seed, suffix, turn, share
+):
+    from netsp.site.occupancy import read_occupancy
+
+    tmp = tmp_path_factory.mktemp("map")
+    cells = basin(np.random.default_rng(seed))
+    file = image(tmp, cells, suffix, origin=[-3.0, -2.0, turn])
+    right = 0.5 * np.array([np.cos(turn), np.sin(turn)])
+    up = 0.5 * np.array([-np.sin(turn), np.cos(turn)])
+
+    def at(column, row):  # rows from below
+        return tuple(np.array([-3.0, -2.0]) + column * right + row * up)
+
+    tolerance = 0.5 * share
+    problem = read_occupancy(file, at(1, 1), [at(1.2, 1.2)], 5.0, tolerance=tolerance)
+    shapes = [shapely.Polygon(o.polygon) for o in problem.obstacles if o.name[0] == "W"]
+    union = shapely.union_all(shapes)
+    rows = len(cells)
+    squares = [
+        shapely.Polygon([at(c, rows - r), at(c + 1, rows - r), at(c + 1, rows - r - 1),
+                         at(c, rows - r - 1)])
+        for r, c in zip(*np.nonzero(cells), strict=True)
+    ]  # fmt: skip
+    exact = shapely.union_all(squares)
+    assert exact.difference(union).area <= 1e-9
+    holes = [shapely.Polygon(i) for p in getattr(exact.buffer(tolerance), "geoms",
+             [exact.buffer(tolerance)]) for i in p.interiors]  # fmt: skip
+    most = shapely.union_all([exact.buffer(1.001 * tolerance, quad_segs=64), *holes])
+    assert union.difference(most).area <= 1e-9
+
+
+def test_an_occupancy_image_becomes_a_plan(tmp_path, capsys):
+    cells = np.zeros((20, 30), dtype=int)
+    cells[:, 15] = 1
+    cells[8:11, 15] = 0
+    cells[0, :] = -1
+    file = image(tmp_path, cells)
+    (tmp_path / "goals.csv").write_text("x,y,name\n10,3,far\n-1,3,near\n")
+    out = tmp_path / "p.json"
+    argv = ["import", str(file), "--base=-2,-1", "--goals", str(tmp_path / "goals.csv"),
+            "--tether", "20", "--clearance", "0.1", "-o", str(out)]  # fmt: skip
+    assert main(argv) == 0
+    said = capsys.readouterr().err
+    assert "30 cells that the map does not know: taken as obstacles" in said
+    problem = Problem.load(out)
+    assert problem.bounds == (-3.0, -2.0, 12.0, 8.0)
+    assert [g.name for g in problem.goals] == ["far", "near"]
+    found = solve(problem)
+    assert verify(problem, found)
+    x, y = np.array(found.path)[:, :2].T
+    gate = y[np.abs(x - 4.75) < 0.6]  # of the wall, 1.5 m wide, at rows 9 to 11 from below
+    assert gate.min() > 2.5
+    assert gate.max() < 4.0
+
+
+@pytest.mark.parametrize(
+    ("said", "complaint"),
+    [
+        ({"resolution": -1}, "resolution: expected"),
+        ({"image": "none.png"}, "none.png: cannot be read"),
+        ({"free_thresh": 0.9}, "free_thresh: expected less than occupied_thresh"),
+        ({"origin": "[1, 2]"}, "origin"),
+        ({"mode": "raw"}, "mode: expected trinary or scale"),
+        ({"negate": 3}, "negate"),
+    ],
+)
+def test_what_is_wrong_with_a_map_file_is_one_line(tmp_path, capsys, said, complaint):
+    file = image(tmp_path, np.zeros((4, 4), dtype=int), **said)
+    (tmp_path / "goals.csv").write_text("x,y\n0,0\n")
+    argv = ["import", str(file), "--base=-2,-1", "--goals", str(tmp_path / "goals.csv"),
+            "--tether", "9"]  # fmt: skip
+    assert main(argv) == 2
+    err = capsys.readouterr().err
+    assert complaint in err
+    assert err.count("\n") == 1
+
+
+def test_options_of_images_and_of_maps_do_not_mix(tmp_path, capsys):
+    file = image(tmp_path, np.zeros((4, 4), dtype=int))
+    assert main(["import", str(file), "--tether", "9"]) == 2
+    assert "needs --base X,Y" in capsys.readouterr().err
+    assert main(["import", str(file), "--crs", "EPSG:32632"]) == 2
+    assert "--crs: expected a map with features" in capsys.readouterr().err
+    assert main(["import", "examples/site.geojson", "--goals", "x.csv"]) == 2
+    assert "--goals: expected an occupancy image" in capsys.readouterr().err
+    (tmp_path / "alone.png").write_bytes(b"no image")
+    (tmp_path / "goals.csv").write_text("x,y\n0,0\n")
+    argv = ["import", str(tmp_path / "alone.png"), "--base", "0,0", "--goals",
+            str(tmp_path / "goals.csv"), "--tether", "9"]  # fmt: skip
+    assert main(argv) == 2
+    assert "expected --resolution" in capsys.readouterr().err
+    assert main([*argv, "--resolution", "1"]) == 2
+    assert "alone.png: not an image" in capsys.readouterr().err

@@ -54,8 +54,9 @@ def run(args: argparse.Namespace) -> int:
     from netsp.files import write_text
     from netsp.pictures import style
     from netsp.problem import Problem
+    from netsp.site.table import from_table
     from netsp.sizing.base import Candidate, best_base
-    from netsp.sizing.candidates import along_line, from_table, over_grid
+    from netsp.sizing.candidates import along_line, over_grid
 
     if args.plot:
         style.check_format(args.plot)

@@ -11,6 +11,7 @@ from netsp.command.types import check_writable, length, option, positive
 from netsp.errors import InputError
 
 if TYPE_CHECKING:
+    from netsp.problem import Problem
     from netsp.site.options import Looking
 
 EXAMPLE = "netsp import examples/site.geojson -o problem.json"
@@ -20,12 +21,14 @@ def arguments(p: argparse.ArgumentParser) -> None:
     """Of the command line."""
     p.add_argument(
         "site", metavar="SITE",
-        help="map: GeoJSON, KML, KMZ, shapefile, GeoPackage, DXF or S-57 (docs/sites.md)",
+        help="map: GeoJSON, KML, KMZ, shapefile, GeoPackage, DXF or S-57; or an occupancy image: "
+        "YAML, PNG, PGM (docs/sites.md)",
     )  # fmt: skip
     p.add_argument(
         "--base",
         metavar="LAT,LON[,HEADING]",
-        help="position of the base, and compass heading of the y axis; default: from the file",
+        help="position of the base, and compass heading of the y axis; default: from the file; "
+        "X,Y (m) in an occupancy image",
     )
     p.add_argument(
         "--tether", type=length, metavar="L", help="tether length (m); default: from the file"
@@ -70,6 +73,24 @@ def arguments(p: argparse.ArgumentParser) -> None:
         "--skip-unreachable", action="store_true",
         help="leave out goals farther from the base than the tether is long, and say so",
     )  # fmt: skip
+    images = p.add_argument_group("occupancy images")
+    images.add_argument(
+        "--goals", metavar="TABLE", help="CSV with the columns x, y and perhaps z, name (m)"
+    )
+    images.add_argument(
+        "--resolution",
+        type=length,
+        metavar="R",
+        help="size of a cell (m), of an image without YAML",
+    )
+    images.add_argument(
+        "--tolerance", type=length, metavar="T",
+        help="how far obstacles may go beyond occupied cells (m); default: a cell",
+    )  # fmt: skip
+    images.add_argument(
+        "--unknown-free", action="store_true",
+        help="take cells that the map does not know as free, not as obstacles",
+    )  # fmt: skip
     p.add_argument(
         "-o", "--output", metavar="FILE", help="write the problem to this file (default: stdout)"
     )
@@ -77,8 +98,63 @@ def arguments(p: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write the problem, and return the exit code."""
-    check_writable(args.output, inputs=(args.site,))
+    check_writable(args.output, inputs=(args.site, args.goals))
     from netsp.files import write_text
+
+    problem = _of_image(args) if _is_image(args) else _of_map(args)
+    print(
+        f"{problem.name}: {problem.summary}",
+        file=sys.stderr,
+    )
+    if args.output is None:
+        sys.stdout.write(problem.to_json())
+    else:
+        write_text(args.output, problem.to_json())
+    return 0
+
+
+def _is_image(args: argparse.Namespace) -> bool:
+    """Whether the site is an occupancy image; what goes with the other kind is refused."""
+    from netsp.site.occupancy import FILES, IMAGES
+
+    image: bool = args.site.lower().endswith((*FILES, *IMAGES))
+    wrong = (
+        ("map", "crs", "radius", "inspect", "standoff") if image
+        else ("goals", "resolution", "tolerance", "unknown_free")
+    )  # fmt: skip
+    for name in wrong:
+        if getattr(args, name):
+            kind = "a map with features" if image else "an occupancy image (YAML, PNG, PGM)"
+            raise InputError(f"--{name.replace('_', '-')}: expected {kind}, got {args.site}")
+    return image
+
+
+def _of_image(args: argparse.Namespace) -> Problem:
+    from netsp.site.occupancy import read_occupancy
+    from netsp.site.table import from_table
+
+    for name, what in (("base", "X,Y"), ("goals", "TABLE"), ("tether", "L")):
+        if getattr(args, name) is None:
+            raise InputError(f"{args.site}: an occupancy image needs --{name} {what}")
+    try:
+        base = tuple(float(v) for v in args.base.split(","))
+    except ValueError:
+        base = ()
+    if len(base) not in (2, 3):
+        raise InputError(f"--base: expected X,Y or X,Y,Z (m) in an image, got {args.base!r}")
+    places, names = from_table(args.goals)
+    goals = [
+        {"position": tuple(p), "name": n or f"g{k}"}
+        for k, (p, n) in enumerate(zip(places.tolist(), names, strict=True), 1)
+    ]
+    return read_occupancy(
+        args.site, base, goals, args.tether, clearance=args.clearance or 0.0,
+        resolution=args.resolution, tolerance=args.tolerance, unknown_is_free=args.unknown_free,
+        on_note=messages.note,
+    )  # fmt: skip
+
+
+def _of_map(args: argparse.Namespace) -> Problem:
     from netsp.site.options import SiteOptions
     from netsp.site.projection import Projection
     from netsp.site.read import read_site
@@ -89,16 +165,7 @@ def run(args: argparse.Namespace) -> int:
         units=args.units, maps=args.map, looking=_looking(args),
         skip_unreachable=args.skip_unreachable,
     )  # fmt: skip
-    problem = read_site(args.site, projection, options=options, on_note=messages.note)
-    print(
-        f"{problem.name}: {problem.summary}",
-        file=sys.stderr,
-    )
-    if args.output is None:
-        sys.stdout.write(problem.to_json())
-    else:
-        write_text(args.output, problem.to_json())
-    return 0
+    return read_site(args.site, projection, options=options, on_note=messages.note)
 
 
 def _looking(args: argparse.Namespace) -> Looking | None:
