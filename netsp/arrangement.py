@@ -8,14 +8,28 @@ ordering problem (Escudero 1988) on that graph.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 
 from netsp.arrays import Bools, Ints
 
-if TYPE_CHECKING:
-    from netsp.problem import Goal
+
+class Goal(Protocol):
+    """What is asked of goals here (`netsp.problem.Goal`)."""
+
+    @property
+    def name(self) -> str | None:
+        """Of the goal."""
+
+    @property
+    def choice(self) -> str | None:
+        """What it is an alternative for."""
+
+    @property
+    def after(self) -> tuple[str, ...]:
+        """Names of what comes before it."""
+
 
 UNORDERED: Bools = np.zeros((0, 0), dtype=bool)
 """Precedences where there are none."""

@@ -303,6 +303,19 @@ def test_goals_out_of_reach_are_left_out_only_when_asked(seed, tmp_path):
     assert sum("left out" in n for n in notes) == 7
 
 
+def test_goals_that_only_a_longer_way_round_reaches_are_left_out_too(tmp_path, capsys):
+    wall = shapely.Polygon([(10, -40), (12, -40), (12, 40), (10, 40)])
+    shapes = [(shapely.Point(5, 0), {"name": "near"}), (shapely.Point(20, 0), {"name": "behind"}),
+              (wall, {"name": "wall"}),
+              (shapely.Point(0, 0), {"kind": "base", "tether_length": 30.0})]  # fmt: skip
+    file = write_geojson(tmp_path / "s.geojson", [feature(on_earth(s), **p) for s, p in shapes])
+    out = tmp_path / "p.json"
+    assert main(["import", str(file), "-o", str(out), "--skip-unreachable"]) == 0
+    said = capsys.readouterr().err
+    assert "note: goal behind is out of reach: tether_length is 30; expected at least 8" in said
+    assert [g.name for g in Problem.load(out).goals] == ["near"]
+
+
 def ring_about(x, y, r, holes=()):
     outer = [(x - r, y - r), (x + r, y - r), (x + r, y + r), (x - r, y + r)]
     return shapely.Polygon(outer, holes)

@@ -71,7 +71,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
     )
     p.add_argument(
         "--skip-unreachable", action="store_true",
-        help="leave out goals farther from the base than the tether is long, and say so",
+        help="leave out goals that the tether cannot reach, and say which and why",
     )  # fmt: skip
     images = p.add_argument_group("occupancy images")
     images.add_argument(
@@ -102,6 +102,12 @@ def run(args: argparse.Namespace) -> int:
     from netsp.files import write_text
 
     problem = _of_image(args) if _is_image(args) else _of_map(args)
+    if args.skip_unreachable:
+        from netsp.roadmap.within_reach import within_reach
+
+        problem, why = within_reach(problem)
+        for line in why:
+            messages.note(f"{line}: left out")
     print(
         f"{problem.name}: {problem.summary}",
         file=sys.stderr,

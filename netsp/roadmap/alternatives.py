@@ -8,8 +8,7 @@ import numpy as np
 
 from netsp.errors import InputError
 from netsp.problem import Problem
-from netsp.roadmap.outline import build_outline
-from netsp.roadmap.shortest import ContactGraph
+from netsp.roadmap.within_reach import HAIR, shortest_tethers
 from netsp.travel.choices import with_choices
 from netsp.travel.graph import TravelGraph
 
@@ -41,10 +40,7 @@ def graph_of_choices(problem: Problem, build: Callable[[Problem], TravelGraph]) 
         raise InputError(
             "state: alternatives are chosen before the robot is out; expected one of each choice"
         )
-    planar = ContactGraph(build_outline(problem)).lengths([0])[0, 1:]
-    tethers = np.hypot(planar, problem.points[1:, 2] - problem.points[0, 2])
-    # a hair longer is left to the roadmap to judge
-    within = tethers <= problem.tether_length * (1.0 + 1e-6)
+    within = shortest_tethers(problem) <= problem.tether_length * (1.0 + HAIR)
     clusters = problem.clusters
     for c in range(1, problem.visits + 1):
         if not within[clusters == c].any():

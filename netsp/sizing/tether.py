@@ -32,8 +32,7 @@ from netsp.errors import InputError, LimitReachedError
 from netsp.fields import checked_argument
 from netsp.files import write_text
 from netsp.problem import Problem
-from netsp.roadmap.outline import build_outline
-from netsp.roadmap.shortest import ContactGraph
+from netsp.roadmap.within_reach import shortest_tethers
 from netsp.solution import Status
 from netsp.solvers.solve import solve_graph, travel_graph
 from netsp.travel.graph import TravelGraph
@@ -268,23 +267,6 @@ def tether_curve(
     k = int(np.argmax(shortest))
     steps = tuple(reversed(curve))
     return TetherCurve(problem.name, problem.units, steps, float(shortest[k]), k, whole)
-
-
-def shortest_tethers(problem: Problem) -> Floats:
-    """The shortest tether that reaches each goal, in any class.
-
-    Parameters
-    ----------
-    problem : Problem
-        Its tether length does not matter.
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        Lengths in 3D; inf where a goal cannot be reached.
-    """
-    planar = ContactGraph(build_outline(problem)).lengths([0])[0, 1:]
-    return np.asarray(np.hypot(planar, problem.points[1:, 2] - problem.points[0, 2]))
 
 
 def _of_choices(problem: Problem, tethers: Floats) -> Floats:
