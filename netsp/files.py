@@ -29,24 +29,32 @@ CHUNK = 2**20
 _NUMBERS = re.compile(r"[-+0-9. eE]*")
 
 
-def read_bytes(path: str | Path, most: int = MOST_BYTES) -> bytes:
-    """Contents of a regular file of at most so many bytes, or `InputError` in one line. Pipes and
-    devices may never end, so they are refused."""
+def check_file(path: str | Path, most: int = MOST_BYTES) -> None:
+    """InputError unless this is a regular file of at most so many bytes, for readers that open it
+    by themselves. Pipes and devices may never end, so they are refused."""
     try:
         status = os.stat(path)
-        if not stat.S_ISREG(status.st_mode):
-            kind = "a directory" if stat.S_ISDIR(status.st_mode) else "a pipe or a device"
-            raise InputError(f"{path}: cannot be read: expected a file, got {kind}")
-        if status.st_size > most:
-            raise InputError(
-                f"{path}: cannot be read: {status.st_size / 2**20:.4g} MiB; expected at most "
-                f"{most / 2**20:g} MiB"
-            )
-        with open(path, "rb") as stream:
-            data = stream.read(most + 1)
     except (OSError, ValueError) as error:  # ValueError: a null character in the name
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"{path}: cannot be read: {reason}") from None
+    if not stat.S_ISREG(status.st_mode):
+        kind = "a directory" if stat.S_ISDIR(status.st_mode) else "a pipe or a device"
+        raise InputError(f"{path}: cannot be read: expected a file, got {kind}")
+    if status.st_size > most:
+        raise InputError(
+            f"{path}: cannot be read: {status.st_size / 2**20:.4g} MiB; expected at most "
+            f"{most / 2**20:g} MiB"
+        )
+
+
+def read_bytes(path: str | Path, most: int = MOST_BYTES) -> bytes:
+    """Contents of a regular file of at most so many bytes, or `InputError` in one line."""
+    check_file(path, most)
+    try:
+        with open(path, "rb") as stream:
+            data = stream.read(most + 1)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
     if len(data) > most:
         raise InputError(f"{path}: cannot be read: more than {most / 2**20:g} MiB")
     return data

@@ -20,7 +20,7 @@ from pydantic import Field, ValidationError
 from netsp.arrays import Bools, Floats
 from netsp.errors import InputError, counted
 from netsp.fields import Number, Positive
-from netsp.files import read_bytes, read_text
+from netsp.files import check_file, read_text
 from netsp.models import Model, explain, shown
 from netsp.problem import Problem
 from netsp.site.shapes import simple_polygons
@@ -197,7 +197,7 @@ def _rasterio() -> Any:
 
 def _values(image: Path) -> Floats:
     """(rows, columns) of the image from 0 (black) to 255, its first row at the top."""
-    read_bytes(image)  # that it is there, a file, and of a reasonable size
+    check_file(image)
     from PIL import Image, UnidentifiedImageError
 
     try:

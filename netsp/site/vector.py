@@ -8,7 +8,6 @@ its layers are a field of its entities, and its circles arrive as closed lines o
 from __future__ import annotations
 
 import math
-import os
 import tempfile
 import zipfile
 import zlib
@@ -20,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from netsp.errors import InputError
-from netsp.files import MOST_BYTES
+from netsp.files import MOST_BYTES, check_file
 from netsp.site.feature import Feature, Map
 
 MOST_FEATURES = 100_000
@@ -53,7 +52,7 @@ def read_vector(file: str | Path, crs: str | None) -> Map:
         Not readable, too large, some layers with a place on the earth and some without, or pyogrio
         is not installed.
     """
-    _check_size(file)
+    check_file(file)
     with _unpacked(file) as plain:
         return _read(file, plain, crs)
 
@@ -218,19 +217,6 @@ def _unpacked(file: str | Path) -> Iterator[str | Path]:
         page = Path(folder) / "doc.kml"
         page.write_bytes(text)
         yield page
-
-
-def _check_size(file: str | Path) -> None:
-    try:
-        status = os.stat(file)
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(f"{file}: cannot be read: {reason}") from None
-    if os.path.isfile(file) and status.st_size > MOST_BYTES:
-        raise InputError(
-            f"{file}: cannot be read: {status.st_size / 2**20:.4g} MiB; expected at most "
-            f"{MOST_BYTES / 2**20:g} MiB"
-        )
 
 
 def _call(file: str | Path, function: Any, *args: Any, **more: Any) -> Any:
