@@ -611,18 +611,20 @@ class Problem(Drawn, FileModel):
         name = self.obstacles[i].name
         return f"obstacles[{i}]" + (f" ({name})" if name else "")
 
-    def grown(self, margin: float) -> Problem:
-        """The problem with all obstacles grown by a margin.
+    def grown(self, margin: float, slack: float = 0.0) -> Problem:
+        """The problem with all obstacles grown by a margin, and a part of the tether set aside.
 
         Parameters
         ----------
         margin : float
             Not negative, in the problem's units.
+        slack : float
+            Share of the taut length that is to be out beyond it.
 
         Returns
         -------
         Problem
-            The same with as much more clearance.
+            The same with as much more clearance, and as much less tether.
 
         Raises
         ------
@@ -630,9 +632,12 @@ class Problem(Drawn, FileModel):
             The margin is negative, or base or a goal lies inside a grown obstacle.
         """
         more = checked_argument("margin", margin, 0.0)
+        length = self.tether_length / (1.0 + checked_argument("slack", slack, 0.0, 1.0))
         try:
             own = {name: getattr(self, name) for name in Problem.model_fields}
-            return Problem.model_validate({**own, "clearance": self.clearance + more})
+            return Problem.model_validate(
+                {**own, "clearance": self.clearance + more, "tether_length": length}
+            )
         except ValidationError as error:
             raise InputError(f"margin {more:g}: {explain(error)}") from None
 

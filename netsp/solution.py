@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal
@@ -10,7 +11,7 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import ConfigDict, Field
 
 from netsp.drawn import Drawn
-from netsp.fields import Name, NonNegative, PathPoint, Total
+from netsp.fields import Name, NonNegative, Number, PathPoint, Total
 from netsp.files import FileModel, write_text
 from netsp.models import Model
 
@@ -32,6 +33,26 @@ class Status(StrEnum):
 
 KeptClasses = Literal["all", "non-looping", "shortest"]
 """Which homotopy classes a roadmap held."""
+
+
+def max_turning(friction: float, max_tension_ratio: float | None) -> float:
+    """How far a tether may turn about obstacles, by the capstan's formula.
+
+    Parameters
+    ----------
+    friction : float
+        Coefficient.
+    max_tension_ratio : float, optional
+        Most that friction may multiply the tension by; None for no limit.
+
+    Returns
+    -------
+    float
+        Sum of angles, radians; inf for no limit.
+    """
+    if max_tension_ratio is None or friction == 0.0:
+        return math.inf
+    return math.log(max_tension_ratio) / friction
 
 
 class ProblemReference(Model):
@@ -74,6 +95,10 @@ class Solution(Drawn, FileModel):
     margin : float
         All obstacles were grown by it, besides the problem's clearance; path, tethers, bound and
         status are those among the grown obstacles.
+    slack : float
+        Share of the taut length that may be out beyond it within the tether's length.
+    friction, max_tension_ratio : float, float or None
+        Of tether on obstacle, and most that it may multiply the tension by; at every visit.
     kept_order : bool
         The goals are visited in the order of the problem; bound, gap and status are those of the
         tours of that order.
@@ -111,6 +136,18 @@ class Solution(Drawn, FileModel):
             "in the problem's units"
         ),
     ] = 0.0
+    slack: Annotated[
+        Annotated[NonNegative, Field(le=1.0)],
+        Field(description="share of the taut length that may be out beyond it"),
+    ] = 0.0
+    friction: Annotated[
+        Annotated[NonNegative, Field(le=10.0)],
+        Field(description="coefficient of friction of tether on obstacle"),
+    ] = 0.0
+    max_tension_ratio: Annotated[
+        Annotated[Number, Field(gt=1.0, le=1e6)] | None,
+        Field(description="most that friction multiplies the tension by; null for no limit"),
+    ] = None
     kept_order: Annotated[
         bool,
         Field(
@@ -164,6 +201,11 @@ class Solution(Drawn, FileModel):
 
     __str__ = __repr__
 
+    @property
+    def max_turning(self) -> float:
+        """Sum of angles (radians) by which the tether may turn; inf where friction has no limit."""
+        return max_turning(self.friction, self.max_tension_ratio)
+
     def to_json(self) -> str:
         """The solution as JSON of format version 1.
 
@@ -180,8 +222,11 @@ class Solution(Drawn, FileModel):
             del data["classes"]
         if not self.margin:
             del data["margin"]
-        if not self.kept_order:
-            del data["kept_order"]
+        for name, plain in (("kept_order", False), ("slack", 0.0), ("friction", 0.0)):
+            if data[name] == plain:
+                del data[name]
+        if self.max_tension_ratio is None:
+            del data["max_tension_ratio"]
         text = json.dumps(data, indent=1, allow_nan=False, ensure_ascii=False)
         rows = ",\n".join("  " + json.dumps(p, allow_nan=False) for p in path)
         return f'{text[:-2]},\n "path": [\n{rows}\n ]\n}}\n'

@@ -87,6 +87,18 @@ def arguments(p: argparse.ArgumentParser) -> None:
         help="visit the goals in the order of the file; only their homotopy classes are chosen",
     )  # fmt: skip
     p.add_argument(
+        "--slack", type=length, default=0.0, metavar="S",
+        help="share of the taut length that must fit beyond it, as 0.05; default 0",
+    )  # fmt: skip
+    p.add_argument(
+        "--friction", type=length, default=0.0, metavar="MU",
+        help="coefficient of friction of tether on obstacle; default 0",
+    )  # fmt: skip
+    p.add_argument(
+        "--max-tension-ratio", type=length, metavar="K",
+        help="use only classes in which friction multiplies the tension by at most K",
+    )  # fmt: skip
+    p.add_argument(
         "--margin", type=length, default=0.0, metavar="R",
         help="plan so that every obstacle may be off by R; default 0 (docs/sizing.md)",
     )  # fmt: skip
@@ -150,6 +162,9 @@ def run(args: argparse.Namespace) -> int:
             params=_params(args),
             warm_start=warm,
             margin=args.margin,
+            slack=args.slack,
+            friction=args.friction,
+            max_tension_ratio=args.max_tension_ratio,
             keep_order=args.keep_order,
             on_progress=listen,
         )

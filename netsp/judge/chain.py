@@ -65,9 +65,9 @@ def contacts_of(corners: Floats, disk_of: list[tuple[float, float, float]]) -> l
 
 def exact_length(
     a: Floats, b: Floats, contacts: list[Contact], disks: Floats, slack: float
-) -> float | None:
-    """Length of the taut path from a to b by way of contacts, among disks (d, 3); None if no
-    consistent set of contacts is found.
+) -> tuple[float, float] | None:
+    """Length of the taut path from a to b by way of contacts, among disks (d, 3), and the angle by
+    which it turns; None if no consistent set of contacts is found.
 
     Parameters
     ----------
@@ -93,7 +93,8 @@ def exact_length(
             continue
         entered = _entered(a, b, chain, legs, disks, slack)
         if entered is None:
-            return length + sum(c.radius * t for c, t in zip(chain, turns, strict=True))
+            arcs = sum(c.radius * t for c, t in zip(chain, turns, strict=True))
+            return length + arcs, sum(turns)
         at, contact = entered
         chain = [Contact(c.x, c.y, c.radius, c.sense, t) for c, t in zip(chain, turns, strict=True)]
         chain.insert(at, contact)

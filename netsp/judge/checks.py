@@ -8,6 +8,7 @@ plain distances (Shapely).
 from __future__ import annotations
 
 import itertools
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -117,11 +118,16 @@ def verify(problem: Problem, solution: Solution) -> Verification:
     return Verification(tuple(_Judge(problem, solution).run()))
 
 
+TURNING_TOLERANCE = 1e-6
+"""Radians; contacts with obstacles are found exactly."""
+
+
 class _Judge:
     def __init__(self, problem: Problem, solution: Solution) -> None:
         self.sha256 = problem.sha256
         # planned with a margin: what is said holds among obstacles grown by it
-        problem = problem.grown(solution.margin) if solution.margin else problem
+        if solution.margin or solution.slack:
+            problem = problem.grown(solution.margin, solution.slack)
         self.problem, self.solution = problem, solution
         # a path that starts in the middle is judged with the tether that is out already before it
         before: Floats = np.array(solution.start_tether, dtype=float).reshape(-1, 3)
@@ -166,6 +172,7 @@ class _Judge:
             same,
             f"sha256 {self.sha256[:12]}…"
             + (f", obstacles grown by {self.solution.margin:g}" if self.solution.margin else "")
+            + (f", tether less {100.0 * self.solution.slack:g} % slack" * (self.solution.slack > 0))
             if same
             else f"solution is for another problem or another version of it "
             f"({self.solution.problem.sha256[:12]}…, this is {self.sha256[:12]}…)",
@@ -364,6 +371,7 @@ class _Judge:
             place = len(points) - 1
         pulled_total = 0.0
         fits: tuple[float, str] = (-np.inf, "")
+        turns: tuple[float, str] = (0.0, "")
         wrong: tuple[float, str] = (-np.inf, "")
         stops = [*((v.goal + 1, s) for v, s in zip(self.solution.tour, self.visits, strict=True))]
         stops.append((0, len(self.path) - 1))
@@ -381,6 +389,7 @@ class _Judge:
             low, high = np.hypot(tether.low, dz), np.hypot(tether.high, dz)
             label = self.problem.goal_label(point - 1)
             fits = max(fits, (float(low), label))
+            turns = max(turns, (tether.turning, label))
             stated = self.solution.tour[k].tether_length
             slack = TAUT_TOLERANCE * limit + self.tiny
             wrong = max(wrong, (float(max(low - stated, stated - high) - slack), label))
@@ -404,6 +413,21 @@ class _Judge:
                 if wrong[0] <= 0.0
                 else f"off by {wrong[0] + TAUT_TOLERANCE * limit + self.tiny:.6g} at {wrong[1]}",
             ),
+            *self._tension(*turns),
+        ]
+
+    def _tension(self, turning: float, label: str) -> list[Check]:
+        """What friction does to the tension (capstan), where that has a limit."""
+        s = self.solution
+        if s.max_tension_ratio is None:
+            return []
+        ratio = math.exp(s.friction * turning)
+        return [
+            Check(
+                "tension ratio is kept",
+                turning <= s.max_turning + TURNING_TOLERANCE,
+                f"{ratio:.4g} of {s.max_tension_ratio:g}, at {label}" if label else "no turning",
+            )
         ]
 
     def _length(self) -> Check:

@@ -30,10 +30,12 @@ PLACE_TOLERANCE = 1e-7
 class Pulled:
     """A taut planar length between two bounds. They agree where the contacts with the disks
     themselves were found; else `low` is among inscribed polygons, and `high` adds what the circles
-    stand proud of them along the bends (an estimate: it assumes no bend moves elsewhere)."""
+    stand proud of them along the bends (an estimate: it assumes no bend moves elsewhere). And the
+    angle (radians) by which it turns; at least, where contacts were not found."""
 
     low: float
     high: float
+    turning: float
 
 
 class StringPuller:
@@ -112,14 +114,16 @@ class StringPuller:
         contacts = contacts_of(corners, [self._disk_at.get(p, (*p, 0.0)) for p in own])
         exact = exact_length(a, b, contacts, self.disks, 1e-3 * self.place)
         if exact is not None:
-            return Pulled(exact, exact)
+            return Pulled(exact[0], exact[0], exact[1])
         d = np.diff(corners, axis=0)
         low = float(np.hypot(d[:, 0], d[:, 1]).sum())
         heading = np.unwrap(np.arctan2(d[:, 1], d[:, 0])) if len(d) > 1 else np.zeros(1)
         turns = np.diff(heading)
         switches = int((np.sign(turns[1:]) != np.sign(turns[:-1])).sum()) if len(turns) > 1 else 0
         slack = np.abs(turns).sum() + 2.0 * (switches + 1) * (len(turns) > 0)
-        return Pulled(low, low + self.proud * float(slack))
+        most = float(np.abs(turns).sum())
+        less = 2.0 * math.pi / SIDES * 2.0 * (switches + 1)
+        return Pulled(low, low + self.proud * float(slack), max(most - less, 0.0))
 
 
 def reduce_sleeve(crossings: list[tuple[int, bool]]) -> list[tuple[int, bool]]:

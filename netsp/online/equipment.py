@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Annotated
 
 from pydantic import Field
@@ -11,6 +10,7 @@ from netsp.arrays import Floats
 from netsp.fields import NonNegative, Number, Positive
 from netsp.models import Model
 from netsp.online.tether.load import Load
+from netsp.solution import max_turning
 
 SEA_WATER = 1025.0
 """kg / m^3."""
@@ -111,9 +111,7 @@ class TetherPhysics(Model):
     @property
     def max_turning(self) -> float:
         """Sum of turning angles (rad) at which friction reaches its limit."""
-        if self.max_tension_ratio is None or self.friction == 0.0:
-            return math.inf
-        return math.log(self.max_tension_ratio) / self.friction
+        return max_turning(self.friction, self.max_tension_ratio)
 
 
 class PositionSensor(Model):

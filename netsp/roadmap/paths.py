@@ -66,6 +66,12 @@ class TautPaths:
         """
         return self._pieces(a, b, word, longest)[0]
 
+    def turning(self, a: int, b: int, word: Word) -> float:
+        """Sum of the angles (radians) by which the taut path of a word from point a to point b
+        turns in the plan."""
+        _, pieces = self._pieces(a, b, word)
+        return float(sum(slid for _, slid in pieces[1:]))
+
     def path(self, a: int, b: int, word: Word, longest: float | None = None) -> Floats:
         """(n, 3) polyline of the taut path of a word from point a to point b (0 is the base).
 

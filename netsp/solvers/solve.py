@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -11,10 +12,11 @@ import numpy as np
 from netsp.arrangement import keeps
 from netsp.clock import Clock, TimeLimit
 from netsp.errors import InputError
+from netsp.fields import checked_argument
 from netsp.models import shown
 from netsp.problem import Problem
 from netsp.registry import foreign, load
-from netsp.solution import ProblemReference, Solution, Timings
+from netsp.solution import ProblemReference, Solution, Timings, max_turning
 from netsp.solvers.answer import to_solution
 from netsp.solvers.custom import call, read_options, whole_numbers
 from netsp.solvers.in_order import solve_in_order
@@ -227,6 +229,9 @@ def solve(
     params: Mapping[str, Any] | None = None,
     warm_start: Solution | None = None,
     margin: float = 0.0,
+    slack: float = 0.0,
+    friction: float = 0.0,
+    max_tension_ratio: float | None = None,
     keep_order: bool = False,
     on_progress: OnProgress | None = None,
 ) -> Solution:
@@ -256,6 +261,12 @@ def solve(
     margin : float
         The tour is to bear obstacles that are off by so much (`netsp.sizing.margins`): all are
         grown by it, in the problem's units.
+    slack : float
+        Share of the taut length that is to fit within the tether's length beyond it, up to 1.
+    friction : float
+        Coefficient of friction of tether on obstacle.
+    max_tension_ratio : float, optional
+        Most that friction may multiply the tension by, anywhere on the tour; None for no limit.
     keep_order : bool
         The goals are visited in the problem's order, and only their classes are chosen; with proof,
         whatever the solver.
@@ -292,27 +303,36 @@ def solve(
     if warm_start is not None and warm_start.problem.sha256 != problem.sha256:
         raise InputError("warm_start: it is the solution of another problem (sha256 differs)")
     check_solver(solver, params)  # before the long work
-    if margin:
+    if margin or slack:
+        grown = problem.grown(margin, slack)
         found = solve(
-            problem.grown(margin), solver, roadmap=roadmap, roadmap_options=roadmap_options,
+            grown, solver, roadmap=roadmap, roadmap_options=roadmap_options,
             time_limit=time_limit, iteration_limit=iteration_limit, seed=seed, params=params,
-            warm_start=None if warm_start is None else _for_grown(warm_start, problem, margin),
-            keep_order=keep_order, on_progress=on_progress,
+            warm_start=None if warm_start is None else _for_grown(warm_start, grown),
+            friction=friction, max_tension_ratio=max_tension_ratio, keep_order=keep_order,
+            on_progress=on_progress,
         )  # fmt: skip
         own = ProblemReference(name=problem.name, sha256=problem.sha256)
-        return found.model_copy(update={"problem": own, "margin": float(margin)})
+        return found.model_copy(
+            update={"problem": own, "margin": float(margin), "slack": float(slack)}
+        )
+    limits = {
+        "friction": checked_argument("friction", friction, 0.0, 10.0),
+        "max_tension_ratio": _tension_ratio(max_tension_ratio, friction),
+    }
     clock = Clock(time_limit)
     options: dict[str, Any] = {"time_limit": clock, **(roadmap_options or {})}
     if ROADMAPS.named(roadmap).seeded:
         options.setdefault("seed", seed)
     graph = travel_graph(problem, roadmap, **options)
+    graph = _within_turning(problem, graph, max_turning(friction, max_tension_ratio), clock)
     built = clock.elapsed
     if keep_order:
         listener = graph.progress_listener(on_progress)
         result = graph.as_asked(solve_in_order(graph, clock, listener))
         found = to_solution(problem, graph, result, "in-order", seed)
         return found.model_copy(
-            update={"kept_order": True, "timings": _timings(clock, built, graph)}
+            update={"kept_order": True, "timings": _timings(clock, built, graph), **limits}
         )
     # what is too large for its time takes long to draw, too
     spare = 0.0 if graph.complete else min(SPARE * (time_limit or 0.0), 1.0)
@@ -327,7 +347,27 @@ def solve(
         on_progress=on_progress,
     )
     timings = _timings(clock, built, graph)
-    return to_solution(problem, graph, result, name_of(solver), seed, timings)
+    found = to_solution(problem, graph, result, name_of(solver), seed, timings)
+    return found.model_copy(update=limits) if friction else found
+
+
+def _tension_ratio(value: float | None, friction: float) -> float | None:
+    if value is None:
+        return None
+    if not friction:
+        raise InputError("max_tension_ratio: expected friction > 0 with it, got none")
+    return checked_argument("max_tension_ratio", value, 1.0 + 1e-9, 1e6)
+
+
+def _within_turning(problem: Problem, graph: TravelGraph, most: float, clock: Clock) -> TravelGraph:
+    if math.isinf(most):
+        return graph
+    if graph.start is not None:
+        raise InputError("max_tension_ratio: a tour from a state has no such limit; expected none")
+    from netsp.roadmap.turning import within_turning
+
+    with graph.on_clock(clock):
+        return within_turning(problem, graph, most)
 
 
 def _timings(clock: Clock, built: float, graph: TravelGraph) -> Timings:
@@ -340,10 +380,10 @@ def _timings(clock: Clock, built: float, graph: TravelGraph) -> Timings:
     )
 
 
-def _for_grown(warm: Solution, problem: Problem, margin: float) -> Solution:
+def _for_grown(warm: Solution, grown: Problem) -> Solution:
     """A solution to start from as one of the problem with its obstacles grown."""
-    grown = ProblemReference(name=problem.name, sha256=problem.grown(margin).sha256)
-    return warm.model_copy(update={"problem": grown})
+    own = ProblemReference(name=grown.name, sha256=grown.sha256)
+    return warm.model_copy(update={"problem": own})
 
 
 def check_solver(solver: SolverLike, params: Mapping[str, Any] | None) -> None:

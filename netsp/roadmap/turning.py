@@ -1,0 +1,96 @@
+"""How far a tether turns about obstacles, and the classes in which it turns no farther than it may.
+
+A tether on obstacles is held by friction: a pull at the anchor arrives at the robot divided by
+exp(mu * turning) (Euler and Eytelwein's capstan). Where that has a limit, so has the turning.
+
+Along a leg the tether turns no farther than at one of its ends. The tethers to both ends and the
+leg bound a geodesic triangle: up to where the two tethers part they are one, and from there they
+bulge towards each other. The tether to a point of the leg follows one of them and leaves it on a
+tangent, between the directions of the edges that it leaves; so it has turned no farther than that
+tether has turned one edge later.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from netsp.arrays import Floats
+from netsp.errors import InfeasibleError
+from netsp.problem import Problem
+from netsp.roadmap.paths import TautPaths
+from netsp.travel.graph import TravelGraph
+
+ROUNDING = 1e-9
+"""Radians."""
+
+
+def turnings(problem: Problem, graph: TravelGraph) -> Floats:
+    """How far the tether turns in every class.
+
+    Parameters
+    ----------
+    problem : Problem
+        That the graph is of.
+    graph : TravelGraph
+        Its vertices; its clock ends the work.
+
+    Returns
+    -------
+    ndarray, shape (V,)
+        Sums of angles in the plan, radians: with depth a tether turns no farther than in the plan.
+
+    Raises
+    ------
+    LimitReachedError
+        The clock was up.
+    """
+    paths = TautPaths(problem)
+    out = np.zeros(len(graph))
+    for v in range(1, len(graph)):
+        if graph.clock is not None:
+            graph.clock.check("measuring how far tethers turn")
+        out[v] = paths.turning(0, int(graph.goal[v]), graph.signatures[v])
+    return out
+
+
+def within_turning(problem: Problem, graph: TravelGraph, most: float) -> TravelGraph:
+    """The travel graph without the classes in which the tether turns farther than it may.
+
+    Parameters
+    ----------
+    problem : Problem
+        That the graph is of.
+    graph : TravelGraph
+        From the base.
+    most : float
+        Sum of angles, radians; inf for no limit.
+
+    Returns
+    -------
+    TravelGraph
+        The same where there is no limit.
+
+    Raises
+    ------
+    InfeasibleError
+        A goal is reached in no class that is left.
+    LimitReachedError
+        The clock was up.
+    """
+    if math.isinf(most):
+        return graph
+    turning = turnings(problem, graph)
+    part = graph.subgraph(np.flatnonzero(turning <= most + ROUNDING))
+    part.classes, part.least_left_out = graph.classes, graph.least_left_out
+    lost = sorted(set(graph.cluster.tolist()) - set(part.cluster.tolist()))
+    if lost:
+        members = graph.members(lost[0])
+        best = int(members[np.argmin(turning[members])])
+        raise InfeasibleError(
+            f"{problem.goal_label(int(graph.goal[best]) - 1)} is reached in no class in which the "
+            f"tether turns by at most {math.degrees(most):.4g} degrees; the least is "
+            f"{math.degrees(turning[best]):.4g}"
+        )
+    return part
