@@ -7,7 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from netsp import Problem, Solution
 from netsp.command.main import main
+from netsp.report.wording import Passage, back_from, listed, passages
+from netsp.roadmap.paths import TautPaths
 
 PROBLEMS = Path(__file__).parent.parent / "problems"
 BROWSER = shutil.which("chromium") or shutil.which("chromium-browser")
@@ -90,6 +93,81 @@ def test_pages_print(pages, tmp_path):
     browse(f"--print-to-pdf={out}", f"file://{pages[0]}")
     assert out.read_bytes()[:5] == b"%PDF-"
     assert out.stat().st_size > 10_000
+
+
+@pytest.mark.skipif(BROWSER is None, reason="chromium is not installed")
+def test_pages_are_as_wide_as_a_phone_and_print_on_a4(pages, tmp_path):
+    probed = tmp_path / "narrow.html"
+    ask = (
+        "<script>document.title = [document.documentElement.scrollWidth <= window.innerWidth, "
+        "window.innerWidth].join(';');</script>"
+    )
+    for page in pages:
+        probed.write_text(page.read_text().replace("</body>", ask + "</body>", 1))
+        shown = browse("--window-size=390,800", "--dump-dom", f"file://{probed}")
+        assert re.search(r"<title>true;(3|4|5)\d\d</title>", shown)
+    out = tmp_path / "page.pdf"
+    browse(f"--print-to-pdf={out}", f"file://{pages[0]}")
+    sheets = re.findall(rb"/MediaBox\s*\[0 0 (\d+)[\d.]* (\d+)", out.read_bytes())
+    assert 1 <= len(sheets) <= 3
+    assert all(abs(int(w) - 595) <= 1 and abs(int(h) - 842) <= 1 for w, h in sheets)
+
+
+def test_the_sheet_says_what_an_operator_asks(pages):
+    text = pages[0].read_text()
+    problem = Problem.load(PROBLEMS / "wharf.json")
+    solution = Solution.load(pages[0].parent / "s.json")
+    for n, visit in enumerate(solution.tour, 1):
+        assert f'<td>{n}</td><td class="words">{problem.goal_name(visit.goal)}</td>' in text
+    for part in ("How the tether runs", "if it snags here", "Margins", "may be off by", "x (m)",
+                 "course (° from y)", "depth (m)", "turning (°)"):  # fmt: skip
+        assert part in text
+    assert '<text x="' in text
+    assert ">N</text>" not in text  # north is not known
+
+
+CROSS = {
+    "base": (0, 0), "tether_length": 40, "clearance": 0.5,
+    "obstacles": [{"center": (10, 0), "radius": 1, "name": "A"},
+                  {"center": (20, 5), "radius": 1, "name": "B"}],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("word", "origin", "said"),
+    [
+        ((1,), {"latitude": 55, "longitude": 12}, "north of A (rests on it)"),
+        ((), {"latitude": 55, "longitude": 12}, "south of A (rests on it)"),
+        ((1,), {"latitude": 55, "longitude": 12, "heading": 90}, "east of A (rests on it)"),
+        ((1,), None, "+y of A (rests on it)"),
+        ((1, 2), None, "+x +y of A, −x +y of B (rests on it)"),
+    ],
+)
+def test_a_tether_runs_by_the_names_of_obstacles(word, origin, said):
+    problem = Problem(**CROSS, goals=[(20, 0) if len(word) < 2 else (25, 4)], origin=origin)
+    tether = TautPaths(problem).tether(0, word)
+    run = passages(problem, tether, word)
+    if len(word) == 2:
+        assert [(p.obstacle, p.rests) for p in run][-1] == (1, True)
+        assert [p.obstacle for p in run] == [0, 1]
+        return
+    assert listed(problem, run) == said
+
+
+def test_after_a_snag_one_goes_back_to_where_less_is_touched():
+    problem = Problem(**CROSS, goals=[(5, 0), (20, 0)])
+    on_a, on_b = Passage(0, "north", True), Passage(1, "east", True)
+    runs, names = [[], [on_a], [on_a, on_b], [on_b]], ["w", "x", "y", "z"]
+    assert back_from(problem, runs, names, 0).startswith("straight home")
+    assert back_from(problem, runs, names, 1) == (
+        "back the way it came to visit 1 (w), which clears A"
+    )
+    assert back_from(problem, runs, names, 2) == (
+        "back the way it came to visit 2 (x), which clears B"
+    )
+    assert back_from(problem, [[on_a], [on_b, on_a]], ["x", "y"], 1) == (
+        "home along the tether: north of A, east of B"
+    )
 
 
 def test_what_does_not_belong_together_is_refused(pages, tmp_path, capsys):

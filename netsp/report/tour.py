@@ -1,5 +1,6 @@
-"""One self-contained page about a solution or a run: a map with a slider that moves the robot and
-its taut tether, the goals in their order, the checks, measures of entanglement, a run's log."""
+"""One self-contained page about a solution or a run, to print and take along: a map with a slider
+that moves the robot and its taut tether, the goals in their order, how the tether runs, margins,
+the checks, measures of entanglement, a run's log."""
 
 from __future__ import annotations
 
@@ -10,11 +11,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from netsp.arrays import Floats
 from netsp.errors import InputError, counted
-from netsp.execute.plan import HOME, legs_of
+from netsp.execute.plan import HOME
 from netsp.files import read_text, write_text
 from netsp.geometry import polylines
 from netsp.hsignature.measures import measure
@@ -23,17 +23,35 @@ from netsp.online.scene.scene import scene_of
 from netsp.online.tether import GeodesicTether
 from netsp.online.tether.resolution import suggested_delta
 from netsp.pictures import style
-from netsp.problem import Circle, Problem
+from netsp.problem import Problem
+from netsp.report import briefing, chart
 from netsp.report.page import STYLE
 from netsp.solution import Solution, Status
 
 FRAMES = 240
-WIDTH = 900.0
 
 TOUR_STYLE = """
-#map { border: 1px solid #d5dbe1; background: #f7fbff; width: 100%; max-width: 900px }
+#map { background: #fff; width: 100%; max-width: 900px } #map text { font-size: 12px }
+#map .name { font-size: 11px; fill: #1b2631; paint-order: stroke; stroke: #fff; stroke-width: 3px }
+#map .visit { font-size: 10.5px } #map .grid { stroke: #e8edf1; fill: none }
 #slider { width: 100%; max-width: 900px } .chart { max-width: 900px; width: 100% }
-.ok { color: #2b8a3e } .bad { color: #c92a2a } @media print { #slider, .noprint { display: none } }
+.ok { color: #2b8a3e } .bad { color: #c92a2a } .wide { overflow-x: auto }
+.legend { list-style: none; padding: 0; display: flex; flex-wrap: wrap; gap: .2em 1.2em;
+  font-size: 13px } .legend svg { vertical-align: -3px }
+th.words, td.words { text-align: left } td { vertical-align: top }
+@media (max-width: 600px) {
+  body { margin: .6em auto; padding: 0 .6em } #map text, .chart text { font-size: 20px }
+  #map .visit { font-size: 14px } #map .name { font-size: 18px } th, td { padding: .2em .45em }
+  td.words { min-width: 11em } td:nth-child(2) { min-width: 0 }
+}
+@page { size: A4; margin: 12mm }
+@media print {
+  body { margin: 0; padding: 0; max-width: none; font-size: 11px }
+  .noprint, #robot, #tether, #done { display: none } .wide { overflow: visible }
+  table { font-size: 9px; width: 100% } th, td { padding: .15em .35em } h1 { font-size: 16px }
+  h2 { font-size: 12px; margin: .9em 0 .3em; break-after: avoid } tr, svg { break-inside: avoid }
+  #map { max-height: 130mm }
+}
 """
 
 SCRIPT = """
@@ -119,22 +137,30 @@ def page(
     frames = (
         _frames_of_run(problem, rows, tethers) if tethers else _frames_of_plan(problem, solution)
     )
-    view = _View(problem, np.vstack([f["nodes"] for f in frames]))
+    view = chart.View(problem, np.vstack([f["nodes"] for f in frames]))
     title = f"{problem.name}: {'a run' if run else 'a tour'}"
     fates = _fates(run)
+    own = problem.sha256 == solution.problem.sha256
+    found = briefing.of_tour(problem, solution) if run is None else None
     parts = [
         f"<h1>{html.escape(title)}</h1>",
         _summary(problem, solution, run),
-        '<h2>Map</h2><p class="note">The dashed line is the tour. Move the slider: the thick line '
-        "is the tether, pulled taut round the obstacles as it is when the robot is there.</p>",
-        _map(problem, solution, view, fates),
-        '<input id="slider" type="range" min="0" value="0" aria-label="position along the tour">',
-        '<p id="state" class="note"></p>',
-        "<h2>Goals in their order</h2>", _goals(problem, solution, run, fates),
+        "<h2>Map</h2>", chart.draw(problem, solution, view, fates), chart.legend(),
+        '<div class="noprint"><input id="slider" type="range" min="0" value="0" '
+        'aria-label="position along the tour"><p class="note">Move the slider: the thick line is '
+        "the tether, pulled taut round the obstacles as it is when the robot is there.</p>"
+        '<p id="state" class="note"></p></div>',
+        "<h2>Goals in their order</h2>",
+        briefing.stops(problem, solution, found) if run is None
+        else _reached(problem, solution, run, fates),
     ]  # fmt: skip
-    if run is None or problem.sha256 == solution.problem.sha256:
+    if own and problem.state is None and solution.status is not Status.INVALID:
+        parts += ["<h2>How the tether runs</h2>", briefing.tethers(problem, solution)]
+    if found is not None:
+        parts += ["<h2>Margins</h2>", briefing.margin_list(problem, found)]
+    if run is None or own:
         parts += ["<h2>Checks</h2>", _checks(problem, solution)]
-    if problem.state is None and problem.sha256 == solution.problem.sha256:
+    if problem.state is None and own:
         parts += ["<h2>Measures of entanglement</h2>", _measures(problem, solution)]
     if rows:
         parts += ["<h2>Log</h2>", _charts(rows, problem.units), _events(run)]
@@ -147,39 +173,14 @@ def page(
     ]  # fmt: skip
     data = json.dumps(shown, allow_nan=False).replace("<", "\\u003c")
     return (
-        f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>{html.escape(title)}'
+        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f"<title>{html.escape(title)}"
         f'</title><link rel="icon" href="data:,"><style>{STYLE}{TOUR_STYLE}</style></head><body>'
         + "\n".join(parts)
         + f'<script type="application/json" id="frames">{data}</script>'
         + f"<script>{SCRIPT}</script></body></html>\n"
     )
-
-
-class _View:
-    """From the plan to the picture."""
-
-    def __init__(self, problem: Problem, more: Floats) -> None:
-        xy = [problem.points[:, :2], more[:, :2]]
-        for o in problem.obstacles:
-            c = np.array([o.center]) if isinstance(o, Circle) else np.array(o.polygon)
-            r = o.radius if isinstance(o, Circle) else 0.0
-            xy += [c - r, c + r]
-        every = np.vstack(xy)
-        low, high = every.min(axis=0), every.max(axis=0)
-        room = 0.04 * float((high - low).max()) + 1e-9
-        self.low, self.high = low - room, high + room
-        self.scale = WIDTH / float(self.high[0] - self.low[0])
-        self.height = float(self.high[1] - self.low[1]) * self.scale
-
-    def point(self, p: npt.ArrayLike) -> list[float]:
-        x, y = np.asarray(p, dtype=float)[:2]
-        return [
-            round(float(x - self.low[0]) * self.scale, 2),
-            round(float(self.high[1] - y) * self.scale, 2),
-        ]
-
-    def points(self, line: Floats) -> str:
-        return " ".join(f"{x},{y}" for x, y in (self.point(p) for p in line))
 
 
 def _frames_of_plan(problem: Problem, solution: Solution) -> list[dict[str, Any]]:
@@ -246,8 +247,11 @@ def _summary(problem: Problem, solution: Solution, run: Path | None) -> str:
         proof += f", at most {100 * solution.gap:.2g} % above the shortest"
     lines = [
         f"{html.escape(problem.summary)}. The plan is {solution.length:.6g} "
-        f"{units} long ({proof}; solver {html.escape(solution.solver)})."
+        f"{units} long ({proof}; solver {html.escape(solution.solver)}). "
+        f"{html.escape(briefing.first_words(problem, solution))}"
     ]
+    if planned := briefing.planned_with(solution):
+        lines.append(html.escape(planned))
     if run is not None:
         s = _json(run / "summary.json")
         lines.append(
@@ -268,85 +272,22 @@ def _fates(run: Path | None) -> dict[int, str]:
     return left_out | {int(g): "cancelled" for g in s["cancelled"]}
 
 
-def _map(problem: Problem, solution: Solution, view: _View, fates: dict[int, str]) -> str:
-    shapes = []
-    look = f'fill="{style.OBSTACLE}" stroke="{style.EDGE}"'
-    for i, o in enumerate(problem.obstacles):
-        title = f"<title>{html.escape(problem.obstacle_label(i))}</title>"
-        if isinstance(o, Circle):
-            x, y = view.point(o.center)
-            shapes.append(f'<circle cx="{x}" cy="{y}" r="{o.radius * view.scale:.2f}" '
-                          f'{look}>{title}</circle>')  # fmt: skip
-            if len(problem.obstacles) <= 40:
-                shapes.append(f'<text x="{x}" y="{y + 4}" font-size="10" text-anchor="middle" '
-                              f'fill="{style.EDGE}">{html.escape(problem.obstacle_name(i))}'
-                              "</text>")  # fmt: skip
-        else:
-            corners = view.points(np.array(o.polygon))
-            shapes.append(f'<polygon points="{corners}" {look}>{title}</polygon>')
-    shapes.append(f'<polyline points="{view.points(np.array(solution.path))}" fill="none" '
-                  f'stroke="{style.PLAN}" stroke-dasharray="5 4"/>')  # fmt: skip
-    shapes.append(f'<polyline id="done" fill="none" stroke="{style.PATH}" stroke-width="2"/>')
-    shapes.append(f'<polyline id="tether" fill="none" stroke="{style.TETHER}" stroke-width="3"/>')
-    visit = {v.goal: n + 1 for n, v in enumerate(solution.tour)}
-    for k, goal in enumerate(problem.goals):
-        x, y = view.point(goal.position)
-        label = str(visit.get(k, "–"))
-        colour = {"left out": style.LEFT_OUT, "cancelled": style.CANCELLED}.get(
-            fates.get(k, ""), style.VISITED
-        )
-        fate = f" {fates[k]}" if k in fates else ""
-        shapes.append(f'<circle cx="{x}" cy="{y}" r="5" fill="{colour}"><title>'
-                      f"{html.escape(problem.goal_label(k))}{fate}</title></circle>"
-                      f'<text x="{x + 7}" y="{y - 6}" font-size="12">{label}'
-                      f'<tspan fill="{style.EDGE}"> {html.escape(goal.name or "")}{fate}</tspan>'
-                      "</text>")  # fmt: skip
-    x, y = view.point(problem.base)
-    shapes.append(f'<polygon points="{_star(x, y)}" fill="{style.BASE}"><title>base</title>'
-                  "</polygon>")  # fmt: skip
-    shapes.append(f'<circle id="robot" r="6" fill="{style.ROBOT}" stroke="{style.BASE}"/>')
-    return (f'<svg id="map" viewBox="0 0 {WIDTH:g} {view.height:.1f}" role="img" '
-            f'aria-label="map">{"".join(shapes)}</svg>')  # fmt: skip
-
-
-def _star(x: float, y: float) -> str:
-    """Corners of a star, the mark of the base in all pictures."""
-    angle = np.pi * (np.arange(10) / 5.0 - 0.5)
-    radius = np.where(np.arange(10) % 2, 4.0, 10.0)
-    corners = zip(x + radius * np.cos(angle), y + radius * np.sin(angle), strict=True)
-    return " ".join(f"{a:.2f},{b:.2f}" for a, b in corners)
-
-
-def _goals(problem: Problem, solution: Solution, run: Path | None, fates: dict[int, str]) -> str:
-    legs = legs_of(problem, solution) if run is None else None
-    arrived = {int(r["goal"]): r for r in _table(run / "visits.csv")} if run else {}
-    units = html.escape(problem.units)
-    head = ["visit", "goal", f"tether ({units})", f"slack ({units})", "word"]
-    head += (
-        [f"leg ({units})", f"path so far ({units})"]
-        if legs
-        else ["reached at (s)", f"tether when reached ({units})"]
-    )
-    body, total = [], 0.0
+def _reached(problem: Problem, solution: Solution, run: Path, fates: dict[int, str]) -> str:
+    """The visits of a plan that was carried out."""
+    arrived = {int(r["goal"]): r for r in _table(run / "visits.csv")}
+    u = problem.units
+    head = ["visit", "goal", f"tether ({u})", f"slack ({u})", "reached at (s)",
+            f"tether when reached ({u})", "word"]  # fmt: skip
+    rows = []
     for n, v in enumerate(solution.tour):
-        cells = [
-            str(n + 1), html.escape(problem.goal_name(v.goal)), f"{v.tether_length:.5g}",
+        row = arrived.get(v.goal)
+        rows.append([
+            str(n + 1), problem.goal_name(v.goal), f"{v.tether_length:.5g}",
             f"{problem.tether_length - v.tether_length:.5g}",
-            str(list(v.signature)),
-        ]  # fmt: skip
-        if legs:
-            total += legs[n].length
-            cells += [f"{legs[n].length:.5g}", f"{total:.6g}"]
-        else:
-            row = arrived.get(v.goal)
-            cells += (
-                [f"{float(row['time']):.1f}", f"{float(row['tether']):.5g}"]
-                if row
-                else [fates.get(v.goal, "–"), "–"]
-            )
-        body.append("<tr>" + "".join(f"<td>{c}</td>" for c in cells) + "</tr>")
-    top = "<tr>" + "".join(f"<th>{h}</th>" for h in head) + "</tr>"
-    return f"<table>{top}{''.join(body)}</table>"
+            f"{float(row['time']):.1f}" if row else fates.get(v.goal, "–"),
+            f"{float(row['tether']):.5g}" if row else "–", str(list(v.signature)),
+        ])  # fmt: skip
+    return briefing.table(head, rows, (1, 6))
 
 
 def _checks(problem: Problem, solution: Solution) -> str:
