@@ -63,7 +63,8 @@ class ProblemReference(Model):
 
 
 class Visit(Model):
-    """One visit of the tour: the goal (0-based), the word of the tether there, its taut length."""
+    """One visit of the tour: the goal (0-based), the word of the tether there, its taut length; and
+    the goal's name and position, by which it is found again in a problem that has been edited."""
 
     goal: Annotated[
         Annotated[int, Field(ge=0)], Field(description="index in the problem's goals, from 0")
@@ -74,6 +75,10 @@ class Visit(Model):
     tether_length: Annotated[
         NonNegative, Field(description="of the taut tether at the goal, in the problem's units")
     ]
+    name: Annotated[Name | None, Field(description="of the goal; null for none")] = None
+    position: Annotated[
+        PathPoint | None, Field(description="(x, y, z) of the goal, in the problem's units")
+    ] = None
 
 
 class Timings(Model):
@@ -227,6 +232,10 @@ class Solution(Drawn, FileModel):
                 del data[name]
         if self.max_tension_ratio is None:
             del data["max_tension_ratio"]
+        for visit in data["tour"]:
+            for name in ("name", "position"):
+                if visit[name] is None:
+                    del visit[name]
         text = json.dumps(data, indent=1, allow_nan=False, ensure_ascii=False)
         rows = ",\n".join("  " + json.dumps(p, allow_nan=False) for p in path)
         return f'{text[:-2]},\n "path": [\n{rows}\n ]\n}}\n'

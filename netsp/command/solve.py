@@ -7,6 +7,7 @@ import contextlib
 import sys
 from typing import TYPE_CHECKING
 
+from netsp.command import messages
 from netsp.command.types import (
     check_writable,
     choices,
@@ -102,7 +103,9 @@ def arguments(p: argparse.ArgumentParser) -> None:
         "--margin", type=length, default=0.0, metavar="R",
         help="plan so that every obstacle may be off by R; default 0 (docs/sizing.md)",
     )  # fmt: skip
-    p.add_argument("--warm-start", metavar="SOLUTION", help="start from this solution's tour")
+    p.add_argument("--warm-start", metavar="SOLUTION",
+        help="start from this solution's tour, also one of an older version of the problem",
+    )  # fmt: skip
     p.add_argument(
         "-o", "--output", metavar="FILE", help="write the solution to this file (default: stdout)"
     )
@@ -132,6 +135,10 @@ def run(args: argparse.Namespace) -> int:
         for picture in filter(None, (args.plot, args.plot_trace)):
             style.check_format(picture)
     from netsp.solvers.solve import solve
+    from netsp.solvers.warm import told
+
+    if warm is not None and (text := told(problem, warm)):
+        messages.note(text)
 
     rows: list[Progress] = []
 

@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from netsp.hsignature import entangled
+from netsp.hsignature import Word, entangled
 from netsp.problem import Problem
 from netsp.solution import ProblemReference, Solution, Timings, Visit
 from netsp.travel.graph import TravelGraph
@@ -30,7 +30,7 @@ def to_solution(
         visits, path = _blind_visits(problem, result.trajectory), result.trajectory.path
         wrapped = tuple(k - 1 for k in entangled(result.trajectory.word))
     else:
-        visits, wrapped = _visits(graph, result.tour or ()), ()
+        visits, wrapped = _visits(problem, graph, result.tour or ()), ()
         walk = result.walk or (*(result.tour or ()), 0)
         legs = [graph.path(u, v) for u, v in pairwise(walk)]
         path = np.vstack([legs[0], *(leg[1:] for leg in legs[1:])]) if legs else np.zeros((0, 3))
@@ -53,15 +53,18 @@ def to_solution(
     )
 
 
-def _visits(graph: TravelGraph, tour: Sequence[int]) -> tuple[Visit, ...]:
+def _visits(problem: Problem, graph: TravelGraph, tour: Sequence[int]) -> tuple[Visit, ...]:
     return tuple(
-        Visit(
-            goal=int(graph.goal[v]) - 1,
-            signature=graph.signatures[v],
-            tether_length=float(graph.tethers[v]),
-        )
+        _visit(problem, int(graph.goal[v]) - 1, graph.signatures[v], float(graph.tethers[v]))
         for v in tour[1:]
         if v != graph.start
+    )
+
+
+def _visit(problem: Problem, goal: int, word: Word, tether: float) -> Visit:
+    own = problem.goals[goal]
+    return Visit(
+        goal=goal, signature=word, tether_length=tether, name=own.name, position=own.position
     )
 
 
@@ -72,7 +75,7 @@ def _blind_visits(problem: Problem, walked: Trajectory) -> tuple[Visit, ...]:
     longest = float(np.hypot(*np.diff(walked.path[:, :2], axis=0).T).sum())
     paths = TautPaths(problem, longest * (1.0 + 1e-6))
     return tuple(
-        Visit(goal=goal - 1, signature=word, tether_length=paths.length(0, goal, word))
+        _visit(problem, goal - 1, word, paths.length(0, goal, word))
         for goal, word in zip(walked.order, walked.words, strict=True)
     )
 

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from netsp.arrangement import keeps
 from netsp.clock import Clock, TimeLimit
 from netsp.errors import InputError
 from netsp.fields import checked_argument
@@ -21,6 +20,7 @@ from netsp.solvers.answer import to_solution
 from netsp.solvers.custom import call, read_options, whole_numbers
 from netsp.solvers.in_order import solve_in_order
 from netsp.solvers.table import ROADMAPS, SOLVERS
+from netsp.solvers.warm import old_tour, tour_from
 from netsp.solving.limits import Limits
 from netsp.solving.params import NoParams, read_params
 from netsp.travel.graph import TravelGraph
@@ -256,8 +256,8 @@ def solve(
     params : mapping, optional
         The solver's options by name.
     warm_start : Solution, optional
-        A solution of the same problem to start from, by whatever solver; where a class of it is not
-        in this roadmap, the best of its order is taken.
+        A solution of the problem, or of an older version of it, to start from, by whatever solver
+        (`netsp.solvers.warm`).
     margin : float
         The tour is to bear obstacles that are off by so much (`netsp.sizing.margins`): all are
         grown by it, in the problem's units.
@@ -281,7 +281,7 @@ def solve(
     Raises
     ------
     InputError
-        Unknown names, bad limits, a warm start for another problem.
+        Unknown names, bad limits, a warm start without any goal of the problem.
     InfeasibleError
         Some goal is out of the tether's reach; says which and by how much.
     LimitReachedError
@@ -300,15 +300,15 @@ def solve(
         raise InputError(f"warm_start: expected a Solution, got {warm_start!r}")
     _seed(seed)
     _check_limits(time_limit, iteration_limit)
-    if warm_start is not None and warm_start.problem.sha256 != problem.sha256:
-        raise InputError("warm_start: it is the solution of another problem (sha256 differs)")
+    if warm_start is not None:
+        old_tour(problem, warm_start)
     check_solver(solver, params)  # before the long work
     if margin or slack:
         grown = problem.grown(margin, slack)
         found = solve(
             grown, solver, roadmap=roadmap, roadmap_options=roadmap_options,
             time_limit=time_limit, iteration_limit=iteration_limit, seed=seed, params=params,
-            warm_start=None if warm_start is None else _for_grown(warm_start, grown),
+            warm_start=None if warm_start is None else _for_grown(warm_start, problem, grown),
             friction=friction, max_tension_ratio=max_tension_ratio, keep_order=keep_order,
             on_progress=on_progress,
         )  # fmt: skip
@@ -343,7 +343,7 @@ def solve(
         iteration_limit=iteration_limit,
         seed=seed,
         params=params,
-        warm_start=_tour_of(warm_start, graph) if warm_start is not None else None,
+        warm_start=tour_from(problem, warm_start, graph) if warm_start is not None else None,
         on_progress=on_progress,
     )
     timings = _timings(clock, built, graph)
@@ -380,8 +380,10 @@ def _timings(clock: Clock, built: float, graph: TravelGraph) -> Timings:
     )
 
 
-def _for_grown(warm: Solution, grown: Problem) -> Solution:
+def _for_grown(warm: Solution, problem: Problem, grown: Problem) -> Solution:
     """A solution to start from as one of the problem with its obstacles grown."""
+    if warm.problem.sha256 != problem.sha256:
+        return warm
     own = ProblemReference(name=grown.name, sha256=grown.sha256)
     return warm.model_copy(update={"problem": own})
 
@@ -432,22 +434,3 @@ def _as_tour(vertices: Sequence[int], graph: TravelGraph) -> tuple[int, ...]:
             f"{str(vertices)[:80]}"
         )
     return tour
-
-
-def _tour_of(solution: Solution, graph: TravelGraph) -> list[int] | None:
-    """The vertices of a solution's tour; if a class of it is not in the graph, the best classes for
-    its order; None if it has no tour of all goals."""
-    goals = [visit.goal + 1 for visit in solution.tour]
-    cluster_of = dict(zip(graph.goal.tolist(), graph.cluster.tolist(), strict=True))
-    order = [cluster_of.get(g, 0) for g in goals]
-    if sorted(order) != list(range(1, graph.goal_count + 1)) or not keeps(order, graph.before):
-        return None
-    words = [tuple(visit.signature) for visit in solution.tour]
-    there = graph.vertices_of(goals, words)
-    if there is None and order:
-        from netsp.lns import Instance, best_classes
-
-        instance = Instance.of(graph)
-        _, tour = best_classes(np.array(order), instance.start, instance.costs)
-        return list(instance.original(tour))
-    return [0, *(there or [])]
