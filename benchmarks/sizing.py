@@ -8,7 +8,10 @@ The farms (GeoJSON of turbines: dudgeon.geojson, hornsrev1.geojson) are read fro
 from __future__ import annotations
 
 import argparse
+import sys
+import tempfile
 import time
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +26,11 @@ from netsp.sizing.candidates import over_grid
 from netsp.worlds import reachable_world
 
 PROBLEMS = Path(__file__).parent.parent / "problems"
+FORMATS = (
+    ("GeoJSON", "s.geojson", None), ("KML", "s.kml", "LIBKML"), ("KMZ", "s.kmz", "LIBKML"),
+    ("GeoPackage", "s.gpkg", "GPKG"),
+)  # fmt: skip
+
 SUBSTATION = Projection(55.486, 7.84)
 """About where the one of Horns Rev stands; the data has turbines only."""
 
@@ -56,6 +64,41 @@ def farms(folder: Path, seconds: float) -> None:
             row(name, f"{tether:g}", len(problem.goals), left_out, f"{found.length:.0f}",
                 f"{found.lower_bound:.0f}", f"{100.0 * found.gap:.2f}", found.status.value,
                 f"{took:.0f}", "yes" if good else "NO")  # fmt: skip
+    print()
+
+
+def formats() -> None:
+    """The site of the tests, written in every format and read back."""
+    sys.path.insert(0, str(PROBLEMS.parent))
+    from tests.test_site import PLANE, feature, rows, write_geojson, write_vector
+
+    print("### One site in every format\n")
+    head("format", "goals off by at most, mm", "obstacles differ by, cm²", "read in ms",
+         name="sizing-formats")  # fmt: skip
+    goals = {p["name"]: s.coords[0] for s, p in PLANE["goal"]}
+    shapes = {
+        p["name"]: s.buffer(p["radius_m"], quad_segs=64) if "radius_m" in p else s
+        for s, p in PLANE["obstacle"]
+    }
+    for label, name, driver in FORMATS:
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / name
+            if driver is None:
+                write_geojson(file, [feature(s, kind=k, **p) for k, s, p in rows()])
+            else:
+                plain = file.with_name("doc.kml") if name.endswith("kmz") else file
+                write_vector(plain, driver)
+                if plain != file:
+                    with zipfile.ZipFile(file, "w") as packed:
+                        packed.write(plain, "doc.kml")
+            maps = [("tether_length", "tether_len")] if driver else []
+            read_site(file, maps=maps)  # GDAL loaded
+            begin = time.perf_counter()
+            found = read_site(file, maps=maps)
+            took = time.perf_counter() - begin
+        off = max(np.abs(np.array(g.position) - goals[g.name]).max() for g in found.goals)
+        area = max(o.shape().symmetric_difference(shapes[o.name]).area for o in found.obstacles)
+        row(label, f"{1e3 * off:.2g}", f"{1e4 * area:.2g}", f"{1e3 * took:.0f}")
     print()
 
 
@@ -129,6 +172,7 @@ def main() -> None:
     heading("Sites, tethers and bases")
     solve(Problem.load(PROBLEMS / "pool.json"))  # compiled, or loaded
     np.seterr(all="ignore")
+    formats()
     curves()
     bases()
     margined(args.worlds)

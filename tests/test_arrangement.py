@@ -89,6 +89,10 @@ def test_every_solver_that_may_finds_the_best_of_the_orders_and_places_allowed(
             assert verify(problem, found)
             assert found.length >= best * (1.0 - 1e-9)
         assert solve(problem, "mip").length == pytest.approx(best)
+        found = solve(problem, "anneal-2016", iteration_limit=200)
+        assert verify(problem, found)
+        walked = solve(problem, "greedy-tsp")
+        assert walked.status is Status.INVALID or verify(problem, walked)
 
 
 @settings(max_examples=25, deadline=None)

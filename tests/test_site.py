@@ -604,3 +604,12 @@ def test_options_of_images_and_of_maps_do_not_mix(tmp_path, capsys):
     assert "expected --resolution" in capsys.readouterr().err
     assert main([*argv, "--resolution", "1"]) == 2
     assert "alone.png: not an image" in capsys.readouterr().err
+
+
+def test_degrees_taken_for_metres_are_told(tmp_path):
+    shapes = [(shapely.Point(0.0, 55.0), {"kind": "base", "tether_length": 300.0}),
+              (shapely.Point(0.001, 55.001), {"kind": "goal", "name": "g"})]  # fmt: skip
+    file = write_geojson(tmp_path / "s.geojson", [feature(s, **p) for s, p in shapes])
+    with pytest.raises(InputError, match="they look like degrees; expected metres"):
+        read_site(file, crs="local")
+    assert len(read_site(file).goals) == 1

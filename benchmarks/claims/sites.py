@@ -122,9 +122,43 @@ def farm() -> tuple[str, bool]:
     return f"{found.length:.0f} m, {found.status.value}, {took:.0f} s", good and took <= 60.0
 
 
+def arranged() -> tuple[str, bool]:
+    """Orders given in part, of docs/solvers.md; the same lengths, proven."""
+    from arranged import arranged as world
+
+    from netsp import Status, solve, verify
+
+    lengths, good = [], True
+    for goals, seed, ties, length in ((12, 1, 6, 1244.0), (16, 2, 8, 2092.0), (20, 4, 40, 2962.5)):
+        problem = world(goals, seed, ties)[1]
+        found = solve(problem, time_limit=60)
+        lengths.append(f"{found.length:.1f}")
+        good &= found.status is Status.OPTIMAL and bool(verify(problem, found))
+        good &= abs((found.length or 0.0) - length) < 0.06
+    return f"{', '.join(lengths)}, {'proven' if good else 'NOT all proven, or other lengths'}", good
+
+
+def formats() -> tuple[str, bool]:
+    """An occupancy image and maps of other formats: the example basin, proven."""
+    from netsp import Status, solve, verify
+    from netsp.site.occupancy import read_occupancy
+    from netsp.site.table import from_table
+
+    places, names = from_table(ROOT / "examples" / "basin-goals.csv")
+    goals = [{"position": p, "name": n} for p, n in zip(places.tolist(), names, strict=True)]
+    problem = read_occupancy(
+        ROOT / "examples" / "basin.yaml", (6.0, 8.0), goals, 60.0, clearance=0.3
+    )
+    found = solve(problem)
+    good = found.status is Status.OPTIMAL and bool(verify(problem, found))
+    return f"{found.length:.2f} m among {len(problem.obstacles)} polygons", good
+
+
 def claims() -> Iterator[Claim]:
     """All of this file."""
     yield Claim("example sites, and back from their export", "proven; 1e-5", examples)
+    yield Claim("an occupancy image planned on", "proven, verified", formats)
+    yield Claim("orders given in part, 12 to 20 goals", "lengths of the docs, proven", arranged)
     yield Claim("curves of tether lengths beside solves", "all agree", curve)
     yield Claim("where to stand, 100 places", "60 s each, proven", base(60.0), timed=True)
     yield Claim("worlds that are off by a tour's margin and do not fit", "none", margined)

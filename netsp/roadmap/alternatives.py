@@ -13,6 +13,25 @@ from netsp.travel.choices import with_choices
 from netsp.travel.graph import TravelGraph
 
 
+def nearest_places(problem: Problem) -> list[int]:
+    """Of every goal the place that the shortest tether reaches: for solvers that walk between
+    places, and cannot choose among them.
+
+    Parameters
+    ----------
+    problem : Problem
+        Some of its goals are alternatives.
+
+    Returns
+    -------
+    list of int
+        Indices of goals, one of each cluster, in order.
+    """
+    tethers, clusters = shortest_tethers(problem), problem.clusters
+    members = (np.flatnonzero(clusters == c) for c in range(1, problem.visits + 1))
+    return sorted(int(m[np.argmin(tethers[m])]) for m in members)
+
+
 def graph_of_choices(problem: Problem, build: Callable[[Problem], TravelGraph]) -> TravelGraph:
     """Build over all places in reach, then take alternatives together.
 

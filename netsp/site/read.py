@@ -106,6 +106,9 @@ def read_map(file: str | Path, crs: str | None = None) -> Map:
     return found if crs is None else in_degrees(found, crs, file)
 
 
+DEGREES = 0.01
+"""Of the tether's length: a plane that spans less is taken for one of degrees."""
+
 MOST_OF_A_KIND = 5
 """Goals out of reach that are told one by one."""
 
@@ -149,6 +152,7 @@ class _Site:
                 "obstacles to inspect (--inspect)"
             )
         if tether is not None:
+            self._check_scale(goals, obstacles, anchor, tether)
             goals = self._within_reach(goals, anchor, tether)
         bounds = self._bounds(parts["bounds"])
         if self.complaints:
@@ -420,6 +424,23 @@ class _Site:
                 )
             if name is not None:
                 seen.setdefault(name, thing["where"])
+
+    def _check_scale(
+        self, goals: list[dict[str, Any]], obstacles: list[dict[str, Any]], anchor: Any,
+        tether: float,
+    ) -> None:  # fmt: skip
+        """A plane in which a tether would reach everything many times over is one of degrees."""
+        if self.map.geographic or not goals:
+            return
+        places = np.array([anchor, *(g["position"] for g in goals)])[:, :2] / self._unit
+        span = float(np.ptp(places * self._unit, axis=0).max())
+        small = bool((np.abs(places) <= [180.0, 90.0]).all())
+        whole = bool((places == np.round(places)).all())
+        if small and not whole and span <= DEGREES * tether:
+            self._complain(
+                f"coordinates span {span:g} m, and the tether is {_metres(tether)} long: they look "
+                "like degrees; expected metres, or --crs EPSG:4326"
+            )
 
     def _within_reach(
         self, goals: list[dict[str, Any]], anchor: Any, tether: float

@@ -316,6 +316,12 @@ def solve(
         return found.model_copy(
             update={"problem": own, "margin": float(margin), "slack": float(slack)}
         )
+    if problem.visits < len(problem.goals) and _walks_between_places(solver):
+        return _over_nearest_places(
+            problem, solver, roadmap=roadmap, roadmap_options=roadmap_options,
+            time_limit=time_limit, iteration_limit=iteration_limit, seed=seed, params=params,
+            on_progress=on_progress,
+        )  # fmt: skip
     limits = {
         "friction": checked_argument("friction", friction, 0.0, 10.0),
         "max_tension_ratio": _tension_ratio(max_tension_ratio, friction),
@@ -349,6 +355,23 @@ def solve(
     timings = _timings(clock, built, graph)
     found = to_solution(problem, graph, result, name_of(solver), seed, timings)
     return found.model_copy(update=limits) if friction else found
+
+
+def _walks_between_places(solver: SolverLike) -> bool:
+    return isinstance(solver, str) and SOLVERS.named(solver).geometric
+
+
+def _over_nearest_places(problem: Problem, solver: SolverLike, **more: Any) -> Solution:
+    """The solution over one place of every goal with alternatives. What it proves is of these."""
+    from netsp.roadmap.alternatives import nearest_places
+
+    chosen = nearest_places(problem)
+    goals = tuple(problem.goals[k].model_copy(update={"choice": None}) for k in chosen)
+    found = solve(problem.model_copy(update={"goals": goals}), solver, **more)
+    visits = tuple(v.model_copy(update={"goal": chosen[v.goal]}) for v in found.tour)
+    own = ProblemReference(name=problem.name, sha256=problem.sha256)
+    none = {"lower_bound": None, "gap": None}
+    return found.model_copy(update={"problem": own, "tour": visits, **none})
 
 
 def _tension_ratio(value: float | None, friction: float) -> float | None:
