@@ -99,9 +99,29 @@ class SeveralErrors(InputError):
 
 
 class InfeasibleError(NetspError):
-    """The problem is proven to have no solution; the message names the goal and the reason."""
+    """The problem is proven to have no solution; the message names the goal and the reason.
+
+    Parameters
+    ----------
+    message : object
+        One line.
+    goal : int, optional
+        Index of the first goal that cannot be visited.
+    needed : float, optional
+        Length of the shortest tether that reaches it, in the problem's units; inf where it is cut
+        off; None where the length is not what is wrong.
+    enclosing : sequence of int
+        Obstacles that cut it off, or the base.
+    """
 
     exit_code = EXIT_INFEASIBLE
+
+    def __init__(
+        self, message: object = "", *, goal: int | None = None, needed: float | None = None,
+        enclosing: Sequence[int] = (),
+    ) -> None:  # fmt: skip
+        super().__init__(message)
+        self.goal, self.needed, self.enclosing = goal, needed, tuple(enclosing)
 
 
 class LimitReachedError(NetspError):

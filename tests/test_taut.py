@@ -9,7 +9,17 @@ import shapely
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from netsp import Circle, InfeasibleError, InputError, Polygon, Problem, Status, solve, verify
+from netsp import (
+    Circle,
+    InfeasibleError,
+    InputError,
+    Polygon,
+    Problem,
+    Status,
+    solve,
+    travel_graph,
+    verify,
+)
 from netsp.clock import Clock
 from netsp.errors import LimitReachedError
 from netsp.hsignature import crossings, is_looping, reduce, signature
@@ -596,3 +606,24 @@ def test_beside_a_circle_ever_wider_the_tour_stays_as_long_as_beside_its_tangent
         obstacles=[Circle(center=(radius + 1e-3, 0), radius=radius)],
     )  # fmt: skip
     assert solve(problem).length == pytest.approx(4 + 1 + math.hypot(4, 1), rel=1e-6)
+
+
+def test_what_cannot_be_reached_is_told_by_goal_length_and_obstacles():
+    wall = [Circle(center=(4 + 1.5 * np.cos(a), 1.5 * np.sin(a)), radius=0.7)
+            for a in np.arange(8) * np.pi / 4]  # fmt: skip
+    far = Circle(center=(-9, 0), radius=1)
+    cut_off = Problem(base=(0, 0), goals=[(1, 1), (4, 0)], obstacles=[far, *wall], tether_length=20)
+    with pytest.raises(InfeasibleError) as told:
+        travel_graph(cut_off)
+    assert (told.value.goal, told.value.needed) == (1, np.inf)
+    assert told.value.enclosing == tuple(range(1, 9))
+    short = Problem(base=(0, 0), goals=[(6, 8)], tether_length=9)
+    with pytest.raises(InfeasibleError) as told:
+        travel_graph(short)
+    assert (told.value.goal, told.value.enclosing) == (0, ())
+    assert told.value.needed == pytest.approx(10.0)
+    choice = Problem(base=(0, 0), tether_length=9, goals=[
+        (1, 0), {"name": "c", "any_of": [(60, 80), (6, 8)]}])  # fmt: skip
+    with pytest.raises(InfeasibleError) as told:
+        travel_graph(choice)
+    assert told.value.goal == 1

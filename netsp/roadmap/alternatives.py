@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from netsp.errors import InputError
+from netsp.errors import InfeasibleError, InputError
 from netsp.problem import Problem
 from netsp.roadmap.within_reach import HAIR, shortest_tethers
 from netsp.travel.choices import with_choices
@@ -66,7 +66,13 @@ def graph_of_choices(problem: Problem, build: Callable[[Problem], TravelGraph]) 
             within |= clusters == c  # out of reach altogether: that will be said
     kept = np.flatnonzero(within)
     goals = [problem.goals[k].model_copy(update={"choice": None, "after": ()}) for k in kept]
-    graph = build(problem.model_copy(update={"goals": tuple(goals)}))
+    try:
+        graph = build(problem.model_copy(update={"goals": tuple(goals)}))
+    except InfeasibleError as error:
+        goal = None if error.goal is None else int(kept[error.goal])
+        raise InfeasibleError(
+            error, goal=goal, needed=error.needed, enclosing=error.enclosing
+        ) from None
     out = with_choices(graph, np.concatenate([[0], clusters[kept]]))
     out.goal = np.concatenate([[0], kept + 1])[graph.cluster]
     out.before = problem.precedences

@@ -16,11 +16,10 @@ import numpy as np
 
 from netsp.arrays import Floats, Ints
 from netsp.clock import Clock
-from netsp.errors import InfeasibleError
 from netsp.hsignature import Word, is_looping, signature
 from netsp.roadmap.explore import NON_LOOPING, Found, run_explore
 from netsp.roadmap.paths import TautPaths
-from netsp.roadmap.reach import explain_unreached
+from netsp.roadmap.reach import unreached
 from netsp.roadmap.trie import Trie
 
 STATES_PER_CLASS = 200
@@ -159,7 +158,7 @@ class _Search:
             return None
         missing = sorted(set(range(1, self.goals + 1)) - {g for g, _ in best})
         if missing:
-            raise InfeasibleError(explain_unreached(self.problem, self.paths.outline, missing))
+            raise unreached(self.problem, self.paths.outline, missing)
         order = sorted(best, key=lambda k: (k[0], best[k][0], trie.word(k[1])))
         last = np.array([0, *(best[k][1] for k in order)], dtype=np.int64)
         tree = TetherTree(last, found.tree[:, 3], found.tree_length)
@@ -174,7 +173,7 @@ class _Search:
         planar, before = contacts.tree(0)
         missing = [g for g in range(1, self.goals + 1) if planar[g] > self.within[g]]
         if missing:
-            raise InfeasibleError(explain_unreached(self.problem, self.paths.outline, missing))
+            raise unreached(self.problem, self.paths.outline, missing)
         rays = self.problem.representative_points - self.paths.outline.origin
         rows: list[tuple[int, float, Word]] = []
         tree = _GrowingTree()

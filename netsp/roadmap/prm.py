@@ -20,7 +20,7 @@ import numpy as np
 from netsp.arrays import Bools, Floats, Ints
 from netsp.clock import NEVER, Clock, Flag, TimeLimit
 from netsp.compiled.kernel import kernel
-from netsp.errors import InfeasibleError, InputError, LimitReachedError
+from netsp.errors import InputError, LimitReachedError
 from netsp.geometry.kernels import Blockers, depth_in_obstacle, segment_blocked
 from netsp.hsignature import Word
 from netsp.problem import Circle, Problem
@@ -30,7 +30,7 @@ from netsp.roadmap.legs import TautLegs
 from netsp.roadmap.letters import segment_letters
 from netsp.roadmap.outline import Outline
 from netsp.roadmap.paths import TautPaths
-from netsp.roadmap.reach import explain_unreached
+from netsp.roadmap.reach import unreached
 from netsp.roadmap.shortest import MilestoneGraph
 from netsp.travel.detours import Detours
 from netsp.travel.graph import UNTIMED, TravelGraph
@@ -186,7 +186,7 @@ class PrmRoadmap:
             needs = np.hypot(reach, points[:, 2] - points[0, 2])[: len(points)]
             beyond = [k for k in missing if needs[k] > self.problem.tether_length]
             if beyond:
-                raise InfeasibleError(explain_unreached(self.problem, self.paths.outline, beyond))
+                raise unreached(self.problem, self.paths.outline, beyond)
             k = missing[0]
             more = f" and {len(missing) - 1} more goals" if len(missing) > 1 else ""
             raise LimitReachedError(

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from netsp.errors import InfeasibleError
 from netsp.problem import Circle, Problem
 from netsp.roadmap.outline import Outline
 from netsp.roadmap.shortest import ContactGraph
@@ -17,14 +18,22 @@ if TYPE_CHECKING:
 
 def explain_unreached(problem: Problem, outline: Outline, missing: list[int]) -> str:
     """One line on goals (as point numbers, base 0) that no admissible tether reaches."""
+    return str(unreached(problem, outline, missing))
+
+
+def unreached(problem: Problem, outline: Outline, missing: list[int]) -> InfeasibleError:
+    """The error about goals (as point numbers, base 0) that no admissible tether reaches."""
     planar = ContactGraph(outline).lengths([0])[0]
     dz = problem.points[:, 2] - problem.points[0, 2]
     needed = np.hypot(planar, dz)
-    parts = []
+    parts: list[str] = []
+    enclosing: tuple[int, ...] = ()
     for g in missing[:3]:
         label = problem.goal_label(g - 1)
         if math.isinf(needed[g]):
-            why = _enclosure(problem, g)
+            why, around = _enclosure(problem, g)
+            if g == missing[0]:
+                enclosing = around
             parts.append(f"{label} cannot be reached with a tether of any length: {why}")
         else:
             shortest = math.ceil(needed[g] * 1e6) / 1e6
@@ -34,10 +43,13 @@ def explain_unreached(problem: Problem, outline: Outline, missing: list[int]) ->
             )
     if len(missing) > 3:
         parts.append(f"{len(missing) - 3} more goals are out of reach")
-    return "; ".join(parts)
+    first = missing[0]
+    return InfeasibleError(
+        "; ".join(parts), goal=first - 1, needed=float(needed[first]), enclosing=enclosing
+    )
 
 
-def _enclosure(problem: Problem, g: int) -> str:
+def _enclosure(problem: Problem, g: int) -> tuple[str, tuple[int, ...]]:
     """Which obstacles stand between the base and a goal that no path joins."""
     import shapely
 
@@ -48,12 +60,13 @@ def _enclosure(problem: Problem, g: int) -> str:
     base, goal = (shapely.Point(problem.points[k, :2]) for k in (0, g))
     box = shapely.box(*problem.bounds) if problem.bounds else None
     for sealed, label in ((goal, "it"), (base, "the base")):
-        names, bounded = _ring_around(sealed, grown, box, problem)
-        if names:
+        around, bounded = _ring_around(sealed, grown, box, problem)
+        if around:
+            names = _listed([problem.obstacle_name(i) for i in around])
             if bounded:
-                return f"{label} is cut off by the bounds and {_listed(names)}"
-            return f"{label} is enclosed by {_listed(names)}"
-    return "the obstacles in between block every path"
+                return f"{label} is cut off by the bounds and {names}", around
+            return f"{label} is enclosed by {names}", around
+    return "the obstacles in between block every path", ()
 
 
 def _ring_around(
@@ -61,8 +74,8 @@ def _ring_around(
     shapes: list[shapely.Polygon],
     box: shapely.Polygon | None,
     problem: Problem,
-) -> tuple[list[str], bool]:
-    """Names of the obstacles about the free pocket of a point, and whether bounds help them."""
+) -> tuple[tuple[int, ...], bool]:
+    """The obstacles about the free pocket of a point, and whether bounds help them."""
     import shapely
 
     tolerance = 1e-6 * problem.scale
@@ -71,13 +84,13 @@ def _ring_around(
     free = everything.difference(union)
     pockets = [p for p in getattr(free, "geoms", [free]) if p.distance(point) <= 2 * tolerance]
     if not pockets:
-        return [], False
+        return (), False
     pocket = min(pockets, key=lambda p: p.area)
     if box is None and pocket.buffer(tolerance).contains(everything.exterior):
-        return [], False
+        return (), False
     near = [i for i, s in enumerate(shapes) if s.distance(pocket) <= 3 * tolerance]
     bounded = box is not None and pocket.distance(box.exterior) <= tolerance
-    return [problem.obstacle_name(i) for i in near], bounded
+    return tuple(near), bounded
 
 
 def _listed(names: list[str]) -> str:

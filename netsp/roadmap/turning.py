@@ -91,6 +91,7 @@ def within_turning(problem: Problem, graph: TravelGraph, most: float) -> TravelG
         raise InfeasibleError(
             f"{problem.goal_label(int(graph.goal[best]) - 1)} is reached in no class in which the "
             f"tether turns by at most {math.degrees(most):.4g} degrees; the least is "
-            f"{math.degrees(turning[best]):.4g}"
+            f"{math.degrees(turning[best]):.4g}",
+            goal=int(graph.goal[best]) - 1,
         )
     return part
