@@ -23,6 +23,9 @@ from netsp.errors import LimitReachedError
 Flag = npt.NDArray[np.int64]
 T = TypeVar("T")
 
+ASKED = 0.02
+"""Seconds between two times that `should_stop` is asked."""
+
 NEVER: Flag = np.zeros(1, dtype=np.int64)
 """The flag of a clock without a limit."""
 
@@ -36,13 +39,21 @@ class Clock:
         Seconds from now, None for no limit.
     within
         A clock that this one may not outlast.
+    should_stop
+        Asked every `ASKED` seconds, in a thread of its own: once it says so, the time is up for
+        this clock and all within it. `close` ends that.
     """
 
-    def __init__(self, limit: float | None = None, *, within: Clock | None = None) -> None:
+    def __init__(
+        self, limit: float | None = None, *, within: Clock | None = None,
+        should_stop: Callable[[], bool] | None = None,
+    ) -> None:  # fmt: skip
         self.start = time.monotonic()
         self.deadline = math.inf if limit is None else self.start + limit
+        self._stop = _Stop(should_stop) if should_stop is not None else None
         if within is not None:
             self.deadline = min(self.deadline, within.deadline)
+            self._stop = self._stop or within._stop
         self._flag: Flag | None = None
 
     @classmethod
@@ -63,7 +74,24 @@ class Clock:
     @property
     def left(self) -> float:
         """Seconds left; inf without a limit."""
+        if self.stopped:
+            return 0.0
         return self.deadline - time.monotonic()
+
+    @property
+    def stopped(self) -> bool:
+        """Whether `should_stop` has said so."""
+        return self._stop is not None and self._stop.now
+
+    @property
+    def stoppable(self) -> bool:
+        """Whether the time may be up before the deadline."""
+        return self._stop is not None
+
+    def close(self) -> None:
+        """Ask `should_stop` no more; what it raised is raised here."""
+        if self._stop is not None:
+            self._stop.close()
 
     @property
     def up(self) -> bool:
@@ -79,12 +107,16 @@ class Clock:
                 self._flag[0] = 1
             elif self.deadline < math.inf:
                 _WATCH.add(self.deadline, self._flag)
+            if self._stop is not None:
+                self._stop.add(self._flag)
         return self._flag
 
     def check(self, doing: str) -> None:
         """Raise LimitReachedError, which says what was being done, when the time is up."""
         if self.up:
-            raise LimitReachedError(f"time limit reached while {doing}")
+            raise LimitReachedError(
+                f"{'stopped' if self.stopped else 'time limit reached'} while {doing}"
+            )
 
     def interruptible(self, call: Callable[[], T]) -> T:
         """Make a call that hears the flag, in a thread, so that Ctrl-C ends it at once."""
@@ -114,6 +146,43 @@ class Clock:
 
 TimeLimit = float | Clock | None
 """Seconds, or the clock of the run that the work belongs to, or no limit."""
+
+
+class _Stop:
+    """Whether somebody asks for an end, and whose flags are then set."""
+
+    def __init__(self, asked: Callable[[], bool]) -> None:
+        self.now = False
+        self._asked, self._flags = asked, list[Flag]()
+        self._error: Exception | None = None
+        self._closed = threading.Event()
+        self._lock = threading.Lock()
+        threading.Thread(target=self._run, daemon=True, name="netsp-stop").start()
+
+    def add(self, flag: Flag) -> None:
+        with self._lock:
+            self._flags.append(flag)
+            if self.now:
+                flag[0] = 1
+
+    def close(self) -> None:
+        self._closed.set()
+        if self._error is not None:
+            raise self._error
+
+    def _run(self) -> None:
+        while not self._closed.is_set():
+            try:
+                stop = self._asked()
+            except Exception as error:  # raised where the run ends: here nobody would hear it
+                self._error, stop = error, True
+            if stop:
+                with self._lock:
+                    self.now = True
+                    for flag in self._flags:
+                        flag[0] = 1
+                return
+            self._closed.wait(ASKED)
 
 
 class _Watch:

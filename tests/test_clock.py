@@ -1,5 +1,6 @@
 """One clock for a whole run: compiled loops hear it, and nothing goes on for long after it."""
 
+import threading
 import time
 
 import numpy as np
@@ -11,7 +12,7 @@ from netsp.errors import LimitReachedError, MemoryLimitError
 from netsp.memory import ask, available
 from netsp.mip.cutpool import IDLE, CutPool
 from netsp.mip.cuts import Cut
-from netsp.worlds import random_world
+from netsp.worlds import random_world, reachable_world
 
 
 def test_a_flag_is_set_when_the_time_is_up_and_not_before():
@@ -109,3 +110,42 @@ def test_a_problem_far_from_what_matters_keeps_its_tolerances():
     far = Problem(base=(0, 0), goals=[(3, 4)], obstacles=[rock], tether_length=6)
     assert far.scale == near.scale
     assert solve(far).length == pytest.approx(10.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("solver", ["auto", "mip", "dp", "lns", "anneal", "reduced-mip"])
+@pytest.mark.parametrize("after", [0.02, 0.5])
+def test_a_run_ends_when_it_is_asked_to_with_a_verified_tour(solver, after):
+    problem = reachable_world(3, goals=60, obstacles=60, tether_length=300.0)[0]
+    begin = time.monotonic()
+    asked = []
+
+    def should_stop():
+        asked.append(time.monotonic())
+        return asked[-1] - begin > after
+
+    threads = threading.active_count()
+    found = solve(problem, solver, should_stop=should_stop)
+    took = time.monotonic() - begin
+    assert took < after + 10.0  # all of it would take minutes
+    assert found.status in (Status.FEASIBLE, Status.OPTIMAL)
+    assert verify(problem, found)
+    number = len(asked)
+    time.sleep(0.1)
+    assert len(asked) == number  # nobody asks any more
+    assert threading.active_count() <= threads + 1
+
+
+def test_what_should_stop_raises_is_raised():
+    def broken():
+        raise RuntimeError("no such widget")
+
+    problem = reachable_world(3, goals=20, obstacles=20, tether_length=300.0)[0]
+    with pytest.raises(RuntimeError, match="no such widget"):
+        solve(problem, should_stop=broken)
+
+
+def test_one_that_never_stops_changes_nothing():
+    problem = reachable_world(5, goals=8, obstacles=8, tether_length=300.0)[0]
+    plain = solve(problem, "mip")
+    asked = solve(problem, "mip", should_stop=lambda: False)
+    assert (asked.length, asked.tour, asked.path) == (plain.length, plain.tour, plain.path)

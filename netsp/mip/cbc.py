@@ -14,16 +14,21 @@ import signal
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import pulp
 
+from netsp.clock import Clock, TimeLimit
 from netsp.errors import NetspError
 
 GRACE = 1.0
 """Seconds past its own limit after which CBC is killed."""
+
+WAIT = 0.02
+"""Seconds between two looks at the clock."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +55,7 @@ class CbcOutcome:
 
 
 def run_cbc(
-    model: pulp.LpProblem, *, integer: bool, time_left: float, threads: int = 1
+    model: pulp.LpProblem, *, integer: bool, limit: TimeLimit, threads: int = 1
 ) -> CbcOutcome:
     """Solve a minimisation model as it stands (`integer=False`: its LP relaxation)."""
     with tempfile.TemporaryDirectory(prefix="netsp-cbc-") as folder:
@@ -58,7 +63,8 @@ def run_cbc(
         renamed = model.writeMPS(str(mps), rename=True, mip=1 if integer else 0)
         variable_names, constraint_names = renamed[1], renamed[2]
         command = [_binary(), str(mps)]
-        if time_left != float("inf"):
+        clock = Clock.of(limit)
+        if (time_left := clock.left) != float("inf"):
             command += ["-sec", f"{max(time_left, 0.05):.3f}", "-timeMode", "elapsed"]
         if integer:
             command += ["-ratioGap", "1e-9", "-allowableGap", "1e-9"]
@@ -67,7 +73,7 @@ def run_cbc(
         else:
             command += ["-initialSolve"]
         command += ["-printingOptions", "all", "-solution", str(out)]
-        _run(command, log, None if time_left == float("inf") else time_left + GRACE)
+        _run(command, log, clock)
         text = log.read_text(errors="replace") if log.exists() else ""
         return _read(out, text, variable_names, constraint_names, integer)
 
@@ -92,8 +98,9 @@ def _die_with_parent() -> Callable[[], None] | None:
     return lambda: prctl(1, signal.SIGKILL)
 
 
-def _run(command: list[str], log: Path, timeout: float | None) -> None:
-    """Run to the end or to the timeout; the process group is gone when this returns."""
+def _run(command: list[str], log: Path, clock: Clock) -> None:
+    """Run to the end, or until the clock is up: at a deadline CBC has a while to end by itself. The
+    process group is gone when this returns."""
     with log.open("wb") as stream:
         process = subprocess.Popen(
             command,
@@ -104,9 +111,11 @@ def _run(command: list[str], log: Path, timeout: float | None) -> None:
             preexec_fn=_die_with_parent(),
         )
         try:
-            process.wait(timeout)
-        except subprocess.TimeoutExpired:
-            pass
+            end = time.monotonic() + clock.left + GRACE
+            while time.monotonic() < end and not clock.stopped:
+                with contextlib.suppress(subprocess.TimeoutExpired):
+                    process.wait(WAIT)
+                    break
         finally:
             with contextlib.suppress(ProcessLookupError, PermissionError):
                 os.killpg(process.pid, signal.SIGKILL)

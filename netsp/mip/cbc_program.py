@@ -8,6 +8,7 @@ import numpy as np
 import pulp
 
 from netsp.arrays import Bools, Floats, Ints
+from netsp.clock import TimeLimit
 from netsp.mip.cbc import run_cbc
 from netsp.mip.cutpool import CutPool
 from netsp.mip.cuts import Cut, cut_coefficients
@@ -70,7 +71,7 @@ class CbcRelaxation:
         """Take all cuts out of the program but those marked."""
         self.pool.keep(keep)
 
-    def solve(self, time_left: float) -> Point | None:
+    def solve(self, limit: TimeLimit) -> Point | None:
         """The optimum with duals; None if there is none or the time ran out."""
         problem = pulp.LpProblem("netsp", pulp.LpMinimize)
         y = [pulp.LpVariable(f"y_{u}_{v}", 0, 1) for u, v in self.legs.tolist()]
@@ -87,7 +88,7 @@ class CbcRelaxation:
         for k, values in enumerate(block):
             terms = [(y[e], float(values[e])) for e in np.flatnonzero(values)]
             _row(problem, terms, pulp.LpConstraintGE, -2.0 * self.cuts[k].room, f"cut_{k}")
-        outcome = run_cbc(problem, integer=False, time_left=time_left)
+        outcome = run_cbc(problem, integer=False, limit=limit)
         self.infeasible = outcome.status == "infeasible"
         if outcome.status != "optimal":
             return None
@@ -146,9 +147,9 @@ class CbcInteger:
                 _row(self.problem, terms, pulp.LpConstraintLE, cut.room, name)
             self.cuts.append(cut)
 
-    def solve(self, time_left: float) -> IntegerOutcome:
+    def solve(self, limit: TimeLimit) -> IntegerOutcome:
         """The best integer solution, as far as the time goes."""
-        outcome = run_cbc(self.problem, integer=True, time_left=time_left)
+        outcome = run_cbc(self.problem, integer=True, limit=limit)
         point = None
         if outcome.values:
             x = np.zeros(len(self.cluster))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Sequence
 from typing import Any
 
@@ -11,6 +10,7 @@ import highspy
 import numpy as np
 
 from netsp.arrays import Bools, Floats, Ints
+from netsp.clock import Clock, TimeLimit
 from netsp.mip.cutpool import CutPool
 from netsp.mip.cuts import Cut, cut_coefficients
 from netsp.mip.program import IntegerOutcome, Point, duals_of_relaxation, restricted, scale_of
@@ -41,6 +41,27 @@ def _run(h: highspy.Highs, time_left: float) -> None:
     h.run()
 
 
+class _Interruption:
+    """Ends a run of HiGHS when a clock is up, also before its deadline."""
+
+    def __init__(self, *events: Any) -> None:
+        self.clock = Clock()
+        self._events, self._on = events, False
+
+    def hear(self, clock: Clock, *, always: bool) -> None:
+        """Of this clock from now on. Being asked at every step of the simplex method costs time, so
+        that it is done only where it is needed."""
+        self.clock = clock
+        if (always or clock.stoppable) and not self._on:
+            self._on = True
+            for event in self._events:
+                event.subscribe(self._interrupt)
+
+    def _interrupt(self, event: Any) -> None:
+        if self.clock.up:
+            event.interrupt()
+
+
 def _compressed(dense: Floats) -> tuple[int, Ints, Ints, Floats]:
     """Entries, row starts, columns and values of a dense block of rows."""
     row, col = np.nonzero(dense)
@@ -59,6 +80,7 @@ class HighsRelaxation:
         self.infeasible = False
         self._scale = scale_of(costs)
         self._highs = _solver()
+        self._interruption = _Interruption(self._highs.cbSimplexInterrupt)
         twos = np.full(self.clusters, 2.0)
         self._highs.addRows(self.clusters, twos, twos, *_NONE)
         self.add_legs(legs, costs)
@@ -118,10 +140,11 @@ class HighsRelaxation:
         self._highs.deleteRows(len(gone), gone.astype(np.int32))
         self.pool.keep(keep)
 
-    def solve(self, time_left: float) -> Point | None:
+    def solve(self, limit: TimeLimit) -> Point | None:
         """The optimum with duals; None if there is none or the time ran out."""
         h = self._highs
-        begin = time.monotonic()
+        clock = Clock.of(limit)
+        self._interruption.hear(clock, always=False)
         # a warm basis can end in numerical trouble: then afresh, then with looser tolerances (the
         # bound does not rest on them)
         for tolerance, fresh in ((1e-9, False), (1e-9, True), (1e-7, True)):
@@ -129,7 +152,7 @@ class HighsRelaxation:
                 h.clearSolver()
             h.setOptionValue("primal_feasibility_tolerance", tolerance)
             h.setOptionValue("dual_feasibility_tolerance", tolerance)
-            _run(h, time_left - (time.monotonic() - begin))
+            _run(h, clock.left)
             status = h.getModelStatus()
             if status in _SETTLED:
                 break
@@ -184,10 +207,7 @@ class HighsInteger:
         )
         h.setOptionValue("mip_rel_gap", 1e-9)
         h.setOptionValue("mip_abs_gap", 1e-9)
-        # HiGHS can overrun its own limit in presolve and at the root of its tree
-        self._deadline = math.inf
-        h.cbMipInterrupt.subscribe(self._interrupt)
-        h.cbSimplexInterrupt.subscribe(self._interrupt)
+        self._interruption = _Interruption(h.cbMipInterrupt, h.cbSimplexInterrupt)
 
     def add_cuts(self, cuts: list[Cut]) -> None:
         """Bring cuts into the program."""
@@ -211,15 +231,13 @@ class HighsInteger:
         )  # fmt: skip
         self.cuts = [*self.cuts, *cuts]
 
-    def _interrupt(self, event: Any) -> None:
-        if time.monotonic() > self._deadline:
-            event.interrupt()
-
-    def solve(self, time_left: float) -> IntegerOutcome:
+    def solve(self, limit: TimeLimit) -> IntegerOutcome:
         """The best integer solution, as far as the time goes."""
         h = self._highs
-        self._deadline = time.monotonic() + time_left
-        _run(h, time_left)
+        clock = Clock.of(limit)
+        # HiGHS can overrun its own limit in presolve and at the root of its tree
+        self._interruption.hear(clock, always=True)
+        _run(h, clock.left)
         status = h.getModelStatus()
         if status == highspy.HighsModelStatus.kInfeasible:
             return IntegerOutcome(None, None, finished=True, infeasible=True)

@@ -28,6 +28,7 @@ from typing import Protocol
 import numpy as np
 
 from netsp.arrays import Bools, Floats, Ints
+from netsp.clock import TimeLimit
 from netsp.mip.cutpool import CutPool
 from netsp.mip.cuts import Cut
 
@@ -147,7 +148,7 @@ class Relaxation(Protocol):
     def keep_cuts(self, keep: Bools) -> None:
         """Take all cuts out of the program but those marked."""
 
-    def solve(self, time_left: float) -> Point | None:
+    def solve(self, limit: TimeLimit) -> Point | None:
         """The optimum with duals; None if there is none or the time ran out."""
 
 
@@ -160,5 +161,5 @@ class IntegerProgram(Protocol):
     def add_cuts(self, cuts: list[Cut]) -> None:
         """Bring cuts into the program."""
 
-    def solve(self, time_left: float) -> IntegerOutcome:
+    def solve(self, limit: TimeLimit) -> IntegerOutcome:
         """The best integer solution, as far as the time goes."""

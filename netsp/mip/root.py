@@ -196,7 +196,7 @@ class Root:
         """The next point of the LP; Stop when there is none."""
         run = self.run
         run.check()
-        point = self.lp.solve(run.clock.left)
+        point = self.lp.solve(run.clock)
         run.iterations += 1
         if point is None:
             # without an incumbent all legs are in the program from the start

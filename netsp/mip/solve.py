@@ -155,7 +155,9 @@ class MipRun(SearchingRun):
             return MipRun(graph, limits).solve(backend, None)
 
         share = (
-            Clock(GOALS_SHARE * self.clock.left, within=self.clock) if self.clock.limit else None
+            Clock(GOALS_SHARE * self.clock.left, within=self.clock)
+            if self.clock.limit
+            else self.clock
         )
         limits = Limits(share or self.clock, rng=self.rng)
         self.raise_bound(bound_over_goals(self.graph, prove, limits))
@@ -244,7 +246,7 @@ class MipRun(SearchingRun):
         self.report("fixed", cuts=len(model.cuts), **size)
         while not self.done:
             self.check()
-            outcome = model.solve(self.clock.left)
+            outcome = model.solve(self.clock)
             self.iterations += 1
             point = outcome.point
             if outcome.infeasible:

@@ -95,7 +95,7 @@ def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | Non
     limits = replace(limits, time=clock)
     if graph.goal_count <= FEW_GOALS and graph.roadmapped:
         return _over_shortest(graph, limits, chosen.backend)
-    share = Clock(SHARE * clock.left, within=clock) if clock.limit else None
+    share = Clock(SHARE * clock.left, within=clock) if clock.limit else clock
     found = search(graph, limits=replace(limits, time=share))
     if found.length is None:
         return found

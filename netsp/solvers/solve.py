@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import inspect
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -234,6 +235,7 @@ def solve(
     max_tension_ratio: float | None = None,
     keep_order: bool = False,
     on_progress: OnProgress | None = None,
+    should_stop: Callable[[], bool] | None = None,
 ) -> Solution:
     """Find the shortest non-entangling tour of a problem.
 
@@ -272,6 +274,9 @@ def solve(
         whatever the solver.
     on_progress : callable, optional
         Called with a `netsp.travel.result.Progress` now and then.
+    should_stop : callable, optional
+        Asked every 20 ms in a thread of its own; once it says so, the run ends as at its time
+        limit, with the best tour so far.
 
     Returns
     -------
@@ -310,7 +315,7 @@ def solve(
             time_limit=time_limit, iteration_limit=iteration_limit, seed=seed, params=params,
             warm_start=None if warm_start is None else _for_grown(warm_start, problem, grown),
             friction=friction, max_tension_ratio=max_tension_ratio, keep_order=keep_order,
-            on_progress=on_progress,
+            on_progress=on_progress, should_stop=should_stop,
         )  # fmt: skip
         own = ProblemReference(name=problem.name, sha256=problem.sha256)
         return found.model_copy(
@@ -320,41 +325,42 @@ def solve(
         return _over_nearest_places(
             problem, solver, roadmap=roadmap, roadmap_options=roadmap_options,
             time_limit=time_limit, iteration_limit=iteration_limit, seed=seed, params=params,
-            on_progress=on_progress,
+            on_progress=on_progress, should_stop=should_stop,
         )  # fmt: skip
     limits = {
         "friction": checked_argument("friction", friction, 0.0, 10.0),
         "max_tension_ratio": _tension_ratio(max_tension_ratio, friction),
     }
-    clock = Clock(time_limit)
-    options: dict[str, Any] = {"time_limit": clock, **(roadmap_options or {})}
-    if ROADMAPS.named(roadmap).seeded:
-        options.setdefault("seed", seed)
-    graph = travel_graph(problem, roadmap, **options)
-    graph = _within_turning(problem, graph, max_turning(friction, max_tension_ratio), clock)
-    built = clock.elapsed
-    if keep_order:
-        listener = graph.progress_listener(on_progress)
-        result = graph.as_asked(solve_in_order(graph, clock, listener))
-        found = to_solution(problem, graph, result, "in-order", seed)
-        return found.model_copy(
-            update={"kept_order": True, "timings": _timings(clock, built, graph), **limits}
+    clock = Clock(time_limit, should_stop=should_stop)
+    with contextlib.closing(clock):
+        options: dict[str, Any] = {"time_limit": clock, **(roadmap_options or {})}
+        if ROADMAPS.named(roadmap).seeded:
+            options.setdefault("seed", seed)
+        graph = travel_graph(problem, roadmap, **options)
+        graph = _within_turning(problem, graph, max_turning(friction, max_tension_ratio), clock)
+        built = clock.elapsed
+        if keep_order:
+            listener = graph.progress_listener(on_progress)
+            result = graph.as_asked(solve_in_order(graph, clock, listener))
+            found = to_solution(problem, graph, result, "in-order", seed)
+            return found.model_copy(
+                update={"kept_order": True, "timings": _timings(clock, built, graph), **limits}
+            )
+        # what is too large for its time takes long to draw, too
+        spare = 0.0 if graph.complete else min(SPARE * (time_limit or 0.0), 1.0)
+        result = solve_graph(
+            graph,
+            solver,
+            time_limit=Clock(clock.left - spare, within=clock) if spare else clock,
+            iteration_limit=iteration_limit,
+            seed=seed,
+            params=params,
+            warm_start=tour_from(problem, warm_start, graph) if warm_start is not None else None,
+            on_progress=on_progress,
         )
-    # what is too large for its time takes long to draw, too
-    spare = 0.0 if graph.complete else min(SPARE * (time_limit or 0.0), 1.0)
-    result = solve_graph(
-        graph,
-        solver,
-        time_limit=Clock(clock.left - spare, within=clock) if spare else clock,
-        iteration_limit=iteration_limit,
-        seed=seed,
-        params=params,
-        warm_start=tour_from(problem, warm_start, graph) if warm_start is not None else None,
-        on_progress=on_progress,
-    )
-    timings = _timings(clock, built, graph)
-    found = to_solution(problem, graph, result, name_of(solver), seed, timings)
-    return found.model_copy(update=limits) if friction else found
+        timings = _timings(clock, built, graph)
+        found = to_solution(problem, graph, result, name_of(solver), seed, timings)
+        return found.model_copy(update=limits) if friction else found
 
 
 def _walks_between_places(solver: SolverLike) -> bool:

@@ -128,7 +128,9 @@ class SolverRun:
                 [0, *out], walk=walk, length=2.0 * float(graph.costs_to_base[out].sum())
             )
             return
-        with graph.on_clock(None):  # a few legs; without them there would be nothing to show
+        # a few legs; without them there would be nothing to show. A clock without a limit, not
+        # none: a part of another graph would take that one's instead
+        with graph.on_clock(Clock()):
             few = len(core) <= UNTIMED
             near = graph.costs_among(core) if few else graph.lower_bounds(core)
             tour, left = [0], np.ones(len(core), dtype=bool)
