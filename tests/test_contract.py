@@ -362,3 +362,32 @@ def test_the_library_example_of_a_subgraph_keeps_costs_and_paths():
 def test_costs_to_the_base_are_those_of_the_matrix(roadmap):
     g = graph(roadmap)
     assert np.allclose(g.costs_to_base[1:], g.costs[0, 1:], rtol=1e-12)
+
+
+@pytest.mark.parametrize("solver", ["auto", "mip", "dp", "lns", "reduced-mip", "anneal", "greedy"])
+def test_progress_carries_the_tour(solver):
+    """Of the graph given, whatever part of it the solver works on; the last is the best."""
+    problem = random_world(11, goals=9, tether=330.0)
+    graph = travel_graph(problem)
+    rows = []
+    found = solve_graph(graph, solver, on_progress=rows.append, seed=1)
+    told = [r for r in rows if r.tour is not None]
+    assert told
+    for row in told:
+        assert graph.is_tour(row.tour)
+        if solver != "greedy":  # it retraces its steps
+            assert graph.tour_length(row.tour) == pytest.approx(row.incumbent)
+    assert told[-1].tour == found.tour
+
+
+def test_progress_over_few_classes_first_carries_tours_of_the_whole_graph():
+    problem = random_world(12, goals=26, tether=300.0)
+    graph = travel_graph(problem, max_classes=130)
+    assert not graph.complete
+    rows = []
+    solve_graph(graph, on_progress=rows.append, time_limit=4)
+    told = [r for r in rows if r.tour is not None]
+    assert told
+    for row in told:
+        assert graph.is_tour(row.tour)
+        assert graph.tour_length(row.tour) == pytest.approx(row.incumbent)

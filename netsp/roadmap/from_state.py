@@ -113,6 +113,7 @@ class GraphFromState(TravelGraph):
                     incumbent=None if p.incumbent is None else p.incumbent - off,
                     bound=None if p.bound is None else max(0.0, p.bound - off),
                     current=None if p.current is None else p.current - off,
+                    tour=None if p.tour is None else self.as_tour(p.tour),
                 )
             )
 

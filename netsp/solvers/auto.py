@@ -31,7 +31,7 @@ from netsp.solving.limits import Limits
 from netsp.solving.run import SolverRun
 from netsp.travel.graph import TravelGraph, least_tethers
 from netsp.travel.kept import within_kept
-from netsp.travel.result import Progress, Result, proven
+from netsp.travel.result import Progress, Result, of_part, proven
 
 PROVABLE = 10_000
 """Most vertices of a travel graph that `mip` is asked to bound: about 4 GiB of matrices."""
@@ -103,7 +103,7 @@ def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | Non
     rows: list[Progress] = list(found.trace)
 
     def tell(row: Progress) -> None:
-        rows.append(replace(row, stage="goals", incumbent=length))
+        rows.append(replace(row, stage="goals", incumbent=length, tour=found.tour))
         if limits.on_progress:
             limits.on_progress(rows[-1])
 
@@ -155,7 +155,10 @@ def _from_few(graph: TravelGraph, limits: Limits, backend: str) -> Limits:
     clock = Clock.of(limits.time)
     share = Clock(FEW_SHARE * clock.left, within=clock) if clock.limit is not None else clock
     found = MipRun(
-        graph.subgraph(core), replace(limits, time=share, warm_start=None),
+        graph.subgraph(core),
+        replace(
+            limits, time=share, warm_start=None, on_progress=of_part(limits.on_progress, core)
+        ),
         search_rounds=max(500, ROUNDS_PER_GOAL * graph.goal_count),
     ).solve(backend, None)  # fmt: skip
     if found.tour is None:
@@ -178,7 +181,9 @@ def _over_shortest(graph: TravelGraph, limits: Limits, backend: str) -> Result:
     place = {int(v): k for k, v in enumerate(core)}
     warm = None if given is None else [place[int(v)] for v in given]
     run = MipRun(
-        graph.subgraph(core), limits, search_rounds=max(500, ROUNDS_PER_GOAL * graph.goal_count)
+        graph.subgraph(core),
+        replace(limits, on_progress=of_part(limits.on_progress, core)),
+        search_rounds=max(500, ROUNDS_PER_GOAL * graph.goal_count),
     )
     found = run.solve(backend, warm, walks=True)
     if found.tour is None:

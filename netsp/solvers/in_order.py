@@ -56,6 +56,7 @@ def solve_in_order(graph: TravelGraph, clock: Clock, on_progress: OnProgress | N
         instance = Instance(graph.cluster, graph.costs_among(every, asked))
     order = np.arange(1, last + 1, dtype=np.int64)
     length, tour = best_classes(order, instance.start, instance.costs)
+    found = instance.original(tour)
     if on_progress is not None:
-        on_progress(Progress(clock.elapsed, "in order", length, length))
-    return Result(instance.original(tour), float(length), float(length), Status.OPTIMAL)
+        on_progress(Progress(clock.elapsed, "in order", length, length, tour=found))
+    return Result(found, float(length), float(length), Status.OPTIMAL)

@@ -167,6 +167,7 @@ class SolverRun:
             None if self.tour is None else self.length,
             self.bound,
             iteration=self.iterations,
+            tour=self.tour,
             **more,
         )
         self.trace.append(row)

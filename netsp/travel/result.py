@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from netsp.arrays import Floats
+from netsp.arrays import Floats, Ints
 from netsp.hsignature import Word
 from netsp.solution import Status
 
@@ -40,6 +40,8 @@ class Progress:
         Length of the present state, of solvers that walk from state to state.
     entangled : int, optional
         Obstacles that the present state entangles.
+    tour : tuple of int, optional
+        Vertices of the best tour, as `Result.tour` has them; None while there is none.
     """
 
     time: float
@@ -52,6 +54,7 @@ class Progress:
     iteration: int = 0
     current: float | None = None
     entangled: int | None = None
+    tour: tuple[int, ...] | None = None
 
     @property
     def gap(self) -> float | None:
@@ -60,6 +63,31 @@ class Progress:
 
 
 OnProgress = Callable[[Progress], None]
+
+
+def of_part(listener: OnProgress | None, chosen: Ints) -> OnProgress | None:
+    """A listener for a run over a part of a travel graph.
+
+    Parameters
+    ----------
+    listener : callable, optional
+        Of the run over all of it.
+    chosen : ndarray of int
+        The part's vertices in the whole graph.
+
+    Returns
+    -------
+    callable or None
+        Tells tours by the vertices of the whole graph.
+    """
+    if listener is None:
+        return None
+
+    def tell(row: Progress) -> None:
+        tour = None if row.tour is None else tuple(int(chosen[v]) for v in row.tour)
+        listener(replace(row, tour=tour))
+
+    return tell
 
 
 @dataclass(frozen=True)
