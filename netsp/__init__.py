@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from netsp.errors import InfeasibleError, InputError, NetspError, VerificationError
     from netsp.judge import Verification, verify
     from netsp.problem import Circle, Goal, Polygon, Problem, State
+    from netsp.roadmap.tethers import Tethers
     from netsp.solution import Solution, Status
     from netsp.solvers.solve import solve, solve_graph, travel_graph
     from netsp.travel.graph import TravelGraph
@@ -37,6 +38,7 @@ _PUBLIC = {
     "Solution": "solution",
     "State": "problem",
     "Status": "solution",
+    "Tethers": "roadmap.tethers",
     "TravelGraph": "travel.graph",
     "Verification": "judge",
     "VerificationError": "errors",
@@ -59,6 +61,7 @@ __all__ = [
     "Solution",
     "State",
     "Status",
+    "Tethers",
     "TravelGraph",
     "Verification",
     "VerificationError",

@@ -105,7 +105,7 @@ def build_outline(problem: Problem) -> Outline:
     parts = len(blockers.box) + len(blockers.edges)
     rows = choose(_visible_arcs, 4 * len(disks) * parts)(disks, blockers, bounds)
     places = problem.points[:, :2] - origin
-    points = np.array([_push_out(p, blockers, STAND_OFF * scale) for p in places])
+    points = np.array([pushed_out(p, blockers, STAND_OFF * scale) for p in places])
     rays = problem.representative_points - origin
     arcs, full = np.ascontiguousarray(rows[:, :5]), rows[:, 5] > 0.0
     return Outline(blockers, arcs, full, origin, places, points, rays, margin)
@@ -155,7 +155,7 @@ def _vertex_disks(v: Floats, growth: float) -> list[tuple[float, float, float, f
     return disks
 
 
-def _push_out(point: Floats, blockers: Blockers, distance: float) -> Floats:
+def pushed_out(point: Floats, blockers: Blockers, distance: float) -> Floats:
     """Move a point that lies on a grown boundary, or nearly, to a distance from it."""
     p = np.array(point, dtype=float)
     for _ in range(32):

@@ -81,7 +81,10 @@ class TautPaths:
             A planar length that it is known not to exceed.
         """
         _, pieces = self._pieces(a, b, word, longest)
-        xy = self._polyline(a, b, pieces)
+        return self._raised(a, b, self._polyline(a, b, pieces))
+
+    def _raised(self, a: int, b: int, xy: Floats) -> Floats:
+        """(n, 3) of a planar polyline from point a to point b, rising evenly."""
         steps = np.hypot(*np.diff(xy, axis=0).T)
         total = float(steps.sum())
         fraction = np.concatenate([[0.0], np.cumsum(steps)]) / total if total else steps

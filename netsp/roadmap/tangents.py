@@ -108,11 +108,33 @@ def build_tangents(outline: Outline, reach: float, stop: Flag = NEVER) -> Tangen
         arcs, full = outline.arcs[near], outline.full[near]
     else:
         arcs, full = outline.arcs, outline.full
+    return assembled(outline, arcs, full, tangent_rows(outline, arcs, full, reach, stop=stop))
+
+
+def tangent_rows(
+    outline: Outline, arcs: Floats, full: Bools, reach: float, since: int = 0, stop: Flag = NEVER
+) -> Floats:
+    """Rows of `_tangents` between arcs and the outline's points.
+
+    Parameters
+    ----------
+    since
+        Only those with an end at point `since` or a later one, of all if 0.
+    """
     place = np.zeros((len(arcs) + len(outline.points), 5))
     place[: len(arcs)] = arcs
     place[len(arcs) :, :2] = outline.points
-    steps = 2 * len(place) ** 2 * (1 + len(outline.blockers.box))
-    rows = choose(_tangents, steps)(place, len(arcs), full, base, reach, outline.blockers, stop)
+    first = len(arcs) + since if since else 0
+    steps = 2 * len(place) * (len(place) - first) * (1 + len(outline.blockers.box))
+    return np.asarray(
+        choose(_tangents, steps)(
+            place, len(arcs), full, outline.points[0], reach, outline.blockers, first, stop
+        )
+    )
+
+
+def assembled(outline: Outline, arcs: Floats, full: Bools, rows: Floats) -> TangentGraph:
+    """The graph of rows of `_tangents`."""
     source, target = rows[:, 0].astype(np.int64), rows[:, 1].astype(np.int64)
     key, arrival_key, length = rows[:, 2], rows[:, 3], rows[:, 4]
     ends, angle = np.ascontiguousarray(rows[:, 5:9]), np.ascontiguousarray(rows[:, 9:])
@@ -259,6 +281,7 @@ def _tangents(
     base: Floats,
     reach: float,
     blockers: Blockers,
+    first: int,
     stop: Ints,
 ) -> Floats:
     """All free directed segments between arcs and points, unsorted: rows of source, target, key,
@@ -268,6 +291,8 @@ def _tangents(
     ----------
     place
         Arcs, then points as arcs of radius 0.
+    first
+        Only those with an end at this place or a later one.
     """
     eps = blockers.eps
     out = np.empty((256, 11))
@@ -276,7 +301,7 @@ def _tangents(
     for i in range(total):
         if stop[0] != 0:
             break
-        for j in range(i + 1, total):
+        for j in range(max(i + 1, first), total):
             xi, yi, ri, si, ei = place[i, 0], place[i, 1], place[i, 2], place[i, 3], place[i, 4]
             xj, yj, rj, sj, ej = place[j, 0], place[j, 1], place[j, 2], place[j, 3], place[j, 4]
             dx, dy = xj - xi, yj - yi
