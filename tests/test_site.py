@@ -575,6 +575,8 @@ def test_an_occupancy_image_becomes_a_plan(tmp_path, capsys):
         ({"origin": "[1, 2]"}, "origin"),
         ({"mode": "raw"}, "mode: expected trinary or scale"),
         ({"negate": 3}, "negate"),
+        ({"resolution": "[" * 2000 + "]" * 2000}, "not YAML"),
+        ({"resolution": "!!int abc"}, "resolution: expected a number"),
     ],
 )
 def test_what_is_wrong_with_a_map_file_is_one_line(tmp_path, capsys, said, complaint):
@@ -586,6 +588,14 @@ def test_what_is_wrong_with_a_map_file_is_one_line(tmp_path, capsys, said, compl
     err = capsys.readouterr().err
     assert complaint in err
     assert err.count("\n") == 1
+
+
+def test_fields_that_matter_to_nobody_and_numbers_of_any_style_are_read(tmp_path):
+    from netsp.site.occupancy import read_occupancy
+
+    file = image(tmp_path, np.zeros((9, 9), dtype=int), resolution="5e-1", negate="false",
+                 date="2024-13-01", odd="0x_")  # fmt: skip
+    assert read_occupancy(file, (-2, -1), [(-1, -1)], 5.0).bounds == (-3.0, -2.0, 1.5, 2.5)
 
 
 def test_options_of_images_and_of_maps_do_not_mix(tmp_path, capsys):

@@ -84,6 +84,14 @@ def test_on_the_command_line(tmp_path, capsys):
     assert main(["verify", str(edited), str(tmp_path / "t.json"), "--quiet"]) == 0
 
 
+def test_a_solution_without_a_path_cannot_be_known_again():
+    problem = Problem(base=(0, 0), goals=[(3, 4), (4, 0)], tether_length=9)
+    bare = solve(problem).model_copy(update={"path": ()})
+    edited = problem.model_copy(update={"goals": problem.goals[:1]})
+    with pytest.raises(InputError, match="warm_start: has no path"):
+        solve(edited, warm_start=bare)
+
+
 def test_a_solution_that_has_nothing_to_do_with_the_problem_is_refused():
     old = solve(Problem(base=(0, 0), goals=[(3, 4)], tether_length=9))
     far = Problem(base=(0, 0), goals=[(-300, 4)], tether_length=900)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 from typing import TYPE_CHECKING
 
@@ -145,6 +146,8 @@ def _of_image(args: argparse.Namespace) -> Problem:
     try:
         base = tuple(float(v) for v in args.base.split(","))
     except ValueError:
+        base = ()
+    if not all(map(math.isfinite, base)):
         base = ()
     if len(base) not in (2, 3):
         raise InputError(f"--base: expected X,Y or X,Y,Z (m) in an image, got {args.base!r}")

@@ -31,6 +31,12 @@ if TYPE_CHECKING:
 IMAGES = (".png", ".pgm")
 FILES = (".yaml", ".yml")
 
+MODES = ("1", "L", "LA", "P", "RGB", "RGBA", "I", "I;16", "I;16B", "I;16L")
+"""Of Pillow: those whose values are known to run from black to white."""
+
+MOST_PIECES = 20_000
+"""Of occupied cells that hang together: more are noise, among which nobody plans."""
+
 MOST_CELLS = 100_000_000
 """Of an image: 10 km by 10 km at a metre."""
 
@@ -161,8 +167,9 @@ def _opened(file: str | Path, resolution: float | None) -> tuple[MapFile, Path]:
     except ImportError:
         raise InputError("maps in YAML need PyYAML: pip install 'netsp[geo]'") from None
     try:
-        data = yaml.safe_load(read_text(path))
-    except yaml.YAMLError as error:
+        # all scalars as text: what other fields hold does not matter, and 5e-2 is a number here
+        data = yaml.load(read_text(path), Loader=yaml.BaseLoader)
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
         reason = " ".join(str(error).split())
         raise InputError(f"{file}: not YAML: {reason[:200]}") from None
     if not isinstance(data, dict):
@@ -171,9 +178,10 @@ def _opened(file: str | Path, resolution: float | None) -> tuple[MapFile, Path]:
         raise InputError(f"{file}: mode: expected trinary or scale, got {shown(data['mode'])}")
     if data.get("mode") == "raw":
         raise InputError(f"{file}: mode: expected trinary or scale, got 'raw'")
-    own = {k: v for k, v in data.items() if k in MapFile.model_fields}
-    if isinstance(own.get("negate"), bool):
-        own["negate"] = int(own["negate"])
+    own = {
+        k: v if k == "image" else _numbers(v)
+        for k, v in data.items() if k in MapFile.model_fields
+    }  # fmt: skip
     try:
         said = MapFile.model_validate(own)
     except ValidationError as error:
@@ -184,6 +192,19 @@ def _opened(file: str | Path, resolution: float | None) -> tuple[MapFile, Path]:
             f"got {said.free_thresh:g}"
         )
     return said, path.parent / said.image
+
+
+def _numbers(value: Any) -> Any:
+    """Text as numbers, where it is some; yes and no as 1 and 0."""
+    if isinstance(value, list):
+        return [_numbers(v) for v in value]
+    if isinstance(value, str) and value.lower() in ("true", "false", "yes", "no"):
+        return int(value.lower() in ("true", "yes"))
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        return value
+    return int(number) if number in (0.0, 1.0) else number
 
 
 def _rasterio() -> Any:
@@ -203,11 +224,16 @@ def _values(image: Path) -> Floats:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)
-            with Image.open(image) as opened:
+            with Image.open(image, formats=("PNG", "PPM")) as opened:
                 columns, rows = opened.size
                 if columns * rows > MOST_CELLS:
                     raise InputError(
                         f"{image}: {columns} x {rows} cells; expected at most {MOST_CELLS:g} in all"
+                    )
+                if opened.mode not in MODES:
+                    raise InputError(
+                        f"{image}: pixels of kind {opened.mode!r}; expected grey or colours of 8 "
+                        "or 16 bits"
                     )
                 if opened.mode == "P":
                     values = np.asarray(opened.convert("RGB"))
@@ -268,6 +294,11 @@ def _polygons(
     ]  # fmt: skip
     if not cells:
         return [], []
+    if len(cells) > MOST_PIECES:
+        raise InputError(
+            f"{said.image}: {len(cells):,} separate pieces of obstacles; expected at most "
+            f"{MOST_PIECES:,}: a map without noise"
+        )
     exact = shapely.union_all(cells)
     grown = exact.buffer(GROWN * tolerance, quad_segs=4)
     parts = list(getattr(grown, "geoms", [grown]))

@@ -73,6 +73,8 @@ def old_tour(problem: Problem, solution: Solution) -> OldTour:
         return OldTour(tuple(v.goal for v in solution.tour), same, 0)
     rays = problem.representative_points
     path = np.array(solution.path).reshape(-1, 3)
+    if solution.tour and len(path) < 2:
+        raise InputError("warm_start: has no path, by which it could be known in another problem")
     by_name = {g.name: k for k, g in enumerate(problem.goals) if g.name is not None}
     goals: list[int] = []
     words: list[Word] = []
