@@ -118,6 +118,7 @@ def _joined(argv: Sequence[str]) -> list[str]:
 COMMANDS = {
     "plan": {
         "solve": ("solve", "find the shortest non-entangling tour of a problem"),
+        "app": ("app", "plan on a map in the browser"),
         "verify": ("verify", "judge a solution independently of what found it"),
         "margins": ("margins", "find how far the world may be off before a tour does not fit"),
         "plot": ("plot", "draw a problem or a scene, with a solution or a tether"),

@@ -1,0 +1,1 @@
+"""Plan on a map, in the browser (`netsp app`, docs/app.md)."""

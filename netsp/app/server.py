@@ -1,0 +1,321 @@
+"""The server behind the page: this machine only, for whoever has the token.
+
+The page says what it wants over one WebSocket, in order; every answer goes to all pages that are
+open, so that two tabs show the same.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import secrets
+from collections.abc import AsyncIterator, Mapping
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+from netsp.app.solving import Worker
+from netsp.app.state import Document
+from netsp.app.tethers import Cursor
+from netsp.errors import InputError, NetspError
+from netsp.fields import checked_argument
+from netsp.models import shown
+
+STATIC = Path(__file__).parent / "static"
+
+MOST_BYTES = 4 * 2**20
+"""Of one message."""
+
+POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; "
+    "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'self'"
+)
+
+
+class Session:
+    """A document, its solver, and the pages that show it.
+
+    Parameters
+    ----------
+    document : Document
+        What is edited.
+    time_limit : float
+        Seconds of solving for one version.
+    """
+
+    def __init__(self, document: Document, time_limit: float = 60.0) -> None:
+        self.document = document
+        self.pages: set[asyncio.Queue[str]] = set()
+        self.answer: dict[str, Any] | None = None
+        self.solution: str | None = None
+        self._cursor: Cursor | None = None
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._worker = Worker(self._solver_told, time_limit)
+
+    def begin(self) -> None:
+        """From within the running loop."""
+        self._loop = asyncio.get_running_loop()
+        self._changed()
+
+    def close(self) -> None:
+        """End the solver."""
+        self._worker.close()
+
+    def everything(self) -> list[dict[str, Any]]:
+        """What a page that has just been opened needs."""
+        told = [self._state()]
+        if self.answer is not None:
+            told.append({"tour": self.answer})
+        return told
+
+    def tell(self, message: Mapping[str, Any]) -> None:
+        """Tell all pages."""
+        text = json.dumps(message)
+        for page in self.pages:
+            page.put_nowait(text)
+
+    def asked(self, message: Mapping[str, Any]) -> dict[str, Any] | None:
+        """Do what a page asks; what is to be said to that page alone, if anything."""
+        number = message.get("id")
+        try:
+            answer = self._do(message)
+        except NetspError as error:
+            return {"id": number, "error": str(error).removeprefix("problem: ")}
+        return None if answer is None and number is None else {"id": number, **(answer or {})}
+
+    def _do(self, message: Mapping[str, Any]) -> dict[str, Any] | None:
+        document = self.document
+        if "edit" in message:
+            document.apply(message["edit"])
+            self._changed()
+        elif "undo" in message:
+            if document.undo():
+                self._changed()
+        elif "redo" in message:
+            if document.redo():
+                self._changed()
+        elif "save" in message:
+            document.save()
+            self.tell(self._state())
+        elif "hover" in message:
+            x, y = _numbers(message["hover"], 2)
+            return {"hover": self._cursor.hover(x, y) if self._cursor else None}
+        elif "along" in message:
+            (share,) = _numbers([message["along"]], 1)
+            return {"along": self._cursor.along(share) if self._cursor else None}
+        elif "classes" in message:
+            return {"classes": self._classes(message["classes"])}
+        else:
+            raise InputError("message: expected edit, undo, redo, save, hover, along or classes")
+        return None
+
+    def _classes(self, goal: object) -> list[dict[str, Any]]:
+        if self._cursor is None:
+            return []
+        if not isinstance(goal, int) or not 0 <= goal < len(self._cursor.problem.goals):
+            raise InputError("classes: expected the number of a goal")
+        return self._cursor.classes(goal)
+
+    def _state(self) -> dict[str, Any]:
+        document = self.document
+        return {"state": {
+            "version": document.version, "data": document.data, "error": document.complaint(),
+            "saved": document.saved, "file": document.file.name if document.file else None,
+        }}  # fmt: skip
+
+    def _changed(self) -> None:
+        """After every edit: the pages are told, and the solver begins again."""
+        self.tell(self._state())
+        self._cursor = None
+        try:
+            problem = self.document.problem()
+        except InputError:
+            return
+        self._cursor = Cursor(problem)
+        self._worker.solve(self.document.version, problem.to_json())
+
+    def _solver_told(self, said: dict[str, Any]) -> None:
+        """Called in the thread that listens to the solver."""
+        if self._loop is not None:
+            with contextlib.suppress(RuntimeError):  # the server is going down
+                self._loop.call_soon_threadsafe(self._take, said)
+
+    def _take(self, said: dict[str, Any]) -> None:
+        if said["version"] != self.document.version:
+            return
+        self.solution = said.pop("solution", None)
+        self.answer = said
+        if self._cursor is not None and "path" in said:
+            self._cursor.follow(said["path"])
+        self.tell({"tour": said})
+
+
+def application(session: Session, token: str, port: int) -> Any:
+    """The ASGI application.
+
+    Parameters
+    ----------
+    session : Session
+        What it serves.
+    token : str
+        Without it nothing is served.
+    port : int
+        That it listens on; requests for other hosts are refused (DNS rebinding).
+
+    Returns
+    -------
+    starlette.applications.Starlette
+        The application.
+
+    Raises
+    ------
+    InputError
+        Starlette is not installed.
+    """
+    try:
+        from starlette.applications import Starlette
+        from starlette.requests import Request
+        from starlette.responses import FileResponse, PlainTextResponse, Response
+        from starlette.routing import Mount, Route, WebSocketRoute
+        from starlette.staticfiles import StaticFiles
+        from starlette.websockets import WebSocket, WebSocketDisconnect
+    except ImportError:
+        raise InputError("the map needs Starlette: pip install 'netsp[app]'") from None
+
+    hosts = {f"127.0.0.1:{port}", f"localhost:{port}"}
+
+    def known(headers: Mapping[str, str]) -> bool:
+        """Whether a request is for this server, and comes from its own page or from none."""
+        origin = headers.get("origin")
+        return headers.get("host") in hosts and (
+            origin is None or (urlsplit(origin).netloc in hosts and origin.startswith("http://"))
+        )
+
+    def allowed(given: str | None) -> bool:
+        return given is not None and secrets.compare_digest(given.encode(), token.encode())
+
+    def page(request: Request) -> Response:
+        if not allowed(request.query_params.get("token")):
+            return PlainTextResponse("netsp: the address lacks its token", status_code=403)
+        return FileResponse(STATIC / "index.html")
+
+    def download(request: Request) -> Response:
+        if not allowed(request.query_params.get("token")):
+            return PlainTextResponse("netsp: the address lacks its token", status_code=403)
+        answer: Response = _download(session, request.path_params["name"])
+        return answer
+
+    async def live(socket: WebSocket) -> None:
+        if not (known(socket.headers) and allowed(socket.query_params.get("token"))):
+            await socket.close(code=4403)
+            return
+        await socket.accept()
+        queue: asyncio.Queue[str] = asyncio.Queue()
+        for told in session.everything():
+            queue.put_nowait(json.dumps(told))
+        session.pages.add(queue)
+
+        async def send() -> None:
+            while True:
+                await socket.send_text(await queue.get())
+
+        sending = asyncio.create_task(send())
+        try:
+            while True:
+                answer = await asyncio.to_thread(_parsed, await socket.receive_text())
+                said = session.asked(answer) if isinstance(answer, dict) else {"error": answer}
+                if said is not None:
+                    queue.put_nowait(json.dumps(said))
+        except WebSocketDisconnect:
+            pass
+        finally:
+            session.pages.discard(queue)
+            sending.cancel()
+
+    @contextlib.asynccontextmanager
+    async def lifespan(app: Any) -> AsyncIterator[None]:
+        del app
+        session.begin()
+        try:
+            yield
+        finally:
+            session.close()
+
+    app = Starlette(
+        routes=[
+            Route("/", page),
+            Route("/download/{name}", download),
+            WebSocketRoute("/live", live),
+            Mount("/static", StaticFiles(directory=STATIC)),
+        ],
+        lifespan=lifespan,
+    )
+
+    async def guarded(scope: Any, receive: Any, send: Any) -> None:
+        """Host and Origin of every request, and what every answer says of itself."""
+        if scope["type"] == "http":
+            headers = {k.decode("latin-1"): v.decode("latin-1") for k, v in scope["headers"]}
+            if not known(headers):
+                await PlainTextResponse("netsp: not this host", 403)(scope, receive, send)
+                return
+
+            async def stamped(message: Any) -> None:
+                if message["type"] == "http.response.start":
+                    message["headers"] = [
+                        *message["headers"], (b"content-security-policy", POLICY.encode()),
+                        (b"x-content-type-options", b"nosniff"),
+                        (b"referrer-policy", b"no-referrer"),
+                        (b"cache-control", b"no-store"),
+                    ]  # fmt: skip
+                await send(message)
+
+            await app(scope, receive, stamped)
+            return
+        await app(scope, receive, send)
+
+    return guarded
+
+
+def _numbers(values: object, count: int) -> list[float]:
+    """So many finite numbers of a message."""
+    if not isinstance(values, list) or len(values) != count:
+        raise InputError(f"message: expected {count} numbers, got {shown(values)}")
+    return [checked_argument("message", v, -1e12) for v in values]
+
+
+def _parsed(text: str) -> Any:
+    """A message, or what is wrong with it."""
+    try:
+        message = json.loads(text)
+    except ValueError:
+        return "message: not JSON"
+    return message if isinstance(message, dict) else "message: expected an object"
+
+
+def _download(session: Session, name: str) -> Any:
+    """A file of what is shown: problem.json, solution.json, report.html."""
+    from starlette.responses import PlainTextResponse, Response
+
+    try:
+        problem = session.document.problem()
+        if name == "problem.json":
+            text, kind = problem.to_json(), "application/json"
+        elif session.solution is None:
+            return PlainTextResponse("netsp: there is no tour yet", status_code=409)
+        elif name == "solution.json":
+            text, kind = session.solution, "application/json"
+        elif name == "report.html":
+            from netsp.report.tour import page
+            from netsp.solution import Solution
+
+            solution = Solution.from_json(session.solution)
+            text, kind = page(problem, solution, [], None, None), "text/html"
+        else:
+            return PlainTextResponse("netsp: no such file", status_code=404)
+    except InputError as error:
+        return PlainTextResponse(f"netsp: {error}", status_code=409)
+    return Response(
+        text, media_type=kind,
+        headers={"content-disposition": f'attachment; filename="{name}"'},
+    )  # fmt: skip

@@ -1,0 +1,158 @@
+"""Tours of the latest version, from a process of its own: the page never waits for a proof.
+
+The worker begins again whenever a newer version is there, which it notices within a few hundredths
+of a second (`solve(should_stop=…)`); one that dies is replaced.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import threading
+import time
+from collections.abc import Callable
+from itertools import pairwise
+from multiprocessing.connection import Connection
+from typing import Any
+
+TELL = 0.15
+"""Shortest time between two tours that are told, seconds."""
+
+Told = Callable[[dict[str, Any]], None]
+
+
+class Worker:
+    """Solves the latest version that it is given.
+
+    Parameters
+    ----------
+    told : callable
+        Called in a thread with what the worker says: version, stage, and a tour or an error.
+    time_limit : float
+        Seconds for one version.
+    """
+
+    def __init__(self, told: Told, time_limit: float = 60.0) -> None:
+        self.told, self.time_limit = told, time_limit
+        self._lock = threading.Lock()
+        self._closed = False
+        self._latest: tuple[int, str] | None = None
+        self._start()
+
+    def solve(self, version: int, problem: str) -> None:
+        """Solve this version from now on.
+
+        Parameters
+        ----------
+        version : int
+            Its number.
+        problem : str
+            Text of its problem file.
+        """
+        with self._lock:
+            self._latest = version, problem
+            if not self._process.is_alive():
+                self._start()
+            self._ours.send((version, problem, self.time_limit))
+
+    def close(self) -> None:
+        """End the worker."""
+        self._closed = True
+        with self._lock:
+            self._process.kill()
+            self._process.join()
+
+    def _start(self) -> None:
+        context = multiprocessing.get_context("spawn")
+        self._ours, theirs = context.Pipe()
+        self._process = context.Process(target=work, args=(theirs,), daemon=True)
+        self._process.start()
+        theirs.close()
+        threading.Thread(
+            target=self._listen, args=(self._ours,), daemon=True, name="netsp-app-solving"
+        ).start()
+
+    def _listen(self, connection: Connection) -> None:
+        while True:
+            try:
+                said = connection.recv()
+            except (EOFError, OSError):
+                break
+            self.told(said)
+        with self._lock:  # it died: whoever asked last is served by the next
+            if not self._closed and connection is self._ours and self._latest is not None:
+                version, _ = self._latest
+                self.told({"version": version, "stage": "failed",
+                           "error": "the solver's process died; it is started again"})  # fmt: skip
+                self._latest = None
+                self._start()
+
+
+def work(connection: Connection) -> None:
+    """What the worker does until its other end is closed."""
+    try:
+        while True:
+            job = connection.recv()
+            while connection.poll():
+                job = connection.recv()
+            _solve(connection, *job)
+    except (EOFError, OSError, KeyboardInterrupt):
+        return
+
+
+def _solve(connection: Connection, version: int, text: str, time_limit: float) -> None:
+    from netsp.clock import Clock
+    from netsp.errors import InfeasibleError, NetspError
+    from netsp.problem import Problem
+    from netsp.solvers.answer import to_solution
+    from netsp.solvers.solve import solve_graph, travel_graph
+    from netsp.travel.graph import TravelGraph
+    from netsp.travel.result import Progress
+
+    problem = Problem.from_json(text)
+    last: list[Any] = [0.0, None]
+
+    def drawn(graph: TravelGraph, tour: tuple[int, ...]) -> dict[str, Any]:
+        legs = [graph.path(u, v) for u, v in pairwise((*tour, 0))]
+        path = [p[:3].tolist() for leg in legs for p in leg]
+        visits = [
+            {"goal": int(graph.goal[v]) - 1, "tether": float(graph.tethers[v])} for v in tour[1:]
+        ]
+        return {"path": path, "visits": visits}
+
+    def tell(graph: TravelGraph, row: Progress) -> None:
+        if row.tour is None or row.incumbent is None:
+            return
+        if row.tour == last[1] or time.monotonic() < last[0] + TELL:
+            return
+        last[:] = time.monotonic(), row.tour
+        connection.send({
+            "version": version, "stage": "searching", "length": row.incumbent,
+            "bound": row.bound, **drawn(graph, row.tour),
+        })  # fmt: skip
+
+    clock = Clock(time_limit, should_stop=connection.poll)
+    try:
+        graph = travel_graph(problem, time_limit=clock)
+        result = solve_graph(graph, time_limit=clock, on_progress=lambda row: tell(graph, row))
+        if clock.stopped:
+            return
+        if result.tour is None:
+            connection.send({"version": version, "stage": "done", "error": result.status.value})
+            return
+        connection.send({
+            "version": version, "stage": "done", "status": result.status.value,
+            "length": result.length, "bound": result.lower_bound,
+            "solution": to_solution(problem, graph, result, "auto", 0).to_json(),
+            **drawn(graph, result.tour),
+        })  # fmt: skip
+    except InfeasibleError as error:
+        connection.send({
+            "version": version, "stage": "done", "error": str(error), "goal": error.goal,
+            "needed": error.needed if error.needed not in (None, float("inf")) else None,
+            "enclosing": list(error.enclosing),
+        })  # fmt: skip
+    except NetspError as error:
+        if not clock.stopped:
+            connection.send({"version": version, "stage": "done", "error": str(error)})
+    finally:
+        clock.close()

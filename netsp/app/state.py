@@ -1,0 +1,256 @@
+"""What is being edited: a problem as its file has it, every version of it, and nothing of the web.
+
+A version may break the format while somebody is at it: it is kept as it is, with what is wrong, and
+only versions that are problems are solved.
+"""
+
+from __future__ import annotations
+
+import copy
+import json
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from netsp.errors import InputError
+from netsp.files import read_text, write_text
+from netsp.models import parse_json_object, read_model, shown
+from netsp.problem import Problem
+
+EMPTY: dict[str, Any] = {
+    "schema_version": 1, "name": "new", "base": [0.0, 0.0, 0.0], "goals": [], "obstacles": [],
+    "tether_length": 50.0, "clearance": 0.3, "units": "m",
+}  # fmt: skip
+"""A map with nothing on it but the base."""
+
+LISTS = ("goals", "obstacles")
+
+MOST_VERSIONS = 10_000
+"""Versions that can be gone back to; each shares with the one before what did not change."""
+
+
+class Document:
+    """A problem that is being edited.
+
+    Parameters
+    ----------
+    file : str or Path, optional
+        Problem file that it is saved to; what was edited and not saved is kept beside it.
+    data : mapping, optional
+        The problem as its file has it; default: the file's, or an empty map.
+
+    Attributes
+    ----------
+    version : int
+        Counts all changes, going back too.
+    """
+
+    def __init__(
+        self, file: str | Path | None = None, data: Mapping[str, Any] | None = None
+    ) -> None:
+        self.file = None if file is None else Path(file)
+        self.version = 0
+        if data is None:
+            data = _read(self.file) if self.file and self.file.exists() else EMPTY
+        self._versions: list[dict[str, Any]] = [dict(data)]
+        self._at = 0
+        self._saved = self._versions[0]
+        if (kept := self._kept()) is not None:
+            self._push(kept)
+
+    @property
+    def data(self) -> dict[str, Any]:
+        """The present version, as a problem file has it; not to be changed."""
+        return self._versions[self._at]
+
+    @property
+    def saved(self) -> bool:
+        """Whether the file holds the present version."""
+        return self.data == self._saved
+
+    def problem(self) -> Problem:
+        """The present version as a problem.
+
+        Returns
+        -------
+        Problem
+            Validated.
+
+        Raises
+        ------
+        InputError
+            It is none; says why.
+        """
+        if not self.data.get("goals"):
+            raise InputError("there is no goal yet")
+        return read_model(Problem, json.dumps(self.data), "problem")
+
+    def complaint(self) -> str | None:
+        """What is wrong with the present version, in one line; None for a problem."""
+        try:
+            self.problem()
+        except InputError as error:
+            return str(error).removeprefix("problem: ")
+        return None
+
+    def apply(self, edit: Mapping[str, Any]) -> None:
+        """Make a new version.
+
+        Parameters
+        ----------
+        edit : mapping
+            ``{"set": path, "value": v}``, ``{"add": "goals", "value": v}``, ``{"delete": [path]}``,
+            or ``{"replace": data}``; a path is a field, or a list's name, an index and perhaps a
+            field.
+
+        Raises
+        ------
+        InputError
+            Not such an edit; nothing is changed.
+        """
+        data = copy.deepcopy(self.data)
+        if "set" in edit:
+            _set(data, edit["set"], edit.get("value"))
+        elif "add" in edit:
+            _list(data, edit["add"]).append(edit.get("value"))
+        elif "delete" in edit:
+            _delete(data, edit["delete"])
+        elif isinstance(edit.get("replace"), dict):
+            data = dict(edit["replace"])
+        else:
+            raise InputError(f"edit: expected set, add, delete or replace, got {shown(edit)}")
+        try:
+            json.dumps(data, allow_nan=False)
+        except (TypeError, ValueError):
+            raise InputError("edit: expected finite numbers") from None
+        self._push(data)
+
+    def undo(self) -> bool:
+        """Go back one version; whether there was one."""
+        return self._go(self._at - 1)
+
+    def redo(self) -> bool:
+        """Go on to the version that was gone back from; whether there was one."""
+        return self._go(self._at + 1)
+
+    def save(self, file: str | Path | None = None) -> Path:
+        """Write the problem file.
+
+        Parameters
+        ----------
+        file : str or Path, optional
+            Its name from now on.
+
+        Returns
+        -------
+        Path
+            The file.
+
+        Raises
+        ------
+        InputError
+            The present version is no problem, has no name of a file, or it cannot be written.
+        """
+        target = Path(file) if file is not None else self.file
+        if target is None:
+            raise InputError("save: expected the name of a file")
+        text = self.problem().to_json()
+        write_text(target, text)
+        self._forget()
+        self.file, self._saved = target, self.data
+        return target
+
+    def _push(self, data: dict[str, Any]) -> None:
+        del self._versions[self._at + 1 :]
+        self._versions.append(data)
+        del self._versions[: max(0, len(self._versions) - MOST_VERSIONS)]
+        self._at = len(self._versions) - 1
+        self._changed()
+
+    def _go(self, to: int) -> bool:
+        if not 0 <= to < len(self._versions):
+            return False
+        self._at = to
+        self._changed()
+        return True
+
+    def _changed(self) -> None:
+        self.version += 1
+        if self._aside is not None:
+            write_text(self._aside, json.dumps(self.data, allow_nan=False))
+
+    # what was not saved
+
+    @property
+    def _aside(self) -> Path | None:
+        """Where the present version is kept until it is saved."""
+        return None if self.file is None else self.file.with_name(f".{self.file.name}.unsaved")
+
+    def _kept(self) -> dict[str, Any] | None:
+        aside = self._aside
+        if aside is None or not aside.exists():
+            return None
+        if (
+            self.file
+            and self.file.exists()
+            and os.path.getmtime(aside) < os.path.getmtime(self.file)
+        ):
+            return None  # the file was changed by somebody else since
+        return parse_json_object(read_text(aside), str(aside))
+
+    def _forget(self) -> None:
+        if self._aside is not None:
+            self._aside.unlink(missing_ok=True)
+
+
+def _read(file: Path) -> dict[str, Any]:
+    """A problem file with everything written out that it says in short."""
+    return dict(json.loads(Problem.load(file).to_json()))
+
+
+def _list(data: dict[str, Any], name: object) -> list[Any]:
+    if name not in LISTS:
+        raise InputError(f"edit: expected one of {', '.join(LISTS)}, got {shown(name)}")
+    found = data.setdefault(str(name), [])
+    if not isinstance(found, list):
+        raise InputError(f"edit: {name} is no list")
+    return found
+
+
+def _item(data: dict[str, Any], path: object) -> tuple[list[Any], int]:
+    if not isinstance(path, list) or len(path) < 2:
+        raise InputError(f"edit: expected [list, index], got {shown(path)}")
+    items, k = _list(data, path[0]), path[1]
+    if not isinstance(k, int) or isinstance(k, bool) or not 0 <= k < len(items):
+        raise InputError(f"edit: {path[0]}: no item {shown(k)}")
+    return items, k
+
+
+def _set(data: dict[str, Any], path: object, value: Any) -> None:
+    if not isinstance(path, list) or not path or len(path) > 3:
+        raise InputError(f"edit: expected a path of a field, got {shown(path)}")
+    if len(path) == 1:
+        if path[0] not in Problem.model_fields:
+            raise InputError(f"edit: unknown field {shown(path[0])}")
+        data[path[0]] = value
+        return
+    items, k = _item(data, path)
+    if len(path) == 2:
+        items[k] = value
+        return
+    if not isinstance(items[k], dict) or not isinstance(path[2], str):
+        raise InputError(f"edit: expected the name of a field, got {shown(path[2])}")
+    if value is None:
+        items[k].pop(path[2], None)
+    else:
+        items[k][path[2]] = value
+
+
+def _delete(data: dict[str, Any], paths: object) -> None:
+    if not isinstance(paths, list) or not paths:
+        raise InputError(f"edit: expected paths to delete, got {shown(paths)}")
+    gone = [(items, k) for items, k in (_item(data, p) for p in paths)]
+    for items, k in sorted(gone, key=lambda g: -g[1]):
+        if k < len(items):
+            del items[k]

@@ -1,0 +1,233 @@
+// @ts-check
+/** Pointer and keys: select, drag, draw, pan, zoom. */
+
+import { placeOf } from "./map.js";
+
+/** @param {any} page @param {import("./link.js").Link} link */
+export function edits(page, link) {
+  const svg = document.getElementById("map");
+  const where = document.getElementById("where");
+  if (!svg || !where) return;
+  const view = page.view;
+  /** @type {any} */
+  let held = null;
+  /** @type {Map<number, PointerEvent>} */
+  const fingers = new Map();
+
+  /** @param {number} v */
+  const tidy = (v) => +v.toPrecision(Math.max(4, Math.ceil(Math.log10(Math.abs(v) * view.scale + 1)) + 2));
+  /** @param {[number, number]} p @param {MouseEvent} event @returns {[number, number]} */
+  const snapped = (p, event) => {
+    const step = event.shiftKey ? 1 : 0;
+    return step ? [Math.round(p[0] / step) * step, Math.round(p[1] / step) * step] : [tidy(p[0]), tidy(p[1])];
+  };
+
+  /** @param {string} tool */
+  function pick(tool) {
+    page.tool = tool;
+    page.draft = null;
+    for (const b of document.querySelectorAll("[data-tool]")) {
+      b.setAttribute("aria-pressed", String(b.getAttribute("data-tool") === tool));
+    }
+    page.redraw();
+  }
+  for (const b of document.querySelectorAll("[data-tool]")) {
+    b.addEventListener("click", () => pick(b.getAttribute("data-tool") ?? "select"));
+  }
+
+  /** @param {string} list @param {number} k @param {number} dx @param {number} dy */
+  function moved(list, k, dx, dy) {
+    if (list === "base") {
+      const [x, y, z = 0] = page.data.base;
+      return [["base"], [tidy(x + dx), tidy(y + dy), z]];
+    }
+    const item = page.data[list][k];
+    if (list === "goals") {
+      const [x, y, z = 0] = placeOf(item);
+      const position = [tidy(x + dx), tidy(y + dy), z];
+      return [["goals", k], Array.isArray(item) ? position : { ...item, position }];
+    }
+    if (item.center) return [["obstacles", k], { ...item, center: [tidy(item.center[0] + dx), tidy(item.center[1] + dy)] }];
+    return [["obstacles", k], { ...item, polygon: item.polygon.map((p) => [tidy(p[0] + dx), tidy(p[1] + dy)]) }];
+  }
+
+  /** Show at once what the server will be told. @param {any[]} path @param {any} value */
+  function preview(path, value) {
+    if (path.length === 1) page.data = { ...page.data, [path[0]]: value };
+    else {
+      const items = [...page.data[path[0]]];
+      items[path[1]] = value;
+      page.data = { ...page.data, [path[0]]: items };
+    }
+    page.redraw();
+  }
+
+  svg.addEventListener("pointerdown", (event) => {
+    svg.focus();
+    svg.setPointerCapture(event.pointerId);
+    fingers.set(event.pointerId, event);
+    if (fingers.size === 2) { held = null; return; }
+    const at = view.toWorld(event);
+    const target = /** @type {Element} */ (event.target);
+    const corner = target.closest("[data-corner]");
+    const thing = target.closest("[data-list]");
+    if (page.tool === "goal") {
+      page.edit({ add: "goals", value: { position: [...snapped(at, event), 0], name: freeName("g") } });
+    } else if (page.tool === "circle") {
+      const [x, y] = snapped(at, event);
+      held = { kind: "circle" };
+      page.draft = { x, y, radius: 0 };
+    } else if (page.tool === "polygon") {
+      page.draft ??= { points: [] };
+      page.draft.points.push(snapped(at, event));
+      page.redraw();
+    } else if (corner) {
+      held = { kind: "corner", index: Number(corner.getAttribute("data-index")), corner: Number(corner.getAttribute("data-corner")) };
+    } else if (thing) {
+      const own = [thing.getAttribute("data-list"), Number(thing.getAttribute("data-index"))];
+      const known = page.chosen.some(([l, k]) => l === own[0] && k === own[1]);
+      if (event.shiftKey) page.chosen = known ? page.chosen : [...page.chosen, own];
+      else if (!known) page.chosen = [own];
+      held = { kind: "move", from: at, before: page.data };
+      page.onchosen?.();
+      page.redraw();
+    } else {
+      held = { kind: "pan", x: event.clientX, y: event.clientY };
+      if (!event.shiftKey) { page.chosen = []; page.classes = []; page.onchosen?.(); page.redraw(); }
+    }
+  });
+
+  svg.addEventListener("pointermove", (event) => {
+    const before = fingers.get(event.pointerId);
+    const at = view.toWorld(event);
+    if (fingers.size === 2 && before) {
+      const other = [...fingers.values()].find((f) => f.pointerId !== event.pointerId);
+      if (other) {
+        const far = (/** @type {PointerEvent} */ e) => Math.hypot(e.clientX - other.clientX, e.clientY - other.clientY);
+        view.zoom(far(event) / Math.max(far(before), 1), view.toWorld(other));
+      }
+      fingers.set(event.pointerId, event);
+      return;
+    }
+    if (before) fingers.set(event.pointerId, event);
+    if (held?.kind === "pan") {
+      view.x -= (event.clientX - held.x) / view.scale;
+      view.y += (event.clientY - held.y) / view.scale;
+      held.x = event.clientX; held.y = event.clientY;
+      view.place();
+    } else if (held?.kind === "move") {
+      page.data = held.before;
+      held.changes = page.chosen.map(([l, k]) => moved(l, k, at[0] - held.from[0], at[1] - held.from[1]));
+      for (const [path, value] of held.changes) preview(path, value);
+    } else if (held?.kind === "corner") {
+      const o = page.data.obstacles[held.index], p = snapped(at, event);
+      held.value = o.center
+        ? { ...o, radius: tidy(Math.max(Math.hypot(p[0] - o.center[0], p[1] - o.center[1]), 1e-6)) }
+        : { ...o, polygon: o.polygon.map((q, n) => (n === held.corner ? p : q)) };
+      preview(["obstacles", held.index], held.value);
+    } else if (held?.kind === "circle") {
+      page.draft.radius = tidy(Math.hypot(at[0] - page.draft.x, at[1] - page.draft.y));
+      page.redraw();
+    }
+    where.textContent = `x ${at[0].toFixed(2)}  y ${at[1].toFixed(2)} m` + earth(at);
+    if (!held) {
+      link.latest("hover", { hover: at }, (answer) => {
+        page.hovered = answer.hover;
+        if (answer.hover?.length != null) {
+          where.textContent = `x ${answer.hover.x.toFixed(2)}  y ${answer.hover.y.toFixed(2)} m` + earth([answer.hover.x, answer.hover.y])
+            + `   tether ${answer.hover.length.toFixed(2)} m   word [${answer.hover.word.join(", ")}]`;
+        }
+        page.redraw();
+      });
+    }
+  });
+
+  /** @param {PointerEvent} event */
+  async function released(event) {
+    fingers.delete(event.pointerId);
+    const was = held;
+    held = null;
+    if (was?.kind === "move" && was.changes) {
+      for (const [path, value] of was.changes) await page.edit({ set: path, value });
+    } else if (was?.kind === "corner" && was.value) {
+      await page.edit({ set: ["obstacles", was.index], value: was.value });
+    } else if (was?.kind === "circle") {
+      const { x, y, radius } = page.draft;
+      page.draft = null;
+      if (radius > 0) await page.edit({ add: "obstacles", value: { center: [x, y], radius, name: freeName("o") } });
+      page.redraw();
+    }
+  }
+  svg.addEventListener("pointerup", released);
+  svg.addEventListener("pointercancel", released);
+  svg.addEventListener("pointerleave", () => { page.hovered = null; page.redraw(); });
+  svg.addEventListener("wheel", (event) => {
+    event.preventDefault();
+    view.zoom(Math.exp(-event.deltaY * 0.0015), view.toWorld(event));
+  }, { passive: false });
+
+  /** Latitude and longitude under the cursor, near the origin. @param {[number, number]} p */
+  function earth(p) {
+    const o = page.data?.origin;
+    if (!o) return "";
+    const turn = (o.heading ?? 0) * Math.PI / 180;
+    const [dx, dy] = [p[0] - page.data.base[0], p[1] - page.data.base[1]];
+    const east = dx * Math.cos(turn) + dy * Math.sin(turn), north = dy * Math.cos(turn) - dx * Math.sin(turn);
+    const lat = o.latitude + north / 111320;
+    const lon = o.longitude + east / (111320 * Math.cos(o.latitude * Math.PI / 180));
+    return `   ${lat.toFixed(6)}, ${lon.toFixed(6)}`;
+  }
+
+  /** A name that nothing has. @param {string} letter */
+  function freeName(letter) {
+    const taken = new Set([...(page.data.goals ?? []), ...(page.data.obstacles ?? [])].map((i) => i.name));
+    for (let k = 1; ; k++) if (!taken.has(`${letter}${k}`)) return `${letter}${k}`;
+  }
+
+  function remove() {
+    const paths = page.chosen.filter(([l]) => l !== "base").map(([l, k]) => [l, k]);
+    page.chosen = [];
+    if (paths.length) page.edit({ delete: paths });
+  }
+
+  async function duplicate() {
+    const step = 40 / view.scale;
+    for (const [list, k] of page.chosen) {
+      if (list === "base") continue;
+      const [, value] = moved(list, k, step, -step);
+      await page.edit({ add: list, value: Array.isArray(value) ? value : { ...value, name: freeName(list[0]) } });
+    }
+  }
+
+  document.addEventListener("keydown", (event) => {
+    if (/** @type {Element} */ (event.target).closest("input:not([type=range])")) return;
+    const key = event.key, control = event.ctrlKey || event.metaKey;
+    const step = (event.shiftKey ? 60 : 12) / view.scale;
+    const ways = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
+    if (control && key.toLowerCase() === "z") link.ask(event.shiftKey ? { redo: true } : { undo: true });
+    else if (control && key.toLowerCase() === "y") link.ask({ redo: true });
+    else if (control && key.toLowerCase() === "s") document.getElementById("save")?.click();
+    else if (control && key.toLowerCase() === "d") duplicate();
+    else if (control) return;
+    else if (key === "Delete" || key === "Backspace") remove();
+    else if (key === "Escape") { page.draft = null; page.chosen = []; page.classes = []; pick("select"); }
+    else if (key === "Enter" && page.draft?.points?.length >= 3) {
+      const polygon = page.draft.points;
+      page.draft = null;
+      page.edit({ add: "obstacles", value: { polygon, name: freeName("o") } });
+    } else if (key in ways && document.activeElement === svg) {
+      const [dx, dy] = ways[key];
+      if (page.chosen.length) {
+        for (const [l, k] of page.chosen) { const [path, value] = moved(l, k, dx * step, dy * step); page.edit({ set: path, value }); }
+      } else { view.x += 4 * dx * step; view.y += 4 * dy * step; view.place(); }
+    } else if (key === "+" || key === "=") view.zoom(1.25, [view.x, view.y]);
+    else if (key === "-") view.zoom(0.8, [view.x, view.y]);
+    else if (key === "v") pick("select");
+    else if (key === "g") pick("goal");
+    else if (key === "c") pick("circle");
+    else if (key === "p") pick("polygon");
+    else if (key === "f") view.fit(page.data);
+    else return;
+    event.preventDefault();
+  });
+}

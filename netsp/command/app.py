@@ -1,0 +1,88 @@
+"""`netsp app`: plan on a map, in the browser."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import secrets
+import socket
+import sys
+import threading
+import webbrowser
+from typing import TYPE_CHECKING
+
+from netsp.command import messages
+from netsp.command.types import positive
+from netsp.errors import InputError
+
+if TYPE_CHECKING:
+    from netsp.app.state import Document
+
+EXAMPLE = "netsp app problems/wharf.json"
+
+
+def arguments(p: argparse.ArgumentParser) -> None:
+    """Of the command line."""
+    p.add_argument(
+        "problem", metavar="PROBLEM", nargs="?",
+        help="problem file (JSON), made if there is none, or a map of a site (docs/sites.md); "
+        "default: an empty map without a file",
+    )  # fmt: skip
+    p.add_argument(
+        "--port", type=int, default=0, metavar="N", help="port to listen on; default: a free one"
+    )
+    p.add_argument(
+        "--time-limit", type=positive, default=60, metavar="S",
+        help="seconds of solving for each version; default 60",
+    )  # fmt: skip
+    p.add_argument("--no-browser", action="store_true", help="only print the address")
+
+
+def _document(name: str | None) -> Document:
+    """What is on the map at first: a problem, or a site, which becomes one beside it."""
+    from netsp.app.state import Document
+
+    if name is None or name.lower().endswith(".json"):
+        return Document(name)
+    from pathlib import Path
+
+    from netsp.site.read import read_site
+
+    made = read_site(name, on_note=messages.note)
+    return Document(Path(name).with_suffix(".json"), json.loads(made.to_json()))
+
+
+def run(args: argparse.Namespace) -> int:
+    """Serve until Ctrl-C, and return the exit code."""
+    try:
+        import uvicorn
+    except ImportError:
+        raise InputError("the map needs uvicorn: pip install 'netsp[app]'") from None
+    from netsp.app.server import MOST_BYTES, Session, application
+
+    document = _document(args.problem)
+    if not document.saved:
+        messages.note(f"{args.problem}: what was edited last and not saved is on the map")
+    if not 0 <= args.port <= 65535:
+        raise InputError(f"--port: expected 0 to 65535, got {args.port}")
+    try:
+        listening = socket.create_server(("127.0.0.1", args.port))
+    except OSError as error:
+        raise InputError(f"--port: {args.port} cannot be had: {error.strerror}") from None
+    port = listening.getsockname()[1]
+    token = secrets.token_urlsafe(24)
+    address = f"http://127.0.0.1:{port}/?token={token}"
+    session = Session(document, float(args.time_limit))
+    print(f"the map is at {address}\nCtrl-C ends it", file=sys.stderr, flush=True)
+    if not args.no_browser:
+        threading.Timer(0.5, webbrowser.open, [address]).start()
+    config = uvicorn.Config(
+        application(session, token, port), log_level="warning", ws_max_size=MOST_BYTES,
+        access_log=False, server_header=False,
+    )  # fmt: skip
+    try:
+        uvicorn.Server(config).run(sockets=[listening])
+    finally:
+        session.close()
+        listening.close()
+    return 0
