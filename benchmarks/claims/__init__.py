@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from claims import command, offline, online, sites
+from claims import command, offline, online, page, sites
 from claims.claim import Claim
 
 
@@ -19,4 +19,5 @@ def claims() -> Iterator[Claim]:
     yield from offline.claims()
     yield from online.claims()
     yield from sites.claims()
+    yield from page.claims()
     yield from command.running()

@@ -6,13 +6,17 @@ of a second (`solve(should_stop=…)`); one that dies is replaced.
 
 from __future__ import annotations
 
+import contextlib
 import multiprocessing
 import threading
 import time
 from collections.abc import Callable
 from itertools import pairwise
 from multiprocessing.connection import Connection
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from netsp.solution import Solution
 
 TELL = 0.15
 """Shortest time between two tours that are told, seconds."""
@@ -89,27 +93,35 @@ class Worker:
 
 def work(connection: Connection) -> None:
     """What the worker does until its other end is closed."""
+    last: Solution | None = None
     try:
         while True:
             job = connection.recv()
             while connection.poll():
                 job = connection.recv()
-            _solve(connection, *job)
+            version, text, limit = job
+            last = _solve(connection, version, text, limit, last) or last
     except (EOFError, OSError, KeyboardInterrupt):
         return
 
 
-def _solve(connection: Connection, version: int, text: str, time_limit: float) -> None:
+def _solve(
+    connection: Connection, version: int, text: str, time_limit: float, before: Solution | None
+) -> Solution | None:
+    """Solve one version, and tell the tours found on the way: first what is left of the tour before
+    (`netsp.solvers.warm`), which an edit rarely changes much. Returns the solution if there is one.
+    """
     from netsp.clock import Clock
-    from netsp.errors import InfeasibleError, NetspError
+    from netsp.errors import InfeasibleError, InputError, NetspError
     from netsp.problem import Problem
     from netsp.solvers.answer import to_solution
     from netsp.solvers.solve import solve_graph, travel_graph
+    from netsp.solvers.warm import tour_from
     from netsp.travel.graph import TravelGraph
     from netsp.travel.result import Progress
 
     problem = Problem.from_json(text)
-    last: list[Any] = [0.0, None]
+    told: list[Any] = [0.0, None]
 
     def drawn(graph: TravelGraph, tour: tuple[int, ...]) -> dict[str, Any]:
         legs = [graph.path(u, v) for u, v in pairwise((*tour, 0))]
@@ -122,9 +134,9 @@ def _solve(connection: Connection, version: int, text: str, time_limit: float) -
     def tell(graph: TravelGraph, row: Progress) -> None:
         if row.tour is None or row.incumbent is None:
             return
-        if row.tour == last[1] or time.monotonic() < last[0] + TELL:
+        if row.tour == told[1] or time.monotonic() < told[0] + TELL:
             return
-        last[:] = time.monotonic(), row.tour
+        told[:] = time.monotonic(), row.tour
         connection.send({
             "version": version, "stage": "searching", "length": row.incumbent,
             "bound": row.bound, **drawn(graph, row.tour),
@@ -133,18 +145,27 @@ def _solve(connection: Connection, version: int, text: str, time_limit: float) -
     clock = Clock(time_limit, should_stop=connection.poll)
     try:
         graph = travel_graph(problem, time_limit=clock)
-        result = solve_graph(graph, time_limit=clock, on_progress=lambda row: tell(graph, row))
+        start = None
+        with contextlib.suppress(InputError):  # nothing is left of it
+            start = tour_from(problem, before, graph) if before is not None else None
+        if start is not None and graph.is_tour(start):
+            tell(graph, Progress(0.0, "edited", graph.tour_length(start), tour=tuple(start)))
+        result = solve_graph(
+            graph, time_limit=clock, warm_start=start,
+            on_progress=lambda row: tell(graph, row),
+        )  # fmt: skip
         if clock.stopped:
-            return
+            return None
         if result.tour is None:
             connection.send({"version": version, "stage": "done", "error": result.status.value})
-            return
+            return None
+        found = to_solution(problem, graph, result, "auto", 0)
         connection.send({
             "version": version, "stage": "done", "status": result.status.value,
             "length": result.length, "bound": result.lower_bound,
-            "solution": to_solution(problem, graph, result, "auto", 0).to_json(),
-            **drawn(graph, result.tour),
+            "solution": found.to_json(), **drawn(graph, result.tour),
         })  # fmt: skip
+        return found
     except InfeasibleError as error:
         connection.send({
             "version": version, "stage": "done", "error": str(error), "goal": error.goal,
@@ -156,3 +177,4 @@ def _solve(connection: Connection, version: int, text: str, time_limit: float) -
             connection.send({"version": version, "stage": "done", "error": str(error)})
     finally:
         clock.close()
+    return None

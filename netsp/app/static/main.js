@@ -127,6 +127,9 @@ function redraw() {
     const [x, y] = view.toScreen(page.walked.x, page.walked.y);
     screen.push(make("circle", { cx: x, cy: y, r: 6, class: "handle" }));
   }
+  // for whoever measures: the version that is shown, and that of the tour on it
+  view.svg.dataset.version = String(page.version);
+  view.svg.dataset.tour = String(tour?.path ? tour.version : "");
   view.world.replaceChildren(...world);
   view.screen.replaceChildren(...screen);
 }

@@ -1,0 +1,43 @@
+"""Claims about the map in the browser."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+
+from claims.claim import Claim
+
+ABSENT = "not measured: chromium or Playwright is not installed"
+
+
+def kept() -> tuple[str, bool]:
+    """Versions after random edits and kills of the server, beside the library's."""
+    import app
+
+    lost = app.edits(150, 2)
+    return f"{lost} of 3 others than the library's", lost == 0
+
+
+def drawn() -> tuple[str, bool]:
+    """Drags of goals of 20, from letting go to a tour of the new version on the map."""
+    import numpy as np
+
+    if not (shutil.which("chromium") or shutil.which("chromium-browser")):
+        return ABSENT, True
+    try:
+        import playwright  # noqa: F401
+    except ImportError:
+        return ABSENT, True
+    import app
+
+    _, took, moved = app.dragged(app.cases()[1][1], 40)
+    tour, tether = (1e3 * float(np.percentile(v, 95)) for v in (took, moved))
+    return f"{tour:.0f} ms, tether at the cursor {tether:.0f} ms", tour <= 500.0 and tether <= 100.0
+
+
+def claims() -> Iterator[Claim]:
+    """All of this file."""
+    yield Claim("the map: 150 edits, the server killed twice", "nothing lost", kept)
+    yield Claim(
+        "the map: drags of 20 goals, p95", "a tour in 500 ms, a tether in 100", drawn, timed=True
+    )
