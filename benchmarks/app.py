@@ -64,7 +64,8 @@ def page_at(url: str):
 
 SHOWN = (
     "() => { const d = document.getElementById('map').dataset;"
-    " return [Number(d.version), d.tour === '' ? -1 : Number(d.tour)]; }"
+    " return [Number(d.version), d.tour === '' ? -1 : Number(d.tour),"
+    " document.getElementById('answer').className === 'bad']; }"
 )
 
 
@@ -78,9 +79,11 @@ def wait_for_tour(page, after: int, seconds: float = 60.0) -> float:
     """Seconds until a tour of a version later than this one is on the map."""
     begin = time.perf_counter()
     while time.perf_counter() < begin + seconds:
-        version, tour = page.evaluate(SHOWN)
+        version, tour, bad = page.evaluate(SHOWN)
         if version > after and tour == version:
             return time.perf_counter() - begin
+        if version > after and bad:
+            return np.inf
         time.sleep(0.002)
     return np.inf
 
