@@ -90,7 +90,8 @@ def test_every_solver_that_may_finds_the_best_of_the_orders_and_places_allowed(
             assert found.length >= best * (1.0 - 1e-9)
         assert solve(problem, "mip").length == pytest.approx(best)
         found = solve(problem, "anneal-2016", iteration_limit=200)
-        assert verify(problem, found)
+        # so few proposals may end entangled
+        assert found.status is Status.NO_SOLUTION_FOUND or verify(problem, found)
         walked = solve(problem, "greedy-tsp")
         assert walked.status is Status.INVALID or verify(problem, walked)
 
