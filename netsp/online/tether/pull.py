@@ -114,9 +114,11 @@ def pull_end(
     y: float,
     z: float,
     settings: PullSettings,
+    passing: bool,
 ) -> tuple[Floats, int, float]:
-    """Move one end (the robot's if `last`) to (x, y, z) and pull taut. Returns (strand, count,
-    residual): the strand may have been copied to grow; residual is the last round's motion."""
+    """Move one end (the robot's if `last`) to (x, y, z) and pull taut; if `passing` only so far as
+    an end asks for that moves on at once. Returns (strand, count, residual): the strand may have
+    been copied to grow; residual is the last round's motion."""
     delta = settings.delta
     stride, slip = STRIDE * delta, SLIP * delta
     end = count - 1 if last else 0
@@ -124,8 +126,6 @@ def pull_end(
     residual = 0.0
     ox, oy, oz = strand[end, X], strand[end, Y], strand[end, Z]
     path = math.sqrt((x - ox) ** 2 + (y - oy) ** 2 + (z - oz) ** 2)
-    # the last round's count grows with the path: a node moves by at most a stride in each
-    last_rounds = settings.rounds + min(2000, int(path / stride))
     while left > 0.0:
         end = count - 1 if last else 0
         next_to = end - 1 if last else 1
@@ -148,12 +148,25 @@ def pull_end(
             strand[end, Y] += f * dy
             strand[end, Z] += f * dz
         note_motion(strand, count, end, f * motion)
-        strand, count, residual = pull(
-            field, strand, count, settings, last_rounds if left == 0.0 else PASSING,
-            MORE_ROUNDS if left == 0.0 and settings.spread <= delta else 0,
-            MOST_NUDGE if path <= 0.1 * stride else 1,
-        )  # fmt: skip
+        if left == 0.0 and not passing:
+            strand, count, residual = come_to_rest(field, strand, count, settings, path)
+        else:
+            strand, count, residual = pull(field, strand, count, settings, PASSING, 0, 1)
     return strand, count, residual
+
+
+@kernel
+def come_to_rest(
+    field: Field, strand: Floats, count: int, settings: PullSettings, path: float
+) -> tuple[Floats, int, float]:
+    """Pull taut after an end has followed a path so long: the number of rounds grows with it, for a
+    node moves by at most a stride in each."""
+    stride = STRIDE * settings.delta
+    return pull(
+        field, strand, count, settings, settings.rounds + min(2000, int(path / stride)),
+        MORE_ROUNDS if settings.spread <= settings.delta else 0,
+        MOST_NUDGE if path <= 0.1 * stride else 1,
+    )  # fmt: skip
 
 
 @kernel
