@@ -36,7 +36,7 @@ PIVOTS = 24
 ROUGH = 0.9
 """Pulled taut, a path is seldom shorter than this share of what it is roughly pulled."""
 
-COMING_TO_REST = 300
+COMING_TO_REST = 60
 """Rounds that a tether gets to come free at home."""
 
 CHECK, LAG = 2.0, 3.0

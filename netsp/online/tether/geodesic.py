@@ -242,10 +242,9 @@ class GeodesicTether:
         path : array_like, shape (k, 3)
             Points that the robot passes, metres.
         floor : float
-            Metres. Where the tether is shorter it is not pulled quite taut before it goes on, so
-            these lengths are a little more than they need be, and, but for the last, less by what
-            edges cut off of the corners of voxels (about a hundredth at most): for callers who ask
-            whether a tether stays below a limit.
+            Metres. What edges cut off of the corners of voxels (about a hundredth at most) is added
+            to lengths from this one on, and to the last: for callers who ask whether a tether stays
+            below a limit.
 
         Returns
         -------

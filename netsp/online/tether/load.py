@@ -118,7 +118,7 @@ def drive_under(
     payouts, turnings, residual = np.empty(len(path)), np.empty(len(path)), 0.0
     for k in range(len(path)):
         strand, count, residual = pull_end(
-            field, strand, count, True, path[k, 0], path[k, 1], path[k, 2], settings, False
+            field, strand, count, True, path[k, 0], path[k, 1], path[k, 2], settings
         )
         more = cut_off(field, strand, count, settings)
         payouts[k] = payout_of(strand, count, load) + (1.0 + load.slack) * more

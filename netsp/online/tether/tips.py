@@ -11,6 +11,9 @@ from netsp.online.scene.sampling import Field
 from netsp.online.tether.mend import mend
 from netsp.online.tether.strand import (
     CONE,
+    EX,
+    EY,
+    EZ,
     PART,
     SHARP,
     X,
@@ -59,8 +62,13 @@ def nudge(
             sharp = sharp or uneven or edge or not rests(strand, k)
         if turned and sharp and j < i + TIP:
             before, kept = strand_length(strand, count), strand[:count].copy()
-            for side in (1.0, -1.0):
-                grown, vx, vy, vz = count, side * wx, side * wy, side * wz
+            # over an edge that it crosses at a slant, a strand slips along the edge
+            along_edge = i == j and strand[i, SHARP] == 1.0
+            for way in range(4 if along_edge else 2):
+                side, grown = (1.0, -1.0)[way % 2], count
+                vx, vy, vz = side * wx, side * wy, side * wz
+                if way >= 2:
+                    vx, vy, vz = side * kept[i, EX], side * kept[i, EY], side * kept[i, EZ]
                 for _ in range(steps):
                     if not sidestep(field, strand, grown, i, j, vx, vy, vz, stride):
                         break
@@ -70,6 +78,8 @@ def nudge(
                     ux, uy, uz, turned = across(strand, i, j)
                     if grown != count or not turned:
                         break
+                    if way >= 2:
+                        continue
                     same = 1.0 if ux * vx + uy * vy + uz * vz > 0.0 else -1.0
                     vx, vy, vz = same * ux, same * uy, same * uz
                 strand[:count] = kept
