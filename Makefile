@@ -4,7 +4,7 @@ PYTHON ?= python3
 BIN     = $(VENV)/bin
 DEMO   ?= demo
 
-.PHONY: demo test accept tables lint bench clean
+.PHONY: demo test accept tables lint bench js clean
 .DELETE_ON_ERROR:
 
 $(VENV)/.installed: pyproject.toml
@@ -25,6 +25,10 @@ test: $(VENV)/.installed
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/python -m pytest -n auto --dist worksteal
+
+# the linter and type checker for the page's scripts, where there is npm; `make test` runs them then
+js:
+	npm ci --prefix tests/js --no-audit --no-fund --silent
 
 # every figure of README and docs, measured on this commit
 accept: $(VENV)/.installed

@@ -1,5 +1,6 @@
 """The map in the browser: versions, the solver beside it, who is let in, and the page itself."""
 
+import dataclasses
 import itertools
 import json
 import re
@@ -14,16 +15,31 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from netsp import InputError, Problem, Solution, Tethers, solve, verify
+from netsp import InfeasibleError, InputError, Problem, Solution, Tethers, solve, verify
+from netsp.app.facts import facts, shortest_sufficient
+from netsp.app.files import EXPORTS, bare_name
+from netsp.app.frame import Frame
+from netsp.app.shown import read_shown
 from netsp.app.solving import Worker
 from netsp.app.state import Document
 from netsp.app.tethers import Cursor
+from netsp.execute.run import execute
+from netsp.execute.write import write_execution
+from netsp.export.write import export
+from netsp.geometry import polylines
+from netsp.online.log import write_run
+from netsp.online.mission import Mission
+from netsp.online.simulate import simulate
+from netsp.problem import Origin
+from netsp.site.read import read_site
+from netsp.sizing.margins import margins
 
 testclient = pytest.importorskip("starlette.testclient")
 
 from netsp.app.server import Session, application  # noqa: E402
 
 ROOT = Path(__file__).parent.parent
+JS = ROOT / "tests" / "js"
 WHARF = ROOT / "problems" / "wharf.json"
 BROWSER = shutil.which("chromium") or shutil.which("chromium-browser")
 
@@ -176,8 +192,9 @@ def test_nobody_comes_in_without_the_token_or_from_elsewhere(client):
     assert made.get("/?token=Secret").status_code == 403
     page = made.get("/?token=secret")
     assert page.status_code == 200
-    assert "script-src 'self'" in page.headers["content-security-policy"]
-    assert "'unsafe-inline'" not in page.headers["content-security-policy"]
+    policy = page.headers["content-security-policy"].split("; ")
+    assert "script-src 'self'" in policy
+    assert "default-src 'none'" in policy
     rebound = {"host": "evil.example:1234"}
     assert made.get("/?token=secret", headers=rebound).status_code == 403
     assert made.get("/?token=secret", headers={"origin": "http://evil"}).status_code == 403
@@ -249,6 +266,170 @@ def test_an_edit_is_answered_with_a_verified_tour_on_every_page(client):
     assert Problem.load(file) == problem
 
 
+def test_what_is_told_beside_the_length_is_true():
+    problem = Problem.load(WHARF)
+    solution = solve(problem)
+    told = facts(problem, solution)
+    lengths = [row[1] for row in told["profile"]]
+    assert max(lengths) <= problem.tether_length
+    at_visits = [min(told["profile"], key=lambda r, v=v: abs(r[0] - v))[1] for v in told["visits"]]
+    assert at_visits == pytest.approx([v.tether_length for v in solution.tour], abs=1e-3)
+    assert told["margins"] == dataclasses.asdict(margins(problem, solution))
+    least = told["sufficient"]
+    assert solve(problem.model_copy(update={"tether_length": least * (1 + 1e-9)})).length
+    with pytest.raises(InfeasibleError):
+        solve(problem.model_copy(update={"tether_length": least * (1 - 1e-6)}))
+    assert shortest_sufficient(problem.model_copy(update={"tether_length": 0.9 * least})) is None
+    assert facts(problem, solution, lambda: True) is None
+
+
+def posted(client, file, name=None, content=None):
+    return client.post(
+        "/import", params={"token": "secret", "name": file.name if name is None else name},
+        content=file.read_bytes() if content is None else content,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ["harbour.kml", "site.geojson"])
+def test_a_map_on_the_page_is_what_the_command_makes_of_it(client, name):
+    pytest.importorskip("pyogrio")
+    made, _ = client
+    file = ROOT / "examples" / name
+    assert posted(made, file).status_code == 200
+    text = made.get("/download/problem.json?token=secret").text
+    assert text == read_site(file).to_json()
+
+
+def test_what_cannot_be_opened_changes_nothing(client):
+    made, file = client
+    before = made.get("/download/problem.json?token=secret").text
+    for name, content, status, said in (
+        ("a.json", b"{", 422, "a.json: not JSON"), ("a.json", b"[]", 422, "a.json"),
+        ("../../a.exe", b"MZ", 422, "a.exe: expected .json"), ("", b"{}", 422, "expected a name"),
+        ("a.kml", b"<kml", 422, "a.kml"), ("a.geojson", b"\xff\xfe", 422, "a.geojson"),
+    ):  # fmt: skip
+        answer = posted(made, None, name, content)
+        assert answer.status_code == status
+        assert said in answer.text
+        assert answer.text.count("\n") == 0
+        assert "/tmp" not in answer.text
+    assert made.post("/import?name=a.json", content=b"{}").status_code == 403
+    far = {"origin": "http://evil"}
+    assert (
+        made.post("/import?token=secret&name=a.json", content=b"", headers=far).status_code == 403
+    )
+    large = {"content-length": str(10**9)}
+    assert made.post("/import?token=secret&name=a", content=b"x", headers=large).status_code == 413
+    assert made.get("/download/problem.json?token=secret").text == before
+    assert Problem.load(file) == Problem.load(WHARF)
+
+
+def test_what_is_exported_is_what_the_command_writes(tmp_path):
+    file = tmp_path / "harbour.json"
+    problem = Problem.load(WHARF).model_copy(
+        update={"origin": Origin(latitude=54.0, longitude=8.0)}
+    )
+    file.write_text(problem.to_json())
+    session = Session(Document(file), 20.0)
+    app = application(session, "secret", 1234)
+    with testclient.TestClient(app, base_url="http://127.0.0.1:1234") as made:
+        end = time.monotonic() + 60
+        while session.solution is None or session.answer["stage"] != "done":
+            assert time.monotonic() < end
+            time.sleep(0.05)
+        solution = Solution.from_json(session.solution)
+        for kind, name in EXPORTS.items():
+            export(problem, solution, tmp_path / name, kind)
+            answer = made.get(f"/download/{kind}?token=secret")
+            assert answer.text == (tmp_path / name).read_text()
+            assert f'filename="{name}"' in answer.headers["content-disposition"]
+    session.close()
+
+
+def test_it_saves_into_the_folder_that_was_opened_and_over_nothing(client, tmp_path):
+    made, file = client
+    (file.parent / "other.json").write_text("kept")
+    headers = {"host": "127.0.0.1:1234"}
+    with made.websocket_connect("/live?token=secret", headers=headers) as socket:
+        for n, (name, said) in enumerate((
+            ("other.json", "exists already"), ("../../new", None), ("", "expected a name"),
+            (".hidden", "expected a name"), (7, "expected the name"),
+        )):  # fmt: skip
+            socket.send_json({"id": n, "save": name})
+            answer = listen(socket, lambda m, n=n: m.get("id") == n)
+            assert (said in answer["error"]) if said else "error" not in answer
+    assert (file.parent / "other.json").read_text() == "kept"
+    assert Problem.load(file.parent / "new.json") == Problem.load(WHARF)
+    assert sorted(f.name for f in file.parent.iterdir()) == ["new.json", "other.json", "wharf.json"]
+    assert bare_name("C:\\a\\b.json") == "b.json"
+
+
+def test_a_solution_and_runs_can_be_looked_at_and_not_changed(tmp_path):
+    problem = Problem.load(WHARF)
+    solution = solve(problem)
+    (tmp_path / "s.json").write_text(solution.to_json())
+    write_execution(execute(problem, solution), tmp_path / "run")
+    mission = Mission.load(ROOT / "missions" / "basin.json")
+    short = mission.model_copy(update={"waypoints": mission.waypoints[:3]})
+    write_run(simulate(short, "predictive"), tmp_path / "flown")
+    for source, file, run in (
+        ("s.json", WHARF, False), ("run", None, True), ("flown", None, True)
+    ):  # fmt: skip
+        seen = read_shown(tmp_path / source, file)
+        session = Session(Document(None, seen.data), 20.0, seen)
+        app = application(session, "secret", 1234)
+        with testclient.TestClient(app, base_url="http://127.0.0.1:1234") as made:
+            headers = {"host": "127.0.0.1:1234"}
+            with made.websocket_connect("/live?token=secret", headers=headers) as socket:
+                state = socket.receive_json()["state"]
+                assert (state["shown"], state["run"], state["error"]) == (True, run, None)
+                assert socket.receive_json()["tour"]["length"] > 0
+                rows = socket.receive_json()["facts"]["profile"]
+                assert max(r[1] for r in rows) <= state["data"]["tether_length"]
+                socket.send_json({"id": 1, "edit": {"delete": [["goals", 0]]}})
+                assert "only shows" in socket.receive_json()["error"]
+                for share, row in ((0.0, rows[0]), (1.0, rows[-1])):
+                    socket.send_json({"id": 2, "along": share})
+                    told = socket.receive_json()["along"]
+                    assert told["length"] == pytest.approx(row[1], abs=1e-6)
+                    assert polylines.length(np.array(told["path"])[:, :2]) <= row[1] + 0.02
+                socket.send_json({"id": 3, "space": 0.5})
+                space = socket.receive_json()["space"]
+                assert space["data"][-1]["name"] == "tether"
+            assert posted(made, WHARF).status_code == 422
+    with pytest.raises(InputError, match="expected --problem"):
+        read_shown(tmp_path / "s.json")
+    with pytest.raises(InputError, match="folder of a run"):
+        read_shown(tmp_path)
+
+
+def test_the_map_in_a_notebook(tmp_path):
+    problem = Problem.load(WHARF)
+    with Frame(problem) as frame:
+        assert frame.problem() == problem
+        assert f'src="{frame.address}"' in frame._repr_html_()
+        server = frame._server
+        assert server.poll() is None
+    assert server.poll() is not None
+    broken = tmp_path / "b.json"
+    broken.write_text("{")
+    with pytest.raises(InputError, match="JSON"):
+        Frame(broken)
+
+
+@pytest.mark.skipif(not (JS / "node_modules").is_dir(), reason="npm is not installed: make js")
+@pytest.mark.parametrize("check", [
+    ("tsc", "-p", "tests/js"),
+    ("eslint", "--config", "tests/js/eslint.config.mjs", "netsp/app/static"),
+])  # fmt: skip
+def test_the_scripts_of_the_page_pass_the_linter_and_the_type_checker(check):
+    done = subprocess.run(
+        [JS / "node_modules" / ".bin" / check[0], *check[1:]], cwd=ROOT, capture_output=True,
+        text=True,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout
+
+
 @pytest.mark.skipif(BROWSER is None, reason="chromium is not installed")
 def test_the_page_in_a_browser(tmp_path):
     """Drag, draw, undo, by pointer and by key; the library agrees with what is shown."""
@@ -307,6 +488,17 @@ def test_the_page_in_a_browser(tmp_path):
             page.keyboard.press("Escape")
             page.mouse.move(500, 500)
             wait(lambda: "word" in page.inner_text("#where"))
+            wait(lambda: page.locator("svg.chart").count() == 2)
+            page.keyboard.press("b")
+            page.mouse.move(40, 100)
+            page.mouse.down()
+            page.mouse.move(870, 720, steps=3)
+            page.mouse.up()
+            wait(lambda: page.locator("polygon.bounds").count() == 1)
+            page.keyboard.press("3")
+            wait(lambda: page.get_attribute("#space", "data-drawn") == "yes")
+            page.keyboard.press("3")
+            page.keyboard.press("Control+z")
             page.keyboard.press("Control+s")
             wait(lambda: page.locator("#save").is_disabled())
             assert len(Problem.load(file).obstacles) == 9

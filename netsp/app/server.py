@@ -9,18 +9,25 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+import os
 import secrets
 from collections.abc import AsyncIterator, Mapping
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
+from netsp.app.facts import facts
+from netsp.app.files import EXPORTS, bare_name, exported, imported
+from netsp.app.files import MOST_BYTES as MOST_FILE
+from netsp.app.shown import Shown
 from netsp.app.solving import Worker
 from netsp.app.state import Document
 from netsp.app.tethers import Cursor
 from netsp.errors import InputError, NetspError
 from netsp.fields import checked_argument
 from netsp.models import shown
+from netsp.problem import Problem
+from netsp.solution import Solution
 
 STATIC = Path(__file__).parent / "static"
 
@@ -28,9 +35,12 @@ MOST_BYTES = 4 * 2**20
 """Of one message."""
 
 POLICY = (
-    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; "
-    "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'self'"
+    "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; "
+    "img-src 'self' data: blob:; connect-src 'self'; base-uri 'none'; form-action 'none'; "
+    "frame-ancestors 'self' http://127.0.0.1:* http://localhost:*"
 )
+"""Scripts come from files only; plotly styles what it draws in place. Frames: notebooks are served
+from this machine, too; without the token they see nothing."""
 
 
 class Session:
@@ -42,31 +52,50 @@ class Session:
         What is edited.
     time_limit : float
         Seconds of solving for one version.
+    shown : Shown, optional
+        Something that is only looked at: nothing is edited or solved then.
     """
 
-    def __init__(self, document: Document, time_limit: float = 60.0) -> None:
-        self.document = document
+    def __init__(
+        self, document: Document, time_limit: float = 60.0, shown: Shown | None = None
+    ) -> None:
+        self.document, self.shown = document, shown
         self.pages: set[asyncio.Queue[str]] = set()
         self.answer: dict[str, Any] | None = None
         self.solution: str | None = None
+        self.facts: dict[str, Any] | None = None
         self._cursor: Cursor | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
-        self._worker = Worker(self._solver_told, time_limit)
+        self._worker = Worker(self._solver_told, time_limit) if shown is None else None
 
     def begin(self) -> None:
         """From within the running loop."""
         self._loop = asyncio.get_running_loop()
-        self._changed()
+        if self.shown is None:
+            self._changed()
+            return
+        self.answer = self.shown.answer
+        if self.shown.solution is not None:
+            problem = Problem.model_validate(self.shown.data)
+            self.solution = self.shown.solution.to_json()
+            self._cursor = Cursor(problem, self.shown.solution.path)
+            if not self.shown.frames:
+                self.facts = facts(problem, self.shown.solution)
+        if self.shown.frames:
+            self.facts = self.shown.facts()
 
     def close(self) -> None:
         """End the solver."""
-        self._worker.close()
+        if self._worker is not None:
+            self._worker.close()
 
     def everything(self) -> list[dict[str, Any]]:
         """What a page that has just been opened needs."""
         told = [self._state()]
         if self.answer is not None:
             told.append({"tour": self.answer})
+        if self.facts is not None:
+            told.append({"facts": self.facts})
         return told
 
     def tell(self, message: Mapping[str, Any]) -> None:
@@ -86,6 +115,8 @@ class Session:
 
     def _do(self, message: Mapping[str, Any]) -> dict[str, Any] | None:
         document = self.document
+        if self.shown is not None and any(k in message for k in ("edit", "undo", "redo", "save")):
+            raise InputError("this page only shows: nothing can be edited on it")
         if "edit" in message:
             document.apply(message["edit"])
             self._changed()
@@ -96,19 +127,64 @@ class Session:
             if document.redo():
                 self._changed()
         elif "save" in message:
-            document.save()
+            document.save(self._target(message["save"]))
             self.tell(self._state())
         elif "hover" in message:
             x, y = _numbers(message["hover"], 2)
             return {"hover": self._cursor.hover(x, y) if self._cursor else None}
         elif "along" in message:
             (share,) = _numbers([message["along"]], 1)
-            return {"along": self._cursor.along(share) if self._cursor else None}
+            return {"along": self._along(share)}
         elif "classes" in message:
             return {"classes": self._classes(message["classes"])}
+        elif "space" in message:
+            (share,) = _numbers([message["space"]], 1)
+            return {"space": self._space(share)}
         else:
-            raise InputError("message: expected edit, undo, redo, save, hover, along or classes")
+            raise InputError(
+                "message: expected edit, undo, redo, save, hover, along, classes or space"
+            )
         return None
+
+    def _target(self, asked: object) -> Path | None:
+        """Where to save: in the folder that was opened, and over no other file."""
+        if asked is True:
+            return None
+        if not isinstance(asked, str):
+            raise InputError(f"save: expected the name of a file, got {shown(asked)}")
+        name = bare_name(asked)
+        own = self.document.file
+        target = (own.parent if own is not None else Path()) / (
+            name if name.endswith(".json") else f"{name}.json"
+        )
+        if target.exists() and (
+            own is None or not own.exists() or not os.path.samefile(target, own)
+        ):
+            raise InputError(f"save: {target.name} exists already; expected another name")
+        return target
+
+    def _along(self, share: float) -> dict[str, Any] | None:
+        if self.shown is not None and self.shown.frames:
+            return self.shown.along(share)
+        return self._cursor.along(share) if self._cursor else None
+
+    def _space(self, share: float) -> dict[str, Any]:
+        """Solids, path and tether in space."""
+        from netsp.app.space import figure
+
+        told = self._along(share) or {}
+        if self.shown is not None:
+            nodes = told.get("path") or []
+            return figure(
+                self.shown.scene, self.shown.data, self.shown.answer["path"],
+                nodes if self.shown.frames else _in_space(told),
+            )  # fmt: skip
+        from netsp.online.scene.scene import scene_of
+
+        path = (self.answer or {}).get("path", [])
+        problem = self.document.problem()
+        data = json.loads(problem.to_json())
+        return figure(scene_of(problem), data, path, _in_space(told))
 
     def _classes(self, goal: object) -> list[dict[str, Any]]:
         if self._cursor is None:
@@ -119,20 +195,26 @@ class Session:
 
     def _state(self) -> dict[str, Any]:
         document = self.document
+        wrong = document.complaint() if self.shown is None else None
         return {"state": {
-            "version": document.version, "data": document.data, "error": document.complaint(),
+            "version": document.version, "data": document.data, "error": wrong,
             "saved": document.saved, "file": document.file.name if document.file else None,
+            "shown": self.shown is not None,
+            "events": self.shown.events if self.shown is not None else [],
+            "run": self.shown is not None and bool(self.shown.frames),
+            "plan": self.shown is None or self.shown.solution is not None,
         }}  # fmt: skip
 
     def _changed(self) -> None:
         """After every edit: the pages are told, and the solver begins again."""
         self.tell(self._state())
-        self._cursor = None
+        self._cursor = self.facts = None
         try:
             problem = self.document.problem()
         except InputError:
             return
         self._cursor = Cursor(problem)
+        assert self._worker is not None
         self._worker.solve(self.document.version, problem.to_json())
 
     def _solver_told(self, said: dict[str, Any]) -> None:
@@ -143,6 +225,10 @@ class Session:
 
     def _take(self, said: dict[str, Any]) -> None:
         if said["version"] != self.document.version:
+            return
+        if "facts" in said:
+            self.facts = said["facts"]
+            self.tell({"facts": self.facts})
             return
         self.solution = said.pop("solution", None)
         self.answer = said
@@ -206,6 +292,36 @@ def application(session: Session, token: str, port: int) -> Any:
         answer: Response = _download(session, request.path_params["name"])
         return answer
 
+    async def take_in(request: Request) -> Response:
+        """A file that was dropped on the page becomes the next version."""
+        if not allowed(request.query_params.get("token")):
+            return PlainTextResponse("netsp: the address lacks its token", status_code=403)
+        size = request.headers.get("content-length", "")
+        if not size.isdigit() or int(size) > MOST_FILE:
+            return PlainTextResponse(f"netsp: expected at most {MOST_FILE} bytes", status_code=413)
+        content = await request.body()
+        try:
+            if session.shown is not None:
+                raise InputError("this page only shows: nothing can be edited on it")
+            tether = session.document.data.get("tether_length")
+            data, notes = await asyncio.to_thread(
+                imported, request.query_params.get("name", ""), content,
+                tether if isinstance(tether, int | float) else None,
+            )  # fmt: skip
+            session.asked({"edit": {"replace": data}})
+        except NetspError as error:
+            return PlainTextResponse(f"netsp: {error}", status_code=422)
+        return PlainTextResponse("\n".join(notes))
+
+    def plotly(request: Request) -> Response:
+        del request
+        from netsp.app.space import script
+
+        try:
+            return FileResponse(script(), media_type="text/javascript")
+        except InputError as error:
+            return PlainTextResponse(f"netsp: {error}", status_code=404)
+
     async def live(socket: WebSocket) -> None:
         if not (known(socket.headers) and allowed(socket.query_params.get("token"))):
             await socket.close(code=4403)
@@ -246,6 +362,8 @@ def application(session: Session, token: str, port: int) -> Any:
         routes=[
             Route("/", page),
             Route("/download/{name}", download),
+            Route("/import", take_in, methods=["POST"]),
+            Route("/plotly.js", plotly),
             WebSocketRoute("/live", live),
             Mount("/static", StaticFiles(directory=STATIC)),
         ],
@@ -277,6 +395,21 @@ def application(session: Session, token: str, port: int) -> Any:
     return guarded
 
 
+def _in_space(told: Mapping[str, Any]) -> list[list[float]]:
+    """The taut tether of an answer about the plane, its height in proportion to its length."""
+    import numpy as np
+
+    from netsp.geometry import polylines
+
+    flat = np.array(told.get("path") or [], dtype=float).reshape(-1, 2)
+    if len(flat) < 2:
+        return []
+    s = polylines.along(flat)
+    low, high = told.get("base_z", 0.0), told.get("z", 0.0)
+    rise = low + (high - low) * (s / s[-1] if s[-1] else s)
+    return np.column_stack([flat, rise]).round(4).tolist()  # type: ignore[no-any-return]
+
+
 def _numbers(values: object, count: int) -> list[float]:
     """So many finite numbers of a message."""
     if not isinstance(values, list) or len(values) != count:
@@ -298,7 +431,12 @@ def _download(session: Session, name: str) -> Any:
     from starlette.responses import PlainTextResponse, Response
 
     try:
-        problem = session.document.problem()
+        if session.shown is not None and session.shown.solution is None:
+            return PlainTextResponse("netsp: a run has no such file", status_code=404)
+        problem = (
+            session.document.problem() if session.shown is None
+            else Problem.model_validate(session.shown.data)
+        )  # fmt: skip
         if name == "problem.json":
             text, kind = problem.to_json(), "application/json"
         elif session.solution is None:
@@ -307,10 +445,12 @@ def _download(session: Session, name: str) -> Any:
             text, kind = session.solution, "application/json"
         elif name == "report.html":
             from netsp.report.tour import page
-            from netsp.solution import Solution
 
             solution = Solution.from_json(session.solution)
             text, kind = page(problem, solution, [], None, None), "text/html"
+        elif name in EXPORTS:
+            name, text = exported(problem, Solution.from_json(session.solution), name)
+            kind = "application/octet-stream"
         else:
             return PlainTextResponse("netsp: no such file", status_code=404)
     except InputError as error:

@@ -111,6 +111,7 @@ def _solve(
     """Solve one version, and tell the tours found on the way: first what is left of the tour before
     (`netsp.solvers.warm`), which an edit rarely changes much. Returns the solution if there is one.
     """
+    from netsp.app.facts import facts
     from netsp.clock import Clock
     from netsp.errors import InfeasibleError, InputError, NetspError
     from netsp.problem import Problem
@@ -165,6 +166,9 @@ def _solve(
             "length": result.length, "bound": result.lower_bound,
             "solution": found.to_json(), **drawn(graph, result.tour),
         })  # fmt: skip
+        known = facts(problem, found, connection.poll)
+        if known is not None:
+            connection.send({"version": version, "facts": known})
         return found
     except InfeasibleError as error:
         connection.send({

@@ -39,6 +39,16 @@ class Cursor:
         self._path = np.array(path, dtype=float).reshape(-1, 3)
         self._along = polylines.along(self._path) if len(self._path) > 1 else np.zeros(0)
 
+    @property
+    def shares(self) -> Floats:
+        """Of the tour's length, up to each point of its path."""
+        return self._along / self._along[-1] if len(self._along) else self._along
+
+    def share_at(self, place: Floats) -> float:
+        """The share of the tour's length at which it is nearest to a place (3,)."""
+        k = int(np.argmin(np.linalg.norm(self._path - place, axis=1)))
+        return float(self.shares[k])
+
     def hover(self, x: float, y: float) -> dict[str, Any]:
         """The taut tether to a place, in the class that it would have coming from the nearest point
         of the tour; the shortest of all while there is no tour."""
@@ -75,7 +85,10 @@ class Cursor:
         walked = np.vstack([self._path[: k + 1], place])
         word = concatenate((), crossings(walked[:, :2], self.problem.representative_points))
         found = self._tethers.to(float(place[0]), float(place[1]), word, float(place[2]))
-        told = {"x": float(place[0]), "y": float(place[1]), "share": share}
+        told = {
+            "x": float(place[0]), "y": float(place[1]), "z": float(place[2]), "share": share,
+            "base_z": float(self.problem.base[2]),
+        }  # fmt: skip
         return told | (_told(found) if found else {"length": None})
 
 

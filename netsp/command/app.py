@@ -26,8 +26,14 @@ def arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument(
         "problem", metavar="PROBLEM", nargs="?",
         help="problem file (JSON), made if there is none, or a map of a site (docs/sites.md); "
-        "default: an empty map without a file",
+        "default: an empty map without a file; with --show a solution file, or the folder of a run",
     )  # fmt: skip
+    p.add_argument(
+        "--show", action="store_true",
+        help="only look: at a solution (with --problem), or a run of `netsp execute` or `simulate`",
+    )  # fmt: skip
+    p.add_argument("--problem", metavar="FILE", dest="problem_file",
+                   help="with --show: the problem of a solution file")  # fmt: skip
     p.add_argument(
         "--port", type=int, default=0, metavar="N", help="port to listen on; default: a free one"
     )
@@ -59,8 +65,20 @@ def run(args: argparse.Namespace) -> int:
     except ImportError:
         raise InputError("the map needs uvicorn: pip install 'netsp[app]'") from None
     from netsp.app.server import MOST_BYTES, Session, application
+    from netsp.app.state import Document
 
-    document = _document(args.problem)
+    looked_at = None
+    if args.show:
+        from netsp.app.shown import read_shown
+
+        if args.problem is None:
+            raise InputError("--show: expected a solution file, or the folder of a run")
+        looked_at = read_shown(args.problem, args.problem_file)
+        document = Document(None, looked_at.data)
+    elif args.problem_file is not None:
+        raise InputError("--problem: goes with --show only")
+    else:
+        document = _document(args.problem)
     if not document.saved:
         messages.note(f"{args.problem}: what was edited last and not saved is on the map")
     if not 0 <= args.port <= 65535:
@@ -72,7 +90,7 @@ def run(args: argparse.Namespace) -> int:
     port = listening.getsockname()[1]
     token = secrets.token_urlsafe(24)
     address = f"http://127.0.0.1:{port}/?token={token}"
-    session = Session(document, float(args.time_limit))
+    session = Session(document, float(args.time_limit), looked_at)
     print(f"the map is at {address}\nCtrl-C ends it", file=sys.stderr, flush=True)
     if not args.no_browser:
         threading.Timer(0.5, webbrowser.open, [address]).start()

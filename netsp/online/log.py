@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import os
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, ClassVar
@@ -132,7 +133,10 @@ def write_run(run: Run, folder: str | Path) -> None:
         (place / "log.csv").write_text(text.getvalue(), encoding="utf-8")
         summary = json.dumps(run.summary, indent=1, allow_nan=False)
         (place / "summary.json").write_text(summary + "\n", encoding="utf-8")
-        mission = json.dumps(run.mission.model_dump(mode="json"), indent=1)
+        data = run.mission.model_dump(mode="json")
+        # a mission file names its scene from where it lies itself
+        data["scene"] = Path(os.path.relpath(data["scene"], place)).as_posix()
+        mission = json.dumps(data, indent=1)
         (place / "mission.json").write_text(mission + "\n", encoding="utf-8")
     except OSError as error:
         raise InputError(f"{folder}: cannot be written: {error.strerror or error}") from None

@@ -1,7 +1,7 @@
 // @ts-check
 /** Pointer and keys: select, drag, draw, pan, zoom. */
 
-import { placeOf } from "./map.js";
+import { cornersOf, placeOf } from "./map.js";
 
 /** @param {any} page @param {import("./link.js").Link} link */
 export function edits(page, link) {
@@ -68,11 +68,15 @@ export function edits(page, link) {
     fingers.set(event.pointerId, event);
     if (fingers.size === 2) { held = null; return; }
     const at = view.toWorld(event);
+    if (page.shown) { held = { kind: "pan", x: event.clientX, y: event.clientY }; return; }
     const target = /** @type {Element} */ (event.target);
     const corner = target.closest("[data-corner]");
     const thing = target.closest("[data-list]");
     if (page.tool === "goal") {
       page.edit({ add: "goals", value: { position: [...snapped(at, event), 0], name: freeName("g") } });
+    } else if (page.tool === "bounds") {
+      held = { kind: "bounds", from: snapped(at, event) };
+      page.draft = { points: [] };
     } else if (page.tool === "circle") {
       const [x, y] = snapped(at, event);
       held = { kind: "circle" };
@@ -111,20 +115,32 @@ export function edits(page, link) {
     }
     if (before) fingers.set(event.pointerId, event);
     if (held?.kind === "pan") {
-      view.x -= (event.clientX - held.x) / view.scale;
-      view.y += (event.clientY - held.y) / view.scale;
+      view.pan(-(event.clientX - held.x) / view.scale, (event.clientY - held.y) / view.scale);
       held.x = event.clientX; held.y = event.clientY;
-      view.place();
     } else if (held?.kind === "move") {
       page.data = held.before;
       held.changes = page.chosen.map(([l, k]) => moved(l, k, at[0] - held.from[0], at[1] - held.from[1]));
       for (const [path, value] of held.changes) preview(path, value);
+    } else if (held?.kind === "corner" && held.index < 0) {
+      const p = snapped(at, event), b = page.data.bounds, k = held.corner;
+      if (Array.isArray(b[0])) held.value = b.map((q, n) => (n === k ? p : q));
+      else {
+        const other = cornersOf(b)[(k + 2) % 4];
+        held.value = [Math.min(p[0], other[0]), Math.min(p[1], other[1]), Math.max(p[0], other[0]), Math.max(p[1], other[1])];
+        page.draft = { points: [...cornersOf(held.value), cornersOf(held.value)[0]] };
+      }
+      page.redraw();
     } else if (held?.kind === "corner") {
       const o = page.data.obstacles[held.index], p = snapped(at, event);
       held.value = o.center
         ? { ...o, radius: tidy(Math.max(Math.hypot(p[0] - o.center[0], p[1] - o.center[1]), 1e-6)) }
         : { ...o, polygon: o.polygon.map((q, n) => (n === held.corner ? p : q)) };
       preview(["obstacles", held.index], held.value);
+    } else if (held?.kind === "bounds") {
+      const [[a, b], [c, d]] = [held.from, snapped(at, event)];
+      held.value = [Math.min(a, c), Math.min(b, d), Math.max(a, c), Math.max(b, d)];
+      page.draft = { points: [[a, b], [c, b], [c, d], [a, d], [a, b]] };
+      page.redraw();
     } else if (held?.kind === "circle") {
       page.draft.radius = tidy(Math.hypot(at[0] - page.draft.x, at[1] - page.draft.y));
       page.redraw();
@@ -137,7 +153,7 @@ export function edits(page, link) {
           where.textContent = `x ${answer.hover.x.toFixed(2)}  y ${answer.hover.y.toFixed(2)} m` + earth([answer.hover.x, answer.hover.y])
             + `   tether ${answer.hover.length.toFixed(2)} m   word [${answer.hover.word.join(", ")}]`;
         }
-        page.redraw();
+        page.drawTethers();
       });
     }
   });
@@ -147,10 +163,18 @@ export function edits(page, link) {
     fingers.delete(event.pointerId);
     const was = held;
     held = null;
+    if (was?.kind === "pan") view.place();
     if (was?.kind === "move" && was.changes) {
       for (const [path, value] of was.changes) await page.edit({ set: path, value });
     } else if (was?.kind === "corner" && was.value) {
-      await page.edit({ set: ["obstacles", was.index], value: was.value });
+      page.draft = null;
+      await page.edit({ set: was.index < 0 ? ["bounds"] : ["obstacles", was.index], value: was.value });
+    } else if (was?.kind === "bounds") {
+      page.draft = null;
+      pick("select");
+      const box = was.value;
+      if (box && box[0] < box[2] && box[1] < box[3]) await page.edit({ set: ["bounds"], value: box });
+      page.redraw();
     } else if (was?.kind === "circle") {
       const { x, y, radius } = page.draft;
       page.draft = null;
@@ -160,7 +184,7 @@ export function edits(page, link) {
   }
   svg.addEventListener("pointerup", released);
   svg.addEventListener("pointercancel", released);
-  svg.addEventListener("pointerleave", () => { page.hovered = null; page.redraw(); });
+  svg.addEventListener("pointerleave", () => { page.hovered = null; page.drawTethers(); });
   svg.addEventListener("wheel", (event) => {
     event.preventDefault();
     view.zoom(Math.exp(-event.deltaY * 0.0015), view.toWorld(event));
@@ -200,7 +224,8 @@ export function edits(page, link) {
   }
 
   document.addEventListener("keydown", (event) => {
-    if (/** @type {Element} */ (event.target).closest("input:not([type=range])")) return;
+    if (page.shown && !/^(Arrow|\+|=|-|f|3)/.test(event.key)) return;
+    if (/** @type {Element} */ (event.target).closest("input:not([type=range]), select")) return;
     const key = event.key, control = event.ctrlKey || event.metaKey;
     const step = (event.shiftKey ? 60 : 12) / view.scale;
     const ways = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
@@ -226,6 +251,8 @@ export function edits(page, link) {
     else if (key === "g") pick("goal");
     else if (key === "c") pick("circle");
     else if (key === "p") pick("polygon");
+    else if (key === "b") pick("bounds");
+    else if (key === "3") document.getElementById("space-on")?.click();
     else if (key === "f") view.fit(page.data);
     else return;
     event.preventDefault();

@@ -42,16 +42,17 @@ export class Link {
   }
 
   /** Ask of a kind of which only the latest matters, such as where the cursor is.
-   * @param {string} kind @param {any} message @param {(answer: any) => void} done */
-  latest(kind, message, done) {
+   * @param {string} kind @param {any} message @param {(answer: any) => void} done
+   * @param {(error: string) => void} failed */
+  latest(kind, message, done, failed = () => {}) {
     const state = this.kinds.get(kind) ?? { busy: false, next: null };
     this.kinds.set(kind, state);
-    if (state.busy) { state.next = [message, done]; return; }
+    if (state.busy) { state.next = [message, done, failed]; return; }
     state.busy = true;
     this.ask(message).then((answer) => {
       state.busy = false;
-      if (!answer.error) done(answer);
-      if (state.next) { const [m, d] = state.next; state.next = null; this.latest(kind, m, d); }
+      if (answer.error) failed(answer.error); else done(answer);
+      if (state.next) { const [m, d, f] = state.next; state.next = null; this.latest(kind, m, d, f); }
     });
   }
 }

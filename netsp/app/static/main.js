@@ -2,9 +2,12 @@
 /** The page: what is shown of the state, and what is asked for. */
 
 import { edits } from "./edit.js";
+import { files } from "./files.js";
 import { Link } from "./link.js";
-import { ChartView, make, middleOf, placeOf } from "./map.js";
+import { ChartView, cornersOf, make, middleOf, placeOf } from "./map.js";
 import { fill } from "./panel.js";
+import { mark } from "./profile.js";
+import { Space } from "./space.js";
 
 /** @param {string} id @returns {any} */
 const by = (id) => document.getElementById(id);
@@ -12,19 +15,27 @@ const by = (id) => document.getElementById(id);
 /** @type {any} What the server said last, and what is chosen here. */
 const page = {
   data: null, version: -1, error: null, saved: true, file: null, tour: null, chosen: [], along: 0,
-  tool: "select", draft: null, ask: (m) => link.ask(m), edit, redraw, view: null,
+  tool: "select", draft: null, ask: (m) => link.ask(m), edit, redraw, drawTethers, view: null, facts: null,
+  shown: false, run: false, events: [], refit: () => { fitted = false; }, go: goTo,
 };
 
 const view = new ChartView(by("map"));
 page.view = view;
 view.onplaced = () => redraw();
 const link = new Link(heard);
+const space = new Space(by("space"), link, note);
 let fitted = false;
+
+/** @param {string} text @param {boolean} bad */
+function note(text, bad = false) {
+  by("where").textContent = text;
+  by("where").className = bad ? "note bad" : "note";
+}
 
 /** @param {any} change */
 async function edit(change) {
   const answer = await link.ask({ edit: change });
-  if (answer.error) by("where").textContent = answer.error;
+  if (answer.error) note(answer.error, true);
 }
 
 /** @param {any} message */
@@ -32,13 +43,16 @@ function heard(message) {
   if (message.connected === false) by("answer").textContent = "the server is gone; trying again";
   if (message.state) {
     Object.assign(page, message.state);
-    if (page.tour) page.tour.stale = true;
+    if (page.tour && !page.shown) page.tour.stale = true;
+    page.facts = null;
+    document.body.classList.toggle("shown", page.shown);
     page.chosen = page.chosen.filter(([list, k]) => list === "base" || k < (page.data[list] ?? []).length);
     view.heading = page.data.origin ? page.data.origin.heading ?? 0 : undefined;
     if (!fitted) { fitted = true; view.fit(page.data); }
     fill(page);
   }
   if (message.tour) { page.tour = message.tour; page.fresh = true; showAlong(); fill(page); }
+  if (message.facts) { page.facts = message.facts; fill(page); mark(by("along").value / 1000); }
   redraw();
   page.fresh = false;
   say();
@@ -51,21 +65,42 @@ function say() {
   answer.className = page.error || tour?.error ? "bad" : "";
   if (page.error) answer.textContent = page.error;
   else if (tour?.error) answer.textContent = tour.error;
-  else if (!tour || tour.version !== page.version) answer.textContent = "solving …";
+  else if (page.run && tour) {
+    const s = tour.summary;
+    const left = (s.left_out ?? []).length;
+    answer.textContent = `a run: ${s.visited} visited${left ? `, ${left} left out` : ""}, longest tether `
+      + `${s.longest_tether.toFixed(2)} of ${page.data.tether_length} m, over the limit for ${s.exceedance_s.toFixed(1)} s`;
+  } else if (!tour || tour.version !== page.version) answer.textContent = "solving …";
   else {
     const gap = tour.bound ? 100 * (1 - tour.bound / tour.length) : null;
     answer.textContent = `${tour.length.toFixed(2)} m` + (tour.status === "optimal" ? ", proven shortest"
       : gap === null ? ", searching" : `, at most ${Math.max(gap, 0).toFixed(2)} % above the shortest`)
       + (tour.stage === "searching" ? " …" : "");
   }
-  by("save").disabled = page.saved || page.file === null;
-  const token = new URLSearchParams(location.search).get("token") ?? "";
-  for (const [id, name] of [["get-problem", "problem.json"], ["get-solution", "solution.json"],
-    ["get-report", "report.html"]]) by(id).href = `/download/${name}?token=${encodeURIComponent(token)}`;
+  by("save").disabled = page.saved && page.file !== null;
+  by("undo").hidden = by("redo").hidden = by("save").hidden = by("open").hidden = page.shown;
+  by("get").hidden = page.shown && !page.plan;
 }
 
 /** @param {number[][]} points */
 const line = (points) => points.map((p) => `${p[0]},${p[1]}`).join(" ");
+
+/** Which way the tour goes: an arrow every so many pixels. @param {number[][]} path */
+function arrows(path) {
+  const out = [];
+  let along = 60;
+  for (let k = 1; k < path.length; k++) {
+    const [ax, ay] = view.toScreen(path[k - 1][0], path[k - 1][1]), [bx, by_] = view.toScreen(path[k][0], path[k][1]);
+    const far = Math.hypot(bx - ax, by_ - ay);
+    for (; along < far && out.length < 200; along += 130) {
+      const f = along / far;
+      out.push(make("path", { class: "arrow", d: "M5 0L-4 -4L-2 0L-4 4Z",
+        transform: `translate(${ax + f * (bx - ax)} ${ay + f * (by_ - ay)}) rotate(${Math.atan2(by_ - ay, bx - ax) * 180 / Math.PI})` }));
+    }
+    along -= far;
+  }
+  return out;
+}
 
 /** @param {string} list @param {number} k */
 const isChosen = (list, k) => page.chosen.some(([l, n]) => l === list && n === k);
@@ -75,9 +110,13 @@ function redraw() {
   if (!data) return;
   const world = [], screen = [];
   const blamed = new Set(page.tour?.enclosing ?? []);
-  if (data.bounds) {
-    const [a, b, c, d] = data.bounds;
-    world.push(make("rect", { x: a, y: b, width: c - a, height: d - b, class: "bounds" }));
+  if (Array.isArray(data.bounds)) {
+    const corners = cornersOf(data.bounds);
+    world.push(make("polygon", { points: line(corners), class: `bounds${isChosen("bounds", 0) ? " chosen" : ""}` }));
+    if (!page.shown) corners.forEach((p, n) => {
+      const [hx, hy] = view.toScreen(p[0], p[1]);
+      screen.push(make("rect", { x: hx - 5, y: hy - 5, width: 10, height: 10, class: "handle faint", "data-corner": n, "data-index": -1 }));
+    });
   }
   (data.obstacles ?? []).forEach((o, k) => {
     const look = { class: `obstacle${blamed.has(k) ? " blamed" : ""}${isChosen("obstacles", k) ? " chosen" : ""}`,
@@ -88,7 +127,7 @@ function redraw() {
     } else {
       world.push(make("polygon", { points: line(o.polygon), ...look }));
     }
-    const [x, y] = view.toScreen(...middleOf(o));
+    const [x, y] = view.toScreen(middleOf(o)[0], middleOf(o)[1]);
     if ((data.obstacles ?? []).length <= 60 && o.name) {
       screen.push(make("text", { x, y: y + 4, class: "label", "text-anchor": "middle" }, o.name));
     }
@@ -101,19 +140,19 @@ function redraw() {
     }
   });
   const tour = page.tour;
+  if (tour?.planned) world.push(make("polyline", { points: line(tour.planned), class: "tour planned" }));
   if (tour?.path) {
     const stale = tour.stale || tour.version !== page.version;
     world.push(make("polyline", { points: line(tour.path), class: `tour${stale ? " stale" : ""}${page.fresh ? " new" : ""}` }));
   }
-  if (page.hovered?.path) world.push(make("polyline", { points: line(page.hovered.path), class: "hover" }));
+  if (tour?.path && tour.version === page.version && !tour.stale) screen.push(...arrows(tour.path));
   for (const c of page.classes ?? []) world.push(make("polyline", { points: line(c.path), class: "hover" }));
-  if (page.walked?.path) world.push(make("polyline", { points: line(page.walked.path), class: "tether" }));
   if (page.draft) world.push(make(page.draft.radius === undefined ? "polyline" : "circle", page.draft.radius === undefined
     ? { points: line(page.draft.points), class: "draft" }
     : { cx: page.draft.x, cy: page.draft.y, r: page.draft.radius, class: "draft" }));
   const visit = new Map((tour?.visits ?? []).map((v, n) => [v.goal, n + 1]));
   (data.goals ?? []).forEach((g, k) => {
-    const [x, y] = view.toScreen(...placeOf(g).slice(0, 2));
+    const [x, y] = view.toScreen(placeOf(g)[0], placeOf(g)[1]);
     const known = tour && !tour.stale && tour.version === page.version;
     screen.push(make("g", { class: `goal${tour?.goal === k && known ? " unreached" : ""}`, "data-list": "goals", "data-index": k },
       make("circle", { cx: x, cy: y, r: 9, class: isChosen("goals", k) ? "chosen" : "" }),
@@ -123,25 +162,41 @@ function redraw() {
   const [bx, by_] = view.toScreen(data.base[0], data.base[1]);
   screen.push(make("path", { class: `base${isChosen("base", 0) ? " chosen" : ""}`, "data-list": "base", "data-index": 0,
     d: `M${bx} ${by_ - 11}l3 8h8l-6 5 2 9-7-5-7 5 2-9-6-5h8z` }));
-  if (page.walked && page.walked.x !== undefined) {
-    const [x, y] = view.toScreen(page.walked.x, page.walked.y);
-    screen.push(make("circle", { cx: x, cy: y, r: 6, class: "handle" }));
-  }
   // for whoever measures: the version that is shown, and that of the tour on it
   view.svg.dataset.version = String(page.version);
   view.svg.dataset.tour = String(tour?.path ? tour.version : "");
   view.world.replaceChildren(...world);
   view.screen.replaceChildren(...screen);
+  drawTethers();
+}
+
+/** The tethers at the cursor and along the tour, which move while all else stays. */
+function drawTethers() {
+  const over = [], [px, py] = view.panned;
+  /** As the rest of the screen was drawn, before it was shifted. @param {number} x @param {number} y */
+  const at = (x, y) => { const [sx, sy] = view.toScreen(x, y); return [sx - px, sy - py]; };
+  /** @param {number[][]} path @param {string} look */
+  const add = (path, look) => over.push(make("polyline", { class: look, points: path.map((p) => at(p[0], p[1]).join(",")).join(" ") }));
+  if (page.hovered?.path) add(page.hovered.path, "hover");
+  if (page.walked?.path) add(page.walked.path, "tether");
+  if (page.walked && page.walked.x !== undefined) {
+    const [x, y] = at(page.walked.x, page.walked.y);
+    over.push(make("circle", { cx: x, cy: y, r: 6, class: "robot" }));
+  }
+  view.over.replaceChildren(...over);
 }
 
 function showAlong() {
   if (!page.tour?.path) return;
   const share = by("along").value / 1000;
+  mark(share);
+  space.update(share);
   link.latest("along", { along: share }, (answer) => {
     page.walked = answer.along;
     const length = answer.along?.length;
-    by("along-said").textContent = length == null ? "" : `tether ${length.toFixed(2)} of ${page.data.tether_length} m`;
-    redraw();
+    by("along-said").textContent = length == null ? "" : `tether ${length.toFixed(2)} of ${page.data.tether_length} m`
+      + (answer.along.time === undefined ? "" : `, ${answer.along.time.toFixed(0)} s, ${answer.along.mode}`);
+    drawTethers();
   });
 }
 
@@ -155,9 +210,18 @@ by("play").addEventListener("click", () => {
 });
 by("undo").addEventListener("click", () => link.ask({ undo: true }));
 by("redo").addEventListener("click", () => link.ask({ redo: true }));
-by("save").addEventListener("click", async () => {
-  const answer = await link.ask({ save: true });
-  by("where").textContent = answer.error ?? `saved as ${page.file}`;
+by("space-on").addEventListener("click", () => {
+  const on = !space.open;
+  by("space-on").setAttribute("aria-pressed", String(on));
+  by("map").style.display = on ? "none" : "";
+  space.show(on, () => by("along").value / 1000);
 });
+
+/** The slider to a share of the tour. @param {number} share */
+function goTo(share) {
+  by("along").value = String(Math.round(1000 * share));
+  showAlong();
+}
 by("fit").addEventListener("click", () => page.data && view.fit(page.data));
 edits(page, link);
+files(page, link, note);

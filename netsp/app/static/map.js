@@ -28,6 +28,13 @@ export function middleOf(obstacle) {
   return [0, 1].map((k) => obstacle.polygon.reduce((sum, p) => sum + p[k], 0) / n);
 }
 
+/** Corners of the bounds, a box or an outline. @param {any} bounds @returns {number[][]} */
+export function cornersOf(bounds) {
+  if (Array.isArray(bounds[0])) return bounds;
+  const [a, b, c, d] = bounds;
+  return [[a, b], [c, b], [c, d], [a, d]];
+}
+
 export class ChartView {
   /** @param {SVGSVGElement} svg */
   constructor(svg) {
@@ -35,16 +42,52 @@ export class ChartView {
     this.x = 0; this.y = 0; this.scale = 10;   // of the middle of the screen; pixels per metre
     this.world = make("g");
     this.screen = make("g");
-    svg.append(this.world, this.screen);
-    new ResizeObserver(() => this.place()).observe(svg);
+    this.back = make("g");
+    this.over = make("g");
+    svg.append(this.back, this.world, this.screen, this.over);
+    new ResizeObserver(() => { this.known = undefined; this.place(); }).observe(svg);
   }
 
-  get size() { const box = this.svg.getBoundingClientRect(); return [box.width || 1, box.height || 1]; }
+  /** Asked once a change of the window: it makes the browser lay the page out. */
+  get size() { return this.known ??= this.measure(); }
 
-  place() {
+  /** @returns {[number, number]} */
+  measure() { const box = this.svg.getBoundingClientRect(); return [box.width || 1, box.height || 1]; }
+
+  /** @type {[number, number] | undefined} */
+  known;
+
+  /** The middle moves by so many metres: what is on the screen is only shifted, once a frame, until
+   * `place` draws it again. @param {number} dx @param {number} dy */
+  pan(dx, dy) {
+    this.x += dx; this.y += dy;
+    this.panned[0] -= dx * this.scale; this.panned[1] += dy * this.scale;
+    if (this.asked) return;
+    this.asked = true;
+    requestAnimationFrame(() => {
+      this.asked = false;
+      const shift = `translate(${this.panned[0]} ${this.panned[1]})`;
+      this.screen.setAttribute("transform", shift);
+      this.over.setAttribute("transform", shift);
+      this.lay();
+      this.furniture();
+    });
+  }
+
+  asked = false;
+  panned = [0, 0];
+
+  lay() {
     const [w, h] = this.size;
     this.world.setAttribute("transform",
       `translate(${w / 2} ${h / 2}) scale(${this.scale} ${-this.scale}) translate(${-this.x} ${-this.y})`);
+  }
+
+  place() {
+    this.panned = [0, 0];
+    this.screen.removeAttribute("transform");
+    this.over.removeAttribute("transform");
+    this.lay();
     this.furniture();
     this.onplaced?.();
   }
@@ -83,7 +126,7 @@ export class ChartView {
       const r = o.radius ?? 0;
       for (const [x, y] of o.center ? [o.center] : o.polygon) { xs.push(x - r, x + r); ys.push(y - r, y + r); }
     }
-    if (data.bounds) { xs.push(data.bounds[0], data.bounds[2]); ys.push(data.bounds[1], data.bounds[3]); }
+    if (Array.isArray(data.bounds)) for (const [x, y] of cornersOf(data.bounds)) { xs.push(x); ys.push(y); }
     const low = [Math.min(...xs), Math.min(...ys)], high = [Math.max(...xs), Math.max(...ys)];
     const [w, h] = this.size;
     const wide = Math.max(high[0] - low[0], 1e-6), tall = Math.max(high[1] - low[1], 1e-6);
@@ -118,7 +161,6 @@ export class ChartView {
         make("path", { d: "M0 -14L6 4H-6Z", class: "base" })),
       make("text", { x: w - 34, y: 70, class: "label" }, "N"));
     }
-    this.back ??= this.svg.insertBefore(make("g"), this.world);
     this.back.replaceChildren(make("path", { d: lines, class: "grid" }), ...parts);
   }
 

@@ -2,6 +2,7 @@
 /** The numbers beside the map. */
 
 import { placeOf } from "./map.js";
+import { profiles } from "./profile.js";
 
 /** @param {string} tag @param {any[]} inner */
 function element(tag, ...inner) {
@@ -15,7 +16,7 @@ function field(name, value, changed, kind = "number") {
   const input = document.createElement("input");
   input.type = kind;
   if (kind === "number") input.step = "any";
-  input.value = value ?? "";
+  input.value = typeof value === "number" ? String(+value.toFixed(4)) : value ?? "";
   input.addEventListener("change", () => changed(input.value));
   input.addEventListener("keydown", (event) => { if (event.key === "Enter") input.blur(); });
   return element("label", name, input);
@@ -24,21 +25,31 @@ function field(name, value, changed, kind = "number") {
 /** @param {any} page */
 export function fill(page) {
   const panel = document.getElementById("panel");
-  if (!panel || !page.data || panel.contains(document.activeElement)) return;
+  if (!panel || !page.data) return;
+  const at = document.activeElement;
+  if (at && panel.contains(at) && at.matches("input")) return;  // somebody is typing
   page.onchosen = () => fill(page);
   const data = page.data, parts = [];
   /** @param {any[]} path @param {any} value */
   const set = (path, value) => page.edit({ set: path, value });
-  parts.push(element("h2", "Problem"),
-    field("name", data.name, (v) => set(["name"], v), "text"),
-    field("tether length (m)", data.tether_length, (v) => set(["tether_length"], Number(v))),
-    tetherSlider(page),
-    field("clearance (m)", data.clearance, (v) => set(["clearance"], Number(v))),
-    field("base depth (m)", -(data.base[2] ?? 0), (v) => set(["base"], [data.base[0], data.base[1], 0 - Number(v)])));
-  if (page.tour?.needed) parts.push(element("p", `a tether of ${page.tour.needed.toFixed(2)} m would do`));
-  for (const [list, k] of page.chosen.slice(0, 5)) parts.push(...chosen(page, list, k, set));
+  if (page.shown) {
+    parts.push(element("h2", data.name ?? ""), element("p", `tether ${data.tether_length} m, clearance ${data.clearance} m`));
+    if (page.events.length) {
+      parts.push(element("h2", "Events"), element("ul", ...page.events.map((e) => element("li", `${(+e.time).toFixed(0)} s, ${e.event}: ${e.text}`))));
+    }
+  } else {
+    parts.push(element("h2", "Problem"),
+      field("name", data.name, (v) => set(["name"], v), "text"),
+      field("tether length (m)", data.tether_length, (v) => set(["tether_length"], Number(v))),
+      ...tetherSlider(page, set),
+      field("clearance (m)", data.clearance, (v) => set(["clearance"], Number(v))),
+      field("base depth (m)", 0 - (data.base[2] ?? 0), (v) => set(["base"], [data.base[0], data.base[1], 0 - Number(v)])),
+      ...bounds(data, set));
+    if (page.tour?.needed) parts.push(element("p", `a tether of ${page.tour.needed.toFixed(2)} m would do`));
+    for (const [list, k] of page.chosen.slice(0, 5)) parts.push(...chosen(page, list, k, set));
+  }
   const tour = page.tour;
-  if (tour?.visits && tour.version === page.version) {
+  if (tour?.visits?.length && tour.version === page.version) {
     const rows = tour.visits.map((v, n) => {
       const row = element("tr", element("td", String(n + 1)), element("td", data.goals[v.goal]?.name ?? `#${v.goal}`),
         element("td", v.tether.toFixed(2)), element("td", (data.tether_length - v.tether).toFixed(2)));
@@ -48,29 +59,67 @@ export function fill(page) {
     parts.push(element("h2", "Tour"), element("table",
       element("tr", element("th", ""), element("th", "goal"), element("th", "tether"), element("th", "slack")), ...rows));
   }
+  parts.push(...profiles(page, page.go), ...margins(page));
   panel.replaceChildren(...parts);
 }
 
-/** @param {any} page */
-function tetherSlider(page) {
+/** How far the world may be off. @param {any} page */
+function margins(page) {
+  const m = page.facts?.margins;
+  if (!m) return [];
+  const stops = m.stops.map((s) => element("tr", element("td", ""), element("td", s.name), element("td", s.slack.toFixed(2)),
+    element("td", (s.turning * 180 / Math.PI).toFixed(0)), element("td", s.clearance.toFixed(2))));
+  return [element("h2", "Margins"),
+    element("p", `Every obstacle may be off by ${m.obstacles.toFixed(2)} m (${m.limited_by}), the robot ${m.cross_track.toFixed(2)} m beside its path, `
+      + `and ${m.tether.toFixed(2)} m of tether may be lost.`),
+    element("table", element("tr", element("th", ""), element("th", "goal"), element("th", "slack m"), element("th", "turns °"), element("th", "clear m")), ...stops)];
+}
+
+/** @param {any} data @param {(path: any[], value: any) => void} set */
+function bounds(data, set) {
+  const b = data.bounds;
+  if (!Array.isArray(b)) return [];
+  const none = element("button", "Remove the bounds");
+  none.addEventListener("click", () => set(["bounds"], null));
+  if (Array.isArray(b[0])) return [element("h2", `Bounds of ${b.length} corners`), none];
+  return [element("h2", "Bounds"), ...["left (m)", "bottom (m)", "right (m)", "top (m)"].map((name, k) => field(name, b[k],
+    (v) => set(["bounds"], b.map((w, n) => (n === k ? Number(v) : w))))), none];
+}
+
+/** The tether's length, and the shortest that is enough marked on it.
+ * @param {any} page @param {(path: any[], value: any) => void} set */
+function tetherSlider(page, set) {
+  const length = page.data.tether_length;
+  if (!(length > 0)) return [];
+  const least = page.facts?.sufficient ?? page.tour?.needed ?? null;
+  page.range = page.range && page.range[0] < length && length < page.range[1] ? page.range : [0, 2 * length];
+  if (least !== null && least * 1.2 > page.range[1]) page.range = [0, 2 * least];
+  const [low, high] = page.range;
   const input = document.createElement("input");
   input.type = "range";
   input.min = "0"; input.max = "1000";
-  const length = page.data.tether_length;
-  input.value = "500";
+  input.value = String(1000 * (length - low) / (high - low));
   input.setAttribute("aria-label", "tether length");
+  const value = () => +(low + (high - low) * Math.max(Number(input.value), 1) / 1000).toPrecision(4);
   let last = 0;
   input.addEventListener("input", () => {
-    const now = Date.now();
-    if (now < last + 150) return;
-    last = now;
-    page.edit({ set: ["tether_length"], value: +(length * 2 ** ((Number(input.value) - 500) / 250)).toPrecision(4) });
+    if (Date.now() < last + 150) return;
+    last = Date.now();
+    set(["tether_length"], value());
   });
-  input.addEventListener("change", () => {
-    page.edit({ set: ["tether_length"], value: +(length * 2 ** ((Number(input.value) - 500) / 250)).toPrecision(4) });
-    input.blur();
-  });
-  return element("label", "", input);
+  input.addEventListener("change", () => { set(["tether_length"], value()); input.blur(); });
+  const row = element("label", "", input);
+  if (least === null) return [row];
+  const marked = document.createElement("datalist");
+  marked.id = "least";
+  const option = document.createElement("option");
+  option.value = String(1000 * (least - low) / (high - low));
+  marked.append(option);
+  input.setAttribute("list", "least");
+  const enough = Math.ceil(least * 100 + 1e-6) / 100;
+  const take = element("button", `take the shortest sufficient: ${enough.toFixed(2)} m`);
+  take.addEventListener("click", () => set(["tether_length"], enough));
+  return [row, marked, take];
 }
 
 /** @param {any} page @param {string} list @param {number} k @param {(path: any[], value: any) => void} set */
