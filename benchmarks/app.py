@@ -23,6 +23,7 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 import numpy as np
+import shapely
 from table import ROOT, head, heading, row
 
 from netsp import Problem
@@ -55,7 +56,9 @@ def page_at(url: str):
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as p:
-        browser = p.chromium.launch(executable_path=BROWSER, args=["--no-sandbox"])
+        browser = p.chromium.launch(
+            executable_path=BROWSER, args=["--no-sandbox", "--js-flags=--expose-gc"]
+        )
         page = browser.new_page(viewport={"width": 1400, "height": 900})
         page.goto(url)
         yield page
@@ -146,6 +149,115 @@ def drags(count: int) -> None:
     print()
 
 
+PAN = """async () => {
+  const svg = document.getElementById("map"), box = svg.getBoundingClientRect();
+  svg.setPointerCapture = () => {};
+  const send = (kind, x, y) => svg.dispatchEvent(
+    new PointerEvent(kind, { clientX: x, clientY: y, pointerId: 1, bubbles: true }));
+  const times = [];
+  let n = 0, last = 0;
+  send("pointerdown", box.x + 3, box.y + 3);
+  await new Promise((done) => {
+    const frame = (t) => {
+      if (last) times.push(t - last);
+      last = t;
+      send("pointermove", box.x + 3 + 100 * Math.sin(n / 10), box.y + 3 + 80 * Math.cos(n / 13));
+      if (++n < 240) requestAnimationFrame(frame); else done();
+    };
+    requestAnimationFrame(frame);
+  });
+  send("pointerup", box.x + 3, box.y + 3);
+  return times;
+}"""
+"""Drags the water about for 240 frames; milliseconds between them."""
+
+
+def crowded(goals: int = 200, obstacles: int = 100) -> str:
+    """A problem file of so many things."""
+    problem = reachable_world(1, goals=60, obstacles=obstacles, tether_length=400.0)[0]
+    rng = np.random.default_rng(0)
+    places = np.array([g.position[:2] for g in problem.goals])
+    data = json.loads(problem.to_json())
+    free = shapely.union_all([shape_of(o) for o in problem.obstacles])
+    while len(data["goals"]) < goals:
+        place = rng.uniform(places.min(0), places.max(0))
+        if free.distance(shapely.Point(place)) > problem.clearance + 0.1:
+            data["goals"].append({"position": [*place.tolist(), 0.0]})
+    return json.dumps(data)
+
+
+def shape_of(obstacle) -> shapely.Geometry:
+    if hasattr(obstacle, "center"):
+        return shapely.Point(obstacle.center).buffer(obstacle.radius)
+    return shapely.Polygon(obstacle.polygon)
+
+
+def frames() -> None:
+    """Frames while panning, and two tabs after an edit in one of them."""
+    print("### 100 obstacles and 200 goals\n")
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "p.json"
+        file.write_text(crowded())
+        with served(file) as (url, _), page_at(url) as page:
+            wait_for_tour(page, -1)
+            page.wait_for_timeout(1000)
+            times = np.array(page.evaluate(PAN))
+    head("obstacles", "goals", "ms between frames p50", "p95", "worst", name="app-frames")
+    row(100, 200, f"{np.median(times):.1f}", f"{np.percentile(times, 95):.1f}",
+        f"{times.max():.1f}")  # fmt: skip
+    print()
+
+
+def resident(pid: int) -> float:
+    """MiB of a process and its children."""
+    import psutil
+
+    process = psutil.Process(pid)
+    return sum(p.memory_info().rss for p in (process, *process.children(recursive=True))) / 2**20
+
+
+def memory(count: int) -> None:
+    """MiB of server and solver, and of the page's heap, on the way through so many edits."""
+    from websockets.sync.client import connect
+
+    print(f"### Memory over {count} edits\n")
+    rng = random.Random(1)
+
+    def moved() -> dict:
+        """As many goals as before: the solver takes what the problem asks for."""
+        place = [rng.uniform(0, 18), rng.uniform(0, 9), -3.0]
+        edit = {"edit": {"set": ["goals", rng.randrange(8), "position"], "value": place}}
+        return rng.choice([edit, edit, {"undo": True}, {"redo": True}])
+
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "p.json"
+        file.write_text((ROOT / "problems" / "wharf.json").read_text())
+        with served(file) as (url, server), page_at(url) as page:
+            head("edits", "server and solver MiB", "page's heap MiB", "two tabs differ",
+                 name="app-memory")  # fmt: skip
+            other = page.context.browser.new_page()
+            other.goto(url)
+            at, done = urlsplit(url), 0
+            with connect(f"ws://{at.netloc}/live?{at.query}", max_size=None) as socket:
+                for until in (count // 10, count // 2, count):
+                    for k in range(done, until):
+                        socket.send(json.dumps({"id": k, **moved()}))
+                        while json.loads(socket.recv()).get("id") != k:
+                            pass
+                    done = until
+                    page.wait_for_timeout(3000)
+                    page.evaluate("() => window.gc?.()")
+                    heap = page.evaluate("() => performance.memory.usedJSHeapSize") / 2**20
+                    seen = [
+                        p.evaluate("() => document.getElementById('map').dataset.version + "
+                                   "document.getElementById('answer').textContent")
+                        for p in (page, other)
+                    ]  # fmt: skip
+                    row(until, f"{resident(server.pid):.0f}", f"{heap:.1f}",
+                        "no" if seen[0] == seen[1] else "yes")  # fmt: skip
+    print()
+
+
 def random_edit(rng: random.Random) -> dict:
     """Some of them break the format for a while, or cannot be made."""
     return rng.choice([
@@ -211,10 +323,15 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--drags", type=int, default=200)
     parser.add_argument("--edits", type=int, default=1000)
+    parser.add_argument("--only", choices=("drags", "edits", "frames", "memory"))
     args = parser.parse_args()
     heading("The map in the browser")
-    drags(args.drags)
-    edited(args.edits, 10)
+    for name, measure in (
+        ("drags", lambda: drags(args.drags)), ("edits", lambda: edited(args.edits, 10)),
+        ("frames", frames), ("memory", lambda: memory(2 * args.edits)),
+    ):  # fmt: skip
+        if args.only in (None, name):
+            measure()
 
 
 if __name__ == "__main__":

@@ -109,15 +109,16 @@ class Document:
         InputError
             Not such an edit; nothing is changed.
         """
-        data = copy.deepcopy(self.data)
+        data = dict(self.data)  # what an edit changes is copied on the way to it
+        value = copy.deepcopy(edit.get("value"))
         if "set" in edit:
-            _set(data, edit["set"], edit.get("value"))
+            _set(data, edit["set"], value)
         elif "add" in edit:
-            _list(data, edit["add"]).append(edit.get("value"))
+            _list(data, edit["add"]).append(value)
         elif "delete" in edit:
             _delete(data, edit["delete"])
         elif isinstance(edit.get("replace"), dict):
-            data = dict(edit["replace"])
+            data = copy.deepcopy(dict(edit["replace"]))
         else:
             raise InputError(f"edit: expected set, add, delete or replace, got {shown(edit)}")
         try:
@@ -210,12 +211,14 @@ def _read(file: Path) -> dict[str, Any]:
 
 
 def _list(data: dict[str, Any], name: object) -> list[Any]:
+    """A list of this version's own, to be changed."""
     if name not in LISTS:
         raise InputError(f"edit: expected one of {', '.join(LISTS)}, got {shown(name)}")
-    found = data.setdefault(str(name), [])
+    found = data.get(str(name), [])
     if not isinstance(found, list):
         raise InputError(f"edit: {name} is no list")
-    return found
+    own = data[str(name)] = list(found)
+    return own
 
 
 def _item(data: dict[str, Any], path: object) -> tuple[list[Any], int]:
@@ -241,16 +244,16 @@ def _set(data: dict[str, Any], path: object, value: Any) -> None:
         return
     if not isinstance(items[k], dict) or not isinstance(path[2], str):
         raise InputError(f"edit: expected the name of a field, got {shown(path[2])}")
-    if value is None:
-        items[k].pop(path[2], None)
-    else:
+    items[k] = {f: v for f, v in items[k].items() if f != path[2]}
+    if value is not None:
         items[k][path[2]] = value
 
 
 def _delete(data: dict[str, Any], paths: object) -> None:
     if not isinstance(paths, list) or not paths:
         raise InputError(f"edit: expected paths to delete, got {shown(paths)}")
-    gone = [(items, k) for items, k in (_item(data, p) for p in paths)]
-    for items, k in sorted(gone, key=lambda g: -g[1]):
-        if k < len(items):
-            del items[k]
+    for path in paths:
+        _item(data, path)  # all of them are there, or nothing is deleted
+    gone = {(str(name), int(k)) for name, k, *_ in paths}
+    for name in {name for name, _ in gone}:
+        data[name] = [v for k, v in enumerate(data[name]) if (name, k) not in gone]

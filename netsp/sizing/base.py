@@ -207,10 +207,6 @@ def best_base(
     InputError
         Bad candidates, or a problem whose robot is already out.
     """
-    if problem.visits < len(problem.goals) or len(problem.precedences):
-        raise InputError(
-            "goals: the search for a base knows no 'any_of' and no 'after'; expected goals without"
-        )
     if problem.state is not None:
         raise InputError("state: a base is chosen before the robot is out; expected none")
     places = _places(problem, candidates)
@@ -301,7 +297,7 @@ def _rated(
             out.append(Candidate(position, name, np.inf, np.inf, why=blocked[k]))
             continue
         to = tethers[free.index(k)]
-        farthest = int(np.argmax(to))
+        farthest = _hardest(problem, to)
         shortest = float(to[farthest])
         if shortest > problem.tether_length * (1.0 + 1e-12):
             goal = problem.goal_label(farthest)
@@ -311,7 +307,7 @@ def _rated(
             )  # fmt: skip
             out.append(Candidate(position, name, shortest, np.inf, why=why))
             continue
-        bound = _tour_bound(to, between, clock, seed)
+        bound = _tour_bound(problem, to, between, clock, seed)
         out.append(Candidate(position, name, shortest, bound))
     return out
 
@@ -360,15 +356,31 @@ def _shortest_paths(problem: Problem, places: Floats) -> tuple[Floats, Floats]:
     return lengths[:, len(goals) :].T.copy(), lengths[:, : len(goals)].copy()
 
 
-def _tour_bound(to: Floats, between: Floats, clock: Clock, seed: int) -> float:
-    """No tour from a place is shorter than the travelling salesperson's over shortest paths."""
+def _hardest(problem: Problem, to: Floats) -> int:
+    """The goal that asks for the longest tether, where of every choice the nearest is taken."""
+    nearest = [
+        members[np.argmin(to[members])]
+        for c in range(1, problem.visits + 1)
+        for members in (np.flatnonzero(problem.clusters == c),)
+    ]
+    return int(max(nearest, key=lambda k: to[k]))
+
+
+def _tour_bound(
+    problem: Problem, to: Floats, between: Floats, clock: Clock, seed: int
+) -> float:  # fmt: skip
+    """No tour from a place is shorter than the travelling salesperson's over shortest paths, one
+    goal of each choice, in any order."""
+    within = np.flatnonzero(np.isfinite(to))
+    to, between = to[within], between[np.ix_(within, within)]
     n = len(to)
     costs = np.zeros((n + 1, n + 1))
     costs[0, 1:] = costs[1:, 0] = to
     costs[1:, 1:] = np.minimum(between, between.T)
     np.fill_diagonal(costs, 0.0)
-    over = TravelGraph.from_costs(costs, range(n + 1))
-    least = 2.0 * float(to.max())  # there and back
+    choices = problem.clusters[within]
+    over = TravelGraph.from_costs(costs, [0, *choices.tolist()])
+    least = 2.0 * max(float(to[choices == c].min()) for c in np.unique(choices))  # there and back
     if clock.up:
         return least
     bound = solve_graph(over, time_limit=clock, seed=seed).lower_bound or 0.0

@@ -89,6 +89,9 @@ PATIENCE, SHARE = 8, 20
 taut as it gets: over rims and braces its nodes may come and go for ever (91 to 93 of them on a
 retreat through a jetty, the length to and fro by 0.02 %)."""
 
+STANDING = 40
+"""Times the rounds for a strand whose ends stand still: what is slipping slowly comes to rest."""
+
 PASSING = 2
 """Rounds of a pull on the way, where the end of the strand moves on at once."""
 
@@ -131,6 +134,9 @@ def pull_end(
     path = math.sqrt((x - ox) ** 2 + (y - oy) ** 2 + (z - oz) ** 2)
     # the last round's count grows with the path: a node moves by at most a stride in each
     last_rounds = settings.rounds + min(2000, int(path / stride))
+    standing = path <= 0.1 * stride
+    if standing:
+        last_rounds *= STANDING
     while left > 0.0:
         end = count - 1 if last else 0
         next_to = end - 1 if last else 1
@@ -156,7 +162,7 @@ def pull_end(
         strand, count, residual = pull(
             field, strand, count, settings, last_rounds if left == 0.0 else PASSING,
             MORE_ROUNDS if left == 0.0 and settings.spread <= delta else 0,
-            MOST_NUDGE if path <= 0.1 * stride else 1,
+            MOST_NUDGE if standing else 1,
         )  # fmt: skip
     return strand, count, residual
 
