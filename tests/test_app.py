@@ -88,6 +88,24 @@ def test_every_version_can_be_gone_back_to_and_nothing_is_lost_on_the_way(
     assert Problem.load(file) == Problem.load(WHARF)  # not saved, not touched
 
 
+def test_a_version_shares_what_an_edit_does_not_change(tmp_path):
+    """Ten thousand versions of a large problem would not fit into memory else."""
+    document = Document(None, json.loads(Problem.load(WHARF).to_json()))
+    before = document.data
+    place = [1.0, 2.0, -3.0]
+    document.apply({"set": ["goals", 2, "position"], "value": place})
+    after = document.data
+    assert after["obstacles"] is before["obstacles"]
+    assert all(a is b for k, (a, b) in enumerate(zip(after["goals"], before["goals"], strict=True))
+               if k != 2)  # fmt: skip
+    assert before["goals"][2]["position"] != place
+    place[0] = 9.0
+    assert after["goals"][2]["position"] == [1.0, 2.0, -3.0]
+    with pytest.raises(InputError):
+        document.apply({"delete": [["goals", 0], ["goals", 99]]})
+    assert document.data is after
+
+
 def test_what_is_saved_is_what_the_command_line_reads(tmp_path):
     file = tmp_path / "p.json"
     document = Document(file)

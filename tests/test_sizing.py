@@ -111,6 +111,27 @@ def test_the_best_base_is_the_best_of_solves_from_all(seed):
     assert every.best.length == pytest.approx(found.best.length)
 
 
+@settings(max_examples=6, deadline=None)
+@given(seed=st.integers(0, 10**6))
+def test_the_best_base_is_the_best_with_choices_and_orders_too(seed):
+    rng = np.random.default_rng(seed)
+    goals = [
+        {"name": "a", "any_of": rng.uniform(0.0, 9.0, (2, 2)).tolist()},
+        {"name": "b", "position": rng.uniform(0.0, 9.0, 2).tolist(), "after": ["c"]},
+        {"name": "c", "position": rng.uniform(0.0, 9.0, 2).tolist()},
+        {"name": "d", "any_of": [[99.0, 0.0], rng.uniform(0.0, 9.0, 2).tolist()]},
+    ]
+    problem = Problem(base=(0, 0), goals=goals, tether_length=30)
+    places = rng.uniform(0.0, 9.0, (6, 2))
+    found = best_base(problem, places)
+    data = problem.model_dump()
+    lengths = [solve(Problem.model_validate({**data, "base": tuple(p)})).length for p in places]
+    assert found.proven
+    assert found.best.length == pytest.approx(min(lengths), rel=1e-6)
+    for c in found.candidates:
+        assert c.lower_bound <= lengths[int(c.name[1:])] * (1 + 1e-9)
+
+
 def test_goals_at_one_spot_and_candidates_on_goals_do_no_harm():
     problem = Problem(
         base=(0, 0), goals=[(4, 1, -1), (4, 1, -3), (2, 5)],
