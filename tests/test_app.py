@@ -16,7 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp import InfeasibleError, InputError, Problem, Solution, Tethers, solve, verify
-from netsp.app.facts import facts, shortest_sufficient
+from netsp.app.facts import facts, plain, shortest_sufficient
 from netsp.app.files import EXPORTS, bare_name
 from netsp.app.frame import Frame
 from netsp.app.shown import read_shown
@@ -166,7 +166,8 @@ def test_what_cannot_be_solved_is_told_and_a_dead_solver_is_replaced(worker):
     far = Problem(base=(0, 0), goals=[(1, 0), (30, 40)], tether_length=20)
     made.solve(100, far.to_json())
     said = heard(box, lambda m: m["version"] == 100)
-    assert (said["goal"], said["needed"]) == (1, pytest.approx(50.0))
+    assert said["unreached"] == [{"goal": 1, "needed": pytest.approx(50.0)}]
+    assert said["needed"] == pytest.approx(50.0)
     made._process.kill()
     made._process.join()
     time.sleep(0.2)
@@ -292,13 +293,20 @@ def test_what_is_told_beside_the_length_is_true():
     assert max(lengths) <= problem.tether_length
     at_visits = [min(told["profile"], key=lambda r, v=v: abs(r[0] - v))[1] for v in told["visits"]]
     assert at_visits == pytest.approx([v.tether_length for v in solution.tour], abs=1e-3)
-    assert told["margins"] == dataclasses.asdict(margins(problem, solution))
+    assert told["margins"] == plain(dataclasses.asdict(margins(problem, solution)))
     least = told["sufficient"]
     assert solve(problem.model_copy(update={"tether_length": least * (1 + 1e-9)})).length
     with pytest.raises(InfeasibleError):
         solve(problem.model_copy(update={"tether_length": least * (1 - 1e-6)}))
-    assert shortest_sufficient(problem.model_copy(update={"tether_length": 0.9 * least})) is None
+    short = problem.model_copy(update={"tether_length": 0.5 * least})
+    assert shortest_sufficient(short) == pytest.approx(least)  # whatever tether there is
     assert facts(problem, solution, lambda: True) is None
+
+
+def test_what_is_told_without_obstacles_can_be_said_in_json():
+    problem = Problem(base=(0, 0), goals=[(3, 4)], tether_length=6)
+    told = facts(problem, solve(problem))
+    assert json.loads(json.dumps(told, allow_nan=False))["margins"]["obstacles"] is None
 
 
 def posted(client, file, name=None, content=None):
@@ -504,8 +512,21 @@ def test_the_page_in_a_browser(tmp_path):
             wait(lambda: page.locator("circle.obstacle").count() == 9)
             wait(lambda: "proven" in answer() or "reach" in answer())
             page.keyboard.press("Escape")
+            page.locator("#map").focus()
+            page.keyboard.press("n")
+            assert page.inner_text("#where").startswith("base at")
+            page.keyboard.press("n")
+            assert page.inner_text("#where").startswith("goal A1 at")
+            page.keyboard.press("Escape")
+            page.keyboard.press("p")
+            for corner in ((600, 300), (640, 300), (640, 340), (600, 300)):
+                page.mouse.click(*corner)  # the first again ends it
+            wait(lambda: page.locator("polygon.obstacle").count() == 1)
+            page.keyboard.press("Control+z")
+            wait(lambda: page.locator("polygon.obstacle").count() == 0)
+            page.keyboard.press("Escape")
             page.mouse.move(500, 500)
-            wait(lambda: "word" in page.inner_text("#where"))
+            wait(lambda: "class" in page.inner_text("#where"))
             wait(lambda: page.locator("svg.chart").count() == 2)
             page.keyboard.press("b")
             page.mouse.move(40, 100)

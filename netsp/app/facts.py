@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import asdict
 from typing import Any
@@ -9,9 +10,10 @@ from typing import Any
 import numpy as np
 
 from netsp.app.tethers import Cursor
+from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.problem import Problem
-from netsp.roadmap.tethers import Tethers
+from netsp.sizing.base import shortest_paths
 from netsp.sizing.margins import margins
 from netsp.solution import Solution
 
@@ -53,7 +55,7 @@ def facts(
     found = None
     if problem.state is None:
         try:
-            found = asdict(margins(problem, solution))
+            found = plain(asdict(margins(problem, solution)))
         except InputError:  # found with limits of its own; the judge says more
             found = None
     return {
@@ -73,17 +75,37 @@ def shortest_sufficient(problem: Problem) -> float | None:
     Returns
     -------
     float or None
-        In the problem's units; None if the tether there is does not suffice.
+        In the problem's units; None where no tether would do.
     """
-    tethers = Tethers(problem)
-    least = np.full(problem.visits + 1, np.inf)
-    for goal, choice in zip(problem.goals, problem.clusters, strict=True):
-        x, y, z = goal.position
-        found = tethers.to(x, y, z=z)
-        if found is not None:
-            least[choice] = min(least[choice], found.length)
-    longest = float(least[1:].max())
+    to = needed(problem)
+    least = [min(to[problem.clusters == c]) for c in range(1, problem.visits + 1)]
+    longest = float(max(least))
     return longest if np.isfinite(longest) else None
+
+
+def needed(problem: Problem) -> Floats:
+    """The shortest tether to every goal, whatever tether there is.
+
+    Parameters
+    ----------
+    problem : Problem
+        Base, goals and obstacles count.
+
+    Returns
+    -------
+    ndarray, shape (goals,)
+        Lengths in the problem's units; infinite where nothing leads there.
+    """
+    return np.asarray(shortest_paths(problem, problem.points[:1])[0][0])
+
+
+def plain(value: Any) -> Any:
+    """The same with None for numbers that are not finite, which JSON cannot say."""
+    if isinstance(value, dict):
+        return {k: plain(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(v) for v in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _places(problem: Problem, solution: Solution) -> list[Any]:

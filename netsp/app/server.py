@@ -100,7 +100,7 @@ class Session:
 
     def tell(self, message: Mapping[str, Any]) -> None:
         """Tell all pages."""
-        text = json.dumps(message)
+        text = json.dumps(message, allow_nan=False)
         for page in self.pages:
             page.put_nowait(text)
 
@@ -198,6 +198,7 @@ class Session:
         wrong = document.complaint() if self.shown is None else None
         return {"state": {
             "version": document.version, "data": document.data, "error": wrong,
+            "undo": document.can_undo, "redo": document.can_redo,
             "saved": document.saved, "file": document.file.name if document.file else None,
             "shown": self.shown is not None,
             "events": self.shown.events if self.shown is not None else [],

@@ -16,6 +16,7 @@ from multiprocessing.connection import Connection
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from netsp.problem import Problem
     from netsp.solution import Solution
 
 TELL = 0.15
@@ -172,9 +173,8 @@ def _solve(
         return found
     except InfeasibleError as error:
         connection.send({
-            "version": version, "stage": "done", "error": str(error), "goal": error.goal,
-            "needed": error.needed if error.needed not in (None, float("inf")) else None,
-            "enclosing": list(error.enclosing),
+            "version": version, "stage": "done", "error": str(error),
+            "enclosing": list(error.enclosing), **_out_of_reach(problem),
         })  # fmt: skip
     except NetspError as error:
         if not clock.stopped:
@@ -182,3 +182,18 @@ def _solve(
     finally:
         clock.close()
     return None
+
+
+def _out_of_reach(problem: Problem) -> dict[str, Any]:
+    """Goals that the tether does not reach, with what each needs (None: nothing leads there), and
+    the tether that would do for all."""
+    from netsp.app.facts import needed, plain, shortest_sufficient
+
+    if problem.state is not None:
+        return {"unreached": [], "needed": None}
+    far = [
+        {"goal": k, "needed": plain(float(t))}
+        for k, t in enumerate(needed(problem))
+        if t > problem.tether_length
+    ]
+    return {"unreached": far, "needed": shortest_sufficient(problem)}

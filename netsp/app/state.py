@@ -52,7 +52,10 @@ class Document:
         self.file = None if file is None else Path(file)
         self.version = 0
         if data is None:
-            data = _read(self.file) if self.file and self.file.exists() else EMPTY
+            data = EMPTY
+            if self.file is not None:
+                named = {**EMPTY, "name": self.file.stem}
+                data = _read(self.file) if self.file.exists() else named
         self._versions: list[dict[str, Any]] = [dict(data)]
         self._at = 0
         self._saved = self._versions[0]
@@ -126,6 +129,16 @@ class Document:
         except (TypeError, ValueError):
             raise InputError("edit: expected finite numbers") from None
         self._push(data)
+
+    @property
+    def can_undo(self) -> bool:
+        """Whether there is a version to go back to."""
+        return self._at > 0
+
+    @property
+    def can_redo(self) -> bool:
+        """Whether there is a version that was gone back from."""
+        return self._at + 1 < len(self._versions)
 
     def undo(self) -> bool:
         """Go back one version; whether there was one."""

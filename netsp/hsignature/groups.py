@@ -204,9 +204,7 @@ def _shortened(relators: Sequence[Word]) -> tuple[int, Word, list[Word]] | None:
 def _substituted(word: Word, generator: int, means: Word) -> Word:
     back = invert(means)
     return reduce(
-        y
-        for x in word
-        for y in (means if x == generator else back if x == -generator else (x,))
+        y for x in word for y in (means if x == generator else back if x == -generator else (x,))
     )
 
 
@@ -244,18 +242,16 @@ def _rewritten(letters: Iterable[int], rules: Sequence[tuple[Word, Word]]) -> Wo
     return tuple(kept)
 
 
-def _completed(
-    rank: int, relators: Sequence[Word]
-) -> tuple[tuple[tuple[Word, Word], ...], bool]:
+def _completed(rank: int, relators: Sequence[Word]) -> tuple[tuple[tuple[Word, Word], ...], bool]:
     """Rules of a group, and whether they are complete."""
-    inverses = [((x, -x), ()) for g in range(1, rank + 1) for x in (g, -g)]
+    inverses: list[tuple[Word, Word]] = [((x, -x), ()) for g in range(1, rank + 1) for x in (g, -g)]
     place = _places(rank, relators)
 
     def order(word: Word) -> tuple[int, list[tuple[int, bool]]]:
         return len(word), [(place[abs(x)], x < 0) for x in word]
 
     rules: list[tuple[Word, Word]] = []
-    equations = [(r, ()) for w in relators for r in (w, invert(w))]
+    equations: list[tuple[Word, Word]] = [(r, ()) for w in relators for r in (w, invert(w))]
     pairs, exact, done = 0, True, 0
     while True:
         while equations:
@@ -296,9 +292,7 @@ def _within(part: Word, word: Word) -> bool:
     return any(word[k : k + len(part)] == part for k in range(len(word) - len(part) + 1))
 
 
-def _overlaps(
-    first: tuple[Word, Word], second: tuple[Word, Word]
-) -> Iterable[tuple[Word, Word]]:
+def _overlaps(first: tuple[Word, Word], second: tuple[Word, Word]) -> Iterable[tuple[Word, Word]]:
     """What a word becomes by either of two rules, where the end of one's left side is the beginning
     of the other's."""
     (a, b), (c, d) = first, second

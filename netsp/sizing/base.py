@@ -287,7 +287,7 @@ def _rated(
     """Candidates with their shortest tethers and bounds."""
     blocked = [_blocked(problem, p) for p in places]
     free = [k for k, why in enumerate(blocked) if not why]
-    tethers, between = _shortest_paths(problem, places[free])
+    tethers, between = shortest_paths(problem, places[free])
     labels = [names[k] if names is not None else None for k in range(len(places))]
     out: list[Candidate] = []
     for k, place in enumerate(places):
@@ -328,9 +328,23 @@ def _blocked(problem: Problem, place: Floats) -> str:
     return ""
 
 
-def _shortest_paths(problem: Problem, places: Floats) -> tuple[Floats, Floats]:
-    """Lengths in 3D of the shortest paths in any class, (k, goals) from places to goals and (goals,
-    goals) between goals."""
+def shortest_paths(problem: Problem, places: Floats) -> tuple[Floats, Floats]:
+    """Shortest paths in any class.
+
+    Parameters
+    ----------
+    problem : Problem
+        Its base and tether do not count.
+    places : ndarray, shape (k, 3)
+        In the problem's units.
+
+    Returns
+    -------
+    from_places : ndarray, shape (k, goals)
+        Lengths in 3D from places to goals, infinite where there is no path.
+    between : ndarray, shape (goals, goals)
+        The same between goals.
+    """
     goals = problem.points[1:]
     if not len(places):
         return np.zeros((0, len(goals))), np.zeros((len(goals), len(goals)))

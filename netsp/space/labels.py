@@ -47,7 +47,7 @@ def edge_flag(flags: Flags, i: int, j: int, k: int, axis: int, sign: int) -> boo
         i, j, k = i - (axis == 0), j - (axis == 1), k - (axis == 2)
         if i < 0 or j < 0 or k < 0:
             return False
-    return flags[i, j, k] & (EDGE << axis) != 0
+    return bool(flags[i, j, k] & (EDGE << axis))
 
 
 @kernel
@@ -161,7 +161,10 @@ def distances(flags: Flags, root: Ints) -> tuple[npt.NDArray[np.int32], npt.NDAr
 
 @kernel
 def labelled(
-    flags: Flags, far: npt.NDArray[np.int32], order: npt.NDArray[np.int32], table: Table,
+    flags: Flags,
+    far: npt.NDArray[np.int32],
+    order: npt.NDArray[np.int32],
+    table: Table,
     rules: Rules,
 ) -> tuple[Labels, Table, int]:
     """A label for every edge between cells that are reached, and how many generators there are.
@@ -173,7 +176,7 @@ def labelled(
     table
         With their words.
     generators
-        Their number; more than MOST_GENERATORS if that is passed, and labels then are not all known.
+        Their number; more than MOST_GENERATORS if that is passed: not all labels are known then.
     """
     nx, ny, nz = flags.shape
     labels = np.full(3 * nx * ny * nz, UNKNOWN, dtype=np.int32)
@@ -254,14 +257,12 @@ def longer_ints(a: Ints) -> Ints:
 
 
 @kernel
-def square_beside(
-    flags: Flags, edge: int, n: int
-) -> tuple[int, int, int, int, int]:
+def square_beside(flags: Flags, edge: int, n: int) -> tuple[int, int, int, int, int]:
     """The n-th of four squares beside an edge: (whether it counts, its four edges).
 
     Edges in the order in which a walk along a, then b meets them: a below, b on the right, a above,
     b on the left."""
-    nx, ny, nz = flags.shape
+    _nx, ny, nz = flags.shape
     cell, axis = edge // 3, edge % 3
     other = (axis + 1 + n % 2) % 3
     normal = 3 - axis - other
@@ -321,7 +322,7 @@ def relations(
     flags: Flags, labels: Labels, order: npt.NDArray[np.int32], table: Table, rules: Rules
 ) -> tuple[Ints, Table]:
     """Numbers of the words around squares that are not the empty word, each once."""
-    nx, ny, nz = flags.shape
+    _nx, ny, nz = flags.shape
     seen: Bools = np.zeros(1024, dtype=np.bool_)
     out, count = np.empty(1024, dtype=np.int64), 0
     for cell in order:

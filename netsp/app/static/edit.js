@@ -1,7 +1,7 @@
 // @ts-check
 /** Pointer and keys: select, drag, draw, pan, zoom. */
 
-import { cornersOf, placeOf } from "./map.js";
+import { cornersOf, middleOf, placeOf, said } from "./map.js";
 
 /** @param {any} page @param {import("./link.js").Link} link */
 export function edits(page, link) {
@@ -22,8 +22,34 @@ export function edits(page, link) {
     return step ? [Math.round(p[0] / step) * step, Math.round(p[1] / step) * step] : [tidy(p[0]), tidy(p[1])];
   };
 
+  const finish = document.getElementById("finish");
+
+  /** The polygon that is being drawn becomes an obstacle, if it has three corners. */
+  function finished() {
+    const polygon = page.draft?.points;
+    page.draft = null;
+    if (page.tool === "polygon" && polygon?.length >= 3) page.edit({ add: "obstacles", value: { polygon, name: freeName("o") } });
+    if (finish) finish.hidden = true;
+    page.redraw();
+  }
+  finish?.addEventListener("click", finished);
+
+  /** A corner of the polygon that is being drawn; the first one again ends it. @param {[number, number]} p */
+  function corner(p) {
+    page.draft ??= { points: [] };
+    const [first] = page.draft.points;
+    const near = first && Math.hypot(p[0] - first[0], p[1] - first[1]) * view.scale < 12;
+    if (near && page.draft.points.length >= 3) { finished(); return; }
+    const last = page.draft.points.at(-1);
+    if (last && Math.hypot(p[0] - last[0], p[1] - last[1]) * view.scale < 3) return;
+    page.draft.points.push(p);
+    if (finish) finish.hidden = page.draft.points.length < 3;
+    page.redraw();
+  }
+
   /** @param {string} tool */
   function pick(tool) {
+    if (tool !== "polygon" && page.draft) finished();
     page.tool = tool;
     page.draft = null;
     for (const b of document.querySelectorAll("[data-tool]")) {
@@ -70,7 +96,7 @@ export function edits(page, link) {
     const at = view.toWorld(event);
     if (page.shown) { held = { kind: "pan", x: event.clientX, y: event.clientY }; return; }
     const target = /** @type {Element} */ (event.target);
-    const corner = target.closest("[data-corner]");
+    const handle = target.closest("[data-corner]");
     const thing = target.closest("[data-list]");
     if (page.tool === "goal") {
       page.edit({ add: "goals", value: { position: [...snapped(at, event), 0], name: freeName("g") } });
@@ -82,11 +108,9 @@ export function edits(page, link) {
       held = { kind: "circle" };
       page.draft = { x, y, radius: 0 };
     } else if (page.tool === "polygon") {
-      page.draft ??= { points: [] };
-      page.draft.points.push(snapped(at, event));
-      page.redraw();
-    } else if (corner) {
-      held = { kind: "corner", index: Number(corner.getAttribute("data-index")), corner: Number(corner.getAttribute("data-corner")) };
+      corner(snapped(at, event));
+    } else if (handle) {
+      held = { kind: "corner", index: Number(handle.getAttribute("data-index")), corner: Number(handle.getAttribute("data-corner")) };
     } else if (thing) {
       const own = [thing.getAttribute("data-list"), Number(thing.getAttribute("data-index"))];
       const known = page.chosen.some(([l, k]) => l === own[0] && k === own[1]);
@@ -151,7 +175,7 @@ export function edits(page, link) {
         page.hovered = answer.hover;
         if (answer.hover?.length != null) {
           where.textContent = `x ${answer.hover.x.toFixed(2)}  y ${answer.hover.y.toFixed(2)} m` + earth([answer.hover.x, answer.hover.y])
-            + `   tether ${answer.hover.length.toFixed(2)} m   word [${answer.hover.word.join(", ")}]`;
+            + `   tether ${answer.hover.length.toFixed(2)} m   ${said(page.data, answer.hover.word)}`;
         }
         page.drawTethers();
       });
@@ -202,11 +226,24 @@ export function edits(page, link) {
     return `   ${lat.toFixed(6)}, ${lon.toFixed(6)}`;
   }
 
+  /** @type {Map<string, number>} */
+  const given = new Map();
+
   /** A name that nothing has. @param {string} letter */
   function freeName(letter) {
     const taken = new Set([...(page.data.goals ?? []), ...(page.data.obstacles ?? [])].map((i) => i.name));
-    for (let k = 1; ; k++) if (!taken.has(`${letter}${k}`)) return `${letter}${k}`;
+    // what was named a moment ago may still be on its way to the server
+    for (const [name, when] of given) if (when < Date.now() - 5000) given.delete(name);
+    for (let k = 1; ; k++) {
+      const name = `${letter}${k}`;
+      if (taken.has(name) || given.has(name)) continue;
+      given.set(name, Date.now());
+      return name;
+    }
   }
+
+  page.remove = remove;
+  page.duplicate = duplicate;
 
   function remove() {
     const paths = page.chosen.filter(([l]) => l !== "base").map(([l, k]) => [l, k]);
@@ -223,6 +260,29 @@ export function edits(page, link) {
     }
   }
 
+  /** Choose what comes next on the map: base, goals, obstacles. @param {number} by */
+  function next(by) {
+    const every = [["base", 0], ...["goals", "obstacles"].flatMap((l) => (page.data[l] ?? []).map((_, k) => [l, k]))];
+    const [list, k] = page.chosen.at(-1) ?? ["", 0];
+    const now = every.findIndex(([l, n]) => l === list && n === k);
+    const one = every[now < 0 ? (by > 0 ? 0 : every.length - 1) : (now + by + every.length) % every.length];
+    page.chosen = [one];
+    const item = one[0] === "base" ? null : page.data[one[0]][one[1]];
+    const p = item === null ? page.data.base : one[0] === "goals" ? placeOf(item) : middleOf(item);
+    if (where) where.textContent = `${item === null ? "base" : `${one[0].slice(0, -1)} ${item.name ?? one[1] + 1}`} at x ${p[0].toFixed(2)}  y ${p[1].toFixed(2)} m`;
+    page.onchosen?.();
+    page.redraw();
+  }
+
+  /** Draw with the keys: at the cross in the middle of the map. */
+  function atCross() {
+    /** @type {[number, number]} */
+    const p = [tidy(view.x), tidy(view.y)];
+    if (page.tool === "goal") page.edit({ add: "goals", value: { position: [...p, 0], name: freeName("g") } });
+    else if (page.tool === "circle") page.edit({ add: "obstacles", value: { center: p, radius: tidy(30 / view.scale), name: freeName("o") } });
+    else if (page.tool === "polygon") corner(p);
+  }
+
   document.addEventListener("keydown", (event) => {
     if (page.shown && !/^(Arrow|\+|=|-|f|3)/.test(event.key)) return;
     if (/** @type {Element} */ (event.target).closest("input:not([type=range]), select")) return;
@@ -235,12 +295,12 @@ export function edits(page, link) {
     else if (control && key.toLowerCase() === "d") duplicate();
     else if (control) return;
     else if (key === "Delete" || key === "Backspace") remove();
-    else if (key === "Escape") { page.draft = null; page.chosen = []; page.classes = []; pick("select"); }
-    else if (key === "Enter" && page.draft?.points?.length >= 3) {
-      const polygon = page.draft.points;
-      page.draft = null;
-      page.edit({ add: "obstacles", value: { polygon, name: freeName("o") } });
-    } else if (key in ways && document.activeElement === svg) {
+    else if (key === "Escape" && page.inSpace?.()) document.getElementById("space-on")?.click();
+    else if (key === "Escape") { page.draft = null; page.chosen = []; page.classes = []; finished(); pick("select"); page.onchosen?.(); }
+    else if (key === "Enter" && page.draft?.points?.length >= 3) finished();
+    else if (key === " " && document.activeElement === svg && page.tool !== "select") atCross();
+    else if (key.toLowerCase() === "n" && document.activeElement === svg) next(event.shiftKey ? -1 : 1);
+    else if (key in ways && document.activeElement === svg) {
       const [dx, dy] = ways[key];
       if (page.chosen.length) {
         for (const [l, k] of page.chosen) { const [path, value] = moved(l, k, dx * step, dy * step); page.edit({ set: path, value }); }

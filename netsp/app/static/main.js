@@ -16,6 +16,7 @@ const by = (id) => document.getElementById(id);
 const page = {
   data: null, version: -1, error: null, saved: true, file: null, tour: null, chosen: [], along: 0,
   tool: "select", draft: null, ask: (m) => link.ask(m), edit, redraw, drawTethers, view: null, facts: null,
+  inSpace: () => space.open, picked: null, wrong: null, undo: false, redo: false,
   shown: false, run: false, events: [], refit: () => { fitted = false; }, go: goTo,
 };
 
@@ -25,6 +26,9 @@ view.onplaced = () => redraw();
 const link = new Link(heard);
 const space = new Space(by("space"), link, note);
 let fitted = false;
+
+/** Seconds in which the whole tour is played. */
+const LASTS = 24;
 
 /** @param {string} text @param {boolean} bad */
 function note(text, bad = false) {
@@ -40,11 +44,16 @@ async function edit(change) {
 
 /** @param {any} message */
 function heard(message) {
-  if (message.connected === false) by("answer").textContent = "the server is gone; trying again";
+  if (message.connected === false) { by("answer").textContent = "the server is gone; trying again"; return; }
   if (message.state) {
+    const other = page.version !== message.state.version;
     Object.assign(page, message.state);
-    if (page.tour && !page.shown) page.tour.stale = true;
-    page.facts = null;
+    if (other) {
+      if (page.tour && !page.shown) page.tour.stale = true;
+      page.facts = page.hovered = page.walked = null;
+      page.classes = [];
+      by("along-said").textContent = "";
+    }
     document.body.classList.toggle("shown", page.shown);
     page.chosen = page.chosen.filter(([list, k]) => list === "base" || k < (page.data[list] ?? []).length);
     view.heading = page.data.origin ? page.data.origin.heading ?? 0 : undefined;
@@ -62,9 +71,12 @@ function say() {
   const tour = page.tour, answer = by("answer");
   by("name").textContent = `${page.data?.name ?? "netsp"}${page.saved ? "" : " *"}`;
   document.title = `${page.saved ? "" : "* "}${page.data?.name ?? "netsp"}`;
-  answer.className = page.error || tour?.error ? "bad" : "";
-  if (page.error) answer.textContent = page.error;
-  else if (tour?.error) answer.textContent = tour.error;
+  const empty = !page.shown && !(page.data?.goals ?? []).length;
+  const wrong = empty ? null : page.error ?? outOfReach() ?? (tour?.version === page.version ? tour?.error : null);
+  answer.classList.toggle("bad", Boolean(wrong));
+  page.wrong = wrong;
+  if (empty) answer.textContent = "draw goals and obstacles, or open a file";
+  else if (wrong) answer.textContent = wrong;
   else if (page.run && tour) {
     const s = tour.summary;
     const left = (s.left_out ?? []).length;
@@ -77,9 +89,25 @@ function say() {
       : gap === null ? ", searching" : `, at most ${Math.max(gap, 0).toFixed(2)} % above the shortest`)
       + (tour.stage === "searching" ? " …" : "");
   }
+  answer.title = answer.textContent;
+  const walkable = Boolean(tour?.path?.length) && (page.shown || !tour.error);
+  by("play").disabled = by("along").disabled = !walkable;
+  if (!walkable) stop();
+  by("undo").disabled = !page.undo;
+  by("redo").disabled = !page.redo;
   by("save").disabled = page.saved && page.file !== null;
   by("undo").hidden = by("redo").hidden = by("save").hidden = by("open").hidden = page.shown;
   by("get").hidden = page.shown && !page.plan;
+}
+
+/** Which goals the tether does not reach, and what each needs. @returns {string | null} */
+function outOfReach() {
+  const tour = page.tour;
+  const far = tour?.version === page.version ? tour.unreached ?? [] : [];
+  if (!far.length) return null;
+  const each = far.slice(0, 6).map((f) => `${page.data.goals[f.goal]?.name ?? `#${f.goal}`} `
+    + (f.needed === null ? "is shut in" : `needs ${(Math.ceil(f.needed * 100) / 100).toFixed(2)} m of tether`));
+  return `${each.join(", ")}${far.length > 6 ? `, and ${far.length - 6} more` : ""}; there are ${page.data.tether_length} m`;
 }
 
 /** @param {number[][]} points */
@@ -125,7 +153,8 @@ function redraw() {
       world.push(make("circle", { cx: o.center[0], cy: o.center[1], r: o.radius + data.clearance, class: "clearance" }),
         make("circle", { cx: o.center[0], cy: o.center[1], r: o.radius, ...look }));
     } else {
-      world.push(make("polygon", { points: line(o.polygon), ...look }));
+      world.push(make("polygon", { points: line(o.polygon), class: "halo", "stroke-width": 2 * (data.clearance || 0) }),
+        make("polygon", { points: line(o.polygon), ...look }));
     }
     const [x, y] = view.toScreen(middleOf(o)[0], middleOf(o)[1]);
     if ((data.obstacles ?? []).length <= 60 && o.name) {
@@ -150,11 +179,12 @@ function redraw() {
   if (page.draft) world.push(make(page.draft.radius === undefined ? "polyline" : "circle", page.draft.radius === undefined
     ? { points: line(page.draft.points), class: "draft" }
     : { cx: page.draft.x, cy: page.draft.y, r: page.draft.radius, class: "draft" }));
+  const far = new Set((tour?.unreached ?? []).map((f) => f.goal));
   const visit = new Map((tour?.visits ?? []).map((v, n) => [v.goal, n + 1]));
   (data.goals ?? []).forEach((g, k) => {
     const [x, y] = view.toScreen(placeOf(g)[0], placeOf(g)[1]);
     const known = tour && !tour.stale && tour.version === page.version;
-    screen.push(make("g", { class: `goal${tour?.goal === k && known ? " unreached" : ""}`, "data-list": "goals", "data-index": k },
+    screen.push(make("g", { class: `goal${known && far.has(k) ? " unreached" : ""}`, "data-list": "goals", "data-index": k },
       make("circle", { cx: x, cy: y, r: 9, class: isChosen("goals", k) ? "chosen" : "" }),
       make("text", { x, y: y + 4, "text-anchor": "middle" }, String(known ? visit.get(k) ?? "" : "")),
       make("text", { x: x + 12, y: y + 4, class: "label" }, g.name ?? "")));
@@ -178,6 +208,7 @@ function drawTethers() {
   /** @param {number[][]} path @param {string} look */
   const add = (path, look) => over.push(make("polyline", { class: look, points: path.map((p) => at(p[0], p[1]).join(",")).join(" ") }));
   if (page.hovered?.path) add(page.hovered.path, "hover");
+  if (page.picked?.path) add(page.picked.path, "picked");
   if (page.walked?.path) add(page.walked.path, "tether");
   if (page.walked && page.walked.x !== undefined) {
     const [x, y] = at(page.walked.x, page.walked.y);
@@ -202,16 +233,31 @@ function showAlong() {
 
 by("along").addEventListener("input", showAlong);
 let playing = 0;
+function stop() {
+  cancelAnimationFrame(playing);
+  by("play").setAttribute("aria-pressed", "false");
+  by("play").textContent = "Play";
+}
 by("play").addEventListener("click", () => {
-  const on = by("play").getAttribute("aria-pressed") !== "true";
-  by("play").setAttribute("aria-pressed", String(on));
-  clearInterval(playing);
-  if (on) playing = setInterval(() => { by("along").value = (Number(by("along").value) + 3) % 1001; showAlong(); }, 50);
+  if (by("play").getAttribute("aria-pressed") === "true") { stop(); return; }
+  by("play").setAttribute("aria-pressed", "true");
+  by("play").textContent = "Pause";
+  if (Number(by("along").value) >= 1000) by("along").value = "0";
+  let share = Number(by("along").value) / 1000, before = performance.now();
+  const go = (/** @type {number} */ now) => {
+    share += (now - before) / 1000 / LASTS;
+    before = now;
+    by("along").value = String(Math.min(Math.round(1000 * share), 1000));
+    showAlong();
+    if (share >= 1) stop(); else playing = requestAnimationFrame(go);
+  };
+  playing = requestAnimationFrame(go);
 });
 by("undo").addEventListener("click", () => link.ask({ undo: true }));
 by("redo").addEventListener("click", () => link.ask({ redo: true }));
 by("space-on").addEventListener("click", () => {
   const on = !space.open;
+  note("");
   by("space-on").setAttribute("aria-pressed", String(on));
   by("map").style.display = on ? "none" : "";
   space.show(on, () => by("along").value / 1000);

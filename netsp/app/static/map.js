@@ -35,6 +35,14 @@ export function cornersOf(bounds) {
   return [[a, b], [c, b], [c, d], [a, d]];
 }
 
+/** A word of the tether's class by the names of the obstacles: between which of them and infinity
+ * (above them) it passes, a minus for leftwards. @param {any} data @param {number[]} word */
+export function said(data, word) {
+  if (!word.length) return "class: the direct one";
+  const name = (/** @type {number} */ letter) => `${letter < 0 ? "−" : ""}${data.obstacles?.[Math.abs(letter) - 1]?.name ?? Math.abs(letter)}`;
+  return `class ${word.map(name).join(" ")}`;
+}
+
 export class ChartView {
   /** @param {SVGSVGElement} svg */
   constructor(svg) {
@@ -161,6 +169,7 @@ export class ChartView {
         make("path", { d: "M0 -14L6 4H-6Z", class: "base" })),
       make("text", { x: w - 34, y: 70, class: "label" }, "N"));
     }
+    parts.push(make("path", { d: `M${w / 2 - 9} ${h / 2}h18M${w / 2} ${h / 2 - 9}v18`, class: "cross" }));
     this.back.replaceChildren(make("path", { d: lines, class: "grid" }), ...parts);
   }
 

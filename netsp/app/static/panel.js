@@ -1,7 +1,7 @@
 // @ts-check
 /** The numbers beside the map. */
 
-import { placeOf } from "./map.js";
+import { placeOf, said } from "./map.js";
 import { profiles } from "./profile.js";
 
 /** @param {string} tag @param {any[]} inner */
@@ -11,13 +11,19 @@ function element(tag, ...inner) {
   return e;
 }
 
-/** @param {string} name @param {any} value @param {(text: string) => void} changed @param {string} kind */
-function field(name, value, changed, kind = "number") {
+/** @param {string} name @param {any} value @param {(text: string) => void} changed @param {string} kind
+ * @param {(v: number) => boolean} good */
+function field(name, value, changed, kind = "number", good = () => true) {
   const input = document.createElement("input");
   input.type = kind;
   if (kind === "number") input.step = "any";
   input.value = typeof value === "number" ? String(+value.toFixed(4)) : value ?? "";
-  input.addEventListener("change", () => changed(input.value));
+  const before = input.value;
+  input.addEventListener("change", () => {
+    const v = Number(input.value);
+    if (kind !== "number" || (input.value !== "" && Number.isFinite(v) && good(v))) changed(input.value);
+    else input.value = before;
+  });
   input.addEventListener("keydown", (event) => { if (event.key === "Enter") input.blur(); });
   return element("label", name, input);
 }
@@ -27,7 +33,7 @@ export function fill(page) {
   const panel = document.getElementById("panel");
   if (!panel || !page.data) return;
   const at = document.activeElement;
-  if (at && panel.contains(at) && at.matches("input")) return;  // somebody is typing
+  if (at && panel.contains(at) && (at.matches("input") || at.closest(".classes"))) return;  // somebody is typing
   page.onchosen = () => fill(page);
   const data = page.data, parts = [];
   /** @param {any[]} path @param {any} value */
@@ -40,13 +46,15 @@ export function fill(page) {
   } else {
     parts.push(element("h2", "Problem"),
       field("name", data.name, (v) => set(["name"], v), "text"),
-      field("tether length (m)", data.tether_length, (v) => set(["tether_length"], Number(v))),
+      field("tether length (m)", data.tether_length, (v) => set(["tether_length"], Number(v)), "number", (v) => v > 0),
       ...tetherSlider(page, set),
-      field("clearance (m)", data.clearance, (v) => set(["clearance"], Number(v))),
+      field("clearance (m)", data.clearance, (v) => set(["clearance"], Number(v)), "number", (v) => v >= 0),
       field("base depth (m)", 0 - (data.base[2] ?? 0), (v) => set(["base"], [data.base[0], data.base[1], 0 - Number(v)])),
       ...bounds(data, set));
-    if (page.tour?.needed) parts.push(element("p", `a tether of ${page.tour.needed.toFixed(2)} m would do`));
+    if (page.wrong) { const p = element("p", page.wrong); p.className = "bad"; parts.unshift(p); }
     for (const [list, k] of page.chosen.slice(0, 5)) parts.push(...chosen(page, list, k, set));
+    if (page.chosen.some(([l]) => l !== "base")) parts.push(...copying(page));
+    parts.push(...origin(data, set));
   }
   const tour = page.tour;
   if (tour?.visits?.length && tour.version === page.version) {
@@ -57,7 +65,7 @@ export function fill(page) {
       return row;
     });
     parts.push(element("h2", "Tour"), element("table",
-      element("tr", element("th", ""), element("th", "goal"), element("th", "tether"), element("th", "slack")), ...rows));
+      element("tr", element("th", ""), element("th", "goal"), element("th", "tether m"), element("th", "slack m")), ...rows));
   }
   parts.push(...profiles(page, page.go), ...margins(page));
   panel.replaceChildren(...parts);
@@ -68,12 +76,40 @@ function margins(page) {
   const m = page.facts?.margins;
   if (!m) return [];
   const stops = m.stops.map((s) => element("tr", element("td", ""), element("td", s.name), element("td", s.slack.toFixed(2)),
-    element("td", (s.turning * 180 / Math.PI).toFixed(0)), element("td", s.clearance.toFixed(2))));
+    element("td", (s.turning * 180 / Math.PI).toFixed(0)), element("td", s.clearance?.toFixed(2) ?? "")));
   return [element("h2", "Margins"),
-    element("p", `Every obstacle may be off by ${m.obstacles.toFixed(2)} m (${m.limited_by}), the robot ${m.cross_track.toFixed(2)} m beside its path, `
-      + `and ${m.tether.toFixed(2)} m of tether may be lost.`),
+    element("p", (m.obstacles === null ? "There are no obstacles; "
+      : `Every obstacle may be off by ${m.obstacles.toFixed(2)} m (${m.limited_by}), the robot ${m.cross_track?.toFixed(2) ?? "any"} m beside its path, and `)
+      + `${m.tether.toFixed(2)} m of tether may be lost.`),
     element("table", element("tr", element("th", ""), element("th", "goal"), element("th", "slack m"), element("th", "turns °"), element("th", "clear m")), ...stops)];
 }
+
+/** For whoever has no keyboard. @param {any} page */
+function copying(page) {
+  const copy = element("button", "Duplicate"), away = element("button", "Delete");
+  copy.addEventListener("click", () => page.duplicate());
+  away.addEventListener("click", () => page.remove());
+  const row = element("div", copy, " ", away);
+  return [row];
+}
+
+/** Where on the earth the base is: what missions and GeoJSON need.
+ * @param {any} data @param {(path: any[], value: any) => void} set */
+function origin(data, set) {
+  const o = data.origin ?? {};
+  const keep = (/** @type {any} */ change) => {
+    const next = { heading: 0, ...o, ...pending, ...change };
+    pending = next;
+    if (next.latitude !== undefined && next.longitude !== undefined) { pending = {}; set(["origin"], next); }
+  };
+  return [element("h2", "Position of the base"),
+    field("latitude (°)", o.latitude ?? pending.latitude, (v) => keep({ latitude: Number(v) }), "number", (v) => Math.abs(v) <= 90),
+    field("longitude (°)", o.longitude ?? pending.longitude, (v) => keep({ longitude: Number(v) }), "number", (v) => Math.abs(v) <= 180),
+    field("y axis points to (°)", o.heading ?? 0, (v) => keep({ heading: Number(v) }), "number", (v) => Math.abs(v) <= 360)];
+}
+
+/** Latitude or longitude while the other is still missing. @type {any} */
+let pending = {};
 
 /** @param {any} data @param {(path: any[], value: any) => void} set */
 function bounds(data, set) {
@@ -117,7 +153,8 @@ function tetherSlider(page, set) {
   marked.append(option);
   input.setAttribute("list", "least");
   const enough = Math.ceil(least * 100 + 1e-6) / 100;
-  const take = element("button", `take the shortest sufficient: ${enough.toFixed(2)} m`);
+  const take = element("button", `shortest that reaches every goal: ${enough.toFixed(2)} m`);
+  take.title = "with it the tour may be another, and longer";
   take.addEventListener("click", () => set(["tether_length"], enough));
   return [row, marked, take];
 }
@@ -132,22 +169,31 @@ function chosen(page, list, k, set) {
   const rename = field("name", named.name, (v) => set([list, k], { ...named, name: v || undefined }), "text");
   if (list === "goals") {
     const p = placeOf(item);
-    const classes = element("button", "Show its classes");
+    const classes = element("button", "All classes of its tether");
+    const list_ = element("div");
     classes.addEventListener("click", async () => {
       const answer = await page.ask({ classes: k });
       page.classes = answer.classes ?? [];
-      const told = page.classes.map((c) => `[${c.word.join(", ")}] ${c.length.toFixed(2)} m`).join("\n");
-      list_.textContent = told || "none within the tether's length";
+      const rows = page.classes.map((c) => {
+        const row = element("button", `${c.length.toFixed(2)} m, ${said(data, c.word)}`);
+        const show = (/** @type {any} */ what) => () => { page.picked = what; page.drawTethers(); };
+        row.addEventListener("pointerenter", show(c));
+        row.addEventListener("focus", show(c));
+        row.addEventListener("pointerleave", show(null));
+        row.addEventListener("blur", show(null));
+        return row;
+      });
+      list_.replaceChildren(...(rows.length ? rows : ["none within the tether's length"]));
+      list_.className = "classes";
       page.redraw();
     });
-    const list_ = element("pre");
     return [element("h2", "Goal"), rename, ...xy(p, (q) => set([list, k], { ...named, position: [...q, p[2] ?? 0] })),
       field("depth (m)", 0 - (p[2] ?? 0), (v) => set([list, k], { ...named, position: [p[0], p[1], 0 - Number(v)] })),
       classes, list_];
   }
   if (item.center) {
     return [element("h2", "Circle"), rename, ...xy(item.center, (q) => set([list, k], { ...item, center: q })),
-      field("radius (m)", item.radius, (v) => set([list, k], { ...item, radius: Number(v) }))];
+      field("radius (m)", item.radius, (v) => set([list, k], { ...item, radius: Number(v) }), "number", (v) => v > 0)];
   }
   return [element("h2", `Polygon of ${item.polygon.length} corners`), rename,
     ...item.polygon.slice(0, 12).map((p, n) => field(`corner ${n + 1}`, `${p[0]}, ${p[1]}`, (v) => {

@@ -29,10 +29,11 @@ function chart(title, rows, column, limit, visits, look, go) {
     svg.append(make("path", { d: `M${LEFT} ${y(k * step)}H${WIDE - RIGHT}`, class: "grid" }),
       make("text", { x: LEFT - 4, y: y(k * step) + 4, class: "label", "text-anchor": "end" }, String(+(k * step).toPrecision(6))));
   }
+  let last = -Infinity;
   visits.forEach((share, n) => {
     const x = LEFT + share * (WIDE - LEFT - RIGHT);
     svg.append(make("path", { d: `M${x} ${TOP}V${TALL - BOTTOM}`, class: "grid" }));
-    if (visits.length <= 24) svg.append(make("text", { x, y: TALL - 4, class: "label", "text-anchor": "middle" }, String(n + 1)));
+    if (x - last > 14) { last = x; svg.append(make("text", { x, y: TALL - 4, class: "label", "text-anchor": "middle" }, String(n + 1))); }
   });
   if (limit !== null) svg.append(make("path", { d: `M${LEFT} ${y(limit)}H${WIDE - RIGHT}`, class: "limit" }));
   svg.append(make("polyline", { points: curve(rows, column, low, high), class: look }),

@@ -20,6 +20,8 @@ export class Space {
   constructor(place, link, say) {
     this.place = place; this.link = link; this.say = say;
     this.drawn = false;
+    this.share = 0;
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.update(this.share));
   }
 
   get open() { return !this.place.hidden; }
@@ -28,6 +30,7 @@ export class Space {
   async show(on, share) {
     this.place.hidden = !on;
     if (!on) return;
+    if (!this.drawn) this.say("loading the view in space …");
     try {
       this.plotly = await plotly();
     } catch (error) {
@@ -40,6 +43,7 @@ export class Space {
 
   /** Draw it again, with the tether where the slider is. @param {number} share */
   update(share) {
+    this.share = share;
     if (!this.open || !this.plotly) return;
     this.link.latest("space", { space: share }, (answer) => {
       const dark = matchMedia("(prefers-color-scheme: dark)").matches;
@@ -49,8 +53,15 @@ export class Space {
       layout.scene = { ...layout.scene, uirevision: "kept" };
       for (const a of ["xaxis", "yaxis", "zaxis"]) layout.scene[a] = { ...layout.scene[a], ...axis };
       delete layout.template;
+      for (const trace of answer.space.data) {
+        if (trace.name === "base") trace.marker.color = colour;
+        if (trace.name === "goals") { trace.mode = "markers+text"; trace.textposition = "top center"; trace.textfont = { color: colour, size: 11 }; }
+      }
+      layout.scene.camera = { eye: { x: 1.6, y: -1.6, z: 1.1 } };
       this.plotly.react(this.place, answer.space.data, layout, { responsive: true, displaylogo: false });
       this.place.dataset.drawn = "yes";
+      if (!this.drawn) this.say("");
+      this.drawn = true;
     }, (error) => this.say(error, true));
   }
 }
