@@ -1,6 +1,6 @@
 """Tethers among random meshes, against their own refinement and an independent string.
 
-    python benchmarks/strings.py [--meshes 200] [--drives 100] [--keep]
+    python benchmarks/strings.py [--meshes 200] [--drives 100] [--jobs 2] [--keep]
 
 Each mesh is a union of tilted boxes, some of them thin. A robot wanders between them; after every
 drive it stays for three updates, and the tether's length is compared with two others in its class:
@@ -18,6 +18,8 @@ import argparse
 import sys
 import time
 from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 
 import numpy as np
 import trimesh
@@ -184,17 +186,20 @@ def main() -> None:
     parser.add_argument("--drives", type=int, default=100)
     parser.add_argument("--every", type=int, default=20, help="drives between two strings")
     parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--jobs", type=int, default=1)
     args = parser.parse_args()
     heading("Tethers among random meshes")
     begin = time.perf_counter()
     finer: list[float] = []
     string: list[float] = []
-    for seed in range(args.first, args.first + args.meshes):
-        a, b = compared(seed, args.drives, args.every)
-        finer += a
-        string += b
-        if seed % 10 == 9:
-            print(f"{seed + 1} meshes", file=sys.stderr, flush=True)
+    seeds = range(args.first, args.first + args.meshes)
+    one = partial(compared, drives=args.drives, every=args.every)
+    with ProcessPoolExecutor(args.jobs) as pool:
+        for done, (a, b) in enumerate(pool.map(one, seeds), 1):
+            finer += a
+            string += b
+            if done % 10 == 0:
+                print(f"{done} meshes", file=sys.stderr, flush=True)
     print()
     head("against", "stops", "it comes to no rest", "median %", "worst above %",
          "above 0.5 %", "worst below %", "below 0.05 %", name="tether-strings")  # fmt: skip
