@@ -1,8 +1,8 @@
 """Words of paths in any scene: the second kind of `netsp.hsignature.signature.Signature`.
 
 The labels of a complex (`netsp.space.labels`) after relations have eliminated what generators they
-can. How often a path's word is right: always where the path keeps off the solids by what
-`TOLERANCE` says, and the word then says the same of it as of any path that it can be deformed into.
+can. How often a path's word is right: always where the path keeps off the solids by its
+tolerance, and the word then says the same of it as of any path that it can be deformed into.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from netsp.hsignature.wordtable import (
     empty_table,
     number_of,
     packed,
+    times,
     word_of,
 )
 from netsp.online.scene.field import DistanceField
@@ -39,9 +40,7 @@ from netsp.space.labels import (
 from netsp.space.walk import held, walked
 
 TOLERANCE = 0.015
-"""Metres that a path may dip into a surface, as taut tethers do between their nodes (delta / 8 at
-the default delta of 0.1 m); also the size of what is not looked at more closely. Bars thinner than
-four times that might be passed through by a path that touches them."""
+"""Metres: somewhat more than an eighth of the tether's default delta of 0.1 m."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +61,8 @@ class SpaceSignature:
         (n,) hundredths of a cell from the root, FAR for what is cut off.
     generators : int
         How many there were before relations eliminated any.
+    tolerance : float
+        Metres that paths may dip into a surface.
     """
 
     cells: Cells
@@ -70,12 +71,13 @@ class SpaceSignature:
     labels: Labels = field(repr=False)
     far: npt.NDArray[np.int32] = field(repr=False)
     generators: int
+    tolerance: float
     _tables: list[Table] = field(repr=False)
 
     @classmethod
     def of(
         cls, scene: DistanceField, low: npt.ArrayLike, high: npt.ArrayLike, cell: float,
-        root: npt.ArrayLike,
+        root: npt.ArrayLike, *, tolerance: float = TOLERANCE,
     ) -> SpaceSignature:  # fmt: skip
         """The words of a box in a scene.
 
@@ -91,6 +93,10 @@ class SpaceSignature:
             Size of a cell, metres. Gaps narrower than it may count as closed.
         root : array_like, shape (3,)
             A point of the water that is meant: the anchor.
+        tolerance : float
+            Metres that paths may dip into a surface, as taut tethers do between their nodes (by
+            delta / 8); also the size of what is not looked at more closely. Bars thinner than four
+            times that might be passed through by a path that touches them.
 
         Returns
         -------
@@ -115,10 +121,12 @@ class SpaceSignature:
         (1, 1)
         """
         cells = Cells.of(scene, low, high, cell)
-        return cls.of_cells(cells, root)
+        return cls.of_cells(cells, root, tolerance=tolerance)
 
     @classmethod
-    def of_cells(cls, cells: Cells, root: npt.ArrayLike) -> SpaceSignature:
+    def of_cells(
+        cls, cells: Cells, root: npt.ArrayLike, *, tolerance: float = TOLERANCE
+    ) -> SpaceSignature:
         """The words of a complex.
 
         Parameters
@@ -127,6 +135,8 @@ class SpaceSignature:
             The complex.
         root : array_like, shape (3,)
             A point of the water that is meant, metres.
+        tolerance : float
+            As of `of`, metres.
 
         Returns
         -------
@@ -142,7 +152,7 @@ class SpaceSignature:
         everywhere = np.ones(cells.flags.shape, dtype=np.uint8)
         at = held(
             cells.field.arrays, cells.low, cells.cell, cells.flags, everywhere, point,
-            TOLERANCE, TOLERANCE,
+            tolerance, tolerance,
         )  # fmt: skip
         if at < 0:
             raise InputError(
@@ -164,7 +174,7 @@ class SpaceSignature:
         )
         group = Group.of(rank, relators)
         labels, table = _renumbered(labels, table, meaning, packed(group.rules))
-        return cls(cells, begin, group, labels, far, generators, [table])
+        return cls(cells, begin, group, labels, far, generators, tolerance, [table])
 
     @property
     def exact(self) -> bool:
@@ -212,7 +222,7 @@ class SpaceSignature:
         c = self.cells
         at = held(
             c.field.arrays, c.low, c.cell, c.flags, self.known, np.asarray(point, dtype=float),
-            TOLERANCE, TOLERANCE,
+            self.tolerance, self.tolerance,
         )  # fmt: skip
         return None if at < 0 else int(at)
 
@@ -291,7 +301,7 @@ class SpaceSignature:
         c = self.cells
         number, table, where = walked(
             c.field.arrays, c.low, c.cell, c.flags, self.labels, self.known, self.table,
-            self.rules, np.ascontiguousarray(line), TOLERANCE, TOLERANCE,
+            self.rules, np.ascontiguousarray(line), self.tolerance, self.tolerance,
         )  # fmt: skip
         self.keep(table)
         return (None if number < 0 else int(number)), where
@@ -310,6 +320,40 @@ class SpaceSignature:
             In its normal form.
         """
         return self.group.normal(x for word in words for x in word)
+
+    def letters(self, number: int) -> Word:
+        """The word of a number.
+
+        Parameters
+        ----------
+        number : int
+            In the table.
+
+        Returns
+        -------
+        Word
+            Its letters.
+        """
+        return word_of(self.table, number)
+
+    def times(self, a: int, b: int) -> int:
+        """`product` of words by their numbers in the table.
+
+        Parameters
+        ----------
+        a : int
+            Number of the first.
+        b : int
+            Number of the second.
+
+        Returns
+        -------
+        int
+            Of both.
+        """
+        number, table = times(self.table, self.rules, a, b)
+        self.keep(table)
+        return int(number)
 
     def inverse(self, word: Word) -> Word:
         """The word of a path backwards.

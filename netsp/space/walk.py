@@ -26,9 +26,6 @@ SIDE = 2 * REACH + 1
 NEAR = 1.5
 """From so many cells on, a nearer one is sought."""
 
-HALVINGS = 40
-"""Of a part of a path, one after the other; enough for any."""
-
 
 @kernel
 def triangle_free(field: Field, p: Floats, q: Floats, r: Floats, fine: float, into: float) -> bool:
@@ -213,7 +210,7 @@ def walked(
     if hold < 0:
         return -1, table, p
     for n in range(1, len(path)):
-        share, step, halvings = 0.0, 1.0, 0
+        share = 0.0
         begin, end = path[n - 1], path[n]
         long = math.sqrt(((end - begin) ** 2).sum())
         step = min(1.0, cell / max(long, 1e-12))
@@ -222,14 +219,11 @@ def walked(
             q = begin + (share + step) * (end - begin)
             c = centre_of(low, cell, hold // (ny * nz), hold // nz % ny, hold % nz)
             if not triangle_free(field, p, q, c, fine, into):
-                if halvings < 2:
-                    step, halvings = 0.5 * step, halvings + 1
-                    continue
                 there, edges = moved(field, low, cell, flags, labels, p, hold, -1, q, fine, into)
                 if there < 0:
-                    if step * long < 0.25 * fine or halvings > HALVINGS:
+                    if step * long < 0.25 * fine:
                         return -1, table, p
-                    step, halvings = 0.5 * step, halvings + 1
+                    step *= 0.5
                     continue
                 word, table = along_edges(labels, table, rules, word, edges)
                 hold = there
@@ -255,7 +249,7 @@ def walked(
                     if there >= 0:
                         word, table = along_edges(labels, table, rules, word, edges)
                         hold = there
-            step, halvings = min(2.0 * step, cell / max(long, 1e-12)), 0
+            step = min(2.0 * step, cell / max(long, 1e-12))
     last = held(field, low, cell, flags, known, p, fine, into)
     if last < 0:
         return -1, table, p

@@ -1,0 +1,178 @@
+"""How a tether can come to lie when the robot is at a waypoint.
+
+A state is a waypoint, a word, and the tether as it hangs: words alone do not tell all there is,
+for tethers hang on bodies with free ends, which give no letters. The few shortest words of each
+waypoint make the first states; others come of going on from these (`netsp.space.legs`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from netsp.arrays import Floats
+from netsp.geometry import polylines
+from netsp.online.tether import Tether
+from netsp.space.water import Water
+
+MOST_WORDS = 3
+"""Shortest words of a waypoint that make states."""
+
+MOST_STATES = 5
+"""Of a waypoint."""
+
+ROUNDS = 300
+"""Of pulling a tether taut."""
+
+
+@dataclass(frozen=True)
+class State:
+    """A tether at a waypoint.
+
+    Parameters
+    ----------
+    point : int
+        The waypoint.
+    word : int
+        Number of the tether's word in the water's table.
+    tether : Tether
+        As it hangs.
+    """
+
+    point: int
+    word: int
+    tether: Tether
+
+
+@dataclass
+class States:
+    """All states so far.
+
+    Parameters
+    ----------
+    water : Water
+        Where they are.
+    points : ndarray, shape (n, 3)
+        The waypoints, metres.
+    limit : float
+        Longest tether, metres.
+    """
+
+    water: Water
+    points: Floats
+    limit: float
+    all: list[State] = field(default_factory=list)
+    of: dict[int, list[int]] = field(default_factory=dict)
+
+    def find(self, point: int, word: int, tether: Tether) -> int | None:
+        """The number of the state that a tether is in.
+
+        Parameters
+        ----------
+        point : int
+            The waypoint.
+        word : int
+            The tether's word.
+        tether : Tether
+            The tether.
+
+        Returns
+        -------
+        int or None
+            None where it is in none so far.
+        """
+        delta = self.water.mission.delta
+        for s in self.of.get(point, ()):
+            if self.all[s].word == word and alike(self.all[s].tether, tether, delta):
+                return s
+        return None
+
+    def add(self, point: int, word: int, tether: Tether) -> int | None:
+        """A new state, if there is room for one more and the tether is no longer than its limit.
+
+        Parameters
+        ----------
+        point : int
+            The waypoint.
+        word : int
+            The tether's word.
+        tether : Tether
+            The tether.
+
+        Returns
+        -------
+        int or None
+            Its number, None if there is none.
+        """
+        here = self.of.setdefault(point, [])
+        if len(here) >= MOST_STATES or tether.length > self.limit:
+            return None
+        here.append(len(self.all))
+        self.all.append(State(point, word, tether))
+        return here[-1]
+
+
+def alike(a: Tether, b: Tether, delta: float) -> bool:
+    """Whether two tethers of one word between the same ends hang alike.
+
+    Parameters
+    ----------
+    a : Tether
+        One tether.
+    b : Tether
+        The other.
+    delta : float
+        Resolution of both, metres.
+
+    Returns
+    -------
+    bool
+        By length, and points at quarters of it.
+    """
+    if abs(a.length - b.length) > delta:
+        return False
+    one, other = (
+        np.array([polylines.points_along(t.nodes, 0.25 * t.length + 1e-9)[k] for k in (1, 2)])
+        if t.length > 1e-6
+        else np.zeros((2, 3))
+        for t in (a, b)
+    )
+    return bool(np.linalg.norm(one - other, axis=1).max() < 2.0 * delta)
+
+
+def first_states(water: Water, points: Floats, limit: float) -> States:
+    """States of the shortest words of each waypoint.
+
+    Parameters
+    ----------
+    water : Water
+        Where they are.
+    points : ndarray, shape (n, 3)
+        The waypoints, metres.
+    limit : float
+        Longest tether, metres.
+
+    Returns
+    -------
+    States
+        The states; waypoints without any are out of reach of the tether.
+    """
+    states = States(water, points, limit)
+    words = water.words
+    anchor = np.asarray(water.mission.anchor, dtype=float)
+    root = int(np.ravel_multi_index(tuple(words.root), words.cells.flags.shape))
+    found = water.search(water.everywhere, root, None, MOST_WORDS, limit)
+    for n, point in enumerate(points):
+        cell = words.held(point)
+        if cell is None:
+            continue
+        for word, way in water.ways(found, cell):
+            tether = water.model.relaxed(np.vstack([anchor, way, point]), ROUNDS)
+            if tether.length > limit:
+                continue
+            hangs = water.number(tether.nodes)
+            hangs = word if hangs is None else hangs
+            if states.find(n, hangs, tether) is None:
+                states.add(n, hangs, tether)
+    return states

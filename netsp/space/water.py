@@ -1,0 +1,252 @@
+"""A mission's water: its words, where the robot fits, and the tether's model, in one place."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from netsp.arrays import Bools, Floats
+from netsp.geometry import polylines
+from netsp.online.mission import Mission
+from netsp.online.paths.tree import Grid, free_cells, taut
+from netsp.online.scene.field import DistanceField
+from netsp.online.tether import GeodesicTether
+from netsp.space.search import NONE, Found, shortest_words, way_back
+from netsp.space.signature import SpaceSignature
+
+LONGER = 1.35
+"""Of paths along cells beside those pulled taut: 26 directions make 1.09, and round bodies more."""
+
+DIP = 0.15
+"""Of delta: a tether's edges dip into a surface by an eighth of it (docs/tether.md)."""
+
+WIDER = 3
+"""Cells that a search's box is wider than what it is for."""
+
+
+@dataclass(frozen=True)
+class Water:
+    """What planning asks of a scene.
+
+    Parameters
+    ----------
+    mission : Mission
+        What is to be visited.
+    field : DistanceField
+        The scene.
+    words : SpaceSignature
+        Its classes of paths, in the tether's water.
+    model : GeodesicTether
+        The tether.
+    """
+
+    mission: Mission
+    field: DistanceField
+    words: SpaceSignature
+    model: GeodesicTether
+
+    @classmethod
+    def of(cls, mission: Mission, field: DistanceField, grid: Grid) -> Water:
+        """The water of a mission.
+
+        Parameters
+        ----------
+        mission : Mission
+            Its anchor, delta and clearance count.
+        field : DistanceField
+            Its scene.
+        grid : Grid
+            Of `netsp.online.simulate.grid_of`: the box and the size of cells.
+
+        Returns
+        -------
+        Water
+            The same.
+        """
+        high = grid.low + grid.cell * np.array(grid.free.shape)
+        words = SpaceSignature.of(
+            field, grid.low, high, grid.cell, mission.anchor, tolerance=DIP * mission.delta
+        )
+        return cls(mission, field, words, GeodesicTether(field, mission.delta))
+
+    @cached_property
+    def room(self) -> Bools:
+        """(nx, ny, nz) cells that keep the robot's clearance."""
+        c = self.words.cells
+        nx, ny, nz = c.flags.shape
+        return np.asarray(
+            free_cells(c.field.arrays, c.low, c.cell, (nx, ny, nz), self.mission.clearance)
+        )
+
+    @cached_property
+    def everywhere(self) -> Bools:
+        """(nx, ny, nz) all cells: the tether's water."""
+        return np.ones(self.words.cells.flags.shape, dtype=np.bool_)
+
+    def search(
+        self, room: Bools, cell: int, around: Floats | None, most: int, length: float
+    ) -> Found:
+        """The soonest words of cells, from one of them on.
+
+        Parameters
+        ----------
+        room : ndarray of bool
+            Cells that may be passed; the first always is.
+        cell : int
+            Number of the first.
+        around : ndarray of shape (n, 3) or None
+            Points whose box is searched; None for all there is.
+        most : int
+            Words of a cell.
+        length : float
+            Of paths pulled taut, metres: what is searched for is `LONGER`.
+
+        Returns
+        -------
+        Found
+            The words, by their numbers in the table.
+        """
+        words, cells = self.words, self.words.cells
+        shape = np.array(cells.flags.shape)
+        root = np.array(np.unravel_index(cell, cells.flags.shape), dtype=np.int64)
+        first, last = np.zeros(3, dtype=np.int64), shape - 1
+        if around is not None:
+            at = np.vstack([cells.index(around), root])
+            first = np.maximum(at.min(0) - WIDER, 0)
+            last = np.minimum(at.max(0) + WIDER, shape - 1)
+        longest = int(100.0 * LONGER * length / cells.cell)
+        found, table = shortest_words(
+            cells.flags, room, words.labels, words.table, words.rules, root, first, last, most,
+            longest,
+        )  # fmt: skip
+        words.keep(table)
+        return Found(*found)
+
+    def ways(self, found: Found, cell: int) -> list[tuple[int, Floats]]:
+        """Words and paths that a search has found to a cell.
+
+        Parameters
+        ----------
+        found : Found
+            Of `search`.
+        cell : int
+            Number of the cell.
+
+        Returns
+        -------
+        list of (int, ndarray of shape (m, 3))
+            Number of the word, centres of the cells from the first on; shortest first.
+        """
+        c = self.words.cells
+        at = np.array(np.unravel_index(cell, c.flags.shape), dtype=np.int64)
+        place = tuple(at - found.first)
+        if min(place) < 0 or any(p >= n for p, n in zip(place, found.word.shape, strict=False)):
+            return []
+        words, far = found.word[place], found.far[place]
+        return [
+            (int(words[s]), c.centre(way_back(found, at, int(s))))
+            for s in np.argsort(far, kind="stable")
+            if words[s] != NONE
+        ]
+
+    def taut(self, path: Floats) -> Floats:
+        """A path of the robot pulled taut in its class, at its clearance.
+
+        Parameters
+        ----------
+        path : ndarray, shape (k, 3)
+            Metres.
+
+        Returns
+        -------
+        ndarray, shape (m, 3)
+            Metres.
+        """
+        return taut(self.field, path, self.mission.clearance, self.mission.delta)
+
+    def straight(self, a: Floats, b: Floats) -> bool:
+        """Whether a straight path keeps the clearance, or what its ends have of it.
+
+        Parameters
+        ----------
+        a : ndarray, shape (3,)
+            Where it begins, metres.
+        b : ndarray, shape (3,)
+            Where it ends, metres.
+
+        Returns
+        -------
+        bool
+            Whether it does.
+        """
+        ends = float(self.field.distance(np.array([a, b])).min())
+        room = max(0.0, min(self.mission.clearance, ends) - 1e-3)
+        return self.field.grown(room).line_of_sight(a, b, depth=1e-3)
+
+    def number(self, path: Floats) -> int | None:
+        """Number of a path's word; None where it has none.
+
+        Parameters
+        ----------
+        path : ndarray, shape (k, 3)
+            Metres.
+
+        Returns
+        -------
+        int or None
+            Its number in the table.
+        """
+        return self.words.number(path)[0]
+
+    def product(self, a: int, b: int) -> int:
+        """Number of the word of one path and another.
+
+        Parameters
+        ----------
+        a : int
+            Of the first.
+        b : int
+            Of the second.
+
+        Returns
+        -------
+        int
+            Of both.
+        """
+        return self.words.times(a, b)
+
+
+def along(path: Floats) -> float:
+    """Length of a path, metres.
+
+    Parameters
+    ----------
+    path : ndarray, shape (k, 3)
+        Metres.
+
+    Returns
+    -------
+    float
+        Metres.
+    """
+    return float(polylines.length(path))
+
+
+def cells_of(water: Water, points: Floats) -> list[int | None]:
+    """The cells that points hold on to.
+
+    Parameters
+    ----------
+    water : Water
+        The water.
+    points : ndarray, shape (n, 3)
+        Metres.
+
+    Returns
+    -------
+    list of int or None
+        None where no cell is in sight.
+    """
+    return [water.words.held(p) for p in points]
