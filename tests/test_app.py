@@ -106,6 +106,24 @@ def test_a_version_shares_what_an_edit_does_not_change(tmp_path):
     assert document.data is after
 
 
+def test_one_slide_is_one_version_to_go_back_from():
+    document = Document(None, json.loads(Problem.load(WHARF).to_json()))
+    before = document.data["tether_length"]
+    for slide in (1, 2):
+        for length in (10.0, 20.0, 30.0 * slide):
+            document.apply({"set": ["tether_length"], "value": length, "merge": slide})
+    document.apply({"set": ["tether_length"], "value": 5.0})
+    seen = []
+    while document.undo():
+        seen.append(document.data["tether_length"])
+    assert seen == [60.0, 30.0, before]
+    # what was gone back from is not written over
+    document.redo()
+    document.apply({"set": ["tether_length"], "value": 7.0, "merge": 1})
+    document.undo()
+    assert document.data["tether_length"] == 30.0
+
+
 def test_what_is_saved_is_what_the_command_line_reads(tmp_path):
     file = tmp_path / "p.json"
     document = Document(file)
@@ -183,7 +201,9 @@ def test_the_tether_at_the_cursor_is_that_of_the_class_of_the_tour():
     for visit in solution.tour:
         x, y, _ = problem.goals[visit.goal].position
         assert tuple(cursor.hover(x, y)["word"]) == visit.signature
-        lengths = [c["length"] for c in cursor.classes(visit.goal)]
+        told = cursor.classes(visit.goal)
+        lengths = [c["length"] for c in told["classes"]]
+        assert told["count"] >= len(lengths) > 0
         assert lengths == sorted(lengths)
         assert min(abs(length - visit.tether_length) for length in lengths) < 1e-6
     ends = [cursor.along(s) for s in (0.0, 1.0)]

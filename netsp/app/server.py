@@ -136,7 +136,7 @@ class Session:
             (share,) = _numbers([message["along"]], 1)
             return {"along": self._along(share)}
         elif "classes" in message:
-            return {"classes": self._classes(message["classes"])}
+            return self._classes(message["classes"])
         elif "space" in message:
             (share,) = _numbers([message["space"]], 1)
             return {"space": self._space(share)}
@@ -186,9 +186,9 @@ class Session:
         data = json.loads(problem.to_json())
         return figure(scene_of(problem), data, path, _in_space(told))
 
-    def _classes(self, goal: object) -> list[dict[str, Any]]:
+    def _classes(self, goal: object) -> dict[str, Any]:
         if self._cursor is None:
-            return []
+            return {"classes": [], "count": 0}
         if not isinstance(goal, int) or not 0 <= goal < len(self._cursor.problem.goals):
             raise InputError("classes: expected the number of a goal")
         return self._cursor.classes(goal)

@@ -125,7 +125,8 @@ def _answer(problem: Problem, solution: Solution) -> dict[str, Any]:
     return {
         "version": 0, "stage": "done", "status": solution.status.value, "length": solution.length,
         "bound": solution.lower_bound, "path": [list(p) for p in solution.path],
-        "visits": [{"goal": v.goal, "tether": v.tether_length} for v in solution.tour],
+        "visits": [{"goal": v.goal, "tether": v.tether_length, "word": list(v.signature)}
+                   for v in solution.tour],
     }  # fmt: skip
 
 

@@ -129,7 +129,12 @@ def _solve(
         legs = [graph.path(u, v) for u, v in pairwise((*tour, 0))]
         path = [p[:3].tolist() for leg in legs for p in leg]
         visits = [
-            {"goal": int(graph.goal[v]) - 1, "tether": float(graph.tethers[v])} for v in tour[1:]
+            {
+                "goal": int(graph.goal[v]) - 1,
+                "tether": float(graph.tethers[v]),
+                "word": list(graph.signatures[v]),
+            }
+            for v in tour[1:]
         ]
         return {"path": path, "visits": visits}
 

@@ -58,6 +58,7 @@ class Document:
                 data = _read(self.file) if self.file.exists() else named
         self._versions: list[dict[str, Any]] = [dict(data)]
         self._at = 0
+        self._merging: str | None = None
         self._saved = self._versions[0]
         if (kept := self._kept()) is not None:
             self._push(kept)
@@ -105,7 +106,8 @@ class Document:
         edit : mapping
             ``{"set": path, "value": v}``, ``{"add": "goals", "value": v}``, ``{"delete": [path]}``,
             or ``{"replace": data}``; a path is a field, or a list's name, an index and perhaps a
-            field.
+            field. With ``"merge": n`` it takes the place of the version before if that came of an
+            edit of the same path with the same n, so that a slider's way is undone in one.
 
         Raises
         ------
@@ -128,7 +130,13 @@ class Document:
             json.dumps(data, allow_nan=False)
         except (TypeError, ValueError):
             raise InputError("edit: expected finite numbers") from None
-        self._push(data)
+        key = json.dumps([edit.get("set"), edit["merge"]]) if edit.get("merge") else None
+        if key is not None and key == self._merging:
+            self._versions[self._at] = data
+            self._changed()
+        else:
+            self._push(data)
+        self._merging = key
 
     @property
     def can_undo(self) -> bool:
@@ -186,6 +194,7 @@ class Document:
         if not 0 <= to < len(self._versions):
             return False
         self._at = to
+        self._merging = None
         self._changed()
         return True
 

@@ -68,10 +68,11 @@ class Cursor:
             found = self._tethers.to(x, y)
         return {"x": x, "y": y} | (_told(found) if found else {"length": None})
 
-    def classes(self, goal: int) -> list[dict[str, Any]]:
-        """All classes of a goal, the shortest first."""
+    def classes(self, goal: int) -> dict[str, Any]:
+        """The shortest classes of a goal, and how many there are."""
         x, y, z = self.problem.goals[goal].position
-        return [_told(t) for t in self._tethers.classes(x, y, z)[:MOST_CLASSES]]
+        every = self._tethers.classes(x, y, z)
+        return {"classes": [_told(t) for t in every[:MOST_CLASSES]], "count": len(every)}
 
     def along(self, share: float) -> dict[str, Any]:
         """The tether in the class that the tour has at a share of its length."""

@@ -21,10 +21,21 @@ def check_polygon(vertices: Vertices) -> None:
     shape = shapely.Polygon(vertices)
     size = float(np.ptp(np.asarray(vertices), axis=0).max())
     reason = "" if shape.is_valid else shapely.is_valid_reason(shape)
-    if abs(shape.area) <= 1e-12 * size**2 and not reason.startswith("Self-intersection"):
+    # signed areas of a bow tie cancel; it is the hull that is flat where all vertices lie on a line
+    if shapely.convex_hull(shape).area <= 1e-12 * size**2 or (not reason and shape.area == 0.0):
         raise ValueError("polygon has zero area; expected one that encloses something")
     if reason:
-        raise ValueError(f"polygon is not simple ({reason}); expected edges that do not cross")
+        raise ValueError(
+            f"polygon is not simple: {_told(reason)}; expected edges that do not cross"
+        )
+
+
+def _told(reason: str) -> str:
+    """GEOS's reason, such as "Self-intersection[0.0005 11.5]", as a person would say it."""
+    kind, _, place = reason.removesuffix("]").partition("[")
+    at = ", ".join(f"{float(v):.6g}" for v in place.split())
+    said = {"Self-intersection": "edges cross", "Ring Self-intersection": "it touches itself"}
+    return f"{said.get(kind, kind.lower())} at ({at})" if at else kind.lower()
 
 
 def counterclockwise(vertices: npt.ArrayLike) -> npt.NDArray[np.float64]:

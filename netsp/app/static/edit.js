@@ -1,7 +1,7 @@
 // @ts-check
 /** Pointer and keys: select, drag, draw, pan, zoom. */
 
-import { cornersOf, middleOf, placeOf, said } from "./map.js";
+import { cornersOf, metres, middleOf, placeOf, said } from "./map.js";
 
 /** @param {any} page @param {import("./link.js").Link} link */
 export function edits(page, link) {
@@ -14,8 +14,25 @@ export function edits(page, link) {
   /** @type {Map<number, PointerEvent>} */
   const fingers = new Map();
 
-  /** @param {number} v */
-  const tidy = (v) => +v.toPrecision(Math.max(4, Math.ceil(Math.log10(Math.abs(v) * view.scale + 1)) + 2));
+  /** To a pixel, in decimals. @param {number} v */
+  const tidy = (v) => +v.toFixed(Math.min(Math.max(Math.ceil(Math.log10(view.scale)), 0), 9)) || 0;
+
+  /** @param {string} text @param {boolean} bad */
+  function tell(text, bad = false) {
+    if (!where) return;
+    where.textContent = text;
+    where.className = bad ? "note bad" : "note";
+  }
+
+  /** @param {number[]} p */
+  const at_ = (p) => `x ${metres(p[0])}, y ${metres(p[1])} m${earth(/** @type {[number, number]} */ (p))}`;
+
+  const HINTS = {
+    goal: "click where the goals are; with keys: arrows move the cross, Space puts a goal there",
+    circle: "drag from the centre, or click; with keys: arrows move the cross, Space puts a circle there",
+    polygon: "click its corners, the first again to finish; with keys: arrows, Space, then Enter",
+    bounds: "drag a rectangle",
+  };
   /** @param {[number, number]} p @param {MouseEvent} event @returns {[number, number]} */
   const snapped = (p, event) => {
     const step = event.shiftKey ? 1 : 0;
@@ -50,6 +67,7 @@ export function edits(page, link) {
   /** @param {string} tool */
   function pick(tool) {
     if (tool !== "polygon" && page.draft) finished();
+    tell(HINTS[tool] ?? "");
     page.tool = tool;
     page.draft = null;
     for (const b of document.querySelectorAll("[data-tool]")) {
@@ -90,6 +108,7 @@ export function edits(page, link) {
 
   svg.addEventListener("pointerdown", (event) => {
     svg.focus();
+    svg.classList.remove("keyed");
     svg.setPointerCapture(event.pointerId);
     fingers.set(event.pointerId, event);
     if (fingers.size === 2) { held = null; return; }
@@ -169,13 +188,12 @@ export function edits(page, link) {
       page.draft.radius = tidy(Math.hypot(at[0] - page.draft.x, at[1] - page.draft.y));
       page.redraw();
     }
-    where.textContent = `x ${at[0].toFixed(2)}  y ${at[1].toFixed(2)} m` + earth(at);
+    tell(at_(at));
     if (!held) {
       link.latest("hover", { hover: at }, (answer) => {
         page.hovered = answer.hover;
         if (answer.hover?.length != null) {
-          where.textContent = `x ${answer.hover.x.toFixed(2)}  y ${answer.hover.y.toFixed(2)} m` + earth([answer.hover.x, answer.hover.y])
-            + `   tether ${answer.hover.length.toFixed(2)} m   ${said(page.data, answer.hover.word)}`;
+          tell(`${at_([answer.hover.x, answer.hover.y])}; tether ${answer.hover.length.toFixed(2)} m, ${said(page.data, answer.hover.word)}`);
         }
         page.drawTethers();
       });
@@ -202,7 +220,8 @@ export function edits(page, link) {
     } else if (was?.kind === "circle") {
       const { x, y, radius } = page.draft;
       page.draft = null;
-      if (radius > 0) await page.edit({ add: "obstacles", value: { center: [x, y], radius, name: freeName("o") } });
+      const size = radius * view.scale > 4 ? radius : tidy(30 / view.scale);
+      await page.edit({ add: "obstacles", value: { center: [x, y], radius: size, name: freeName("o") } });
       page.redraw();
     }
   }
@@ -223,7 +242,7 @@ export function edits(page, link) {
     const east = dx * Math.cos(turn) + dy * Math.sin(turn), north = dy * Math.cos(turn) - dx * Math.sin(turn);
     const lat = o.latitude + north / 111320;
     const lon = o.longitude + east / (111320 * Math.cos(o.latitude * Math.PI / 180));
-    return `   ${lat.toFixed(6)}, ${lon.toFixed(6)}`;
+    return ` (${lat.toFixed(6)}, ${lon.toFixed(6)})`;
   }
 
   /** @type {Map<string, number>} */
@@ -269,7 +288,7 @@ export function edits(page, link) {
     page.chosen = [one];
     const item = one[0] === "base" ? null : page.data[one[0]][one[1]];
     const p = item === null ? page.data.base : one[0] === "goals" ? placeOf(item) : middleOf(item);
-    if (where) where.textContent = `${item === null ? "base" : `${one[0].slice(0, -1)} ${item.name ?? one[1] + 1}`} at x ${p[0].toFixed(2)}  y ${p[1].toFixed(2)} m`;
+    tell(`${item === null ? "base" : `${one[0].slice(0, -1)} ${item.name ?? one[1] + 1}`} at ${at_(p)}`);
     page.onchosen?.();
     page.redraw();
   }
@@ -298,13 +317,18 @@ export function edits(page, link) {
     else if (key === "Escape" && page.inSpace?.()) document.getElementById("space-on")?.click();
     else if (key === "Escape") { page.draft = null; page.chosen = []; page.classes = []; finished(); pick("select"); page.onchosen?.(); }
     else if (key === "Enter" && page.draft?.points?.length >= 3) finished();
-    else if (key === " " && document.activeElement === svg && page.tool !== "select") atCross();
+    else if (key === "Enter" && page.draft?.points) tell("a polygon needs three corners", true);
+    else if (key === " " && document.activeElement === svg && page.tool !== "select") { svg.classList.add("keyed"); atCross(); }
     else if (key.toLowerCase() === "n" && document.activeElement === svg) next(event.shiftKey ? -1 : 1);
     else if (key in ways && document.activeElement === svg) {
       const [dx, dy] = ways[key];
       if (page.chosen.length) {
         for (const [l, k] of page.chosen) { const [path, value] = moved(l, k, dx * step, dy * step); page.edit({ set: path, value }); }
-      } else { view.x += 4 * dx * step; view.y += 4 * dy * step; view.place(); }
+      } else {
+        view.x += 4 * dx * step; view.y += 4 * dy * step; view.place();
+        svg.classList.add("keyed");
+        if (page.tool !== "select") tell(`the cross is at ${at_([view.x, view.y])}`);
+      }
     } else if (key === "+" || key === "=") view.zoom(1.25, [view.x, view.y]);
     else if (key === "-") view.zoom(0.8, [view.x, view.y]);
     else if (key === "v") pick("select");

@@ -16,7 +16,7 @@ const by = (id) => document.getElementById(id);
 const page = {
   data: null, version: -1, error: null, saved: true, file: null, tour: null, chosen: [], along: 0,
   tool: "select", draft: null, ask: (m) => link.ask(m), edit, redraw, drawTethers, view: null, facts: null,
-  inSpace: () => space.open, picked: null, wrong: null, undo: false, redo: false,
+  inSpace: () => space.open, picked: null, note, wrong: null, undo: false, redo: false,
   shown: false, run: false, events: [], refit: () => { fitted = false; }, go: goTo,
 };
 
@@ -52,12 +52,13 @@ function heard(message) {
       if (page.tour && !page.shown) page.tour.stale = true;
       page.facts = page.hovered = page.walked = null;
       page.classes = [];
+      page.classesOf = null;
       by("along-said").textContent = "";
     }
     document.body.classList.toggle("shown", page.shown);
     page.chosen = page.chosen.filter(([list, k]) => list === "base" || k < (page.data[list] ?? []).length);
     view.heading = page.data.origin ? page.data.origin.heading ?? 0 : undefined;
-    if (!fitted) { fitted = true; view.fit(page.data); }
+    if (!fitted && !space.open) { fitted = true; view.fit(page.data); }
     fill(page);
   }
   if (message.tour) { page.tour = message.tour; page.fresh = true; showAlong(); fill(page); }
@@ -90,7 +91,7 @@ function say() {
       + (tour.stage === "searching" ? " …" : "");
   }
   answer.title = answer.textContent;
-  const walkable = Boolean(tour?.path?.length) && (page.shown || !tour.error);
+  const walkable = Boolean(tour?.path?.length) && (page.shown || !(tour.error || page.error));
   by("play").disabled = by("along").disabled = !walkable;
   if (!walkable) stop();
   by("undo").disabled = !page.undo;
@@ -105,9 +106,11 @@ function outOfReach() {
   const tour = page.tour;
   const far = tour?.version === page.version ? tour.unreached ?? [] : [];
   if (!far.length) return null;
+  const around = (tour.enclosing ?? []).slice(0, 6).map((k) => page.data.obstacles[k]?.name ?? `#${k}`).join(", ");
   const each = far.slice(0, 6).map((f) => `${page.data.goals[f.goal]?.name ?? `#${f.goal}`} `
-    + (f.needed === null ? "is shut in" : `needs ${(Math.ceil(f.needed * 100) / 100).toFixed(2)} m of tether`));
-  return `${each.join(", ")}${far.length > 6 ? `, and ${far.length - 6} more` : ""}; there are ${page.data.tether_length} m`;
+    + (f.needed === null ? `is shut in${around ? ` by ${around}` : ""}` : `needs ${(Math.ceil(f.needed * 100) / 100).toFixed(2)} m of tether`));
+  return `${each.join(", ")}${far.length > 6 ? `, and ${far.length - 6} more` : ""}`
+    + (far.some((f) => f.needed !== null) ? `; the tether has ${page.data.tether_length} m` : "");
 }
 
 /** @param {number[][]} points */
@@ -138,6 +141,8 @@ function redraw() {
   if (!data) return;
   const world = [], screen = [];
   const blamed = new Set(page.tour?.enclosing ?? []);
+  // what the reason names, as in "base: …" and "goals[3]: … obstacles[0] …"
+  const wrong = new Set(page.error?.match(/\bbase\b|\b(?:goals|obstacles)\[\d+\]/g) ?? []);
   if (Array.isArray(data.bounds)) {
     const corners = cornersOf(data.bounds);
     world.push(make("polygon", { points: line(corners), class: `bounds${isChosen("bounds", 0) ? " chosen" : ""}` }));
@@ -147,7 +152,7 @@ function redraw() {
     });
   }
   (data.obstacles ?? []).forEach((o, k) => {
-    const look = { class: `obstacle${blamed.has(k) ? " blamed" : ""}${isChosen("obstacles", k) ? " chosen" : ""}`,
+    const look = { class: `obstacle${blamed.has(k) ? " blamed" : ""}${wrong.has(`obstacles[${k}]`) ? " wrong" : ""}${isChosen("obstacles", k) ? " chosen" : ""}`,
       "data-list": "obstacles", "data-index": k };
     if (o.center) {
       world.push(make("circle", { cx: o.center[0], cy: o.center[1], r: o.radius + data.clearance, class: "clearance" }),
@@ -184,13 +189,13 @@ function redraw() {
   (data.goals ?? []).forEach((g, k) => {
     const [x, y] = view.toScreen(placeOf(g)[0], placeOf(g)[1]);
     const known = tour && !tour.stale && tour.version === page.version;
-    screen.push(make("g", { class: `goal${known && far.has(k) ? " unreached" : ""}`, "data-list": "goals", "data-index": k },
+    screen.push(make("g", { class: `goal${known && far.has(k) ? " unreached" : ""}${wrong.has(`goals[${k}]`) ? " wrong" : ""}`, "data-list": "goals", "data-index": k },
       make("circle", { cx: x, cy: y, r: 9, class: isChosen("goals", k) ? "chosen" : "" }),
       make("text", { x, y: y + 4, "text-anchor": "middle" }, String(known ? visit.get(k) ?? "" : "")),
       make("text", { x: x + 12, y: y + 4, class: "label" }, g.name ?? "")));
   });
   const [bx, by_] = view.toScreen(data.base[0], data.base[1]);
-  screen.push(make("path", { class: `base${isChosen("base", 0) ? " chosen" : ""}`, "data-list": "base", "data-index": 0,
+  screen.push(make("path", { class: `base${isChosen("base", 0) ? " chosen" : ""}${wrong.has("base") ? " wrong" : ""}`, "data-list": "base", "data-index": 0,
     d: `M${bx} ${by_ - 11}l3 8h8l-6 5 2 9-7-5-7 5 2-9-6-5h8z` }));
   // for whoever measures: the version that is shown, and that of the tour on it
   view.svg.dataset.version = String(page.version);
@@ -260,6 +265,8 @@ by("space-on").addEventListener("click", () => {
   note("");
   by("space-on").setAttribute("aria-pressed", String(on));
   by("map").style.display = on ? "none" : "";
+  view.known = undefined;
+  if (!on && !fitted && page.data) { fitted = true; view.fit(page.data); }
   space.show(on, () => by("along").value / 1000);
 });
 

@@ -35,10 +35,13 @@ export function cornersOf(bounds) {
   return [[a, b], [c, b], [c, d], [a, d]];
 }
 
+/** In centimetres, without a negative zero. @param {number} v */
+export const metres = (v) => (Math.abs(v) < 0.005 ? 0 : v).toFixed(2);
+
 /** A word of the tether's class by the names of the obstacles: between which of them and infinity
  * (above them) it passes, a minus for leftwards. @param {any} data @param {number[]} word */
 export function said(data, word) {
-  if (!word.length) return "class: the direct one";
+  if (!word.length) return "class –";
   const name = (/** @type {number} */ letter) => `${letter < 0 ? "−" : ""}${data.obstacles?.[Math.abs(letter) - 1]?.name ?? Math.abs(letter)}`;
   return `class ${word.map(name).join(" ")}`;
 }

@@ -1,7 +1,7 @@
 // @ts-check
 /** The numbers beside the map. */
 
-import { placeOf, said } from "./map.js";
+import { metres, placeOf, said } from "./map.js";
 import { profiles } from "./profile.js";
 
 /** @param {string} tag @param {any[]} inner */
@@ -11,9 +11,12 @@ function element(tag, ...inner) {
   return e;
 }
 
+/** Says why a number was not taken. @type {(text: string, bad?: boolean) => void} */
+let complain = () => {};
+
 /** @param {string} name @param {any} value @param {(text: string) => void} changed @param {string} kind
- * @param {(v: number) => boolean} good */
-function field(name, value, changed, kind = "number", good = () => true) {
+ * @param {(v: number) => boolean} good @param {string} expected */
+function field(name, value, changed, kind = "number", good = () => true, expected = "a number") {
   const input = document.createElement("input");
   input.type = kind;
   if (kind === "number") input.step = "any";
@@ -22,7 +25,10 @@ function field(name, value, changed, kind = "number", good = () => true) {
   input.addEventListener("change", () => {
     const v = Number(input.value);
     if (kind !== "number" || (input.value !== "" && Number.isFinite(v) && good(v))) changed(input.value);
-    else input.value = before;
+    else {
+      complain(`${name}: expected ${expected}, got ${input.value === "" ? "nothing" : input.value}`, true);
+      input.value = before;
+    }
   });
   input.addEventListener("keydown", (event) => { if (event.key === "Enter") input.blur(); });
   return element("label", name, input);
@@ -36,6 +42,7 @@ export function fill(page) {
   if (at && panel.contains(at) && (at.matches("input") || at.closest(".classes"))) return;  // somebody is typing
   page.onchosen = () => fill(page);
   const data = page.data, parts = [];
+  complain = page.note;
   /** @param {any[]} path @param {any} value */
   const set = (path, value) => page.edit({ set: path, value });
   if (page.shown) {
@@ -46,9 +53,9 @@ export function fill(page) {
   } else {
     parts.push(element("h2", "Problem"),
       field("name", data.name, (v) => set(["name"], v), "text"),
-      field("tether length (m)", data.tether_length, (v) => set(["tether_length"], Number(v)), "number", (v) => v > 0),
+      field("tether length (m)", data.tether_length, (v) => set(["tether_length"], Number(v)), "number", (v) => v > 0, "a length greater than 0"),
       ...tetherSlider(page, set),
-      field("clearance (m)", data.clearance, (v) => set(["clearance"], Number(v)), "number", (v) => v >= 0),
+      field("clearance (m)", data.clearance, (v) => set(["clearance"], Number(v)), "number", (v) => v >= 0, "a distance of 0 or more"),
       field("base depth (m)", 0 - (data.base[2] ?? 0), (v) => set(["base"], [data.base[0], data.base[1], 0 - Number(v)])),
       ...bounds(data, set));
     if (page.wrong) { const p = element("p", page.wrong); p.className = "bad"; parts.unshift(p); }
@@ -79,8 +86,8 @@ function margins(page) {
     element("td", (s.turning * 180 / Math.PI).toFixed(0)), element("td", s.clearance?.toFixed(2) ?? "")));
   return [element("h2", "Margins"),
     element("p", (m.obstacles === null ? "There are no obstacles; "
-      : `Every obstacle may be off by ${m.obstacles.toFixed(2)} m (${m.limited_by}), the robot ${m.cross_track?.toFixed(2) ?? "any"} m beside its path, and `)
-      + `${m.tether.toFixed(2)} m of tether may be lost.`),
+      : `Any one of these is harmless: every obstacle off its place by up to ${m.obstacles.toFixed(2)} m (${m.limited_by}), the robot off its path by ${m.cross_track?.toFixed(2) ?? "any number of"} m, `)
+      + `a tether shorter by ${m.tether.toFixed(2)} m.`),
     element("table", element("tr", element("th", ""), element("th", "goal"), element("th", "slack m"), element("th", "turns °"), element("th", "clear m")), ...stops)];
 }
 
@@ -101,11 +108,12 @@ function origin(data, set) {
     const next = { heading: 0, ...o, ...pending, ...change };
     pending = next;
     if (next.latitude !== undefined && next.longitude !== undefined) { pending = {}; set(["origin"], next); }
+    else complain(`position of the base: the ${next.latitude === undefined ? "latitude" : "longitude"} is needed, too`);
   };
   return [element("h2", "Position of the base"),
-    field("latitude (°)", o.latitude ?? pending.latitude, (v) => keep({ latitude: Number(v) }), "number", (v) => Math.abs(v) <= 90),
-    field("longitude (°)", o.longitude ?? pending.longitude, (v) => keep({ longitude: Number(v) }), "number", (v) => Math.abs(v) <= 180),
-    field("y axis points to (°)", o.heading ?? 0, (v) => keep({ heading: Number(v) }), "number", (v) => Math.abs(v) <= 360)];
+    field("latitude (°)", o.latitude ?? pending.latitude, (v) => keep({ latitude: Number(v) }), "number", (v) => Math.abs(v) <= 90, "-90 to 90"),
+    field("longitude (°)", o.longitude ?? pending.longitude, (v) => keep({ longitude: Number(v) }), "number", (v) => Math.abs(v) <= 180, "-180 to 180"),
+    field("bearing of the y axis (°)", o.heading ?? 0, (v) => keep({ heading: Number(v) }), "number", (v) => Math.abs(v) <= 360, "-360 to 360")];
 }
 
 /** Latitude or longitude while the other is still missing. @type {any} */
@@ -137,13 +145,15 @@ function tetherSlider(page, set) {
   input.value = String(1000 * (length - low) / (high - low));
   input.setAttribute("aria-label", "tether length");
   const value = () => +(low + (high - low) * Math.max(Number(input.value), 1) / 1000).toPrecision(4);
-  let last = 0;
+  // one slide is one version, however often it is solved on the way
+  let last = 0, slide = 0;
+  const slid = () => page.edit({ set: ["tether_length"], value: value(), merge: slide ||= Date.now() });
   input.addEventListener("input", () => {
     if (Date.now() < last + 150) return;
     last = Date.now();
-    set(["tether_length"], value());
+    slid();
   });
-  input.addEventListener("change", () => { set(["tether_length"], value()); input.blur(); });
+  input.addEventListener("change", () => { slid(); slide = 0; input.blur(); });
   const row = element("label", "", input);
   if (least === null) return [row];
   const marked = document.createElement("datalist");
@@ -173,9 +183,15 @@ function chosen(page, list, k, set) {
     const list_ = element("div");
     classes.addEventListener("click", async () => {
       const answer = await page.ask({ classes: k });
-      page.classes = answer.classes ?? [];
+      Object.assign(page, { classes: answer.classes ?? [], classesOf: k, classCount: answer.count ?? 0 });
+      listed();
+      page.redraw();
+    });
+    const listed = () => {
+      const its = page.tour?.version === page.version ? page.tour.visits?.find((v) => v.goal === k)?.word : null;
       const rows = page.classes.map((c) => {
-        const row = element("button", `${c.length.toFixed(2)} m, ${said(data, c.word)}`);
+        const marks = [c === page.classes[0] ? "shortest" : "", its && its.join() === c.word.join() ? "the tour's" : ""].filter(Boolean);
+        const row = element("button", `${metres(c.length)} m, ${said(data, c.word)}${marks.length ? ` (${marks.join(", ")})` : ""}`);
         const show = (/** @type {any} */ what) => () => { page.picked = what; page.drawTethers(); };
         row.addEventListener("pointerenter", show(c));
         row.addEventListener("focus", show(c));
@@ -183,17 +199,18 @@ function chosen(page, list, k, set) {
         row.addEventListener("blur", show(null));
         return row;
       });
-      list_.replaceChildren(...(rows.length ? rows : ["none within the tether's length"]));
+      const more = page.classCount > rows.length ? [element("p", `the ${rows.length} shortest of ${page.classCount}`)] : [];
+      list_.replaceChildren(...more, ...(rows.length ? rows : ["none within the tether's length"]));
       list_.className = "classes";
-      page.redraw();
-    });
+    };
+    if (page.classesOf === k && page.classes?.length) listed();
     return [element("h2", "Goal"), rename, ...xy(p, (q) => set([list, k], { ...named, position: [...q, p[2] ?? 0] })),
       field("depth (m)", 0 - (p[2] ?? 0), (v) => set([list, k], { ...named, position: [p[0], p[1], 0 - Number(v)] })),
       classes, list_];
   }
   if (item.center) {
     return [element("h2", "Circle"), rename, ...xy(item.center, (q) => set([list, k], { ...item, center: q })),
-      field("radius (m)", item.radius, (v) => set([list, k], { ...item, radius: Number(v) }), "number", (v) => v > 0)];
+      field("radius (m)", item.radius, (v) => set([list, k], { ...item, radius: Number(v) }), "number", (v) => v > 0, "a radius greater than 0")];
   }
   return [element("h2", `Polygon of ${item.polygon.length} corners`), rename,
     ...item.polygon.slice(0, 12).map((p, n) => field(`corner ${n + 1}`, `${p[0]}, ${p[1]}`, (v) => {

@@ -63,6 +63,6 @@ export function profiles(page, go) {
   const heading = document.createElement("h2");
   heading.textContent = "Along the tour";
   const parts = [heading, ...chart(`tether out (m), at most ${page.data.tether_length}`, rows, 1, page.data.tether_length, visits, "tether", go)];
-  if (rows.some((r) => r[2] !== rows[0][2])) parts.push(...chart("height (m)", rows, 2, null, visits, "tour", go));
+  if (rows.some((r) => r[2] !== rows[0][2])) parts.push(...chart("height above the surface (m)", rows, 2, null, visits, "tour", go));
   return parts;
 }

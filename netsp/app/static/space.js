@@ -58,7 +58,7 @@ export class Space {
         if (trace.name === "goals") { trace.mode = "markers+text"; trace.textposition = "top center"; trace.textfont = { color: colour, size: 11 }; }
       }
       layout.scene.camera = { eye: { x: 1.6, y: -1.6, z: 1.1 } };
-      this.plotly.react(this.place, answer.space.data, layout, { responsive: true, displaylogo: false });
+      this.plotly.react(this.place, answer.space.data, layout, { responsive: true, displayModeBar: false });
       this.place.dataset.drawn = "yes";
       if (!this.drawn) this.say("");
       this.drawn = true;
