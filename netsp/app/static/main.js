@@ -192,7 +192,7 @@ function redraw() {
     screen.push(make("g", { class: `goal${known && far.has(k) ? " unreached" : ""}${wrong.has(`goals[${k}]`) ? " wrong" : ""}`, "data-list": "goals", "data-index": k },
       make("circle", { cx: x, cy: y, r: 9, class: isChosen("goals", k) ? "chosen" : "" }),
       make("text", { x, y: y + 4, "text-anchor": "middle" }, String(known ? visit.get(k) ?? "" : "")),
-      make("text", { x: x + 12, y: y + 4, class: "label" }, g.name ?? "")));
+      make("text", { x: x + 9, y: y - 8, class: "label" }, g.name ?? "")));
   });
   const [bx, by_] = view.toScreen(data.base[0], data.base[1]);
   screen.push(make("path", { class: `base${isChosen("base", 0) ? " chosen" : ""}${wrong.has("base") ? " wrong" : ""}`, "data-list": "base", "data-index": 0,

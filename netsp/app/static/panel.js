@@ -61,7 +61,6 @@ export function fill(page) {
     if (page.wrong) { const p = element("p", page.wrong); p.className = "bad"; parts.unshift(p); }
     for (const [list, k] of page.chosen.slice(0, 5)) parts.push(...chosen(page, list, k, set));
     if (page.chosen.some(([l]) => l !== "base")) parts.push(...copying(page));
-    parts.push(...origin(data, set));
   }
   const tour = page.tour;
   if (tour?.visits?.length && tour.version === page.version) {
@@ -75,6 +74,7 @@ export function fill(page) {
       element("tr", element("th", ""), element("th", "goal"), element("th", "tether m"), element("th", "slack m")), ...rows));
   }
   parts.push(...profiles(page, page.go), ...margins(page));
+  if (!page.shown) parts.push(...origin(data, set));
   panel.replaceChildren(...parts);
 }
 
