@@ -9,12 +9,15 @@ import numpy as np
 
 from netsp.arrays import Floats, Ints
 from netsp.space.states import States
-from netsp.space.water import LONGER, Water, along
+from netsp.space.water import Water, along
 
 NEIGHBOURS = 10
 """Waypoints nearest to each that legs are sought to."""
 
-MOST_WAYS = 2
+FARTHER = 2.2
+"""Ways are no longer than so many times the distance: around a row of piles it is twice."""
+
+MOST_WAYS = 4
 """Classes of ways between two waypoints."""
 
 
@@ -58,13 +61,13 @@ class Ways:
             return
         water, words = self.water, self.water.words
         here = words.held(self.points[n])
-        far = [m for m in to if not self._straight_only(n, m)]
         found = None
-        if here is not None and far:
-            reach = float(self._apart[n, far].max())
-            found = water.search(
-                water.room, here, self.points[[n, *far]], MOST_WAYS, LONGER * reach
-            )
+        if here is not None:
+            ends = {m: words.held(self.points[m]) for m in to}
+            limits = {
+                c: FARTHER * float(self._apart[n, m]) for m, c in ends.items() if c is not None
+            }
+            found = water.search(True, here, MOST_WAYS, 0.0, limits) if limits else None
         for m in to:
             ways = []
             if water.straight(self.points[n], self.points[m]):
@@ -72,7 +75,7 @@ class Ways:
                 word = water.number(line)
                 if word is not None:
                     ways.append((word, line))
-            there = words.held(self.points[m]) if found is not None and m in far else None
+            there = ends[m] if found is not None else None
             if found is not None and there is not None:
                 for _, cells in water.ways(found, there):
                     path = water.taut(np.vstack([self.points[n], cells, self.points[m]]))
@@ -86,11 +89,6 @@ class Ways:
                 if word is not None:
                     back.append((word, path[::-1]))
             self._known[n, m], self._known[m, n] = ways, back
-
-    def _straight_only(self, n: int, m: int) -> bool:
-        """Whether balls without solids cover the straight way and what is beside it: then it is the
-        only one of its class, and any other way is much longer."""
-        return False
 
     def between(self, n: int, m: int) -> list[tuple[int, Floats]]:
         """Ways from one waypoint to another, shortest first.

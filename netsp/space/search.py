@@ -17,7 +17,8 @@ from netsp.arrays import Bools, Ints
 from netsp.compiled.growing import more_int_rows
 from netsp.compiled.kernel import kernel
 from netsp.hsignature.wordtable import Rules, Table, times, times_inverse
-from netsp.space.cells import FREE, OPEN
+from netsp.online.paths.tree import ONWARD
+from netsp.space.cells import FREE
 from netsp.space.labels import (
     BUCKETS,
     LENGTHS,
@@ -61,10 +62,13 @@ class Found(NamedTuple):
 
 @kernel
 def shortest_words(
-    flags: Flags, room: Bools, labels: Labels, table: Table, rules: Rules, root: Ints,
-    first: Ints, last: Ints, most: int, longest: int,
+    flags: Flags, room: Bools, open_: Bools, labels: Labels, table: Table, rules: Rules,
+    root: Ints, first: Ints, last: Ints, most: int, targets: Ints, limits: Ints,
 ) -> tuple[Found, Table]:  # fmt: skip
-    """The `most` soonest words of every cell of a box.
+    """The `most` soonest words of the cells of a box that are on the way to some targets.
+
+    About an open cell everything is free and of one class, so only those steps are taken that lead
+    further on (`netsp.online.paths.tree`): the other cells beside it are reached as soon around it.
 
     Parameters
     ----------
@@ -72,14 +76,18 @@ def shortest_words(
         Of the whole complex.
     room
         (nx, ny, nz) cells that may be passed.
+    open_
+        (nx, ny, nz) cells about which all 26 are free, may be passed, and are of one class.
     root
         (3,) the cell to begin at.
     first, last
         (3,) corners of the box, both within it.
     most
         Words of a cell.
-    longest
-        Hundredths of a cell; paths are no longer.
+    targets
+        (t, 3) cells; with none, all cells are sought.
+    limits
+        (t,) or, with no targets, (1,): hundredths of a cell; paths to each are no longer.
     """
     _, ny, nz = flags.shape
     sx, sy, sz = last[0] - first[0] + 1, last[1] - first[1] + 1, last[2] - first[2] + 1
@@ -95,6 +103,7 @@ def shortest_words(
     word[i, j, k, 0], far[i, j, k, 0], step[i, j, k, 0] = 0, 0, 26
     waiting[0, 0], waiting[0, 1], waiting[0, 2] = ((i * sy + j) * sz + k) * most, 0, -1
     bucket[0], empty, now = 0, 0, 0
+    longest = limits.max()
     while empty < BUCKETS and now <= longest:
         entry = bucket[now % BUCKETS]
         if entry < 0:
@@ -113,8 +122,21 @@ def shortest_words(
         done[i, j, k, n] = True
         here = word[i, j, k, n]
         x, y, z = i + first[0], j + first[1], k + first[2]
-        open_ = flags[x, y, z] & OPEN != 0
-        for s in range(26):
+        on_the_way = len(targets) == 0
+        for t in range(len(targets)):
+            far2 = (targets[t, 0] - x) ** 2 + (targets[t, 1] - y) ** 2 + (targets[t, 2] - z) ** 2
+            left = limits[t] - now
+            if left >= 0 and 10_000 * far2 <= left * left:
+                on_the_way = True
+                break
+        if not on_the_way:
+            continue
+        open_here = open_[x, y, z]
+        came = step[i, j, k, n]
+        inside = 0 < i < sx - 1 and 0 < j < sy - 1 and 0 < k < sz - 1
+        few = open_here and inside and came != 26
+        for nth in range(ONWARD[came, 0] if few else 26):
+            s = ONWARD[came, nth + 1] if few else nth
             there = now + LENGTHS[s]
             if there > longest:
                 continue
@@ -126,7 +148,7 @@ def shortest_words(
                 continue
             if far[p, q, r, most - 1] <= there and done[p, q, r, most - 1]:
                 continue
-            order = 0 if open_ else staircase(flags, x, y, z, s)
+            order = 0 if open_here else staircase(flags, x, y, z, s)
             if order < 0:
                 continue
             new, table = word_after(labels, table, rules, here, x, y, z, ny, nz, s, order)

@@ -162,7 +162,7 @@ def first_states(water: Water, points: Floats, limit: float) -> States:
     words = water.words
     anchor = np.asarray(water.mission.anchor, dtype=float)
     root = int(np.ravel_multi_index(tuple(words.root), words.cells.flags.shape))
-    found = water.search(water.everywhere, root, None, MOST_WORDS, limit)
+    found = water.search(False, root, MOST_WORDS, limit, None)
     for n, point in enumerate(points):
         cell = words.held(point)
         if cell is None:

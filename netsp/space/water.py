@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -10,9 +11,11 @@ import numpy as np
 from netsp.arrays import Bools, Floats
 from netsp.geometry import polylines
 from netsp.online.mission import Mission
-from netsp.online.paths.tree import Grid, free_cells, taut
+from netsp.online.paths.tree import OPEN as ALL_FREE
+from netsp.online.paths.tree import Grid, free_cells, states_of, taut
 from netsp.online.scene.field import DistanceField
 from netsp.online.tether import GeodesicTether
+from netsp.space.cells import FREE, OPEN
 from netsp.space.search import NONE, Found, shortest_words, way_back
 from netsp.space.signature import SpaceSignature
 
@@ -21,9 +24,6 @@ LONGER = 1.35
 
 DIP = 0.15
 """Of delta: a tether's edges dip into a surface by an eighth of it (docs/tether.md)."""
-
-WIDER = 3
-"""Cells that a search's box is wider than what it is for."""
 
 
 @dataclass(frozen=True)
@@ -85,23 +85,36 @@ class Water:
         """(nx, ny, nz) all cells: the tether's water."""
         return np.ones(self.words.cells.flags.shape, dtype=np.bool_)
 
+    @cached_property
+    def open(self) -> tuple[Bools, Bools]:
+        """(nx, ny, nz) cells about which all are free and of one class, for the tether and for the
+        robot."""
+        flags = self.words.cells.flags
+        free = (flags & FREE) != 0
+        both = []
+        for mask in (free, free & self.room):
+            inner = states_of(mask)[1:-1, 1:-1, 1:-1] == ALL_FREE
+            both.append(inner & ((flags & OPEN) != 0))
+        return both[0], both[1]
+
     def search(
-        self, room: Bools, cell: int, around: Floats | None, most: int, length: float
+        self, robot: bool, cell: int, most: int, length: float, to: Mapping[int, float] | None
     ) -> Found:
         """The soonest words of cells, from one of them on.
 
         Parameters
         ----------
-        room : ndarray of bool
-            Cells that may be passed; the first always is.
+        robot : bool
+            Whether the robot's clearance is kept.
         cell : int
             Number of the first.
-        around : ndarray of shape (n, 3) or None
-            Points whose box is searched; None for all there is.
         most : int
             Words of a cell.
         length : float
             Of paths pulled taut, metres: what is searched for is `LONGER`.
+        to : mapping of int to float, or None
+            Cells that are sought, and how long the paths to each may be; None for all within the
+            length.
 
         Returns
         -------
@@ -112,14 +125,19 @@ class Water:
         shape = np.array(cells.flags.shape)
         root = np.array(np.unravel_index(cell, cells.flags.shape), dtype=np.int64)
         first, last = np.zeros(3, dtype=np.int64), shape - 1
-        if around is not None:
-            at = np.vstack([cells.index(around), root])
-            first = np.maximum(at.min(0) - WIDER, 0)
-            last = np.minimum(at.max(0) + WIDER, shape - 1)
-        longest = int(100.0 * LONGER * length / cells.cell)
+        targets, scale = np.empty((0, 3), dtype=np.int64), 100.0 * LONGER / cells.cell
+        limits = np.array([scale * length], dtype=np.int64)
+        if to is not None:
+            targets = np.column_stack(np.unravel_index(list(to), cells.flags.shape))
+            limits = np.array([scale * v for v in to.values()], dtype=np.int64)
+            # a path is no farther from where it begins than half its length and what it leads to
+            apart = 100.0 * np.abs(targets - root)
+            reach = np.ceil(0.005 * (limits[:, None] + apart).max(0)).astype(np.int64) + 1
+            first, last = np.maximum(root - reach, 0), np.minimum(root + reach, shape - 1)
+        room = self.room if robot else self.everywhere
         found, table = shortest_words(
-            cells.flags, room, words.labels, words.table, words.rules, root, first, last, most,
-            longest,
+            cells.flags, room, self.open[robot], words.labels, words.table, words.rules, root,
+            first, last, most, targets, limits,
         )  # fmt: skip
         words.keep(table)
         return Found(*found)

@@ -212,7 +212,7 @@ def _onward() -> Ints:
     return out
 
 
-_ONWARD = _onward()
+ONWARD = _onward()
 
 BLOCKED, FREE, OPEN = range(3)
 """Of a cell: its centre is not free, is free, is free as are all 26 about it."""
@@ -317,8 +317,8 @@ def grow(states: npt.NDArray[np.uint8], root: Ints, wanted: Ints) -> npt.NDArray
             if asked[cell]:
                 left -= 1
             here = lengths[cell]
-            for n in range(26 if all_of_them else _ONWARD[came, 0]):
-                s = n if all_of_them else _ONWARD[came, n + 1]
+            for n in range(26 if all_of_them else ONWARD[came, 0]):
+                s = n if all_of_them else ONWARD[came, n + 1]
                 beside = cell + offset[s]
                 if state[beside] == BLOCKED:
                     continue
