@@ -192,16 +192,20 @@ def shape_of(obstacle) -> shapely.Geometry:
     return shapely.Polygon(obstacle.polygon)
 
 
-def frames() -> None:
-    """Frames while panning, and two tabs after an edit in one of them."""
-    print("### 100 obstacles and 200 goals\n")
+def panned() -> np.ndarray:
+    """Milliseconds between frames while a map of 100 obstacles and 200 goals is dragged about."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "p.json"
         file.write_text(crowded())
         with served(file) as (url, _), page_at(url) as page:
             wait_for_tour(page, -1)
             page.wait_for_timeout(1000)
-            times = np.array(page.evaluate(PAN))
+            return np.array(page.evaluate(PAN))
+
+
+def frames() -> None:
+    print("### 100 obstacles and 200 goals\n")
+    times = panned()
     head("obstacles", "goals", "ms between frames p50", "p95", "worst", name="app-frames")
     row(100, 200, f"{np.median(times):.1f}", f"{np.percentile(times, 95):.1f}",
         f"{times.max():.1f}")  # fmt: skip

@@ -14,7 +14,7 @@ from netsp import Problem, Solution, solve
 from netsp.execute import ExecutionOptions, Surprises, execute
 from netsp.execute.log import Execution
 from netsp.online.mission import Mission
-from netsp.online.order import Ordered, reorder
+from netsp.space.order import Ordered, reorder
 from netsp.worlds import random_world
 
 SPEED = 1.0

@@ -14,7 +14,7 @@ import netsp
 
 MODULES = (
     "netsp.errors", "netsp.execute.log", "netsp.online.log", "netsp.online.mission",
-    "netsp.online.order", "netsp.online.simulate", "netsp.registry", "netsp.solvers.table",
+    "netsp.space.order", "netsp.online.simulate", "netsp.registry", "netsp.solvers.table",
     "netsp.solving.limits", "netsp.travel.result", "netsp.worlds",
 )  # fmt: skip
 """Modules that docs import from by name, beside the packages with an `__all__`."""

@@ -10,8 +10,8 @@ import pytest
 from netsp.command.main import main
 from netsp.online import Scene
 from netsp.online.mission import Mission
-from netsp.online.order import reorder, waypoint_graph
 from netsp.online.simulate import grid_of, simulate
+from netsp.space.order import reorder, waypoint_graph
 
 MISSIONS = Path(__file__).parent.parent / "missions"
 

@@ -9,10 +9,10 @@ from netsp import InputError
 from netsp.online import Scene
 from netsp.online.log import describe_run
 from netsp.online.mission import Mission
-from netsp.online.order import reorder
 from netsp.online.simulate import simulate
 from netsp.online.track import Track
 from netsp.pictures.mission import save_runs, tethers_along
+from netsp.space.order import reorder
 
 PILES = Scene(
     solids=[

@@ -42,7 +42,7 @@ def run(args: argparse.Namespace) -> int:
     check_writable(args.output, inputs=(args.mission,))
     from netsp.files import read_text, write_text
     from netsp.online.mission import Mission
-    from netsp.online.order import reorder
+    from netsp.space.order import reorder
 
     mission = Mission.load(args.mission)
     scene_file = Mission.from_json(read_text(args.mission)).scene
@@ -56,6 +56,13 @@ def run(args: argparse.Namespace) -> int:
                 f"{name:<6} inspection {s['inspection_s']:.1f} s, with tether recovery "
                 f"{s['total_s']['tether']:.1f} s, longest tether {s['longest_tether']:.2f} of "
                 f"{s['tether_length']:g} m, {s['visited']} of {s['waypoints']} visited",
+                file=sys.stderr,
+            )
+        if (p := found.plan) is not None:
+            proven = "proven shortest" if p.result.status.value == "optimal" else "the best found"
+            print(
+                f"tour   {p.length:.2f} m, {proven} of those along {p.legs} legs between "
+                f"{p.states} ways that the tether can hang",
                 file=sys.stderr,
             )
         if kept:

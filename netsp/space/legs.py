@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from netsp.arrays import Floats, Ints
-from netsp.space.states import States
+from netsp.space.states import Effort, States
 from netsp.space.water import Water, along
 
 NEIGHBOURS = 10
@@ -16,9 +16,6 @@ NEIGHBOURS = 10
 
 FARTHER = 2.2
 """Ways are no longer than so many times the distance: around a row of piles it is twice."""
-
-MOST_WAYS = 4
-"""Classes of ways between two waypoints."""
 
 
 @dataclass
@@ -31,10 +28,13 @@ class Ways:
         Where they are.
     points : ndarray, shape (n, 3)
         The waypoints, metres.
+    effort : Effort
+        How many.
     """
 
     water: Water
     points: Floats
+    effort: Effort
     _known: dict[tuple[int, int], list[tuple[int, Floats]]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -67,7 +67,7 @@ class Ways:
             limits = {
                 c: FARTHER * float(self._apart[n, m]) for m, c in ends.items() if c is not None
             }
-            found = water.search(True, here, MOST_WAYS, 0.0, limits) if limits else None
+            found = water.search(True, here, self.effort.ways, 0.0, limits) if limits else None
         for m in to:
             ways = []
             if water.straight(self.points[n], self.points[m]):

@@ -20,14 +20,14 @@ import numpy as np
 
 from netsp.arrays import Floats
 from netsp.clock import Clock
-from netsp.errors import InputError
+from netsp.errors import InputError, LimitReachedError
 from netsp.online.mission import Mission
 from netsp.online.scene.field import DistanceField
 from netsp.online.simulate import first_tether, grid_of
 from netsp.online.tether import Tether
 from netsp.solvers.solve import solve_graph
 from netsp.space.legs import Legs, Ways, grown
-from netsp.space.states import States, alike, first_states
+from netsp.space.states import Effort, States, alike, first_states
 from netsp.space.water import Water, along
 from netsp.travel.graph import TravelGraph
 from netsp.travel.result import Result
@@ -80,6 +80,10 @@ class SpacePlan:
         Of the tour, metres.
     result : Result
         Of the solver: its status, bound and gap are about the states and legs that were found.
+    states : int
+        How many there were to choose from.
+    legs : int
+        How many of them were driven.
     unreached : tuple of int
         Waypoints that no tether within the limit was found to.
     free : bool
@@ -93,6 +97,8 @@ class SpacePlan:
     home: Floats
     length: float
     result: Result
+    states: int
+    legs: int
     unreached: tuple[int, ...]
     free: bool
     water: Water
@@ -139,6 +145,8 @@ def plan(
     InputError
         A moving anchor; waypoints in solids; no tether that reaches any of them; as of
         `netsp.space.signature.SpaceSignature`.
+    LimitReachedError
+        No tour was found in time whose tether stays within its limit all along.
     """
     if mission.track:
         raise InputError("track: a moving anchor has no one best order; expected a mission without")
@@ -151,11 +159,12 @@ def plan(
     water = Water.of(mission, field, grid)
     points, limit = mission.places, SHARE * mission.tether_length
     tell("states")
-    states = first_states(water, points, limit)
+    effort = Effort.of(len(points))
+    states = first_states(water, points, limit, effort)
     if not states.all:
         raise InputError("waypoints: no tether within the limit reaches any of them")
     tell("ways")
-    ways = Ways(water, points)
+    ways = Ways(water, points, effort)
     for n in range(len(points)):
         ways.prepare(n)
     tell("legs")
@@ -175,11 +184,14 @@ def plan(
             break
         board.forbidden.add(driven.fault)
     if found is None:
-        raise InputError("waypoints: no tour was found whose tether stays within the limit")
+        raise LimitReachedError(
+            "waypoints: no tour was found whose tether stays within the limit all along"
+        )
     result, driven = found
     reached = set(states.of)
     return SpacePlan(
-        mission, tuple(driven.stops), driven.home, driven.length, result,
+        mission, tuple(driven.stops), driven.home, driven.length, result, len(states.all),
+        len(board.legs),
         tuple(n for n in range(len(points)) if n not in reached), driven.free, water,
     )  # fmt: skip
 

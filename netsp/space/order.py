@@ -1,11 +1,15 @@
 """The order in which to visit waypoints so that the tether stays short: NE-TSP in space.
 
-Offline, a goal and the class of its tether make one vertex, and legs belong to classes, so that no
-tour can wind the tether up. The same here, with classes found by the tether model: the shortest
-tether to each waypoint, and those that come of going straight on to it from its neighbours. A leg
-within a class is the straight line if the tether that comes of it is that of the class; between any
-two classes there is the path back along one tether and out along the other, pulled taut. What comes
-out is a generalised TSP, which our own solvers take.
+Two ways are tried, and the better is kept: a tour of states and legs (`netsp.space.plan`), and the
+older one that is below, which is better for some bodies with many free ends. Each order is flown
+before it is believed.
+
+The older one. A waypoint and the class of its tether make one vertex, and legs belong to classes,
+so that no tour can wind the tether up, as offline. Classes are found by the tether model: the
+shortest tether to each waypoint, and those that come of going straight on to it from its
+neighbours. A leg within a class is the straight line if the tether that comes of it is that of the
+class; between any two classes there is the path back along one tether and out along the other,
+pulled taut. What comes out is a generalised TSP, which our own solvers take.
 """
 
 from __future__ import annotations
@@ -16,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from netsp.arrays import Floats
-from netsp.errors import InputError
+from netsp.errors import InputError, LimitReachedError
 from netsp.geometry import polylines
 from netsp.lns import Instance, best_classes
 from netsp.online.log import Run
@@ -26,6 +30,7 @@ from netsp.online.scene.field import DistanceField
 from netsp.online.simulate import grid_of, simulate
 from netsp.online.tether import GeodesicTether, Tether
 from netsp.solvers.solve import solve_graph
+from netsp.space.plan import SpacePlan, plan
 from netsp.travel.graph import TravelGraph
 
 NEIGHBOURS = 12
@@ -55,12 +60,16 @@ class Ordered:
         The given order, flown by `predictive`.
     after : Run
         The new order; the same as `before` when no better one was found.
+    plan : SpacePlan or None
+        The tour of states and legs, whether its order was the best or not; None where none was
+        found.
     """
 
     mission: Mission
     order: tuple[int, ...]
     before: Run
     after: Run
+    plan: SpacePlan | None
 
 
 @dataclass
@@ -116,7 +125,7 @@ def reorder(
     mission : Mission
         The mission.
     time_limit : float
-        Seconds of the solver.
+        Seconds of each solver.
     seed : int
         Of the solver.
     on_progress : callable, optional
@@ -141,7 +150,14 @@ def reorder(
     tell("flying the given order")
     before = simulate(mission, scene=scene, field=field)
     _not_interrupted(before)
-    tell("tethers and legs")
+    tours = []
+    planned = None
+    try:
+        planned = plan(mission, field=field, time_limit=time_limit, seed=seed, on_progress=tell)
+        tours.append(planned.order)
+    except LimitReachedError as error:
+        tell(str(error))
+    tell("tethers and legs, the older way")
     graph, points, start = waypoint_graph(mission, field, scene_grid=grid_of(mission, scene, field))
     given = [start.index(n) + 1 for n in range(len(mission.waypoints)) if n in start]
     tell("order")
@@ -153,17 +169,18 @@ def reorder(
     )  # fmt: skip
     assert result.tour is not None
     best, after = tuple(range(len(mission.waypoints))), before
-    tour = [points[v] for v in result.tour[1:]]
-    rest = [n for n in range(len(mission.waypoints)) if n not in tour]
-    for direction, candidate in (("forward", tour), ("in reverse", tour[::-1])):
-        order = (*candidate, *rest)
-        tell(f"flying the new order {direction}")
-        run = simulate(_in_order(mission, order), scene=scene, field=field)
-        _not_interrupted(run)
-        if _better(run, after):
-            best, after = order, run
+    tours.append(tuple(points[v] for v in result.tour[1:]))
+    for k, tour in enumerate(dict.fromkeys(tours)):
+        rest = [n for n in range(len(mission.waypoints)) if n not in tour]
+        for direction, candidate in (("forward", tour), ("in reverse", tour[::-1])):
+            order = (*candidate, *rest)
+            tell(f"flying order {k + 1} {direction}")
+            run = simulate(_in_order(mission, order), scene=scene, field=field)
+            _not_interrupted(run)
+            if _better(run, after):
+                best, after = order, run
     full = Mission.model_validate(_in_order(mission, best).model_dump())
-    return Ordered(full, best, before, after)
+    return Ordered(full, best, before, after, planned)
 
 
 def _not_interrupted(run: Run) -> None:

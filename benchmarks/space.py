@@ -1,0 +1,286 @@
+"""Words and tours in space.
+
+    python benchmarks/space.py [--only words|loops|prisms|missions] [--keep]
+
+Words: what groups scenes have, and what they take. Loops: random ones, beside a second invariant.
+Prisms: tours in space of problems whose shortest tour is proven in the plane. Missions: the shipped
+ones, planned, and flown by `predictive` in the order that was planned.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import json
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from table import ROOT, head, heading, row
+
+from netsp import Problem, solve
+from netsp.hsignature.rays import signature
+from netsp.online import Scene
+from netsp.online.mission import Mission
+from netsp.online.scene.field import DistanceField
+from netsp.online.scene.scene import scene_of
+from netsp.online.simulate import grid_of, simulate
+from netsp.space.plan import SHARE, plan
+from netsp.space.signature import SpaceSignature
+from netsp.worlds import reachable_world
+
+MISSIONS = ("basin", "pipes", "jacket")
+
+LOW, HIGH, ANCHOR = [-5.0] * 3, [5.0] * 3, [4.0, 0.3, 3.0]
+POSTS = np.array([[-2.0, -1.0], [0.5, 1.5], [2.0, -2.0]])
+
+
+def torus(centre: list[float], axis: list[float], radius: float = 2.0, tube: float = 0.05) -> dict:
+    return {"torus": {"center": centre, "axis": axis, "major_radius": radius,
+                      "minor_radius": tube}}  # fmt: skip
+
+
+def bar(a: list[float], b: list[float], radius: float = 0.15) -> dict:
+    return {"capsule": {"a": list(a), "b": list(b), "radius": radius}}
+
+
+def trefoil() -> list[dict]:
+    t = np.linspace(0.0, 2.0 * np.pi, 61)
+    p = np.c_[np.sin(t) + 2 * np.sin(2 * t), np.cos(t) - 2 * np.cos(2 * t), -np.sin(3 * t)]
+    return [bar(a, b) for a, b in itertools.pairwise(p.tolist())]
+
+
+def cube() -> list[dict]:
+    corners = list(itertools.product((-2.0, 2.0), repeat=3))
+    return [bar(a, b) for a, b in itertools.combinations(corners, 2)
+            if sum(x != y for x, y in zip(a, b, strict=True)) == 1]  # fmt: skip
+
+
+def shapes() -> dict[str, list[dict]]:
+    up, along = [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]
+    return {
+        "ring": [torus([0, 0, 0], up)],
+        "two rings": [torus([0, 0, -2], up), torus([0, 0, 2], up)],
+        "two linked rings": [torus([0, 0, 0], up), torus([2, 0, 0], along)],
+        "chain of three": [torus([-1.5, 0, 0], up, 1.2), torus([0, 0, 0], along, 1.2),
+                           torus([1.5, 0, 0], up, 1.2)],
+        "trefoil": trefoil(),
+        "frame of a cube": cube(),
+        "pipe above the floor": [bar([-20, 0, 0], [20, 0, 0]),
+                                 {"half_space": {"point": [0, 0, -3], "normal": up}}],
+    }  # fmt: skip
+
+
+def shown(rank: int, relators: tuple) -> str:
+    letters = [
+        " ".join(f"{'abcdefghij'[abs(x) - 1]}{'⁻¹' if x < 0 else ''}" for x in r) for r in relators
+    ]
+    return f"F{rank}" if not relators else f"{rank} generators, {'; '.join(letters)}"
+
+
+def words() -> None:
+    """Groups of scenes, each in a process of its own."""
+    head("scene", "cells", "group", "exact", "s", "MiB", name="space-words")
+    for name in (*shapes(), *MISSIONS, "jacket, five million cells"):
+        line = subprocess.run(
+            [sys.executable, __file__, "--group", name], capture_output=True, text=True, check=True
+        ).stdout.splitlines()[-1]
+        row(*json.loads(line))
+    print()
+
+
+def group(name: str) -> list[str]:
+    """One row of `words`."""
+    import resource
+
+    warm = SpaceSignature.of(Scene(solids=shapes()["ring"]).field(), LOW, HIGH, 0.5, ANCHOR)
+    assert warm.exact
+    if name in shapes():
+        field, box, cell, anchor = Scene(solids=shapes()[name]).field(), (LOW, HIGH), 0.2, ANCHOR
+    else:
+        mission = Mission.load(ROOT / "missions" / f"{name.split(',')[0]}.json")
+        scene = mission.load_scene()
+        field = scene.field()
+        grid = grid_of(mission, scene, field)
+        box = (grid.low, grid.low + grid.cell * np.array(grid.free.shape))
+        cell, anchor = grid.cell, mission.anchor
+        if "," in name:
+            cell *= (grid.free.size / 5e6) ** (1 / 3)
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    begin = time.perf_counter()
+    made = SpaceSignature.of(field, *box, cell, anchor)
+    took = time.perf_counter() - begin
+    more = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024
+    return [name, f"{made.cells.flags.size:,}", shown(made.group.rank, made.group.relators),
+            "yes" if made.exact else "no", f"{took:.1f}", f"{more:.0f}"]  # fmt: skip
+
+
+def random_loops(count: int, field: DistanceField, seed: int = 0) -> Iterator[np.ndarray]:
+    """Closed polylines at least 5 cm from all solids."""
+    rng = np.random.default_rng(seed)
+    clear = field.grown(0.05)
+    while count:
+        points = rng.uniform(-4.7, 4.7, (rng.integers(3, 9), 3))
+        closed = np.vstack([points, points[:1]])
+        if (clear.distance(points) > 0).all() and all(
+            clear.line_of_sight(a, b) for a, b in itertools.pairwise(closed)
+        ):
+            count -= 1
+            yield points
+
+
+def linking(points: np.ndarray, z: float) -> int:
+    """Passages of a loop through the disc of a ring of radius 2 about the z axis, with signs."""
+    total = 0
+    for a, b in itertools.pairwise(np.vstack([points, points[:1]])):
+        if (a[2] < z) != (b[2] < z):
+            at = a + (z - a[2]) / (b[2] - a[2]) * (b - a)
+            total += (1 if b[2] > a[2] else -1) * int(np.hypot(*at[:2]) < 2.0)
+    return total
+
+
+def loops(count: int) -> None:
+    """Disagreements of words with a second invariant."""
+    head("loops", "beside", "classes met", "disagree", "no word", name="space-loops")
+    row(*beside_linking(count))
+    row(*beside_rays(count))
+    row(*beside_cells(count))
+    print()
+
+
+def beside_linking(count: int) -> tuple[int, str, int, int, int]:
+    field = Scene(solids=shapes()["two rings"]).field()
+    made = SpaceSignature.of(field, LOW, HIGH, 0.25, ANCHOR)
+    seen: dict[tuple, tuple] = {}
+    wrong = without = 0
+    for points in random_loops(count, field):
+        word, broken = made.word_until(points, closed=True)
+        without += broken is not None
+        number = linking(points, -2.0), linking(points, 2.0)
+        wrong += seen.setdefault(number, made.windings(word)) != made.windings(word)
+    wrong += len(seen) - len(set(seen.values()))
+    return count, "linking numbers of two rings", len(seen), wrong, without
+
+
+def beside_rays(count: int) -> tuple[int, str, int, int, int]:
+    solids = [{"post": {"center": p.tolist(), "radius": 0.3}} for p in POSTS]
+    field = Scene(solids=solids).field()
+    made = SpaceSignature.of(field, LOW, HIGH, 0.25, ANCHOR)
+    seen: dict[tuple, tuple] = {}
+    wrong = without = done = 0
+    clear = field.grown(0.05)
+    for points in random_loops(20 * count, field, 1):
+        if not clear.line_of_sight(points[0], ANCHOR):
+            continue
+        moored = np.vstack([ANCHOR, points, points[:1], ANCHOR])
+        word, broken = made.word_until(moored)
+        without += broken is not None
+        rays = signature(moored, POSTS)
+        wrong += seen.setdefault(rays, word) != word
+        done += 1
+        if done == count:
+            break
+    wrong += len(seen) - len(set(seen.values()))
+    return done, "words of the rays of three posts", len(seen), wrong, without
+
+
+def beside_cells(count: int) -> tuple[int, str, int, int, int]:
+    field = Scene(solids=cube()).field()
+    one, other = (SpaceSignature.of(field, LOW, HIGH, cell, ANCHOR) for cell in (0.25, 0.19))
+    seen: dict[tuple, tuple] = {}
+    wrong = without = 0
+    for points in random_loops(count, field, 2):
+        (a, x), (b, y) = (made.word_until(points, closed=True) for made in (one, other))
+        without += x is not None or y is not None
+        wrong += (a == ()) != (b == ())
+        wrong += seen.setdefault(one.windings(a), other.windings(b)) != other.windings(b)
+    return count, "cells of another size, frame of a cube", len(seen), wrong, without
+
+
+def in_space(problem: Problem, folder: Path) -> Mission:
+    """A problem of the plane as a mission; the tether's share for steering is given on top."""
+    (folder / "scene.json").write_text(scene_of(problem).model_dump_json(exclude_none=True))
+    (folder / "mission.json").write_text(json.dumps({
+        "schema_version": 1, "scene": "scene.json", "anchor": problem.base, "start": problem.base,
+        "waypoints": [g.position for g in problem.goals], "clearance": 0.0,
+        "tether_length": problem.tether_length / SHARE,
+    }))  # fmt: skip
+    return Mission.load(folder / "mission.json")
+
+
+def prism_worlds() -> Iterator[tuple[str, Problem]]:
+    for name in ("pool", "wharf"):
+        yield name, Problem.load(ROOT / "problems" / f"{name}.json")
+    for seed in range(5):
+        problem, _ = reachable_world(seed, goals=6, obstacles=5, tether_length=40.0)
+        yield f"random {seed}", problem
+
+
+def beside_plane(problem: Problem) -> tuple[float, float, str, float]:
+    """Tour in space, tour in the plane, status of that, and seconds of the first."""
+    with tempfile.TemporaryDirectory() as folder:
+        mission = in_space(problem, Path(folder))
+        begin = time.perf_counter()
+        found = plan(mission, time_limit=60.0)
+        took = time.perf_counter() - begin
+    best = solve(problem, time_limit=60.0)
+    assert best.length is not None
+    return found.length, best.length, best.status.value, took
+
+
+def prisms() -> None:
+    head("problem", "goals", "in space m", "in the plane m", "status there", "longer by %", "s",
+         name="space-prisms")  # fmt: skip
+    for name, problem in prism_worlds():
+        length, best, status, took = beside_plane(problem)
+        row(name, len(problem.goals), f"{length:.3f}", f"{best:.3f}", status,
+            f"{100 * (length / best - 1):.2f}", f"{took:.0f}")  # fmt: skip
+    print()
+
+
+def missions() -> None:
+    head("mission", "waypoints", "states", "legs", "tour m", "status among them", "bound m",
+         "longest tether m", "planning s", "flown s", "over s", "visited",
+         name="space-missions")  # fmt: skip
+    for name in MISSIONS:
+        mission = Mission.load(ROOT / "missions" / f"{name}.json")
+        begin = time.perf_counter()
+        found = plan(mission, time_limit=40.0)
+        took = time.perf_counter() - begin
+        rest = [n for n in range(len(mission.waypoints)) if n not in found.order]
+        order = (*found.order, *rest)
+        flown = simulate(found.mission.model_copy(update={
+            "waypoints": tuple(found.mission.waypoints[n] for n in order), "camera": None,
+        })).summary  # fmt: skip
+        row(name, len(order), found.states, found.legs, f"{found.length:.2f}",
+            found.result.status.value, f"{found.result.lower_bound:.2f}",
+            f"{max(s.most for s in found.stops):.2f} of {mission.tether_length:g}", f"{took:.0f}",
+            f"{flown['total_s']['tether']:.1f}", f"{flown['exceedance_s']:.1f}",
+            f"{flown['visited']} of {len(order)}")  # fmt: skip
+    print()
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--only", choices=("words", "loops", "prisms", "missions"))
+    parser.add_argument("--loops", type=int, default=10_000)
+    parser.add_argument("--group", help=argparse.SUPPRESS)
+    args = parser.parse_args()
+    if args.group:
+        print(json.dumps(group(args.group)))
+        return
+    heading("In space")
+    for name, measure in (
+        ("words", words), ("loops", lambda: loops(args.loops)), ("prisms", prisms),
+        ("missions", missions),
+    ):  # fmt: skip
+        if args.only in (None, name):
+            measure()
+
+
+if __name__ == "__main__":
+    main()

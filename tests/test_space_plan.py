@@ -1,0 +1,156 @@
+"""Tours in space: the fewest metres, a tether that fits, and nothing that is wound up."""
+
+import heapq
+import json
+
+import numpy as np
+import pytest
+
+from netsp import Circle, Problem, solve
+from netsp.errors import InputError
+from netsp.hsignature.wordtable import times, times_inverse
+from netsp.online import Scene
+from netsp.online.mission import Mission
+from netsp.online.scene.scene import scene_of
+from netsp.online.simulate import grid_of
+from netsp.space.labels import LENGTHS, STEPS, axes_of, lower_end, nth_axis, staircase
+from netsp.space.plan import plan
+from netsp.space.water import Water
+
+POSTS = [
+    Circle(center=(3.0, 0.4), radius=0.5),
+    Circle(center=(5.0, -1.0), radius=0.5),
+    Circle(center=(5.2, 1.6), radius=0.5),
+]
+GOALS = [(4.2, 2.2, -1.0), (6.3, 0.2, -1.5), (4.0, -1.5, -0.5), (6.0, 2.4, -1.0)]
+
+
+def mission_of(problem, folder, **more):
+    """The same in space: obstacles upright, grown by the clearance already."""
+    (folder / "scene.json").write_text(scene_of(problem).model_dump_json(exclude_none=True))
+    mission = {
+        "schema_version": 1, "scene": "scene.json", "anchor": problem.base, "start": problem.base,
+        "waypoints": [g.position for g in problem.goals], "clearance": 0.0,
+        "tether_length": problem.tether_length / 0.99, **more,
+    }  # fmt: skip
+    file = folder / "mission.json"
+    file.write_text(json.dumps(mission))
+    return Mission.load(file)
+
+
+@pytest.fixture
+def posts(tmp_path):
+    problem = Problem(
+        base=(0, 0, 0), goals=GOALS, obstacles=POSTS, tether_length=7.6, clearance=0.1
+    )
+    return problem, mission_of(problem, tmp_path)
+
+
+def test_among_prisms_it_is_as_short_as_the_proven_optimum(posts):
+    problem, mission = posts
+    found, best = plan(mission), solve(problem)
+    assert best.status.value == "optimal"
+    assert found.length == pytest.approx(best.length, rel=2e-3)
+    assert found.free
+    assert sorted(found.order) == [0, 1, 2, 3]
+    assert max(stop.most for stop in found.stops) <= mission.tether_length
+    # and the tether is at every goal in the class that it has in the plane
+    path, words = np.array(best.path), found.water.words
+    for stop in found.stops:
+        near = int(np.argmin(np.linalg.norm(path - problem.goals[stop.point].position, axis=1)))
+        assert words.word(path[: near + 1]) == stop.word
+
+
+def test_a_shorter_tether_makes_another_tour_that_keeps_to_it(posts, tmp_path):
+    problem, _ = posts
+    least = max(v.tether_length for v in solve(problem).tour)
+    shorter = problem.model_copy(update={"tether_length": least - 0.02})
+    best = solve(shorter)
+    found = plan(mission_of(shorter, tmp_path))
+    assert found.length == pytest.approx(best.length, rel=2e-3)
+    assert max(stop.most for stop in found.stops) <= shorter.tether_length + 0.02
+
+
+def test_the_same_seed_gives_the_same_plan(posts):
+    one, other = (plan(posts[1]) for _ in range(2))
+    assert one.order == other.order
+    assert one.length == other.length
+    assert [s.word for s in one.stops] == [s.word for s in other.stops]
+
+
+def test_every_stop_has_the_word_of_the_way_to_it(posts):
+    found = plan(posts[1])
+    words = found.water.words
+    walked = [np.asarray(found.mission.anchor, dtype=float)[None]]
+    for stop in found.stops:
+        walked.append(stop.path)
+        assert words.word(np.vstack(walked)) == stop.word
+    walked.append(found.home)
+    assert words.word(np.vstack(walked)) == ()
+
+
+def test_what_the_tether_does_not_reach_is_told(posts, tmp_path):
+    problem, _ = posts
+    far = problem.model_copy(update={"tether_length": 5.5})
+    found = plan(mission_of(far, tmp_path))
+    assert set(found.unreached) | set(found.order) == {0, 1, 2, 3}
+    assert found.unreached
+    with pytest.raises(InputError, match="no tether within the limit reaches"):
+        plan(mission_of(problem.model_copy(update={"tether_length": 1.0}), tmp_path))
+    moving = mission_of(problem, tmp_path, track=[[10.0, 1.0, 0.0, 0.0]])
+    with pytest.raises(InputError, match="track: a moving anchor"):
+        plan(moving)
+
+
+def test_a_search_finds_the_shortest_words_of_each_cell(tmp_path):
+    """Beside a search that keeps every word, and takes every step."""
+    solids = [{"capsule": {"a": [2.0, 2.0, -9], "b": [2.0, 2.0, 9], "radius": 0.3}},
+              {"capsule": {"a": [-9, 3.2, 1.5], "b": [9, 3.2, 1.5], "radius": 0.3}}]  # fmt: skip
+    bounds = [0, 0, 0, 4.8, 4.8, 3.2]
+    (tmp_path / "s.json").write_text(Scene(solids=solids, bounds=bounds).model_dump_json())
+    file = tmp_path / "m.json"
+    file.write_text(json.dumps({
+        "schema_version": 1, "scene": "s.json", "anchor": [0.6, 0.6, 0.6], "start": [0.6, 0.6, 0.6],
+        "waypoints": [[4, 4, 1]], "tether_length": 20, "cell": 0.4, "clearance": 0.1,
+    }))  # fmt: skip
+    mission = Mission.load(file)
+    scene = mission.load_scene()
+    water = Water.of(mission, scene.field(), grid_of(mission, scene, scene.field()))
+    words, most, longest = water.words, 3, 7.0
+    root = int(np.ravel_multi_index(tuple(words.root), words.cells.flags.shape))
+    found = water.search(False, root, most, longest, None)
+    limit = int(100 * 1.35 * longest / 0.4)
+    _, ny, nz = words.cells.flags.shape
+    kept: dict[tuple[int, int], int] = {(root, 0): 0}
+    queue = [(0, root, 0)]
+    while queue:
+        far, cell, word = heapq.heappop(queue)
+        if kept[cell, word] < far:
+            continue
+        i, j, k = np.unravel_index(cell, words.cells.flags.shape)
+        for s, step in enumerate(STEPS):
+            order = staircase(words.cells.flags, i, j, k, s)
+            there = far + int(LENGTHS[s])
+            if order < 0 or there > limit:
+                continue
+            at, new, table = cell, word, words.table
+            n, a, b, c = axes_of(s)
+            for m in range(n):
+                axis = nth_axis(n, a, b, c, order, m)
+                label = words.labels[3 * lower_end(at, axis, step[axis], ny, nz) + axis]
+                by = times if step[axis] > 0 else times_inverse
+                new, table = by(table, words.rules, new, label)
+                words.keep(table)
+                at += step[axis] * (ny * nz, nz, 1)[axis]
+            if there < kept.get((int(at), int(new)), limit + 1):
+                kept[int(at), int(new)] = there
+                heapq.heappush(queue, (there, int(at), int(new)))
+    each: dict[int, list[int]] = {}
+    for (cell, _), far in kept.items():
+        each.setdefault(cell, []).append(far)
+    assert max(map(len, each.values())) > most
+    for cell, lengths in each.items():
+        place = np.unravel_index(cell, words.cells.flags.shape)
+        has = found.word[place] >= 0
+        assert sorted(found.far[place][has].tolist()) == sorted(lengths)[:most]
+        assert len(set(found.word[place][has].tolist())) == has.sum()
