@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from claims import command, offline, online, page, sites
+from claims import command, offline, online, page, sites, space
 from claims.claim import Claim
 
 
@@ -20,4 +20,5 @@ def claims() -> Iterator[Claim]:
     yield from online.claims()
     yield from sites.claims()
     yield from page.claims()
+    yield from space.claims()
     yield from command.running()

@@ -1,0 +1,55 @@
+"""Claims about words and tours in space."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from claims.claim import Claim
+
+
+def groups() -> tuple[str, bool]:
+    """What groups scenes have."""
+    from space import ANCHOR, HIGH, LOW, shapes
+
+    from netsp.online import Scene
+    from netsp.space.signature import SpaceSignature
+
+    found = []
+    for name, solids in shapes().items():
+        made = SpaceSignature.of(Scene(solids=solids).field(), LOW, HIGH, 0.2, ANCHOR)
+        found.append((name, made.group.rank, len(made.group.relators), made.exact))
+    wanted = [
+        ("ring", 1, 0, True), ("two rings", 2, 0, True), ("two linked rings", 2, 1, True),
+        ("chain of three", 3, 2, True), ("trefoil", 2, 1, False),
+        ("frame of a cube", 5, 0, True), ("pipe above the floor", 1, 0, True),
+    ]  # fmt: skip
+    right = sum(a == b for a, b in zip(found, wanted, strict=True))
+    return f"{right} of {len(wanted)}", right == len(wanted)
+
+
+def loops() -> tuple[str, bool]:
+    """Words beside linking numbers, rays, and words of other cells."""
+    from space import beside_cells, beside_linking, beside_rays
+
+    rows = [beside(300) for beside in (beside_linking, beside_rays, beside_cells)]
+    wrong = sum(r[3] + r[4] for r in rows)
+    return f"{wrong} of {sum(r[0] for r in rows)}", wrong == 0
+
+
+def tours() -> tuple[str, bool]:
+    """Tours in space beside the proven shortest of the plane."""
+    from space import beside_plane, prism_worlds
+
+    worst = 0.0
+    for name, problem in prism_worlds():
+        if name in ("pool", "random 0", "random 3"):
+            length, best, status, _ = beside_plane(problem)
+            worst = max(worst, length / best - 1.0) if status == "optimal" else float("inf")
+    return f"{100 * worst:.2f} % longer", worst <= 1e-3
+
+
+def claims() -> Iterator[Claim]:
+    """All of this file."""
+    yield Claim("words: groups of seven scenes", "as known", groups)
+    yield Claim("words: 900 loops beside a second invariant", "no disagreement", loops)
+    yield Claim("tours in space: three problems of the plane", "within 0.1 % of it", tours)
