@@ -5,6 +5,8 @@ import itertools
 import json
 import re
 import shutil
+import socket
+import struct
 import subprocess
 import sys
 import time
@@ -474,6 +476,36 @@ def test_the_scripts_of_the_page_pass_the_linter_and_the_type_checker(check):
         text=True,
     )  # fmt: skip
     assert done.returncode == 0, done.stdout
+
+
+def test_a_page_that_goes_away_unread_leaves_no_traceback(tmp_path):
+    """As a phone does that goes out of range while the cursor's tethers are on their way to it."""
+    client = pytest.importorskip("websockets.sync.client")
+    file = tmp_path / "p.json"
+    file.write_text(WHARF.read_text())
+    with subprocess.Popen(
+        [sys.executable, "-m", "netsp", "app", str(file), "--no-browser"],
+        stderr=subprocess.PIPE, text=True, cwd=ROOT,
+    ) as server:  # fmt: skip
+        try:
+            said = itertools.takewhile(lambda line: "Ctrl-C" not in line, server.stderr)
+            url = re.search(r"http://(\S+)/\?(\S+)", "".join(said))
+            live = f"ws://{url[1]}/live?{url[2]}"
+            for count in (300, 1500):
+                with client.connect(live, max_size=None, close_timeout=0.1) as gone:
+                    for k in range(count):
+                        gone.send(json.dumps({"id": k, "hover": [k % 10, 3]}))
+                    linger = struct.pack("ii", 1, 0)
+                    gone.socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, linger)
+                    gone.socket.shutdown(socket.SHUT_RDWR)
+            with client.connect(live, max_size=None) as other:
+                other.send(json.dumps({"id": 1, "hover": [3, 3]}))
+                while json.loads(other.recv(timeout=60)).get("id") != 1:
+                    pass
+        finally:
+            server.terminate()
+            text = server.stderr.read()
+    assert "Traceback" not in text
 
 
 @pytest.mark.skipif(BROWSER is None, reason="chromium is not installed")

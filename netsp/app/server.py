@@ -266,7 +266,7 @@ def application(session: Session, token: str, port: int) -> Any:
         from starlette.responses import FileResponse, PlainTextResponse, Response
         from starlette.routing import Mount, Route, WebSocketRoute
         from starlette.staticfiles import StaticFiles
-        from starlette.websockets import WebSocket, WebSocketDisconnect
+        from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
     except ImportError:
         raise InputError("the map needs Starlette: pip install 'netsp[app]'") from None
 
@@ -334,12 +334,14 @@ def application(session: Session, token: str, port: int) -> Any:
         session.pages.add(queue)
 
         async def send() -> None:
-            while True:
-                await socket.send_text(await queue.get())
+            with contextlib.suppress(WebSocketDisconnect):
+                while True:
+                    await socket.send_text(await queue.get())
 
         sending = asyncio.create_task(send())
         try:
-            while True:
+            # a page that is gone may be found out by sending to it
+            while socket.application_state is WebSocketState.CONNECTED:
                 answer = await asyncio.to_thread(_parsed, await socket.receive_text())
                 said = session.asked(answer) if isinstance(answer, dict) else {"error": answer}
                 if said is not None:
