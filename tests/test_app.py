@@ -193,6 +193,11 @@ def test_what_cannot_be_solved_is_told_and_a_dead_solver_is_replaced(worker):
     time.sleep(0.2)
     made.solve(101, Problem.load(WHARF).to_json())
     assert heard(box, lambda m: m["version"] == 101 and m["stage"] == "done")["length"]
+    far = {**json.loads(Problem.load(WHARF).to_json()), "base": [1e9, 1e9, 0.0]}
+    made.solve(102, json.dumps(far))
+    said = heard(box, lambda m: m["version"] == 102 and m["stage"] == "done")
+    assert said["error"]
+    assert (said["unreached"], said["needed"]) == ([], None)
 
 
 def test_the_tether_at_the_cursor_is_that_of_the_class_of_the_tour():

@@ -255,8 +255,9 @@ def test_a_tour_planned_with_a_margin_has_it_and_is_verified_with_it(seed, margi
     assert planned.length == pytest.approx(solve(problem.grown(margin)).length)
     again = type(planned).model_validate_json(planned.to_json())
     assert again.margin == margin
-    lying = planned.model_copy(update={"margin": 0.5 * margin, "tour": plain.tour})
-    assert not verify(problem, lying) or plain.tour == planned.tour
+    # a tour that has the margin unplanned is as good as the one that was planned with it
+    lying = plain.model_copy(update={"margin": margin})
+    assert not verify(problem, lying) or plain.length == pytest.approx(planned.length)
 
 
 def test_margins_are_printed(tmp_path, capsys):

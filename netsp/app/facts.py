@@ -75,9 +75,13 @@ def shortest_sufficient(problem: Problem) -> float | None:
     Returns
     -------
     float or None
-        In the problem's units; None where no tether would do.
+        In the problem's units; None where no tether would do, or places are too far apart to be
+        measured with one.
     """
-    to = needed(problem)
+    try:
+        to = needed(problem)
+    except InputError:
+        return None
     least = [min(to[problem.clusters == c]) for c in range(1, problem.visits + 1)]
     longest = float(max(least))
     return longest if np.isfinite(longest) else None
@@ -95,6 +99,11 @@ def needed(problem: Problem) -> Floats:
     -------
     ndarray, shape (goals,)
         Lengths in the problem's units; infinite where nothing leads there.
+
+    Raises
+    ------
+    InputError
+        Places are too far apart to be measured with one tether.
     """
     return np.asarray(shortest_paths(problem, problem.points[:1])[0][0])
 

@@ -193,12 +193,17 @@ def _out_of_reach(problem: Problem) -> dict[str, Any]:
     """Goals that the tether does not reach, with what each needs (None: nothing leads there), and
     the tether that would do for all."""
     from netsp.app.facts import needed, plain, shortest_sufficient
+    from netsp.errors import InputError
 
     if problem.state is not None:
         return {"unreached": [], "needed": None}
+    try:
+        lengths = needed(problem)
+    except InputError:  # too far apart to be measured: the error itself says which goal, and why
+        return {"unreached": [], "needed": None}
     far = [
         {"goal": k, "needed": plain(float(t))}
-        for k, t in enumerate(needed(problem))
+        for k, t in enumerate(lengths)
         if t > problem.tether_length
     ]
     return {"unreached": far, "needed": shortest_sufficient(problem)}

@@ -344,6 +344,11 @@ def shortest_paths(problem: Problem, places: Floats) -> tuple[Floats, Floats]:
         Lengths in 3D from places to goals, infinite where there is no path.
     between : ndarray, shape (goals, goals)
         The same between goals.
+
+    Raises
+    ------
+    InputError
+        Places so far apart that obstacles between them are too small to be told apart.
     """
     goals = problem.points[1:]
     if not len(places):
@@ -354,8 +359,8 @@ def shortest_paths(problem: Problem, places: Floats) -> tuple[Floats, Floats]:
     which = np.asarray(which).reshape(-1)
     data: dict[str, Any] = problem.model_dump(exclude={"origin", "state", "bounds"})
     reach = 10.0 * float(np.ptp(flat, axis=0).max() + problem.tether_length)
-    plain = Problem.model_validate(
-        {
+    plain = Problem(
+        **{
             **data, "base": tuple(flat[0]), "tether_length": reach,
             "goals": [tuple(p) for p in flat[1:]] or [tuple(flat[0] + 1e-3 * reach)],
             "bounds": problem.bounds,
