@@ -415,6 +415,9 @@ def test_it_saves_into_the_folder_that_was_opened_and_over_nothing(client, tmp_p
     assert Problem.load(file.parent / "new.json") == Problem.load(WHARF)
     assert sorted(f.name for f in file.parent.iterdir()) == ["new.json", "other.json", "wharf.json"]
     assert bare_name("C:\\a\\b.json") == "b.json"
+    for name in ("", "..", ".hidden", "a\0b", "a\nb", "\ud800.json", "a" * 201, "\u00fc" * 101):
+        with pytest.raises(InputError):
+            bare_name(name)
 
 
 def test_a_solution_and_runs_can_be_looked_at_and_not_changed(tmp_path):

@@ -8,8 +8,12 @@ from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any
 
 from netsp.errors import InputError
+from netsp.models import shown
 from netsp.problem import Problem
 from netsp.solution import Solution
+
+LONGEST_NAME = 200
+"""Bytes: file systems take 255, and what is not saved yet is kept under a longer one."""
 
 MOST_BYTES = 64 * 2**20
 """Of a file that comes in."""
@@ -40,11 +44,15 @@ def bare_name(name: str) -> str:
     Raises
     ------
     InputError
-        Nothing is left, or it is hidden.
+        Nothing is left, it is hidden, cannot be printed, or is too long.
     """
     last = PurePosixPath(PureWindowsPath(name).name).name
-    if not last or last.startswith(".") or "\0" in last:
-        raise InputError(f"file: expected a name, got {name!r}")
+    if not last or last.startswith(".") or not last.isprintable():
+        raise InputError(f"file: expected a name, got {shown(name)}")
+    if len(last.encode()) > LONGEST_NAME:
+        raise InputError(
+            f"file: expected a name of at most {LONGEST_NAME} bytes, got {len(last.encode())}"
+        )
     return last
 
 
