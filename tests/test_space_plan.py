@@ -118,7 +118,7 @@ def test_a_search_finds_the_shortest_words_of_each_cell(tmp_path):
     water = Water.of(mission, scene.field(), grid_of(mission, scene, scene.field()))
     words, most, longest = water.words, 3, 7.0
     root = int(np.ravel_multi_index(tuple(words.root), words.cells.flags.shape))
-    found = water.search(False, root, most, longest, None)
+    found = water.search(False, root, most, longest)
     limit = int(100 * 1.35 * longest / 0.4)
     _, ny, nz = words.cells.flags.shape
     kept: dict[tuple[int, int], int] = {(root, 0): 0}

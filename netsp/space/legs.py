@@ -9,7 +9,7 @@ import numpy as np
 
 from netsp.arrays import Floats, Ints
 from netsp.space.states import Effort, States
-from netsp.space.water import Water, along
+from netsp.space.water import Water, along, straight
 
 NEIGHBOURS = 10
 """Waypoints nearest to each that legs are sought to."""
@@ -67,10 +67,10 @@ class Ways:
             limits = {
                 c: FARTHER * float(self._apart[n, m]) for m, c in ends.items() if c is not None
             }
-            found = water.search(True, here, self.effort.ways, 0.0, limits) if limits else None
+            found = water.search(True, here, self.effort.ways, limits) if limits else None
         for m in to:
             ways = []
-            if water.straight(self.points[n], self.points[m]):
+            if straight(water.field, self.points[n], self.points[m], water.mission.clearance):
                 line = self.points[[n, m]]
                 word = water.number(line)
                 if word is not None:
@@ -158,12 +158,10 @@ def grown(states: States, ways: Ways) -> Legs:
         state = states.all[v]
         for m in ways.near[state.point]:
             for word, path in ways.between(state.point, int(m)):
-                if 0.0 < states.limit < along(path) - state.tether.length:
-                    continue
                 there, lengths = model.drive(state.tether, path[1:])
                 if lengths.max() > states.limit:
                     continue
-                writes = states.water.product(state.word, word)
+                writes = states.water.words.times(state.word, word)
                 w = states.find(int(m), writes, there)
                 if w is None:
                     w = states.add(int(m), writes, there)

@@ -19,7 +19,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from netsp.arrays import Floats
 from netsp.errors import InputError, LimitReachedError
 from netsp.geometry import polylines
 from netsp.lns import Instance, best_classes
@@ -30,7 +29,9 @@ from netsp.online.scene.field import DistanceField
 from netsp.online.simulate import grid_of, simulate
 from netsp.online.tether import GeodesicTether, Tether
 from netsp.solvers.solve import solve_graph
-from netsp.space.plan import SpacePlan, plan
+from netsp.space.plan import SHARE, SpacePlan, plan
+from netsp.space.states import alike
+from netsp.space.water import straight
 from netsp.travel.graph import TravelGraph
 
 NEIGHBOURS = 12
@@ -41,9 +42,6 @@ MOST_CLASSES = 3
 
 ROUNDS = 150
 """Of pulling a tether taut."""
-
-SHARE = 0.99
-"""Of the tether that classes may need: the rest is for what lies between the waypoints."""
 
 
 @dataclass(frozen=True)
@@ -85,29 +83,6 @@ class _Classes:
             if m == n and alike(tether, other, delta):
                 return v
         return None
-
-
-def alike(a: Tether, b: Tether, delta: float) -> bool:
-    """Whether two tethers between the same ends are the same, by length and middle.
-
-    Parameters
-    ----------
-    a : Tether
-        One tether.
-    b : Tether
-        The other.
-    delta : float
-        Resolution of both, metres.
-
-    Returns
-    -------
-    bool
-        Whether they are.
-    """
-    if abs(a.length - b.length) > delta:
-        return False
-    middle = (polylines.points_along(t.nodes, 0.51 * t.length + 1e-9)[1] for t in (a, b))
-    return bool(np.linalg.norm(next(middle) - next(middle)) < 2.0 * delta)
 
 
 def reorder(
@@ -244,14 +219,14 @@ def waypoint_graph(
     near = np.argsort(np.linalg.norm(points[:, None] - points[None], axis=2), axis=1)[
         :, 1 : NEIGHBOURS + 1
     ]
-    straight: dict[tuple[int, int], float] = {}
+    direct: dict[tuple[int, int], float] = {}
     v = 0
     while v < len(found.point):
         n = found.point[v]
         for m in near[n]:
-            path = np.array([points[n], points[m]])
-            if not _free(field, path, mission.clearance):
+            if not straight(field, points[n], points[m], mission.clearance):
                 continue
+            path = np.array([points[n], points[m]])
             there, lengths = model.drive(found.tether[v], path[1:])
             if lengths.max() > limit:
                 continue
@@ -261,7 +236,7 @@ def waypoint_graph(
                 found.point.append(int(m))
                 found.tether.append(there)
             if w is not None:
-                straight[v, w] = float(np.linalg.norm(path[1] - path[0]))
+                direct[v, w] = float(np.linalg.norm(path[1] - path[0]))
         v += 1
     count = len(found.point)
     reach = np.array([t.length for t in found.tether])
@@ -274,7 +249,7 @@ def waypoint_graph(
             pair = (found.point[v], found.point[w])
             if pair not in neighbours and pair[::-1] not in neighbours:
                 continue
-            leg = min(straight.get((v, w), np.inf), straight.get((w, v), np.inf))
+            leg = min(direct.get((v, w), np.inf), direct.get((w, v), np.inf))
             if not np.isfinite(leg):
                 line = np.vstack([found.tether[v].nodes[::-1], found.tether[w].nodes[1:]])
                 path = taut(field, line, mission.clearance, mission.delta)
@@ -285,9 +260,3 @@ def waypoint_graph(
         raise InputError("waypoints: no tether within the limit reaches any of them")
     cluster = [0, *(reached.index(n) + 1 for n in found.point)]
     return TravelGraph.from_costs(costs, cluster), [-1, *found.point], reached
-
-
-def _free(field: DistanceField, path: Floats, clearance: float) -> bool:
-    """Whether a straight path keeps the clearance, or what its ends have of it."""
-    room = max(0.0, min(clearance, float(field.distance(path).min())) - 1e-3)
-    return field.grown(room).line_of_sight(path[0], path[1], depth=1e-3)

@@ -4,11 +4,12 @@ Offline, a goal and the class of its tether make one vertex, and legs belong to 
 tour can wind the tether up. The same here, where states take the place of classes
 (`netsp.space.states`), and legs are those that the tether model was driven along
 (`netsp.space.legs`); between any two states there is also the way back along one tether and out
-along the other. The travel graph is solved like any other, the whole tour is driven, and where a
-leg does not do what it did alone, it is forbidden and the graph is solved again.
+along the other. The travel graph is solved like any other, and the whole tour is driven. Where the
+tether gets too long on the way, or does not arrive in the state that was meant, that leg is
+forbidden and the graph is solved again: no tour is believed that was not driven without fault.
 
-What is proven is about these states and legs. `bound` holds for all classes: it is that of the
-lengths of shortest paths between waypoints, whatever the tether does.
+Status and bound of the result are about these states and legs, less those forbidden, and not about
+all tours there are.
 """
 
 from __future__ import annotations
@@ -174,15 +175,15 @@ def plan(
     clock = Clock.of(time_limit)
     found: tuple[Result, _Driven] | None = None
     for again in range(MOST_AGAIN):
-        tell("order" if again == 0 else f"order, again without {len(board.forbidden)} legs")
+        tell("order" if again == 0 else f"order, again without {again} legs")
         result = board.solved(solver, clock, seed)
-        if result.tour is None:
+        if result is None or result.tour is None:
             break
         driven = board.driven([int(v) for v in result.tour[1:]])
         if driven.fault is None:
             found = result, driven
             break
-        board.forbidden.add(driven.fault)
+        board.forbid(driven.fault)
     if found is None:
         raise LimitReachedError(
             "waypoints: no tour was found whose tether stays within the limit all along"
@@ -217,7 +218,7 @@ class _Board:
     out: list[Floats]
     start: Tether
     cluster: list[int]
-    forbidden: set[tuple[int, int]]
+    cut: set[tuple[int, int]]
 
     @classmethod
     def of(cls, water: Water, states: States, legs: Legs, start: Tether) -> _Board:
@@ -225,7 +226,10 @@ class _Board:
         out = [water.taut(np.vstack([start.nodes[::-1], s.tether.nodes[1:]])) for s in states.all]
         reached = sorted(states.of)
         cluster = [0, *(1 + reached.index(s.point) for s in states.all)]
-        both = {(v, w): path for v, w, path in legs.both_ways()}
+        both = {
+            (v, w): path for v, w, path in legs.both_ways()
+            if along(path) < along(out[v]) + along(out[w])
+        }  # fmt: skip
         return cls(water, states, both, out, start, cluster, set())
 
     def path(self, v: int, w: int) -> Floats:
@@ -234,25 +238,31 @@ class _Board:
             return self.out[w]
         if w < 0:
             return self.out[v][::-1]
-        direct = None if (min(v, w), max(v, w)) in self.forbidden else self.legs.get(
-            (min(v, w), max(v, w))
-        )  # fmt: skip
+        direct = self.legs.get((min(v, w), max(v, w)))
         if direct is None:
             return np.vstack([self.out[v][::-1], self.out[w][1:]])
         return direct if v < w else direct[::-1]
 
-    def solved(self, solver: str, clock: Clock, seed: int) -> Result:
-        """The graph as it is now, solved."""
+    def forbid(self, pair: tuple[int, int]) -> None:
+        """Take the leg between two states away, or if it was by way of the start, that."""
+        if self.legs.pop(pair, None) is None:
+            self.cut.add(pair)
+
+    def solved(self, solver: str, clock: Clock, seed: int) -> Result | None:
+        """The graph as it is now, solved; None where too much was forbidden for any tour."""
         home = np.array([along(p) for p in self.out])
         n = len(home)
         costs = np.zeros((n + 1, n + 1))
         costs[1:, 1:] = home[:, None] + home[None, :]
         costs[0, 1:] = costs[1:, 0] = home
         for (v, w), path in self.legs.items():
-            if (v, w) not in self.forbidden:
-                length = min(along(path), costs[v + 1, w + 1])
-                costs[v + 1, w + 1] = costs[w + 1, v + 1] = length
-        graph = TravelGraph.from_costs(costs, self.cluster)
+            costs[v + 1, w + 1] = costs[w + 1, v + 1] = along(path)
+        for v, w in self.cut:
+            costs[v + 1, w + 1] = costs[w + 1, v + 1] = np.inf
+        try:
+            graph = TravelGraph.from_costs(costs, self.cluster)
+        except InputError:  # some waypoint is joined to nothing any more
+            return None
         return solve_graph(graph, solver, time_limit=clock, seed=seed)
 
     def driven(self, tour: list[int]) -> _Driven:
@@ -268,11 +278,10 @@ class _Board:
             tether, lengths = water.model.drive(tether, path[1:])
             total += along(path)
             meant = self.start if state < 0 else states.all[state].tether
-            pair = (min(before, state), max(before, state))
-            if fault is None and pair in self.legs and pair not in self.forbidden and (
+            if fault is None and (
                 lengths.max() > states.limit or not alike(tether, meant, delta)
             ):  # fmt: skip
-                fault = pair
+                fault = (min(before, state), max(before, state))
             if state >= 0:
                 s = states.all[state]
                 stops.append(

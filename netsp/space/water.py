@@ -98,7 +98,7 @@ class Water:
         return both[0], both[1]
 
     def search(
-        self, robot: bool, cell: int, most: int, length: float, to: Mapping[int, float] | None
+        self, robot: bool, cell: int, most: int, within: float | Mapping[int, float]
     ) -> Found:
         """The soonest words of cells, from one of them on.
 
@@ -110,11 +110,9 @@ class Water:
             Number of the first.
         most : int
             Words of a cell.
-        length : float
-            Of paths pulled taut, metres: what is searched for is `LONGER`.
-        to : mapping of int to float, or None
-            Cells that are sought, and how long the paths to each may be; None for all within the
-            length.
+        within : float or mapping of int to float
+            Metres: all cells that paths no longer than that lead to when pulled taut; or the cells
+            that are sought, and how long the paths to each may be.
 
         Returns
         -------
@@ -126,10 +124,11 @@ class Water:
         root = np.array(np.unravel_index(cell, cells.flags.shape), dtype=np.int64)
         first, last = np.zeros(3, dtype=np.int64), shape - 1
         targets, scale = np.empty((0, 3), dtype=np.int64), 100.0 * LONGER / cells.cell
-        limits = np.array([scale * length], dtype=np.int64)
-        if to is not None:
-            targets = np.column_stack(np.unravel_index(list(to), cells.flags.shape))
-            limits = np.array([scale * v for v in to.values()], dtype=np.int64)
+        if isinstance(within, float):
+            limits = np.array([scale * within], dtype=np.int64)
+        else:
+            targets = np.column_stack(np.unravel_index(list(within), cells.flags.shape))
+            limits = np.array([scale * v for v in within.values()], dtype=np.int64)
             # a path is no farther from where it begins than half its length and what it leads to
             apart = 100.0 * np.abs(targets - root)
             reach = np.ceil(0.005 * (limits[:, None] + apart).max(0)).astype(np.int64) + 1
@@ -184,25 +183,6 @@ class Water:
         """
         return taut(self.field, path, self.mission.clearance, self.mission.delta)
 
-    def straight(self, a: Floats, b: Floats) -> bool:
-        """Whether a straight path keeps the clearance, or what its ends have of it.
-
-        Parameters
-        ----------
-        a : ndarray, shape (3,)
-            Where it begins, metres.
-        b : ndarray, shape (3,)
-            Where it ends, metres.
-
-        Returns
-        -------
-        bool
-            Whether it does.
-        """
-        ends = float(self.field.distance(np.array([a, b])).min())
-        room = max(0.0, min(self.mission.clearance, ends) - 1e-3)
-        return self.field.grown(room).line_of_sight(a, b, depth=1e-3)
-
     def number(self, path: Floats) -> int | None:
         """Number of a path's word; None where it has none.
 
@@ -217,23 +197,6 @@ class Water:
             Its number in the table.
         """
         return self.words.number(path)[0]
-
-    def product(self, a: int, b: int) -> int:
-        """Number of the word of one path and another.
-
-        Parameters
-        ----------
-        a : int
-            Of the first.
-        b : int
-            Of the second.
-
-        Returns
-        -------
-        int
-            Of both.
-        """
-        return self.words.times(a, b)
 
 
 def along(path: Floats) -> float:
@@ -252,19 +215,25 @@ def along(path: Floats) -> float:
     return float(polylines.length(path))
 
 
-def cells_of(water: Water, points: Floats) -> list[int | None]:
-    """The cells that points hold on to.
+def straight(field: DistanceField, a: Floats, b: Floats, clearance: float) -> bool:
+    """Whether a straight path keeps the clearance, or what its ends have of it.
 
     Parameters
     ----------
-    water : Water
-        The water.
-    points : ndarray, shape (n, 3)
+    field : DistanceField
+        The scene.
+    a : ndarray, shape (3,)
+        Where it begins, metres.
+    b : ndarray, shape (3,)
+        Where it ends, metres.
+    clearance : float
         Metres.
 
     Returns
     -------
-    list of int or None
-        None where no cell is in sight.
+    bool
+        Whether it does.
     """
-    return [water.words.held(p) for p in points]
+    ends = float(field.distance(np.array([a, b])).min())
+    room = max(0.0, min(clearance, ends) - 1e-3)
+    return field.grown(room).line_of_sight(a, b, depth=1e-3)
