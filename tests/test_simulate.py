@@ -21,8 +21,8 @@ from netsp.online.equipment import PositionSensor
 from netsp.online.log import describe_run
 from netsp.online.mission import Mission
 from netsp.online.paths.tree import STEPS, Grid, ShortestTree, grow, states_of, taut, way
-from netsp.online.planner import PLANNERS
-from netsp.online.planner.predictive import PredictivePlanner
+from netsp.online.planner import PLANNERS, PlannerOptions
+from netsp.online.planner.predictive import WORTH, PredictivePlanner
 from netsp.online.scene.field import pushed_out
 from netsp.online.sensing import Positions
 from netsp.online.simulate import simulate
@@ -63,6 +63,41 @@ def test_the_predictive_planner_visits_all_and_never_exceeds_the_tether(length):
     assert run.summary["exceedance_s"] == 0.0
     places = np.array([[r.x, r.y, r.z] for r in run.log])
     assert POST.field().distance(places).min() > 0.15  # clearance, but for its corners
+
+
+@settings(max_examples=300, deadline=None)
+@given(
+    saved=st.lists(st.floats(0.0, 0.2), min_size=1, max_size=20),
+    fitting=st.integers(-1, 20), looks=st.integers(1, 8), metres=st.floats(1.0, 100.0),
+)  # fmt: skip
+def test_the_tautest_path_is_sought_until_little_is_to_be_saved_or_enough_was_looked(
+    saved, fitting, looks, metres
+):
+    """Of ever shorter paths of which the first fit only. What is taken fits; where one fits and is
+    not the best by more than its share, the budget was spent."""
+    lengths = 10.0 * np.cumprod(1.0 - np.array(saved))
+    paths = [np.array([[0.0, 0, 0], [x, 0, 0]]) for x in lengths]
+    planner = object.__new__(PredictivePlanner)
+    planner.options = PlannerOptions(looks=looks, metres=metres)
+    planner._looks, planner._looked = 0, 0.0
+    planner._ever_tauter = lambda _: iter(paths)
+
+    that_fit = lengths[: fitting + 1]
+    found = []
+
+    def fits(_, path, limit):
+        assert not (found and (planner._looks >= looks or planner._looked >= metres))
+        planner._looks, planner._looked = planner._looks + 1, planner._looked + path[1, 0]
+        found.extend(that_fit[that_fit == path[1, 0]])
+        return path[1, 0] in that_fit
+
+    planner._fits = fits
+    taken = planner._tautest(None, None, 0.0)
+    if taken is None:
+        assert not len(that_fit)
+    else:
+        assert taken[1, 0] in that_fit
+        assert planner._looked_enough or taken[1, 0] * (1.0 - WORTH) <= that_fit.min() + 1e-9
 
 
 def test_what_the_tether_cannot_reach_is_left_out_with_the_reason():

@@ -74,12 +74,15 @@ class PlannerOptions:
     looks : int
         How often `predictive` simulates the tether ahead for one plan; then the best path so far is
         taken, and the first if there is none yet.
+    metres : float
+        Of paths along which it does so, likewise.
     """
 
     paths: str = "tree"
     refine: str | None = None
     seed: int = 0
     looks: int = 10
+    metres: float = 15.0
 
 
 @dataclass

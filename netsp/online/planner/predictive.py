@@ -33,6 +33,9 @@ from netsp.online.tether import GeodesicTether, Tether
 PIVOTS = 24
 """At most so many places along the tether to turn at."""
 
+WORTH = 0.03
+"""Share of a path that must still be to save for another look."""
+
 ROUGH = 0.9
 """Pulled taut, a path is seldom shorter than this share of what it is roughly pulled."""
 
@@ -78,6 +81,7 @@ class PredictivePlanner(Planner):
     _homes: int = 0
     _sure: bool = False
     _looks: int = 0
+    _looked: float = 0.0
     _checked: float = 0.0
     _caught_before: float = 0.0
     _candidates: list[Candidate] = field(default_factory=list)
@@ -218,6 +222,7 @@ class PredictivePlanner(Planner):
     ) -> bool:
         """Whether the tether stays within the limit all along a path, and at its end."""
         self._looks += 1
+        self._looked += polylines.length(path)
         return self._ahead.fits(tether, path, limit, self._stay if staying is None else staying)
 
     def _straight(self, robot: Floats, tether: Tether, limit: float) -> Floats | None:
@@ -261,7 +266,7 @@ class PredictivePlanner(Planner):
             passed = int(np.searchsorted(along, places[i] - 1e-9, side="right"))
             return np.vstack([tether.nodes[: max(1, len(nodes) - passed)], back[i]])
 
-        self._looks, self._candidates = 0, []
+        self._looks, self._looked, self._candidates = 0, 0.0, []
         if onward[0] is not None:
             # the shortest path of all: where the tether fits on it, nothing else need be tried
             path = self.pulled(onward[0])
@@ -308,9 +313,9 @@ class PredictivePlanner(Planner):
 
     @property
     def _looked_enough(self) -> bool:
-        """Whether the best path so far is to be taken. Looks are counted and not seconds, so that a
-        plan is the same on every machine."""
-        return self._looks >= self.options.looks
+        """Whether the best path so far is to be taken. Looks and their metres are counted and not
+        seconds, so that a plan is the same on every machine."""
+        return self._looks >= self.options.looks or self._looked >= self.options.metres
 
     def _tautest(
         self, tether: Tether, line: Floats, limit: float, least: float = np.inf
@@ -324,8 +329,11 @@ class PredictivePlanner(Planner):
             middle = len(paths) // 2
             if self._fits(tether, paths[middle], limit):
                 best, paths = paths[middle], paths[middle + 1 :]
+                least = polylines.length(best)
             else:
                 paths = paths[:middle]
+            if paths and least - polylines.length(paths[-1]) < WORTH * least:
+                break
         return best
 
     def plan_home(self, robot: Floats, tether: Tether) -> bool:
