@@ -41,6 +41,9 @@ LEAST, MOST = -0.0005, 0.005
 
 BOUNDS = np.array([[-4.5] * 3, [4.5] * 3])
 MOST_BEADS = 1500
+PRECISION = 5e-3 * DELTA
+"""Metres from taut at which a tether says that it is at rest: the model's default."""
+
 LEGS = 10
 """Steps of a drive."""
 
@@ -157,14 +160,17 @@ def refined(field: DistanceField, tether: Tether) -> float:
     return again.length if abs(again.length - once.length) < AT_REST * once.length else np.nan
 
 
-def compared(seed: int, drives: int, every: int) -> tuple[list[float], list[float]]:
+def compared(seed: int, drives: int, every: int) -> tuple[list[float], list[float], list[bool]]:
     """Shares by which the tether is above its refinement, and above the string: at every so many
-    stops, and wherever it is not what it may be beside its refinement (said on stderr)."""
+    stops, and wherever it is not what it may be beside its refinement (said on stderr); and at
+    which stops the tether itself says that it is at rest."""
     finer: list[float] = []
     string: list[float] = []
+    still: list[bool] = []
     doubts = 0
     for k, (field, tether) in enumerate(stops(seed, drives)):
         finer.append(tether.length / refined(field, tether) - 1.0)
+        still.append(tether.residual <= PRECISION)
         doubtful = np.isfinite(finer[-1]) and not LEAST < finer[-1] < MOST
         looked = doubtful and doubts < MOST_DOUBTS
         doubts += looked
@@ -177,7 +183,7 @@ def compared(seed: int, drives: int, every: int) -> tuple[list[float], list[floa
             beside = f", {100 * string[-1]:.3f} % above the string" if looked else ""
             print(f"mesh {seed}, drive {k}: {100 * finer[-1]:.3f} % above its refinement{beside}",
                   file=sys.stderr, flush=True)  # fmt: skip
-    return finer, string
+    return finer, string, still
 
 
 def main() -> None:
@@ -192,18 +198,25 @@ def main() -> None:
     begin = time.perf_counter()
     finer: list[float] = []
     string: list[float] = []
+    still: list[bool] = []
     seeds = range(args.first, args.first + args.meshes)
     one = partial(compared, drives=args.drives, every=args.every)
     with ProcessPoolExecutor(args.jobs) as pool:
-        for done, (a, b) in enumerate(pool.map(one, seeds), 1):
+        for done, (a, b, c) in enumerate(pool.map(one, seeds), 1):
             finer += a
             string += b
+            still += c
             if done % 10 == 0:
                 print(f"{done} meshes", file=sys.stderr, flush=True)
     print()
     head("against", "stops", "it comes to no rest", "median %", "worst above %",
          "above 0.5 %", "worst below %", "below 0.05 %", name="tether-strings")  # fmt: skip
-    for name, found in (("its refinement", finer), ("a string of beads", string)):
+    at_rest = [v for v, rests in zip(finer, still, strict=True) if rests]
+    moving = [v for v, rests in zip(finer, still, strict=True) if not rests]
+    for name, found in (
+        ("its refinement", finer), ("where it says it is at rest", at_rest),
+        ("where it says it is not", moving), ("a string of beads", string),
+    ):  # fmt: skip
         s = 100.0 * np.array([v for v in found if np.isfinite(v)])
         row(name, len(found), len(found) - len(s), f"{np.median(s):.4f}", f"{s.max():.3f}",
             int((s > 100.0 * MOST).sum()), f"{s.min():.3f}",

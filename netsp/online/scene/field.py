@@ -24,7 +24,7 @@ ASK_ALL = 6
 CELLS = 40
 """Cells along the longest side of the coarse grid that tells which solids may be nearest."""
 
-FILE_VERSION = 3
+FILE_VERSION = 4
 
 MOST_LOOKS = 2_000
 """Solid voxels in blocks whose surroundings tell how much of a scene is thin."""
@@ -55,12 +55,16 @@ class DistanceField:
         What was assumed about meshes and clouds.
     thickness : tuple of (str, float)
         Thickness of each part, metres.
+    seams : tuple of int
+        For each solid that was put in at the end to fill a seam between two others
+        (`netsp.online.scene.seams`), the number of one of them.
     """
 
     arrays: Field
     voxel: float | None = None
     notes: tuple[str, ...] = ()
     thickness: tuple[tuple[str, float], ...] = ()
+    seams: tuple[int, ...] = ()
 
     @classmethod
     def build(
@@ -72,6 +76,7 @@ class DistanceField:
         grid: VoxelGrid | None,
         offset: float,
         thickness: Sequence[tuple[str, float]] = (),
+        seams: Sequence[int] = (),
     ) -> DistanceField:
         """A field from encoded solids, their bounding boxes and voxels.
 
@@ -91,6 +96,8 @@ class DistanceField:
             Metres that everything is grown by.
         thickness : sequence of (str, float)
             Thickness of each part, metres.
+        seams : sequence of int
+            As the attribute.
 
         Returns
         -------
@@ -112,6 +119,7 @@ class DistanceField:
             grid.voxel if grid is not None else None,
             grid.notes if grid is not None else (),
             tuple(thickness),
+            tuple(seams),
         )
 
     def distance(self, points: npt.ArrayLike) -> Floats:
@@ -163,8 +171,12 @@ class DistanceField:
             Index of the solid, -1 for voxels.
         """
         p = self._points(points)
-        found = sample_many(self.arrays, p.reshape(-1, 3))[:, 4]
-        return np.asarray(found.astype(np.int64).reshape(p.shape[:-1]))
+        found = sample_many(self.arrays, p.reshape(-1, 3))[:, 4].astype(np.int64)
+        if self.seams:
+            first = int(self.arrays.data[packing.COUNT]) - len(self.seams)
+            inside = found >= first
+            found[inside] = np.array(self.seams)[found[inside] - first]
+        return np.asarray(found.reshape(p.shape[:-1]))
 
     def line_of_sight(self, a: npt.ArrayLike, b: npt.ArrayLike, depth: float = 0.0) -> bool:
         """Whether a segment is nowhere deeper inside a solid than allowed.
@@ -291,7 +303,7 @@ class DistanceField:
             The grown field.
         """
         arrays = self.arrays._replace(offset=float(self.arrays.offset) + by)
-        return DistanceField(arrays, self.voxel, self.notes, self.thickness)
+        return DistanceField(arrays, self.voxel, self.notes, self.thickness, self.seams)
 
     @property
     def voxels(self) -> VoxelGrid | None:
@@ -335,6 +347,7 @@ class DistanceField:
                 notes=np.array(self.notes, dtype=str),
                 parts=np.array([n for n, _ in self.thickness], dtype=str),
                 thickness=np.array([t for _, t in self.thickness]),
+                seams=np.array(self.seams, dtype=np.int64),
                 **dict(self.arrays._asdict().items()),
             )
         except OSError as error:
@@ -374,6 +387,7 @@ class DistanceField:
                         (str(n), float(t))
                         for n, t in zip(data["parts"], data["thickness"], strict=True)
                     ),
+                    tuple(data["seams"].tolist()),
                 )
         except OSError as error:
             raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None

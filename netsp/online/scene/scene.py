@@ -20,6 +20,7 @@ from netsp.files import FileModel, read_text
 from netsp.models import Model
 from netsp.online.scene.field import DistanceField
 from netsp.online.scene.grid import VoxelGrid
+from netsp.online.scene.seams import seam_boxes
 from netsp.online.scene.shapes import (
     Box,
     Capsule,
@@ -31,6 +32,7 @@ from netsp.online.scene.shapes import (
     Sphere,
     Torus,
 )
+from netsp.online.scene.solids import BOX
 from netsp.problem import Circle, Problem
 
 _KINDS = ("sphere", "capsule", "cylinder", "box", "torus", "post", "prism", "half_space")
@@ -319,9 +321,11 @@ class Scene(FileModel):
         """
         kind, rows, outline = encode(solids)
         boxes = [b for s in solids if (b := s.shape.box()) is not None]
+        seams = seam_boxes([s.shape for s in solids])
         return DistanceField.build(
-            kind, rows, outline, boxes, grid, self.tether_radius, _thickness(solids)
-        )
+            kind + [BOX] * len(seams), rows + [row for _, row in seams], outline, boxes, grid,
+            self.tether_radius, _thickness(solids), [owner for owner, _ in seams],
+        )  # fmt: skip
 
     def voxels(
         self,
