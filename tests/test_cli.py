@@ -37,8 +37,9 @@ def test_solve_writes_a_solution_that_verify_accepts(tmp_path, capsys):
     assert "FAIL" not in text
 
 
-def test_without_output_the_solution_goes_to_stdout_and_nothing_else_does():
-    done = run("solve", SMALL)
+@pytest.mark.parametrize("solver", ["auto", "mip"])
+def test_without_output_the_solution_goes_to_stdout_and_nothing_else_does(solver):
+    done = run("solve", SMALL, "--solver", solver)
     assert done.returncode == 0
     solution = json.loads(done.stdout)
     assert solution["status"] == "optimal"

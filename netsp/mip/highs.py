@@ -25,8 +25,17 @@ _SETTLED = (
 _NONE = (0, np.zeros(0, np.int32), np.zeros(0, np.int32), np.zeros(0))
 
 
+class _Quiet(highspy.Highs):  # type: ignore[misc]
+    """HiGHS that prints nothing: 1.16 prints its banner to standard output, where solutions go, as
+    soon as callbacks are enabled, which its constructor does."""
+
+    def enableCallbacks(self) -> None:  # noqa: N802, the name is theirs
+        self.setOptionValue("output_flag", False)
+        super().enableCallbacks()
+
+
 def _solver() -> highspy.Highs:
-    h = highspy.Highs()
+    h = _Quiet()
     h.setOptionValue("output_flag", False)
     h.setOptionValue("threads", 1)
     h.setOptionValue("primal_feasibility_tolerance", 1e-9)
