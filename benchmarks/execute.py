@@ -1,6 +1,6 @@
 """Tours carried out online: as planned, and with an obstacle that is not on the map.
 
-python benchmarks/execute.py [--worlds 100] [--goals 20] [--tether 300] [--order]
+python benchmarks/execute.py [--worlds 100] [--goals 20] [--tether 300]
 """
 
 from __future__ import annotations
@@ -8,13 +8,11 @@ from __future__ import annotations
 import argparse
 
 import numpy as np
-from table import ROOT, head, heading, row
+from table import head, heading, row
 
 from netsp import Problem, Solution, solve
 from netsp.execute import ExecutionOptions, Surprises, execute
 from netsp.execute.log import Execution
-from netsp.online.mission import Mission
-from netsp.space.order import Ordered, reorder
 from netsp.worlds import random_world
 
 SPEED = 1.0
@@ -64,41 +62,13 @@ def table(name: str, runs: list[Execution]) -> None:
     )  # fmt: skip
 
 
-def saved(name: str) -> Ordered:
-    """The given order of a shipped mission and ours, both flown; its iterations end the search, so
-    that a busy machine finds the same."""
-    return reorder(Mission.load(ROOT / "missions" / f"{name}.json"), time_limit=600.0)
-
-
-def orders() -> None:
-    head(
-        "mission", "order", "inspection s", "total with tether recovery, s", "longest tether m",
-        "over the limit s", "saved %", name="order",
-    )  # fmt: skip
-    for name in ("basin", "pipes", "jacket"):
-        found = saved(name)
-        given = found.before.summary["total_s"]["tether"]
-        for label, run in (("given", found.before), ("ours", found.after)):
-            s = run.summary
-            row(
-                name, label, f"{s['inspection_s']:.1f}", f"{s['total_s']['tether']:.1f}",
-                f"{s['longest_tether']:.2f}", f"{s['exceedance_s']:.1f}",
-                f"{100 * (1 - s['total_s']['tether'] / given):.1f}",
-            )  # fmt: skip
-    print()
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--worlds", type=int, default=100)
     parser.add_argument("--goals", type=int, default=20)
     parser.add_argument("--tether", type=float, default=300.0)
-    parser.add_argument("--order", action="store_true", help="only tether-aware orders of missions")
     args = parser.parse_args()
     heading("Tours carried out")
-    if args.order:
-        orders()
-        return
     plain, surprised = [], []
     for seed in range(args.worlds):
         problem = random_world(goals=args.goals, tether_length=args.tether, seed=seed)

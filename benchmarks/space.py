@@ -1,10 +1,11 @@
 """Words and tours in space.
 
-    python benchmarks/space.py [--only words|loops|prisms|missions] [--keep]
+    python benchmarks/space.py [--only words|loops|prisms|missions] [--missions jacket …] [--keep]
 
 Words: what groups scenes have, and what they take. Loops: random ones, beside a second invariant.
 Prisms: tours in space of problems whose shortest tour is proven in the plane. Missions: the shipped
-ones, planned, and flown by `predictive` in the order that was planned.
+ones, and the sites of `benchmarks/sites.py`, solved, and flown by `predictive` as they were planned
+and in the order that they were given.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+from sites import SITES, mission_of, shipped
 from table import ROOT, head, heading, row
 
 from netsp import Problem, solve
@@ -31,9 +33,11 @@ from netsp.online.scene.scene import scene_of
 from netsp.online.simulate import grid_of, simulate
 from netsp.space.plan import SHARE, plan
 from netsp.space.signature import SpaceSignature
+from netsp.space.solve import GOING_ON, seconds_until_home, solve_mission
 from netsp.worlds import reachable_world
 
 MISSIONS = ("basin", "pipes", "jacket")
+WAYS = {GOING_ON: "going straight on"}
 
 LOW, HIGH, ANCHOR = [-5.0] * 3, [5.0] * 3, [4.0, 0.3, 3.0]
 POSTS = np.array([[-2.0, -1.0], [0.5, 1.5], [2.0, -2.0]])
@@ -242,31 +246,34 @@ def prisms() -> None:
     print()
 
 
-def missions() -> None:
-    head("mission", "waypoints", "states", "legs", "tour m", "status among them", "bound m",
-         "longest tether m", "planning s", "flown s", "over s", "visited",
+def missions(names: list[str]) -> None:
+    head("mission", "waypoints", "found by", "tour m", "status", "bound of all tours m", "gap %",
+         "longest tether m", "solved in s", "home after s", "as given s", "over s", "visited",
          name="space-missions")  # fmt: skip
-    for name in MISSIONS:
-        mission = Mission.load(ROOT / "missions" / f"{name}.json")
+    for name in names:
+        mission, scene = mission_of(name) if name in SITES else shipped(name)
         begin = time.perf_counter()
-        found = plan(mission, time_limit=40.0)
+        found = solve_mission(mission, scene=scene)
         took = time.perf_counter() - begin
-        rest = [n for n in range(len(mission.waypoints)) if n not in found.order]
-        order = (*found.order, *rest)
-        flown = simulate(found.mission.model_copy(update={
-            "waypoints": tuple(found.mission.waypoints[n] for n in order), "camera": None,
-        })).summary  # fmt: skip
-        row(name, len(order), found.states, found.legs, f"{found.length:.2f}",
-            found.result.status.value, f"{found.result.lower_bound:.2f}",
-            f"{max(s.most for s in found.stops):.2f} of {mission.tether_length:g}", f"{took:.0f}",
-            f"{flown['total_s']['tether']:.1f}", f"{flown['exceedance_s']:.1f}",
-            f"{flown['visited']} of {len(order)}")  # fmt: skip
+        run = found.run or simulate(found.mission, scene=scene)
+        given = found.given or simulate(mission, scene=scene)
+        tour, flown = found.tour, run.summary
+        row(name, len(mission.waypoints), WAYS.get(tour.solver, "states and legs"),
+            f"{tour.length:.1f}", tour.status.value, f"{tour.bound_of_all or 0.0:.1f}",
+            f"{100 * (tour.gap_to_all or 1.0):.1f}",
+            f"{tour.longest_tether:.2f} of {mission.tether_length:g}", f"{took:.0f}",
+            f"{seconds_until_home(run):.1f}", f"{seconds_until_home(given):.1f}",
+            f"{flown['exceedance_s']:.1f}", f"{flown['visited']} of {len(mission.waypoints)}",
+            )  # fmt: skip
     print()
 
 
 def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--only", choices=("words", "loops", "prisms", "missions"))
+    parser.add_argument(
+        "--missions", nargs="*", default=[*MISSIONS, *SITES], help="names of missions and sites"
+    )
     parser.add_argument("--loops", type=int, default=10_000)
     parser.add_argument("--group", help=argparse.SUPPRESS)
     args = parser.parse_args()
@@ -276,7 +283,7 @@ def main() -> None:
     heading("In space")
     for name, measure in (
         ("words", words), ("loops", lambda: loops(args.loops)), ("prisms", prisms),
-        ("missions", missions),
+        ("missions", lambda: missions(args.missions)),
     ):  # fmt: skip
         if args.only in (None, name):
             measure()

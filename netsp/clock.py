@@ -10,10 +10,12 @@ from __future__ import annotations
 import heapq
 import itertools
 import math
+import signal
 import threading
 import time
-from collections.abc import Callable
-from typing import TypeVar
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -146,6 +148,47 @@ class Clock:
 
 TimeLimit = float | Clock | None
 """Seconds, or the clock of the run that the work belongs to, or no limit."""
+
+
+@contextmanager
+def until_interrupt(limit: TimeLimit) -> Iterator[Clock]:
+    """A clock whose time is up at Ctrl-C, too, so that many stages of work end one after another
+    with what they have; pressed again, it interrupts as ever. In threads, and where somebody else
+    hears the signal, Ctrl-C does what it did.
+
+    Parameters
+    ----------
+    limit : float, Clock or None
+        As of `Clock.of`.
+
+    Yields
+    ------
+    Clock
+        The clock.
+    """
+    before = signal.getsignal(signal.SIGINT)
+    if (
+        threading.current_thread() is not threading.main_thread()
+        or before is not signal.default_int_handler
+        or (isinstance(limit, Clock) and limit.stoppable)
+    ):
+        yield Clock.of(limit)
+        return
+    pressed = False
+
+    def press(*_: Any) -> None:
+        nonlocal pressed
+        pressed = True
+        signal.signal(signal.SIGINT, before)
+
+    within, seconds = (limit, None) if isinstance(limit, Clock) else (None, limit)
+    clock = Clock(seconds, within=within, should_stop=lambda: pressed)
+    signal.signal(signal.SIGINT, press)
+    try:
+        yield clock
+    finally:
+        signal.signal(signal.SIGINT, before)
+        clock.close()
 
 
 class _Stop:

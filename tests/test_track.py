@@ -12,7 +12,7 @@ from netsp.online.mission import Mission
 from netsp.online.simulate import simulate
 from netsp.online.track import Track
 from netsp.pictures.mission import save_runs, tethers_along
-from netsp.space.order import reorder
+from netsp.space.solve import solve_mission
 
 PILES = Scene(
     solids=[
@@ -159,4 +159,4 @@ def test_what_cannot_follow_a_moving_anchor_says_so():
     with pytest.raises(InputError, match="track: tether model 'react' cannot follow it"):
         simulate(moving, "react", tether="react", scene=PILES)
     with pytest.raises(InputError, match="track: a moving anchor has no one best order"):
-        reorder(moving)
+        solve_mission(moving, scene=PILES)

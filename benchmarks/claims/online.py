@@ -239,16 +239,6 @@ def external() -> tuple[str, bool]:
     return shown, s["exceedance_s"] == 0.0 and s["visited"] == s["waypoints"]
 
 
-def ordered() -> tuple[str, bool]:
-    """Per cent of its time that our order saves on the basin mission, flown."""
-    import execute
-
-    found = execute.saved("basin")
-    given, ours = (r.summary["total_s"]["tether"] for r in (found.before, found.after))
-    saved = 100.0 * (1.0 - ours / given)
-    return f"{saved:.1f} %", saved >= 25.0 and found.after.summary["exceedance_s"] == 0.0
-
-
 def carried_out(kind: str, runs: int = 20) -> Claim:
     """Tours carried out with a surprise of a kind, over worlds of all kinds."""
 
@@ -288,7 +278,6 @@ def claims() -> Iterator[Claim]:
         yield site(name)
     yield Claim("inspection where `none` will do", "no slower; safe and free", no_slower)
     yield Claim("external tour, 30 waypoints: over the limit; visited", "0.0 s; all", external)
-    yield Claim("order: saved on the basin mission", "25 %", ordered)
     yield Claim("predicted times of recorded flights", "within 10 %", flights)
     for kind in surprises.KINDS:
         yield carried_out(kind)

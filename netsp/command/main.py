@@ -117,7 +117,7 @@ def _joined(argv: Sequence[str]) -> list[str]:
 
 COMMANDS = {
     "plan": {
-        "solve": ("solve", "find the shortest non-entangling tour of a problem"),
+        "solve": ("solve", "find the shortest non-entangling tour of a problem or a mission"),
         "app": ("app", "plan on a map in the browser"),
         "verify": ("verify", "judge a solution independently of what found it"),
         "margins": ("margins", "find how far the world may be off before a tour does not fit"),
@@ -129,7 +129,7 @@ COMMANDS = {
     "carry out": {
         "simulate": ("simulate", "run a mission in a scene with a taut tether"),
         "execute": ("execute", "carry a tour out online, and repair it on the way"),
-        "order": ("order", "reorder a mission's waypoints for a short tether"),
+        "order": ("order", "another name of solve, for missions"),
     },
     "hand over": {
         "export": ("export", "write a tour as a mission file of a ground station"),

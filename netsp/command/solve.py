@@ -1,4 +1,4 @@
-"""`netsp solve`: from a problem file to its solution."""
+"""`netsp solve`: from a problem file to its solution, or from a mission to its plan."""
 
 from __future__ import annotations
 
@@ -28,7 +28,10 @@ EXAMPLE = "netsp solve problems/wharf.json -o solution.json --plot wharf.png"
 
 def arguments(p: argparse.ArgumentParser) -> None:
     """Of the command line."""
-    p.add_argument("problem", metavar="PROBLEM", help="problem file (JSON)")
+    p.add_argument(
+        "problem", metavar="PROBLEM",
+        help="problem file or mission file (JSON); a mission is written with its tour",
+    )  # fmt: skip
     p.add_argument(
         "--solver",
         default="auto",
@@ -74,7 +77,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
         "--time-limit",
         type=seconds,
         metavar="S",
-        help="seconds for roadmap, legs and solver together; default no limit",
+        help="seconds for roadmap, legs and solver together; default no limit, for missions 60",
     )
     p.add_argument(
         "--iteration-limit",
@@ -107,8 +110,9 @@ def arguments(p: argparse.ArgumentParser) -> None:
         help="start from this solution's tour, also one of an older version of the problem",
     )  # fmt: skip
     p.add_argument(
-        "-o", "--output", metavar="FILE", help="write the solution to this file (default: stdout)"
-    )
+        "-o", "--output", metavar="FILE",
+        help="write the solution (the planned mission) to this file (default: stdout)",
+    )  # fmt: skip
     p.add_argument("--plot", metavar="FILE", help="draw the solution (png, svg or pdf)")
     p.add_argument(
         "--plot-trace",
@@ -120,6 +124,15 @@ def arguments(p: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Solve, write, and return the exit code."""
+    from netsp.command import solve_mission
+
+    if solve_mission.is_mission(args.problem):
+        solve_mission.check_flags(args, _defaults())
+        return solve_mission.solve(
+            args.problem, solver=args.solver, params=_params(args), time_limit=args.time_limit,
+            iteration_limit=args.iteration_limit, seed=args.seed, output=args.output,
+            plot=args.plot, quiet=args.quiet,
+        )  # fmt: skip
     from netsp.command.progress import ProgressTable, summary
     from netsp.files import write_text
     from netsp.problem import Problem
@@ -196,6 +209,12 @@ _EXIT = {
     "no_solution_found": EXIT_NOT_ALL,
     "invalid": EXIT_NOT_VERIFIED,
 }
+
+
+def _defaults() -> dict[str, object]:
+    parser = argparse.ArgumentParser()
+    arguments(parser)
+    return vars(parser.parse_args([""]))
 
 
 def _params(args: argparse.Namespace) -> dict[str, str]:

@@ -29,7 +29,7 @@ class _Quiet(highspy.Highs):  # type: ignore[misc]
     """HiGHS that prints nothing: 1.16 prints its banner to standard output, where solutions go, as
     soon as callbacks are enabled, which its constructor does."""
 
-    def enableCallbacks(self) -> None:  # noqa: N802, the name is theirs
+    def enableCallbacks(self) -> None:
         self.setOptionValue("output_flag", False)
         super().enableCallbacks()
 

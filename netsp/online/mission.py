@@ -15,6 +15,7 @@ from pydantic import (
     WithJsonSchema,
     field_validator,
     model_serializer,
+    model_validator,
 )
 
 from netsp.arrays import Floats
@@ -25,6 +26,7 @@ from netsp.models import Model
 from netsp.online.equipment import Camera, PositionSensor, RangeSensor, TetherPhysics
 from netsp.online.scene.field import DistanceField, pushed_out
 from netsp.online.scene.scene import Scene
+from netsp.online.tour import PlannedTour
 
 TURN_TIME = 30.0
 """Seconds that are given to turn to a heading."""
@@ -148,6 +150,9 @@ class Mission(FileModel):
     cell : float or None
         Of the grid that paths are sought on, metres; None for 0.2 m, or as much more as two million
         cells ask for.
+    tour : PlannedTour or None
+        How the robot is to get from waypoint to waypoint (`netsp.space.solve`), which `predictive`
+        keeps to; None to leave it to the planner.
 
     Raises
     ------
@@ -209,6 +214,10 @@ class Mission(FileModel):
             "site is large"
         ),
     ] = None
+    tour: Annotated[
+        PlannedTour | None,
+        Field(description="that was planned through these waypoints; null: it is left to planners"),
+    ] = None
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
@@ -243,6 +252,14 @@ class Mission(FileModel):
                     f"{before:g} s"
                 )
         return rows
+
+    @model_validator(mode="after")
+    def _tour_fits(self) -> Self:
+        if self.tour is not None:
+            wrong = self.tour.against(self.start, self.places, self.reach)
+            if wrong is not None:
+                raise ValueError(f"tour.{wrong}")
+        return self
 
     @property
     def places(self) -> Floats:

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import heapq
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from netsp.arrays import Floats, Ints
-from netsp.space.states import Effort, States
+from netsp.clock import Clock
+from netsp.space.states import ROUNDS, Effort, State, States
 from netsp.space.water import Water, along, straight
 
 NEIGHBOURS = 10
 """Waypoints nearest to each that legs are sought to."""
-
-FARTHER = 2.2
-"""Ways are no longer than so many times the distance: around a row of piles it is twice."""
 
 
 @dataclass
@@ -48,13 +47,15 @@ class Ways:
         self.near: list[Ints] = [np.flatnonzero(row) for row in both]
         self._apart = apart
 
-    def prepare(self, n: int) -> None:
+    def prepare(self, n: int, *, straight_only: bool = False) -> None:
         """Seek the ways from a waypoint to those near it that have a greater number.
 
         Parameters
         ----------
         n : int
             The waypoint.
+        straight_only : bool
+            Look at the straight ways only, which takes no time.
         """
         to = [int(m) for m in self.near[n] if m > n and (n, int(m)) not in self._known]
         if not to:
@@ -62,10 +63,12 @@ class Ways:
         water, words = self.water, self.water.words
         here = words.held(self.points[n])
         found = None
-        if here is not None:
+        if here is not None and not straight_only:
             ends = {m: words.held(self.points[m]) for m in to}
             limits = {
-                c: FARTHER * float(self._apart[n, m]) for m, c in ends.items() if c is not None
+                c: self.effort.farther * float(self._apart[n, m])
+                for m, c in ends.items()
+                if c is not None
             }
             found = water.search(True, here, self.effort.ways, limits) if limits else None
         for m in to:
@@ -90,8 +93,22 @@ class Ways:
                     back.append((word, path[::-1]))
             self._known[n, m], self._known[m, n] = ways, back
 
-    def between(self, n: int, m: int) -> list[tuple[int, Floats]]:
-        """Ways from one waypoint to another, shortest first.
+    def prepare_all(self, clock: Clock, tell: Callable[[str], None]) -> None:
+        """Seek all ways between waypoints that are near.
+
+        Parameters
+        ----------
+        clock : Clock
+            When it is up, straight ways are all that is looked at.
+        tell : callable
+            Called with a line of text now and then.
+        """
+        for n in range(len(self.points)):
+            tell(f"ways of the robot from waypoint {n + 1} of {len(self.points)}")
+            self.prepare(n, straight_only=clock.up)
+
+    def known(self, n: int, m: int) -> list[tuple[int, Floats]]:
+        """Ways from one waypoint to another that were found so far, shortest first.
 
         Parameters
         ----------
@@ -105,8 +122,6 @@ class Ways:
         list of (int, ndarray of shape (k, 3))
             Number of the word, and the path, metres.
         """
-        if (n, m) not in self._known:
-            self.prepare(min(n, m))
         return self._known.get((n, m), [])
 
 
@@ -136,39 +151,97 @@ class Legs:
                 yield v, w, min(path, back[::-1], key=along)
 
 
-def grown(states: States, ways: Ways) -> Legs:
-    """Drive each state's own tether along all ways to waypoints near, and make a state of what it
-    arrives in; from there on, too.
+@dataclass
+class Growth:
+    """Legs and the states that they lead to: each state's own tether is driven along all ways to
+    waypoints near, and what it arrives in is a state, too. The shortest legs come first, so that
+    states are made in chains of neighbours, and what there is when the time is up joins them.
 
     Parameters
     ----------
     states : States
         Those so far; more are added.
     ways : Ways
-        The ways.
-
-    Returns
-    -------
-    Legs
-        Those on which the tether was never longer than its limit.
+        The robot's ways.
     """
-    legs, model = Legs(), states.water.model
-    v = 0
-    while v < len(states.all):
+
+    states: States
+    ways: Ways
+    legs: Legs = field(default_factory=Legs)
+    _waiting: list[tuple[float, int, int, int, int]] = field(default_factory=list)
+    _no_room: list[tuple[float, int, int, int, int]] = field(default_factory=list)
+    _known: int = 0
+    _count: int = 0
+    _shortest: dict[tuple[int, int], float] = field(default_factory=dict)
+
+    def go_on(self, most: int, clock: Clock, tell: Callable[[str], None]) -> None:
+        """Drive legs until there are none left to drive, or the time is up.
+
+        Parameters
+        ----------
+        most : int
+            States of a waypoint.
+        clock : Clock
+            When it is up, legs and states are what they are by then.
+        tell : callable
+            Called with a line of text now and then.
+        """
+        self.states.most = most
+        for leg in self._no_room:
+            heapq.heappush(self._waiting, leg)
+        self._no_room.clear()
+        while self._drive_on() and not clock.up:
+            tell(f"legs, {len(self.legs.arrives)} driven between {len(self.states.all)} states")
+
+    def _look_at_new(self) -> None:
+        """Take the ways from new states on among those that wait."""
+        for v in range(self._known, len(self.states.all)):
+            state = self.states.all[v]
+            key = state.point, state.word
+            self._shortest[key] = min(state.tether.length, self._shortest.get(key, np.inf))
+            for m in self.ways.near[state.point]:
+                for k, (_, path) in enumerate(self.ways.known(state.point, int(m))):
+                    self._count += 1
+                    heapq.heappush(self._waiting, (along(path), self._count, v, int(m), k))
+        self._known = len(self.states.all)
+
+    def _drive_on(self) -> bool:
+        """Drive the next leg; whether there was one."""
+        self._look_at_new()
+        if not self._waiting:
+            return False
+        leg = heapq.heappop(self._waiting)
+        _, _, v, m, k = leg
+        states, legs = self.states, self.legs
         state = states.all[v]
-        for m in ways.near[state.point]:
-            for word, path in ways.between(state.point, int(m)):
-                there, lengths = model.drive(state.tether, path[1:])
-                if lengths.max() > states.limit:
-                    continue
-                writes = states.water.words.times(state.word, word)
-                w = states.find(int(m), writes, there)
-                if w is None:
-                    w = states.add(int(m), writes, there)
-                if w is None:
-                    continue
-                old = legs.arrives.get((v, w))
-                if old is None or along(path) < along(old):
-                    legs.arrives[v, w] = path
-        v += 1
-    return legs
+        word, path = self.ways.known(state.point, m)[k]
+        writes = states.water.words.times(state.word, word)
+        if not states.may_take(m, writes):
+            self._no_room.append(leg)
+            return True
+        if not self._may_fit(state, m, writes, path):
+            return True
+        there, lengths = states.water.model.drive(state.tether, path[1:])
+        if lengths.max() > states.limit:
+            return True
+        w = states.find(m, writes, there)
+        if w is None:
+            w = states.add(m, writes, there)
+        if w is None:
+            self._no_room.append(leg)
+        else:
+            old = legs.arrives.get((v, w))
+            if old is None or along(path) < along(old):
+                legs.arrives[v, w] = path
+        return True
+
+    def _may_fit(self, state: State, m: int, writes: int, path: Floats) -> bool:
+        """Whether the tether may be within its limit at the end of a way: a drive takes ten times
+        as long as to pull it taut there."""
+        key = m, writes
+        if self._shortest.get(key, np.inf) > self.states.limit:
+            line = np.vstack([state.tether.nodes, path[1:]])
+            length = self.states.water.model.relaxed(line, ROUNDS).length
+            self._shortest[key] = min(length, self._shortest.get(key, np.inf))
+            return bool(length <= self.states.limit)
+        return True

@@ -1,10 +1,7 @@
-"""The order in which to visit waypoints so that the tether stays short: NE-TSP in space.
+"""An order of waypoints in which the tether stays short, by going straight on: the older way.
 
-Two ways are tried, and the better is kept: a tour of states and legs (`netsp.space.plan`), and the
-older one that is below, which is better for some bodies with many free ends. Each order is flown
-before it is believed.
-
-The older one. A waypoint and the class of its tether make one vertex, and legs belong to classes,
+A tour of states and legs (`netsp.space.plan`) is mostly shorter; this one is for bodies with many
+free ends. A waypoint and the class of its tether make one vertex, and legs belong to classes,
 so that no tour can wind the tether up, as offline. Classes are found by the tether model: the
 shortest tether to each waypoint, and those that come of going straight on to it from its
 neighbours. A leg within a class is the straight line if the tether that comes of it is that of the
@@ -14,22 +11,20 @@ pulled taut. What comes out is a generalised TSP, which our own solvers take.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from netsp.errors import InputError, LimitReachedError
+from netsp.clock import Clock
+from netsp.errors import InputError
 from netsp.geometry import polylines
 from netsp.lns import Instance, best_classes
-from netsp.online.log import Run
 from netsp.online.mission import Mission
-from netsp.online.paths.tree import ShortestTree, taut
+from netsp.online.paths.tree import Grid, ShortestTree, taut
 from netsp.online.scene.field import DistanceField
-from netsp.online.simulate import grid_of, simulate
 from netsp.online.tether import GeodesicTether, Tether
 from netsp.solvers.solve import solve_graph
-from netsp.space.plan import SHARE, SpacePlan, plan
+from netsp.space.plan import SHARE
 from netsp.space.states import alike
 from netsp.space.water import straight
 from netsp.travel.graph import TravelGraph
@@ -43,31 +38,8 @@ MOST_CLASSES = 3
 ROUNDS = 150
 """Of pulling a tether taut."""
 
-
-@dataclass(frozen=True)
-class Ordered:
-    """A mission in another order.
-
-    Parameters
-    ----------
-    mission : Mission
-        With its waypoints reordered.
-    order : tuple of int
-        Old numbers in the new order.
-    before : Run
-        The given order, flown by `predictive`.
-    after : Run
-        The new order; the same as `before` when no better one was found.
-    plan : SpacePlan or None
-        The tour of states and legs, whether its order was the best or not; None where none was
-        found.
-    """
-
-    mission: Mission
-    order: tuple[int, ...]
-    before: Run
-    after: Run
-    plan: SpacePlan | None
+ITERATIONS = 400
+"""Of the search for an order."""
 
 
 @dataclass
@@ -85,100 +57,48 @@ class _Classes:
         return None
 
 
-def reorder(
-    mission: Mission, *, time_limit: float = 20.0, seed: int = 0,
-    on_progress: Callable[[str], None] | None = None,
-) -> Ordered:  # fmt: skip
-    """Find an order of a mission's waypoints with less total time in which the tether fits.
-
-    Total time is that of the inspection and of tether recovery afterwards. The new order is flown
-    by `predictive` before it is believed; the given one is kept unless the new one visits as many
-    waypoints, never exceeds the tether and takes less time.
+def order_by_going_on(
+    mission: Mission, field: DistanceField, grid: Grid, *, clock: Clock, seed: int = 0
+) -> tuple[int, ...]:
+    """The shortest order of a mission's waypoints along classes and legs of going straight on.
 
     Parameters
     ----------
     mission : Mission
-        The mission.
-    time_limit : float
-        Seconds of each solver.
+        The mission; its order is what the search starts from.
+    field : DistanceField
+        Its scene.
+    grid : Grid
+        The grid that paths are sought on.
+    clock : Clock
+        When it is up, the best order so far is returned.
     seed : int
         Of the solver.
-    on_progress : callable, optional
-        Called with a line of text now and then.
 
     Returns
     -------
-    Ordered
-        Both orders and their runs.
+    tuple of int
+        Waypoints; those that no tether reaches are left out.
 
     Raises
     ------
     InputError
-        As of `simulate`; a mission whose anchor moves.
+        No tether reaches any of them.
     """
-    if mission.track:
-        raise InputError("track: a moving anchor has no one best order; expected a mission without")
-    tell = on_progress or (lambda _: None)
-    scene = mission.load_scene()
-    field = scene.field()
-    mission = mission.checked_waypoints(field).model_copy(update={"camera": None})
-    tell("flying the given order")
-    before = simulate(mission, scene=scene, field=field)
-    _not_interrupted(before)
-    tours = []
-    planned = None
-    try:
-        planned = plan(mission, field=field, time_limit=time_limit, seed=seed, on_progress=tell)
-        tours.append(planned.order)
-    except LimitReachedError as error:
-        tell(str(error))
-    tell("tethers and legs, the older way")
-    graph, points, start = waypoint_graph(mission, field, scene_grid=grid_of(mission, scene, field))
+    graph, points, start = waypoint_graph(mission, field, grid)
     given = [start.index(n) + 1 for n in range(len(mission.waypoints)) if n in start]
-    tell("order")
     instance = Instance.of(graph)
     _, warm = best_classes(np.array(given), instance.start, instance.costs)
     result = solve_graph(
-        graph, "lns", time_limit=time_limit, iteration_limit=400, seed=seed,
+        graph, "lns", time_limit=clock, iteration_limit=ITERATIONS, seed=seed,
         warm_start=[int(v) for v in instance.original(warm)],
     )  # fmt: skip
     assert result.tour is not None
-    best, after = tuple(range(len(mission.waypoints))), before
-    tours.append(tuple(points[v] for v in result.tour[1:]))
-    for k, tour in enumerate(dict.fromkeys(tours)):
-        rest = [n for n in range(len(mission.waypoints)) if n not in tour]
-        for direction, candidate in (("forward", tour), ("in reverse", tour[::-1])):
-            order = (*candidate, *rest)
-            tell(f"flying order {k + 1} {direction}")
-            run = simulate(_in_order(mission, order), scene=scene, field=field)
-            _not_interrupted(run)
-            if _better(run, after):
-                best, after = order, run
-    full = Mission.model_validate(_in_order(mission, best).model_dump())
-    return Ordered(full, best, before, after, planned)
-
-
-def _not_interrupted(run: Run) -> None:
-    """Ctrl-C ends a flight with what there is of it; here it is to end all."""
-    if run.summary["status"] == "interrupted":
-        raise KeyboardInterrupt
-
-
-def _in_order(mission: Mission, order: tuple[int, ...]) -> Mission:
-    return mission.model_copy(update={"waypoints": tuple(mission.waypoints[n] for n in order)})
-
-
-def _better(run: Run, than: Run) -> bool:
-    a, b = run.summary, than.summary
-    return bool(
-        a["visited"] >= b["visited"]
-        and a["exceedance_s"] <= b["exceedance_s"]
-        and a["total_s"]["tether"] < b["total_s"]["tether"]
-    )
+    return tuple(points[v] for v in result.tour[1:])
 
 
 def waypoint_graph(
-    mission: Mission, field: DistanceField, scene_grid: object
+    mission: Mission, field: DistanceField, grid: Grid
 ) -> tuple[TravelGraph, list[int], list[int]]:
     """Classes and legs of a mission.
 
@@ -190,7 +110,7 @@ def waypoint_graph(
         The mission.
     field : DistanceField
         Its scene.
-    scene_grid : Grid
+    grid : Grid
         The grid that paths are sought on.
 
     Returns
@@ -202,11 +122,10 @@ def waypoint_graph(
     clusters : list of int
         The waypoints in the order of the clusters.
     """
-    grid = scene_grid
     model = GeodesicTether(field, mission.delta)
     anchor, limit = np.array(mission.anchor), SHARE * mission.tether_length
     points = mission.places
-    tree = ShortestTree(grid, anchor, points)  # type: ignore[arg-type]
+    tree = ShortestTree(grid, anchor, points)
     found = _Classes([], [])
     for n in range(len(points)):
         path = tree.path(n)

@@ -5,8 +5,9 @@ tour can wind the tether up. The same here, where states take the place of class
 (`netsp.space.states`), and legs are those that the tether model was driven along
 (`netsp.space.legs`); between any two states there is also the way back along one tether and out
 along the other. The travel graph is solved like any other, and the whole tour is driven. Where the
-tether gets too long on the way, or does not arrive in the state that was meant, that leg is
-forbidden and the graph is solved again: no tour is believed that was not driven without fault.
+tether gets too long on the way, or is not free at the end, the first leg that did not arrive in the
+state that was meant is forbidden, and the graph is solved again: no tour is believed that was not
+driven without fault.
 
 Status and bound of the result are about these states and legs, less those forbidden, and not about
 all tours there are.
@@ -14,30 +15,42 @@ all tours there are.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from dataclasses import field as dataclass_field
+from typing import Any
 
 import numpy as np
 
 from netsp.arrays import Floats
-from netsp.clock import Clock
+from netsp.clock import Clock, TimeLimit, until_interrupt
 from netsp.errors import InputError, LimitReachedError
+from netsp.fields import Point3
 from netsp.online.mission import Mission
 from netsp.online.scene.field import DistanceField
+from netsp.online.scene.scene import Scene
 from netsp.online.simulate import first_tether, grid_of
 from netsp.online.tether import Tether
-from netsp.solvers.solve import solve_graph
-from netsp.space.legs import Legs, Ways, grown
+from netsp.online.tour import PlannedStop, PlannedTour, simplified
+from netsp.solution import Status
+from netsp.solvers.solve import SolverLike, solve_graph
+from netsp.solvers.table import SOLVERS
+from netsp.space.legs import Growth, Legs, Ways
 from netsp.space.states import Effort, States, alike, first_states
 from netsp.space.water import Water, along
 from netsp.travel.graph import TravelGraph
-from netsp.travel.result import Result
+from netsp.travel.result import Result, relative_gap
 
 SHARE = 0.99
 """Of the tether that states and legs may need: the rest is for how the robot is steered."""
 
 MOST_AGAIN = 20
 """Times that a graph is solved again because legs were at fault."""
+
+SEARCHING, GROWING, SOLVING, LEAST_SOLVING = 0.3, 0.5, 0.5, 0.5
+"""Of the time left, what the search for ways may take, then states and legs, and the solver each
+time; the rest is for driving, and for solving again. When the time is up, the solver still gets so
+many seconds."""
 
 
 @dataclass(frozen=True)
@@ -91,6 +104,8 @@ class SpacePlan:
         Whether the tether was as at the start when the whole tour was driven.
     water : Water
         With the words.
+    ways : Ways
+        Of the robot between waypoints.
     """
 
     mission: Mission
@@ -103,19 +118,60 @@ class SpacePlan:
     unreached: tuple[int, ...]
     free: bool
     water: Water
+    ways: Ways
 
     @property
     def order(self) -> tuple[int, ...]:
         """The waypoints' numbers in the order of the tour."""
         return tuple(stop.point for stop in self.stops)
 
+    def planned(self, solver: str = "auto", seed: int = 0, bound: float | None = None) -> Mission:
+        """The mission with its waypoints in the order of the tour, and the tour; waypoints that no
+        tether reaches come last.
+
+        Parameters
+        ----------
+        solver : str
+            Name of the solver that was used.
+        seed : int
+            That it was given.
+        bound : float, optional
+            Of all tours (`netsp.space.bound`), metres.
+
+        Returns
+        -------
+        Mission
+            The same mission, planned.
+        """
+        rest = [n for n in range(len(self.mission.waypoints)) if n not in set(self.order)]
+        result = self.result
+        tour = PlannedTour(
+            stops=tuple(
+                PlannedStop(
+                    path=_points(stop.path), signature=stop.word,
+                    tether_length=stop.tether, longest_tether=stop.most,
+                )
+                for stop in self.stops
+            ),
+            home=_points(self.home), status=result.status, solver=solver, seed=seed,
+            length=self.length, lower_bound=result.lower_bound,
+            gap=relative_gap(self.length, result.lower_bound),
+            bound_of_all=bound, gap_to_all=relative_gap(self.length, bound),
+            states=self.states, legs=self.legs, exact=self.water.words.exact,
+        )  # fmt: skip
+        waypoints = tuple(self.mission.waypoints[n] for n in (*self.order, *rest))
+        return self.mission.model_copy(update={"waypoints": waypoints, "tour": tour})
+
 
 def plan(
     mission: Mission,
     *,
+    scene: Scene | None = None,
     field: DistanceField | None = None,
-    solver: str = "auto",
-    time_limit: float | None = 60.0,
+    solver: SolverLike = "auto",
+    params: Mapping[str, Any] | None = None,
+    time_limit: TimeLimit = 60.0,
+    iteration_limit: int | None = None,
     seed: int = 0,
     on_progress: Callable[[str], None] | None = None,
 ) -> SpacePlan:
@@ -125,12 +181,19 @@ def plan(
     ----------
     mission : Mission
         The mission; the order of its waypoints does not count.
+    scene : Scene, optional
+        Its scene, when it is at hand.
     field : DistanceField, optional
-        Its scene, where it is built already.
-    solver : str
-        Name of a solver.
-    time_limit : float, optional
-        Seconds of the solver.
+        The scene's field, when it is at hand.
+    solver : str or callable
+        As of `netsp.solvers.solve.solve_graph`.
+    params : mapping, optional
+        Options of the solver.
+    time_limit : float or Clock, optional
+        Seconds for all; the best tour so far is returned when they are up. What comes before there
+        is any is not cut short: the words of the scene, and the first states.
+    iteration_limit : int, optional
+        Iterations of the solver.
     seed : int
         Of the solver.
     on_progress : callable, optional
@@ -139,7 +202,7 @@ def plan(
     Returns
     -------
     SpacePlan
-        The tour.
+        The tour. At Ctrl-C, the best by then.
 
     Raises
     ------
@@ -147,60 +210,123 @@ def plan(
         A moving anchor; waypoints in solids; no tether that reaches any of them; as of
         `netsp.space.signature.SpaceSignature`.
     LimitReachedError
-        No tour was found in time whose tether stays within its limit all along.
+        No tour was found whose tether stays within its limit all along.
     """
     if mission.track:
         raise InputError("track: a moving anchor has no one best order; expected a mission without")
-    tell = on_progress or (lambda _: None)
-    scene = mission.load_scene()
+    with until_interrupt(time_limit) as clock:
+        _try_out(solver, params, seed)
+        how = {
+            "solver": solver, "seed": seed, "params": params, "iteration_limit": iteration_limit
+        }  # fmt: skip
+        return _planned(mission, scene, field, clock, on_progress or (lambda _: None), how)
+
+
+def _planned(
+    mission: Mission, scene: Scene | None, field: DistanceField | None, clock: Clock,
+    tell: Callable[[str], None], how: dict[str, Any],
+) -> SpacePlan:  # fmt: skip
+    scene = scene or mission.load_scene()
     field = field or scene.field()
     mission = mission.checked_waypoints(field)
     grid = grid_of(mission, scene, field)
-    tell("words")
+    tell("words of the scene")
     water = Water.of(mission, field, grid)
     points, limit = mission.places, SHARE * mission.tether_length
-    tell("states")
+    tell("shortest tethers to each waypoint")
     effort = Effort.of(len(points))
     states = first_states(water, points, limit, effort)
     if not states.all:
         raise InputError("waypoints: no tether within the limit reaches any of them")
-    tell("ways")
     ways = Ways(water, points, effort)
-    for n in range(len(points)):
-        ways.prepare(n)
-    tell("legs")
-    legs = grown(states, ways)
-    start = first_tether(mission, field, water.model, grid)
-    board = _Board.of(water, states, legs, start)
-    clock = Clock.of(time_limit)
-    found: tuple[Result, _Driven] | None = None
-    for again in range(MOST_AGAIN):
-        tell("order" if again == 0 else f"order, again without {again} legs")
-        result = board.solved(solver, clock, seed)
-        if result is None or result.tour is None:
+    ways.prepare_all(_share(SEARCHING, clock), tell)
+    growth = Growth(states, ways)
+    board = _Board(water, states, first_tether(mission, field, water.model, grid))
+    best: tuple[Result, _Driven] | None = None
+    for most in effort.states:
+        begin = clock.elapsed
+        growth.go_on(most, _share(GROWING, clock), tell)
+        board.take(growth.legs)
+        found = _best_driven(board, clock, tell, None if best is None else best[1].tour, how)
+        if found is not None and (best is None or found[1].length <= best[1].length):
+            best = found
+        if clock.left < clock.elapsed - begin:
             break
-        driven = board.driven([int(v) for v in result.tour[1:]])
-        if driven.fault is None:
-            found = result, driven
-            break
-        board.forbid(driven.fault)
-    if found is None:
+    if best is None:
         raise LimitReachedError(
             "waypoints: no tour was found whose tether stays within the limit all along"
         )
-    result, driven = found
-    reached = set(states.of)
+    result, driven = best
     return SpacePlan(
         mission, tuple(driven.stops), driven.home, driven.length, result, len(states.all),
-        len(board.legs),
-        tuple(n for n in range(len(points)) if n not in reached), driven.free, water,
+        len(board.legs), tuple(n for n in range(len(points)) if n not in states.of), driven.free,
+        water, ways,
     )  # fmt: skip
+
+
+def _share(share: float, clock: Clock) -> Clock:
+    """A clock for a part of the time left."""
+    return Clock(None if clock.limit is None else share * clock.left, within=clock)
+
+
+def _try_out(solver: SolverLike, params: Mapping[str, Any] | None, seed: int) -> None:
+    """Solve next to nothing, so that a name or an option that is wrong is told at once."""
+    if isinstance(solver, str) and SOLVERS.named(solver).geometric:
+        raise InputError(
+            f"solver: {solver!r} needs the geometry of a problem in the plane; expected one that "
+            "takes any travel graph, as auto, mip, dp, lns, anneal or greedy"
+        )
+    costs = np.ones((3, 3)) - np.eye(3)
+    solve_graph(
+        TravelGraph.from_costs(costs, [0, 1, 2]), solver, params=params, seed=seed,
+        iteration_limit=1,
+    )  # fmt: skip
+
+
+def _best_driven(
+    board: _Board, clock: Clock, tell: Callable[[str], None], warm: list[int] | None,
+    how: dict[str, Any],
+) -> tuple[Result, _Driven] | None:  # fmt: skip
+    """The best tour that was driven without fault. As long as there is time, the graph is solved
+    again without the legs that were at fault; then the tour goes by way of the start there."""
+    again, tour = 0, None
+    result: Result | None = None
+    while again < MOST_AGAIN or clock.up:
+        if tour is None:
+            tell("order" if again == 0 else f"order, {again} legs at fault forbidden")
+            solving = Clock(LEAST_SOLVING) if clock.up else _share(SOLVING, clock)
+            start = None if warm is None else [0, *warm]
+            result = board.solved(solving, warm_start=start, **how)
+            if result is None or result.tour is None:
+                return None
+            tour = [int(v) for v in result.tour[1:]]
+        assert result is not None
+        tell("driving the tour")
+        driven = board.driven(tour)
+        if driven.fault is None:
+            # by way of the start it may be longer than what the solver spoke of
+            solved = np.inf if result.length is None else result.length
+            proven_still = driven.length <= solved * (1.0 + 1e-9) + 1e-9
+            status = result.status if proven_still else Status.FEASIBLE
+            return replace(result, status=status), driven
+        if not board.forbid(driven.fault) and clock.up:
+            return None
+        warm = None  # it may go along that leg
+        again += 1
+        if not clock.up:
+            tour = None
+    return None
+
+
+def _points(path: Floats) -> tuple[Point3, ...]:
+    return tuple((x, y, z) for x, y, z in simplified(path).tolist())
 
 
 @dataclass
 class _Driven:
     """What came of driving a tour."""
 
+    tour: list[int]
     stops: list[Stop]
     home: Floats
     length: float
@@ -210,27 +336,33 @@ class _Driven:
 
 @dataclass
 class _Board:
-    """States, legs, and ways by way of the start."""
+    """States, legs, and ways by way of the start, less what was forbidden."""
 
     water: Water
     states: States
-    legs: dict[tuple[int, int], Floats]
-    out: list[Floats]
     start: Tether
-    cluster: list[int]
-    cut: set[tuple[int, int]]
+    legs: dict[tuple[int, int], Floats] = dataclass_field(default_factory=dict)
+    out: list[Floats] = dataclass_field(default_factory=list)
+    forbidden: set[tuple[int, int]] = dataclass_field(default_factory=set)
+    cut: set[tuple[int, int]] = dataclass_field(default_factory=set)
 
-    @classmethod
-    def of(cls, water: Water, states: States, legs: Legs, start: Tether) -> _Board:
-        """Put together; paths from the start run along its tether and out along another."""
-        out = [water.taut(np.vstack([start.nodes[::-1], s.tether.nodes[1:]])) for s in states.all]
-        reached = sorted(states.of)
-        cluster = [0, *(1 + reached.index(s.point) for s in states.all)]
-        both = {
+    def take(self, legs: Legs) -> None:
+        """Legs as they are now, and paths from the start to new states: along its tether, and out
+        along theirs."""
+        for s in self.states.all[len(self.out) :]:
+            line = np.vstack([self.start.nodes[::-1], s.tether.nodes[1:]])
+            self.out.append(self.water.taut(line))
+        self.legs = {
             (v, w): path for v, w, path in legs.both_ways()
-            if along(path) < along(out[v]) + along(out[w])
+            if (v, w) not in self.forbidden
+            and along(path) < along(self.out[v]) + along(self.out[w])
         }  # fmt: skip
-        return cls(water, states, both, out, start, cluster, set())
+
+    @property
+    def cluster(self) -> list[int]:
+        """Of each vertex of the travel graph."""
+        reached = sorted(self.states.of)
+        return [0, *(1 + reached.index(s.point) for s in self.states.all)]
 
     def path(self, v: int, w: int) -> Floats:
         """From one state to another; -1 is the start."""
@@ -243,12 +375,15 @@ class _Board:
             return np.vstack([self.out[v][::-1], self.out[w][1:]])
         return direct if v < w else direct[::-1]
 
-    def forbid(self, pair: tuple[int, int]) -> None:
-        """Take the leg between two states away, or if it was by way of the start, that."""
+    def forbid(self, pair: tuple[int, int]) -> bool:
+        """Take the leg between two states away, or if it was by way of the start, that; whether
+        they are still joined."""
         if self.legs.pop(pair, None) is None:
             self.cut.add(pair)
+        self.forbidden.add(pair)
+        return pair not in self.cut
 
-    def solved(self, solver: str, clock: Clock, seed: int) -> Result | None:
+    def solved(self, clock: Clock, **how: Any) -> Result | None:
         """The graph as it is now, solved; None where too much was forbidden for any tour."""
         home = np.array([along(p) for p in self.out])
         n = len(home)
@@ -263,14 +398,14 @@ class _Board:
             graph = TravelGraph.from_costs(costs, self.cluster)
         except InputError:  # some waypoint is joined to nothing any more
             return None
-        return solve_graph(graph, solver, time_limit=clock, seed=seed)
+        return solve_graph(graph, time_limit=clock, **how)
 
     def driven(self, tour: list[int]) -> _Driven:
         """A tour, driven with the tether it begins with."""
         states, water = self.states, self.water
         tether, before = self.start, -1
         stops: list[Stop] = []
-        total, fault = 0.0, None
+        total, fault, astray = 0.0, None, None
         delta = water.mission.delta
         for vertex in [*tour, 0]:
             state = vertex - 1
@@ -278,17 +413,20 @@ class _Board:
             tether, lengths = water.model.drive(tether, path[1:])
             total += along(path)
             meant = self.start if state < 0 else states.all[state].tether
-            if fault is None and (
-                lengths.max() > states.limit or not alike(tether, meant, delta)
-            ):  # fmt: skip
-                fault = (min(before, state), max(before, state))
+            pair = (min(before, state), max(before, state))
+            # since which leg the tether hangs otherwise than in its state; it does no harm if all
+            # ends well
+            astray = None if alike(tether, meant, delta) else astray or pair
+            if fault is None and lengths.max() > states.limit:
+                fault = astray or pair
             if state >= 0:
                 s = states.all[state]
                 stops.append(
                     Stop(s.point, self._word(s.word), tether.length, path, float(lengths.max()))
                 )
             before = state
-        return _Driven(stops, path, total, alike(tether, self.start, delta), fault)
+        free = alike(tether, self.start, delta)
+        return _Driven(tour, stops, path, total, free, fault or astray)
 
     def _word(self, number: int) -> tuple[int, ...]:
         return self.water.words.letters(number)

@@ -28,15 +28,18 @@ class Effort:
     ----------
     words : int
         Shortest words of a waypoint that make states.
-    states : int
-        States of a waypoint.
+    states : tuple of int
+        States of a waypoint, at most: at first, and then ever more as long as there is time.
     ways : int
         Classes of ways between two waypoints.
+    farther : float
+        Ways are no longer than so many times the distance.
     """
 
     words: int
-    states: int
+    states: tuple[int, ...]
     ways: int
+    farther: float
 
     @classmethod
     def of(cls, waypoints: int) -> Effort:
@@ -52,11 +55,13 @@ class Effort:
         Effort
             The fewer waypoints, the more for each.
         """
-        # among prisms, tours were within 0.03 % of the proven shortest with the first; with the
-        # second, 1.1 % longer on the wharf and the pool (benchmarks/space.py)
         if waypoints <= 24:
-            return cls(words=5, states=7, ways=6)
-        return cls(words=3, states=5, ways=4)
+            # around a row of piles, a way is twice as long as the distance: tours were within
+            # 0.03 % of the proven shortest among prisms with these (benchmarks/space.py)
+            return cls(words=5, states=(7,), ways=6, farther=2.2)
+        if waypoints <= 100:
+            return cls(words=4, states=(5, 10, 16), ways=4, farther=1.5)
+        return cls(words=3, states=(5, 10), ways=4, farther=1.5)
 
 
 @dataclass(frozen=True)
@@ -123,6 +128,24 @@ class States:
             if self.all[s].word == word and alike(self.all[s].tether, tether, delta):
                 return s
         return None
+
+    def may_take(self, point: int, word: int) -> bool:
+        """Whether a tether of a word may be in some state of a waypoint, or make a new one.
+
+        Parameters
+        ----------
+        point : int
+            The waypoint.
+        word : int
+            The tether's word.
+
+        Returns
+        -------
+        bool
+            Whether it may.
+        """
+        here = self.of.get(point, [])
+        return len(here) < self.most or any(self.all[s].word == word for s in here)
 
     def add(self, point: int, word: int, tether: Tether) -> int | None:
         """A new state, if there is room for one more and the tether is no longer than its limit.
@@ -196,7 +219,7 @@ def first_states(water: Water, points: Floats, limit: float, effort: Effort) -> 
     States
         The states; waypoints without any are out of reach of the tether.
     """
-    states = States(water, points, limit, effort.states)
+    states = States(water, points, limit, effort.states[0])
     words = water.words
     anchor = np.asarray(water.mission.anchor, dtype=float)
     root = int(np.ravel_multi_index(tuple(words.root), words.cells.flags.shape))

@@ -290,12 +290,25 @@ class Planner:
         """
         del tether
         self.scene, self.tethers, self.grid = scene, tethers, self.grid.over(scene, box)
-        if not len(self.path):
-            return
-        line = polylines.dense(np.vstack([robot, self.path]), 0.5 * self.grid.cell)
-        room = min(self.mission.clearance, float(scene.distance(robot)))
-        if len(line) and scene.distance(line).min() < ROOM * room:
+        if len(self.path) and not self.keeps_off(np.vstack([robot, self.path])):
             self.path = self.path[:0]
+
+    def keeps_off(self, path: Floats) -> bool:
+        """Whether a path keeps off all solids of the map.
+
+        Parameters
+        ----------
+        path : ndarray, shape (k, 3)
+            From the robot on, metres.
+
+        Returns
+        -------
+        bool
+            Whether it does, by most of the clearance, or of what its ends have of it.
+        """
+        line = polylines.dense(path, 0.5 * self.grid.cell)
+        room = min(self.mission.clearance, float(self.scene.distance(path[[0, -1]]).min()))
+        return not len(line) or bool(self.scene.distance(line).min() >= ROOM * room)
 
     def hear_of_payout(self, more: float, trail: Floats) -> None:
         """How much more tether is out than the map explains.

@@ -33,6 +33,10 @@ from netsp.online.tether import GeodesicTether, Tether
 PIVOTS = 24
 """At most so many places along the tether to turn at."""
 
+ALIKE = 1.5
+"""Times the reach that a robot may be off a tour, and its tether longer or shorter by, to go on
+along it."""
+
 WORTH = 0.03
 """Share of a path that must still be to save for another look."""
 
@@ -97,8 +101,13 @@ class PredictivePlanner(Planner):
             and not self._overtaken(robot, tether)
         ):
             return False
+        first = self._planned != self.index
         self._planned, self._checked = self.index, self.now
         limit = self.limit
+        leg = self._leg(robot, tether) if first else None
+        if leg is not None and self._fits(tether, leg, limit):
+            self.path, self.mode = leg[1:], NORMAL
+            return True
         straight = self._straight(robot, tether, limit)
         if straight is not None:
             self.path, self.mode = straight[1:], NORMAL
@@ -116,6 +125,27 @@ class PredictivePlanner(Planner):
             path = better
         self.path, self.mode = path[1:], mode
         return True
+
+    def _leg(self, robot: Floats, tether: Tether) -> Floats | None:
+        """The leg of the mission's tour, where the robot is where it begins, the tether as the tour
+        has it there, and nothing on the map in the way."""
+        tour = self.mission.tour
+        if tour is None or self.track is not None:
+            return None
+        leg = np.array(tour.home) if self.homeward else tour.leg(self.index)
+        before = min(self.index, len(tour.stops)) - 1
+        meant = self.laid_now.length if before < 0 else tour.stops[before].tether_length
+        if (
+            leg is None
+            or np.linalg.norm(leg[0] - robot) > ALIKE * self.mission.reach
+            or abs(tether.length - meant) > ALIKE * (self.mission.reach + self.mission.delta)
+        ):
+            return None
+        # it counts as there a bit before the waypoint, from where a corner may be cut too short
+        for path in (np.vstack([robot, leg[1:]]), np.vstack([robot, leg])):
+            if self.is_free(path[:2]) and self.keeps_off(path):
+                return path
+        return None
 
     @property
     def limit(self) -> float:
@@ -352,12 +382,22 @@ class PredictivePlanner(Planner):
             if self.scene.distance(back).min() > DEEPEST * self.mission.delta:
                 self.path, self.mode, self._sure = back[1:], HOME, False
                 return True
-        path = self._direct_home(robot, tether)
+        path = self._leg_home(robot, tether)
+        if path is None:
+            path = self._direct_home(robot, tether)
         self._sure = path is not None
         if path is None:
             path = self._home_along(tether)
         self.path, self.mode = path[1:], HOME
         return True
+
+    def _leg_home(self, robot: Floats, tether: Tether) -> Floats | None:
+        """The way home of the mission's tour, if the tether fits on it and comes free."""
+        leg = self._leg(robot, tether)
+        if leg is None:
+            return None
+        far, end = self._ahead.follow(tether, leg, self.limit, 0.0)
+        return leg if np.isinf(far) and self._is_free(end) else None
 
     def _direct_home(self, robot: Floats, tether: Tether) -> Floats | None:
         """The shortest path of all, if it happens to free the tether."""

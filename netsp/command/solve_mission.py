@@ -1,0 +1,215 @@
+"""What `netsp solve` and `netsp order` do with a mission: find the shortest tour of its waypoints
+that leaves the tether free, and write the mission in that order, with the tour."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import json
+import os
+import sys
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TextIO
+
+from netsp.command.types import check_writable
+from netsp.errors import EXIT_NOT_ALL, InputError
+
+if TYPE_CHECKING:
+    from netsp.online.mission import Mission
+    from netsp.online.scene.scene import Scene
+    from netsp.space.solve import SolvedMission
+
+TIME_LIMIT = 60.0
+"""Seconds, where no limit is given."""
+
+EVERY = 5.0
+"""Seconds between two lines of one stage where nobody watches a terminal."""
+
+FOR_PROBLEMS = {
+    "roadmap": "--roadmap", "classes_rule": "--classes", "samples": "--samples",
+    "shortcut": "--shortcut", "max_classes": "--max-classes", "keep_order": "--keep-order",
+    "slack": "--slack", "friction": "--friction", "max_tension_ratio": "--max-tension-ratio",
+    "margin": "--margin", "warm_start": "--warm-start", "plot_trace": "--plot-trace",
+}  # fmt: skip
+"""Flags of `netsp solve` that say something of a problem only."""
+
+
+def is_mission(file: str) -> bool:
+    """Whether a file is a mission; what cannot be read is left to who reads problems."""
+    from netsp.files import read_text
+
+    try:
+        found = json.loads(read_text(file))
+    except (InputError, ValueError, RecursionError):
+        return False
+    return isinstance(found, dict) and "waypoints" in found and "goals" not in found
+
+
+def check_flags(args: argparse.Namespace, parser_defaults: dict[str, Any]) -> None:
+    """InputError for a flag that says something of a problem only."""
+    for name, flag in FOR_PROBLEMS.items():
+        if getattr(args, name) != parser_defaults[name]:
+            raise InputError(
+                f"{flag}: is for problems, and {args.problem} is a mission; expected none "
+                "(tether and clearance are the mission's own)"
+            )
+
+
+def solve(
+    file: str, *, solver: str, params: dict[str, str], time_limit: float | None,
+    iteration_limit: int | None, seed: int, output: str | None, plot: str | None, quiet: bool,
+) -> int:  # fmt: skip
+    """Plan the mission, write it, and return the exit code."""
+    check_writable(output, plot, inputs=(file,))
+    from netsp.files import read_text, write_text
+    from netsp.online.mission import Mission
+
+    if plot:
+        from netsp.pictures import style
+
+        style.check_format(plot)
+    mission = Mission.load(file)
+    from netsp.command.compiling import compile_messages
+    from netsp.space.solve import solve_mission
+
+    stages = None if quiet else Stages(sys.stderr)
+    begin = time.monotonic()
+    compiling = contextlib.nullcontext() if quiet else compile_messages(sys.stderr)
+    with stages or contextlib.nullcontext(), compiling:
+        scene = mission.load_scene()
+        found = solve_mission(
+            mission, scene=scene, solver=solver, params=params,
+            time_limit=time_limit or TIME_LIMIT, iteration_limit=iteration_limit, seed=seed,
+            on_progress=stages,
+        )  # fmt: skip
+    placed = Mission.from_json(read_text(file)).scene
+    if output is not None and not Path(placed).is_absolute():
+        # a mission file names its scene from where it lies itself
+        placed = Path(os.path.relpath(Path(file).parent / placed, Path(output).parent)).as_posix()
+    full = found.mission.model_copy(update={"scene": placed})
+    text = json.dumps(full.model_dump(mode="json", exclude_none=True), indent=1) + "\n"
+    if output is None:
+        sys.stdout.write(text)
+        sys.stdout.flush()
+    else:
+        write_text(output, text)
+    if plot:
+        draw(found, scene, plot)
+    if not quiet:
+        print(
+            summary(mission, found, time.monotonic() - begin, output, plot, scene.units),
+            file=sys.stderr,
+        )
+    return EXIT_NOT_ALL if found.left_out else 0
+
+
+def draw(found: SolvedMission, scene: Scene, file: str) -> None:
+    """The flight, or where there was no time for one, the tour in space."""
+    if found.run is not None:
+        from netsp.pictures.mission import save_runs
+
+        save_runs([found.run], scene, file)
+    else:
+        from netsp.pictures.scene import save
+
+        save(scene, file, path=found.tour.line, title=found.mission.name)
+
+
+MOST_NAMED = 16
+"""Waypoints of an order that is told whole."""
+
+
+def summary(
+    mission: Mission, found: SolvedMission, seconds: float, output: str | None, plot: str | None,
+    units: str,
+) -> str:  # fmt: skip
+    """What was found, in a few lines."""
+    from netsp.space.solve import seconds_until_home
+
+    tour, status = found.tour, found.tour.status.value
+    if status == "optimal":
+        verdict = f"the shortest along {tour.legs} legs between {tour.states} states of the tether"
+    elif tour.lower_bound is not None:
+        verdict = (
+            f"bound {tour.lower_bound:.6g} along {tour.legs} legs between {tour.states} states of "
+            "the tether"
+        )
+    else:
+        verdict = "found by going straight on"
+    lines = [f"tour     {tour.length:.6g} {units}, {verdict}"]
+    if tour.bound_of_all is not None:
+        lines.append(
+            f"bound    {tour.bound_of_all:.6g} {units} of all tours, whatever the tether does: gap "
+            f"{100 * (tour.gap_to_all or 0.0):.1f} %"
+        )
+    names = [f"#{n}" for n in found.order[: len(tour.stops)]]
+    if len(names) > MOST_NAMED:
+        names = [*names[: MOST_NAMED // 2], "…", *names[-MOST_NAMED // 2 :]]
+    lines.append(f"order    start → {' → '.join(names)} → start")
+    lines.append(f"tether   longest {tour.longest_tether:.4g} of {mission.tether_length:g} {units}")
+    if found.run is not None:
+        s = found.run.summary
+        given = "" if found.given is None else f" ({_as_given(found)})"
+        free = "free" if s["home"]["tether_free"] else "NOT free"
+        lines.append(
+            f"flown    {seconds_until_home(found.run):.1f} s until home, the tether {free}, over "
+            f"the limit for {s['exceedance_s']:.1f} s{given}"
+        )
+    else:
+        lines.append("flown    not: the time was up")
+    if found.left_out:
+        named = ", ".join(f"#{n}" for n in found.left_out[:MOST_NAMED])
+        more = len(found.left_out) - MOST_NAMED
+        lines.append(
+            f"left out {named}{f' and {more} more' if more > 0 else ''}: no tether within the "
+            "limit was found to reach them"
+        )
+    lines.append(f"time     {seconds:.1f} s")
+    if output:
+        lines.append(f"mission  {output}")
+    if plot:
+        lines.append(f"picture  {plot}")
+    return "\n".join(lines)
+
+
+def _as_given(found: SolvedMission) -> str:
+    from netsp.space.solve import seconds_until_home
+
+    assert found.given is not None
+    s = found.given.summary
+    missed = s["waypoints"] - s["visited"]
+    return f"in the order given {seconds_until_home(found.given):.1f} s" + (
+        f", {missed} waypoints missed" if missed else ""
+    )
+
+
+class Stages:
+    """Shows what is being done: in one line that is written again where somebody watches, else in a
+    line for each stage, and for a long one now and then."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream, self._begin = stream, time.monotonic()
+        self._watched = stream.isatty()
+        self._stage, self._shown = "", -EVERY
+
+    def __call__(self, text: str) -> None:
+        """Show it, if it is a new stage or some time has passed."""
+        now = time.monotonic()
+        stage = text.split(",")[0].split(" from ")[0]
+        if stage == self._stage and now - self._shown < (0.1 if self._watched else EVERY):
+            return
+        line = f"{now - self._begin:7.1f}s  {text} …"
+        if self._watched:
+            end = "\n" if stage != self._stage and self._stage else ""
+            print(f"{end}\r{line:<78}", end="", file=self._stream, flush=True)
+        else:
+            print(line, file=self._stream, flush=True)
+        self._stage, self._shown = stage, now
+
+    def __enter__(self) -> Stages:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._watched and self._stage:
+            print(file=self._stream)

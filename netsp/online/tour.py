@@ -1,0 +1,192 @@
+"""A tour that was planned for a mission: how the robot is to get from stop to stop."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from netsp.arrays import Floats
+from netsp.fields import Name, NonNegative, Point3
+from netsp.geometry import polylines
+from netsp.models import Model
+from netsp.solution import Status
+
+PathField = Annotated[tuple[Point3, ...], Field(min_length=2)]
+
+
+class PlannedStop(Model):
+    """One stop of a tour.
+
+    Attributes
+    ----------
+    path : tuple of (x, y, z)
+        From the stop before, or the start, to the waypoint, metres.
+    signature : tuple of int
+        Word of the tether there (`netsp.space.signature`), among the letters of this mission.
+    tether_length : float
+        Of the taut tether there, metres.
+    longest_tether : float
+        Of the taut tether on the way there, metres.
+    """
+
+    path: Annotated[PathField, Field(description="from the stop before to the waypoint, m")]
+    signature: Annotated[tuple[int, ...], Field(description="word of the tether there")] = ()
+    tether_length: Annotated[NonNegative, Field(description="of the taut tether there, m")]
+    longest_tether: Annotated[NonNegative, Field(description="of tether on the way there, m")]
+
+
+class PlannedTour(Model):
+    """A tour through the first waypoints of a mission, and what is known of it.
+
+    Attributes
+    ----------
+    stops : tuple of PlannedStop
+        One for each waypoint of the mission, in its order; waypoints that no tether reaches come
+        after all others and have none.
+    home : tuple of (x, y, z)
+        From the last stop back to the start, metres.
+    status : Status
+        `optimal` and `feasible` speak of the states and legs that were found.
+    solver : str
+        Name of the solver.
+    seed : int
+        Of all that was random.
+    length : float
+        Of the tour, metres.
+    lower_bound : float or None
+        Of tours along the states and legs that were found, metres.
+    gap : float or None
+        (length - lower_bound) / length.
+    bound_of_all : float or None
+        Of all tours whatever the tether's classes: of the shortest paths between waypoints.
+    gap_to_all : float or None
+        (length - bound_of_all) / length.
+    states : int
+        In how many ways the tether was found to hang at the waypoints.
+    legs : int
+        How many legs between these were driven.
+    exact : bool
+        Whether words that differ are of different classes.
+    """
+
+    stops: tuple[PlannedStop, ...]
+    home: Annotated[PathField, Field(description="from the last stop to the start, m")]
+    status: Annotated[
+        Status, Field(description="optimal: shortest along the states and legs that were found")
+    ]
+    solver: Annotated[Name, Field(description="name of the solver")]
+    seed: Annotated[int, Field(description="of all that was random")] = 0
+    length: Annotated[NonNegative, Field(description="of the tour, m")]
+    lower_bound: Annotated[
+        NonNegative | None,
+        Field(description="of tours along the states and legs that were found, m"),
+    ] = None
+    gap: Annotated[NonNegative | None, Field(description="(length - lower_bound) / length")] = None
+    bound_of_all: Annotated[
+        NonNegative | None,
+        Field(description="of all tours: from the shortest paths between waypoints, m"),
+    ] = None
+    gap_to_all: Annotated[
+        NonNegative | None, Field(description="(length - bound_of_all) / length")
+    ] = None
+    states: Annotated[
+        Annotated[int, Field(ge=0)],
+        Field(description="ways in which the tether was found to hang at the waypoints"),
+    ] = 0
+    legs: Annotated[
+        Annotated[int, Field(ge=0)], Field(description="legs between these that were driven")
+    ] = 0
+    exact: Annotated[
+        bool, Field(description="whether words that differ are of different classes")
+    ] = True
+
+    def leg(self, index: int) -> Floats | None:
+        """How the robot gets to a waypoint.
+
+        Parameters
+        ----------
+        index : int
+            The waypoint.
+
+        Returns
+        -------
+        ndarray of shape (k, 3), or None
+            The path from the stop before, metres; None where the tour does not go there.
+        """
+        return np.array(self.stops[index].path) if index < len(self.stops) else None
+
+    @property
+    def line(self) -> Floats:
+        """(n, 3) the whole tour, metres."""
+        legs = [*(stop.path for stop in self.stops), self.home]
+        return np.vstack([legs[0][:1], *(leg[1:] for leg in legs)])
+
+    @property
+    def longest_tether(self) -> float:
+        """Of the tether all along, but for the way home, metres."""
+        return max((stop.longest_tether for stop in self.stops), default=0.0)
+
+    def against(
+        self, start: tuple[float, float, float], places: Floats, tolerance: float
+    ) -> str | None:
+        """What does not match the mission that the tour is part of.
+
+        Parameters
+        ----------
+        start : (x, y, z)
+            Where the mission starts, metres.
+        places : ndarray, shape (n, 3)
+            Its waypoints, metres.
+        tolerance : float
+            Metres that ends of paths may be off.
+
+        Returns
+        -------
+        str or None
+            One line that names the field, the value and what was expected.
+        """
+        if len(self.stops) > len(places):
+            return (
+                f"stops: {len(self.stops)} of them; expected no more than there are waypoints, "
+                f"{len(places)}"
+            )
+        here = np.array(start)
+        for k, stop in enumerate(self.stops):
+            for name, place, end in (("begins", here, 0), ("ends", places[k], -1)):
+                off = float(np.linalg.norm(np.array(stop.path[end]) - place))
+                if off > tolerance:
+                    return (
+                        f"stops[{k}].path: {name} {off:.2f} m from "
+                        f"{'waypoint' if end else 'the stop before'}"
+                        f"{f' #{k}' if end else ''}; expected no more than {tolerance:g}"
+                    )
+            here = places[k]
+        for name, place, end in (("begins", here, 0), ("ends", np.array(start), -1)):
+            off = float(np.linalg.norm(np.array(self.home[end]) - place))
+            if off > tolerance:
+                where = "the start" if end else "the last stop"
+                return f"home: {name} {off:.2f} m from {where}; expected no more than {tolerance:g}"
+        return None
+
+
+def simplified(path: Floats) -> Floats:
+    """A path without the points that lie on the line between their neighbours.
+
+    Parameters
+    ----------
+    path : ndarray, shape (k, 3)
+        Metres.
+
+    Returns
+    -------
+    ndarray, shape (m, 3)
+        The same path.
+    """
+    keep = [0]
+    for k in range(1, len(path) - 1):
+        a, b, c = path[keep[-1]], path[k], path[k + 1]
+        if polylines.length(np.array([a, b, c])) > np.linalg.norm(c - a) + 1e-9:
+            keep.append(k)
+    return np.asarray(path[[*keep, len(path) - 1]])

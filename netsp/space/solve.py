@@ -1,0 +1,332 @@
+"""From a mission to the same mission planned: order, legs, and a flight that proves them.
+
+Two ways are tried, and the better is kept: the tour of states and legs (`netsp.space.plan`), and
+the order by going straight on (`netsp.space.order`), which is better for some bodies with many free
+ends. What counts is the time until the robot is home, of a flight by `predictive`, which keeps to
+the legs of the first, and finds those of the second.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from netsp.clock import Clock, TimeLimit, until_interrupt
+from netsp.errors import LimitReachedError
+from netsp.fields import Point3
+from netsp.online.log import LogRow, Run
+from netsp.online.mission import Mission
+from netsp.online.scene.field import DistanceField
+from netsp.online.scene.scene import Scene
+from netsp.online.simulate import grid_of, simulate
+from netsp.online.tour import PlannedStop, PlannedTour, simplified
+from netsp.solution import Status
+from netsp.solvers.solve import SolverLike
+from netsp.space.bound import bound_of_all
+from netsp.space.order import order_by_going_on
+from netsp.space.plan import SpacePlan, plan
+from netsp.space.water import along
+from netsp.travel.result import relative_gap
+
+PLANNING, BOUNDING, ORDERING = 0.6, 0.15, 0.3
+"""Of the time left, what the tour of states and legs may take, then the bound, then the order by
+going straight on; the rest is for flights."""
+
+GOING_ON = "going-straight-on"
+"""Name of the older way, where tours tell their solver."""
+
+
+@dataclass(frozen=True)
+class SolvedMission:
+    """A mission, planned.
+
+    Parameters
+    ----------
+    mission : Mission
+        With its waypoints in the order of the tour, and the tour.
+    order : tuple of int
+        Old numbers of the waypoints in the new order; those that are left out come last.
+    run : Run or None
+        The planned mission, flown; None when there was no time left.
+    given : Run or None
+        The mission as it was given, flown; None when there was no time left.
+    plan : SpacePlan or None
+        The tour of states and legs, whether it was kept or not; None where none was found.
+    """
+
+    mission: Mission
+    order: tuple[int, ...]
+    run: Run | None
+    given: Run | None
+    plan: SpacePlan | None
+
+    @property
+    def tour(self) -> PlannedTour:
+        """Of the mission."""
+        assert self.mission.tour is not None
+        return self.mission.tour
+
+    @property
+    def left_out(self) -> tuple[int, ...]:
+        """Old numbers of the waypoints that the tour does not go to."""
+        return self.order[len(self.tour.stops) :]
+
+
+@dataclass
+class _Flights:
+    """Flights of one mission in several orders, until the time is up."""
+
+    mission: Mission
+    scene: Scene
+    field: DistanceField
+    clock: Clock
+    tell: Callable[[str], None]
+
+    def of(self, mission: Mission, name: str) -> Run | None:
+        """A flight to its end; None if the time was up before."""
+        if self.clock.up:
+            return None
+        self.tell(f"flying {name}")
+
+        def watch(*_: object) -> None:
+            if self.clock.up:
+                raise KeyboardInterrupt  # it ends a flight
+
+        run = simulate(
+            mission.model_copy(update={"camera": None}),
+            scene=self.scene, field=self.field, on_step=watch,
+        )  # fmt: skip
+        return None if run.summary["status"] == "interrupted" else run
+
+
+def solve_mission(
+    mission: Mission,
+    *,
+    scene: Scene | None = None,
+    solver: SolverLike = "auto",
+    params: Mapping[str, Any] | None = None,
+    time_limit: TimeLimit = 60.0,
+    iteration_limit: int | None = None,
+    seed: int = 0,
+    on_progress: Callable[[str], None] | None = None,
+) -> SolvedMission:
+    """Plan a mission: the shortest tour through its waypoints that leaves the tether free.
+
+    Parameters
+    ----------
+    mission : Mission
+        The mission.
+    scene : Scene, optional
+        Its scene, when it is at hand.
+    solver : str or callable
+        As of `netsp.solvers.solve.solve_graph`.
+    params : mapping, optional
+        Options of the solver.
+    time_limit : float or Clock, optional
+        Seconds for all; when they are up, the best by then is returned (`netsp.space.plan.plan`).
+    iteration_limit : int, optional
+        Iterations of the solver.
+    seed : int
+        Of the solver.
+    on_progress : callable, optional
+        Called with a line of text now and then.
+
+    Returns
+    -------
+    SolvedMission
+        The planned mission and its flight. At Ctrl-C, the best by then.
+
+    Raises
+    ------
+    InputError
+        As of `netsp.space.plan.plan` and `simulate`.
+    LimitReachedError
+        No tour was found on which the tether stays within its limit.
+    """
+    tell = on_progress or (lambda _: None)
+    name = solver if isinstance(solver, str) else getattr(solver, "__name__", "solver")
+    with until_interrupt(time_limit) as clock:
+        scene = scene or mission.load_scene()
+        field = scene.field()
+        mission = mission.checked_waypoints(field).model_copy(update={"tour": None})
+        planned, failure, bound = None, None, None
+        best: SolvedMission | None = None
+        try:
+            planned = plan(
+                mission, scene=scene, field=field, solver=solver, params=params,
+                time_limit=_share(PLANNING, clock), iteration_limit=iteration_limit, seed=seed,
+                on_progress=tell,
+            )  # fmt: skip
+        except LimitReachedError as error:
+            failure = error
+        flights = _Flights(mission, scene, field, clock, tell)
+        if planned is not None:
+            tell("bound on all tours")
+            reached = sorted(planned.order)
+            bound = bound_of_all(planned.ways, reached, _share(BOUNDING, clock), seed)
+            best = _of_plan(planned, name, seed, bound)
+            best = replace(best, run=flights.of(best.mission, "the tour"))
+        best = _or_going_on(best, flights, planned, bound, seed)
+        if best is None:
+            raise failure or LimitReachedError("time limit reached before any tour was found")
+        return replace(best, given=flights.of(mission, "the order as given"))
+
+
+def _share(share: float, clock: Clock) -> Clock:
+    """A clock for a part of the time left."""
+    return Clock(None if clock.limit is None else share * clock.left, within=clock)
+
+
+def _of_plan(planned: SpacePlan, solver: str, seed: int, bound: float | None) -> SolvedMission:
+    rest = [n for n in range(len(planned.mission.waypoints)) if n not in set(planned.order)]
+    mission = planned.planned(solver, seed, bound)
+    return SolvedMission(mission, (*planned.order, *rest), None, None, planned)
+
+
+def _or_going_on(
+    best: SolvedMission | None, flights: _Flights, planned: SpacePlan | None,
+    bound: float | None, seed: int,
+) -> SolvedMission | None:  # fmt: skip
+    """The better of a tour and of the order by going straight on, in both directions."""
+    mission, clock = flights.mission, flights.clock
+    if clock.up:
+        return best
+    flights.tell("order by going straight on")
+    grid = grid_of(mission, flights.scene, flights.field)
+    limited = _share(ORDERING, clock)
+    found = order_by_going_on(mission, flights.field, grid, clock=limited, seed=seed)
+    rest = tuple(n for n in range(len(mission.waypoints)) if n not in found)
+    for direction, tour in (("forward", found), ("in reverse", found[::-1])):
+        order = (*tour, *rest)
+        there = mission.model_copy(update={"waypoints": tuple(mission.waypoints[n] for n in order)})
+        run = flights.of(there, f"that order {direction}")
+        if run is None:
+            break
+        if best is not None and best.run is not None and not better(run, best.run):
+            continue
+        kept = tour_of_flight(there, order, run, planned, bound, seed)
+        if kept is None:
+            continue
+        again = flights.of(kept.mission, "it as it will be written")
+        if again is None or (best is not None and best.run and not better(again, best.run)):
+            continue
+        best = replace(kept, run=again)
+    return best
+
+
+def tour_of_flight(
+    mission: Mission, order: tuple[int, ...], run: Run, planned: SpacePlan | None = None,
+    bound: float | None = None, seed: int = 0,
+) -> SolvedMission | None:  # fmt: skip
+    """Where a robot was on a flight, made the tour of its mission.
+
+    Parameters
+    ----------
+    mission : Mission
+        What was flown.
+    order : tuple of int
+        Numbers of its waypoints in the mission that it came of.
+    run : Run
+        The flight.
+    planned : SpacePlan, optional
+        Whose words the stops get.
+    bound : float, optional
+        Of all tours, metres.
+    seed : int
+        Of what found the order.
+
+    Returns
+    -------
+    SolvedMission or None
+        The mission with the tour; None where the robot did not come home free, or the tether was
+        over the limit.
+    """
+    if not run.summary["home"]["tether_free"] or run.summary["exceedance_s"] > 0.0:
+        return None
+    stops = run.summary["stops"]
+    visited = [int(stop["waypoint"]) for stop in stops]
+    left = [k for k in range(len(order)) if k not in visited]
+    parts = _parts(run.log, visited)
+    legs = [np.array([[r.x, r.y, r.z] for r in part]) for part in parts]
+    path = np.vstack([legs[0][:1], *(leg[1:] for leg in legs)])
+    words = planned.water.words if planned is not None else None
+    anchor = np.asarray(mission.anchor, dtype=float)[None]
+    planned_stops = []
+    for k, stop in enumerate(stops):
+        walked = np.vstack([anchor, *legs[: k + 1]])
+        word = words.word(walked) if words is not None else None
+        planned_stops.append(
+            PlannedStop(
+                path=_points(legs[k]), signature=word or (), tether_length=stop["tether"],
+                longest_tether=max(r.tether for r in parts[k]),
+            )
+        )  # fmt: skip
+    length = along(path)
+    tour = PlannedTour(
+        stops=tuple(planned_stops), home=_points(legs[-1]), status=Status.FEASIBLE, solver=GOING_ON,
+        seed=seed, length=length, bound_of_all=bound, gap_to_all=relative_gap(length, bound),
+        states=len(visited), legs=len(legs),
+        exact=words.exact if words is not None else False,
+    )  # fmt: skip
+    chosen = [*visited, *left]
+    there = mission.model_copy(
+        update={"waypoints": tuple(mission.waypoints[k] for k in chosen), "tour": tour}
+    )
+    return SolvedMission(there, tuple(order[k] for k in chosen), None, None, planned)
+
+
+def _parts(log: tuple[LogRow, ...], visited: list[int]) -> list[tuple[LogRow, ...]]:
+    """A log from each waypoint that was visited to the next, and home; two rows at least."""
+    next_one = np.array([r.waypoint for r in log])
+    ends = [int(np.argmax(next_one > k)) for k in visited]
+    cuts = [0, *ends, len(log) - 1]
+    return [log[a : b + 1] if b > a else (log[a], log[a]) for a, b in pairwise(cuts)]
+
+
+def _points(path: np.ndarray) -> tuple[Point3, ...]:
+    return tuple((x, y, z) for x, y, z in simplified(path).tolist())
+
+
+def better(run: Run, than: Run) -> bool:
+    """Whether a flight is better than another of the same mission.
+
+    Parameters
+    ----------
+    run : Run
+        A flight.
+    than : Run
+        The other.
+
+    Returns
+    -------
+    bool
+        It visits as many waypoints, is not longer over the limit, comes home as free, and is home
+        earlier.
+    """
+    a, b = run.summary, than.summary
+    return bool(
+        a["visited"] >= b["visited"]
+        and a["exceedance_s"] <= b["exceedance_s"]
+        and a["home"]["tether_free"] >= b["home"]["tether_free"]
+        and seconds_until_home(run) < seconds_until_home(than)
+    )
+
+
+def seconds_until_home(run: Run) -> float:
+    """Of a flight.
+
+    Parameters
+    ----------
+    run : Run
+        The flight.
+
+    Returns
+    -------
+    float
+        Seconds of inspection and way home.
+    """
+    return float(run.summary["inspection_s"] + run.summary["home"]["seconds"])

@@ -1,0 +1,264 @@
+"""Planned tours: what they must match, and that they are flown as they were planned."""
+
+import json
+import signal
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from netsp.clock import Clock, until_interrupt
+from netsp.command.main import main
+from netsp.geometry import polylines
+from netsp.online.mission import Mission
+from netsp.online.planner.predictive import PredictivePlanner
+from netsp.online.simulate import simulate
+from netsp.online.tour import simplified
+from netsp.space.bound import bound_of_all
+from netsp.space.plan import plan
+from netsp.space.solve import seconds_until_home, solve_mission
+
+SCENE = {
+    "schema_version": 1, "bounds": [-1, -4, -4, 9, 4, 1],
+    "solids": [
+        {"post": {"center": [3.0, 0.4], "radius": 0.5}},
+        {"post": {"center": [5.0, -1.0], "radius": 0.5}},
+        {"post": {"center": [5.2, 1.6], "radius": 0.5}},
+    ],
+}  # fmt: skip
+WAYPOINTS = [[4.2, 2.8, -1.0], [6.5, 0.2, -1.5], [4.0, -1.8, -0.5], [6.4, 2.6, -1.0]]
+
+
+def written(folder: Path, **more) -> Path:
+    """A mission among three posts, with its waypoints in a poor order."""
+    (folder / "scene.json").write_text(json.dumps(SCENE))
+    mission = {
+        "schema_version": 1, "scene": "scene.json", "anchor": [0, 0, 0], "start": [0, 0.3, 0],
+        "waypoints": WAYPOINTS, "clearance": 0.2, "tether_length": 8.5, **more,
+    }  # fmt: skip
+    file = folder / "mission.json"
+    file.write_text(json.dumps(mission))
+    return file
+
+
+@pytest.fixture(scope="module")
+def solved(tmp_path_factory):
+    mission = Mission.load(written(tmp_path_factory.mktemp("posts")))
+    return mission, solve_mission(mission, time_limit=None)
+
+
+def test_predictive_flies_the_legs_and_looks_for_no_others(solved, monkeypatch):
+    mission, found = solved
+    sought = []
+    seek = PredictivePlanner._shortest_feasible
+    monkeypatch.setattr(PredictivePlanner, "warm_up", lambda *_: None)
+    monkeypatch.setattr(
+        PredictivePlanner, "_shortest_feasible", lambda self, *a: sought.append(a) or seek(self, *a)
+    )
+    planned = found.plan.planned()
+    run = simulate(planned)
+    assert not sought
+    assert run.summary["visited"] == 4
+    assert run.summary["home"]["tether_free"]
+    # a waypoint counts as visited a bit before it, so that a flight may be shorter
+    assert seconds_until_home(run) <= planned.tour.length / mission.speed + 1.0
+    assert seconds_until_home(run) >= 0.93 * planned.tour.length / mission.speed
+    for stop, flown in zip(planned.tour.stops, run.summary["stops"], strict=True):
+        assert flown["tether"] == pytest.approx(stop.tether_length, abs=2 * mission.reach)
+
+
+def test_a_robot_that_is_elsewhere_plans_for_itself(solved):
+    planned = solved[1].plan.planned()
+    other = planned.model_copy(update={"start": (0.0, -2.0, 0.0)})
+    run = simulate(other)
+    assert run.summary["visited"] == 4
+    assert run.summary["exceedance_s"] == 0.0
+    assert run.summary["home"]["tether_free"]
+
+
+def test_what_is_new_on_the_map_is_not_flown_through(solved, tmp_path):
+    planned = solved[1].plan.planned()
+    leg = np.array(planned.tour.stops[1].path)
+    middle = polylines.points_along(leg, 0.5 * polylines.length(leg))[1]
+    scene = {**SCENE, "solids": [
+        *SCENE["solids"], {"sphere": {"center": middle.tolist(), "radius": 0.25}},
+    ]}  # fmt: skip
+    (tmp_path / "scene.json").write_text(json.dumps(scene))
+    other = planned.model_copy(update={"scene": str(tmp_path / "scene.json")})
+    run = simulate(other)
+    assert run.summary["contacts"] == 0
+    assert run.summary["visited"] == 4
+
+
+def test_a_solved_mission_is_never_worse_than_the_order_given(solved):
+    mission, found = solved
+    assert sorted(found.order) == [0, 1, 2, 3]
+    assert found.mission.waypoints == tuple(mission.waypoints[n] for n in found.order)
+    assert seconds_until_home(found.run) <= seconds_until_home(found.given)
+    tour = found.tour
+    assert tour.bound_of_all <= tour.length
+    assert tour.longest_tether <= mission.tether_length
+    assert tour.length == pytest.approx(polylines.length(tour.line))
+
+
+def test_the_bound_is_no_longer_than_any_order_without_a_tether(solved):
+    mission, found = solved
+    bound = bound_of_all(found.plan.ways, [0, 1, 2, 3], Clock())
+    loose = plan(mission.model_copy(update={"tether_length": 60.0}), time_limit=None)
+    assert bound <= loose.length + 1e-6
+    assert bound >= 2.0 * max(np.linalg.norm(np.subtract(p, mission.start)) for p in WAYPOINTS)
+
+
+def test_the_same_seed_gives_the_same_mission(solved):
+    mission, found = solved
+    again = solve_mission(mission, time_limit=None)
+    assert again.mission.model_dump_json() == found.mission.model_dump_json()
+
+
+def test_a_planned_mission_is_written_and_read_and_flies(tmp_path, capsys):
+    file, out = written(tmp_path), tmp_path / "planned.json"
+    assert main(["solve", str(file), "-o", str(out), "--plot", str(tmp_path / "p.png")]) == 0
+    said = capsys.readouterr()
+    assert said.out == ""
+    for word in ("tour ", "bound ", "order ", "tether ", "flown ", "mission "):
+        assert word in said.err
+    assert (tmp_path / "p.png").read_bytes().startswith(b"\x89PNG")
+    again = Mission.load(out)
+    assert again.tour.status.value in ("optimal", "feasible")
+    assert len(again.tour.stops) == 4
+    assert main(["simulate", str(out), "--quiet"]) == 0
+    # and as text to standard output, with the scene where it was
+    assert main(["order", str(file), "--quiet"]) == 0
+    assert json.loads(capsys.readouterr().out.rsplit("}\n{", 1)[-1].join(["{", ""]))
+
+
+BAD = {
+    "a stop too many": (lambda t: t["stops"].append(t["stops"][0]), "tour.stops: 5 of them"),
+    "a leg elsewhere": (
+        lambda t: t["stops"][1]["path"].__setitem__(-1, [1.0, 1.0, 1.0]), "tour.stops[1].path: ends"
+    ),
+    "a leg from elsewhere": (
+        lambda t: t["stops"][2]["path"].__setitem__(0, [1.0, 1.0, 1.0]),
+        "tour.stops[2].path: begins",
+    ),
+    "home elsewhere": (lambda t: t["home"].__setitem__(-1, [3.0, 3.0, 0.0]), "tour.home: ends"),
+    "no number": (lambda t: t["home"].__setitem__(0, [0.0, 0.0, "x"]), "tour.home"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("change", "expected"), BAD.values(), ids=BAD)
+def test_a_tour_that_does_not_match_is_told_in_one_line(solved, change, expected, tmp_path, capsys):
+    written(tmp_path)
+    data = json.loads(solved[1].mission.model_dump_json())
+    data["scene"] = "scene.json"
+    change(data["tour"])
+    file = tmp_path / "bad.json"
+    file.write_text(json.dumps(data))
+    assert main(["simulate", str(file), "--quiet"]) == 2
+    said = capsys.readouterr().err
+    assert expected in said
+    assert said.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("flags", "expected"),
+    [
+        (["--slack", "0.1"], "--slack: is for problems"),
+        (["--roadmap", "prm"], "--roadmap: is for problems"),
+        (["--keep-order"], "--keep-order: is for problems"),
+        (["--warm-start", "x.json"], "--warm-start: is for problems"),
+        (["--solver", "nonesuch"], "nonesuch"),
+        (["--solver", "greedy-tsp"], "greedy-tsp"),
+        (["--option", "nonesuch=1"], "nonesuch"),
+        (["--plot", "x.bmp"], "x.bmp"),
+    ],
+)
+def test_what_missions_do_not_take_is_told_before_anything_is_done(
+    flags, expected, tmp_path, capsys
+):
+    out = tmp_path / "out.json"
+    file = written(tmp_path)
+    assert main(["solve", str(file), "-o", str(out), "--quiet", *flags]) == 2
+    said = capsys.readouterr().err
+    assert expected in said
+    assert said.count("\n") == 1
+    assert not out.exists()
+
+
+def test_waypoints_that_no_tether_reaches_come_last_and_are_told(tmp_path, capsys):
+    file, out = written(tmp_path, tether_length=6.2), tmp_path / "out.json"
+    assert main(["solve", str(file), "-o", str(out)]) == 4
+    mission = Mission.load(out)
+    assert 0 < len(mission.tour.stops) < 4
+    assert "left out #" in capsys.readouterr().err
+    assert simulate(mission).summary["visited"] == len(mission.tour.stops)
+
+
+def test_any_solver_will_do(tmp_path):
+    mission = Mission.load(written(tmp_path))
+    best = plan(mission, time_limit=None).length
+    for solver in ("mip", "dp", "lns", "anneal", "greedy"):
+        found = plan(mission, solver=solver, time_limit=None, iteration_limit=300)
+        assert found.length >= best - 1e-6
+        assert found.free
+
+
+def test_when_the_time_is_up_there_is_a_tour(tmp_path):
+    mission = Mission.load(written(tmp_path))
+    found = solve_mission(mission, time_limit=1e-3)
+    assert sorted(found.order) == [0, 1, 2, 3]
+    assert found.tour.longest_tether <= mission.tether_length
+    assert found.run is None
+
+
+def test_ctrl_c_ends_the_search_with_a_tour(tmp_path):
+    mission = Mission.load(written(tmp_path))
+
+    def press(text: str) -> None:
+        if text.startswith("legs") and not pressed:
+            pressed.append(text)
+            signal.raise_signal(signal.SIGINT)
+
+    pressed: list[str] = []
+    found = solve_mission(mission, time_limit=None, on_progress=press)
+    assert pressed
+    assert len(found.tour.stops) == 4
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def pressed_twice() -> None:
+    with until_interrupt(None) as clock:
+        signal.raise_signal(signal.SIGINT)
+        while not clock.up:
+            threading.Event().wait(0.01)
+        signal.raise_signal(signal.SIGINT)
+
+
+def test_pressed_again_it_interrupts():
+    with pytest.raises(KeyboardInterrupt):
+        pressed_twice()
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+POINT = st.tuples(*[st.integers(-5, 5).map(float)] * 3)
+
+
+@given(st.lists(POINT, min_size=2, max_size=12))
+def test_a_simplified_path_is_the_same_path(points):
+    path = np.array(points)
+    short = simplified(path)
+    assert len(short) <= len(path)
+    assert polylines.length(short) == pytest.approx(polylines.length(path))
+    assert (short[[0, -1]] == path[[0, -1]]).all()
+    # each corner that is left out lies on the path
+    for p in path:
+        ends = np.stack([short[:-1], short[1:]], axis=1)
+        near = [
+            np.linalg.norm(a + np.clip((p - a) @ (b - a) / max((b - a) @ (b - a), 1e-12), 0, 1)
+                           * (b - a) - p)
+            for a, b in ends
+        ]  # fmt: skip
+        assert min(near) < 1e-6
