@@ -17,7 +17,10 @@ from netsp.online.mission import Mission
 from netsp.online.planner.predictive import PredictivePlanner
 from netsp.online.simulate import simulate
 from netsp.online.tour import simplified
+from netsp.solution import Status
 from netsp.space.bound import bound_of_all
+from netsp.space.flown import words_of_flight
+from netsp.space.judge import verify_mission
 from netsp.space.plan import plan
 from netsp.space.solve import seconds_until_home, solve_mission
 
@@ -129,10 +132,111 @@ def test_a_planned_mission_is_written_and_read_and_flies(tmp_path, capsys):
     again = Mission.load(out)
     assert again.tour.status.value in ("optimal", "feasible")
     assert len(again.tour.stops) == 4
-    assert main(["simulate", str(out), "--quiet"]) == 0
+    assert main(["simulate", str(out)]) == 0
+    said = capsys.readouterr()
+    assert "classes  as planned at 4 of 4 stops; empty at home" in said.err
+    words = json.loads(said.out)["words"]
+    assert words["home"] == []
+    assert [stop["as_planned"] for stop in words["stops"]] == [True] * 4
     # and as text to standard output, with the scene where it was
     assert main(["order", str(file), "--quiet"]) == 0
-    assert json.loads(capsys.readouterr().out.rsplit("}\n{", 1)[-1].join(["{", ""]))
+    assert json.loads(capsys.readouterr().out)["scene"] == "scene.json"
+
+
+def test_the_flight_is_in_the_planned_classes_and_ends_in_none(solved):
+    planned = solved[1].mission
+    flown = words_of_flight(simulate(planned))
+    assert flown.as_planned == len(flown.stops) == 4
+    assert flown.home == ()
+    assert any(word for _, word in flown.stops)
+
+
+def test_a_flight_in_other_classes_is_told(solved):
+    """By a planner that does not know of tethers, round a post."""
+    around = [(3.0, 1.4, -1), (4.2, 0.4, -1), (3.0, -0.6, -1), (1.8, 0.4, -1)]
+    lasso = Mission.model_validate({**solved[0].model_dump(), "waypoints": around})
+    run = simulate(lasso.model_copy(update={"tether_length": 50.0}), "none")
+    flown = words_of_flight(run)
+    assert flown.planned == ()
+    assert flown.home != ()
+    assert not run.summary["home"]["tether_free"]
+
+
+def test_the_judge_accepts_what_was_solved(solved):
+    verdict = verify_mission(solved[1].mission)
+    assert verdict, str(verdict)
+    assert verify_mission(solved[1].plan.planned(bound=solved[1].tour.bound_of_all))
+
+
+def changed(mission: Mission, **tour) -> Mission:
+    return mission.model_copy(update={"tour": mission.tour.model_copy(update=tour)})
+
+
+def another_stop(mission: Mission, k: int, **stop) -> Mission:
+    stops = list(mission.tour.stops)
+    stops[k] = stops[k].model_copy(update=stop)
+    return changed(mission, stops=tuple(stops))
+
+
+def through_a_post(mission: Mission) -> Mission:
+    path = mission.tour.stops[0].path
+    return another_stop(mission, 0, path=(path[0], (3.0, 0.4, -0.5), path[-1]))
+
+
+def round_a_post(mission: Mission) -> Mission:
+    """A loop about the first post before the first leg."""
+    loop = [(2.2, -0.4, 0.0), (3.8, -0.4, 0.0), (3.8, 1.2, 0.0), (2.2, 1.2, 0.0), (2.2, -0.4, 0.0)]
+    path = mission.tour.stops[0].path
+    return another_stop(mission, 0, path=(path[0], *loop, *path[:0:-1][::-1]))
+
+
+FALSE = {
+    "the word of a stop": (lambda m: another_stop(m, 1, signature=(9,)), "words at the stops"),
+    "the tether of a stop": (
+        lambda m: another_stop(m, 1, tether_length=m.tour.stops[1].tether_length + 0.3),
+        "tethers as long as stated",
+    ),
+    "the length": (lambda m: changed(m, length=m.tour.length - 0.5), "length as stated"),
+    "the bound": (
+        lambda m: changed(m, bound_of_all=m.tour.length + 1.0, gap_to_all=0.0), "bounds and status"
+    ),
+    "the gap": (lambda m: changed(m, gap_to_all=0.0), "bounds and status"),
+    "the status": (
+        lambda m: changed(m, status=Status.OPTIMAL, gap=0.5, lower_bound=0.5 * m.tour.length),
+        "bounds and status",
+    ),
+    "a leg through a post": (through_a_post, "keeps clear of solids"),
+    "a leg round a post": (round_a_post, "empty word at the end"),
+    "a tether that is too short": (
+        lambda m: m.model_copy(update={"tether_length": 0.9 * m.tour.longest_tether}),
+        "within the tether's length",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("falsify", "check"), FALSE.values(), ids=FALSE)
+def test_the_judge_sees_what_is_wrong(solved, falsify, check):
+    verdict = verify_mission(falsify(solved[1].mission))
+    assert not verdict
+    assert check in [c.name for c in verdict.checks if not c.passed], str(verdict)
+
+
+def test_missions_are_judged_by_command(solved, tmp_path, capsys):
+    written(tmp_path)
+    file = tmp_path / "planned.json"
+    right = solved[1].mission.model_copy(update={"scene": "scene.json"})
+    file.write_text(right.model_dump_json())
+    assert main(["verify", str(file)]) == 0
+    assert capsys.readouterr().out.endswith("\nverified\n")
+    file.write_text(
+        changed(right, length=1.0, gap_to_all=None, bound_of_all=None).model_dump_json()
+    )
+    assert main(["verify", str(file)]) == 5
+    assert "NOT VERIFIED" in capsys.readouterr().out
+    assert main(["verify", str(tmp_path / "mission.json")]) == 2
+    assert "tour: the mission has none" in capsys.readouterr().err
+    assert main(["verify", str(file), "--margins"]) == 2
+    assert "--margins" in capsys.readouterr().err
 
 
 BAD = {

@@ -120,6 +120,11 @@ def run(args: argparse.Namespace) -> int:
                 on_step=show_mission(mission, scene.units) if show else None,
             )  # fmt: skip
             runs.append(run)
+            if mission.tour is not None and not mission.track:
+                from netsp.space.flown import words_of_flight
+
+                flown = words_of_flight(run, scene=scene, field=field)
+                run.summary["words"] = flown.told()
             if not args.quiet:
                 print(
                     ("\r\n" if sys.stderr.isatty() else "") + describe_run(run, scene.units),

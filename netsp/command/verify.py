@@ -12,8 +12,12 @@ EXAMPLE = "netsp verify problems/wharf.json solution.json"
 
 def arguments(p: argparse.ArgumentParser) -> None:
     """Of the command line."""
-    p.add_argument("problem", metavar="PROBLEM", help="problem file (JSON)")
-    p.add_argument("solution", metavar="SOLUTION", help="solution file (JSON)")
+    p.add_argument(
+        "problem", metavar="PROBLEM", help="problem file, or a mission that was planned (JSON)"
+    )
+    p.add_argument(
+        "solution", metavar="SOLUTION", nargs="?", help="solution file (JSON) of the problem"
+    )
     p.add_argument(
         "--measures",
         action="store_true",
@@ -29,6 +33,12 @@ def arguments(p: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Judge, print, and return the exit code."""
+    from netsp.command.solve_mission import is_mission
+
+    if is_mission(args.problem):
+        return _mission(args)
+    if args.solution is None:
+        raise InputError(f"SOLUTION: {args.problem} is no mission; expected a solution beside it")
     if args.measures:
         from netsp.command.measures import describe_path
         from netsp.files import read_path
@@ -62,6 +72,25 @@ def run(args: argparse.Namespace) -> int:
         from netsp.sizing.margins import margins
 
         print(f"\n{describe(problem, margins(problem, solution))}")
+    return 0 if verdict else EXIT_NOT_VERIFIED
+
+
+def _mission(args: argparse.Namespace) -> int:
+    """Judge a planned mission."""
+    for name, flag in (
+        ("solution", "SOLUTION"),
+        ("measures", "--measures"),
+        ("margins", "--margins"),
+    ):
+        if getattr(args, name):
+            raise InputError(f"{flag}: {args.problem} is a mission; expected nothing beside it")
+    from netsp.online.mission import Mission
+    from netsp.space.judge import verify_mission
+
+    verdict = verify_mission(Mission.load(args.problem))
+    if not args.quiet:
+        print(verdict)
+        print("verified" if verdict else "NOT VERIFIED")
     return 0 if verdict else EXIT_NOT_VERIFIED
 
 

@@ -174,6 +174,18 @@ def describe_run(run: Run, units: str) -> str:
     ]
     if s["longest_payout"] > s["longest_tether"] * (1.0 + 1e-9):
         lines.insert(4, f"payout   at most {s['longest_payout']:.3f} {units}, with slack and sag")
+    if (words := s.get("words")) is not None and words["as_planned"] is not None:
+        home = words["home"]
+        lines.append(
+            f"classes  as planned at {words['as_planned']} of {len(words['stops'])} stops; "
+            + (
+                "none told at home"
+                if home is None
+                else "empty at home"
+                if not home
+                else f"NOT empty at home: {home}"
+            )
+        )
     if s["friction"] is not None:
         lines.append(
             f"friction multiplies the tension by {s['friction']['most_tension_ratio']:.2f} at most "

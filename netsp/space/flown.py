@@ -1,0 +1,121 @@
+"""In which classes a tether was on a flight: at each stop, and at home."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from netsp.errors import InputError
+from netsp.hsignature import Word
+from netsp.online.log import Run
+from netsp.online.scene.field import DistanceField
+from netsp.online.scene.scene import Scene
+from netsp.online.simulate import first_tether, grid_of
+from netsp.online.tether import GeodesicTether
+from netsp.space.signature import SpaceSignature
+from netsp.space.water import DIP
+
+
+@dataclass(frozen=True)
+class FlownWords:
+    """Words of a flight, by the scene of its mission.
+
+    Parameters
+    ----------
+    stops : tuple of (int, Word or None)
+        Waypoint that was visited, and the word of the tether there; None where there is none, as
+        when the robot went where the map has a solid.
+    home : Word or None
+        Of the tether at the end, closed along the way from the start to the anchor; empty where it
+        was left free.
+    exact : bool
+        Whether words that differ are of different classes.
+    planned : tuple of Word
+        Of the mission's tour, if it has one.
+    """
+
+    stops: tuple[tuple[int, Word | None], ...]
+    home: Word | None
+    exact: bool
+    planned: tuple[Word, ...] = ()
+
+    @property
+    def as_planned(self) -> int:
+        """How many stops were made in the class that the tour has there."""
+        return sum(k < len(self.planned) and self.planned[k] == word for k, word in self.stops)
+
+    def told(self) -> dict[str, Any]:
+        """For the summary of a run.
+
+        Returns
+        -------
+        dict
+            The words by name.
+        """
+        return {
+            "exact": self.exact,
+            "stops": [
+                {
+                    "waypoint": k,
+                    "signature": None if word is None else list(word),
+                    **({"as_planned": self.planned[k] == word} if k < len(self.planned) else {}),
+                }
+                for k, word in self.stops
+            ],
+            "home": None if self.home is None else list(self.home),
+            "as_planned": self.as_planned if self.planned else None,
+        }
+
+
+def words_of_flight(
+    run: Run, *, scene: Scene | None = None, field: DistanceField | None = None
+) -> FlownWords:
+    """The words of a flight.
+
+    The tether and the robot's path are of one class, so that the path tells the word.
+
+    Parameters
+    ----------
+    run : Run
+        The flight; its anchor stays where it is.
+    scene : Scene, optional
+        Of the mission, when it is at hand.
+    field : DistanceField, optional
+        The scene's field, when it is at hand.
+
+    Returns
+    -------
+    FlownWords
+        The words.
+
+    Raises
+    ------
+    InputError
+        A moving anchor; as of `netsp.space.signature.SpaceSignature.of`.
+    """
+    mission = run.mission
+    if mission.track:
+        raise InputError("track: of a moving anchor no words are told; expected a mission without")
+    scene = scene or mission.load_scene()
+    field = field or scene.field()
+    grid = grid_of(mission, scene, field)
+    high = grid.low + grid.cell * np.array(grid.free.shape)
+    words = SpaceSignature.of(
+        field, grid.low, high, grid.cell, mission.anchor, tolerance=DIP * mission.delta
+    )
+    laid = first_tether(mission, field, GeodesicTether(field, mission.delta), grid).nodes
+    places = np.vstack([laid, np.array([[r.x, r.y, r.z] for r in run.log])])
+    next_one = np.array([r.waypoint for r in run.log])
+    stops = []
+    for stop in run.summary["stops"]:
+        k = int(stop["waypoint"])
+        end = len(laid) + int(np.argmax(next_one > k))
+        # on to the waypoint itself: words of paths compare only where these end at the same place
+        word, broken = words.word_until(np.vstack([places[: end + 1], mission.places[k]]))
+        stops.append((k, None if broken is not None else word))
+    word, broken = words.word_until(np.vstack([places, laid[::-1]]))
+    tour = mission.tour
+    planned = () if tour is None else tuple(stop.signature for stop in tour.stops)
+    return FlownWords(tuple(stops), None if broken is not None else word, words.exact, planned)

@@ -1,0 +1,219 @@
+"""The judge of a planned mission: asks again what its tour says, and imports no solver.
+
+The tether is driven along the whole tour by the same model at half the resolution, which is another
+discretisation but not another model; benchmarks compare the model with strings of beads. Words are
+those of the mission's own cells, for letters have no meaning beyond them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+
+from netsp.arrays import Floats
+from netsp.errors import InputError
+from netsp.geometry import polylines
+from netsp.judge import Check, Verification
+from netsp.online.mission import Mission
+from netsp.online.planner.base import FREE
+from netsp.online.scene.field import DistanceField
+from netsp.online.scene.scene import Scene
+from netsp.online.simulate import first_tether, grid_of
+from netsp.online.tether import GeodesicTether, Tether
+from netsp.online.tour import PlannedTour
+from netsp.solution import Status
+from netsp.space.signature import SpaceSignature
+from netsp.space.water import DIP
+from netsp.travel.result import relative_gap
+
+FINER = 0.5
+"""Times the mission's resolution at which the tether is driven again."""
+
+LENGTH_TOLERANCE = 0.01
+"""Share of a stated tether length, beside the mission's resolution, by which the length at another
+resolution may differ: three times the worst drives against finer ones (docs/tether.md)."""
+
+ROUNDING = 1e-6
+"""Metres, and share of a length, that stated figures may be off."""
+
+
+def verify_mission(
+    mission: Mission, *, scene: Scene | None = None, field: DistanceField | None = None
+) -> Verification:
+    """Judge a planned mission.
+
+    Checks that the tour leads from the start through the first waypoints and home, clear of solids;
+    that the tether's word at every stop is the stated one and empty at the end; that the tether,
+    driven along it once more, keeps to its limit, has the stated lengths and is free at home; and
+    that length, bounds, gaps and status are consistent.
+
+    Parameters
+    ----------
+    mission : Mission
+        A mission with a tour.
+    scene : Scene, optional
+        Its scene, when it is at hand.
+    field : DistanceField, optional
+        The scene's field, when it is at hand.
+
+    Returns
+    -------
+    Verification
+        All checks, in order.
+
+    Raises
+    ------
+    InputError
+        A mission without a tour, or with a moving anchor.
+    """
+    if mission.tour is None:
+        raise InputError("tour: the mission has none; expected one that `netsp solve` has planned")
+    if mission.track:
+        raise InputError("track: a tour is for a fixed anchor; expected a mission without")
+    scene = scene or mission.load_scene()
+    field = field or scene.field()
+    return Verification(tuple(_Judge(mission, mission.tour, scene, field).run()))
+
+
+@dataclass
+class _Judge:
+    mission: Mission
+    tour: PlannedTour
+    scene: Scene
+    field: DistanceField
+
+    def run(self) -> list[Check]:
+        return [
+            self._joined(), self._clear(), *self._words(), *self._tethers(), self._length(),
+            self._bounds(),
+        ]  # fmt: skip
+
+    @cached_property
+    def legs(self) -> list[Floats]:
+        """(k, 3) each; the last is the way home."""
+        return [*(np.array(s.path) for s in self.tour.stops), np.array(self.tour.home)]
+
+    @cached_property
+    def model(self) -> GeodesicTether:
+        """At another resolution."""
+        return GeodesicTether(self.field, FINER * self.mission.delta)
+
+    @cached_property
+    def laid(self) -> Tether:
+        """The tether at the start."""
+        grid = grid_of(self.mission, self.scene, self.field)
+        return first_tether(self.mission, self.field, self.model, grid)
+
+    def _joined(self) -> Check:
+        """Validation asks the ends of each path; that one goes on where the other ended, here."""
+        gaps = [float(np.linalg.norm(b[0] - a[-1])) for a, b in pairwise(self.legs)]
+        off = max(gaps, default=0.0)
+        left = len(self.mission.waypoints) - len(self.tour.stops)
+        told = f"{len(self.tour.stops)} stops" + (f", {left} waypoints left out" if left else "")
+        good = off <= self.mission.reach
+        return Check(
+            "leads through the waypoints and home", good,
+            told if good else f"a leg begins {off:.3g} m from where the one before it ended",
+        )  # fmt: skip
+
+    def _clear(self) -> Check:
+        line = self.tour.line
+        room = float(self.field.distance(polylines.dense(line, 0.02)).min())
+        ends = [float(self.field.distance(leg[[0, -1]]).min()) for leg in self.legs]
+        # a leg has the clearance that its ends have; a taut corner dips a little below it
+        wanted = min([self.mission.clearance, *ends]) - 0.5 * self.mission.delta
+        free = all(self.field.line_of_sight(a, b, depth=1e-3) for a, b in pairwise(line))
+        return Check(
+            "keeps clear of solids", free and room >= wanted,
+            f"{room:.3g} m from the nearest" if free else "passes through a solid",
+        )  # fmt: skip
+
+    def _words(self) -> list[Check]:
+        mission = self.mission
+        grid = grid_of(mission, self.scene, self.field)
+        high = grid.low + grid.cell * np.array(grid.free.shape)
+        words = SpaceSignature.of(
+            self.field, grid.low, high, grid.cell, mission.anchor, tolerance=DIP * mission.delta
+        )
+        walked, wrong = self.laid.nodes, []
+        for k, (stop, leg) in enumerate(zip(self.tour.stops, self.legs, strict=False)):
+            walked = np.vstack([walked, leg])
+            word, broken = words.word_until(np.vstack([walked, mission.places[k]]))
+            if broken is not None or word != stop.signature:
+                found = "no word" if broken is not None else f"the word {list(word)}"
+                wrong.append(f"stop {k} has {found}, stated {list(stop.signature)}")
+        word, broken = words.word_until(np.vstack([walked, self.legs[-1], self.laid.nodes[::-1]]))
+        certain = "" if words.exact else "; other words may be of the same class, too"
+        return [
+            Check(
+                "words at the stops", not wrong,
+                f"all as stated{certain}" if not wrong else
+                f"{wrong[0]}" + (f", and {len(wrong) - 1} more" if len(wrong) > 1 else ""),
+            ),
+            Check(
+                "empty word at the end", broken is None and word == (),
+                "contractible" if broken is None and word == () else
+                "no word" if broken is not None else f"{list(word)}",
+            ),
+        ]  # fmt: skip
+
+    def _tethers(self) -> list[Check]:
+        tether, longest, where, off = self.laid, 0.0, 0, []
+        for k, leg in enumerate(self.legs):
+            tether, lengths = self.model.drive(tether, leg[1:])
+            if lengths.max() > longest:
+                longest, where = float(lengths.max()), k
+            if k < len(self.tour.stops):
+                stated = self.tour.stops[k].tether_length
+                allowed = self.mission.delta + LENGTH_TOLERANCE * stated
+                if abs(tether.length - stated) > allowed:
+                    off.append(f"stop {k}: {tether.length:.3f} m, stated {stated:.3f}")
+        left = self.model.refine(tether).length - self.model.refine(self.laid).length
+        limit = self.mission.tether_length
+        name = "home" if where == len(self.tour.stops) else f"stop {where}"
+        return [
+            Check(
+                "within the tether's length", longest <= limit * (1.0 + ROUNDING),
+                f"longest {longest:.3f} of {limit:g} m, on the way to {name}",
+            ),
+            Check(
+                "tethers as long as stated", not off,
+                "all" if not off else
+                f"{off[0]}" + (f", and {len(off) - 1} more" if len(off) > 1 else ""),
+            ),
+            Check(
+                "free at home", left <= FREE * self.mission.delta,
+                f"{max(left, 0.0):.3f} m longer than at the start",
+            ),
+        ]  # fmt: skip
+
+    def _length(self) -> Check:
+        length = sum(float(polylines.length(leg)) for leg in self.legs)
+        stated = self.tour.length
+        good = abs(length - stated) <= self.mission.reach + ROUNDING * stated
+        return Check(
+            "length as stated", good,
+            f"{stated:.6g} m" if good else f"the path is {length:.6g} m long, stated {stated:.6g}",
+        )  # fmt: skip
+
+    def _bounds(self) -> Check:
+        tour, faults = self.tour, []
+        for name, bound, gap in (
+            ("lower_bound", tour.lower_bound, tour.gap),
+            ("bound_of_all", tour.bound_of_all, tour.gap_to_all),
+        ):
+            slack = ROUNDING * tour.length
+            if bound is not None and bound > tour.length + slack:
+                faults.append(f"{name} {bound:.6g} is above the length")
+            right = relative_gap(tour.length, bound)
+            if (right is None) != (gap is None) or abs((right or 0.0) - (gap or 0.0)) > 1e-6:
+                faults.append(f"the gap of {name} is {right}, stated {gap}")
+        proven = tour.gap is not None and tour.gap <= ROUNDING
+        if tour.status is Status.OPTIMAL and not proven:
+            faults.append(f"status optimal with a gap of {tour.gap}")
+        if tour.status not in (Status.OPTIMAL, Status.FEASIBLE):
+            faults.append(f"status {tour.status.value}; expected optimal or feasible")
+        return Check("bounds and status", not faults, faults[0] if faults else tour.status.value)
