@@ -33,11 +33,11 @@ from netsp.online.scene.scene import scene_of
 from netsp.online.simulate import grid_of, simulate
 from netsp.space.plan import SHARE, plan
 from netsp.space.signature import SpaceSignature
-from netsp.space.solve import GOING_ON, seconds_until_home, solve_mission
+from netsp.space.solve import AS_GIVEN, GOING_ON, seconds_until_home, solve_mission
 from netsp.worlds import reachable_world
 
 MISSIONS = ("basin", "pipes", "jacket")
-WAYS = {GOING_ON: "going straight on"}
+WAYS = {GOING_ON: "going straight on", AS_GIVEN: "the order given"}
 
 LOW, HIGH, ANCHOR = [-5.0] * 3, [5.0] * 3, [4.0, 0.3, 3.0]
 POSTS = np.array([[-2.0, -1.0], [0.5, 1.5], [2.0, -2.0]])

@@ -125,7 +125,7 @@ def summary(
     units: str,
 ) -> str:  # fmt: skip
     """What was found, in a few lines."""
-    from netsp.space.solve import seconds_until_home
+    from netsp.space.solve import AS_GIVEN, seconds_until_home
 
     tour, status = found.tour, found.tour.status.value
     if status == "optimal":
@@ -135,6 +135,8 @@ def summary(
             f"bound {tour.lower_bound:.6g} along {tour.legs} legs between {tour.states} states of "
             "the tether"
         )
+    elif tour.solver == AS_GIVEN:
+        verdict = "in the order given, for no better one was found"
     else:
         verdict = "found by going straight on"
     lines = [f"tour     {tour.length:.6g} {units}, {verdict}"]

@@ -171,7 +171,9 @@ class _Judge:
                 allowed = self.mission.delta + LENGTH_TOLERANCE * stated
                 if abs(tether.length - stated) > allowed:
                     off.append(f"stop {k}: {tether.length:.3f} m, stated {stated:.3f}")
-        left = self.model.refine(tether).length - self.model.refine(self.laid).length
+        # as at the start, but to where the tour ends, which may be its reach away
+        as_laid = self.model.update(self.laid, tether.robot)
+        left = self.model.refine(tether).length - self.model.refine(as_laid).length
         limit = self.mission.tether_length
         name = "home" if where == len(self.tour.stops) else f"stop {where}"
         return [
