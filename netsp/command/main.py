@@ -119,6 +119,7 @@ COMMANDS = {
     "plan": {
         "solve": ("solve", "find the shortest non-entangling tour of a problem or a mission"),
         "app": ("app", "plan on a map in the browser"),
+        "cover": ("cover", "place waypoints that see a structure"),
         "verify": ("verify", "judge a solution independently of what found it"),
         "margins": ("margins", "find how far the world may be off before a tour does not fit"),
         "plot": ("plot", "draw a problem or a scene, with a solution or a tether"),

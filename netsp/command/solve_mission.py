@@ -10,7 +10,7 @@ import os
 import sys
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, Any
 
 from netsp.command.types import check_writable
 from netsp.errors import EXIT_NOT_ALL, InputError
@@ -22,9 +22,6 @@ if TYPE_CHECKING:
 
 TIME_LIMIT = 60.0
 """Seconds, where no limit is given."""
-
-EVERY = 5.0
-"""Seconds between two lines of one stage where nobody watches a terminal."""
 
 FOR_PROBLEMS = {
     "roadmap": "--roadmap", "classes_rule": "--classes", "samples": "--samples",
@@ -38,12 +35,12 @@ FOR_PROBLEMS = {
 def is_mission(file: str) -> bool:
     """Whether a file is a mission; what cannot be read is left to who reads problems."""
     from netsp.files import read_text
+    from netsp.models import kind_of, parse_json_object
 
     try:
-        found = json.loads(read_text(file))
-    except (InputError, ValueError, RecursionError):
+        return kind_of(parse_json_object(read_text(file), file)) == "mission"
+    except InputError:
         return False
-    return isinstance(found, dict) and "waypoints" in found and "goals" not in found
 
 
 def check_flags(args: argparse.Namespace, parser_defaults: dict[str, Any]) -> None:
@@ -71,6 +68,7 @@ def solve(
         style.check_format(plot)
     mission = Mission.load(file)
     from netsp.command.compiling import compile_messages
+    from netsp.command.stages import Stages
     from netsp.space.solve import solve_mission
 
     stages = None if quiet else Stages(sys.stderr)
@@ -184,34 +182,3 @@ def _as_given(found: SolvedMission) -> str:
     return f"in the order given {seconds_until_home(found.given):.1f} s" + (
         f", {missed} waypoints missed" if missed else ""
     )
-
-
-class Stages:
-    """Shows what is being done: in one line that is written again where somebody watches, else in a
-    line for each stage, and for a long one now and then."""
-
-    def __init__(self, stream: TextIO) -> None:
-        self._stream, self._begin = stream, time.monotonic()
-        self._watched = stream.isatty()
-        self._stage, self._shown = "", -EVERY
-
-    def __call__(self, text: str) -> None:
-        """Show it, if it is a new stage or some time has passed."""
-        now = time.monotonic()
-        stage = text.split(",")[0].split(" from ")[0]
-        if stage == self._stage and now - self._shown < (0.1 if self._watched else EVERY):
-            return
-        line = f"{now - self._begin:7.1f}s  {text} …"
-        if self._watched:
-            end = "\n" if stage != self._stage and self._stage else ""
-            print(f"{end}\r{line:<78}", end="", file=self._stream, flush=True)
-        else:
-            print(line, file=self._stream, flush=True)
-        self._stage, self._shown = stage, now
-
-    def __enter__(self) -> Stages:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        if self._watched and self._stage:
-            print(file=self._stream)

@@ -11,7 +11,7 @@ import numpy as np
 from netsp.arrays import Bools, Floats
 from netsp.clock import Clock, TimeLimit, until_interrupt
 from netsp.cover.choose import Choice, choose
-from netsp.cover.viewpoints import Viewer, Viewpoints, viewpoints_of
+from netsp.cover.viewpoints import Viewer, Viewpoints, coarser, viewpoints_of
 from netsp.errors import InputError
 from netsp.fields import Point3, checked_argument
 from netsp.geometry import polylines
@@ -58,6 +58,8 @@ class Cover:
         Share of the whole surface that is seen from the waypoints.
     visible : float
         Share of it that is seen from any of the candidates.
+    visible_patches : ndarray of bool, shape (m,)
+        Patches that are seen from any of the candidates.
     """
 
     mission: Mission
@@ -67,6 +69,7 @@ class Cover:
     bound: int
     seen: float
     visible: float
+    visible_patches: Bools
 
     def __repr__(self) -> str:
         """In a line."""
@@ -147,7 +150,8 @@ def cover(
         base = field.free_point(anchor, "anchor")
         first = base if start is None else field.free_point(start, "start")
         tell("surface of the scene")
-        patches = patches_of(scene, field, camera.patch, np.array([anchor]), inspect)
+        fine = patches_of(scene, field, camera.patch, np.array([anchor]), inspect)
+        patches = coarser(fine, camera.patch)
         mission = Mission(
             scene="-", name=scene.name, anchor=anchor, start=tuple(first.tolist()),
             waypoints=(MissionWaypoint(position=anchor),), clearance=clearance, camera=camera,
@@ -268,9 +272,10 @@ def _made(
         for (x, y, z), h in zip(chosen.places.round(4).tolist(), chosen.headings, strict=True)
     )
     areas = patches.areas
+    visible: Bools = np.asarray(found.sees.any(axis=0))
     return Cover(
         mission.model_copy(update={"waypoints": waypoints, "tether_length": length}), chosen,
         patches, len(found), choice.bound,
         float(areas[chosen.sees.any(axis=0)].sum() / areas.sum()),
-        float(areas[found.sees.any(axis=0)].sum() / areas.sum()),
+        float(areas[visible].sum() / areas.sum()), visible,
     )  # fmt: skip

@@ -21,12 +21,15 @@ from netsp.online.coverage import Coverage, Patches
 from netsp.online.equipment import Camera
 from netsp.online.scene.field import DistanceField
 
-SPACING = 0.35
+SPACING = 0.25
 """Of the width that the camera sees at the stand-off: from one patch that is stood before to the
 next."""
 
 TRIES = 24
 """Places at other angles and distances for a patch that is not seen yet."""
+
+AT_ONCE = 100
+"""Patches not seen yet, for which places are sought together."""
 
 NEARER = 0.4
 """Of the stand-off: as near as that the robot goes where there is no other place."""
@@ -182,7 +185,11 @@ class Viewer:
         level = np.hypot(toward[:, 0], toward[:, 1]) > 0.2 * np.linalg.norm(toward, axis=1)
         headings = np.where(level, headings, 0.0)
         sees = [self.seen_from(p, float(h)) for p, h in zip(places, headings, strict=True)]
-        return Viewpoints(places, headings, np.array(sees).reshape(len(places), -1))
+        return Viewpoints(
+            places,
+            headings,
+            np.array(sees, dtype=bool).reshape(len(places), len(self.patches.areas)),
+        )
 
 
 def viewpoints_of(
@@ -216,31 +223,71 @@ def viewpoints_of(
     seen: Bools = np.asarray(found[0].sees.any(axis=0))
     hidden = np.flatnonzero(~seen)
     rng.shuffle(hidden)
-    # what is still hidden is looked at one after the other, for a place often shows its neighbours
-    for k, patch in enumerate(hidden):
-        if clock.up:
-            break
-        if seen[patch]:
+    # one after the other, for a place that shows one often shows its neighbours
+    for part in np.array_split(hidden, max(1, math.ceil(len(hidden) / AT_ONCE))):
+        left = part[~seen[part]]
+        if clock.up or not len(left):
             continue
-        if k % 50 == 0:
-            tell(f"looking for what is hidden, {int((~seen).sum())} patches left")
-        many = np.full(TRIES, patch)
-        off = rng.normal(size=(TRIES, 3)) * rng.uniform(0.0, 1.2, TRIES)[:, None]
-        least, most = NEARER * viewer.standoff, min(viewer.farthest, 2.0 * viewer.standoff)
-        far = rng.uniform(min(least, most), most, TRIES)
-        far[: TRIES // 2] = viewer.standoff
-        off[0] = 0.0
-        for place, target in zip(*viewer.before(many, off, far), strict=True):
-            view = viewer.looks(place[None], np.array([target]))
+        tell(f"looking for what is hidden, {int((~seen).sum())} patches left")
+        for place, patch in zip(*viewer.before(*_around(viewer, left, rng)), strict=True):
+            if seen[patch] or clock.up:
+                continue
+            view = viewer.looks(place[None], np.array([patch]))
             if view.sees[0, patch]:
                 found.append(view)
                 seen |= view.sees[0]
-                break
     return Viewpoints(
         np.vstack([f.places for f in found]),
         np.concatenate([f.headings for f in found]),
         np.vstack([f.sees for f in found]),
     )
+
+
+def _around(viewer: Viewer, patches: Ints, rng: np.random.Generator) -> tuple[Ints, Floats, Floats]:
+    """For each patch, other angles and distances to look at it from; straight first."""
+    many = np.repeat(patches, TRIES)
+    off = rng.normal(size=(len(many), 3)) * rng.uniform(0.0, 1.2, len(many))[:, None]
+    least, most = NEARER * viewer.standoff, min(viewer.farthest, 2.0 * viewer.standoff)
+    far = rng.uniform(min(least, most), most, len(many))
+    far[np.arange(len(many)) % TRIES < TRIES // 2] = viewer.standoff
+    off[::TRIES] = 0.0
+    return many, off, far
+
+
+def coarser(patches: Patches, size: float) -> Patches:
+    """Patches of one cube of space that face the same of six ways as one: tubes are drawn by
+    slivers, of which a view shows hundreds. Its place is that of the patch in their middle.
+
+    Parameters
+    ----------
+    patches : Patches
+        Of a scene.
+    size : float
+        Of the cubes, metres.
+
+    Returns
+    -------
+    Patches
+        Of the same area.
+    """
+    count = len(patches.areas)
+    normals = patches.normals
+    axis = np.abs(normals).argmax(axis=1)
+    facing = 2 * axis + (normals[np.arange(count), axis] > 0.0)
+    cells = np.floor(patches.centres / size).astype(np.int64)
+    _, which = np.unique(np.column_stack([cells, facing]), axis=0, return_inverse=True)
+    which = which.ravel()
+    size_of = np.bincount(which)
+    middle = np.column_stack([np.bincount(which, c) for c in patches.centres.T]) / size_of[:, None]
+    off = np.linalg.norm(patches.centres - middle[which], axis=1)
+    order = np.lexsort((off, which))
+    first = order[np.r_[True, np.diff(which[order]) > 0]]
+    areas: Floats = np.bincount(which, patches.areas).astype(float)
+    sides = patches.sides
+    if len(sides):
+        sides = np.unique(which[sides], axis=0)
+        sides = sides[sides[:, 0] != sides[:, 1]]
+    return Patches(patches.centres[first], normals[first], areas, sides)
 
 
 def spread(points: Floats, apart: float) -> Ints:

@@ -1,0 +1,40 @@
+"""Progress of work that goes through stages."""
+
+from __future__ import annotations
+
+import time
+from typing import TextIO
+
+EVERY = 5.0
+"""Seconds between two lines of one stage where nobody watches a terminal."""
+
+
+class Stages:
+    """Shows what is being done: in one line that is written again where somebody watches, else in a
+    line for each stage, and for a long one now and then."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream, self._begin = stream, time.monotonic()
+        self._watched = stream.isatty()
+        self._stage, self._shown = "", -EVERY
+
+    def __call__(self, text: str) -> None:
+        """Show it, if it is a new stage or some time has passed."""
+        now = time.monotonic()
+        stage = text.split(",")[0].split(" from ")[0]
+        if stage == self._stage and now - self._shown < (0.1 if self._watched else EVERY):
+            return
+        line = f"{now - self._begin:7.1f}s  {text} …"
+        if self._watched:
+            end = "\n" if stage != self._stage and self._stage else ""
+            print(f"{end}\r{line:<78}", end="", file=self._stream, flush=True)
+        else:
+            print(line, file=self._stream, flush=True)
+        self._stage, self._shown = stage, now
+
+    def __enter__(self) -> Stages:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._watched and self._stage:
+            print(file=self._stream)
