@@ -22,8 +22,10 @@ EXAMPLE = (
 
 def arguments(p: argparse.ArgumentParser) -> None:
     """Of the command line."""
-    p.add_argument("solution", metavar="SOLUTION", help="solution file (JSON)")
-    p.add_argument("--problem", required=True, metavar="FILE", help="the problem it solves")
+    p.add_argument(
+        "solution", metavar="SOLUTION", help="solution file, or a mission that was planned (JSON)"
+    )
+    p.add_argument("--problem", metavar="FILE", help="the problem that a solution solves")
     p.add_argument(
         "--format", metavar="NAME",
         help="plan (QGroundControl), wpl (QGC WPL 110), geojson or csv; default: by the extension",
@@ -56,11 +58,21 @@ def arguments(p: argparse.ArgumentParser) -> None:
         "--margin", default="0.3,0.2", metavar="SLACK[,CLEARANCE]",
         help="warn where less tether is left or an obstacle is closer; default 0.3,0.2",
     )  # fmt: skip
+    p.add_argument(
+        "--surface", type=float, default=0.0, metavar="Z",
+        help="of a mission: z of the water's surface (m); default 0",
+    )  # fmt: skip
     p.add_argument("-o", "--output", required=True, metavar="FILE")
 
 
 def run(args: argparse.Namespace) -> int:
     """Write the file, warn of what is tight, and return the exit code."""
+    from netsp.command.solve_mission import is_mission
+
+    if is_mission(args.solution):
+        return _mission(args)
+    if args.problem is None:
+        raise InputError(f"--problem: {args.solution} is no mission; expected its problem")
     check_writable(args.output, inputs=(args.solution, args.problem))
     from netsp.export.margins import warnings
     from netsp.export.write import (
@@ -114,4 +126,53 @@ def run(args: argparse.Namespace) -> int:
                 f"{counted(shallow, 'waypoint')} shallower than {SHALLOWEST} m moved to that depth"
             )
         messages.note("home is assumed to be at the surface above the base; do not set it by hand")
+    return 0
+
+
+def _mission(args: argparse.Namespace) -> int:
+    """Write a planned mission."""
+    if args.problem is not None:
+        raise InputError(f"--problem: {args.solution} is a mission; expected none")
+    check_writable(args.output, inputs=(args.solution,))
+    from netsp.export.mission import export_mission
+    from netsp.export.write import SHALLOWEST, Settings, format_of, predicted_s
+    from netsp.online.mission import Mission
+    from netsp.site.projection import Projection
+
+    mission = Mission.load(args.solution)
+    kind = format_of(args.output, args.format)
+    slack, clearance = margins(args.margin)
+    projection = None
+    if args.origin:
+        projection = Projection.parse(args.origin, mission.start[:2], "--origin")
+    settings = Settings(hold=args.hold, speed=args.speed, max_waypoints=args.max_waypoints)
+    done = export_mission(
+        mission, args.output, kind, projection, acceptance=args.acceptance, settings=settings,
+        surface=args.surface,
+    )  # fmt: skip
+    stops = sum(p.goal is not None and p.goal >= 0 for p in done.points)
+    print(
+        f"{args.output}: {len(done.points)} waypoints, {stops} of them stops, all in the classes "
+        f"of the plan; about {predicted_s(done.points, settings):.0f} s at {settings.speed:g} m/s, "
+        f"stops included; longest tether {done.longest:.2f} of {mission.tether_length:g} m",
+        file=sys.stderr,
+    )
+    if mission.tether_length - done.longest < slack:
+        messages.warning(
+            f"only {mission.tether_length - done.longest:.2f} m of tether are left, less than the "
+            f"margin of {slack:g}: plan with a shorter tether_length, or set another margin"
+        )
+    if done.room < clearance:
+        messages.warning(
+            f"the lines between waypoints come within {done.room:.2f} m of a solid, less than the "
+            f"margin of {clearance:g}: plan with a larger clearance, or set another margin"
+        )
+    if kind in ("plan", "wpl"):
+        shallow = sum(p.position[2] > -SHALLOWEST for p in done.points)
+        if shallow:
+            messages.note(
+                f"{counted(shallow, 'waypoint')} shallower than {SHALLOWEST} m moved to that depth"
+            )
+        messages.note("the solids are not written: fences are upright, whatever the depth")
+        messages.note("home is assumed to be at the surface above the start; do not set it by hand")
     return 0

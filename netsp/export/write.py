@@ -117,12 +117,38 @@ def export(
     if max(v.goal for v in solution.tour) >= len(problem.goals):
         raise InputError(f"solution: tour: expected goals #0 to #{len(problem.goals) - 1}")
     acceptance = checked_argument("acceptance", acceptance, 0.0)
-    if not isinstance(kind, str) or kind not in FORMATS:
-        raise InputError(f"format: expected {', '.join(FORMATS)}, got {kind!r}")
+    settings = settings or Settings()
+    check_settings(kind, settings)
     projection = projection or Projection.of(problem)
     if projection is None and kind != "csv":
         raise InputError(f"origin: format {kind!r} needs latitude and longitude of the base")
-    settings = settings or Settings()
+    points = [start_of(problem, solution), *waypoints_of(problem, solution, acceptance)]
+    if len(points) > settings.max_waypoints and kind in ("plan", "wpl"):
+        raise InputError(
+            f"solution: needs {len(points)} waypoints, and the vehicle takes "
+            f"{settings.max_waypoints}; raise that number if yours takes more"
+        )
+    write_text(file, FORMATS[kind](problem, points, projection, settings))
+    return points
+
+
+def check_settings(kind: str, settings: Settings) -> None:
+    """What a mission file is to say, asked before anything is written.
+
+    Parameters
+    ----------
+    kind : str
+        One of `FORMATS`.
+    settings : Settings
+        Of the file.
+
+    Raises
+    ------
+    InputError
+        An unknown kind; a speed, seconds or a number of waypoints out of range.
+    """
+    if not isinstance(kind, str) or kind not in FORMATS:
+        raise InputError(f"format: expected {', '.join(FORMATS)}, got {kind!r}")
     if settings.speed is not None and not checked_argument("speed", settings.speed, 0.0, FASTEST):
         raise InputError("speed: expected more than 0, got 0")
     for name, least in (("hold", 0), ("bend", 1)):
@@ -132,14 +158,6 @@ def export(
                 f"{name}: expected whole seconds from {least} to 3600, got {seconds!r}"
             )
     checked_argument("max_waypoints", settings.max_waypoints, 1)
-    points = [start_of(problem, solution), *waypoints_of(problem, solution, acceptance)]
-    if len(points) > settings.max_waypoints and kind in ("plan", "wpl"):
-        raise InputError(
-            f"solution: needs {len(points)} waypoints, and the vehicle takes "
-            f"{settings.max_waypoints}; raise that number if yours takes more"
-        )
-    write_text(file, FORMATS[kind](problem, points, projection, settings))
-    return points
 
 
 def start_of(problem: Problem, solution: Solution) -> Waypoint:
