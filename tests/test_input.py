@@ -313,7 +313,7 @@ def kinds(folder: Path) -> dict[str, str]:
 def test_a_file_of_another_kind_is_called_what_it_is(tmp_path, capsys):
     files = kinds(tmp_path)
     wanted = {
-        "problem": ["solve", "FILE"],
+        "problem": ["tether", "FILE"],
         "solution": ["verify", SMALL, "FILE"],
         "mission": ["simulate", "FILE"],
         "surprise file": ["execute", SMALL, files["solution"], "--surprise", "FILE"],
