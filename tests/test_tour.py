@@ -318,6 +318,15 @@ def test_when_the_time_is_up_there_is_a_tour(tmp_path):
     assert found.run is None
 
 
+@pytest.fixture
+def ctrl_c():
+    """Python's own handler, whatever servers of other tests have left behind."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before or signal.SIG_DFL)
+
+
+@pytest.mark.usefixtures("ctrl_c")
 def test_ctrl_c_ends_the_search_with_a_tour(tmp_path):
     mission = Mission.load(written(tmp_path))
 
@@ -336,15 +345,29 @@ def test_ctrl_c_ends_the_search_with_a_tour(tmp_path):
 def pressed_twice() -> None:
     with until_interrupt(None) as clock:
         signal.raise_signal(signal.SIGINT)
-        while not clock.up:
+        for _ in range(500):
+            if clock.up:
+                break
             threading.Event().wait(0.01)
+        assert clock.up
         signal.raise_signal(signal.SIGINT)
 
 
+@pytest.mark.usefixtures("ctrl_c")
 def test_pressed_again_it_interrupts():
     with pytest.raises(KeyboardInterrupt):
         pressed_twice()
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+@pytest.mark.usefixtures("ctrl_c")
+def test_a_handler_of_somebody_else_is_left_alone():
+    heard: list[int] = []
+    signal.signal(signal.SIGINT, lambda *_: heard.append(1))
+    with until_interrupt(None) as clock:
+        signal.raise_signal(signal.SIGINT)
+        assert not clock.up
+    assert heard == [1]
 
 
 POINT = st.tuples(*[st.integers(-5, 5).map(float)] * 3)

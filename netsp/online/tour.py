@@ -71,7 +71,10 @@ class PlannedTour(Model):
         Whether words that differ are of different classes.
     """
 
-    stops: tuple[PlannedStop, ...]
+    stops: Annotated[
+        tuple[PlannedStop, ...],
+        Field(description="one for each of the first waypoints; the others are not reached"),
+    ]
     home: Annotated[PathField, Field(description="from the last stop to the start, m")]
     status: Annotated[
         Status, Field(description="optimal: shortest along the states and legs that were found")
