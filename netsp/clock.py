@@ -63,6 +63,10 @@ class Clock:
         """A clock that starts now, from seconds, a clock that it may not outlast, or no limit."""
         return cls(within=limit) if isinstance(limit, Clock) else cls(limit)
 
+    def part(self, share: float) -> Clock:
+        """A clock for a share of the time that is left."""
+        return Clock(None if self.limit is None else share * self.left, within=self)
+
     @property
     def limit(self) -> float | None:
         """Seconds from the start to the deadline; None without a limit."""

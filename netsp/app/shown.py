@@ -158,8 +158,9 @@ def _of_execution(place: Path, problem: Problem, solution: Solution) -> Shown:
 
 def _of_mission(place: Path) -> Shown:
     """A mission that was flown; the tether is worked out again along the way."""
+    from netsp.online.laid import present_tether
     from netsp.online.mission import Mission
-    from netsp.online.simulate import first_tether, grid_of
+    from netsp.online.simulate import grid_of
     from netsp.online.tether import GeodesicTether
     from netsp.online.track import Track
 
@@ -170,7 +171,7 @@ def _of_mission(place: Path) -> Shown:
     path = np.array([[float(r[k]) for k in "xyz"] for r in rows])
     scene_field = scene.field()
     model = GeodesicTether(scene_field, mission.delta)
-    state = first_tether(mission, scene_field, model, grid_of(mission, scene, scene_field))
+    state = present_tether(mission, scene_field, model, grid_of(mission, scene, scene_field))
     track, frames, every = Track.of(mission), [], max(1, len(rows) // FRAMES)
     for k, row in enumerate(rows):
         anchor = None if track is None else track(float(row["time"]))

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from netsp.arrays import Bools, Floats
-from netsp.clock import Clock, TimeLimit, until_interrupt
+from netsp.clock import TimeLimit, until_interrupt
 from netsp.cover.choose import Choice, choose
 from netsp.cover.viewpoints import Viewer, Viewpoints, coarser, viewpoints_of
 from netsp.errors import InputError
@@ -162,7 +162,7 @@ def cover(
             field, patches, camera, standoff, clearance, math.radians(incidence), farthest,
             reach.allowed,
         )  # fmt: skip
-        looking = Clock(None if clock.limit is None else LOOKING * clock.left, within=clock)
+        looking = clock.part(LOOKING)
         found = viewpoints_of(viewer, np.random.default_rng(seed), looking, tell)
         if not len(found) or not found.sees.any():
             raise InputError(

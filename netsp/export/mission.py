@@ -17,20 +17,17 @@ import numpy as np
 from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.execute.plan import HOME
-from netsp.export.waypoints import STRAIGHT, Waypoint
+from netsp.export.waypoints import STRAIGHT, Waypoint, turn
 from netsp.export.write import FORMATS, Settings, check_settings
-from netsp.fields import checked_argument
+from netsp.fields import Point3, checked_argument
 from netsp.files import write_text
 from netsp.geometry import polylines
 from netsp.online.mission import Mission
 from netsp.online.scene.field import DistanceField
 from netsp.online.scene.scene import Scene
-from netsp.online.simulate import first_tether, grid_of
-from netsp.online.tether import GeodesicTether
 from netsp.problem import Goal, Problem
 from netsp.site.projection import Projection
-from netsp.space.signature import SpaceSignature
-from netsp.space.water import DIP
+from netsp.space.water import Water
 
 SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Of the acceptance radius: a vehicle cuts corners by as much as that, or by less."""
@@ -115,12 +112,13 @@ def export_mission(
         )
     scene = scene or mission.load_scene()
     field = scene.field()
+    water = Water.of(mission, scene, field)
     line = np.array([p.position for p in points])
     longest = 0.0
     for share in SHARES if acceptance else SHARES[:1]:
         way = pursued(line, share * acceptance) if share else line
         _check_free(field, way, share * acceptance)
-        longest = max(longest, _checked(mission, scene, field, points, way, share == 0.0))
+        longest = max(longest, _checked(water, points, way, share == 0.0))
     sunk = [_sunk(p, surface) for p in points]
     write_text(file, FORMATS[kind](_stand_in(mission, surface), sunk, projection, settings))
     room = float(field.distance(polylines.dense(line, 0.05)).min())
@@ -132,11 +130,9 @@ def _waypoints(mission: Mission, projection: Projection | None) -> list[Waypoint
     tour = mission.tour
     assert tour is not None
     north = 0.0 if projection is None else projection.heading
-    out = [Waypoint(mission.start, None, start=True)]
+    out = [Waypoint(mission.begin, None, start=True)]
     for k, stop in enumerate(tour.stops):
-        for a, b, c in zip(stop.path, stop.path[1:], stop.path[2:], strict=False):
-            if _turn(np.array(a), np.array(b), np.array(c)) > STRAIGHT:
-                out.append(Waypoint(b, None))
+        out += _bends(stop.path)
         heading = mission.waypoints[k].heading
         out.append(
             Waypoint(
@@ -145,17 +141,18 @@ def _waypoints(mission: Mission, projection: Projection | None) -> list[Waypoint
                 heading=None if heading is None else (north + 90.0 - heading) % 360.0,
             )
         )  # fmt: skip
-    for a, b, c in zip(tour.home, tour.home[1:], tour.home[2:], strict=False):
-        if _turn(np.array(a), np.array(b), np.array(c)) > STRAIGHT:
-            out.append(Waypoint(b, None))
-    return [*out, Waypoint(mission.start, HOME)]
+    return [*out, *_bends(tour.home), Waypoint(mission.start, HOME)]
 
 
-def _turn(a: Floats, b: Floats, c: Floats) -> float:
-    u, v = b - a, c - b
-    if not u.any() or not v.any():
-        return 0.0
-    return float(np.arctan2(np.linalg.norm(np.cross(u, v)), u @ v))
+def _bends(path: tuple[Point3, ...]) -> list[Waypoint]:
+    """Where a path turns between its ends; a point that it comes to twice in a row is no bend."""
+    line = np.array(path)
+    line = line[np.r_[True, (np.diff(line, axis=0) != 0.0).any(axis=1)]]
+    return [
+        Waypoint(tuple(b.tolist()), None)
+        for a, b, c in zip(line, line[1:], line[2:], strict=False)
+        if turn(a, b, c) > STRAIGHT
+    ]
 
 
 def pursued(line: Floats, radius: float) -> Floats:
@@ -197,37 +194,29 @@ def _check_free(field: DistanceField, line: Floats, radius: float) -> None:
         raise InputError(f"mission: the line from ({x:.4g}, {y:.4g}, {z:.4g}) on enters a solid")
 
 
-def _checked(
-    mission: Mission, scene: Scene, field: DistanceField, points: list[Waypoint], line: Floats,
-    exact: bool,
-) -> float:  # fmt: skip
+def _checked(water: Water, points: list[Waypoint], line: Floats, exact: bool) -> float:
     """The longest taut tether along a line, whose word at the end is empty as in the plan; where it
     goes exactly through the waypoints, those at the stops are asked, too."""
-    grid = grid_of(mission, scene, field)
-    high = grid.low + grid.cell * np.array(grid.free.shape)
-    words = SpaceSignature.of(
-        field, grid.low, high, grid.cell, mission.anchor, tolerance=DIP * mission.delta
-    )
-    model = GeodesicTether(field, mission.delta)
-    tether = first_tether(mission, field, model, grid)
-    word, broken = words.word_until(np.vstack([tether.nodes, line, tether.nodes[::-1]]))
+    words, tether = water.words, water.present
+    word, broken = words.word_until(np.vstack([tether.nodes, line, water.laid.nodes[::-1]]))
     if broken is not None or word != ():
         raise InputError("mission: its waypoints are not of the plan's homotopy class")
     if exact:
         for k, p in enumerate(points):
             if p.goal is None or p.goal == HOME:
                 continue
-            there = np.vstack([tether.nodes, line[: k + 1], mission.places[p.goal]])
+            there = np.vstack([tether.nodes, line[: k + 1], water.mission.places[p.goal]])
             word, broken = words.word_until(there)
             if broken is not None or word != p.word:
                 raise InputError(
                     f"mission: at waypoint #{p.goal} the lines are not of the planned class"
                 )
-    longest = float(model.drive(tether, line[1:])[1].max())
-    if longest > mission.tether_length:
+    longest = float(water.model.drive(tether, line[1:])[1].max())
+    limit = water.mission.tether_length
+    if longest > limit:
         raise InputError(
             f"tether_length: the lines between waypoints take {longest:.4g} m; expected no more "
-            f"than {mission.tether_length:g}"
+            f"than {limit:g}"
         )
     return longest
 

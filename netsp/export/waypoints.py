@@ -104,7 +104,7 @@ def waypoints_of(problem: Problem, solution: Solution, radius: float = 0.0) -> l
         if (
             k + 1 < len(points)
             and kinds[k][0] is None
-            and _turn(here, points[k], points[k + 1]) < STRAIGHT
+            and turn(here, points[k], points[k + 1]) < STRAIGHT
         ):
             continue
         keep.append(k)
@@ -185,8 +185,23 @@ def _meeting(a: Floats, b: Floats, c: Floats, d: Floats) -> Floats | None:
     return np.array([*(a[:2] + s * u), 0.5 * (b[2] + c[2])])
 
 
-def _turn(a: Floats, b: Floats, c: Floats) -> float:
-    """Angle (rad) by which a path turns at b."""
+def turn(a: Floats, b: Floats, c: Floats) -> float:
+    """Angle by which a path turns.
+
+    Parameters
+    ----------
+    a : ndarray, shape (k,)
+        A point of it.
+    b : ndarray, shape (k,)
+        The next.
+    c : ndarray, shape (k,)
+        The one after it.
+
+    Returns
+    -------
+    float
+        Radians; pi where two of them are one.
+    """
     u, v = b - a, c - b
     lu, lv = np.linalg.norm(u), np.linalg.norm(v)
     if lu == 0.0 or lv == 0.0:

@@ -26,13 +26,49 @@ from netsp.models import Model
 from netsp.online.equipment import Camera, PositionSensor, RangeSensor, TetherPhysics
 from netsp.online.scene.field import DistanceField, pushed_out
 from netsp.online.scene.scene import Scene
-from netsp.online.tour import PlannedTour
+from netsp.online.tour import PathField, PlannedTour
 
 TURN_TIME = 30.0
 """Seconds that are given to turn to a heading."""
 
 MOST_DWELL = 86400.0
 """Seconds; a day at one waypoint is taken for a mistake of units."""
+
+
+class Viewpoint(Model):
+    """A place and a heading that serve as well as a waypoint's own.
+
+    Attributes
+    ----------
+    position : (x, y, z)
+        Metres.
+    heading : float or None
+        Degrees from the x axis towards the y axis.
+    """
+
+    position: Annotated[Point3, Field(description="(x, y, z), m")]
+    heading: Annotated[
+        Annotated[Number, Field(ge=-360.0, le=360.0)] | None,
+        Field(description="degrees from the x axis towards y; null for any"),
+    ] = None
+
+
+class MissionState(Model):
+    """Where a robot is that is under way, and how its tether lies.
+
+    Attributes
+    ----------
+    position : (x, y, z)
+        Of the robot, metres.
+    tether : tuple of (x, y, z)
+        A line of its class from the anchor to the robot, taut or not, metres.
+    """
+
+    position: Annotated[Point3, Field(description="(x, y, z) of the robot, m")]
+    tether: Annotated[
+        PathField,
+        Field(description="line from the anchor to the robot along which its tether lies, m"),
+    ]
 
 
 class MissionWaypoint(Model):
@@ -46,6 +82,8 @@ class MissionWaypoint(Model):
         Degrees from the x axis towards the y axis, to be turned to before the robot goes on.
     dwell : float
         Seconds to stay there, at that heading.
+    alternatives : tuple of Viewpoint
+        Other places that would do as well: `netsp.space.plan` chooses, all else goes to `position`.
     """
 
     position: Annotated[Point3, Field(description="(x, y, z) to reach, m")]
@@ -57,6 +95,9 @@ class MissionWaypoint(Model):
         Annotated[NonNegative, Field(le=MOST_DWELL)],
         Field(description="seconds to stay there, at that heading"),
     ] = 0.0
+    alternatives: Annotated[
+        tuple[Viewpoint, ...], Field(description="other places that would do as well")
+    ] = ()
 
     @property
     def longest_stay(self) -> float:
@@ -66,7 +107,36 @@ class MissionWaypoint(Model):
     @model_serializer(mode="wrap")
     def _plain(self, handler: SerializerFunctionWrapHandler) -> Any:
         """A bare position where there is nothing else to say."""
-        return self.position if self.heading is None and not self.dwell else handler(self)
+        if self.heading is None and not self.dwell and not self.alternatives:
+            return self.position
+        told = handler(self)
+        if not self.alternatives:
+            del told["alternatives"]
+        return told
+
+    def at(self, choice: int) -> MissionWaypoint:
+        """The same waypoint with one of its alternatives in the place of its own.
+
+        Parameters
+        ----------
+        choice : int
+            Number of the alternative, from 1 on; 0 for what it has.
+
+        Returns
+        -------
+        MissionWaypoint
+            What was its own place is among its alternatives.
+        """
+        if choice == 0:
+            return self
+        own = Viewpoint(position=self.position, heading=self.heading)
+        chosen, rest = self.alternatives[choice - 1], list(self.alternatives)
+        rest[choice - 1] = own
+        return self.model_copy(
+            update={
+                "position": chosen.position, "heading": chosen.heading, "alternatives": tuple(rest)
+            }
+        )  # fmt: skip
 
 
 def _waypoint(value: Any) -> Any:
@@ -96,6 +166,10 @@ WaypointLike = Annotated[
                             "type": "number", "minimum": 0, "maximum": MOST_DWELL, "default": 0,
                             "description": "seconds to stay there, at that heading",
                         },
+                        "alternatives": {
+                            "type": "array", "items": Viewpoint.model_json_schema(), "default": [],
+                            "description": "other places that would do as well",
+                        },
                     },
                     "required": ["position"],
                     "additionalProperties": False,
@@ -121,6 +195,9 @@ class Mission(FileModel):
     start : (x, y, z)
         Where the robot starts, and where it comes home to, metres; with a track, as far from the
         anchor at the end as at the start where there is room for it, else at the anchor.
+    state : MissionState or None
+        Where the robot is by now, and how its tether lies; None for the start, with the tether laid
+        out to it. Waypoints are those that are left to visit.
     waypoints : tuple of MissionWaypoint
         To be visited in this order; a bare ``[x, y, z]`` is accepted.
     tether_length : float
@@ -175,6 +252,10 @@ class Mission(FileModel):
         tuple[TrackPoint, ...],
         Field(description="(t, x, y, z) of a moving anchor after 0 s, s and m; none: it stays"),
     ] = ()
+    state: Annotated[
+        MissionState | None,
+        Field(description="where the robot is by now and how its tether lies; null: at the start"),
+    ] = None
     waypoints: Annotated[
         Annotated[tuple[WaypointLike, ...], Field(min_length=1)],
         Field(description="(x, y, z) to reach in this order, m, or objects with more to do there"),
@@ -254,12 +335,36 @@ class Mission(FileModel):
         return rows
 
     @model_validator(mode="after")
+    def _state_fits(self) -> Self:
+        if self.state is None:
+            return self
+        if self.track:
+            raise ValueError("state: is for a fixed anchor; expected no track beside it")
+        line = self.state.tether
+        for name, end, place in (
+            ("begins", line[0], self.anchor), ("ends", line[-1], self.state.position)
+        ):  # fmt: skip
+            off = float(np.linalg.norm(np.array(end) - place))
+            if off > self.reach:
+                raise ValueError(
+                    f"state.tether: {name} {off:.2f} m from "
+                    f"{'the anchor' if name == 'begins' else 'the robot'}; expected no more than "
+                    f"{self.reach:g}"
+                )
+        return self
+
+    @model_validator(mode="after")
     def _tour_fits(self) -> Self:
         if self.tour is not None:
-            wrong = self.tour.against(self.start, self.places, self.reach)
+            wrong = self.tour.against(self.begin, self.start, self.places, self.reach)
             if wrong is not None:
                 raise ValueError(f"tour.{wrong}")
         return self
+
+    @property
+    def begin(self) -> Point3:
+        """Where the robot is when the mission begins, metres."""
+        return self.start if self.state is None else self.state.position
 
     @property
     def places(self) -> Floats:
@@ -268,9 +373,17 @@ class Mission(FileModel):
 
     @property
     def every_place(self) -> Floats:
-        """(n, 3) anchor, start, waypoints, and where a moving anchor goes, metres."""
+        """(n, 3) anchor, start, waypoints and their alternatives, where a moving anchor goes, and
+        the tether of a state, metres."""
         track = np.array(self.track).reshape(-1, 4)[:, 1:]
-        return np.vstack([self.anchor, self.start, self.places, track])
+        others = [v.position for w in self.waypoints for v in w.alternatives]
+        line = () if self.state is None else self.state.tether
+        return np.vstack(
+            [
+                self.anchor, self.start, self.places, np.array(others).reshape(-1, 3), track,
+                np.array(line).reshape(-1, 3),
+            ]
+        )  # fmt: skip
 
     def checked_waypoints(self, field: DistanceField, *, snap: bool = False) -> Self:
         """The mission with every waypoint outside of solids.

@@ -9,16 +9,15 @@ from typing import Any
 
 import numpy as np
 
-from netsp.arrays import Floats
 from netsp.errors import InputError, interrupted
 from netsp.online.coverage import Coverage, patches_of
+from netsp.online.laid import first_tether, present_tether
 from netsp.online.limits import check_names, check_size
 from netsp.online.log import LogRow, Run
 from netsp.online.mission import TURN_TIME, Mission, MissionWaypoint
-from netsp.online.paths.tree import Grid, ShortestTree
-from netsp.online.paths.tree import taut as taut_path
+from netsp.online.paths.tree import Grid
 from netsp.online.planner import Command, Planner, PlannerOptions, make_planner
-from netsp.online.planner.base import DONE, DWELL, WAIT, Tethers
+from netsp.online.planner.base import DONE, DWELL, WAIT
 from netsp.online.scene.field import DistanceField
 from netsp.online.scene.scene import Scene
 from netsp.online.scene.surfaces import extent
@@ -28,7 +27,7 @@ from netsp.online.stalls import Stalls
 from netsp.online.summary import summarise
 from netsp.online.surprises import SceneSurprises
 from netsp.online.surroundings import Surroundings
-from netsp.online.tether import GeodesicTether, Tether, make_tether
+from netsp.online.tether import GeodesicTether, make_tether
 from netsp.online.track import Track
 from netsp.online.vehicle import make_vehicle
 from netsp.online.vehicle.kinematic import turned
@@ -77,49 +76,6 @@ def grid_of(mission: Mission, scene: Scene, field: DistanceField) -> Grid:
     if mission.cell is None:
         cell = max(CELL, float(np.prod(np.maximum(high - low, CELL)) / MOST_CELLS) ** (1.0 / 3.0))
     return Grid(field, low, high, cell, mission.clearance)
-
-
-def first_tether(mission: Mission, field: DistanceField, model: Tethers, grid: Grid) -> Tether:
-    """The tether when a mission begins: straight, or along the shortest path from the anchor to a
-    start that it does not see.
-
-    Parameters
-    ----------
-    mission : Mission
-        Its anchor and start count.
-    field : DistanceField
-        The scene's field.
-    model : TetherModel
-        The model of the tether.
-    grid : Grid
-        That paths are sought on.
-
-    Returns
-    -------
-    Tether
-        The tether.
-
-    Raises
-    ------
-    InputError
-        Anchor or start inside a solid, or in different parts of the water.
-    """
-    anchor = field.free_point(mission.anchor, "anchor")
-    start = field.free_point(mission.start, "start")
-    if field.line_of_sight(anchor, start, depth=0.125 * mission.delta):
-        return model.start(anchor, start)
-    path = ShortestTree(grid, start, anchor[None]).path(0)
-    if path is None:
-        raise InputError(
-            f"start: no path in the water leads from the anchor {_shown(anchor)} to "
-            f"{_shown(start)} at the clearance {mission.clearance:g}"
-        )
-    path = taut_path(field, path, 0.0, mission.delta)
-    return model.drive(model.start(anchor, anchor), path[1:])[0]
-
-
-def _shown(point: Floats) -> str:
-    return f"({', '.join(f'{v:g}' for v in point)})"
 
 
 def simulate(
@@ -190,7 +146,8 @@ def simulate(
     mission = mission.checked_waypoints(field, snap=snap)
     tethers = GeodesicTether(field, mission.delta)
     grid = grid_of(mission, scene, field)
-    taut = first_tether(mission, field, tethers, grid)
+    laid = first_tether(mission, field, tethers, grid)
+    taut = present_tether(mission, field, tethers, grid)
     if surprises is not None:
         surprises.check(scene)
     if track is not None:
@@ -200,10 +157,10 @@ def simulate(
             f"tether_length: {mission.tether_length:g} is shorter than the path from anchor to "
             f"start, {taut.length:.4g}"
         )
-    robot = make_vehicle(vehicle, np.array(mission.start), mission.speed)
+    robot = make_vehicle(vehicle, np.array(mission.begin), mission.speed)
     believed = None if tether == "geodesic" else make_tether(tether, field, mission.delta)
     chosen = make_planner(planner, mission, field, believed or tethers, grid, options)
-    chosen.laid = taut
+    chosen.laid = laid
     coverage = None
     if mission.camera is not None:
         patches = patches_of(
@@ -218,7 +175,7 @@ def simulate(
     world = Simulation(mission, field, robot, tethers, taut, water, coverage, believed)
     world.positions, world.track = positions, track
     if believed is not None:
-        world.believed = first_tether(mission, field, believed, grid)
+        world.believed = present_tether(mission, field, believed, grid)
     around = None
     if surprises is not None:
         around = Surroundings(

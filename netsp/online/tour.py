@@ -131,15 +131,15 @@ class PlannedTour(Model):
         """Of the tether all along, but for the way home, metres."""
         return max((stop.longest_tether for stop in self.stops), default=0.0)
 
-    def against(
-        self, start: tuple[float, float, float], places: Floats, tolerance: float
-    ) -> str | None:
+    def against(self, begin: Point3, start: Point3, places: Floats, tolerance: float) -> str | None:
         """What does not match the mission that the tour is part of.
 
         Parameters
         ----------
+        begin : (x, y, z)
+            Where the robot is when the mission begins, metres.
         start : (x, y, z)
-            Where the mission starts, metres.
+            Where it comes home to, metres.
         places : ndarray, shape (n, 3)
             Its waypoints, metres.
         tolerance : float
@@ -155,7 +155,7 @@ class PlannedTour(Model):
                 f"stops: {len(self.stops)} of them; expected no more than there are waypoints, "
                 f"{len(places)}"
             )
-        here = np.array(start)
+        here = np.array(begin)
         for k, stop in enumerate(self.stops):
             for name, place, end in (("begins", here, 0), ("ends", places[k], -1)):
                 off = float(np.linalg.norm(np.array(stop.path[end]) - place))
@@ -174,8 +174,8 @@ class PlannedTour(Model):
         return None
 
 
-def simplified(path: Floats) -> Floats:
-    """A path without the points that lie on the line between their neighbours.
+def in_file(path: Floats) -> tuple[Point3, ...]:
+    """A path as a tour's file has it: without points on the line between their neighbours.
 
     Parameters
     ----------
@@ -184,7 +184,7 @@ def simplified(path: Floats) -> Floats:
 
     Returns
     -------
-    ndarray, shape (m, 3)
+    tuple of (x, y, z)
         The same path.
     """
     keep = [0]
@@ -192,4 +192,4 @@ def simplified(path: Floats) -> Floats:
         a, b, c = path[keep[-1]], path[k], path[k + 1]
         if polylines.length(np.array([a, b, c])) > np.linalg.norm(c - a) + 1e-9:
             keep.append(k)
-    return np.asarray(path[[*keep, len(path) - 1]])
+    return tuple((x, y, z) for x, y, z in path[[*keep, len(path) - 1]].tolist())

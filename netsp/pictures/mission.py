@@ -12,10 +12,11 @@ import numpy.typing as npt
 
 from netsp.arrays import Floats
 from netsp.errors import InputError
+from netsp.online.laid import present_tether
 from netsp.online.log import Run
 from netsp.online.scene.scene import Scene
 from netsp.online.scene.surfaces import extent
-from netsp.online.simulate import first_tether, grid_of
+from netsp.online.simulate import grid_of
 from netsp.online.tether import GeodesicTether, Tether
 from netsp.online.track import Track
 from netsp.pictures import style
@@ -131,7 +132,7 @@ def tethers_along(run: Run, scene: Scene, moments: npt.NDArray[np.int64]) -> lis
     mission = run.mission
     field = scene.field()
     model = GeodesicTether(field, mission.delta)
-    state = first_tether(mission, field, model, grid_of(mission, scene, field))
+    state = present_tether(mission, field, model, grid_of(mission, scene, field))
     path, out, at = path_of(run), [], 0
     track = Track.of(mission)
     for row in moments:

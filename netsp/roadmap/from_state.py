@@ -205,7 +205,32 @@ def graph_from_state(
         part.before = np.zeros((last + 1, last + 1), dtype=bool)
         part.before[:last, :last] = problem.precedences
         part.before[last, 1:last] = True
-    start = len(cluster) - 1
-    nearest = [part.tethers[part.members(c)].min() for c in range(1, last)]
-    some_path = float(part.tethers[start] + 2.0 * sum(nearest))
-    return GraphFromState(part, start, 0.505 * some_path, start_tether)
+    return from_state(part, len(cluster) - 1, start_tether)
+
+
+def from_state(
+    graph: TravelGraph, start: int, start_tether: npt.NDArray[np.float64] | None = None
+) -> GraphFromState:
+    """A travel graph one of whose vertices is where the robot is now.
+
+    Parameters
+    ----------
+    graph : TravelGraph
+        With the state as one of its vertices, alone in its cluster; the ways from all vertices to
+        the base are finite.
+    start : int
+        That vertex.
+    start_tether : ndarray, shape (n, 3), optional
+        The taut tether there.
+
+    Returns
+    -------
+    GraphFromState
+        Its tours lead from the state through all other clusters to the base.
+    """
+    home = graph.costs_to_base
+    own = graph.cluster[start]
+    nearest = [home[graph.members(c)].min() for c in range(1, graph.goal_count + 1) if c != own]
+    some_path = float(home[start] + 2.0 * sum(nearest))
+    line = np.zeros((0, 3)) if start_tether is None else start_tether
+    return GraphFromState(graph, start, 0.505 * some_path, line)

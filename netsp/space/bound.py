@@ -13,6 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from netsp.clock import Clock
+from netsp.roadmap.from_state import from_state
 from netsp.solvers.solve import solve_graph
 from netsp.space.legs import Ways
 from netsp.space.water import along
@@ -38,14 +39,19 @@ def bound_of_all(ways: Ways, reached: list[int], clock: Clock, seed: int = 0) ->
     float or None
         Metres; None if there was no time for any.
     """
-    start = np.array(ways.water.mission.start)
-    points = np.vstack([start, ways.points[reached]])
+    places = ways.places
+    visited = set(reached)
+    some = [n for n in range(len(places)) if n == places.begin or places.waypoint[n] in visited]
+    points = np.vstack([np.array(ways.water.mission.start), places.points[some]])
     costs = np.linalg.norm(points[:, None] - points[None], axis=2)
-    for a, n in enumerate(reached, 1):
-        for b, m in enumerate(reached[: a - 1], 1):
+    for a, n in enumerate(some, 1):
+        for b, m in enumerate(some[: a - 1], 1):
             lengths = [along(path) for _, path in ways.known(n, m)]
             if lengths:
                 # the taut one may be a hair shorter than the straight distance by rounding
                 costs[a, b] = costs[b, a] = max(costs[a, b], min(lengths))
-    graph = TravelGraph.from_costs(costs, range(len(points)))
+    cluster = np.r_[0, 1 + np.unique(places.waypoint[some], return_inverse=True)[1]]
+    graph = TravelGraph.from_costs(costs, cluster)
+    if places.begin is not None:
+        graph = from_state(graph, 1 + some.index(places.begin))
     return solve_graph(graph, "auto", time_limit=clock, seed=seed).lower_bound

@@ -12,10 +12,7 @@ from netsp.hsignature import Word
 from netsp.online.log import Run
 from netsp.online.scene.field import DistanceField
 from netsp.online.scene.scene import Scene
-from netsp.online.simulate import first_tether, grid_of
-from netsp.online.tether import GeodesicTether
-from netsp.space.signature import SpaceSignature
-from netsp.space.water import DIP
+from netsp.space.water import Water
 
 
 @dataclass(frozen=True)
@@ -100,18 +97,14 @@ def words_of_flight(
         raise InputError("track: of a moving anchor no words are told; expected a mission without")
     scene = scene or mission.load_scene()
     field = field or scene.field()
-    grid = grid_of(mission, scene, field)
-    high = grid.low + grid.cell * np.array(grid.free.shape)
-    words = SpaceSignature.of(
-        field, grid.low, high, grid.cell, mission.anchor, tolerance=DIP * mission.delta
-    )
-    laid = first_tether(mission, field, GeodesicTether(field, mission.delta), grid).nodes
-    places = np.vstack([laid, np.array([[r.x, r.y, r.z] for r in run.log])])
+    water = Water.of(mission, scene, field)
+    words, laid, begin = water.words, water.laid.nodes, water.present.nodes
+    places = np.vstack([begin, np.array([[r.x, r.y, r.z] for r in run.log])])
     next_one = np.array([r.waypoint for r in run.log])
     stops = []
     for stop in run.summary["stops"]:
         k = int(stop["waypoint"])
-        end = len(laid) + int(np.argmax(next_one > k))
+        end = len(begin) + int(np.argmax(next_one > k))
         # on to the waypoint itself: words of paths compare only where these end at the same place
         word, broken = words.word_until(np.vstack([places[: end + 1], mission.places[k]]))
         stops.append((k, None if broken is not None else word))

@@ -7,7 +7,7 @@ those of the mission's own cells, for letters have no meaning beyond them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -21,12 +21,10 @@ from netsp.online.mission import Mission
 from netsp.online.planner.base import FREE
 from netsp.online.scene.field import DistanceField
 from netsp.online.scene.scene import Scene
-from netsp.online.simulate import first_tether, grid_of
-from netsp.online.tether import GeodesicTether, Tether
+from netsp.online.tether import GeodesicTether
 from netsp.online.tour import PlannedTour
 from netsp.solution import Status
-from netsp.space.signature import SpaceSignature
-from netsp.space.water import DIP
+from netsp.space.water import Water
 from netsp.travel.result import relative_gap
 
 FINER = 0.5
@@ -97,15 +95,10 @@ class _Judge:
         return [*(np.array(s.path) for s in self.tour.stops), np.array(self.tour.home)]
 
     @cached_property
-    def model(self) -> GeodesicTether:
-        """At another resolution."""
-        return GeodesicTether(self.field, FINER * self.mission.delta)
-
-    @cached_property
-    def laid(self) -> Tether:
-        """The tether at the start."""
-        grid = grid_of(self.mission, self.scene, self.field)
-        return first_tether(self.mission, self.field, self.model, grid)
+    def water(self) -> Water:
+        """With the mission's own cells, and its tether at the judge's resolution."""
+        water = Water.of(self.mission, self.scene, self.field)
+        return replace(water, model=GeodesicTether(self.field, FINER * self.mission.delta))
 
     def _joined(self) -> Check:
         """Validation asks the ends of each path; that one goes on where the other ended, here."""
@@ -132,20 +125,17 @@ class _Judge:
         )  # fmt: skip
 
     def _words(self) -> list[Check]:
-        mission = self.mission
-        grid = grid_of(mission, self.scene, self.field)
-        high = grid.low + grid.cell * np.array(grid.free.shape)
-        words = SpaceSignature.of(
-            self.field, grid.low, high, grid.cell, mission.anchor, tolerance=DIP * mission.delta
-        )
-        walked, wrong = self.laid.nodes, []
+        mission, words = self.mission, self.water.words
+        walked, wrong = self.water.present.nodes, []
         for k, (stop, leg) in enumerate(zip(self.tour.stops, self.legs, strict=False)):
             walked = np.vstack([walked, leg])
             word, broken = words.word_until(np.vstack([walked, mission.places[k]]))
             if broken is not None or word != stop.signature:
                 found = "no word" if broken is not None else f"the word {list(word)}"
                 wrong.append(f"stop {k} has {found}, stated {list(stop.signature)}")
-        word, broken = words.word_until(np.vstack([walked, self.legs[-1], self.laid.nodes[::-1]]))
+        word, broken = words.word_until(
+            np.vstack([walked, self.legs[-1], self.water.laid.nodes[::-1]])
+        )
         certain = "" if words.exact else "; other words may be of the same class, too"
         return [
             Check(
@@ -161,9 +151,10 @@ class _Judge:
         ]  # fmt: skip
 
     def _tethers(self) -> list[Check]:
-        tether, longest, where, off = self.laid, 0.0, 0, []
+        model, laid = self.water.model, self.water.laid
+        tether, longest, where, off = self.water.present, 0.0, 0, []
         for k, leg in enumerate(self.legs):
-            tether, lengths = self.model.drive(tether, leg[1:])
+            tether, lengths = model.drive(tether, leg[1:])
             if lengths.max() > longest:
                 longest, where = float(lengths.max()), k
             if k < len(self.tour.stops):
@@ -172,8 +163,8 @@ class _Judge:
                 if abs(tether.length - stated) > allowed:
                     off.append(f"stop {k}: {tether.length:.3f} m, stated {stated:.3f}")
         # as at the start, but to where the tour ends, which may be its reach away
-        as_laid = self.model.update(self.laid, tether.robot)
-        left = self.model.refine(tether).length - self.model.refine(as_laid).length
+        as_laid = model.update(laid, tether.robot)
+        left = model.refine(tether).length - model.refine(as_laid).length
         limit = self.mission.tether_length
         name = "home" if where == len(self.tour.stops) else f"stop {where}"
         return [

@@ -10,11 +10,12 @@ import numpy as np
 
 from netsp.arrays import Floats, Ints
 from netsp.clock import Clock
+from netsp.space.places import Places
 from netsp.space.states import ROUNDS, Effort, State, States
 from netsp.space.water import Water, along, straight
 
 NEIGHBOURS = 10
-"""Waypoints nearest to each that legs are sought to."""
+"""Waypoints nearest to each that legs are sought to; of alternatives twice as many."""
 
 
 @dataclass
@@ -25,27 +26,31 @@ class Ways:
     ----------
     water : Water
         Where they are.
-    points : ndarray, shape (n, 3)
-        The waypoints, metres.
+    places : Places
+        The waypoints, and where else the robot may be.
     effort : Effort
         How many.
     """
 
     water: Water
-    points: Floats
+    places: Places
     effort: Effort
     _known: dict[tuple[int, int], list[tuple[int, Floats]]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        apart = np.linalg.norm(self.points[:, None] - self.points[None], axis=2)
-        np.fill_diagonal(apart, np.inf)
-        count = min(NEIGHBOURS, len(self.points) - 1)
+        apart = self.places.apart
+        count = min(NEIGHBOURS * int(1 + self.places.choice.any()), len(apart) - 1)
         nearest = np.argsort(apart, axis=1, kind="stable")[:, :count]
         both = np.zeros(apart.shape, dtype=bool)
         both[np.arange(len(apart))[:, None], nearest] = True
-        both |= both.T
+        both = (both | both.T) & np.isfinite(apart)
         self.near: list[Ints] = [np.flatnonzero(row) for row in both]
         self._apart = apart
+
+    @property
+    def points(self) -> Floats:
+        """(n, 3) the places, metres."""
+        return self.places.points
 
     def prepare(self, n: int, *, straight_only: bool = False) -> None:
         """Seek the ways from a waypoint to those near it that have a greater number.

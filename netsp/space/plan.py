@@ -25,17 +25,16 @@ import numpy as np
 from netsp.arrays import Floats
 from netsp.clock import Clock, TimeLimit, until_interrupt
 from netsp.errors import InputError, LimitReachedError
-from netsp.fields import Point3
 from netsp.online.mission import Mission
 from netsp.online.scene.field import DistanceField
 from netsp.online.scene.scene import Scene
-from netsp.online.simulate import first_tether, grid_of
-from netsp.online.tether import Tether
-from netsp.online.tour import PlannedStop, PlannedTour, simplified
+from netsp.online.tour import PlannedStop, PlannedTour, in_file
+from netsp.roadmap.from_state import from_state
 from netsp.solution import Status
 from netsp.solvers.solve import SolverLike, solve_graph
 from netsp.solvers.table import SOLVERS
 from netsp.space.legs import Growth, Legs, Ways
+from netsp.space.places import Places
 from netsp.space.states import Effort, States, alike, first_states
 from netsp.space.water import Water, along
 from netsp.travel.graph import TravelGraph
@@ -43,6 +42,9 @@ from netsp.travel.result import Result, relative_gap
 
 SHARE = 0.99
 """Of the tether that states and legs may need: the rest is for how the robot is steered."""
+
+ROUNDING = 1e-9
+"""Share of a length."""
 
 MOST_AGAIN = 20
 """Times that a graph is solved again because legs were at fault."""
@@ -59,8 +61,10 @@ class Stop:
 
     Parameters
     ----------
-    point : int
-        The waypoint.
+    waypoint : int
+        Which one.
+    choice : int
+        Which of its alternatives was chosen, from 1 on; 0 for its own position.
     word : tuple of int
         Word of the tether there.
     tether : float
@@ -71,7 +75,8 @@ class Stop:
         Metres of tether on the way, at most.
     """
 
-    point: int
+    waypoint: int
+    choice: int
     word: tuple[int, ...]
     tether: float
     path: Floats
@@ -123,7 +128,7 @@ class SpacePlan:
     @property
     def order(self) -> tuple[int, ...]:
         """The waypoints' numbers in the order of the tour."""
-        return tuple(stop.point for stop in self.stops)
+        return tuple(stop.waypoint for stop in self.stops)
 
     def planned(self, solver: str = "auto", seed: int = 0, bound: float | None = None) -> Mission:
         """The mission with its waypoints in the order of the tour, and the tour; waypoints that no
@@ -148,18 +153,22 @@ class SpacePlan:
         tour = PlannedTour(
             stops=tuple(
                 PlannedStop(
-                    path=_points(stop.path), signature=stop.word,
+                    path=in_file(stop.path), signature=stop.word,
                     tether_length=stop.tether, longest_tether=stop.most,
                 )
                 for stop in self.stops
             ),
-            home=_points(self.home), status=result.status, solver=solver, seed=seed,
+            home=in_file(self.home), status=result.status, solver=solver, seed=seed,
             length=self.length, lower_bound=result.lower_bound,
             gap=relative_gap(self.length, result.lower_bound),
             bound_of_all=bound, gap_to_all=relative_gap(self.length, bound),
             states=self.states, legs=self.legs, exact=self.water.words.exact,
         )  # fmt: skip
-        waypoints = tuple(self.mission.waypoints[n] for n in (*self.order, *rest))
+        all_of = self.mission.waypoints
+        waypoints = (
+            *(all_of[stop.waypoint].at(stop.choice) for stop in self.stops),
+            *(all_of[n] for n in rest),
+        )
         return self.mission.model_copy(update={"waypoints": waypoints, "tour": tour})
 
 
@@ -176,6 +185,8 @@ def plan(
     on_progress: Callable[[str], None] | None = None,
 ) -> SpacePlan:
     """Find the shortest tour of a mission's waypoints that leaves the tether free.
+
+    It begins where the mission's state has the robot, and goes to one alternative of each waypoint.
 
     Parameters
     ----------
@@ -229,23 +240,24 @@ def _planned(
     scene = scene or mission.load_scene()
     field = field or scene.field()
     mission = mission.checked_waypoints(field)
-    grid = grid_of(mission, scene, field)
+    places = Places.of(mission, field)
     tell("words of the scene")
-    water = Water.of(mission, field, grid)
-    points, limit = mission.places, SHARE * mission.tether_length
+    water = Water.of(mission, scene, field)
+    # a robot that is farther out than the share may still come back
+    limit = max(SHARE * mission.tether_length, water.present.length * (1.0 + ROUNDING))
     tell("shortest tethers to each waypoint")
-    effort = Effort.of(len(points))
-    states = first_states(water, points, limit, effort)
-    if not states.all:
+    effort = Effort.of(len(places))
+    states = first_states(water, places, limit, effort)
+    if not states.reached - {len(mission.waypoints)}:
         raise InputError("waypoints: no tether within the limit reaches any of them")
-    ways = Ways(water, points, effort)
-    ways.prepare_all(_share(SEARCHING, clock), tell)
+    ways = Ways(water, places, effort)
+    ways.prepare_all(clock.part(SEARCHING), tell)
     growth = Growth(states, ways)
-    board = _Board(water, states, first_tether(mission, field, water.model, grid))
+    board = _Board(water, states)
     best: tuple[Result, _Driven] | None = None
     for most in effort.states:
         begin = clock.elapsed
-        growth.go_on(most, _share(GROWING, clock), tell)
+        growth.go_on(most, clock.part(GROWING), tell)
         board.take(growth.legs)
         found = _best_driven(board, clock, tell, None if best is None else best[1].tour, how)
         if found is not None and (best is None or found[1].length <= best[1].length):
@@ -259,14 +271,10 @@ def _planned(
     result, driven = best
     return SpacePlan(
         mission, tuple(driven.stops), driven.home, driven.length, result, len(states.all),
-        len(board.legs), tuple(n for n in range(len(points)) if n not in states.of), driven.free,
-        water, ways,
+        len(board.legs),
+        tuple(n for n in range(len(mission.waypoints)) if n not in states.reached),
+        driven.free, water, ways,
     )  # fmt: skip
-
-
-def _share(share: float, clock: Clock) -> Clock:
-    """A clock for a part of the time left."""
-    return Clock(None if clock.limit is None else share * clock.left, within=clock)
 
 
 def _try_out(solver: SolverLike, params: Mapping[str, Any] | None, seed: int) -> None:
@@ -294,19 +302,19 @@ def _best_driven(
     while again < MOST_AGAIN or clock.up:
         if tour is None:
             tell("order" if again == 0 else f"order, {again} legs at fault forbidden")
-            solving = Clock(LEAST_SOLVING) if clock.up else _share(SOLVING, clock)
-            start = None if warm is None else [0, *warm]
+            solving = Clock(LEAST_SOLVING) if clock.up else clock.part(SOLVING)
+            start = None if warm is None else [*board.first, *warm]
             result = board.solved(solving, warm_start=start, **how)
             if result is None or result.tour is None:
                 return None
-            tour = [int(v) for v in result.tour[1:]]
+            tour = [int(v) for v in result.tour[len(board.first) :]]
         assert result is not None
         tell("driving the tour")
         driven = board.driven(tour)
         if driven.fault is None:
             # by way of the start it may be longer than what the solver spoke of
             solved = np.inf if result.length is None else result.length
-            proven_still = driven.length <= solved * (1.0 + 1e-9) + 1e-9
+            proven_still = driven.length <= solved * (1.0 + ROUNDING) + ROUNDING
             status = result.status if proven_still else Status.FEASIBLE
             return replace(result, status=status), driven
         if not board.forbid(driven.fault) and clock.up:
@@ -316,10 +324,6 @@ def _best_driven(
         if not clock.up:
             tour = None
     return None
-
-
-def _points(path: Floats) -> tuple[Point3, ...]:
-    return tuple((x, y, z) for x, y, z in simplified(path).tolist())
 
 
 @dataclass
@@ -340,7 +344,6 @@ class _Board:
 
     water: Water
     states: States
-    start: Tether
     legs: dict[tuple[int, int], Floats] = dataclass_field(default_factory=dict)
     out: list[Floats] = dataclass_field(default_factory=list)
     forbidden: set[tuple[int, int]] = dataclass_field(default_factory=set)
@@ -350,7 +353,7 @@ class _Board:
         """Legs as they are now, and paths from the start to new states: along its tether, and out
         along theirs."""
         for s in self.states.all[len(self.out) :]:
-            line = np.vstack([self.start.nodes[::-1], s.tether.nodes[1:]])
+            line = np.vstack([self.water.laid.nodes[::-1], s.tether.nodes[1:]])
             self.out.append(self.water.taut(line))
         self.legs = {
             (v, w): path for v, w, path in legs.both_ways()
@@ -361,8 +364,13 @@ class _Board:
     @property
     def cluster(self) -> list[int]:
         """Of each vertex of the travel graph."""
-        reached = sorted(self.states.of)
-        return [0, *(1 + reached.index(s.point) for s in self.states.all)]
+        number = {w: k for k, w in enumerate(sorted(self.states.reached), 1)}
+        return [0, *(number[int(self.states.places.waypoint[s.point])] for s in self.states.all)]
+
+    @property
+    def first(self) -> list[int]:
+        """Vertices that every tour begins with: the start, and the state of the robot by now."""
+        return [0] if self.states.begin is None else [0, self.states.begin + 1]
 
     def path(self, v: int, w: int) -> Floats:
         """From one state to another; -1 is the start."""
@@ -398,12 +406,14 @@ class _Board:
             graph = TravelGraph.from_costs(costs, self.cluster)
         except InputError:  # some waypoint is joined to nothing any more
             return None
+        if self.states.begin is not None:
+            graph = from_state(graph, self.states.begin + 1)
         return solve_graph(graph, time_limit=clock, **how)
 
     def driven(self, tour: list[int]) -> _Driven:
         """A tour, driven with the tether it begins with."""
-        states, water = self.states, self.water
-        tether, before = self.start, -1
+        states, water, places = self.states, self.water, self.states.places
+        tether, before = water.present, self.first[-1] - 1
         stops: list[Stop] = []
         total, fault, astray = 0.0, None, None
         delta = water.mission.delta
@@ -412,7 +422,7 @@ class _Board:
             path = self.path(before, state)
             tether, lengths = water.model.drive(tether, path[1:])
             total += along(path)
-            meant = self.start if state < 0 else states.all[state].tether
+            meant = water.laid if state < 0 else states.all[state].tether
             pair = (min(before, state), max(before, state))
             # since which leg the tether hangs otherwise than in its state; it does no harm if all
             # ends well
@@ -422,11 +432,11 @@ class _Board:
             if state >= 0:
                 s = states.all[state]
                 stops.append(
-                    Stop(s.point, self._word(s.word), tether.length, path, float(lengths.max()))
-                )
+                    Stop(
+                        int(places.waypoint[s.point]), int(places.choice[s.point]),
+                        water.words.letters(s.word), tether.length, path, float(lengths.max()),
+                    )
+                )  # fmt: skip
             before = state
-        free = alike(tether, self.start, delta)
+        free = alike(tether, water.laid, delta)
         return _Driven(tour, stops, path, total, free, fault or astray)
-
-    def _word(self, number: int) -> tuple[int, ...]:
-        return self.water.words.letters(number)

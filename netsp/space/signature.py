@@ -156,7 +156,7 @@ class SpaceSignature:
         )  # fmt: skip
         if at < 0:
             raise InputError(
-                f"anchor: no free cell of {cells.cell:g} m is in sight of {_shown(point)}; "
+                f"anchor: no free cell of {cells.cell:g} m is in sight of {shown(point)}; "
                 "expected a point in the water, or a smaller cell"
             )
         begin = np.array(np.unravel_index(at, cells.flags.shape), dtype=np.int64)
@@ -251,7 +251,7 @@ class SpaceSignature:
         word, broken = self.word_until(path, closed=closed)
         if broken is not None:
             raise InputError(
-                f"path: no word at {_shown(broken)}: a solid, the bounds, or a gap narrower than "
+                f"path: no word at {shown(broken)}: a solid, the bounds, or a gap narrower than "
                 f"the cell of {self.cells.cell:g} m"
             )
         return word
@@ -403,5 +403,17 @@ def _renumbered(
     return numbers[labels], new
 
 
-def _shown(point: Floats) -> str:
+def shown(point: Floats) -> str:
+    """A point as messages name it.
+
+    Parameters
+    ----------
+    point : ndarray, shape (3,)
+        Metres.
+
+    Returns
+    -------
+    str
+        To the centimetre.
+    """
     return "(" + ", ".join(f"{x:.2f}" for x in point) + ")"

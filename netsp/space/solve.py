@@ -17,13 +17,13 @@ import numpy as np
 
 from netsp.clock import Clock, TimeLimit, until_interrupt
 from netsp.errors import LimitReachedError
-from netsp.fields import Point3
+from netsp.hsignature import Word
 from netsp.online.log import LogRow, Run
 from netsp.online.mission import Mission
 from netsp.online.scene.field import DistanceField
 from netsp.online.scene.scene import Scene
 from netsp.online.simulate import grid_of, simulate
-from netsp.online.tour import PlannedStop, PlannedTour, simplified
+from netsp.online.tour import PlannedStop, PlannedTour, in_file
 from netsp.solution import Status
 from netsp.solvers.solve import SolverLike
 from netsp.space.bound import bound_of_all
@@ -158,7 +158,7 @@ def solve_mission(
         try:
             planned = plan(
                 mission, scene=scene, field=field, solver=solver, params=params,
-                time_limit=_share(PLANNING, clock), iteration_limit=iteration_limit, seed=seed,
+                time_limit=clock.part(PLANNING), iteration_limit=iteration_limit, seed=seed,
                 on_progress=tell,
             )  # fmt: skip
         except LimitReachedError as error:
@@ -167,7 +167,7 @@ def solve_mission(
         if planned is not None:
             tell("bound on all tours")
             reached = sorted(planned.order)
-            bound = bound_of_all(planned.ways, reached, _share(BOUNDING, clock), seed)
+            bound = bound_of_all(planned.ways, reached, clock.part(BOUNDING), seed)
             best = _of_plan(planned, name, seed, bound)
             best = replace(best, run=flights.of(best.mission, "the tour"))
         best = _or_going_on(best, flights, planned, bound, seed)
@@ -181,11 +181,6 @@ def solve_mission(
             if kept is not None and again is not None and better(again, best.run):
                 best = replace(kept, run=again)
         return replace(best, given=given)
-
-
-def _share(share: float, clock: Clock) -> Clock:
-    """A clock for a part of the time left."""
-    return Clock(None if clock.limit is None else share * clock.left, within=clock)
 
 
 def _of_plan(planned: SpacePlan, solver: str, seed: int, bound: float | None) -> SolvedMission:
@@ -204,7 +199,7 @@ def _or_going_on(
         return best
     flights.tell("order by going straight on")
     grid = grid_of(mission, flights.scene, flights.field)
-    limited = _share(ORDERING, clock)
+    limited = clock.part(ORDERING)
     found = order_by_going_on(mission, flights.field, grid, clock=limited, seed=seed)
     rest = tuple(n for n in range(len(mission.waypoints)) if n not in found)
     for direction, tour in (("forward", found), ("in reverse", found[::-1])):
@@ -262,24 +257,24 @@ def tour_of_flight(
     parts = _parts(run.log, visited)
     legs = [np.array([[r.x, r.y, r.z] for r in part]) for part in parts]
     path = np.vstack([legs[0][:1], *(leg[1:] for leg in legs)])
-    words = planned.water.words if planned is not None else None
-    anchor = np.asarray(mission.anchor, dtype=float)[None]
     planned_stops = []
     for k, stop in enumerate(stops):
-        walked = np.vstack([anchor, *legs[: k + 1]])
-        word = words.word(walked) if words is not None else None
+        word: Word = ()
+        if planned is not None:
+            walked = np.vstack([planned.water.present.nodes, *legs[: k + 1]])
+            word = planned.water.words.word(walked)
         planned_stops.append(
             PlannedStop(
-                path=_points(legs[k]), signature=word or (), tether_length=stop["tether"],
+                path=in_file(legs[k]), signature=word, tether_length=stop["tether"],
                 longest_tether=max(r.tether for r in parts[k]),
             )
         )  # fmt: skip
     length = along(path)
     tour = PlannedTour(
-        stops=tuple(planned_stops), home=_points(legs[-1]), status=Status.FEASIBLE, solver=name,
+        stops=tuple(planned_stops), home=in_file(legs[-1]), status=Status.FEASIBLE, solver=name,
         seed=seed, length=length, bound_of_all=bound, gap_to_all=relative_gap(length, bound),
         states=len(visited), legs=len(legs),
-        exact=words.exact if words is not None else False,
+        exact=planned is not None and planned.water.words.exact,
     )  # fmt: skip
     chosen = [*visited, *left]
     there = mission.model_copy(
@@ -294,10 +289,6 @@ def _parts(log: tuple[LogRow, ...], visited: list[int]) -> list[tuple[LogRow, ..
     ends = [int(np.argmax(next_one > k)) for k in visited]
     cuts = [0, *ends, len(log) - 1]
     return [log[a : b + 1] if b > a else (log[a], log[a]) for a, b in pairwise(cuts)]
-
-
-def _points(path: np.ndarray) -> tuple[Point3, ...]:
-    return tuple((x, y, z) for x, y, z in simplified(path).tolist())
 
 
 def better(run: Run, than: Run) -> bool:

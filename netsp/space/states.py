@@ -11,9 +11,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from netsp.arrays import Floats
+from netsp.errors import InputError
 from netsp.geometry import polylines
 from netsp.online.tether import Tether
+from netsp.space.places import Places
+from netsp.space.signature import shown
 from netsp.space.water import Water
 
 ROUNDS = 300
@@ -91,8 +93,8 @@ class States:
     ----------
     water : Water
         Where they are.
-    points : ndarray, shape (n, 3)
-        The waypoints, metres.
+    places : Places
+        The points; that of the mission's state has the one tether that hangs there now.
     limit : float
         Longest tether, metres.
     most : int
@@ -100,7 +102,7 @@ class States:
     """
 
     water: Water
-    points: Floats
+    places: Places
     limit: float
     most: int
     all: list[State] = field(default_factory=list)
@@ -145,7 +147,8 @@ class States:
             Whether it may.
         """
         here = self.of.get(point, [])
-        return len(here) < self.most or any(self.all[s].word == word for s in here)
+        room = len(here) < self.most and point != self.places.begin
+        return room or any(self.all[s].word == word for s in here)
 
     def add(self, point: int, word: int, tether: Tether) -> int | None:
         """A new state, if there is room for one more and the tether is no longer than its limit.
@@ -165,11 +168,25 @@ class States:
             Its number, None if there is none.
         """
         here = self.of.setdefault(point, [])
-        if len(here) >= self.most or tether.length > self.limit:
+        if (
+            len(here) >= self.most
+            or tether.length > self.limit
+            or (point == self.places.begin and here)
+        ):
             return None
         here.append(len(self.all))
         self.all.append(State(point, word, tether))
         return here[-1]
+
+    @property
+    def begin(self) -> int | None:
+        """Number of the state that the mission begins in; None at the start."""
+        return None if self.places.begin is None else self.of[self.places.begin][0]
+
+    @property
+    def reached(self) -> set[int]:
+        """The waypoints that have states; that of the mission's state counts as one more."""
+        return {int(self.places.waypoint[n]) for n in self.of}
 
 
 def alike(a: Tether, b: Tether, delta: float) -> bool:
@@ -200,15 +217,15 @@ def alike(a: Tether, b: Tether, delta: float) -> bool:
     return bool(np.linalg.norm(one - other, axis=1).max() < 2.0 * delta)
 
 
-def first_states(water: Water, points: Floats, limit: float, effort: Effort) -> States:
-    """States of the shortest words of each waypoint.
+def first_states(water: Water, places: Places, limit: float, effort: Effort) -> States:
+    """States of the shortest words of each waypoint, and the one that the mission begins in.
 
     Parameters
     ----------
     water : Water
         Where they are.
-    points : ndarray, shape (n, 3)
-        The waypoints, metres.
+    places : Places
+        The points.
     limit : float
         Longest tether, metres.
     effort : Effort
@@ -218,15 +235,28 @@ def first_states(water: Water, points: Floats, limit: float, effort: Effort) -> 
     -------
     States
         The states; waypoints without any are out of reach of the tether.
+
+    Raises
+    ------
+    InputError
+        The tether of the mission's state has no word: says where.
     """
-    states = States(water, points, limit, effort.states[0])
+    states = States(water, places, limit, effort.states[0])
     words = water.words
+    if places.begin is not None:
+        number, where = words.number(water.present.nodes)
+        if number is None:
+            raise InputError(
+                f"state.tether: no word at {shown(where)}: a gap narrower than the cell of "
+                f"{words.cells.cell:g} m; expected a smaller cell"
+            )
+        states.add(places.begin, number, water.present)
     anchor = np.asarray(water.mission.anchor, dtype=float)
     root = int(np.ravel_multi_index(tuple(words.root), words.cells.flags.shape))
     found = water.search(False, root, effort.words, limit)
-    for n, point in enumerate(points):
+    for n, point in enumerate(places.points):
         cell = words.held(point)
-        if cell is None:
+        if cell is None or n == places.begin:
             continue
         for word, way in water.ways(found, cell):
             tether = water.model.relaxed(np.vstack([anchor, way, point]), ROUNDS)

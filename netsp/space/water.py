@@ -10,11 +10,14 @@ import numpy as np
 
 from netsp.arrays import Bools, Floats
 from netsp.geometry import polylines
+from netsp.online.laid import first_tether, present_tether
 from netsp.online.mission import Mission
 from netsp.online.paths.tree import OPEN as ALL_FREE
 from netsp.online.paths.tree import Grid, free_cells, states_of, taut
 from netsp.online.scene.field import DistanceField
-from netsp.online.tether import GeodesicTether
+from netsp.online.scene.scene import Scene
+from netsp.online.simulate import grid_of
+from netsp.online.tether import GeodesicTether, Tether
 from netsp.space.cells import FREE, OPEN
 from netsp.space.search import NONE, Found, shortest_words, way_back
 from netsp.space.signature import SpaceSignature
@@ -36,6 +39,8 @@ class Water:
         What is to be visited.
     field : DistanceField
         The scene.
+    grid : Grid
+        Of `netsp.online.simulate.grid_of`: the box and the size of cells.
     words : SpaceSignature
         Its classes of paths, in the tether's water.
     model : GeodesicTether
@@ -44,32 +49,49 @@ class Water:
 
     mission: Mission
     field: DistanceField
+    grid: Grid
     words: SpaceSignature
     model: GeodesicTether
 
     @classmethod
-    def of(cls, mission: Mission, field: DistanceField, grid: Grid) -> Water:
+    def of(cls, mission: Mission, scene: Scene, field: DistanceField) -> Water:
         """The water of a mission.
 
         Parameters
         ----------
         mission : Mission
-            Its anchor, delta and clearance count.
-        field : DistanceField
+            The mission.
+        scene : Scene
             Its scene.
-        grid : Grid
-            Of `netsp.online.simulate.grid_of`: the box and the size of cells.
+        field : DistanceField
+            The scene's field.
 
         Returns
         -------
         Water
             The same.
+
+        Raises
+        ------
+        InputError
+            As of `netsp.space.signature.SpaceSignature.of`.
         """
+        grid = grid_of(mission, scene, field)
         high = grid.low + grid.cell * np.array(grid.free.shape)
         words = SpaceSignature.of(
             field, grid.low, high, grid.cell, mission.anchor, tolerance=DIP * mission.delta
         )
-        return cls(mission, field, words, GeodesicTether(field, mission.delta))
+        return cls(mission, field, grid, words, GeodesicTether(field, mission.delta))
+
+    @cached_property
+    def laid(self) -> Tether:
+        """The tether with the robot at the start."""
+        return first_tether(self.mission, self.field, self.model, self.grid)
+
+    @cached_property
+    def present(self) -> Tether:
+        """The tether when the mission begins."""
+        return present_tether(self.mission, self.field, self.model, self.grid)
 
     @cached_property
     def room(self) -> Bools:

@@ -134,7 +134,7 @@ class PredictivePlanner(Planner):
             return None
         leg = np.array(tour.home) if self.homeward else tour.leg(self.index)
         before = min(self.index, len(tour.stops)) - 1
-        meant = self.laid_now.length if before < 0 else tour.stops[before].tether_length
+        meant = tether.length if before < 0 else tour.stops[before].tether_length
         if (
             leg is None
             or np.linalg.norm(leg[0] - robot) > ALIKE * self.mission.reach
