@@ -12,7 +12,6 @@ from netsp.hsignature.wordtable import times, times_inverse
 from netsp.online import Scene
 from netsp.online.mission import Mission
 from netsp.online.scene.scene import scene_of
-from netsp.online.simulate import grid_of
 from netsp.space.labels import LENGTHS, STEPS, axes_of, lower_end, nth_axis, staircase
 from netsp.space.plan import plan
 from netsp.space.water import Water
@@ -57,7 +56,7 @@ def test_among_prisms_it_is_as_short_as_the_proven_optimum(posts):
     # and the tether is at every goal in the class that it has in the plane
     path, words = np.array(best.path), found.water.words
     for stop in found.stops:
-        near = int(np.argmin(np.linalg.norm(path - problem.goals[stop.point].position, axis=1)))
+        near = int(np.argmin(np.linalg.norm(path - problem.goals[stop.waypoint].position, axis=1)))
         assert words.word(path[: near + 1]) == stop.word
 
 
@@ -115,7 +114,7 @@ def test_a_search_finds_the_shortest_words_of_each_cell(tmp_path):
     }))  # fmt: skip
     mission = Mission.load(file)
     scene = mission.load_scene()
-    water = Water.of(mission, scene.field(), grid_of(mission, scene, scene.field()))
+    water = Water.of(mission, scene, scene.field())
     words, most, longest = water.words, 3, 7.0
     root = int(np.ravel_multi_index(tuple(words.root), words.cells.flags.shape))
     found = water.search(False, root, most, longest)

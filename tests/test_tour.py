@@ -16,7 +16,7 @@ from netsp.geometry import polylines
 from netsp.online.mission import Mission
 from netsp.online.planner.predictive import PredictivePlanner
 from netsp.online.simulate import simulate
-from netsp.online.tour import simplified
+from netsp.online.tour import in_file
 from netsp.solution import Status
 from netsp.space.bound import bound_of_all
 from netsp.space.flown import words_of_flight
@@ -376,7 +376,7 @@ POINT = st.tuples(*[st.integers(-5, 5).map(float)] * 3)
 @given(st.lists(POINT, min_size=2, max_size=12))
 def test_a_simplified_path_is_the_same_path(points):
     path = np.array(points)
-    short = simplified(path)
+    short = np.array(in_file(path))
     assert len(short) <= len(path)
     assert polylines.length(short) == pytest.approx(polylines.length(path))
     assert (short[[0, -1]] == path[[0, -1]]).all()

@@ -7,6 +7,7 @@ import json
 import sys
 from collections.abc import Callable
 from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,6 +23,9 @@ if TYPE_CHECKING:
     from netsp.execute.log import ExecutionRow
     from netsp.problem import Problem
 
+SPEED = 0.5
+"""Of a robot in the plane, where none is given; missions have their own."""
+
 EXAMPLE = (
     "netsp execute problems/wharf.json solution.json --surprise examples/surprises.json -o run"
 )
@@ -29,13 +33,16 @@ EXAMPLE = (
 
 def arguments(p: argparse.ArgumentParser) -> None:
     """Of the command line."""
-    p.add_argument("problem", metavar="PROBLEM", help="problem file (JSON)")
-    p.add_argument("solution", metavar="SOLUTION", help="solution file (JSON)")
+    p.add_argument(
+        "problem", metavar="PROBLEM", help="problem file (JSON), or a mission that was planned"
+    )
+    p.add_argument(
+        "solution", metavar="SOLUTION", nargs="?", help="solution file (JSON) of a problem"
+    )
     p.add_argument("--surprise", metavar="FILE", help="surprise file (JSON): events during the run")
     p.add_argument(
         "--speed",
         type=length,
-        default=0.5,
         metavar="V",
         help="speed of the robot, in the problem's units per second; default 0.5",
     )
@@ -43,16 +50,16 @@ def arguments(p: argparse.ArgumentParser) -> None:
         "--vehicle", default="kinematic", metavar="NAME", help="kinematic (default) or bluerov2"
     )
     p.add_argument("--current", metavar="X,Y,Z", help="current (m/s); default none")
-    p.add_argument(
-        "--gusts", type=length, default=0.0, metavar="S", help="gusts added to the current (m/s)"
-    )
+    p.add_argument("--gusts", type=length, metavar="S", help="gusts added to the current (m/s)")
     p.add_argument(
         "--planner", default="repair", metavar="NAME",
-        help="repair (default), or none: keep to the plan whatever happens",
+        help="repair (default), or none: keep to the plan whatever happens; in space, find a way "
+        "to one waypoint after the other",
     )  # fmt: skip
     p.add_argument(
-        "--planning-limit", type=seconds, default=2.0, metavar="S",
-        help="seconds that a repair may take, while the robot holds its position; default 2",
+        "--planning-limit", type=seconds, metavar="S",
+        help="seconds that a repair may take, while the robot holds its position; default 2, in "
+        "space 10",
     )  # fmt: skip
     p.add_argument(
         "--delta",
@@ -73,9 +80,57 @@ def arguments(p: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Carry the tour out, write what happened, and return the exit code."""
+    from netsp.command.solve_mission import is_mission
+
+    if args.planner not in ("repair", "none"):
+        raise InputError(f"--planner: expected repair or none, got {args.planner!r}")
+    return _mission(args) if is_mission(args.problem) else _problem(args)
+
+
+def _mission(args: argparse.Namespace) -> int:
+    """Of a planned mission in space."""
+    from netsp.command.flight import fly
+    from netsp.online.limits import check_names
+    from netsp.online.mission import Mission
+    from netsp.online.planner import PlannerOptions
+    from netsp.online.surprises import SceneSurprises
+
+    for name, flag in (("solution", "SOLUTION"), ("speed", "--speed"), ("delta", "--delta")):
+        if getattr(args, name) is not None:
+            raise InputError(
+                f"{flag}: is for problems, and {args.problem} is a mission, which has its own; "
+                "expected none"
+            )
+    planner = "repair" if args.planner == "repair" else "predictive"
+    check_names(planner, args.vehicle, "geodesic")
+    changes: dict[str, object] = {}
+    if args.current is not None:
+        changes["current"] = vector(args.current, "--current")
+    if args.gusts is not None:
+        changes["gusts"] = args.gusts
+    mission = Mission.load(args.problem).model_copy(update=changes)
+    surprises = SceneSurprises.load(args.surprise) if args.surprise else None
+    options = PlannerOptions(seed=args.seed)
+    if args.planning_limit is not None:
+        options = replace(options, planning_limit=args.planning_limit)
+    (run,) = fly(
+        mission, [planner], output=args.output, quiet=args.quiet, surprises=surprises,
+        source=args.surprise, check=True, vehicle=args.vehicle, options=options, seed=args.seed,
+    )  # fmt: skip
+    s = run.summary
+    if s["defects"]:
+        return EXIT_DEFECT
+    if s["exceedance_s"] > 0.0 or (s["home"]["reached"] and not s["home"]["tether_free"]):
+        return EXIT_NOT_VERIFIED
+    return EXIT_NOT_ALL if s["left_out"] or s["status"] != "done" else 0
+
+
+def _problem(args: argparse.Namespace) -> int:
+    """Of a problem in the plane."""
     from netsp.command.compiling import compile_messages
     from netsp.execute.events import Surprises
     from netsp.execute.log import ExecutionOptions, describe_execution
+    from netsp.execute.repair import REPLAN_S
     from netsp.execute.run import execute
     from netsp.execute.write import write_execution
     from netsp.files import output_folder
@@ -83,16 +138,20 @@ def run(args: argparse.Namespace) -> int:
     from netsp.problem import Problem
     from netsp.solution import Solution
 
+    if args.solution is None:
+        raise InputError(
+            f"SOLUTION: missing; expected a solution file of {args.problem}, or a mission alone"
+        )
     problem, solution = Problem.load(args.problem), Solution.load(args.solution)
     surprises = Surprises.load(args.surprise) if args.surprise else None
     if surprises is not None:
         surprises.check(problem, args.surprise)
-    if args.planner not in ("repair", "none"):
-        raise InputError(f"--planner: expected repair or none, got {args.planner!r}")
     options = ExecutionOptions(
-        speed=args.speed, vehicle=args.vehicle, delta=args.delta, repair=args.planner == "repair",
+        speed=SPEED if args.speed is None else args.speed, vehicle=args.vehicle,
+        delta=args.delta, repair=args.planner == "repair",
         current=vector(args.current, "--current") if args.current else (0.0, 0.0, 0.0),
-        gusts=args.gusts, seed=args.seed, planning_limit=args.planning_limit,
+        gusts=args.gusts or 0.0, seed=args.seed,
+        planning_limit=REPLAN_S if args.planning_limit is None else args.planning_limit,
     )  # fmt: skip
     show = not args.quiet and sys.stderr.isatty()
     on_step = show_execution(problem) if show else None

@@ -199,6 +199,15 @@ def describe_run(run: Run, units: str) -> str:
             + (f", {found['held_back']} had no room" if found["held_back"] else "")
             + (f"; the sensor found {found['found']} solids" if found["found"] else "")
         )
+    for r in s.get("repairs", ()):
+        done = {
+            "kept": "kept", "local": "mended", "replan": "the rest planned anew",
+            "legs": "left to be found leg by leg",
+        }  # fmt: skip
+        lines.append(
+            f"repair   at {r['time']:.1f} s: {done[r['response']]} in {r['planning_s']:.2f} s, "
+            f"{r['reason']}"
+        )
     if s["contacts"]:
         lines.append(f"contact  with solids: {s['contacts']} times")
     if s["waited_s"]:
@@ -223,11 +232,18 @@ def describe_run(run: Run, units: str) -> str:
         for stall in s["stalls"][:5]
     ]
     lines += [
-        f"left out waypoint #{left['waypoint']}: {left['reason']}" for left in s["left_out"][:5]
+        f"left out waypoint #{_given(s, left['waypoint'])}: {left['reason']}"
+        for left in s["left_out"][:5]
     ]
     if len(s["left_out"]) > 5:
         lines.append(f"         and {len(s['left_out']) - 5} more")
     return "\n".join(lines)
+
+
+def _given(summary: dict[str, Any], waypoint: int) -> int:
+    """The number of a waypoint in the mission before anything was planned anew."""
+    given = summary.get("given_as")
+    return waypoint if given is None else int(given[waypoint])
 
 
 def _way_home(home: dict[str, Any]) -> str:

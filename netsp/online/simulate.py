@@ -196,7 +196,7 @@ def simulate(
             if command.mode == DONE:
                 break
             if chosen.reached and chosen.index > before and chosen.reached[-1] == before:
-                stay(world, chosen, mission.waypoints[before], on_step)
+                stay(world, chosen, chosen.mission.waypoints[before], on_step)
                 if chosen.anchor_moves and world.now > row.time:
                     chosen.path = chosen.path[:0]  # it was planned for another moment
                     continue
@@ -219,11 +219,11 @@ def simulate(
             raise
         stopped = True
     wall = time.perf_counter() - begin
-    summary = summarise(mission, chosen, world, wall, stopped)
+    summary = {**summarise(chosen.mission, chosen, world, wall, stopped), **chosen.told()}
     summary["stalls"] = stalls.found
     summary["surprises"] = None if around is None else around.told()
     return Run(
-        mission,
+        chosen.flown,
         planner if isinstance(planner, str) else chosen.name,
         tuple(world.log),
         world.tether,

@@ -12,6 +12,7 @@ from netsp.hsignature import Word
 from netsp.online.log import Run
 from netsp.online.scene.field import DistanceField
 from netsp.online.scene.scene import Scene
+from netsp.online.tour import PlannedTour
 from netsp.space.water import Water
 
 
@@ -29,19 +30,22 @@ class FlownWords:
         was left free.
     exact : bool
         Whether words that differ are of different classes.
-    planned : tuple of Word
-        Of the mission's tour, if it has one.
+    planned : tuple of (Word or None)
+        Of the mission's tour, if it has one, in the same scene.
     """
 
     stops: tuple[tuple[int, Word | None], ...]
     home: Word | None
     exact: bool
-    planned: tuple[Word, ...] = ()
+    planned: tuple[Word | None, ...] = ()
 
     @property
     def as_planned(self) -> int:
         """How many stops were made in the class that the tour has there."""
-        return sum(k < len(self.planned) and self.planned[k] == word for k, word in self.stops)
+        return sum(self._is_as_planned(k, word) for k, word in self.stops)
+
+    def _is_as_planned(self, k: int, word: Word | None) -> bool:
+        return k < len(self.planned) and word is not None and self.planned[k] == word
 
     def told(self) -> dict[str, Any]:
         """For the summary of a run.
@@ -57,7 +61,11 @@ class FlownWords:
                 {
                     "waypoint": k,
                     "signature": None if word is None else list(word),
-                    **({"as_planned": self.planned[k] == word} if k < len(self.planned) else {}),
+                    **(
+                        {"as_planned": self._is_as_planned(k, word)}
+                        if k < len(self.planned)
+                        else {}
+                    ),
                 }
                 for k, word in self.stops
             ],
@@ -76,11 +84,11 @@ def words_of_flight(
     Parameters
     ----------
     run : Run
-        The flight; its anchor stays where it is.
+        The flight; its anchor stays where it is. Words are by the scene as it was at the end.
     scene : Scene, optional
         Of the mission, when it is at hand.
     field : DistanceField, optional
-        The scene's field, when it is at hand.
+        The field of that scene, when it is at hand.
 
     Returns
     -------
@@ -95,6 +103,8 @@ def words_of_flight(
     mission = run.mission
     if mission.track:
         raise InputError("track: of a moving anchor no words are told; expected a mission without")
+    if run.scene is not None:
+        scene, field = run.scene, None
     scene = scene or mission.load_scene()
     field = field or scene.field()
     water = Water.of(mission, scene, field)
@@ -109,6 +119,15 @@ def words_of_flight(
         word, broken = words.word_until(np.vstack([places[: end + 1], mission.places[k]]))
         stops.append((k, None if broken is not None else word))
     word, broken = words.word_until(np.vstack([places, laid[::-1]]))
-    tour = mission.tour
-    planned = () if tour is None else tuple(stop.signature for stop in tour.stops)
+    planned = () if mission.tour is None else _of_tour(mission.tour, water)
     return FlownWords(tuple(stops), None if broken is not None else word, words.exact, planned)
+
+
+def _of_tour(tour: PlannedTour, water: Water) -> tuple[Word | None, ...]:
+    """Words at the stops of a tour, whose own letters may be those of another map."""
+    walked, out = water.present.nodes, list[Word | None]()
+    for stop, place in zip(tour.stops, water.mission.places, strict=False):
+        walked = np.vstack([walked, np.array(stop.path)])
+        word, broken = water.words.word_until(np.vstack([walked, place]))
+        out.append(None if broken is not None else word)
+    return tuple(out)

@@ -76,6 +76,28 @@ def verify_mission(
     return Verification(tuple(_Judge(mission, mission.tour, scene, field).run()))
 
 
+def checked_mission(mission: Mission, scene: Scene, field: DistanceField) -> None:
+    """Refuse a mission whose tour fails a check, as before it is flown.
+
+    Parameters
+    ----------
+    mission : Mission
+        A mission with a tour.
+    scene : Scene
+        Its scene.
+    field : DistanceField
+        The scene's field.
+
+    Raises
+    ------
+    InputError
+        As of `verify_mission`; the tour fails a check.
+    """
+    failed = [c for c in verify_mission(mission, scene=scene, field=field).checks if not c.passed]
+    if failed:
+        raise InputError(f"tour: fails its check {failed[0].name!r}: {failed[0].detail}")
+
+
 @dataclass
 class _Judge:
     mission: Mission

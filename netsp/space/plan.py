@@ -26,8 +26,10 @@ from netsp.arrays import Floats
 from netsp.clock import Clock, TimeLimit, until_interrupt
 from netsp.errors import InputError, LimitReachedError
 from netsp.online.mission import Mission
+from netsp.online.paths.tree import Grid
 from netsp.online.scene.field import DistanceField
 from netsp.online.scene.scene import Scene
+from netsp.online.simulate import grid_of
 from netsp.online.tour import PlannedStop, PlannedTour, in_file
 from netsp.roadmap.from_state import from_state
 from netsp.solution import Status
@@ -130,6 +132,12 @@ class SpacePlan:
         """The waypoints' numbers in the order of the tour."""
         return tuple(stop.waypoint for stop in self.stops)
 
+    @property
+    def every_waypoint(self) -> tuple[int, ...]:
+        """The same, and then those that no tether reaches."""
+        rest = set(range(len(self.mission.waypoints))) - set(self.order)
+        return (*self.order, *sorted(rest))
+
     def planned(self, solver: str = "auto", seed: int = 0, bound: float | None = None) -> Mission:
         """The mission with its waypoints in the order of the tour, and the tour; waypoints that no
         tether reaches come last.
@@ -148,7 +156,6 @@ class SpacePlan:
         Mission
             The same mission, planned.
         """
-        rest = [n for n in range(len(self.mission.waypoints)) if n not in set(self.order)]
         result = self.result
         tour = PlannedTour(
             stops=tuple(
@@ -167,7 +174,7 @@ class SpacePlan:
         all_of = self.mission.waypoints
         waypoints = (
             *(all_of[stop.waypoint].at(stop.choice) for stop in self.stops),
-            *(all_of[n] for n in rest),
+            *(all_of[n] for n in self.every_waypoint[len(self.stops) :]),
         )
         return self.mission.model_copy(update={"waypoints": waypoints, "tour": tour})
 
@@ -177,6 +184,7 @@ def plan(
     *,
     scene: Scene | None = None,
     field: DistanceField | None = None,
+    grid: Grid | None = None,
     solver: SolverLike = "auto",
     params: Mapping[str, Any] | None = None,
     time_limit: TimeLimit = 60.0,
@@ -196,6 +204,8 @@ def plan(
         Its scene, when it is at hand.
     field : DistanceField, optional
         The scene's field, when it is at hand.
+    grid : Grid, optional
+        That paths are sought on, when it is at hand; the scene is then not asked for.
     solver : str or callable
         As of `netsp.solvers.solve.solve_graph`.
     params : mapping, optional
@@ -230,19 +240,22 @@ def plan(
         how = {
             "solver": solver, "seed": seed, "params": params, "iteration_limit": iteration_limit
         }  # fmt: skip
-        return _planned(mission, scene, field, clock, on_progress or (lambda _: None), how)
+        return _planned(mission, scene, field, grid, clock, on_progress or (lambda _: None), how)
 
 
 def _planned(
-    mission: Mission, scene: Scene | None, field: DistanceField | None, clock: Clock,
+    mission: Mission, scene: Scene | None, field: DistanceField | None, grid: Grid | None,
+    clock: Clock,
     tell: Callable[[str], None], how: dict[str, Any],
 ) -> SpacePlan:  # fmt: skip
-    scene = scene or mission.load_scene()
-    field = field or scene.field()
+    if field is None or grid is None:
+        scene = scene or mission.load_scene()
+        field = field or scene.field()
+        grid = grid_of(mission, scene, field)
     mission = mission.checked_waypoints(field)
     places = Places.of(mission, field)
     tell("words of the scene")
-    water = Water.of(mission, scene, field)
+    water = Water.within(mission, field, grid)
     # a robot that is farther out than the share may still come back
     limit = max(SHARE * mission.tether_length, water.present.length * (1.0 + ROUNDING))
     tell("shortest tethers to each waypoint")

@@ -184,9 +184,8 @@ def solve_mission(
 
 
 def _of_plan(planned: SpacePlan, solver: str, seed: int, bound: float | None) -> SolvedMission:
-    rest = [n for n in range(len(planned.mission.waypoints)) if n not in set(planned.order)]
     mission = planned.planned(solver, seed, bound)
-    return SolvedMission(mission, (*planned.order, *rest), None, None, planned)
+    return SolvedMission(mission, planned.every_waypoint, None, None, planned)
 
 
 def _or_going_on(

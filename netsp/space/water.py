@@ -76,7 +76,31 @@ class Water:
         InputError
             As of `netsp.space.signature.SpaceSignature.of`.
         """
-        grid = grid_of(mission, scene, field)
+        return cls.within(mission, field, grid_of(mission, scene, field))
+
+    @classmethod
+    def within(cls, mission: Mission, field: DistanceField, grid: Grid) -> Water:
+        """The same where a grid is at hand.
+
+        Parameters
+        ----------
+        mission : Mission
+            The mission.
+        field : DistanceField
+            Its scene's field.
+        grid : Grid
+            The box and the size of cells.
+
+        Returns
+        -------
+        Water
+            The same.
+
+        Raises
+        ------
+        InputError
+            As of `netsp.space.signature.SpaceSignature.of`.
+        """
         high = grid.low + grid.cell * np.array(grid.free.shape)
         words = SpaceSignature.of(
             field, grid.low, high, grid.cell, mission.anchor, tolerance=DIP * mission.delta

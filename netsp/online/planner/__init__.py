@@ -28,6 +28,7 @@ PLANNERS: Registry[Callable[..., Planner]] = Registry(
     "netsp.planners",
     {
         "predictive": PredictivePlanner,
+        "repair": later("repair", "netsp.space.repair:RepairPlanner"),
         "react": ReactPlanner,
         "react-draft": _draft,
         "none": Planner,
@@ -74,8 +75,8 @@ def make_planner(
         raise InputError(f"paths: expected {', '.join(known)}, got {options.paths!r}")
     if options.refine not in (None, *REFINEMENTS):
         raise InputError(f"refine: expected {', '.join(REFINEMENTS)}, got {options.refine!r}")
-    if name == "predictive" and not isinstance(tethers, GeodesicTether):
-        raise InputError(f"tether: planner 'predictive' needs geodesic, got {tethers.name!r}")
+    if name in ("predictive", "repair") and not isinstance(tethers, GeodesicTether):
+        raise InputError(f"tether: planner {name!r} needs geodesic, got {tethers.name!r}")
     return make(mission, scene, tethers, grid, options)
 
 

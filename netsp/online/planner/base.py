@@ -6,6 +6,7 @@ import math
 import time
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -76,6 +77,8 @@ class PlannerOptions:
         taken, and the first if there is none yet.
     metres : float
         Of paths along which it does so, likewise.
+    planning_limit : float
+        Seconds that `repair` may take to plan the rest of a tour; the robot holds its place.
     """
 
     paths: str = "tree"
@@ -83,6 +86,7 @@ class PlannerOptions:
     seed: int = 0
     looks: int = 10
     metres: float = 15.0
+    planning_limit: float = 10.0
 
 
 @dataclass
@@ -185,6 +189,21 @@ class Planner:
         if isinstance(self.tethers, GeodesicTether):
             return payout(tether, self.load)
         return payout_along(tether.nodes, self.load)
+
+    @property
+    def flown(self) -> Mission:
+        """The mission as it was flown, for a file."""
+        return self.mission
+
+    def told(self) -> dict[str, Any]:
+        """What it adds to the summary of a run.
+
+        Returns
+        -------
+        dict
+            Numbers by name.
+        """
+        return {}
 
     @property
     def waypoint(self) -> Floats:

@@ -129,16 +129,12 @@ class PredictivePlanner(Planner):
     def _leg(self, robot: Floats, tether: Tether) -> Floats | None:
         """The leg of the mission's tour, where the robot is where it begins, the tether as the tour
         has it there, and nothing on the map in the way."""
-        tour = self.mission.tour
-        if tour is None or self.track is not None:
-            return None
-        leg = np.array(tour.home) if self.homeward else tour.leg(self.index)
-        before = min(self.index, len(tour.stops)) - 1
-        meant = tether.length if before < 0 else tour.stops[before].tether_length
+        leg, meant = self._planned_leg()
         if (
             leg is None
             or np.linalg.norm(leg[0] - robot) > ALIKE * self.mission.reach
-            or abs(tether.length - meant) > ALIKE * (self.mission.reach + self.mission.delta)
+            or abs(tether.length - (tether.length if meant is None else meant))
+            > ALIKE * (self.mission.reach + self.mission.delta)
         ):
             return None
         # it counts as there a bit before the waypoint, from where a corner may be cut too short
@@ -146,6 +142,16 @@ class PredictivePlanner(Planner):
             if self.is_free(path[:2]) and self.keeps_off(path):
                 return path
         return None
+
+    def _planned_leg(self) -> tuple[Floats | None, float | None]:
+        """The tour's leg to the waypoint, and metres of tether where it begins: None where that is
+        whatever there is when the mission begins."""
+        tour = self.mission.tour
+        if tour is None or self.track is not None:
+            return None, None
+        leg = np.array(tour.home) if self.homeward else tour.leg(self.index)
+        before = min(self.index, len(tour.stops)) - 1
+        return leg, None if before < 0 else tour.stops[before].tether_length
 
     @property
     def limit(self) -> float:

@@ -1,0 +1,108 @@
+"""Missions flown by `netsp simulate` and `netsp execute`: progress, summaries, files, pictures."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Sequence
+from contextlib import nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from netsp.online.log import LogRow, Run
+    from netsp.online.mission import Mission
+    from netsp.online.planner import Planner
+    from netsp.online.scene.scene import Scene
+    from netsp.online.surprises import SceneSurprises
+
+
+def fly(
+    mission: Mission, planners: Sequence[str], *, output: str | None, quiet: bool,
+    surprises: SceneSurprises | None, source: str | None, check: bool = False, **how: Any,
+) -> list[Run]:  # fmt: skip
+    """Fly a mission by each of some planners, tell what came of it, and write the first run.
+
+    `check` has the mission's tour judged before; `how` is as of `simulate`."""
+    from netsp.command.compiling import compile_messages
+    from netsp.command.plot_scene import tell, warn_of_scene
+    from netsp.files import output_folder
+    from netsp.online.log import describe_run, write_run
+    from netsp.online.simulate import simulate
+    from netsp.online.tether import GeodesicTether
+
+    show = not quiet and sys.stderr.isatty()
+    runs: list[Run] = []
+    messages = nullcontext() if quiet else compile_messages(sys.stderr)
+    with output_folder(output), messages:
+        scene = mission.load_scene()
+        if surprises is not None:
+            surprises.check(scene, source or "")
+        field = scene.field(on_progress=tell)
+        if check:
+            from netsp.space.judge import checked_mission
+
+            checked_mission(mission, scene, field)
+        if not quiet:
+            warn_of_scene(
+                GeodesicTether(field, mission.delta), mission.delta, "lower the mission's delta"
+            )
+        for planner in planners:
+            run = simulate(
+                mission, planner, scene=scene, field=field, surprises=surprises,
+                on_step=show_mission(mission, scene.units) if show else None, **how,
+            )  # fmt: skip
+            runs.append(run)
+            if mission.tour is not None and not mission.track:
+                from netsp.space.flown import words_of_flight
+
+                run.summary["words"] = words_of_flight(run, scene=scene, field=field).told()
+            if not quiet:
+                print(
+                    ("\r\n" if sys.stderr.isatty() else "") + describe_run(run, scene.units),
+                    file=sys.stderr,
+                )
+            if run.summary["status"] == "interrupted":
+                break
+    if output is None:
+        print(json.dumps(runs[0].summary, indent=1, allow_nan=False))
+    else:
+        write_run(runs[0], output)
+        if len(runs) > 1:
+            write_run(runs[1], Path(output) / runs[1].planner)
+        draw_runs(runs, runs[0].scene or scene, Path(output))
+    return runs
+
+
+def draw_runs(runs: list[Run], scene: Scene, folder: Path) -> None:
+    """The pictures of one run, or of two side by side; the page only where plotly is installed."""
+    from netsp.pictures import mission as flights
+
+    flights.save_runs(runs, scene, folder / "run.png")
+    try:
+        import plotly  # noqa: F401
+    except ImportError:
+        return
+    flights.save_page(runs, scene, folder / "run.html")
+
+
+def show_mission(mission: Mission, units: str) -> Callable[[LogRow, Planner], None]:
+    """Shows how a mission goes, in one line."""
+    from netsp.online.simulation import STEP
+
+    count = len(mission.waypoints)
+
+    def on_step(row: LogRow, planner: Planner) -> None:
+        del planner
+        if round(row.time / STEP) % 20:
+            return
+        done = int(20 * row.waypoint / count)
+        seen = f"  seen {100 * row.coverage:.0f} %" if mission.camera is not None else ""
+        print(
+            f"\r[{'#' * done:.<20}] {row.time:7.1f} s  "
+            f"waypoint {min(row.waypoint, count)}/{count}  "
+            f"{row.mode:<8} tether {row.tether:.2f} of {mission.tether_length:g} {units}{seen}   ",
+            end="", file=sys.stderr, flush=True,
+        )  # fmt: skip
+
+    return on_step
