@@ -211,7 +211,7 @@ def _checked(water: Water, points: list[Waypoint], line: Floats, exact: bool) ->
                 raise InputError(
                     f"mission: at waypoint #{p.goal} the lines are not of the planned class"
                 )
-    longest = float(water.model.drive(tether, line[1:])[1].max())
+    _, longest = water.driven(tether, line)
     limit = water.mission.tether_length
     if longest > limit:
         raise InputError(

@@ -192,4 +192,5 @@ def in_file(path: Floats) -> tuple[Point3, ...]:
         a, b, c = path[keep[-1]], path[k], path[k + 1]
         if polylines.length(np.array([a, b, c])) > np.linalg.norm(c - a) + 1e-9:
             keep.append(k)
-    return tuple((x, y, z) for x, y, z in path[[*keep, len(path) - 1]].tolist())
+    # a path that leads nowhere has both of its ends, too
+    return tuple((x, y, z) for x, y, z in path[[*keep, max(len(path) - 1, 0)]].tolist())

@@ -37,7 +37,7 @@ def bound_of_all(ways: Ways, reached: list[int], clock: Clock, seed: int = 0) ->
     Returns
     -------
     float or None
-        Metres; None if there was no time for any.
+        Metres; None if there was no time for any, or nothing is to be visited but the start.
     """
     places = ways.places
     visited = set(reached)
@@ -54,4 +54,4 @@ def bound_of_all(ways: Ways, reached: list[int], clock: Clock, seed: int = 0) ->
     graph = TravelGraph.from_costs(costs, cluster)
     if places.begin is not None:
         graph = from_state(graph, 1 + some.index(places.begin))
-    return solve_graph(graph, "auto", time_limit=clock, seed=seed).lower_bound
+    return solve_graph(graph, "auto", time_limit=clock, seed=seed).lower_bound or None

@@ -179,7 +179,7 @@ class Growth:
     _count: int = 0
     _shortest: dict[tuple[int, int], float] = field(default_factory=dict)
 
-    def go_on(self, most: int, clock: Clock, tell: Callable[[str], None]) -> None:
+    def go_on(self, most: int, clock: Clock, tell: Callable[[str], None]) -> bool:
         """Drive legs until there are none left to drive, or the time is up.
 
         Parameters
@@ -190,13 +190,21 @@ class Growth:
             When it is up, legs and states are what they are by then.
         tell : callable
             Called with a line of text now and then.
+
+        Returns
+        -------
+        bool
+            Whether there are none left for so many states.
         """
         self.states.most = most
         for leg in self._no_room:
             heapq.heappush(self._waiting, leg)
         self._no_room.clear()
-        while self._drive_on() and not clock.up:
+        while self._drive_on():
             tell(f"legs, {len(self.legs.arrives)} driven between {len(self.states.all)} states")
+            if clock.up:
+                return False
+        return True
 
     def _look_at_new(self) -> None:
         """Take the ways from new states on among those that wait."""
@@ -226,8 +234,8 @@ class Growth:
             return True
         if not self._may_fit(state, m, writes, path):
             return True
-        there, lengths = states.water.model.drive(state.tether, path[1:])
-        if lengths.max() > states.limit:
+        there, longest = states.water.driven(state.tether, path)
+        if longest > states.limit:
             return True
         w = states.find(m, writes, there)
         if w is None:

@@ -84,8 +84,10 @@ def order_by_going_on(
     ------
     InputError
         No tether reaches any of them.
+    LimitReachedError
+        The time was up before legs were known.
     """
-    graph, points, start = waypoint_graph(mission, field, grid)
+    graph, points, start = waypoint_graph(mission, field, grid, clock)
     given = [start.index(n) + 1 for n in range(len(mission.waypoints)) if n in start]
     instance = Instance.of(graph)
     _, warm = best_classes(np.array(given), instance.start, instance.costs)
@@ -98,7 +100,7 @@ def order_by_going_on(
 
 
 def waypoint_graph(
-    mission: Mission, field: DistanceField, grid: Grid
+    mission: Mission, field: DistanceField, grid: Grid, clock: Clock | None = None
 ) -> tuple[TravelGraph, list[int], list[int]]:
     """Classes and legs of a mission.
 
@@ -112,6 +114,8 @@ def waypoint_graph(
         Its scene.
     grid : Grid
         The grid that paths are sought on.
+    clock : Clock, optional
+        When it is up, there is no graph.
 
     Returns
     -------
@@ -121,13 +125,22 @@ def waypoint_graph(
         The waypoint of each vertex, -1 for the anchor.
     clusters : list of int
         The waypoints in the order of the clusters.
+
+    Raises
+    ------
+    InputError
+        No tether reaches any of them.
+    LimitReachedError
+        The time was up.
     """
+    clock = clock or Clock()
     model = GeodesicTether(field, mission.delta)
     anchor, limit = np.array(mission.anchor), SHARE * mission.tether_length
     points = mission.places
     tree = ShortestTree(grid, anchor, points)
     found = _Classes([], [])
     for n in range(len(points)):
+        clock.check("looking for tethers to waypoints")
         path = tree.path(n)
         if path is None:
             continue
@@ -141,6 +154,7 @@ def waypoint_graph(
     direct: dict[tuple[int, int], float] = {}
     v = 0
     while v < len(found.point):
+        clock.check("driving straight legs")
         n = found.point[v]
         for m in near[n]:
             if not straight(field, points[n], points[m], mission.clearance):
@@ -164,6 +178,7 @@ def waypoint_graph(
     costs[0, 1:] = costs[1:, 0] = reach
     neighbours = {(n, int(m)) for n in range(len(points)) for m in near[n]}
     for v in range(count):
+        clock.check("pulling legs taut")
         for w in range(v + 1, count):
             pair = (found.point[v], found.point[w])
             if pair not in neighbours and pair[::-1] not in neighbours:

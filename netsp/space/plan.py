@@ -51,10 +51,13 @@ ROUNDING = 1e-9
 MOST_AGAIN = 20
 """Times that a graph is solved again because legs were at fault."""
 
-SEARCHING, GROWING, SOLVING, LEAST_SOLVING = 0.3, 0.5, 0.5, 0.5
+SEARCHING, GROWING, SOLVING = 0.3, 0.5, 0.5
 """Of the time left, what the search for ways may take, then states and legs, and the solver each
-time; the rest is for driving, and for solving again. When the time is up, the solver still gets so
-many seconds."""
+time; the rest is for driving, and for solving again."""
+
+LEAST_GROWING, LEAST_SOLVING = 1.0, 0.5
+"""Seconds that legs and the solver get even if the time is up: there would be no tour, or one by
+way of the anchor."""
 
 
 @dataclass(frozen=True)
@@ -268,9 +271,12 @@ def _planned(
     growth = Growth(states, ways)
     board = _Board(water, states)
     best: tuple[Result, _Driven] | None = None
+    complete = False
     for most in effort.states:
         begin = clock.elapsed
-        growth.go_on(most, clock.part(GROWING), tell)
+        enough = board.legs or GROWING * clock.left >= LEAST_GROWING
+        growing = clock.part(GROWING) if enough else Clock(LEAST_GROWING)
+        complete = growth.go_on(most, growing, tell) or complete
         board.take(growth.legs)
         found = _best_driven(board, clock, tell, None if best is None else best[1].tour, how)
         if found is not None and (best is None or found[1].length <= best[1].length):
@@ -282,6 +288,8 @@ def _planned(
             "waypoints: no tour was found whose tether stays within the limit all along"
         )
     result, driven = best
+    if not complete and result.status is Status.OPTIMAL:
+        result = replace(result, status=Status.FEASIBLE)  # there are more legs within reach
     return SpacePlan(
         mission, tuple(driven.stops), driven.home, driven.length, result, len(states.all),
         len(board.legs),
@@ -433,21 +441,21 @@ class _Board:
         for vertex in [*tour, 0]:
             state = vertex - 1
             path = self.path(before, state)
-            tether, lengths = water.model.drive(tether, path[1:])
+            tether, longest = water.driven(tether, path)
             total += along(path)
             meant = water.laid if state < 0 else states.all[state].tether
             pair = (min(before, state), max(before, state))
             # since which leg the tether hangs otherwise than in its state; it does no harm if all
             # ends well
             astray = None if alike(tether, meant, delta) else astray or pair
-            if fault is None and lengths.max() > states.limit:
+            if fault is None and longest > states.limit:
                 fault = astray or pair
             if state >= 0:
                 s = states.all[state]
                 stops.append(
                     Stop(
                         int(places.waypoint[s.point]), int(places.choice[s.point]),
-                        water.words.letters(s.word), tether.length, path, float(lengths.max()),
+                        water.words.letters(s.word), tether.length, path, longest,
                     )
                 )  # fmt: skip
             before = state

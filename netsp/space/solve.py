@@ -20,6 +20,7 @@ from netsp.errors import LimitReachedError
 from netsp.hsignature import Word
 from netsp.online.log import LogRow, Run
 from netsp.online.mission import Mission
+from netsp.online.planner import PlannerOptions
 from netsp.online.scene.field import DistanceField
 from netsp.online.scene.scene import Scene
 from netsp.online.simulate import grid_of, simulate
@@ -32,9 +33,13 @@ from netsp.space.plan import SpacePlan, plan
 from netsp.space.water import along
 from netsp.travel.result import relative_gap
 
-PLANNING, BOUNDING, ORDERING = 0.6, 0.15, 0.3
+PLANNING, BOUNDING, ORDERING = 0.7, 0.15, 0.3
 """Of the time left, what the tour of states and legs may take, then the bound, then the order by
 going straight on; the rest is for flights."""
+
+WORTH = 0.005
+"""Share of its time that a flight must save to be taken instead of a tour of which more is known;
+what is saved by stopping within reach of the start is less."""
 
 GOING_ON, AS_GIVEN = "going-straight-on", "as-given"
 """Names of the older way and of the order of the file, where tours tell their solver."""
@@ -96,9 +101,13 @@ class _Flights:
             if self.clock.up:
                 raise KeyboardInterrupt  # it ends a flight
 
+        if all(w.heading is None for w in mission.waypoints):
+            # what is seen takes most of the time of a flight, and changes nothing else of it
+            mission = mission.model_copy(update={"camera": None})
         run = simulate(
-            mission.model_copy(update={"camera": None}),
+            mission,
             scene=self.scene, field=self.field, on_step=watch,
+            options=PlannerOptions(prepared=False),
         )  # fmt: skip
         return None if run.summary["status"] == "interrupted" else run
 
@@ -152,7 +161,7 @@ def solve_mission(
     with until_interrupt(time_limit) as clock:
         scene = scene or mission.load_scene()
         field = scene.field()
-        mission = mission.checked_waypoints(field).model_copy(update={"tour": None})
+        mission = mission.checked_waypoints(field)
         planned, failure, bound = None, None, None
         best: SolvedMission | None = None
         try:
@@ -170,16 +179,11 @@ def solve_mission(
             bound = bound_of_all(planned.ways, reached, clock.part(BOUNDING), seed)
             best = _of_plan(planned, name, seed, bound)
             best = replace(best, run=flights.of(best.mission, "the tour"))
+        given = flights.of(mission, "the order as given")
+        best = _or_as_given(best, given, flights, planned, bound, seed)
         best = _or_going_on(best, flights, planned, bound, seed)
         if best is None:
             raise failure or LimitReachedError("time limit reached before any tour was found")
-        given = flights.of(mission, "the order as given")
-        if given is not None and best.run is not None and better(given, best.run):
-            order = tuple(range(len(mission.waypoints)))
-            kept = tour_of_flight(mission, order, given, planned, bound, seed, AS_GIVEN)
-            again = None if kept is None else flights.of(kept.mission, "it as it will be written")
-            if kept is not None and again is not None and better(again, best.run):
-                best = replace(kept, run=again)
         return replace(best, given=given)
 
 
@@ -193,13 +197,16 @@ def _or_going_on(
     bound: float | None, seed: int,
 ) -> SolvedMission | None:  # fmt: skip
     """The better of a tour and of the order by going straight on, in both directions."""
-    mission, clock = flights.mission, flights.clock
-    if clock.up:
-        return best
+    mission, clock = flights.mission.model_copy(update={"tour": None}), flights.clock
+    if clock.up or mission.state is not None:
+        return best  # that way begins at the start
     flights.tell("order by going straight on")
     grid = grid_of(mission, flights.scene, flights.field)
     limited = clock.part(ORDERING)
-    found = order_by_going_on(mission, flights.field, grid, clock=limited, seed=seed)
+    try:
+        found = order_by_going_on(mission, flights.field, grid, clock=limited, seed=seed)
+    except LimitReachedError:
+        return best
     rest = tuple(n for n in range(len(mission.waypoints)) if n not in found)
     for direction, tour in (("forward", found), ("in reverse", found[::-1])):
         order = (*tour, *rest)
@@ -207,16 +214,52 @@ def _or_going_on(
         run = flights.of(there, f"that order {direction}")
         if run is None:
             break
-        if best is not None and best.run is not None and not better(run, best.run):
+        if best is not None and not _better_than(run, best):
             continue
         kept = tour_of_flight(there, order, run, planned, bound, seed)
         if kept is None:
             continue
         again = flights.of(kept.mission, "it as it will be written")
-        if again is None or (best is not None and best.run and not better(again, best.run)):
+        if again is None or (best is not None and not _better_than(again, best)):
             continue
         best = replace(kept, run=again)
     return best
+
+
+def _or_as_given(
+    best: SolvedMission | None, given: Run | None, flights: _Flights, planned: SpacePlan | None,
+    bound: float | None, seed: int,
+) -> SolvedMission | None:  # fmt: skip
+    """The better of a tour and of the mission as it was given, whose own tour is kept if it has
+    one."""
+    mission = flights.mission
+    if given is None or (best is not None and not _better_than(given, best)):
+        return best
+    order = tuple(range(len(mission.waypoints)))
+    if mission.tour is not None and _good(given):
+        return SolvedMission(mission, order, given, None, planned)
+    kept = tour_of_flight(mission, order, given, planned, bound, seed, AS_GIVEN)
+    if kept is None:
+        return best
+    again = flights.of(kept.mission, "it as it will be written")
+    if again is None:
+        return kept if best is None or best.run is None else best
+    return replace(kept, run=again) if best is None or _better_than(again, best) else best
+
+
+def _better_than(run: Run, best: SolvedMission) -> bool:
+    """Whether a flight is better than a tour that was flown; one that there was no time to fly
+    takes at least as long as its length says."""
+    if best.run is not None:
+        worth = (1.0 - WORTH) * seconds_until_home(best.run)
+        return better(run, best.run) and seconds_until_home(run) < worth
+    least = best.tour.length / best.mission.speed
+    return run.summary["visited"] >= len(best.tour.stops) and seconds_until_home(run) < least
+
+
+def _good(run: Run) -> bool:
+    """Whether a flight came home free, and never exceeded the limit."""
+    return bool(run.summary["home"]["tether_free"]) and run.summary["exceedance_s"] == 0.0
 
 
 def tour_of_flight(
@@ -236,7 +279,8 @@ def tour_of_flight(
     planned : SpacePlan, optional
         Whose words the stops get.
     bound : float, optional
-        Of all tours, metres.
+        Of all tours through the waypoints, metres. A robot that turns back a bit before them goes
+        less, by twice as much as it stays away, and once at home.
     seed : int
         Of what found the order.
     name : str
@@ -248,7 +292,7 @@ def tour_of_flight(
         The mission with the tour; None where the robot did not come home free, or the tether was
         over the limit.
     """
-    if not run.summary["home"]["tether_free"] or run.summary["exceedance_s"] > 0.0:
+    if not _good(run):
         return None
     stops = run.summary["stops"]
     visited = [int(stop["waypoint"]) for stop in stops]
@@ -269,6 +313,11 @@ def tour_of_flight(
             )
         )  # fmt: skip
     length = along(path)
+    if bound is not None:
+        ends = np.array([leg[-1] for leg in legs[:-1]]).reshape(-1, 3)
+        off = np.linalg.norm(ends - mission.places[visited].reshape(-1, 3), axis=1)
+        short_of_home = float(np.linalg.norm(legs[-1][-1] - np.array(mission.start)))
+        bound = max(0.0, bound - 2.0 * float(off.sum()) - short_of_home)
     tour = PlannedTour(
         stops=tuple(planned_stops), home=in_file(legs[-1]), status=Status.FEASIBLE, solver=name,
         seed=seed, length=length, bound_of_all=bound, gap_to_all=relative_gap(length, bound),

@@ -229,6 +229,26 @@ class Water:
         """
         return taut(self.field, path, self.mission.clearance, self.mission.delta)
 
+    def driven(self, tether: Tether, path: Floats) -> tuple[Tether, float]:
+        """A tether, once the robot has gone a path.
+
+        Parameters
+        ----------
+        tether : Tether
+            Before.
+        path : ndarray, shape (k, 3)
+            From the robot on, metres.
+
+        Returns
+        -------
+        tether : Tether
+            At the end.
+        longest : float
+            Metres of it on the way.
+        """
+        after, lengths = self.model.drive(tether, path[1:])
+        return after, float(lengths.max(initial=tether.length))
+
     def number(self, path: Floats) -> int | None:
         """Number of a path's word; None where it has none.
 

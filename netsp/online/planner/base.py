@@ -79,6 +79,9 @@ class PlannerOptions:
         Of paths along which it does so, likewise.
     planning_limit : float
         Seconds that `repair` may take to plan the rest of a tour; the robot holds its place.
+    prepared : bool
+        Whether shortest paths to all waypoints are found before the mission, which takes seconds
+        where there are many; else when they are asked for.
     """
 
     paths: str = "tree"
@@ -87,6 +90,7 @@ class PlannerOptions:
     looks: int = 10
     metres: float = 15.0
     planning_limit: float = 10.0
+    prepared: bool = True
 
 
 @dataclass
@@ -369,7 +373,7 @@ class Planner:
     def prepare(self) -> None:
         """Find the shortest paths to all waypoints, and home, from everywhere, before the mission:
         they depend on the map alone."""
-        if self.options.paths == "tree":
+        if self.options.paths == "tree" and self.options.prepared:
             home = [] if self.track is not None else [np.array(self.mission.start)]
             self.grid.prepare([*self.mission.places, *home])
 
