@@ -71,7 +71,7 @@ def test_the_older_way_makes_a_tour_that_flies_as_it_did(rings):
     order = order_by_going_on(mission, field, grid, clock=Clock(20.0))
     there = mission.model_copy(update={"waypoints": tuple(mission.waypoints[n] for n in order)})
     run = simulate(there, scene=scene, field=field)
-    kept = tour_of_flight(there, order, run)
+    kept = tour_of_flight(there, order, run, there.load_scene().field())
     assert kept is not None
     again = simulate(kept.mission, scene=scene, field=field)
     assert again.summary["visited"] == 36
@@ -86,7 +86,7 @@ def test_a_flight_that_does_not_end_free_makes_no_tour(rings):
     mission = Mission.load(rings)
     run = simulate(mission, "none")
     assert run.summary["exceedance_s"] > 0.0
-    assert tour_of_flight(mission, tuple(range(36)), run) is None
+    assert tour_of_flight(mission, tuple(range(36)), run, mission.load_scene().field()) is None
 
 
 def test_the_order_is_written_as_a_mission_that_flies(rings, tmp_path, capsys):

@@ -136,12 +136,14 @@ def _camera(text: str, patch: float) -> Camera:
 def _summary(found: Cover, units: str, output: str | None, plot: str | None) -> str:
     """What was found, in a few lines."""
     mission, count = found.mission, len(found.viewpoints)
-    more = 100.0 * (count / found.bound - 1.0) if found.bound else 0.0
+    less = 100.0 * (1.0 - found.bound / count)
+    fewest = f"no choice among them has fewer than {found.bound}, {less:.1f} % less"
+    if count == found.bound:
+        fewest = "no choice among them has fewer"
     lines = [
         f"seen      {100 * found.seen:.1f} % of the surface; from all {found.candidates} "
         f"candidates together {100 * found.visible:.1f} %",
-        f"waypoints {count}; no choice among the candidates has fewer than {found.bound} "
-        f"({more:.0f} % more)",
+        f"waypoints {count}; {fewest}",
         f"tether    {mission.tether_length:g} {units}",
     ]
     if output:

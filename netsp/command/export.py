@@ -15,6 +15,9 @@ from netsp.command.types import (
 )
 from netsp.errors import InputError, counted
 
+SPEED = 0.5
+"""Metres per second, where none is given."""
+
 EXAMPLE = (
     "netsp export solution.json --problem problems/wharf.json --origin 41.18,-8.70 -o wharf.plan"
 )
@@ -42,11 +45,12 @@ def arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument(
         "--hold",
         type=natural,
-        default=5,
         metavar="S",
-        help="seconds to hold at every goal; default 5",
+        help="seconds to hold at every goal; default 5, of a mission what its waypoints ask for",
     )
-    p.add_argument("--speed", type=length, default=0.5, metavar="V", help="speed, m/s; default 0.5")
+    p.add_argument(
+        "--speed", type=length, metavar="V", help="speed, m/s; default 0.5, or a mission's own"
+    )
     p.add_argument(
         "--max-waypoints",
         type=positive,
@@ -99,7 +103,10 @@ def run(args: argparse.Namespace) -> int:
     projection = None
     if args.origin:
         projection = Projection.parse(args.origin, problem.base[:2], "--origin")
-    settings = Settings(hold=args.hold, speed=args.speed, max_waypoints=args.max_waypoints)
+    settings = Settings(
+        hold=args.hold, speed=SPEED if args.speed is None else args.speed,
+        max_waypoints=args.max_waypoints,
+    )  # fmt: skip
     points = export(
         problem, solution, args.output, kind, projection, acceptance=args.acceptance,
         settings=settings,
@@ -145,7 +152,10 @@ def _mission(args: argparse.Namespace) -> int:
     projection = None
     if args.origin:
         projection = Projection.parse(args.origin, mission.start[:2], "--origin")
-    settings = Settings(hold=args.hold, speed=args.speed, max_waypoints=args.max_waypoints)
+    settings = Settings(
+        hold=args.hold, speed=mission.speed if args.speed is None else args.speed,
+        max_waypoints=args.max_waypoints,
+    )  # fmt: skip
     done = export_mission(
         mission, args.output, kind, projection, acceptance=args.acceptance, settings=settings,
         surface=args.surface,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
+from netsp.command.solve_mission import is_mission
 from netsp.command.types import (
     check_writable,
     length,
@@ -13,7 +14,7 @@ from netsp.command.types import (
     positive,
     roadmap_options,
 )
-from netsp.errors import InputError
+from netsp.errors import InputError, counted
 
 if TYPE_CHECKING:
     from netsp.problem import Problem
@@ -23,7 +24,7 @@ EXAMPLE = "netsp plot problems/wharf.json solution.json -o wharf.svg"
 
 def arguments(p: argparse.ArgumentParser) -> None:
     """Of the command line."""
-    p.add_argument("problem", metavar="PROBLEM", help="problem or scene file (JSON)")
+    p.add_argument("problem", metavar="PROBLEM", help="problem, scene or mission file (JSON)")
     p.add_argument(
         "solution", metavar="SOLUTION", nargs="?",
         help="solution; for a scene, a path that begins at the anchor (CSV x,y,z or JSON), along "
@@ -31,7 +32,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     p.add_argument(
         "-o", "--output", required=True, metavar="FILE",
-        help="png, svg or pdf; a scene also html, interactive",
+        help="png, svg or pdf; a scene or a mission also html, interactive",
     )  # fmt: skip
     p.add_argument(
         "--tether-model", default="geodesic", metavar="NAME",
@@ -53,6 +54,8 @@ def arguments(p: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Draw, and return the exit code."""
     check_writable(args.output, inputs=(args.problem, args.solution))
+    if is_mission(args.problem):
+        return _mission(args)
     if _is_scene(args.problem):
         from netsp.command.plot_scene import plot_scene
 
@@ -88,6 +91,32 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
+def _mission(args: argparse.Namespace) -> int:
+    """Draw a mission: its waypoints in their order, and its tour if it has one."""
+    for name, flag in (
+        ("solution", "SOLUTION"), ("roadmap", "--roadmap"), ("tethers_to", "--tethers-to")
+    ):  # fmt: skip
+        if getattr(args, name) is not None:
+            raise InputError(f"{flag}: {args.problem} is a mission; expected nothing beside it")
+    from netsp.online.mission import Mission
+    from netsp.pictures import scene as pictures
+    from netsp.pictures import style
+
+    style.check_format(args.output, pictures.INTERACTIVE)
+    mission = Mission.load(args.problem)
+    tour, count = mission.tour, len(mission.waypoints)
+    left = () if tour is None else tuple(range(len(tour.stops), count))
+    scene = mission.load_scene()
+    title = f"{mission.name}: {counted(count, 'waypoint')}"
+    if tour is not None:
+        title += f", tour {tour.length:.5g} {scene.units}"
+    pictures.save(
+        scene, args.output, path=None if tour is None else tour.line, title=title,
+        stops=pictures.Stops(mission.places, left, mission.anchor),
+    )  # fmt: skip
+    return 0
+
+
 def _is_scene(path: str) -> bool:
     """A file that describes a scene rather than a problem: by its fields."""
     from netsp.files import read_text
@@ -95,7 +124,9 @@ def _is_scene(path: str) -> bool:
 
     data = parse_json_object(read_text(path), path)
     if kind_of(data) not in (None, "problem", "scene"):
-        raise InputError(f"{path}: this is a {kind_of(data)}; expected a problem or a scene")
+        raise InputError(
+            f"{path}: this is a {kind_of(data)}; expected a problem, a scene or a mission"
+        )
     return "goals" not in data and bool(
         {"solids", "mesh", "cloud", "floor", "problem"} & data.keys()
     )

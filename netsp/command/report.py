@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
+from netsp.command.solve_mission import is_mission
 from netsp.command.types import check_writable
+from netsp.errors import InputError
 
 EXAMPLE = "netsp report rows.jsonl -o report.html"
 
@@ -13,7 +16,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
     """Of the command line."""
     p.add_argument(
         "results", metavar="RESULTS",
-        help="rows of `netsp compare`, a solution file, or the folder of `netsp execute`",
+        help="rows of `netsp compare`, a solution, a planned mission, or the folder of a run",
     )  # fmt: skip
     p.add_argument("--problem", metavar="FILE", help="the problem of a solution file")
     p.add_argument(
@@ -27,9 +30,16 @@ def arguments(p: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Write the page, and return the exit code."""
     if not args.results.endswith((".jsonl", ".jsonl.gz")):
+        check_writable(args.output, inputs=(args.results, args.problem))
+        if _of_mission(args.results):
+            from netsp.report.mission import report_mission
+
+            if args.problem is not None:
+                raise InputError(f"--problem: {args.results} is of a mission; expected none")
+            report_mission(args.results, args.output)
+            return 0
         from netsp.report.tour import report_tour
 
-        check_writable(args.output, inputs=(args.results, args.problem))
         report_tour(args.results, args.problem, args.output)
         return 0
     from netsp.report.page import write_report
@@ -37,3 +47,11 @@ def run(args: argparse.Namespace) -> int:
     check_writable(args.output, inputs=(args.results,))
     write_report(args.results, args.output, args.figures)
     return 0
+
+
+def _of_mission(source: str) -> bool:
+    """Whether it is a mission, or the folder of one that was flown."""
+    place = Path(source)
+    if place.is_dir():
+        return (place / "mission.json").exists() and not (place / "solution.json").exists()
+    return is_mission(source)

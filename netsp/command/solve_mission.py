@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from netsp.command.types import check_writable
-from netsp.errors import EXIT_NOT_ALL, InputError
+from netsp.errors import EXIT_NOT_ALL, InputError, counted
 
 if TYPE_CHECKING:
     from netsp.online.mission import Mission
@@ -48,8 +48,7 @@ def check_flags(args: argparse.Namespace, parser_defaults: dict[str, Any]) -> No
     for name, flag in FOR_PROBLEMS.items():
         if getattr(args, name) != parser_defaults[name]:
             raise InputError(
-                f"{flag}: is for problems, and {args.problem} is a mission; expected none "
-                "(tether and clearance are the mission's own)"
+                f"{flag}: is for problems, and {args.problem} is a mission; expected none"
             )
 
 
@@ -76,8 +75,16 @@ def solve(
     compiling = contextlib.nullcontext() if quiet else compile_messages(sys.stderr)
     with stages or contextlib.nullcontext(), compiling:
         scene = mission.load_scene()
+        field = scene.field()
+        if not quiet:
+            from netsp.command.plot_scene import warn_of_scene
+            from netsp.online.tether import GeodesicTether
+
+            warn_of_scene(
+                GeodesicTether(field, mission.delta), mission.delta, "lower the mission's delta"
+            )
         found = solve_mission(
-            mission, scene=scene, solver=solver, params=params,
+            mission, scene=scene, field=field, solver=solver, params=params,
             time_limit=time_limit or TIME_LIMIT, iteration_limit=iteration_limit, seed=seed,
             on_progress=stages,
         )  # fmt: skip
@@ -126,13 +133,11 @@ def summary(
     from netsp.space.solve import AS_GIVEN, seconds_until_home
 
     tour, status = found.tour, found.tour.status.value
+    legs = f"{counted(tour.legs, 'leg')} between {counted(tour.states, 'state')}"
     if status == "optimal":
-        verdict = f"the shortest along {tour.legs} legs between {tour.states} states of the tether"
+        verdict = f"the shortest along {legs} of the tether"
     elif tour.lower_bound is not None:
-        verdict = (
-            f"bound {tour.lower_bound:.6g} along {tour.legs} legs between {tour.states} states of "
-            "the tether"
-        )
+        verdict = f"bound {tour.lower_bound:.6g} along {legs} of the tether"
     elif tour.solver == AS_GIVEN:
         verdict = "in the order given, for no better one was found"
     else:
@@ -157,15 +162,15 @@ def summary(
             f"the limit for {s['exceedance_s']:.1f} s{given}"
         )
     else:
-        lines.append("flown    not: the time was up")
+        lines.append(f"flown    not: {'interrupted' if found.interrupted else 'the time was up'}")
     if found.left_out:
         named = ", ".join(f"#{n}" for n in found.left_out[:MOST_NAMED])
         more = len(found.left_out) - MOST_NAMED
         lines.append(
-            f"left out {named}{f' and {more} more' if more > 0 else ''}: no tether within the "
-            "limit was found to reach them"
+            f"left out {named}{f' and {more} more' if more > 0 else ''}: not reached by any tether "
+            "within the limit that was found"
         )
-    lines.append(f"time     {seconds:.1f} s")
+    lines.append(f"time     {seconds:.1f} s{', interrupted' if found.interrupted else ''}")
     if output:
         lines.append(f"mission  {output}")
     if plot:
@@ -180,5 +185,5 @@ def _as_given(found: SolvedMission) -> str:
     s = found.given.summary
     missed = s["waypoints"] - s["visited"]
     return f"in the order given {seconds_until_home(found.given):.1f} s" + (
-        f", {missed} waypoints missed" if missed else ""
+        f", {counted(missed, 'waypoint')} missed" if missed else ""
     )

@@ -24,6 +24,8 @@ class Stages:
         stage = text.split(",")[0].split(" from ")[0]
         if stage == self._stage and now - self._shown < (0.1 if self._watched else EVERY):
             return
+        if stage != self._stage and not self._watched:
+            text = stage  # how far it is will be told of those that take long
         line = f"{now - self._begin:7.1f}s  {text} …"
         if self._watched:
             end = "\n" if stage != self._stage and self._stage else ""

@@ -34,10 +34,12 @@ def arguments(p: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Judge, print, and return the exit code."""
     from netsp.command.solve_mission import is_mission
+    from netsp.files import read_text
 
     if is_mission(args.problem):
         return _mission(args)
     if args.solution is None:
+        read_text(args.problem)  # a file that is not there is told as ever
         raise InputError(f"SOLUTION: {args.problem} is no mission; expected a solution beside it")
     if args.measures:
         from netsp.command.measures import describe_path

@@ -10,6 +10,7 @@ import numpy as np
 
 from netsp.arrays import Bools, Floats
 from netsp.clock import TimeLimit, until_interrupt
+from netsp.cover.alternatives import alternatives
 from netsp.cover.choose import Choice, choose
 from netsp.cover.viewpoints import Viewer, Viewpoints, coarser, viewpoints_of
 from netsp.errors import InputError
@@ -17,7 +18,7 @@ from netsp.fields import Point3, checked_argument
 from netsp.geometry import polylines
 from netsp.online.coverage import Patches, patches_of
 from netsp.online.equipment import Camera
-from netsp.online.mission import Mission, MissionWaypoint
+from netsp.online.mission import Mission, MissionWaypoint, Viewpoint
 from netsp.online.paths.tree import Grid, ShortestTree, taut
 from netsp.online.scene.field import DistanceField
 from netsp.online.scene.scene import Scene
@@ -171,7 +172,7 @@ def cover(
             )
         tell(f"choosing among {len(found)} viewpoints")
         choice = choose(found.sees, patches.areas, share, clock)
-        return _made(mission, scene, patches, found, choice, reach)
+        return _made(mission, scene, patches, found, choice, reach, share)
 
 
 def _check(
@@ -260,17 +261,23 @@ class _Reach:
 
 def _made(
     mission: Mission, scene: Scene, patches: Patches, found: Viewpoints, choice: Choice,
-    reach: _Reach,
+    reach: _Reach, share: float,
 ) -> Cover:  # fmt: skip
     chosen = found.only(choice.chosen)
     length = mission.tether_length
     if length == ENDLESS:
         longest = float(reach.tethers(chosen.places).max())
         length = round(LONGER * longest + MORE, 2)
+    needed = share * float(patches.areas[found.sees.any(axis=0)].sum())
+    others_of = alternatives(found, choice.chosen, patches.areas, needed)
+    own = [_viewpoint(found, k) for k in choice.chosen]
     waypoints = tuple(
-        MissionWaypoint(position=(x, y, z), heading=round(math.degrees(h), 1))
-        for (x, y, z), h in zip(chosen.places.round(4).tolist(), chosen.headings, strict=True)
-    )
+        MissionWaypoint(
+            position=v.position, heading=v.heading,
+            alternatives=tuple(_viewpoint(found, k) for k in others),
+        )
+        for v, others in zip(own, others_of, strict=True)
+    )  # fmt: skip
     areas = patches.areas
     visible: Bools = np.asarray(found.sees.any(axis=0))
     return Cover(
@@ -279,3 +286,8 @@ def _made(
         float(areas[chosen.sees.any(axis=0)].sum() / areas.sum()),
         float(areas[visible].sum() / areas.sum()), visible,
     )  # fmt: skip
+
+
+def _viewpoint(found: Viewpoints, k: int) -> Viewpoint:
+    x, y, z = found.places[k].round(4).tolist()
+    return Viewpoint(position=(x, y, z), heading=round(math.degrees(found.headings[k]), 1))

@@ -8,7 +8,8 @@ stations are upright, and would forbid what is above and below.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -139,6 +140,7 @@ def _waypoints(mission: Mission, projection: Projection | None) -> list[Waypoint
                 stop.path[-1], k, stop.signature, stop.tether_length,
                 # from the x axis towards y, to clockwise from north
                 heading=None if heading is None else (north + 90.0 - heading) % 360.0,
+                stay=math.ceil(mission.waypoints[k].dwell),
             )
         )  # fmt: skip
     return [*out, *_bends(tour.home), Waypoint(mission.start, HOME)]
@@ -223,7 +225,7 @@ def _checked(water: Water, points: list[Waypoint], line: Floats, exact: bool) ->
 
 def _sunk(p: Waypoint, surface: float) -> Waypoint:
     x, y, z = p.position
-    return Waypoint((x, y, z - surface), p.goal, p.word, p.tether, p.start, p.heading)
+    return replace(p, position=(x, y, z - surface))
 
 
 def _stand_in(mission: Mission, surface: float) -> Problem:

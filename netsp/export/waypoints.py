@@ -52,6 +52,8 @@ class Waypoint:
         Whether it is the start.
     heading : float, optional
         Degrees clockwise from north; None where it does not matter.
+    stay : int, optional
+        Seconds that are asked for there; None where nothing is said of it.
     """
 
     position: tuple[float, float, float]
@@ -60,6 +62,7 @@ class Waypoint:
     tether: float = 0.0
     start: bool = False
     heading: float | None = None
+    stay: int | None = None
 
 
 def waypoints_of(problem: Problem, solution: Solution, radius: float = 0.0) -> list[Waypoint]:

@@ -34,6 +34,9 @@ from netsp.solution import Solution
 SHALLOWEST = 0.1
 """Metres of depth that the least altitude stands for."""
 
+HOLD = 5
+"""Seconds at every goal, where nothing else is said."""
+
 MOST_ITEMS = 650
 """Mission items: MAVLink counts to 65,535, but ArduSub takes 655 with home and the speed."""
 
@@ -69,7 +72,7 @@ class Settings:
         Waypoints.
     """
 
-    hold: int = 5
+    hold: int | None = None
     bend: int = 1
     speed: float | None = 0.5
     max_waypoints: int = MOST_ITEMS
@@ -153,6 +156,8 @@ def check_settings(kind: str, settings: Settings) -> None:
         raise InputError("speed: expected more than 0, got 0")
     for name, least in (("hold", 0), ("bend", 1)):
         seconds = getattr(settings, name)
+        if name == "hold" and seconds is None:
+            continue
         if not isinstance(seconds, int | np.integer) or not least <= seconds <= 3600:
             raise InputError(
                 f"{name}: expected whole seconds from {least} to 3600, got {seconds!r}"
@@ -191,7 +196,11 @@ def altitude(z: float) -> float:
 
 
 def _hold(point: Waypoint, settings: Settings) -> int:
-    return settings.hold if point.goal not in (None, HOME) else settings.bend
+    if point.goal in (None, HOME):
+        return settings.bend
+    if settings.hold is not None:
+        return settings.hold
+    return HOLD if point.stay is None else point.stay
 
 
 def _plan(

@@ -8,6 +8,7 @@ from netsp.errors import InputError
 from netsp.geometry import polylines
 from netsp.online.mission import Mission
 from netsp.online.planner import PLANNERS
+from netsp.online.scene.scene import Scene
 from netsp.online.simulation import STEP
 from netsp.online.tether import TETHERS
 from netsp.online.track import Track
@@ -44,8 +45,48 @@ def check_names(planner: object, vehicle: object, tether: object) -> None:
             known.named(name)
 
 
+def check_bounds(mission: Mission, scene: Scene) -> None:
+    """Refuse places beyond the bounds of a scene: nothing is known of the water there.
+
+    Parameters
+    ----------
+    mission : Mission
+        Its anchor, start, state, waypoints and their alternatives count.
+    scene : Scene
+        Its bounds count.
+
+    Raises
+    ------
+    InputError
+        One of them is outside; says which, and where.
+    """
+    if scene.bounds is None:
+        return
+    low, high = np.array(scene.bounds[:3]), np.array(scene.bounds[3:])
+    named = [("anchor", mission.anchor), ("start", mission.start)]
+    named += [] if mission.state is None else [("state.position", mission.state.position)]
+    for k, w in enumerate(mission.waypoints):
+        named.append((f"waypoints[{k}]", w.position))
+        named += [
+            (f"waypoints[{k}].alternatives[{c}]", v.position) for c, v in enumerate(w.alternatives)
+        ]
+    for name, place in named:
+        if (np.array(place) < low).any() or (np.array(place) > high).any():
+            shown = ", ".join(f"{v:g}" for v in place)
+            raise InputError(
+                f"{name}: ({shown}) lies outside of the scene's bounds "
+                f"{[float(v) for v in scene.bounds]}; expected a place within, or wider bounds"
+            )
+
+
 def check_size(mission: Mission) -> None:
-    """InputError for a mission that would take for ever."""
+    """InputError for a mission that would take for ever, or whose measures make no sense."""
+    for name, value in (("delta", mission.delta), ("reach", mission.reach)):
+        if value > mission.tether_length:
+            raise InputError(
+                f"{name}: {value:g} is more than the tether_length {mission.tether_length:g}; "
+                "expected far less: mixed units?"
+            )
     places = mission.every_place[1:]
     track = Track.of(mission)
     if track is not None:

@@ -12,7 +12,7 @@ import numpy as np
 from netsp.errors import InputError, interrupted
 from netsp.online.coverage import Coverage, patches_of
 from netsp.online.laid import first_tether, present_tether
-from netsp.online.limits import check_names, check_size
+from netsp.online.limits import check_bounds, check_names, check_size
 from netsp.online.log import LogRow, Run
 from netsp.online.mission import TURN_TIME, Mission, MissionWaypoint
 from netsp.online.paths.tree import Grid
@@ -64,7 +64,7 @@ def grid_of(mission: Mission, scene: Scene, field: DistanceField) -> Grid:
     Raises
     ------
     InputError
-        It would take too much memory; says which cell would not.
+        It would take too much memory; says which cell would not. A cell larger than the site.
     """
     cell = mission.cell or CELL
     if scene.bounds is not None:
@@ -73,6 +73,10 @@ def grid_of(mission: Mission, scene: Scene, field: DistanceField) -> Grid:
         low, high = extent(scene, mission.every_place)
         room = 5.0 * cell + mission.clearance
         low, high = low - room, high + room
+    if cell > (widest := float((high - low).max())):
+        raise InputError(
+            f"cell: {cell:g} is more than the whole site, {widest:.4g} across; expected far less"
+        )
     if mission.cell is None:
         cell = max(CELL, float(np.prod(np.maximum(high - low, CELL)) / MOST_CELLS) ** (1.0 / 3.0))
     return Grid(field, low, high, cell, mission.clearance)
@@ -142,6 +146,7 @@ def simulate(
     if track is not None and tether != "geodesic":
         raise InputError(f"track: tether model {tether!r} cannot follow it; expected geodesic")
     scene = scene or mission.load_scene()
+    check_bounds(mission, scene)
     field = field or scene.field()
     mission = mission.checked_waypoints(field, snap=snap)
     tethers = GeodesicTether(field, mission.delta)

@@ -39,7 +39,7 @@ def save(found: Cover, scene: Scene, file: str | Path) -> None:
     kinds = (
         (seen, style.OBSTACLE, "seen"),
         (~seen & found.visible_patches, style.LIMIT, "left out"),
-        (~found.visible_patches, style.RECOVERY, "cannot be seen"),
+        (~found.visible_patches, style.ROBOT, "cannot be seen"),
     )
     for chosen, colour, label in kinds:
         there = patches.centres[chosen][::step]
@@ -58,9 +58,9 @@ def save(found: Cover, scene: Scene, file: str | Path) -> None:
         for chosen, colour, _ in kinds:
             panel.plot(*patches.centres[chosen][::step][:, [a, b]].T, ".", ms=1.2, color=colour)
         panel.plot(places[:, a], places[:, b], ".", ms=5, color=style.TETHER)
-        if b == 1:
-            for p, d in zip(places, ahead, strict=True):
-                panel.plot([p[0], p[0] + d[0]], [p[1], p[1] + d[1]], color=style.TETHER, lw=0.7)
+        rise = ahead[:, 1] if b == 1 else np.zeros(len(ahead))
+        for p, dx, dy in zip(places, ahead[:, 0], rise, strict=True):
+            panel.plot([p[a], p[a] + dx], [p[b], p[b] + dy], color=style.TETHER, lw=0.7)
         panel.plot(found.mission.anchor[a], found.mission.anchor[b], "*", color=style.BASE)
         panel.set(xlabel=f"{names[a]} ({unit})", ylabel=f"{names[b]} ({unit})", aspect="equal")
         panel.set_title(name, fontsize=9)

@@ -21,6 +21,7 @@ from netsp.online.tether import GeodesicTether, Tether
 from netsp.online.track import Track
 from netsp.pictures import style
 from netsp.pictures.scene import (
+    Stops,
     draw_space,
     layout,
     line_trace,
@@ -42,8 +43,13 @@ def title_of(run: Run) -> str:
     """A run in one line."""
     s = run.summary
     return (
-        f"{s['planner']}: {s['visited']} of {s['waypoints']} in {s['inspection_s']:.0f} s, "
-        f"longest tether {s['longest_tether']:.2f} of {s['tether_length']:g} m; "
+        f"{s['planner']}: {s['visited']} of {s['waypoints']} in {s['inspection_s']:.0f} s"
+        + (
+            f", home after {s['inspection_s'] + s['home']['seconds']:.0f} s"
+            if s["home"]["reached"]
+            else ""
+        )
+        + f", longest tether {s['longest_tether']:.2f} of {s['tether_length']:g} m; "
         + ("tether free at home" if s["home"]["tether_free"] else "tether not free at the end")
     )
 
@@ -68,7 +74,9 @@ def save_runs(runs: Sequence[Run], scene: Scene, file: str | Path) -> None:
         charts[0].set_xlabel("")
     axes = right.subplots(len(runs), 1, subplot_kw={"projection": "3d"}, squeeze=False)[:, 0]
     for run, ax in zip(runs, axes, strict=True):
-        draw_space(scene, path_of(run), run.tether.nodes, ax=ax)
+        left = tuple(int(left["waypoint"]) for left in run.summary["left_out"])
+        stops = Stops(run.mission.places, left, name="waypoint visited")
+        draw_space(scene, path_of(run), run.tether.nodes, ax=ax, stops=stops)
         track = Track.of(run.mission)
         if track is not None:
             gone = track.between(0.0, run.log[-1].time)
@@ -89,15 +97,17 @@ def draw_tether(runs: Sequence[Run], *, ax: Any = None, units: str = "m") -> Any
     colours = style.RUNS if len(runs) > 1 else (style.TETHER,)
     for run, colour in zip(runs, colours, strict=False):
         t = np.array([r.time for r in run.log])
-        if len(runs) == 1:
+        recovering = [r.mode == "recovery" for r in run.log]
+        if len(runs) == 1 and any(recovering):
             ax.fill_between(
-                t, 0, 1, where=[r.mode == "recovery" for r in run.log], color=style.RECOVERY,
+                t, 0, 1, where=recovering, color=style.RECOVERY,
                 transform=ax.get_xaxis_transform(), label="tether recovery",
             )  # fmt: skip
         ax.plot(t, [r.payout for r in run.log], color=colour, lw=1.3, label=run.planner)
     ax.axhline(runs[0].mission.tether_length, color=style.LIMIT, lw=1.0, ls="--", label="limit")
     what = "payout" if any(r.payout > r.tether for run in runs for r in run.log) else "taut tether"
-    ax.set(xlabel="time (s)", ylabel=f"{what} ({units})", ylim=(0, None))
+    most = max(runs[0].mission.tether_length, *(r.payout for run in runs for r in run.log))
+    ax.set(xlabel="time (s)", ylabel=f"{what} ({units})", ylim=(0, 1.06 * most))
     ax.legend(loc="best", fontsize=8)
     return ax
 

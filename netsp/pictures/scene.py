@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -21,13 +22,43 @@ from netsp.pictures import style
 
 INTERACTIVE = ".html"
 
+MOST_NUMBERED = 30
+"""Waypoints whose numbers are drawn."""
+
+
+@dataclass(frozen=True)
+class Stops:
+    """Waypoints of a mission.
+
+    Parameters
+    ----------
+    places : ndarray, shape (n, 3)
+        Metres.
+    left_out : tuple of int
+        Which of them are left out.
+    anchor : (x, y, z) or None
+        Drawn as well where no tether is.
+    name : str
+        What the legend calls those that are not left out.
+    """
+
+    places: Floats
+    left_out: tuple[int, ...] = ()
+    anchor: tuple[float, float, float] | None = None
+    name: str = "waypoint"
+
+    @property
+    def every_place(self) -> Floats:
+        """(m, 3) all that is drawn, metres."""
+        return self.places if self.anchor is None else np.vstack([self.places, self.anchor])
+
 
 def save(
     scene: Scene, file: str | Path, *, path: npt.ArrayLike | None = None,
-    tether: Tether | None = None, title: str | None = None,
+    tether: Tether | None = None, title: str | None = None, stops: Stops | None = None,
 ) -> None:  # fmt: skip
-    """Draw a scene, with a path (k, 3) and a tether if given, by the file name's ending: .png, .svg
-    and .pdf a figure, .html a page that needs nothing else.
+    """Draw a scene, with a path (k, 3), a tether and waypoints if given, by the file name's ending:
+    .png, .svg and .pdf a figure, .html a page that needs nothing else.
 
     Raises
     ------
@@ -37,13 +68,37 @@ def save(
     style.check_format(file, INTERACTIVE)
     line = np.zeros((0, 3)) if path is None else np.asarray(path, dtype=float).reshape(-1, 3)
     nodes = np.zeros((0, 3)) if tether is None else tether.nodes
-    low, high = extent(scene, line, nodes)
+    low, high = extent(scene, line, nodes, *(() if stops is None else (stops.every_place,)))
     parts = parts_of(scene, low, high)
     title = title or _title(scene, line, tether)
     if Path(file).suffix.lower() == INTERACTIVE:
-        write_text(file, _interactive(scene, parts, line, nodes, title))
+        write_text(file, _interactive(scene, parts, line, nodes, title, stops))
     else:
-        style.save(_figure(scene, parts, line, nodes, (low, high), title), file)
+        style.save(_figure(scene, parts, line, nodes, (low, high), title, stops), file)
+
+
+def figure_of(scene: Scene, path: Floats, title: str, stops: Stops) -> Any:
+    """The same as a Matplotlib figure.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    path : ndarray, shape (k, 3)
+        Of the robot, metres.
+    title : str
+        Above it.
+    stops : Stops
+        Waypoints.
+
+    Returns
+    -------
+    Figure
+        The figure.
+    """
+    low, high = extent(scene, path, stops.every_place)
+    nothing = np.zeros((0, 3))
+    return _figure(scene, parts_of(scene, low, high), path, nothing, (low, high), title, stops)
 
 
 def _title(scene: Scene, path: Floats, tether: Tether | None) -> str:
@@ -68,7 +123,7 @@ def parts_of(scene: Scene, low: Floats, high: Floats) -> list[tuple[str, Triangl
 
 def _figure(
     scene: Scene, parts: Sequence[tuple[str, Triangles]], path: Floats, nodes: Floats,
-    box: tuple[Floats, Floats], title: str,
+    box: tuple[Floats, Floats], title: str, stops: Stops | None = None,
 ) -> Any:  # fmt: skip
     """A view in space, and the plans from above and from two sides."""
     from matplotlib.collections import PolyCollection
@@ -79,7 +134,7 @@ def _figure(
     halves: Any = figure.subfigures(1, 2, width_ratios=[1.15, 1.0])
     left, right = halves
     ax: Any = left.add_subplot(projection="3d")
-    draw_space(scene, path, nodes, ax=ax)
+    draw_space(scene, path, nodes, ax=ax, stops=stops)
     cloud = drawn_points(scene) if scene.cloud is not None else np.zeros((0, 3))
     unit = scene.units
     ax.set(xlabel=f"x ({unit})", ylabel=f"y ({unit})", zlabel=f"z ({unit})")
@@ -92,6 +147,8 @@ def _figure(
         if len(cloud):
             panel.plot(cloud[:, a], cloud[:, b], ".", ms=0.4, color=style.OBSTACLE)
         draw_lines(panel, path, nodes, (a, b))
+        if stops is not None:
+            draw_stops(panel, stops, (a, b))
         panel.set(xlim=(low[a], high[a]), ylim=(low[b], high[b]), aspect="equal")
         panel.set_title(name, fontsize=9)
         panel.set(xlabel=f"{names[a]} ({unit})", ylabel=f"{names[b]} ({unit})")
@@ -102,16 +159,18 @@ def _figure(
     return figure
 
 
-def draw_space(scene: Scene, path: Floats, nodes: Floats, *, ax: Any = None) -> Any:
-    """Solids, path (k, 3) and tether (n, 3) in space, on 3D axes of the caller or on new ones;
-    returns the axes."""
+def draw_space(
+    scene: Scene, path: Floats, nodes: Floats, *, ax: Any = None, stops: Stops | None = None
+) -> Any:
+    """Solids, path (k, 3), tether (n, 3) and waypoints in space, on 3D axes of the caller or on new
+    ones; returns the axes."""
     from matplotlib.figure import Figure
     from matplotlib.ticker import MaxNLocator
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
     if ax is None:
         ax = Figure(figsize=(8, 7), layout="constrained").add_subplot(projection="3d")
-    low, high = extent(scene, path, nodes)
+    low, high = extent(scene, path, nodes, *(() if stops is None else (stops.every_place,)))
     for _, (vertices, faces) in parts_of(scene, low, high):
         triangles = vertices[faces]
         ax.add_collection3d(
@@ -120,6 +179,8 @@ def draw_space(scene: Scene, path: Floats, nodes: Floats, *, ax: Any = None) -> 
     if scene.cloud is not None:
         ax.plot(*drawn_points(scene).T, ".", ms=0.6, color=style.OBSTACLE)
     draw_lines(ax, path, nodes, (0, 1, 2))
+    if stops is not None:
+        draw_stops(ax, stops, (0, 1, 2))
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
     ax.set_box_aspect(high - low, zoom=0.85)  # room for the labels
     ax.set(xlabel="x (m)", ylabel="y (m)", zlabel="z (m)")
@@ -128,6 +189,29 @@ def draw_space(scene: Scene, path: Floats, nodes: Floats, *, ax: Any = None) -> 
     for axis, size in zip((ax.xaxis, ax.yaxis, ax.zaxis), high - low, strict=True):
         axis.set_major_locator(MaxNLocator(5 if size > 0.5 * widest else 3))
     return ax
+
+
+def draw_stops(ax: Any, stops: Stops, axes: tuple[int, ...]) -> None:
+    """Waypoints on two or three of the axes (0, 1, 2) of space, with their numbers in the order of
+    the tour where these are few enough to be read."""
+    columns = list(axes)
+    some = np.isin(np.arange(len(stops.places)), stops.left_out)
+    for chosen, look, label in (
+        (~some, {"marker": "o", "ms": 4, "color": style.VISITED}, stops.name),
+        (some, {"marker": "x", "ms": 6, "mew": 1.8, "color": style.LEFT_OUT}, "left out"),
+    ):
+        there = stops.places[chosen][:, columns]
+        if len(there):
+            ax.plot(*there.T, ls="none", label=label, **look)
+    if len(columns) == 2 and len(stops.places) <= MOST_NUMBERED:
+        for k, (x, y) in enumerate(stops.places[:, columns]):
+            ax.annotate(
+                str(k), (x, y), xytext=(3, 3), textcoords="offset points", fontsize=7,
+                path_effects=style.halo(),
+            )  # fmt: skip
+    if stops.anchor is not None:
+        place = np.array(stops.anchor)[columns]
+        ax.plot(*place[:, None], "*", color=style.BASE, ms=9, ls="none", label="anchor")
 
 
 def shaded(triangles: Floats) -> Floats:
@@ -147,14 +231,16 @@ def draw_lines(ax: Any, path: Floats, nodes: Floats, axes: tuple[int, ...]) -> N
         ax.plot(*path[:, columns].T, color=style.PATH, lw=0.9, alpha=0.8, label="path")
     if len(nodes):
         ax.plot(*nodes[:, columns].T, color=style.TETHER, lw=1.8, label="tether")
-        ends = (nodes[0], style.BASE, "*", "anchor"), (nodes[-1], style.ROBOT, "o", "robot")
+        # the anchor last: at home the robot is there, too
+        ends = (nodes[-1], style.ROBOT, "o", "robot"), (nodes[0], style.BASE, "*", "anchor")
         for point, colour, marker, name in ends:
             ax.plot(*point[columns][:, None], marker, color=colour, ms=8, label=name)
 
 
 def _interactive(
-    scene: Scene, parts: Sequence[tuple[str, Triangles]], path: Floats, nodes: Floats, title: str
-) -> str:
+    scene: Scene, parts: Sequence[tuple[str, Triangles]], path: Floats, nodes: Floats, title: str,
+    stops: Stops | None,
+) -> str:  # fmt: skip
     go = plotly_objects()
     figure = go.Figure()
     for name, (vertices, faces) in parts:
@@ -172,6 +258,15 @@ def _interactive(
             ("robot", nodes[-1], style.ROBOT),
         ):
             figure.add_trace(point_trace(name, point, colour))
+    if stops is not None:
+        x, y, z = stops.places.T
+        names = [f"#{k}" for k in range(len(x))]
+        marker = {"size": 3, "color": style.VISITED}
+        figure.add_trace(
+            go.Scatter3d(x=x, y=y, z=z, mode="markers", marker=marker, text=names, name=stops.name)
+        )
+        if stops.anchor is not None:
+            figure.add_trace(point_trace("anchor", np.array(stops.anchor), style.BASE))
     figure.update_layout(**layout(title, scene.units))
     return str(figure.to_html(include_plotlyjs=True, full_html=True))
 

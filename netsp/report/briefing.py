@@ -11,11 +11,18 @@ import numpy as np
 
 from netsp.errors import counted
 from netsp.execute.plan import legs_of
+from netsp.judge import Verification
 from netsp.problem import Problem
 from netsp.report.wording import back_from, bearing, listed, passages
 from netsp.roadmap.paths import TautPaths
 from netsp.sizing.margins import Margins, margins
 from netsp.solution import Solution, Status
+
+STYLE = """
+.ok { color: #2b8a3e } .bad { color: #c92a2a } .wide { overflow-x: auto }
+th.words, td.words { text-align: left } td { vertical-align: top }
+"""
+"""Of tables and checks."""
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]], words: Sequence[int] = ()) -> str:
@@ -42,6 +49,28 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]], words: Sequence[in
         for row in rows
     )
     return f'<div class="wide"><table><tr>{top}</tr>{body}</table></div>'
+
+
+def checks(verdict: Verification) -> str:
+    """The judge's checks.
+
+    Parameters
+    ----------
+    verdict : Verification
+        Of a solution or a mission.
+
+    Returns
+    -------
+    str
+        An element.
+    """
+    rows = "".join(
+        f'<tr><td class="{"ok" if c.passed else "bad"}">{"ok" if c.passed else "FAIL"}</td>'
+        f'<td style="text-align:left">{html.escape(c.name)}</td>'
+        f'<td style="text-align:left">{html.escape(c.detail)}</td></tr>'
+        for c in verdict.checks
+    )
+    return f"<table>{rows}</table>"
 
 
 def planned_with(solution: Solution) -> str:

@@ -4,7 +4,6 @@ the checks, measures of entanglement, a run's log."""
 
 from __future__ import annotations
 
-import csv
 import html
 import json
 from pathlib import Path
@@ -12,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from netsp.arrays import Floats
 from netsp.errors import InputError, counted
 from netsp.execute.plan import HOME
 from netsp.files import read_text, write_text
@@ -22,9 +20,8 @@ from netsp.judge import verify
 from netsp.online.scene.scene import scene_of
 from netsp.online.tether import GeodesicTether
 from netsp.online.tether.resolution import suggested_delta
-from netsp.pictures import style
 from netsp.problem import Problem
-from netsp.report import briefing, chart
+from netsp.report import briefing, chart, log
 from netsp.report.page import STYLE
 from netsp.solution import Solution, Status
 
@@ -35,10 +32,8 @@ TOUR_STYLE = """
 #map .name { font-size: 11px; fill: #1b2631; paint-order: stroke; stroke: #fff; stroke-width: 3px }
 #map .visit { font-size: 10.5px } #map .grid { stroke: #e8edf1; fill: none }
 #slider { width: 100%; max-width: 900px } .chart { max-width: 900px; width: 100% }
-.ok { color: #2b8a3e } .bad { color: #c92a2a } .wide { overflow-x: auto }
 .legend { list-style: none; padding: 0; display: flex; flex-wrap: wrap; gap: .2em 1.2em;
   font-size: 13px } .legend svg { vertical-align: -3px }
-th.words, td.words { text-align: left } td { vertical-align: top }
 @media (max-width: 600px) {
   body { margin: .6em auto; padding: 0 .6em } #map text, .chart text { font-size: 20px }
   #map .visit { font-size: 14px } #map .name { font-size: 18px } th, td { padding: .2em .45em }
@@ -84,10 +79,6 @@ def report_tour(source: str | Path, problem_file: str | Path | None, output: str
     place = Path(source)
     run = place if place.is_dir() else None
     if run is not None:
-        if (run / "mission.json").exists() and not (run / "solution.json").exists():
-            raise InputError(
-                f"{source}: is a run of `netsp simulate`; its page is {source}/run.html"
-            )
         problem_file = problem_file or run / "problem.json"
         place = run / "solution.json"
     solution = Solution.load(place)
@@ -110,7 +101,7 @@ def report_tour(source: str | Path, problem_file: str | Path | None, output: str
         raise InputError(
             f"{source}: path: is {drawn:.4g} long; expected about length, {solution.length:.4g}"
         )
-    rows = _table(run / "log.csv") if run else []
+    rows = log.rows_of(run / "log.csv") if run else []
     if run is not None and not rows:
         raise InputError(f"{run / 'log.csv'}: holds no row")
     tethers = _json(run / "tethers.json") if run else None
@@ -159,11 +150,11 @@ def page(
     if found is not None:
         parts += ["<h2>Margins</h2>", briefing.margin_list(problem, found)]
     if run is None or own:
-        parts += ["<h2>Checks</h2>", _checks(problem, solution)]
+        parts += ["<h2>Checks</h2>", briefing.checks(verify(problem, solution))]
     if problem.state is None and own:
         parts += ["<h2>Measures of entanglement</h2>", _measures(problem, solution)]
     if rows:
-        parts += ["<h2>Log</h2>", _charts(rows, problem.units), _events(run)]
+        parts += ["<h2>Log</h2>", _over_time(rows, problem.units), _events(run)]
     shown = [
         {
             "t": view.points(f["nodes"]), "r": view.point(f["nodes"][-1]),
@@ -176,7 +167,8 @@ def page(
         '<!doctype html><html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
         f"<title>{html.escape(title)}"
-        f'</title><link rel="icon" href="data:,"><style>{STYLE}{TOUR_STYLE}</style></head><body>'
+        f'</title><link rel="icon" href="data:,"><style>{STYLE}{briefing.STYLE}{TOUR_STYLE}'
+        "</style></head><body>"
         + "\n".join(parts)
         + f'<script type="application/json" id="frames">{data}</script>'
         + f"<script>{SCRIPT}</script></body></html>\n"
@@ -274,7 +266,7 @@ def _fates(run: Path | None) -> dict[int, str]:
 
 def _reached(problem: Problem, solution: Solution, run: Path, fates: dict[int, str]) -> str:
     """The visits of a plan that was carried out."""
-    arrived = {int(r["goal"]): r for r in _table(run / "visits.csv")}
+    arrived = {int(r["goal"]): r for r in log.rows_of(run / "visits.csv")}
     u = problem.units
     head = ["visit", "goal", f"tether ({u})", f"slack ({u})", "reached at (s)",
             f"tether when reached ({u})", "word"]  # fmt: skip
@@ -288,16 +280,6 @@ def _reached(problem: Problem, solution: Solution, run: Path, fates: dict[int, s
             f"{float(row['tether']):.5g}" if row else "–", str(list(v.signature)),
         ])  # fmt: skip
     return briefing.table(head, rows, (1, 6))
-
-
-def _checks(problem: Problem, solution: Solution) -> str:
-    rows = "".join(
-        f'<tr><td class="{"ok" if c.passed else "bad"}">{"ok" if c.passed else "FAIL"}</td>'
-        f'<td style="text-align:left">{html.escape(c.name)}</td>'
-        f'<td style="text-align:left">{html.escape(c.detail)}</td></tr>'
-        for c in verify(problem, solution).checks
-    )
-    return f"<table>{rows}</table>"
 
 
 def _measures(problem: Problem, solution: Solution) -> str:
@@ -325,56 +307,15 @@ def _measures(problem: Problem, solution: Solution) -> str:
     return f"<table>{body}</table>"
 
 
-def _charts(rows: list[dict[str, str]], units: str) -> str:
-    """The tether and its limit over time."""
-    t = np.array([float(r["time"]) for r in rows])
-    thin = slice(None, None, max(1, len(t) // 1200))
-    length, limit = (np.array([float(r[k]) for r in rows]) for k in ("tether", "limit"))
-    top = 1.05 * float(max(length.max(), limit.max()))
-    span = float(t[-1]) or 1.0
-    units = html.escape(units)
-
-    def x(time: float) -> float:
-        return 50 + 830 * time / span
-
-    def y(value: float) -> float:
-        return 180 - 165 * value / top
-
-    def line(values: Floats) -> str:
-        return " ".join(
-            f"{x(a):.1f},{y(b):.1f}" for a, b in zip(t[thin], values[thin], strict=True)
-        )
-
-    grid = "".join(
-        f'<line x1="50" y1="{y(v):.1f}" x2="880" y2="{y(v):.1f}" stroke="{style.OBSTACLE}"/>'
-        f'<text x="44" y="{y(v) + 4:.1f}" font-size="12" text-anchor="end">{v:g}</text>'
-        for v in _ticks(top)
+def _over_time(rows: list[dict[str, str]], units: str) -> str:
+    times, lengths, limits = (
+        np.array([float(r[k]) for r in rows]) for k in ("time", "tether", "limit")
     )
-    times = "".join(
-        f'<text x="{x(v):.1f}" y="198" font-size="12" text-anchor="middle">{v:g}</text>'
-        for v in _ticks(span)
-    )
-    return (
-        f'<svg class="chart" viewBox="0 0 900 222" role="img" aria-label="tether over time">{grid}'
-        f'<polyline points="{line(limit)}" fill="none" stroke="{style.LIMIT}" '
-        'stroke-dasharray="5 4"/>'
-        f'<polyline points="{line(length)}" fill="none" stroke="{style.TETHER}" stroke-width="2"/>'
-        f'<text x="465" y="216" font-size="12" text-anchor="middle">time (s)</text>{times}'
-        f'<text x="12" y="98" font-size="12" text-anchor="middle" transform="rotate(-90 12 98)">'
-        f"length ({units})</text></svg>"
-        '<p class="note">Taut tether (solid) and its limit (dashed).</p>'
-    )
-
-
-def _ticks(top: float) -> list[float]:
-    """Round numbers from 0 to at most `top`, four to eight of them."""
-    step = 10.0 ** np.floor(np.log10(top / 4.0))
-    step *= next(k for k in (10.0, 5.0, 2.0, 1.0) if k * step <= top / 3.0)
-    return [float(v) for v in step * np.arange(int(top / step) + 1)]
+    return log.over_time(times, lengths, limits, units)
 
 
 def _events(run: Path | None) -> str:
-    events = _table(run / "events.csv") if run else []
+    events = log.rows_of(run / "events.csv") if run else []
     if not events:
         return "<p>Nothing unforeseen happened.</p>"
     columns = {
@@ -397,7 +338,3 @@ def _json(file: Path) -> Any:
         return json.loads(read_text(file))
     except json.JSONDecodeError as error:
         raise InputError(f"{file}: not JSON: {error.msg}") from None
-
-
-def _table(file: Path) -> list[dict[str, str]]:
-    return list(csv.DictReader(read_text(file).splitlines()))

@@ -14,17 +14,19 @@ from itertools import pairwise
 import numpy as np
 
 from netsp.arrays import Floats
-from netsp.errors import InputError
+from netsp.errors import InputError, counted
 from netsp.geometry import polylines
 from netsp.judge import Check, Verification
+from netsp.online.limits import check_bounds, check_size
 from netsp.online.mission import Mission
+from netsp.online.paths.tree import ShortestTree
 from netsp.online.planner.base import FREE
 from netsp.online.scene.field import DistanceField
 from netsp.online.scene.scene import Scene
 from netsp.online.tether import GeodesicTether
 from netsp.online.tour import PlannedTour
 from netsp.solution import Status
-from netsp.space.water import Water
+from netsp.space.water import Water, has_room, least_room
 from netsp.travel.result import relative_gap
 
 FINER = 0.5
@@ -33,6 +35,9 @@ FINER = 0.5
 LENGTH_TOLERANCE = 0.01
 """Share of a stated tether length, beside the mission's resolution, by which the length at another
 resolution may differ: three times the worst drives against finer ones (docs/tether.md)."""
+
+REACH = 0.99
+"""Of the tether that a plan may need at a waypoint (`netsp.space.plan.SHARE`)."""
 
 ROUNDING = 1e-6
 """Metres, and share of a length, that stated figures may be off."""
@@ -71,7 +76,9 @@ def verify_mission(
         raise InputError("tour: the mission has none; expected one that `netsp solve` has planned")
     if mission.track:
         raise InputError("track: a tour is for a fixed anchor; expected a mission without")
+    check_size(mission)
     scene = scene or mission.load_scene()
+    check_bounds(mission, scene)
     field = field or scene.field()
     return Verification(tuple(_Judge(mission, mission.tour, scene, field).run()))
 
@@ -107,8 +114,8 @@ class _Judge:
 
     def run(self) -> list[Check]:
         return [
-            self._joined(), self._clear(), *self._words(), *self._tethers(), self._length(),
-            self._bounds(),
+            self._joined(), self._left_out(), self._clear(), *self._words(), *self._tethers(),
+            self._length(), self._bounds(),
         ]  # fmt: skip
 
     @cached_property
@@ -122,29 +129,53 @@ class _Judge:
         water = Water.of(self.mission, self.scene, self.field)
         return replace(water, model=GeodesicTether(self.field, FINER * self.mission.delta))
 
+    def _name(self, leg: int) -> str:
+        return "the way home" if leg == len(self.tour.stops) else f"the way to stop {leg}"
+
     def _joined(self) -> Check:
         """Validation asks the ends of each path; that one goes on where the other ended, here."""
         gaps = [float(np.linalg.norm(b[0] - a[-1])) for a, b in pairwise(self.legs)]
         off = max(gaps, default=0.0)
         left = len(self.mission.waypoints) - len(self.tour.stops)
-        told = f"{len(self.tour.stops)} stops" + (f", {left} waypoints left out" if left else "")
+        told = counted(len(self.tour.stops), "stop")
+        told += f", {counted(left, 'waypoint')} left out" if left else ""
         good = off <= self.mission.reach
         return Check(
             "leads through the waypoints and home", good,
             told if good else f"a leg begins {off:.3g} m from where the one before it ended",
         )  # fmt: skip
 
+    def _left_out(self) -> Check:
+        """Only waypoints that no tether reaches within what plans may use may be missing; where the
+        robot has room along a shortest path from the start, the tether follows it."""
+        mission, left = self.mission, range(len(self.tour.stops), len(self.mission.waypoints))
+        name = "leaves out only what is out of reach"
+        if not left:
+            return Check(name, True, "no waypoint")
+        water = self.water
+        tree = ShortestTree(water.grid, np.array(mission.start), mission.places[list(left)])
+        limit = REACH * mission.tether_length - mission.delta
+        for n, k in enumerate(left):
+            path = tree.path(n)
+            if path is None:
+                continue
+            line = np.vstack([water.laid.nodes, path[::-1]])
+            tether, longest = water.driven(water.laid, line[len(water.laid.nodes) - 1 :])
+            if longest <= limit:
+                return Check(name, False, f"waypoint #{k}, which takes {tether.length:.3f} m")
+        return Check(name, True, f"{len(left)} of {len(mission.waypoints)} waypoints")
+
     def _clear(self) -> Check:
-        line = self.tour.line
-        room = float(self.field.distance(polylines.dense(line, 0.02)).min())
-        ends = [float(self.field.distance(leg[[0, -1]]).min()) for leg in self.legs]
-        # a leg has the clearance that its ends have; a taut corner dips a little below it
-        wanted = min([self.mission.clearance, *ends]) - 0.5 * self.mission.delta
+        line, mission = self.tour.line, self.mission
+        room = least_room(self.field, line)
+        tight = [k for k, leg in enumerate(self.legs) if not has_room(self.field, leg, mission)]
         free = all(self.field.line_of_sight(a, b, depth=1e-3) for a, b in pairwise(line))
+        told = f"{room:.3g} m from the nearest, clearance {mission.clearance:g}"
+        if tight:
+            told += f", which {self._name(tight[0])} does not keep within half of delta"
         return Check(
-            "keeps clear of solids", free and room >= wanted,
-            f"{room:.3g} m from the nearest" if free else "passes through a solid",
-        )  # fmt: skip
+            "keeps clear of solids", free and not tight, told if free else "passes through a solid"
+        )
 
     def _words(self) -> list[Check]:
         mission, words = self.mission, self.water.words
@@ -158,6 +189,8 @@ class _Judge:
         word, broken = words.word_until(
             np.vstack([walked, self.legs[-1], self.water.laid.nodes[::-1]])
         )
+        if words.exact != self.tour.exact:
+            wrong.append(f"words are{'' if words.exact else ' not'} exact, stated otherwise")
         certain = "" if words.exact else "; other words may be of the same class, too"
         return [
             Check(
@@ -176,14 +209,18 @@ class _Judge:
         model, laid = self.water.model, self.water.laid
         tether, longest, where, off = self.water.present, 0.0, 0, []
         for k, leg in enumerate(self.legs):
-            tether, lengths = model.drive(tether, leg[1:])
-            if lengths.max() > longest:
-                longest, where = float(lengths.max()), k
+            tether, most = self.water.driven(tether, leg)
+            if most > longest:
+                longest, where = most, k
             if k < len(self.tour.stops):
-                stated = self.tour.stops[k].tether_length
-                allowed = self.mission.delta + LENGTH_TOLERANCE * stated
-                if abs(tether.length - stated) > allowed:
-                    off.append(f"stop {k}: {tether.length:.3f} m, stated {stated:.3f}")
+                stop = self.tour.stops[k]
+                for length, stated, where_ in (
+                    (tether.length, stop.tether_length, "at"),
+                    (most, stop.longest_tether, "on the way to"),
+                ):
+                    allowed = self.mission.delta + LENGTH_TOLERANCE * stated
+                    if abs(length - stated) > allowed:
+                        off.append(f"{where_} stop {k}: {length:.3f} m, stated {stated:.3f}")
         # as at the start, but to where the tour ends, which may be its reach away
         as_laid = model.update(laid, tether.robot)
         left = model.refine(tether).length - model.refine(as_laid).length
@@ -208,7 +245,7 @@ class _Judge:
     def _length(self) -> Check:
         length = sum(float(polylines.length(leg)) for leg in self.legs)
         stated = self.tour.length
-        good = abs(length - stated) <= self.mission.reach + ROUNDING * stated
+        good = abs(length - stated) <= ROUNDING * (1.0 + stated)
         return Check(
             "length as stated", good,
             f"{stated:.6g} m" if good else f"the path is {length:.6g} m long, stated {stated:.6g}",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import heapq
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
@@ -15,7 +16,7 @@ from netsp.space.states import ROUNDS, Effort, State, States
 from netsp.space.water import Water, along, straight
 
 NEIGHBOURS = 10
-"""Waypoints nearest to each that legs are sought to; of alternatives twice as many."""
+"""Waypoints nearest to each that legs are sought to; places, where some have alternatives."""
 
 
 @dataclass
@@ -39,7 +40,8 @@ class Ways:
 
     def __post_init__(self) -> None:
         apart = self.places.apart
-        count = min(NEIGHBOURS * int(1 + self.places.choice.any()), len(apart) - 1)
+        per = len(apart) / np.count_nonzero(self.places.choice == 0)
+        count = min(math.ceil(NEIGHBOURS * per), len(apart) - 1)
         nearest = np.argsort(apart, axis=1, kind="stable")[:, :count]
         both = np.zeros(apart.shape, dtype=bool)
         both[np.arange(len(apart))[:, None], nearest] = True

@@ -10,6 +10,7 @@ from netsp.arrays import Bools, Floats, Ints
 from netsp.errors import InputError
 from netsp.online.mission import Mission
 from netsp.online.scene.field import DistanceField
+from netsp.space.water import DIP
 
 
 @dataclass(frozen=True)
@@ -52,7 +53,7 @@ class Places:
         Raises
         ------
         InputError
-            An alternative that lies inside a solid.
+            A place that lies inside a solid, or touches one.
         """
         points, waypoint, choice = [], [], []
         for k, w in enumerate(mission.waypoints):
@@ -67,12 +68,17 @@ class Places:
             waypoint.append(len(mission.waypoints))
             choice.append(0)
         out = cls(np.array(points), np.array(waypoint), np.array(choice), begin)
-        inside = np.flatnonzero((field.distance(out.points) < 0.0) & (out.choice > 0))
-        if len(inside):
-            n = inside[0]
+        room = field.distance(out.points)
+        tight = np.flatnonzero((room < DIP * mission.delta) & out.to_visit)
+        if len(tight):
+            n = tight[0]
+            choice = out.choice[n]
+            name = f"waypoints[{out.waypoint[n]}]" + (
+                f".alternatives[{choice - 1}]" if choice else ""
+            )
             raise InputError(
-                f"waypoints[{out.waypoint[n]}].alternatives[{out.choice[n] - 1}]: lies inside a "
-                "solid; expected a point in the water"
+                f"{name}: is {'inside a solid' if room[n] < 0.0 else f'{room[n]:.3g} m from one'}; "
+                f"expected {DIP * mission.delta:.3g} m of water or more"
             )
         return out
 

@@ -17,28 +17,28 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from dataclasses import field as dataclass_field
 from typing import Any
 
 import numpy as np
 
 from netsp.arrays import Floats
 from netsp.clock import Clock, TimeLimit, until_interrupt
-from netsp.errors import InputError, LimitReachedError
+from netsp.errors import InputError, LimitReachedError, counted
+from netsp.online.limits import check_bounds, check_size
 from netsp.online.mission import Mission
 from netsp.online.paths.tree import Grid
 from netsp.online.scene.field import DistanceField
 from netsp.online.scene.scene import Scene
 from netsp.online.simulate import grid_of
 from netsp.online.tour import PlannedStop, PlannedTour, in_file
-from netsp.roadmap.from_state import from_state
 from netsp.solution import Status
 from netsp.solvers.solve import SolverLike, solve_graph
 from netsp.solvers.table import SOLVERS
-from netsp.space.legs import Growth, Legs, Ways
+from netsp.space.board import Board, Driven, Stop, with_status
+from netsp.space.legs import Growth, Ways
 from netsp.space.places import Places
-from netsp.space.states import Effort, States, alike, first_states
-from netsp.space.water import Water, along
+from netsp.space.states import Effort, first_states, states_with_room
+from netsp.space.water import Water
 from netsp.travel.graph import TravelGraph
 from netsp.travel.result import Result, relative_gap
 
@@ -58,34 +58,6 @@ time; the rest is for driving, and for solving again."""
 LEAST_GROWING, LEAST_SOLVING = 1.0, 0.5
 """Seconds that legs and the solver get even if the time is up: there would be no tour, or one by
 way of the anchor."""
-
-
-@dataclass(frozen=True)
-class Stop:
-    """A waypoint of a plan.
-
-    Parameters
-    ----------
-    waypoint : int
-        Which one.
-    choice : int
-        Which of its alternatives was chosen, from 1 on; 0 for its own position.
-    word : tuple of int
-        Word of the tether there.
-    tether : float
-        Metres of tether there.
-    path : ndarray, shape (k, 3)
-        How the robot gets there from the stop before, metres.
-    most : float
-        Metres of tether on the way, at most.
-    """
-
-    waypoint: int
-    choice: int
-    word: tuple[int, ...]
-    tether: float
-    path: Floats
-    most: float
 
 
 @dataclass(frozen=True)
@@ -251,8 +223,10 @@ def _planned(
     clock: Clock,
     tell: Callable[[str], None], how: dict[str, Any],
 ) -> SpacePlan:  # fmt: skip
+    check_size(mission)
     if field is None or grid is None:
         scene = scene or mission.load_scene()
+        check_bounds(mission, scene)
         field = field or scene.field()
         grid = grid_of(mission, scene, field)
     mission = mission.checked_waypoints(field)
@@ -265,12 +239,22 @@ def _planned(
     effort = Effort.of(len(places))
     states = first_states(water, places, limit, effort)
     if not states.reached - {len(mission.waypoints)}:
-        raise InputError("waypoints: no tether within the limit reaches any of them")
+        nearest = float(np.linalg.norm(mission.places - np.array(mission.anchor), axis=1).min())
+        raise InputError(
+            f"waypoints: no tether within the limit reaches any of them: {limit:.4g} m "
+            f"({100 * SHARE:g} % of tether_length), and the nearest is {nearest:.4g} m from the "
+            "anchor as the crow flies"
+        )
     ways = Ways(water, places, effort)
     ways.prepare_all(clock.part(SEARCHING), tell)
     growth = Growth(states, ways)
-    board = _Board(water, states)
-    best: tuple[Result, _Driven] | None = None
+    board = Board(water, states)
+    board.take(growth.legs)
+    if lacking := set(range(len(mission.waypoints))) - board.reached:
+        tell("ways with room for the robot")
+        states_with_room(states, lacking, effort.words)
+        board.take(growth.legs)
+    best: tuple[Result, Driven] | None = None
     complete = False
     for most in effort.states:
         begin = clock.elapsed
@@ -283,6 +267,10 @@ def _planned(
             best = found
         if clock.left < clock.elapsed - begin:
             break
+    if not board.reached:
+        raise InputError(
+            f"waypoints: the robot gets to none of them with its clearance of {mission.clearance:g}"
+        )
     if best is None:
         raise LimitReachedError(
             "waypoints: no tour was found whose tether stays within the limit all along"
@@ -293,7 +281,7 @@ def _planned(
     return SpacePlan(
         mission, tuple(driven.stops), driven.home, driven.length, result, len(states.all),
         len(board.legs),
-        tuple(n for n in range(len(mission.waypoints)) if n not in states.reached),
+        tuple(n for n in range(len(mission.waypoints)) if n not in board.reached),
         driven.free, water, ways,
     )  # fmt: skip
 
@@ -313,151 +301,28 @@ def _try_out(solver: SolverLike, params: Mapping[str, Any] | None, seed: int) ->
 
 
 def _best_driven(
-    board: _Board, clock: Clock, tell: Callable[[str], None], warm: list[int] | None,
+    board: Board, clock: Clock, tell: Callable[[str], None], warm: list[int] | None,
     how: dict[str, Any],
-) -> tuple[Result, _Driven] | None:  # fmt: skip
+) -> tuple[Result, Driven] | None:  # fmt: skip
     """The best tour that was driven without fault. As long as there is time, the graph is solved
     again without the legs that were at fault; then the tour goes by way of the start there."""
-    again, tour = 0, None
-    result: Result | None = None
+    again, found = 0, None
     while again < MOST_AGAIN or clock.up:
-        if tour is None:
-            tell("order" if again == 0 else f"order, {again} legs at fault forbidden")
+        if found is None:
+            tell("order" if again == 0 else f"order, {counted(again, 'leg')} at fault forbidden")
             solving = Clock(LEAST_SOLVING) if clock.up else clock.part(SOLVING)
-            start = None if warm is None else [*board.first, *warm]
-            result = board.solved(solving, warm_start=start, **how)
-            if result is None or result.tour is None:
+            found = board.solved(solving, warm, **how)
+            if found is None:
                 return None
-            tour = [int(v) for v in result.tour[len(board.first) :]]
-        assert result is not None
+        result, tour = found
         tell("driving the tour")
         driven = board.driven(tour)
         if driven.fault is None:
-            # by way of the start it may be longer than what the solver spoke of
-            solved = np.inf if result.length is None else result.length
-            proven_still = driven.length <= solved * (1.0 + ROUNDING) + ROUNDING
-            status = result.status if proven_still else Status.FEASIBLE
-            return replace(result, status=status), driven
+            return with_status(result, driven, ROUNDING), driven
         if not board.forbid(driven.fault) and clock.up:
             return None
         warm = None  # it may go along that leg
         again += 1
         if not clock.up:
-            tour = None
+            found = None
     return None
-
-
-@dataclass
-class _Driven:
-    """What came of driving a tour."""
-
-    tour: list[int]
-    stops: list[Stop]
-    home: Floats
-    length: float
-    free: bool
-    fault: tuple[int, int] | None
-
-
-@dataclass
-class _Board:
-    """States, legs, and ways by way of the start, less what was forbidden."""
-
-    water: Water
-    states: States
-    legs: dict[tuple[int, int], Floats] = dataclass_field(default_factory=dict)
-    out: list[Floats] = dataclass_field(default_factory=list)
-    forbidden: set[tuple[int, int]] = dataclass_field(default_factory=set)
-    cut: set[tuple[int, int]] = dataclass_field(default_factory=set)
-
-    def take(self, legs: Legs) -> None:
-        """Legs as they are now, and paths from the start to new states: along its tether, and out
-        along theirs."""
-        for s in self.states.all[len(self.out) :]:
-            line = np.vstack([self.water.laid.nodes[::-1], s.tether.nodes[1:]])
-            self.out.append(self.water.taut(line))
-        self.legs = {
-            (v, w): path for v, w, path in legs.both_ways()
-            if (v, w) not in self.forbidden
-            and along(path) < along(self.out[v]) + along(self.out[w])
-        }  # fmt: skip
-
-    @property
-    def cluster(self) -> list[int]:
-        """Of each vertex of the travel graph."""
-        number = {w: k for k, w in enumerate(sorted(self.states.reached), 1)}
-        return [0, *(number[int(self.states.places.waypoint[s.point])] for s in self.states.all)]
-
-    @property
-    def first(self) -> list[int]:
-        """Vertices that every tour begins with: the start, and the state of the robot by now."""
-        return [0] if self.states.begin is None else [0, self.states.begin + 1]
-
-    def path(self, v: int, w: int) -> Floats:
-        """From one state to another; -1 is the start."""
-        if v < 0:
-            return self.out[w]
-        if w < 0:
-            return self.out[v][::-1]
-        direct = self.legs.get((min(v, w), max(v, w)))
-        if direct is None:
-            return np.vstack([self.out[v][::-1], self.out[w][1:]])
-        return direct if v < w else direct[::-1]
-
-    def forbid(self, pair: tuple[int, int]) -> bool:
-        """Take the leg between two states away, or if it was by way of the start, that; whether
-        they are still joined."""
-        if self.legs.pop(pair, None) is None:
-            self.cut.add(pair)
-        self.forbidden.add(pair)
-        return pair not in self.cut
-
-    def solved(self, clock: Clock, **how: Any) -> Result | None:
-        """The graph as it is now, solved; None where too much was forbidden for any tour."""
-        home = np.array([along(p) for p in self.out])
-        n = len(home)
-        costs = np.zeros((n + 1, n + 1))
-        costs[1:, 1:] = home[:, None] + home[None, :]
-        costs[0, 1:] = costs[1:, 0] = home
-        for (v, w), path in self.legs.items():
-            costs[v + 1, w + 1] = costs[w + 1, v + 1] = along(path)
-        for v, w in self.cut:
-            costs[v + 1, w + 1] = costs[w + 1, v + 1] = np.inf
-        try:
-            graph = TravelGraph.from_costs(costs, self.cluster)
-        except InputError:  # some waypoint is joined to nothing any more
-            return None
-        if self.states.begin is not None:
-            graph = from_state(graph, self.states.begin + 1)
-        return solve_graph(graph, time_limit=clock, **how)
-
-    def driven(self, tour: list[int]) -> _Driven:
-        """A tour, driven with the tether it begins with."""
-        states, water, places = self.states, self.water, self.states.places
-        tether, before = water.present, self.first[-1] - 1
-        stops: list[Stop] = []
-        total, fault, astray = 0.0, None, None
-        delta = water.mission.delta
-        for vertex in [*tour, 0]:
-            state = vertex - 1
-            path = self.path(before, state)
-            tether, longest = water.driven(tether, path)
-            total += along(path)
-            meant = water.laid if state < 0 else states.all[state].tether
-            pair = (min(before, state), max(before, state))
-            # since which leg the tether hangs otherwise than in its state; it does no harm if all
-            # ends well
-            astray = None if alike(tether, meant, delta) else astray or pair
-            if fault is None and longest > states.limit:
-                fault = astray or pair
-            if state >= 0:
-                s = states.all[state]
-                stops.append(
-                    Stop(
-                        int(places.waypoint[s.point]), int(places.choice[s.point]),
-                        water.words.letters(s.word), tether.length, path, longest,
-                    )
-                )  # fmt: skip
-            before = state
-        free = alike(tether, water.laid, delta)
-        return _Driven(tour, stops, path, total, free, fault or astray)

@@ -28,6 +28,7 @@ from netsp.online.scene.field import DistanceField, pushed_out
 from netsp.online.tether import Tether
 from netsp.online.tour import PlannedStop, PlannedTour, in_file
 from netsp.space.plan import SpacePlan, plan
+from netsp.space.water import DIP
 
 KEPT, LOCAL, REPLANNED, BY_LEGS = "kept", "local", "replan", "legs"
 """What became of the rest of a tour: kept; kept but for legs round what blocks it; planned anew; or
@@ -237,7 +238,7 @@ class RepairPlanner(PredictivePlanner):
         )  # fmt: skip
 
     def _inside(self, place: Floats) -> bool:
-        return float(self.scene.distance(place)) <= 0.0
+        return float(self.scene.distance(place)) < DIP * self.mission.delta
 
     @property
     def _left(self) -> range:

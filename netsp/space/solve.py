@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
@@ -17,7 +18,6 @@ import numpy as np
 
 from netsp.clock import Clock, TimeLimit, until_interrupt
 from netsp.errors import LimitReachedError
-from netsp.hsignature import Word
 from netsp.online.log import LogRow, Run
 from netsp.online.mission import Mission
 from netsp.online.planner import PlannerOptions
@@ -30,7 +30,7 @@ from netsp.solvers.solve import SolverLike
 from netsp.space.bound import bound_of_all
 from netsp.space.order import order_by_going_on
 from netsp.space.plan import SpacePlan, plan
-from netsp.space.water import along
+from netsp.space.water import Water, along, has_room
 from netsp.travel.result import relative_gap
 
 PLANNING, BOUNDING, ORDERING = 0.7, 0.15, 0.3
@@ -61,6 +61,8 @@ class SolvedMission:
         The mission as it was given, flown; None when there was no time left.
     plan : SpacePlan or None
         The tour of states and legs, whether it was kept or not; None where none was found.
+    interrupted : bool
+        Whether Ctrl-C ended it.
     """
 
     mission: Mission
@@ -68,6 +70,7 @@ class SolvedMission:
     run: Run | None
     given: Run | None
     plan: SpacePlan | None
+    interrupted: bool = False
 
     @property
     def tour(self) -> PlannedTour:
@@ -90,6 +93,14 @@ class _Flights:
     field: DistanceField
     clock: Clock
     tell: Callable[[str], None]
+    planned: SpacePlan | None
+
+    @cached_property
+    def water(self) -> Water:
+        """With the words that tours name."""
+        if self.planned is not None:
+            return self.planned.water
+        return Water.of(self.mission, self.scene, self.field)
 
     def of(self, mission: Mission, name: str) -> Run | None:
         """A flight to its end; None if the time was up before."""
@@ -116,6 +127,7 @@ def solve_mission(
     mission: Mission,
     *,
     scene: Scene | None = None,
+    field: DistanceField | None = None,
     solver: SolverLike = "auto",
     params: Mapping[str, Any] | None = None,
     time_limit: TimeLimit = 60.0,
@@ -131,6 +143,8 @@ def solve_mission(
         The mission.
     scene : Scene, optional
         Its scene, when it is at hand.
+    field : DistanceField, optional
+        The scene's field, when it is at hand.
     solver : str or callable
         As of `netsp.solvers.solve.solve_graph`.
     params : mapping, optional
@@ -160,7 +174,7 @@ def solve_mission(
     name = solver if isinstance(solver, str) else getattr(solver, "__name__", "solver")
     with until_interrupt(time_limit) as clock:
         scene = scene or mission.load_scene()
-        field = scene.field()
+        field = field or scene.field()
         mission = mission.checked_waypoints(field)
         planned, failure, bound = None, None, None
         best: SolvedMission | None = None
@@ -172,7 +186,7 @@ def solve_mission(
             )  # fmt: skip
         except LimitReachedError as error:
             failure = error
-        flights = _Flights(mission, scene, field, clock, tell)
+        flights = _Flights(mission, scene, field, clock, tell, planned)
         if planned is not None:
             tell("bound on all tours")
             reached = sorted(planned.order)
@@ -180,11 +194,11 @@ def solve_mission(
             best = _of_plan(planned, name, seed, bound)
             best = replace(best, run=flights.of(best.mission, "the tour"))
         given = flights.of(mission, "the order as given")
-        best = _or_as_given(best, given, flights, planned, bound, seed)
-        best = _or_going_on(best, flights, planned, bound, seed)
+        best = _or_as_given(best, given, flights, bound, seed)
+        best = _or_going_on(best, flights, bound, seed)
         if best is None:
             raise failure or LimitReachedError("time limit reached before any tour was found")
-        return replace(best, given=given)
+        return replace(best, given=given, plan=planned, interrupted=clock.stopped)
 
 
 def _of_plan(planned: SpacePlan, solver: str, seed: int, bound: float | None) -> SolvedMission:
@@ -193,8 +207,7 @@ def _of_plan(planned: SpacePlan, solver: str, seed: int, bound: float | None) ->
 
 
 def _or_going_on(
-    best: SolvedMission | None, flights: _Flights, planned: SpacePlan | None,
-    bound: float | None, seed: int,
+    best: SolvedMission | None, flights: _Flights, bound: float | None, seed: int
 ) -> SolvedMission | None:  # fmt: skip
     """The better of a tour and of the order by going straight on, in both directions."""
     mission, clock = flights.mission.model_copy(update={"tour": None}), flights.clock
@@ -216,7 +229,7 @@ def _or_going_on(
             break
         if best is not None and not _better_than(run, best):
             continue
-        kept = tour_of_flight(there, order, run, planned, bound, seed)
+        kept = tour_of_flight(there, order, run, flights.field, flights.water, bound, seed)
         if kept is None:
             continue
         again = flights.of(kept.mission, "it as it will be written")
@@ -227,8 +240,8 @@ def _or_going_on(
 
 
 def _or_as_given(
-    best: SolvedMission | None, given: Run | None, flights: _Flights, planned: SpacePlan | None,
-    bound: float | None, seed: int,
+    best: SolvedMission | None, given: Run | None, flights: _Flights, bound: float | None,
+    seed: int,
 ) -> SolvedMission | None:  # fmt: skip
     """The better of a tour and of the mission as it was given, whose own tour is kept if it has
     one."""
@@ -237,8 +250,10 @@ def _or_as_given(
         return best
     order = tuple(range(len(mission.waypoints)))
     if mission.tour is not None and _good(given):
-        return SolvedMission(mission, order, given, None, planned)
-    kept = tour_of_flight(mission, order, given, planned, bound, seed, AS_GIVEN)
+        return SolvedMission(mission, order, given, None, None)
+    kept = tour_of_flight(
+        mission, order, given, flights.field, flights.water, bound, seed, AS_GIVEN
+    )
     if kept is None:
         return best
     again = flights.of(kept.mission, "it as it will be written")
@@ -263,8 +278,8 @@ def _good(run: Run) -> bool:
 
 
 def tour_of_flight(
-    mission: Mission, order: tuple[int, ...], run: Run, planned: SpacePlan | None = None,
-    bound: float | None = None, seed: int = 0, name: str = GOING_ON,
+    mission: Mission, order: tuple[int, ...], run: Run, field: DistanceField,
+    water: Water | None = None, bound: float | None = None, seed: int = 0, name: str = GOING_ON,
 ) -> SolvedMission | None:  # fmt: skip
     """Where a robot was on a flight, made the tour of its mission.
 
@@ -276,8 +291,10 @@ def tour_of_flight(
         Numbers of its waypoints in the mission that it came of.
     run : Run
         The flight.
-    planned : SpacePlan, optional
-        Whose words the stops get.
+    field : DistanceField
+        Of the scene.
+    water : Water, optional
+        Whose words the stops get, when it is at hand.
     bound : float, optional
         Of all tours through the waypoints, metres. A robot that turns back a bit before them goes
         less, by twice as much as it stays away, and once at home.
@@ -289,8 +306,8 @@ def tour_of_flight(
     Returns
     -------
     SolvedMission or None
-        The mission with the tour; None where the robot did not come home free, or the tether was
-        over the limit.
+        The mission with the tour; None where the robot did not come home free or went where it has
+        not its clearance, or the tether was over the limit.
     """
     if not _good(run):
         return None
@@ -300,12 +317,12 @@ def tour_of_flight(
     parts = _parts(run.log, visited)
     legs = [np.array([[r.x, r.y, r.z] for r in part]) for part in parts]
     path = np.vstack([legs[0][:1], *(leg[1:] for leg in legs)])
+    if not all(has_room(field, leg, mission) for leg in legs):
+        return None
+    water = water or Water.of(mission, mission.load_scene(), field)
     planned_stops = []
     for k, stop in enumerate(stops):
-        word: Word = ()
-        if planned is not None:
-            walked = np.vstack([planned.water.present.nodes, *legs[: k + 1]])
-            word = planned.water.words.word(walked)
+        word = water.words.word(np.vstack([water.present.nodes, *legs[: k + 1]]))
         planned_stops.append(
             PlannedStop(
                 path=in_file(legs[k]), signature=word, tether_length=stop["tether"],
@@ -322,13 +339,13 @@ def tour_of_flight(
         stops=tuple(planned_stops), home=in_file(legs[-1]), status=Status.FEASIBLE, solver=name,
         seed=seed, length=length, bound_of_all=bound, gap_to_all=relative_gap(length, bound),
         states=len(visited), legs=len(legs),
-        exact=planned is not None and planned.water.words.exact,
+        exact=water.words.exact,
     )  # fmt: skip
     chosen = [*visited, *left]
     there = mission.model_copy(
         update={"waypoints": tuple(mission.waypoints[k] for k in chosen), "tour": tour}
     )
-    return SolvedMission(there, tuple(order[k] for k in chosen), None, None, planned)
+    return SolvedMission(there, tuple(order[k] for k in chosen), None, None, None)
 
 
 def _parts(log: tuple[LogRow, ...], visited: list[int]) -> list[tuple[LogRow, ...]]:

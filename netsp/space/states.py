@@ -11,12 +11,17 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.geometry import polylines
 from netsp.online.tether import Tether
 from netsp.space.places import Places
+from netsp.space.search import Found
 from netsp.space.signature import shown
 from netsp.space.water import Water
+
+LONGER = 2.0
+"""Ways of the robot are no longer than so many times the longest tether."""
 
 ROUNDS = 300
 """Of pulling a tether taut."""
@@ -251,19 +256,46 @@ def first_states(water: Water, places: Places, limit: float, effort: Effort) -> 
                 f"{words.cells.cell:g} m; expected a smaller cell"
             )
         states.add(places.begin, number, water.present)
-    anchor = np.asarray(water.mission.anchor, dtype=float)
+    anchor = np.asarray(water.mission.anchor, dtype=float)[None]
     root = int(np.ravel_multi_index(tuple(words.root), words.cells.flags.shape))
     found = water.search(False, root, effort.words, limit)
-    for n, point in enumerate(places.points):
-        cell = words.held(point)
-        if cell is None or n == places.begin:
-            continue
-        for word, way in water.ways(found, cell):
-            tether = water.model.relaxed(np.vstack([anchor, way, point]), ROUNDS)
-            if tether.length > limit:
-                continue
-            hangs = water.number(tether.nodes)
-            hangs = word if hangs is None else hangs
-            if states.find(n, hangs, tether) is None:
-                states.add(n, hangs, tether)
+    for n in range(len(places)):
+        _take(states, n, found, anchor)
     return states
+
+
+def states_with_room(states: States, lacking: set[int], words: int) -> None:
+    """More states, along the robot's own shortest ways from the start: where it does not fit
+    through the gaps that the shortest tethers go through.
+
+    Parameters
+    ----------
+    states : States
+        Those so far; more are added.
+    lacking : set of int
+        Waypoints that these are for.
+    words : int
+        Shortest words of a waypoint that make states.
+    """
+    water = states.water
+    start = water.words.held(water.laid.robot)
+    if start is None:
+        return
+    found = water.search(True, start, words, LONGER * states.limit)
+    for n in np.flatnonzero(np.isin(states.places.waypoint, list(lacking))):
+        _take(states, int(n), found, water.laid.nodes)
+
+
+def _take(states: States, n: int, found: Found, begin: Floats) -> None:
+    """States of a place by the ways found to it, which go on from a line."""
+    water, words, point = states.water, states.water.words, states.places.points[n]
+    cell = words.held(point)
+    if cell is None or n == states.places.begin:
+        return
+    for _, way in water.ways(found, cell):
+        tether = water.model.relaxed(np.vstack([begin, way, point]), ROUNDS)
+        if tether.length > states.limit:
+            continue
+        hangs = water.number(tether.nodes)
+        if hangs is not None and states.find(n, hangs, tether) is None:
+            states.add(n, hangs, tether)

@@ -25,6 +25,9 @@ from netsp.space.signature import SpaceSignature
 LONGER = 1.35
 """Of paths along cells beside those pulled taut: 26 directions make 1.09, and round bodies more."""
 
+ROOM_STEP = 0.01
+"""Metres that the room along a path may be overstated by."""
+
 DIP = 0.15
 """Of delta: a tether's edges dip into a surface by an eighth of it (docs/tether.md)."""
 
@@ -279,6 +282,49 @@ def along(path: Floats) -> float:
         Metres.
     """
     return float(polylines.length(path))
+
+
+def has_room(field: DistanceField, path: Floats, mission: Mission) -> bool:
+    """Whether a path keeps the clearance, or what its ends have of it; corners that were pulled
+    taut dip below it by half of delta at most.
+
+    Parameters
+    ----------
+    field : DistanceField
+        The scene.
+    path : ndarray, shape (k, 3)
+        Metres.
+    mission : Mission
+        Its clearance and delta count.
+
+    Returns
+    -------
+    bool
+        Whether it does.
+    """
+    return (
+        least_room(field, path)
+        >= min(mission.clearance, float(field.distance(path[[0, -1]]).min())) - 0.5 * mission.delta
+    )
+
+
+def least_room(field: DistanceField, path: Floats) -> float:
+    """How near a path comes to solids.
+
+    Parameters
+    ----------
+    field : DistanceField
+        The scene.
+    path : ndarray, shape (k, 3)
+        Metres.
+
+    Returns
+    -------
+    float
+        Metres, right to a hundredth of one, or to a millionth of the path's length.
+    """
+    step = max(2.0 * ROOM_STEP, along(path) / 1e6)
+    return float(field.distance(polylines.dense(path, step)).min())
 
 
 def straight(field: DistanceField, a: Floats, b: Floats, clearance: float) -> bool:

@@ -15,7 +15,8 @@ from netsp.files import MOST_BYTES
 
 
 def read_mesh(path: str | Path) -> tuple[Floats, npt.NDArray[np.int64]]:
-    """Vertices (n, 3) and faces (m, 3) of a mesh file. InputError if there are none."""
+    """Vertices (n, 3) and faces (m, 3) of a mesh file. InputError if there are none, or
+    coordinates are not finite."""
     trimesh = _trimesh()
     _exists(path)
     try:
@@ -25,7 +26,13 @@ def read_mesh(path: str | Path) -> tuple[Floats, npt.NDArray[np.int64]]:
     faces = getattr(mesh, "faces", None)
     if faces is None or len(faces) == 0:
         raise InputError(f"{path}: expected a mesh with triangles, got none")
-    return np.asarray(mesh.vertices, dtype=float), np.asarray(faces, dtype=np.int64)
+    vertices = np.asarray(mesh.vertices, dtype=float)
+    wrong = np.flatnonzero(~np.isfinite(vertices).all(axis=1))
+    if len(wrong):
+        raise InputError(
+            f"{path}: vertex {wrong[0]} is {vertices[wrong[0]].tolist()}; expected finite numbers"
+        )
+    return vertices, np.asarray(faces, dtype=np.int64)
 
 
 def read_cloud(path: str | Path) -> Floats:

@@ -1,0 +1,341 @@
+"""The travel graph of a mission: states, legs and ways by the anchor, less what was forbidden."""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from netsp.arrays import Floats
+from netsp.clock import Clock
+from netsp.errors import InputError
+from netsp.roadmap.from_state import from_state
+from netsp.solution import Status
+from netsp.solvers.solve import solve_graph
+from netsp.space.legs import Legs
+from netsp.space.states import States, alike
+from netsp.space.water import Water, along, has_room
+from netsp.travel.graph import TravelGraph
+from netsp.travel.result import Result
+
+
+@dataclass(frozen=True)
+class Stop:
+    """A waypoint of a plan.
+
+    Parameters
+    ----------
+    waypoint : int
+        Which one.
+    choice : int
+        Which of its alternatives was chosen, from 1 on; 0 for its own position.
+    word : tuple of int
+        Word of the tether there.
+    tether : float
+        Metres of tether there.
+    path : ndarray, shape (k, 3)
+        How the robot gets there from the stop before, metres.
+    most : float
+        Metres of tether on the way, at most.
+    """
+
+    waypoint: int
+    choice: int
+    word: tuple[int, ...]
+    tether: float
+    path: Floats
+    most: float
+
+
+@dataclass(frozen=True)
+class Driven:
+    """What came of driving a tour.
+
+    Parameters
+    ----------
+    tour : list of int
+        States, in their order.
+    stops : list of Stop
+        The same with their paths.
+    home : ndarray, shape (k, 3)
+        From the last stop to the start, metres.
+    length : float
+        Of it all, metres.
+    free : bool
+        Whether the tether was at the end as it is laid at the start.
+    fault : (int, int) or None
+        Two states, -1 for the start: the leg between them is to blame for a tether over its limit,
+        or one that is not free at the end.
+    """
+
+    tour: list[int]
+    stops: list[Stop]
+    home: Floats
+    length: float
+    free: bool
+    fault: tuple[int, int] | None
+
+
+@dataclass
+class Board:
+    """States and how to get from one to another.
+
+    Parameters
+    ----------
+    water : Water
+        Where they are.
+    states : States
+        Those so far.
+    legs : dict of (int, int) to ndarray of shape (k, 3)
+        Paths from the state with the lower number to the other, metres.
+    """
+
+    water: Water
+    states: States
+    legs: dict[tuple[int, int], Floats] = field(default_factory=dict)
+    _out: list[Floats | None] = field(default_factory=list)
+    _home: list[float] = field(default_factory=list)
+    _via: dict[int, int] = field(default_factory=dict)
+    _forbidden: set[tuple[int, int]] = field(default_factory=set)
+    _cut: set[tuple[int, int]] = field(default_factory=set)
+
+    def take(self, legs: Legs) -> None:
+        """Legs as they are now, and ways from the start to all states.
+
+        Parameters
+        ----------
+        legs : Legs
+            Those driven so far.
+        """
+        for s in self.states.all[len(self._out) :]:
+            line = np.vstack([self.water.laid.nodes[::-1], s.tether.nodes[1:]])
+            self._out.append(self._with_room(self.water.taut(line)))
+        if self.states.begin is not None and self._out[self.states.begin] is None:
+            # the robot is there, and may go back along its tether whatever the clearance
+            self._out[self.states.begin] = np.vstack(
+                [self.water.laid.nodes[::-1], self.water.present.nodes[1:]]
+            )
+        every = {
+            (v, w): path for v, w, path in legs.both_ways() if (v, w) not in self._forbidden
+        }  # fmt: skip
+        self._find_ways(every)
+        self.legs = {
+            (v, w): path for (v, w), path in every.items()
+            if along(path) < self._home[v] + self._home[w]
+            or self._via.get(v) == w or self._via.get(w) == v
+        }  # fmt: skip
+
+    def _with_room(self, path: Floats) -> Floats | None:
+        """A path that has room; None for others: a tether goes through gaps that a robot does
+        not."""
+        return path if has_room(self.water.field, path, self.water.mission) else None
+
+    def _find_ways(self, legs: dict[tuple[int, int], Floats]) -> None:
+        """How far it is from the start to each state: along its own tether, or where the robot has
+        no room on that way, by way of others."""
+        beside: dict[int, list[tuple[int, float]]] = {}
+        for (v, w), path in legs.items():
+            far = along(path)
+            beside.setdefault(v, []).append((w, far))
+            beside.setdefault(w, []).append((v, far))
+        self._home = [np.inf if path is None else along(path) for path in self._out]
+        self._via = {}
+        waiting = [(far, v) for v, far in enumerate(self._home) if np.isfinite(far)]
+        heapq.heapify(waiting)
+        while waiting:
+            far, v = heapq.heappop(waiting)
+            if far > self._home[v]:
+                continue
+            for w, leg in beside.get(v, ()):
+                if self._out[w] is None and far + leg < self._home[w]:
+                    self._home[w], self._via[w] = far + leg, v
+                    heapq.heappush(waiting, (far + leg, w))
+
+    @property
+    def reached(self) -> set[int]:
+        """Waypoints that the robot gets to, whichever way."""
+        places = self.states.places
+        count = len(self.water.mission.waypoints)
+        found = {
+            int(places.waypoint[s.point])
+            for s, far in zip(self.states.all, self._home, strict=False) if np.isfinite(far)
+        }  # fmt: skip
+        return {n for n in found if n < count}
+
+    def path(self, v: int, w: int) -> Floats:
+        """From one state to another.
+
+        Parameters
+        ----------
+        v : int
+            Its number, -1 for the start.
+        w : int
+            The other's.
+
+        Returns
+        -------
+        ndarray, shape (k, 3)
+            Metres.
+        """
+        if v < 0:
+            return self._way_out(w)
+        if w < 0:
+            return self._way_out(v)[::-1]
+        direct = self.legs.get((min(v, w), max(v, w)))
+        if direct is None:
+            return np.vstack([self._way_out(v)[::-1], self._way_out(w)[1:]])
+        return direct if v < w else direct[::-1]
+
+    def _way_out(self, v: int) -> Floats:
+        """(k, 3) from the start to a state."""
+        own = self._out[v] if v >= 0 else self.water.laid.nodes[-1:]
+        if own is not None:
+            return own
+        u = self._via[v]
+        leg = self.legs[min(u, v), max(u, v)]
+        return np.vstack([self._way_out(u), (leg if u < v else leg[::-1])[1:]])
+
+    def forbid(self, pair: tuple[int, int]) -> bool:
+        """Take the leg between two states away, or if it was by way of the start, that.
+
+        Parameters
+        ----------
+        pair : (int, int)
+            The states, the lower number first.
+
+        Returns
+        -------
+        bool
+            Whether they are still joined.
+        """
+        if self.legs.pop(pair, None) is None:
+            self._cut.add(pair)
+        else:
+            self._find_ways(self.legs)
+        self._forbidden.add(pair)
+        return pair not in self._cut
+
+    @property
+    def _usable(self) -> list[int]:
+        """States that the robot gets to."""
+        return [v for v, far in enumerate(self._home) if np.isfinite(far)]
+
+    def solved(
+        self, clock: Clock, warm: Sequence[int] | None = None, **how: Any
+    ) -> tuple[Result, list[int]] | None:
+        """The graph as it is now, solved.
+
+        Parameters
+        ----------
+        clock : Clock
+            When it is up, the result is the best by then.
+        warm : sequence of int, optional
+            States of a tour to start from.
+        **how : Any
+            As of `netsp.solvers.solve.solve_graph`.
+
+        Returns
+        -------
+        result : Result
+            Of the solver.
+        tour : list of int
+            States in the order of its tour, but for that which the mission begins in.
+            None in place of both where there is no tour.
+        """
+        some = self._usable
+        vertex = {v: k for k, v in enumerate(some, 1)}
+        home = np.array([self._home[v] for v in some])
+        costs = np.zeros((len(some) + 1, len(some) + 1))
+        costs[1:, 1:] = home[:, None] + home[None, :]
+        costs[0, 1:] = costs[1:, 0] = home
+        for (v, w), path in self.legs.items():
+            if v in vertex and w in vertex:
+                costs[vertex[v], vertex[w]] = costs[vertex[w], vertex[v]] = along(path)
+        for v, w in self._cut:
+            a, b = vertex.get(v, 0), vertex.get(w, 0)
+            costs[a, b] = costs[b, a] = np.inf
+        places, begin = self.states.places, self.states.begin
+        waypoint = [int(places.waypoint[self.states.all[v].point]) for v in some]
+        cluster = np.r_[0, 1 + np.unique(waypoint, return_inverse=True)[1]]
+        try:
+            graph = TravelGraph.from_costs(costs, cluster)
+        except InputError:  # some waypoint is joined to nothing any more
+            return None
+        if begin is not None:
+            graph = from_state(graph, vertex[begin])
+        first = [0] if begin is None else [0, vertex[begin]]
+        start = None
+        if warm is not None and all(v in vertex for v in warm):
+            start = [*first, *(vertex[v] for v in warm)]
+        result = solve_graph(graph, time_limit=clock, warm_start=start, **how)
+        if result.tour is None:
+            return None
+        return result, [some[int(k) - 1] for k in result.tour[len(first) :]]
+
+    def driven(self, tour: Sequence[int]) -> Driven:
+        """A tour, driven with the tether it begins with.
+
+        Parameters
+        ----------
+        tour : sequence of int
+            States.
+
+        Returns
+        -------
+        Driven
+            What came of it.
+        """
+        states, water, places = self.states, self.water, self.states.places
+        tether, before = water.present, -1 if states.begin is None else states.begin
+        stops: list[Stop] = []
+        total, fault, astray = 0.0, None, None
+        delta = water.mission.delta
+        for state in [*tour, -1]:
+            path = self.path(before, state)
+            tether, longest = water.driven(tether, path)
+            total += along(path)
+            meant = water.laid if state < 0 else states.all[state].tether
+            pair = (min(before, state), max(before, state))
+            # since which leg the tether hangs otherwise than in its state; it does no harm if all
+            # ends well
+            astray = None if alike(tether, meant, delta) else astray or pair
+            if fault is None and longest > states.limit:
+                fault = astray or pair
+            if state >= 0:
+                s = states.all[state]
+                stops.append(
+                    Stop(
+                        int(places.waypoint[s.point]), int(places.choice[s.point]),
+                        water.words.letters(s.word), tether.length, path, longest,
+                    )
+                )  # fmt: skip
+            before = state
+        free = alike(tether, water.laid, delta)
+        return Driven(list(tour), stops, path, total, free, fault or astray)
+
+
+def with_status(result: Result, driven: Driven, share: float) -> Result:
+    """A solver's result, of a tour that was driven: by way of the start it may be longer than what
+    the solver spoke of, and is then no longer proven.
+
+    Parameters
+    ----------
+    result : Result
+        Of the solver.
+    driven : Driven
+        Its tour.
+    share : float
+        Of the length, and metres, that rounding may take.
+
+    Returns
+    -------
+    Result
+        The same, with the status that still holds.
+    """
+    solved = np.inf if result.length is None else result.length
+    if driven.length <= solved * (1.0 + share) + share:
+        return result
+    return replace(result, status=Status.FEASIBLE)
