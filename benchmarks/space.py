@@ -1,9 +1,10 @@
 """Words and tours in space.
 
-    python benchmarks/space.py [--only words|loops|prisms|missions] [--missions jacket …] [--keep]
+    python benchmarks/space.py [--only words|loops|prisms|frames|missions] [--missions jacket …] [--keep]
 
 Words: what groups scenes have, and what they take. Loops: random ones, beside a second invariant.
-Prisms: tours in space of problems whose shortest tour is proven in the plane. Missions: the shipped
+Prisms: tours in space of problems whose shortest tour is proven in the plane. Frames: random ones,
+with the gap to the bound of all tours. Missions: the shipped
 ones, and the sites of `benchmarks/sites.py`, solved, and flown by `predictive` as they were planned
 and in the order that they were given.
 """
@@ -25,12 +26,14 @@ from sites import SITES, mission_of, shipped
 from table import ROOT, head, heading, row
 
 from netsp import Problem, solve
+from netsp.clock import Clock
 from netsp.hsignature.rays import signature
 from netsp.online import Scene
 from netsp.online.mission import Mission
 from netsp.online.scene.field import DistanceField
 from netsp.online.scene.scene import scene_of
 from netsp.online.simulate import grid_of, simulate
+from netsp.space.bound import bound_of_all
 from netsp.space.plan import SHARE, plan
 from netsp.space.signature import SpaceSignature
 from netsp.space.solve import AS_GIVEN, GOING_ON, seconds_until_home, solve_mission
@@ -224,25 +227,75 @@ def prism_worlds() -> Iterator[tuple[str, Problem]]:
         yield f"random {seed}", problem
 
 
-def beside_plane(problem: Problem) -> tuple[float, float, str, float]:
-    """Tour in space, tour in the plane, status of that, and seconds of the first."""
+def beside_plane(problem: Problem) -> tuple[float, float, float, str, float]:
+    """Tour in space, its bound, tour in the plane, status of that, and seconds of the first."""
     with tempfile.TemporaryDirectory() as folder:
         mission = in_space(problem, Path(folder))
         begin = time.perf_counter()
         found = plan(mission, time_limit=60.0)
         took = time.perf_counter() - begin
+    bound = bound_of_all(found.ways, sorted(found.order), Clock(20.0)) or 0.0
     best = solve(problem, time_limit=60.0)
     assert best.length is not None
-    return found.length, best.length, best.status.value, took
+    return found.length, bound, best.length, best.status.value, took
 
 
 def prisms() -> None:
-    head("problem", "goals", "in space m", "in the plane m", "status there", "longer by %", "s",
-         name="space-prisms")  # fmt: skip
+    head("problem", "goals", "in space m", "in the plane m", "status there", "longer by %",
+         "bound of all tours m", "gap %", "s", name="space-prisms")  # fmt: skip
     for name, problem in prism_worlds():
-        length, best, status, took = beside_plane(problem)
+        length, bound, best, status, took = beside_plane(problem)
         row(name, len(problem.goals), f"{length:.3f}", f"{best:.3f}", status,
-            f"{100 * (length / best - 1):.2f}", f"{took:.0f}")  # fmt: skip
+            f"{100 * (length / best - 1):.2f}", f"{bound:.3f}",
+            f"{100 * (1 - bound / length):.1f}", f"{took:.0f}")  # fmt: skip
+    print()
+
+
+def random_frame(seed: int) -> tuple[Mission, Scene]:
+    """4 to 12 members between random joints, each new one from a joint that is there, and twelve
+    waypoints beside them."""
+    rng = np.random.default_rng(seed)
+    joints = [rng.uniform(-3.0, 3.0, 3)]
+    members = []
+    for k in range(int(rng.integers(4, 13))):
+        a = joints[int(rng.integers(len(joints)))]
+        far = [j for j in joints if np.linalg.norm(j - a) > 1.0]
+        # every third member closes a loop, where it can
+        closes = k % 3 == 2 and far
+        b = far[int(rng.integers(len(far)))] if closes else rng.uniform(-3.0, 3.0, 3)
+        members.append(bar(a.tolist(), b.tolist(), 0.15))
+        joints.append(b)
+    scene = Scene(name=f"frame {seed}", solids=members)
+    field, waypoints = scene.field(), []
+    while len(waypoints) < 12:
+        p = rng.uniform(-3.5, 3.5, 3)
+        if 0.4 <= float(field.distance(p)) <= 1.0:
+            waypoints.append(p.round(2).tolist())
+    mission = Mission(
+        scene="-", name=scene.name, anchor=(5, 5, 5), start=(4.8, 4.8, 4.8), waypoints=waypoints,
+        tether_length=20.0, clearance=0.2,
+    )  # fmt: skip
+    return mission, scene
+
+
+def frames() -> None:
+    head("frame", "members", "group", "tour m", "status", "bound of all tours m", "gap %",
+         "solved in s", "home after s", "as given s", "over s", "visited", name="space-frames")  # fmt: skip
+    for seed in range(10):
+        mission, scene = random_frame(seed)
+        begin = time.perf_counter()
+        found = solve_mission(mission, scene=scene)
+        took = time.perf_counter() - begin
+        run = found.run or simulate(found.mission, scene=scene)
+        given = found.given or simulate(mission, scene=scene)
+        words = found.plan.water.words.group if found.plan is not None else None
+        tour, flown = found.tour, run.summary
+        row(seed, len(scene.solids), "–" if words is None else shown(words.rank, words.relators),
+            f"{tour.length:.1f}", tour.status.value, f"{tour.bound_of_all or 0.0:.1f}",
+            f"{100 * (tour.gap_to_all or 0.0):.1f}", f"{took:.0f}",
+            f"{seconds_until_home(run):.1f}", f"{seconds_until_home(given):.1f}",
+            f"{flown['exceedance_s']:.1f}", f"{flown['visited']} of {len(mission.waypoints)}",
+            )  # fmt: skip
     print()
 
 
@@ -270,7 +323,7 @@ def missions(names: list[str]) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser()
-    parser.add_argument("--only", choices=("words", "loops", "prisms", "missions"))
+    parser.add_argument("--only", choices=("words", "loops", "prisms", "frames", "missions"))
     parser.add_argument(
         "--missions", nargs="*", default=[*MISSIONS, *SITES], help="names of missions and sites"
     )
@@ -283,7 +336,7 @@ def main() -> None:
     heading("In space")
     for name, measure in (
         ("words", words), ("loops", lambda: loops(args.loops)), ("prisms", prisms),
-        ("missions", lambda: missions(args.missions)),
+        ("frames", frames), ("missions", lambda: missions(args.missions)),
     ):  # fmt: skip
         if args.only in (None, name):
             measure()
