@@ -1,6 +1,7 @@
 """Words and tours in space.
 
-    python benchmarks/space.py [--only words|loops|prisms|frames|missions] [--missions jacket …] [--keep]
+    python benchmarks/space.py [--only words|loops|prisms|frames|missions]
+                               [--missions jacket …] [--keep]
 
 Words: what groups scenes have, and what they take. Loops: random ones, beside a second invariant.
 Prisms: tours in space of problems whose shortest tour is proven in the plane. Frames: random ones,
@@ -280,7 +281,8 @@ def random_frame(seed: int) -> tuple[Mission, Scene]:
 
 def frames() -> None:
     head("frame", "members", "group", "tour m", "status", "bound of all tours m", "gap %",
-         "solved in s", "home after s", "as given s", "over s", "visited", name="space-frames")  # fmt: skip
+         "solved in s", "home after s", "as given s", "over s", "visited",
+         name="space-frames")  # fmt: skip
     for seed in range(10):
         mission, scene = random_frame(seed)
         begin = time.perf_counter()

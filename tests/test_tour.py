@@ -190,7 +190,26 @@ def round_a_post(mission: Mission) -> Mission:
     return another_stop(mission, 0, path=(path[0], *loop, *path[:0:-1][::-1]))
 
 
+def without_the_last_stop(mission: Mission) -> Mission:
+    """It goes home from the last but one, the way it came, and says that this is the shortest."""
+    stops = mission.tour.stops[:-1]
+    line = np.vstack([np.array(s.path) for s in stops])
+    length = 2.0 * sum(polylines.length(np.array(s.path)) for s in stops)
+    return changed(
+        mission, stops=stops, home=tuple(map(tuple, line[::-1].tolist())), length=length,
+        status=Status.OPTIMAL, lower_bound=length, gap=0.0, bound_of_all=length, gap_to_all=0.0,
+    )  # fmt: skip
+
+
 FALSE = {
+    "a stop that is missing": (without_the_last_stop, "leaves out only what is out of reach"),
+    "the tether on the way to a stop": (
+        lambda m: another_stop(m, 1, longest_tether=m.tour.stops[1].longest_tether + 0.3),
+        "tethers as long as stated",
+    ),
+    "that words are exact": (
+        lambda m: changed(m, exact=not m.tour.exact), "words at the stops"
+    ),
     "the word of a stop": (lambda m: another_stop(m, 1, signature=(9,)), "words at the stops"),
     "the tether of a stop": (
         lambda m: another_stop(m, 1, tether_length=m.tour.stops[1].tether_length + 0.3),

@@ -43,7 +43,7 @@ def tours() -> tuple[str, bool]:
     worst = 0.0
     for name, problem in prism_worlds():
         if name in ("pool", "random 0", "random 3"):
-            length, best, status, _ = beside_plane(problem)
+            length, _, best, status, _ = beside_plane(problem)
             worst = max(worst, length / best - 1.0) if status == "optimal" else float("inf")
     return f"{100 * worst:.2f} % longer", worst <= 1e-3
 
@@ -93,6 +93,37 @@ def seen(name: str) -> Claim:
     return Claim(f"cover: {name}", "99 % of the visible; 15 %; safe", measure)
 
 
+def mended() -> tuple[str, bool]:
+    """A solid on a leg of the tour, one flight for each leg."""
+    import numpy as np
+    from sites import mission_of
+
+    from netsp.geometry import polylines
+    from netsp.online.simulate import simulate
+    from netsp.online.surprises import SceneSurprises
+    from netsp.space.plan import plan
+
+    mission, scene = mission_of("ring")
+    planned = plan(mission, scene=scene).planned()
+    safe = flights = 0
+    for stop in planned.tour.stops:
+        leg = np.array(stop.path)
+        if polylines.length(leg) < 1.0:
+            continue
+        middle = polylines.points_along(leg, 0.5 * polylines.length(leg))[1].tolist()
+        solid = {"sphere": {"center": middle, "radius": 0.2}}
+        events = [{"time": 1.0, "appear": solid}]
+        surprises = SceneSurprises.model_validate({"schema_version": 1, "events": events})
+        s = simulate(planned, "repair", scene=scene, surprises=surprises).summary
+        flights += 1
+        safe += (
+            s["visited"] == s["waypoints"] and s["home"]["tether_free"]
+            and s["exceedance_s"] == 0.0 and s["contacts"] == 0
+            and s["repairs"][0]["response"] != "kept"
+        )  # fmt: skip
+    return f"{safe} of {flights} safe, all, free", safe == flights > 0
+
+
 def claims() -> Iterator[Claim]:
     """All of this file."""
     yield Claim("words: groups of seven scenes", "as known", groups)
@@ -101,4 +132,5 @@ def claims() -> Iterator[Claim]:
     yield solved("ring", 46.0, 15.0)
     yield solved("hull", 80.0, 35.0)
     yield seen("ring")
+    yield Claim("repair: a solid on each leg about the ring", "safe, all, free", mended)
     yield Claim("tours in space: three problems of the plane", "within 0.1 % of it", tours)

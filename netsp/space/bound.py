@@ -1,26 +1,54 @@
-"""A bound on every tour of a mission's waypoints, whatever the tether does.
+"""A bound on every tour of a mission's waypoints, of two that are asked for.
 
-No tour is shorter than the shortest one of the robot alone, which goes from waypoint to waypoint
-along the shortest paths there are. Between waypoints in sight of one another these are straight,
-and between those that are not near, the straight distance is a bound, too. For the others the
-shortest of the ways found is taken, pulled taut in each of several classes
-(`netsp.space.legs.Ways`): a measured length, which nothing proves the shortest. What is proven is
-the tour through these distances.
+The first knows nothing of the tether: no tour is shorter than the shortest one of the robot alone,
+which goes from waypoint to waypoint along the shortest paths there are. Between waypoints in sight
+of one another these are straight, and between those that are not near, the straight distance is a
+bound, too. For the others the shortest of the ways found is taken, pulled taut in each of several
+classes (`netsp.space.legs.Ways`): a measured length, which nothing proves the shortest.
+
+The second asks for classes as well: at a waypoint the tether is of one of the classes in which it
+is no longer than its limit, and a leg between two of these is as long as the shortest way of the
+class that it must have: back along one tether and out along the other, pulled taut. Of classes that
+no search has found, the least is taken that they can be. That tethers hang on bodies with free
+ends, and what they do on the way, it leaves aside.
+
+What is proven of either is the tour through these distances.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from itertools import pairwise
+
 import numpy as np
 
+from netsp.arrays import Bools, Floats, Ints
 from netsp.clock import Clock
+from netsp.online.tether import Tether
 from netsp.roadmap.from_state import from_state
 from netsp.solvers.solve import solve_graph
 from netsp.space.legs import Ways
-from netsp.space.water import along
+from netsp.space.states import ROUNDS
+from netsp.space.water import LONGER, along
 from netsp.travel.graph import TravelGraph
+from netsp.travel.result import Result
+
+PLAIN, CLASSES = 0.4, 0.5
+"""Of the time left: for the first bound, and for the classes of the second."""
+
+MOST_WORDS, MOST_ENTRIES = 100, 40_000_000
+"""Words of a cell that are sought, and of all cells together: an entry takes 11 bytes."""
+
+MOST_VERTICES = 3000
+"""Classes of all waypoints together: of more there is the first bound only."""
+
+ANY = -1
+"""In place of a word: of a class that was not found."""
 
 
-def bound_of_all(ways: Ways, reached: list[int], clock: Clock, seed: int = 0) -> float | None:
+def bound_of_all(
+    ways: Ways, reached: list[int], clock: Clock | None, seed: int = 0
+) -> float | None:
     """A bound on all tours through waypoints.
 
     Parameters
@@ -29,7 +57,7 @@ def bound_of_all(ways: Ways, reached: list[int], clock: Clock, seed: int = 0) ->
         Of the robot between waypoints.
     reached : list of int
         The waypoints of the tours.
-    clock : Clock
+    clock : Clock, optional
         When it is up, the bound is what is proven by then.
     seed : int
         Of the solver.
@@ -39,19 +67,156 @@ def bound_of_all(ways: Ways, reached: list[int], clock: Clock, seed: int = 0) ->
     float or None
         Metres; None if there was no time for any, or nothing is to be visited but the start.
     """
-    places = ways.places
-    visited = set(reached)
+    clock = clock or Clock()
+    places, visited = ways.places, set(reached)
     some = [n for n in range(len(places)) if n == places.begin or places.waypoint[n] in visited]
-    points = np.vstack([np.array(ways.water.mission.start), places.points[some]])
-    costs = np.linalg.norm(points[:, None] - points[None], axis=2)
-    for a, n in enumerate(some, 1):
-        for b, m in enumerate(some[: a - 1], 1):
-            lengths = [along(path) for _, path in ways.known(n, m)]
-            if lengths:
-                # the taut one may be a hair shorter than the straight distance by rounding
-                costs[a, b] = costs[b, a] = max(costs[a, b], min(lengths))
-    cluster = np.r_[0, 1 + np.unique(places.waypoint[some], return_inverse=True)[1]]
-    graph = TravelGraph.from_costs(costs, cluster)
-    if places.begin is not None:
-        graph = from_state(graph, 1 + some.index(places.begin))
-    return solve_graph(graph, "auto", time_limit=clock, seed=seed).lower_bound or None
+    if not some:
+        return None
+    plain = [_Class(n, ANY, 0.0) for n in some]
+    first = _solved(ways, plain, clock.part(PLAIN), seed)
+    if clock.up:
+        return first
+    classes = _classes(ways, some, clock.part(CLASSES))
+    second = None if classes is None else _solved(ways, classes, clock, seed)
+    return max(first or 0.0, second or 0.0) or None
+
+
+@dataclass(frozen=True)
+class _Class:
+    """A place, the number of the tether's word there, its least length, metres, and the tether;
+    None where nothing is known of that."""
+
+    point: int
+    word: int
+    length: float
+    line: Floats | None = None
+
+
+def _classes(ways: Ways, some: list[int], clock: Clock) -> list[_Class] | None:
+    """All classes in which the tether reaches places; None if it cannot be told."""
+    water, places = ways.water, ways.places
+    words, limit = water.words, water.mission.tether_length
+    most = min(MOST_WORDS, MOST_ENTRIES // words.cells.flags.size)
+    if not words.exact or most < 2:
+        return None
+    root = int(np.ravel_multi_index(tuple(words.root), words.cells.flags.shape))
+    found = water.search(False, root, most, limit)
+    anchor = np.asarray(water.mission.anchor, dtype=float)[None]
+    out: list[_Class] = []
+    for n in some:
+        if n == places.begin:
+            number = water.number(water.present.nodes)
+            line = water.present.nodes
+            out.append(_Class(n, ANY if number is None else number, 0.0, line))
+            continue
+        cell = words.held(places.points[n])
+        there = [] if cell is None else water.ways(found, cell)
+        known: dict[int, Tether] = {}
+        for word, way in there:
+            if clock.up:
+                return None
+            tether = water.model.relaxed(np.vstack([anchor, way, places.points[n]]), ROUNDS)
+            if tether.length > limit + water.mission.delta:
+                continue
+            number = water.number(tether.nodes)
+            key = word if number is None else number
+            if key not in known or tether.length < known[key].length:
+                known[key] = tether
+        out += [_Class(n, word, t.length, t.nodes) for word, t in known.items()]
+        # paths along cells are longer than those pulled taut by no more than that factor
+        beyond = along(there[-1][1]) / LONGER if there else 0.0
+        if (len(there) >= most and beyond <= limit) or not known:
+            out.append(_Class(n, ANY, beyond if known else 0.0))
+        if len(out) > MOST_VERTICES:
+            return None
+    return out
+
+
+def _solved(ways: Ways, classes: list[_Class], clock: Clock, seed: int) -> float | None:
+    """The bound that is proven on tours through one class of each waypoint. Legs of the shortest of
+    these that were only estimated are measured, and it is sought again, until none is left."""
+    costs, measured = _costs(ways, classes)
+    places, best = ways.places, 0.0
+    point = np.array([c.point for c in classes])
+    cluster: Ints = np.r_[0, 1 + np.unique(places.waypoint[point], return_inverse=True)[1]]
+    begin = None if places.begin is None else 1 + int(np.flatnonzero(point == places.begin)[0])
+    while True:
+        graph = TravelGraph.from_costs(costs, cluster)
+        if begin is not None:
+            graph = from_state(graph, begin)
+        result = solve_graph(graph, "auto", time_limit=clock, seed=seed)
+        best = max(best, result.lower_bound or 0.0)
+        if clock.up or result.tour is None or not _measure(ways, classes, costs, measured, result):
+            return best or None
+
+
+def _costs(ways: Ways, classes: list[_Class]) -> tuple[Floats, Bools]:
+    """(v, v) least lengths of legs between the start and all classes, and which need not be
+    measured."""
+    places, water = ways.places, ways.water
+    point = np.array([c.point for c in classes])
+    straight = np.linalg.norm(places.points[point] - np.array(water.mission.start), axis=1)
+    # a tether to the start, and on along the way from there, is no shorter than the taut one
+    out = np.array([c.length for c in classes]) - water.laid.length
+    costs = np.zeros((len(classes) + 1, len(classes) + 1))
+    measured = np.zeros(costs.shape, dtype=np.bool_)
+    costs[0, 1:] = costs[1:, 0] = np.maximum(straight, out)
+    members = {int(n): np.flatnonzero(point == n) for n in np.unique(point)}
+    for n, own in members.items():
+        for m, others in members.items():
+            if n >= m:
+                continue
+            block, known = _between(ways, [classes[k] for k in own], [classes[k] for k in others])
+            for whole, part in ((costs, block), (measured, known)):
+                whole[np.ix_(own + 1, others + 1)] = part
+                whole[np.ix_(others + 1, own + 1)] = part.T
+    return costs, measured
+
+
+def _measure(
+    ways: Ways, classes: list[_Class], costs: Floats, measured: Bools, result: Result
+) -> bool:
+    """Pull the legs of a tour taut that were only estimated, in their classes: back along one
+    tether, and out along the other. Whether any was longer."""
+    assert result.tour is not None
+    water, longer = ways.water, False
+    for u, v in pairwise((*result.tour, 0)):
+        lines = [water.laid.nodes if w == 0 else classes[w - 1].line for w in (u, v)]
+        if measured[u, v] or lines[0] is None or lines[1] is None:
+            continue
+        measured[u, v] = measured[v, u] = True
+        length = along(water.taut(np.vstack([lines[0][::-1], lines[1][1:]])))
+        if length > costs[u, v] * (1.0 + 1e-9) + 1e-9:
+            costs[u, v] = costs[v, u] = length
+            longer = True
+    return longer
+
+
+def _between(ways: Ways, own: list[_Class], others: list[_Class]) -> tuple[Floats, Bools]:
+    """(a, b) least lengths of legs between the classes of two places, and which of them are those
+    of ways that were found."""
+    n, m = own[0].point, others[0].point
+    straight = float(np.linalg.norm(ways.points[n] - ways.points[m]))
+    known = [(word, max(straight, along(path))) for word, path in ways.known(n, m)]
+    least = min((length for _, length in known), default=straight)
+    # a tether, and on along the way to the next place, is no shorter than the taut one there
+    here, there = (np.array([c.length for c in some]) for some in (own, others))
+    far = max(straight, ways.beyond(n, m))
+    block = np.maximum(far, np.abs(here[:, None] - there[None]))
+    measured = np.zeros(block.shape, dtype=np.bool_)
+    column = {c.word: k for k, c in enumerate(others)}
+    times = ways.water.words.times
+    for k, c in enumerate(own):
+        if c.word == ANY:
+            block[k] = np.maximum(least, c.length - there)
+            continue
+        for word, length in reversed(known):  # the shortest of a class comes last
+            to = column.get(times(c.word, word))
+            if to is not None:
+                block[k, to], measured[k, to] = length, True
+    if ANY in column:
+        k = column[ANY]
+        block[:, k] = np.maximum(least, others[k].length - here)
+        if own[-1].word == ANY:
+            block[-1, k] = least
+    return block, measured

@@ -13,7 +13,7 @@ from netsp.arrays import Floats, Ints
 from netsp.clock import Clock
 from netsp.space.places import Places
 from netsp.space.states import ROUNDS, Effort, State, States
-from netsp.space.water import Water, along, straight
+from netsp.space.water import LONGER, Water, along, straight
 
 NEIGHBOURS = 10
 """Waypoints nearest to each that legs are sought to; places, where some have alternatives."""
@@ -37,6 +37,7 @@ class Ways:
     places: Places
     effort: Effort
     _known: dict[tuple[int, int], list[tuple[int, Floats]]] = field(default_factory=dict)
+    _beyond: dict[tuple[int, int], float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         apart = self.places.apart
@@ -99,6 +100,33 @@ class Ways:
                 if word is not None:
                     back.append((word, path[::-1]))
             self._known[n, m], self._known[m, n] = ways, back
+            if found is not None and there is not None:
+                self._beyond[n, m] = self._beyond[m, n] = self._least_beyond(n, m, ways)
+
+    def _least_beyond(self, n: int, m: int, ways: list[tuple[int, Floats]]) -> float:
+        """Metres that ways of other classes than those found are at least long."""
+        farther = self.effort.farther * float(self._apart[n, m])
+        if len(ways) < self.effort.ways:
+            return farther
+        # paths along cells are longer than those pulled taut by no more than that factor
+        return min(farther, along(ways[-1][1]) / LONGER)
+
+    def beyond(self, n: int, m: int) -> float:
+        """Metres that ways of other classes than those of `known` are at least long.
+
+        Parameters
+        ----------
+        n : int
+            Where they begin.
+        m : int
+            Where they end.
+
+        Returns
+        -------
+        float
+            0 where no search has told.
+        """
+        return self._beyond.get((n, m), 0.0)
 
     def prepare_all(self, clock: Clock, tell: Callable[[str], None]) -> None:
         """Seek all ways between waypoints that are near.

@@ -51,8 +51,8 @@ ROUNDING = 1e-9
 MOST_AGAIN = 20
 """Times that a graph is solved again because legs were at fault."""
 
-SEARCHING, GROWING, SOLVING = 0.3, 0.5, 0.5
-"""Of the time left, what the search for ways may take, then states and legs, and the solver each
+STARTING, SEARCHING, GROWING, SOLVING = 0.3, 0.3, 0.5, 0.5
+"""Of the time left, what first states may take, then the search for ways, then states and legs, and the solver each
 time; the rest is for driving, and for solving again."""
 
 LEAST_GROWING, LEAST_SOLVING = 1.0, 0.5
@@ -237,7 +237,7 @@ def _planned(
     limit = max(SHARE * mission.tether_length, water.present.length * (1.0 + ROUNDING))
     tell("shortest tethers to each waypoint")
     effort = Effort.of(len(places))
-    states = first_states(water, places, limit, effort)
+    states = first_states(water, places, limit, effort, clock.part(STARTING))
     if not states.reached - {len(mission.waypoints)}:
         nearest = float(np.linalg.norm(mission.places - np.array(mission.anchor), axis=1).min())
         raise InputError(

@@ -177,8 +177,7 @@ class RepairPlanner(PredictivePlanner):
             there, why = self._along(tether, leg, name)
             if there is None:
                 rest.reason = rest.reason or why
-                path = ShortestTree(self.grid, planned[-1], here[None]).path(0)
-                leg = None if path is None else self.pulled(path)
+                leg = self._way_round(here, planned[-1])
                 there, _ = self._along(tether, leg, name)
             if there is not None and home and not self._is_free(there):
                 rest.reason = rest.reason or "the tether would not be free at home"
@@ -193,6 +192,11 @@ class RepairPlanner(PredictivePlanner):
             rest.legs.append((leg, tether.length))
             rest.kept += [] if home else [k]
         return rest
+
+    def _way_round(self, here: Floats, there: Floats) -> Floats | None:
+        """The shortest way by the map, pulled taut."""
+        path = ShortestTree(self.grid, there, here[None]).path(0)
+        return None if path is None else self.pulled(path)
 
     def _along(self, tether: Tether, leg: Floats | None, name: str) -> tuple[Tether | None, str]:
         """The tether at the end of a leg; None, and why, where the robot cannot go along it."""

@@ -33,7 +33,7 @@ from netsp.space.plan import SpacePlan, plan
 from netsp.space.water import Water, along, has_room
 from netsp.travel.result import relative_gap
 
-PLANNING, BOUNDING, ORDERING = 0.7, 0.15, 0.3
+PLANNING, BOUNDING, ORDERING = 0.7, 0.3, 0.3
 """Of the time left, what the tour of states and legs may take, then the bound, then the order by
 going straight on; the rest is for flights."""
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from netsp.arrays import Floats
+from netsp.clock import Clock
 from netsp.errors import InputError
 from netsp.geometry import polylines
 from netsp.online.tether import Tether
@@ -222,7 +223,9 @@ def alike(a: Tether, b: Tether, delta: float) -> bool:
     return bool(np.linalg.norm(one - other, axis=1).max() < 2.0 * delta)
 
 
-def first_states(water: Water, places: Places, limit: float, effort: Effort) -> States:
+def first_states(
+    water: Water, places: Places, limit: float, effort: Effort, clock: Clock
+) -> States:
     """States of the shortest words of each waypoint, and the one that the mission begins in.
 
     Parameters
@@ -235,6 +238,8 @@ def first_states(water: Water, places: Places, limit: float, effort: Effort) -> 
         Longest tether, metres.
     effort : Effort
         How many.
+    clock : Clock
+        When it is up, one for each of the waypoints that are left.
 
     Returns
     -------
@@ -260,7 +265,7 @@ def first_states(water: Water, places: Places, limit: float, effort: Effort) -> 
     root = int(np.ravel_multi_index(tuple(words.root), words.cells.flags.shape))
     found = water.search(False, root, effort.words, limit)
     for n in range(len(places)):
-        _take(states, n, found, anchor)
+        _take(states, n, found, anchor, 1 if clock.up else effort.words)
     return states
 
 
@@ -283,16 +288,16 @@ def states_with_room(states: States, lacking: set[int], words: int) -> None:
         return
     found = water.search(True, start, words, LONGER * states.limit)
     for n in np.flatnonzero(np.isin(states.places.waypoint, list(lacking))):
-        _take(states, int(n), found, water.laid.nodes)
+        _take(states, int(n), found, water.laid.nodes, words)
 
 
-def _take(states: States, n: int, found: Found, begin: Floats) -> None:
-    """States of a place by the ways found to it, which go on from a line."""
+def _take(states: States, n: int, found: Found, begin: Floats, most: int) -> None:
+    """States of a place by the shortest ways found to it, which go on from a line."""
     water, words, point = states.water, states.water.words, states.places.points[n]
     cell = words.held(point)
     if cell is None or n == states.places.begin:
         return
-    for _, way in water.ways(found, cell):
+    for _, way in water.ways(found, cell)[:most]:
         tether = water.model.relaxed(np.vstack([begin, way, point]), ROUNDS)
         if tether.length > states.limit:
             continue
