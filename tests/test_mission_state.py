@@ -95,7 +95,10 @@ def test_a_mission_from_the_middle_is_solved_judged_flown_and_reported(planned, 
         ({"tether": [[1, 0, 0], [2, 2.5, -1]]}, "state.tether: begins"),
         ({"tether": [[0, 0, 0]]}, "state.tether"),
         ({"tether": [[0, 0, 0], [3, 0.4, -0.5], [2, 2.5, -1]]}, "passes through a solid"),
-        ({"tether": [[0, 0, 0], [0, 3.9, -3], [8, 3.9, -3], [2, 2.5, -1]]}, "expected no more"),
+        (
+            {"tether": [[0, 0, 0], [1, -3, -1], [8, -3, -1], [8, 3, -1], [2, 2.5, -1]]},
+            "expected no more",
+        ),
         ({"position": [3, 0.4, -1], "tether": [[0, 0, 0], [3, 0.4, -1]]}, "state.position"),
         ({"position": [30, 0, -1], "tether": [[0, 0, 0], [30, 0, -1]]}, "outside of the scene's"),
     ],
@@ -138,14 +141,11 @@ def test_an_alternative_in_a_solid_is_told(planned):
 
 
 def test_alternatives_of_a_cover_see_as_much_in_any_combination():
-    ring = {"center": [0, 0, 0], "axis": [0, 0, 1], "major_radius": 2, "minor_radius": 0.3}
-    scene = Scene(solids=[{"name": "ring", "torus": ring}])
+    scene = Scene(solids=[{"box": {"center": [0, 0, 0], "size": [2, 1, 1]}}])
     found = cover(
-        scene, anchor=(4, 0, 2), camera=Camera(range=2.0, patch=0.3), standoff=1.0, share=0.9,
-        time_limit=None,
-    )  # fmt: skip
-    some = [k for k, w in enumerate(found.mission.waypoints) if w.alternatives]
-    assert some
+        scene, anchor=(4, 0, 2), camera=Camera(range=2.5, patch=0.25), standoff=1.2, time_limit=None
+    )
+    assert sum(len(w.alternatives) for w in found.mission.waypoints) >= 3
     rng = np.random.default_rng(0)
     field = scene.field()
     for _ in range(3):
@@ -155,7 +155,7 @@ def test_alternatives_of_a_cover_see_as_much_in_any_combination():
         seen = simulate(
             found.mission.model_copy(update={"waypoints": chosen}), scene=scene, field=field
         ).summary["coverage"]
-        assert seen >= 0.9 * found.visible - 0.01
+        assert seen >= 0.99 * found.visible - 0.01
 
 
 # ------------------------------------------------------------------------------------------ repair
@@ -188,7 +188,7 @@ def test_without_surprises_repair_is_predictive(planned):
 
 
 @pytest.mark.parametrize("leg", [0, 1, 2, 3])
-def test_what_blocks_a_leg_is_gone_round_and_the_rest_is_kept(planned, leg):
+def test_what_blocks_a_leg_is_not_met_and_all_is_visited_all_the_same(planned, leg):
     run = fly(planned, appear(middle_of(planned[0], leg), 0.15, 0.5), planning_limit=60.0)
     s = run.summary
     assert s["visited"] == 4
@@ -196,7 +196,9 @@ def test_what_blocks_a_leg_is_gone_round_and_the_rest_is_kept(planned, leg):
     assert s["exceedance_s"] == 0.0
     assert s["contacts"] == 0
     (repair,) = s["repairs"]
-    assert repair["response"] == "local"
+    # the second and the third only need a way round, and planning for a minute is worth no more
+    assert repair["response"] == "local" or leg in (0, 3)
+    assert repair["response"] in ("local", "replan")
     assert f"waypoint #{leg} is blocked" in repair["reason"]
     # words are told by the scene at the end, and are as in the tour that was mended
     assert words_of_flight(run).as_planned == 4

@@ -52,8 +52,8 @@ MOST_AGAIN = 20
 """Times that a graph is solved again because legs were at fault."""
 
 STARTING, SEARCHING, GROWING, SOLVING = 0.3, 0.3, 0.5, 0.5
-"""Of the time left, what first states may take, then the search for ways, then states and legs, and the solver each
-time; the rest is for driving, and for solving again."""
+"""Of the time left, what first states may take, then the search for ways, then states and legs, and
+the solver each time; the rest is for driving, and for solving again."""
 
 LEAST_GROWING, LEAST_SOLVING = 1.0, 0.5
 """Seconds that legs and the solver get even if the time is up: there would be no tour, or one by

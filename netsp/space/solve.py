@@ -28,6 +28,7 @@ from netsp.online.tour import PlannedStop, PlannedTour, in_file
 from netsp.solution import Status
 from netsp.solvers.solve import SolverLike
 from netsp.space.bound import bound_of_all
+from netsp.space.judge import verify_mission
 from netsp.space.order import order_by_going_on
 from netsp.space.plan import SpacePlan, plan
 from netsp.space.water import Water, along, has_room
@@ -246,9 +247,15 @@ def _or_as_given(
     """The better of a tour and of the mission as it was given, whose own tour is kept if it has
     one."""
     mission = flights.mission
+    order = tuple(range(len(mission.waypoints)))
+    if given is None and mission.tour is not None:
+        # no time to fly it, but to judge it
+        if best is not None and best.tour.length <= mission.tour.length:
+            return best
+        good = verify_mission(mission, scene=flights.scene, field=flights.field)
+        return SolvedMission(mission, order, None, None, None) if good else best
     if given is None or (best is not None and not _better_than(given, best)):
         return best
-    order = tuple(range(len(mission.waypoints)))
     if mission.tour is not None and _good(given):
         return SolvedMission(mission, order, given, None, None)
     kept = tour_of_flight(

@@ -324,7 +324,7 @@ def least_room(field: DistanceField, path: Floats) -> float:
         Metres, right to a hundredth of one, or to a millionth of the path's length.
     """
     step = max(2.0 * ROOM_STEP, along(path) / 1e6)
-    return float(field.distance(polylines.dense(path, step)).min())
+    return float(field.distance(np.vstack([path[:1], polylines.dense(path, step)])).min())
 
 
 def straight(field: DistanceField, a: Floats, b: Floats, clearance: float) -> bool:
