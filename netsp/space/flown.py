@@ -40,6 +40,11 @@ class FlownWords:
     planned: tuple[Word | None, ...] = ()
 
     @property
+    def complete(self) -> bool:
+        """Whether every word could be told."""
+        return self.home is not None and all(word is not None for _, word in self.stops)
+
+    @property
     def as_planned(self) -> int:
         """How many stops were made in the class that the tour has there."""
         return sum(self._is_as_planned(k, word) for k, word in self.stops)
@@ -84,7 +89,8 @@ def words_of_flight(
     Parameters
     ----------
     run : Run
-        The flight; its anchor stays where it is. Words are by the scene as it was at the end.
+        The flight; its anchor stays where it is. Words are by the map that it began with; where
+        that has solids on the way, by the scene as it was at the end.
     scene : Scene, optional
         Of the mission, when it is at hand.
     field : DistanceField, optional
@@ -103,12 +109,19 @@ def words_of_flight(
     mission = run.mission
     if mission.track:
         raise InputError("track: of a moving anchor no words are told; expected a mission without")
-    if run.scene is not None:
-        scene, field = run.scene, None
     scene = scene or mission.load_scene()
-    field = field or scene.field()
-    water = Water.of(mission, scene, field)
-    words, laid, begin = water.words, water.laid.nodes, water.present.nodes
+    told = _by(run, Water.of(mission, scene, field or scene.field()))
+    if run.scene is None or told.complete:
+        return told
+    # where the map was wrong, the way may lead through what it shows
+    by_the_end = _by(run, Water.of(mission, run.scene, run.scene.field()))
+    return by_the_end if by_the_end.complete else told
+
+
+def _by(run: Run, water: Water) -> FlownWords:
+    """The words of a flight in some scene."""
+    mission, words = run.mission, water.words
+    laid, begin = water.laid.nodes, water.present.nodes
     places = np.vstack([begin, np.array([[r.x, r.y, r.z] for r in run.log])])
     next_one = np.array([r.waypoint for r in run.log])
     stops = []
