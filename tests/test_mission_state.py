@@ -237,6 +237,74 @@ def test_where_the_order_no_longer_holds_the_rest_is_planned_anew(planned, monke
     assert words_of_flight(run).as_planned == 4
 
 
+def events(*some) -> SceneSurprises:
+    return SceneSurprises.model_validate({"schema_version": 1, "events": list(some)})
+
+
+@pytest.mark.parametrize("planner", ["repair", "predictive"])
+@pytest.mark.parametrize("time", [0.5, 30.0, 1e4])
+def test_a_waypoint_that_is_added_is_visited_and_one_that_is_cancelled_is_not(
+    planned, planner, time
+):
+    surprises = events(
+        {"time": time, "add_waypoint": [1.5, 1.5, -0.5]}, {"time": 0.2, "cancel_waypoint": 2}
+    )
+    s = (run := fly(planned, surprises, planner, planning_limit=5.0)).summary
+    late = time > 1e3
+    assert s["visited"] == s["waypoints"] == (3 if late else 4)
+    assert s["given_as"].count(2) == 0
+    assert (4 in s["given_as"]) is not late
+    assert s["home"]["tether_free"]
+    assert s["exceedance_s"] == 0.0
+    assert s["surprises"]["happened"] == (1 if late else 2)
+    places = [w.position for w in run.mission.waypoints]
+    assert ((1.5, 1.5, -0.5) in places) is not late
+    if planner == "repair":
+        assert len(s["repairs"]) == (1 if late else 2)
+        assert s["repairs"][0]["response"] == "kept"  # one fewer leaves the rest as it was
+        assert run.mission.tour is not None
+
+
+def test_a_waypoint_that_was_visited_cannot_be_cancelled(planned):
+    first = planned[0].tour.stops[0]
+    late = 1.0 + polylines.length(np.array(first.path)) / planned[0].speed
+    s = fly(planned, events({"time": late, "cancel_waypoint": 0})).summary
+    assert s["visited"] == 4
+
+
+@pytest.mark.parametrize("planner", ["repair", "predictive", "react", "none"])
+def test_a_robot_that_is_carried_off_goes_on_from_there(planned, planner):
+    run = fly(planned, events({"time": 4.0, "push": [-0.6, -0.8, 0.3]}), planner)
+    place = np.array([[r.x, r.y, r.z] for r in run.log])
+    jump = np.linalg.norm(np.diff(place, axis=0), axis=1).max()
+    assert 0.5 < jump < 1.1
+    assert run.summary["visited"] == 4
+    if planner in ("repair", "predictive"):
+        assert run.summary["exceedance_s"] == 0.0
+        assert run.summary["home"]["tether_free"]
+
+
+def test_a_robot_is_carried_no_farther_than_there_is_water_and_tether(planned):
+    run = fly(planned, events({"time": 4.0, "push": [50.0, 0.0, 0.0]}))
+    assert run.summary["exceedance_s"] == 0.0
+    assert run.summary["visited"] == 4
+    assert planned[2].distance([[r.x, r.y, r.z] for r in run.log]).min() > -0.05
+
+
+def test_a_waypoint_that_is_not_there_cannot_be_cancelled(planned, tmp_path, capsys):
+    mission, scene, _ = planned
+    (tmp_path / "scene.json").write_text(scene.model_dump_json(exclude_none=True))
+    file, bad = tmp_path / "planned.json", tmp_path / "events.json"
+    file.write_text(
+        mission.model_copy(update={"scene": "scene.json"}).model_dump_json(exclude_none=True)
+    )
+    bad.write_text(events({"time": 1, "cancel_waypoint": 4}).model_dump_json(exclude_none=True))
+    assert main(["execute", str(file), "--surprise", str(bad), "--quiet"]) == 2
+    assert "events[0]: cancel_waypoint: no waypoint #4; expected #0 to #3" in (
+        capsys.readouterr().err
+    )
+
+
 def test_execute_tells_what_it_did_and_refuses_what_fails_its_checks(planned, tmp_path, capsys):
     mission, scene, _ = planned
     (tmp_path / "scene.json").write_text(scene.model_dump_json(exclude_none=True))

@@ -37,7 +37,7 @@ def fly(
     with output_folder(output), messages:
         scene = mission.load_scene()
         if surprises is not None:
-            surprises.check(scene, source or "")
+            surprises.check(scene, source or "", len(mission.waypoints))
         field = scene.field(on_progress=tell)
         if check:
             from netsp.space.judge import checked_mission

@@ -51,7 +51,8 @@ def arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument("--compare", metavar="NAME", help="also fly with this planner, for comparison")
     p.add_argument(
         "--surprise", metavar="FILE",
-        help="surprise file (JSON): solids that appear, vanish or move",
+        help="surprise file (JSON): solids that appear, vanish or move; waypoints added or "
+        "cancelled; a robot carried off",
     )  # fmt: skip
     p.add_argument("--snap", action="store_true", help="move waypoints out of solids")
     p.add_argument(

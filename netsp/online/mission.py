@@ -369,7 +369,7 @@ class Mission(FileModel):
     @property
     def places(self) -> Floats:
         """(n, 3) where the waypoints are, metres."""
-        return np.array([w.position for w in self.waypoints])
+        return np.array([w.position for w in self.waypoints]).reshape(-1, 3)
 
     @property
     def every_place(self) -> Floats:

@@ -154,7 +154,7 @@ def simulate(
     laid = first_tether(mission, field, tethers, grid)
     taut = present_tether(mission, field, tethers, grid)
     if surprises is not None:
-        surprises.check(scene)
+        surprises.check(scene, "", len(mission.waypoints))
     if track is not None:
         track.check(field, mission.delta)
     if taut.length > mission.tether_length:

@@ -10,7 +10,11 @@ from netsp.errors import InputError
 from netsp.fields import Name, NonNegative, Point3
 from netsp.files import FileModel
 from netsp.models import Model
+from netsp.online.mission import WaypointLike
 from netsp.online.scene.scene import Scene, Solid
+
+KINDS = ("appear", "vanish", "move", "add_waypoint", "cancel_waypoint", "push")
+"""What may happen."""
 
 
 class SolidMove(Model):
@@ -33,19 +37,41 @@ class SceneEvent(Model):
         Name of a solid that is not there after all.
     move : SolidMove or None
         A solid that moves.
+    add_waypoint : MissionWaypoint or None
+        One more to visit.
+    cancel_waypoint : int or None
+        Number of one that need not be visited, in the order of the mission file; those that were
+        added come after all others.
+    push : (x, y, z) or None
+        How far the robot is carried off, metres.
     """
 
     time: Annotated[NonNegative, Field(description="seconds after the start")]
     appear: Annotated[Solid | None, Field(description="a solid that is there from now on")] = None
     vanish: Annotated[Name | None, Field(description="name of a solid that is gone")] = None
     move: Annotated[SolidMove | None, Field(description="a solid that moves")] = None
+    add_waypoint: Annotated[
+        WaypointLike | None, Field(description="one more to visit: (x, y, z), m, or an object")
+    ] = None
+    cancel_waypoint: Annotated[
+        Annotated[int, Field(ge=0)] | None,
+        Field(description="number of a waypoint that need not be visited"),
+    ] = None
+    push: Annotated[
+        Point3 | None, Field(description="(x, y, z) by which the robot is carried off, m")
+    ] = None
+
+    @property
+    def of_scene(self) -> bool:
+        """Whether a solid appears, vanishes or moves."""
+        return any(v is not None for v in (self.appear, self.vanish, self.move))
 
     @model_validator(mode="after")
     def _one(self) -> Self:
-        given = [k for k in ("appear", "vanish", "move") if getattr(self, k) is not None]
+        given = [k for k in KINDS if getattr(self, k) is not None]
         if len(given) != 1:
             raise ValueError(
-                f"expected one of appear, vanish, move, got {', '.join(given) or 'none'}"
+                f"expected one of {', '.join(KINDS)}, got {', '.join(given) or 'none'}"
             )
         return self
 
@@ -75,8 +101,8 @@ class SceneSurprises(FileModel):
         """
         return sorted(self.events, key=lambda e: e.time)
 
-    def check(self, scene: Scene, source: str = "") -> None:
-        """Refuse events that a scene cannot have.
+    def check(self, scene: Scene, source: str = "", waypoints: int | None = None) -> None:
+        """Refuse events that a scene or a mission cannot have.
 
         Parameters
         ----------
@@ -84,16 +110,26 @@ class SceneSurprises(FileModel):
             The map.
         source : str
             What messages call these surprises; nothing if it is empty.
+        waypoints : int, optional
+            How many the mission has.
 
         Raises
         ------
         InputError
-            A solid that is not there when the event comes, or a name that two would have.
+            A solid or waypoint that is not there when the event comes, or a name that two would
+            have.
         """
         solids = scene.all_solids()
         for k, event in sorted(enumerate(self.events), key=lambda e: e[1].time):
             try:
                 solids = changed(solids, event)
+                if waypoints is not None:
+                    waypoints += event.add_waypoint is not None
+                    if (event.cancel_waypoint or 0) >= waypoints:
+                        raise InputError(
+                            f"cancel_waypoint: no waypoint #{event.cancel_waypoint}; expected #0 "
+                            f"to #{waypoints - 1}"
+                        )
             except InputError as error:
                 where = f"{source}: " if source else ""
                 raise InputError(f"{where}events[{k}]: {error}") from None
@@ -119,6 +155,8 @@ def changed(solids: tuple[Solid, ...], event: SceneEvent) -> tuple[Solid, ...]:
     InputError
         It names a solid that is not there, or one appears by a name that is taken.
     """
+    if not event.of_scene:
+        return solids
     names = [s.name for s in solids]
     if event.appear is not None:
         if event.appear.name is not None and event.appear.name in names:

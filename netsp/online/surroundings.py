@@ -132,7 +132,7 @@ class Surroundings:
         here = world.vehicle.position
         self._leave_trail(here)
         before = self.mapped
-        told = self._happen(world)
+        told = self._happen(world, planner)
         if self.ranging is not None:
             told = self._steps % EVERY == 0 and self._look(world, planner)
         self._steps += 1
@@ -158,12 +158,16 @@ class Surroundings:
         if np.linalg.norm(here - self.trail[-1]) >= TRAIL:
             self.trail = np.vstack([self.trail, here])
 
-    def _happen(self, world: Simulation) -> bool:
+    def _happen(self, world: Simulation, planner: Planner) -> bool:
         """What is due happens, but for solids that would stand on the tether, on home or in the
         anchor's way, or nearer to the robot than its clearance and a second of its way: these wait
         until there is room."""
         waiting, before = [], self.solids
         for event in self.due:
+            if not event.of_scene and event.time <= world.now:
+                self._tell_of(event, world, planner)
+                self.happened.append((world.now, event))
+                continue
             solids = changed(self.solids, event) if event.time <= world.now else None
             if solids is None or not self._has_room(world, solids):
                 waiting.append(event)
@@ -179,6 +183,30 @@ class Surroundings:
         if self.ranging is None:
             self.mapped = self.solids
         return True
+
+    def _tell_of(self, event: SceneEvent, world: Simulation, planner: Planner) -> None:
+        """What does not change the scene: other waypoints, or a robot that is carried off, as far
+        as there is water and its tether reaches."""
+        if event.add_waypoint is not None:
+            planner.add_waypoint(event.add_waypoint)
+        elif event.cancel_waypoint is not None:
+            planner.cancel_waypoint(event.cancel_waypoint)
+        elif event.push is not None:
+            start = world.vehicle.position
+            most = max(self.mission.tether_length, world.tether.length)
+            line = np.array([start, start + np.array(event.push)])
+            for point in polylines.dense(line, 0.5 * self.mission.delta):
+                if float(world.scene.distance(point)) < 0.0:
+                    break
+                tether = world.tethers.update(world.tether, point)
+                if tether.length > most:
+                    break
+                world.tether = tether
+                world.vehicle.stop_at(point)
+                if world.believed is not None and isinstance(world.model, GeodesicTether):
+                    world.believed = world.model.update(world.believed, point)
+                self._leave_trail(point)
+            planner.carried_off()
 
     def _has_room(self, world: Simulation, solids: tuple[Solid, ...]) -> bool:
         new = [s for s in solids if all(s is not old for old in self.solids)]

@@ -91,12 +91,15 @@ class RepairPlanner(PredictivePlanner):
     _until: float = -np.inf
     _walked: list[Floats] = field(default_factory=list)
     _first: tuple[int, Floats] | None = None
-    _given: list[int] = field(default_factory=list)
+    _added: bool = False
+    _as_given: Mission | None = None
 
     name = "repair"
 
     def __post_init__(self) -> None:
-        self._given = list(range(len(self.mission.waypoints)))
+        """See `Planner`."""
+        super().__post_init__()
+        self._as_given = self.mission
 
     def take_map(
         self, scene: DistanceField, tethers: Tethers, box: Floats, robot: Floats, tether: Tether
@@ -125,6 +128,38 @@ class RepairPlanner(PredictivePlanner):
             return Command(robot[None], HOLD)
         return super().step(robot, tether)
 
+    def add_waypoint(self, waypoint: MissionWaypoint) -> None:
+        """See `Planner`."""
+        super().add_waypoint(waypoint)
+        self._asked_for = self._added = self.mission.tour is not None
+
+    def _without_stop(self, k: int) -> None:
+        """The tour goes from the stop before to the one after, pulled taut in its class."""
+        tour = self.mission.tour
+        if tour is None or k >= len(tour.stops):
+            return
+        stops, path = list(tour.stops), np.array(tour.stops[k].path)
+        if self._first is not None and self._first[0] == k:
+            path = self._first[1]
+        del stops[k]
+        onward = tour.home if k == len(stops) else stops[k].path
+        leg = in_file(self.pulled(np.vstack([path, np.array(onward)])))
+        self._first = (k, np.array(leg)) if k == self.index else self._first
+        home = tour.home
+        if k == len(stops):
+            home = leg
+        else:
+            stops[k] = stops[k].model_copy(update={"path": leg})
+        self.mission = self.mission.model_copy(
+            update={"tour": tour.model_copy(update={"stops": tuple(stops), "home": home})}
+        )
+        self._asked_for = True
+
+    def carried_off(self) -> None:
+        """See `Planner`."""
+        super().carried_off()
+        self._asked_for, self._planned = self.mission.tour is not None, -1
+
     def _next(self) -> None:
         super()._next()
         self._walked = self._walked[-1:]
@@ -135,13 +170,16 @@ class RepairPlanner(PredictivePlanner):
         rest = self._rest(robot, tether)
         if rest is None:
             return
+        if self._added:
+            rest.reason = f"waypoint #{max(self.given)} was added"
         if rest.reason is None:
             self._note(KEPT, "the rest of the tour still holds", rest.length, begin)
             return
         worth = rest.old + self.options.planning_limit * self.mission.speed
-        found = None
-        if not self.homeward and (not rest.whole or rest.length > worth):
-            found = self._planned_anew(robot, tether, rest)
+        found, added = None, self._added
+        self._added = False
+        if not self.homeward and (added or not rest.whole or rest.length > worth):
+            found = self._planned_anew(robot, tether, rest, added)
         if found is not None:
             self._take(found)
             self._note(REPLANNED, rest.reason, found.length, begin)
@@ -210,8 +248,11 @@ class RepairPlanner(PredictivePlanner):
             )
         return there, ""
 
-    def _planned_anew(self, robot: Floats, tether: Tether, rest: _Rest) -> SpacePlan | None:
-        """A tour from here, if one is found that is shorter than what there is."""
+    def _planned_anew(
+        self, robot: Floats, tether: Tether, rest: _Rest, added: bool
+    ) -> SpacePlan | None:
+        """A tour from here, if one is found that goes to more waypoints or is shorter than what
+        there is."""
         self._until = self.now + self.options.planning_limit
         if all(self._is_lost(k) for k in self._left):
             return None
@@ -219,7 +260,8 @@ class RepairPlanner(PredictivePlanner):
             found = self._rest_of_tour(robot, tether)
         except (InputError, LimitReachedError):
             return None
-        return None if rest.whole and rest.length <= found.length else found
+        more = added and len(found.order) > len(rest.kept)
+        return None if rest.whole and rest.length <= found.length and not more else found
 
     def _rest_of_tour(self, robot: Floats, tether: Tether) -> SpacePlan:
         """A tour from here through the waypoints that are left, by the map."""
@@ -283,7 +325,7 @@ class RepairPlanner(PredictivePlanner):
         """Take stops and waypoints for those that are left, whose numbers were `left`. The file of
         the tour has the first of them begin at the stop before."""
         old, n = self.mission.tour, self.index
-        self._given = [*self._given[:n], *(self._given[k] for k in left)]
+        self.given = [*self.given[:n], *(self.given[k] for k in left)]
         assert old is not None
         self._first = (n, np.array(stops[0].path if stops else home))
         walked = in_file(np.vstack([np.array(self._walked), self._first[1]]))
@@ -306,13 +348,14 @@ class RepairPlanner(PredictivePlanner):
 
     def told(self) -> dict[str, Any]:
         """See `Planner`: what was done when the map had changed."""
-        return {"repairs": [asdict(r) for r in self.repairs], "given_as": self._given}
+        return {"repairs": [asdict(r) for r in self.repairs], "given_as": self.given}
 
     @property
     def flown(self) -> Mission:
         """See `Planner`: without a tour that the waypoints do not lie on, as when some were left
         out before it was planned anew."""
-        m = self.mission
+        m = self.mission if self.mission.waypoints else self._as_given
+        assert m is not None
         if m.tour is not None and m.tour.against(m.begin, m.start, m.places, m.reach):
             return m.model_copy(update={"tour": None})
         return m

@@ -13,7 +13,7 @@ import numpy as np
 from netsp.arrays import Floats
 from netsp.errors import interrupted
 from netsp.geometry import polylines
-from netsp.online.mission import Mission
+from netsp.online.mission import Mission, MissionWaypoint
 from netsp.online.paths.beside import beside
 from netsp.online.paths.refine import refined
 from netsp.online.paths.sampled import SampledPaths
@@ -133,6 +133,8 @@ class Planner:
         Metres of tether that are out beyond what the map explains.
     trail : ndarray, shape (n, 3)
         The way that the tether was laid along, where it is known.
+    given : list of int
+        What number each waypoint had when the mission began; those added come after all others.
     """
 
     mission: Mission
@@ -152,6 +154,7 @@ class Planner:
     now: float = 0.0
     caught: float = 0.0
     trail: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    given: list[int] = field(default_factory=list)
     _held: int = 0
 
     name = "none"
@@ -194,6 +197,53 @@ class Planner:
             return payout(tether, self.load)
         return payout_along(tether.nodes, self.load)
 
+    def __post_init__(self) -> None:
+        """Waypoints have their own numbers at first."""
+        self.given = list(range(len(self.mission.waypoints)))
+
+    def add_waypoint(self, waypoint: MissionWaypoint) -> None:
+        """Visit one more, after all others.
+
+        Parameters
+        ----------
+        waypoint : MissionWaypoint
+            The waypoint.
+        """
+        if self.done:
+            return
+        if self.homeward:
+            self.path, self.mode = self.path[:0], NORMAL
+        self.given.append(max(self.given, default=-1) + 1)
+        waypoints = (*self.mission.waypoints, waypoint)
+        self.mission = self.mission.model_copy(update={"waypoints": waypoints})
+
+    def cancel_waypoint(self, number: int) -> int | None:
+        """Do not visit one, if it is still to be visited.
+
+        Parameters
+        ----------
+        number : int
+            That it was given.
+
+        Returns
+        -------
+        int or None
+            What number it had by now; None where the robot has been there already.
+        """
+        k = self.given.index(number) if number in self.given else -1
+        if k < self.index or self.done:
+            return None
+        del self.given[k]
+        waypoints = (*self.mission.waypoints[:k], *self.mission.waypoints[k + 1 :])
+        self.mission = self.mission.model_copy(update={"waypoints": waypoints})
+        if k == self.index:
+            self.path, self.mode = self.path[:0], NORMAL
+        return k
+
+    def carried_off(self) -> None:
+        """The robot is not where it was: what was planned does not begin there."""
+        self.path = self.path[:0]
+
     @property
     def flown(self) -> Mission:
         """The mission as it was flown, for a file."""
@@ -207,7 +257,8 @@ class Planner:
         dict
             Numbers by name.
         """
-        return {}
+        changed = self.given != list(range(len(self.given)))
+        return {"given_as": self.given} if changed else {}
 
     @property
     def waypoint(self) -> Floats:

@@ -15,6 +15,7 @@ import numpy as np
 
 from netsp.arrays import Floats
 from netsp.geometry import polylines
+from netsp.online.mission import MissionWaypoint
 from netsp.online.paths.beside import beside
 from netsp.online.paths.tree import ever_tauter, homotopic, roughly_taut
 from netsp.online.planner.ahead import DEEPEST, MARGIN, Ahead
@@ -152,6 +153,24 @@ class PredictivePlanner(Planner):
         leg = np.array(tour.home) if self.homeward else tour.leg(self.index)
         before = min(self.index, len(tour.stops)) - 1
         return leg, None if before < 0 else tour.stops[before].tether_length
+
+    def add_waypoint(self, waypoint: MissionWaypoint) -> None:
+        """See `Planner`."""
+        super().add_waypoint(waypoint)
+        self._planned = -1
+
+    def cancel_waypoint(self, number: int) -> int | None:
+        """See `Planner`; the legs of a tour are no longer those that lead to the others."""
+        k = super().cancel_waypoint(number)
+        if k is not None:
+            self._planned = -1
+            self._without_stop(k)
+        return k
+
+    def _without_stop(self, k: int) -> None:
+        """Forget the tour, whose legs would lead to other waypoints."""
+        del k
+        self.mission = self.mission.model_copy(update={"tour": None})
 
     @property
     def limit(self) -> float:
