@@ -1,5 +1,7 @@
 """Measures of entanglement against worlds where the answer is seen at a glance."""
 
+import json
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,6 +11,8 @@ from netsp import Circle, Problem
 from netsp.command.main import main
 from netsp.hsignature import concatenate, cyclically_reduced, entangled, invert, reduce
 from netsp.hsignature.measures import measure, self_crossings, winding_numbers
+from netsp.online import Scene
+from netsp.space.measures import measure_path
 
 PILE = Circle(center=(0, 0), radius=1)
 FAR = Circle(center=(10, 0), radius=1)
@@ -172,3 +176,27 @@ def test_a_byte_order_mark_does_not_cost_a_point(tmp_path):
 
     (tmp_path / "a.csv").write_text("\ufeff0,0\n1,1\n", encoding="utf-8")
     assert len(read_path(tmp_path / "a.csv")) == 2
+
+
+def test_a_loop_in_a_scene_winds_about_rings_as_often_as_it_goes_through_them(tmp_path, capsys):
+    rings = [
+        {"torus": {"center": [x, 0, 0], "axis": [0, 0, 1], "major_radius": 1, "minor_radius": 0.1}}
+        for x in (-2.0, 2.0)
+    ]
+    scene, path = tmp_path / "scene.json", tmp_path / "path.json"
+    scene.write_text(json.dumps({"schema_version": 1, "solids": rings}))
+    once = [[-2, 0, 1.5], [-2, 0, -1.5], [0, 0, -1.5], [0, 0, 1.5]]
+    for turns in (0, 1, 2):
+        loop = [*(once * turns), [0, 1, 1.5], [0, 2, 1.5], [-2, 0, 1.5]]
+        loop = [loop[-1], *loop]
+        found = measure_path(Scene.load(scene), loop)
+        assert found.closed
+        assert sorted(map(abs, found.windings)) == [0, turns]
+        assert (found.signature == ()) is (turns == 0)
+        path.write_text(json.dumps(loop))
+        assert main(["verify", str(scene), str(path), "--measures"]) == 0
+        said = capsys.readouterr().out
+        assert ("windings  all zero" in said) is (turns == 0)
+    path.write_text(json.dumps([[-4, 0, 0], [4, 0, 0]]))
+    assert main(["verify", str(scene), str(path), "--measures"]) == 2
+    assert "path: no word at" in capsys.readouterr().err

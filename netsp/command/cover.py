@@ -130,7 +130,13 @@ def _camera(text: str, patch: float) -> Camera:
         values = []
     if not 1 <= len(values) <= len(names):
         raise InputError(f"--camera: expected RANGE[,FIELD[,TILT]], as 2,70,90, got {text!r}")
-    return Camera(**dict(zip(names, values, strict=False)), patch=patch)
+    try:
+        return Camera(**dict(zip(names, values, strict=False)), patch=patch)
+    except InputError as error:
+        # of what was given, or of the patch, which has a flag of its own
+        told = str(error).removeprefix("Camera: ")
+        flag = "--patch" if told.startswith("patch") else "--camera"
+        raise InputError(f"{flag}: {told}") from None
 
 
 def _summary(found: Cover, units: str, output: str | None, plot: str | None) -> str:

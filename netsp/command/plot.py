@@ -56,7 +56,7 @@ def run(args: argparse.Namespace) -> int:
     check_writable(args.output, inputs=(args.problem, args.solution))
     if is_mission(args.problem):
         return _mission(args)
-    if _is_scene(args.problem):
+    if is_scene(args.problem):
         from netsp.command.plot_scene import plot_scene
 
         return plot_scene(args)
@@ -117,7 +117,7 @@ def _mission(args: argparse.Namespace) -> int:
     return 0
 
 
-def _is_scene(path: str) -> bool:
+def is_scene(path: str) -> bool:
     """A file that describes a scene rather than a problem: by its fields."""
     from netsp.files import read_text
     from netsp.models import kind_of, parse_json_object

@@ -163,6 +163,11 @@ def summary(
         )
     else:
         lines.append(f"flown    not: {'interrupted' if found.interrupted else 'the time was up'}")
+    if not tour.exact:
+        lines.append(
+            "words    the scene's group is not completed: other words may be of the same class, "
+            "too; an empty one still is that of a free tether"
+        )
     if found.left_out:
         named = ", ".join(f"#{n}" for n in found.left_out[:MOST_NAMED])
         more = len(found.left_out) - MOST_NAMED

@@ -13,7 +13,9 @@ EXAMPLE = "netsp verify problems/wharf.json solution.json"
 def arguments(p: argparse.ArgumentParser) -> None:
     """Of the command line."""
     p.add_argument(
-        "problem", metavar="PROBLEM", help="problem file, or a mission that was planned (JSON)"
+        "problem",
+        metavar="PROBLEM",
+        help="problem file, or a mission that was planned; for a path, also a scene (JSON)",
     )
     p.add_argument(
         "solution", metavar="SOLUTION", nargs="?", help="solution file (JSON) of the problem"
@@ -33,11 +35,14 @@ def arguments(p: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Judge, print, and return the exit code."""
+    from netsp.command.plot import is_scene
     from netsp.command.solve_mission import is_mission
     from netsp.files import read_text
 
     if is_mission(args.problem):
         return _mission(args)
+    if args.measures and args.solution is not None and is_scene(args.problem):
+        return _path_in_scene(args)
     if args.solution is None:
         read_text(args.problem)  # a file that is not there is told as ever
         raise InputError(f"SOLUTION: {args.problem} is no mission; expected a solution beside it")
@@ -75,6 +80,26 @@ def run(args: argparse.Namespace) -> int:
 
         print(f"\n{describe(problem, margins(problem, solution))}")
     return 0 if verdict else EXIT_NOT_VERIFIED
+
+
+def _path_in_scene(args: argparse.Namespace) -> int:
+    """Measure a path in a scene."""
+    from netsp.command.plot_scene import points_of
+    from netsp.online.scene.scene import Scene
+    from netsp.space.measures import measure_path
+
+    scene = Scene.load(args.problem)
+    m = measure_path(scene, points_of(args.solution))
+    if not args.quiet:
+        kind = "loop" if m.closed else "path, its ends joined to its beginning by shortest ways"
+        print(f"length    {m.length:.6g} {scene.units} ({kind})")
+        print(f"word      {list(m.signature) if m.signature else 'empty: nothing holds it'}")
+        turns = "all zero" if not any(m.windings) else list(m.windings)
+        print(f"windings  {turns}")
+        if not m.exact:
+            print("          other words may be of the same class, too: the group is not completed")
+        print(f"cell      {m.cell:.3g} {scene.units}: narrower gaps may count as closed")
+    return 0
 
 
 def _mission(args: argparse.Namespace) -> int:

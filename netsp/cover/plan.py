@@ -18,6 +18,7 @@ from netsp.fields import Point3, checked_argument
 from netsp.geometry import polylines
 from netsp.online.coverage import Patches, patches_of
 from netsp.online.equipment import Camera
+from netsp.online.limits import check_bounds
 from netsp.online.mission import Mission, MissionWaypoint, Viewpoint
 from netsp.online.paths.tree import Grid, ShortestTree, taut
 from netsp.online.scene.field import DistanceField
@@ -147,6 +148,13 @@ def cover(
         standoff = 0.5 * camera.range if standoff is None else standoff
         farthest = camera.range if farthest is None else min(farthest, camera.range)
         _check(standoff, farthest, clearance, share, incidence, tether_length)
+        check_bounds(
+            Mission(
+                scene="-", anchor=anchor, start=start or anchor, tether_length=ENDLESS,
+                waypoints=(MissionWaypoint(position=anchor),),
+            ),
+            scene,
+        )  # fmt: skip
         field = scene.field()
         base = field.free_point(anchor, "anchor")
         first = base if start is None else field.free_point(start, "start")

@@ -101,7 +101,10 @@ def patches_of(
     c, n, a = np.vstack(centres), np.vstack(normals), np.concatenate(areas)
     bare = field.distance(c + 0.1 * size * n) > 0.0 if len(c) else np.zeros(0, dtype=bool)
     if not a[bare].any():
-        raise InputError("inspect: expected a surface to be seen, and there is none")
+        raise InputError(
+            "scene: there is no surface to be seen (half spaces and sea floors do not count); "
+            "expected solids, a mesh or a cloud, and if `inspect` names some, one with a surface"
+        )
     place = np.cumsum(bare) - 1
     return Patches(c[bare], n[bare], a[bare], place[pairs[bare[pairs].all(axis=1)]])
 
@@ -129,7 +132,10 @@ def divided(triangles: Floats, size: float) -> Floats:
         done.append(triangles[small])
         large = triangles[~small]
         if len(large) > MOST_PATCHES:
-            raise InputError(f"camera.patch: {size:g} makes more than {MOST_PATCHES} patches")
+            raise InputError(
+                f"camera.patch: {size:g} makes more than {MOST_PATCHES} patches; expected larger "
+                "ones"
+            )
         k = sides[~small].argmax(axis=1)
         row = np.arange(len(large))
         a, b, c = large[row, k], large[row, (k + 1) % 3], large[row, (k + 2) % 3]
