@@ -36,8 +36,9 @@ from netsp.travel.result import Result
 PLAIN, CLASSES = 0.4, 0.5
 """Of the time left: for the first bound, and for the classes of the second."""
 
-MOST_WORDS, MOST_ENTRIES = 100, 40_000_000
-"""Words of a cell that are sought, and of all cells together: an entry takes 11 bytes."""
+MOST_WORDS, LEAST_WORDS, MOST_ENTRIES, A_SECOND = 100, 4, 15_000_000, 500_000
+"""Words of a cell that are sought, at most and at least; and of all cells together, at most (11
+bytes each), and in a second."""
 
 MOST_VERTICES = 3000
 """Classes of all waypoints together: of more there is the first bound only."""
@@ -96,8 +97,9 @@ def _classes(ways: Ways, some: list[int], clock: Clock) -> list[_Class] | None:
     """All classes in which the tether reaches places; None if it cannot be told."""
     water, places = ways.water, ways.places
     words, limit = water.words, water.mission.tether_length
-    most = min(MOST_WORDS, MOST_ENTRIES // words.cells.flags.size)
-    if not words.exact or most < 2:
+    entries = min(MOST_ENTRIES, A_SECOND * clock.left)
+    most = min(MOST_WORDS, int(entries / words.cells.flags.size))
+    if not words.exact or most < LEAST_WORDS:
         return None
     root = int(np.ravel_multi_index(tuple(words.root), words.cells.flags.shape))
     found = water.search(False, root, most, limit)
