@@ -11,18 +11,18 @@ EXAMPLE = "netsp order missions/basin.json -o better.json"
 
 
 def arguments(p: argparse.ArgumentParser) -> None:
-    """Of the command line: those of `netsp solve`."""
-    solve.arguments(p)
+    """Of the command line: those of `netsp solve` that missions take."""
+    solve.for_all(p)
 
 
 def run(args: argparse.Namespace) -> int:
     """Plan, write the mission, and return the exit code."""
-    from netsp.command.solve_mission import is_mission
+    from netsp.command import solve_mission
     from netsp.files import read_text
 
-    if not is_mission(args.problem):
+    if not solve_mission.is_mission(args.problem):
         read_text(args.problem)
         raise InputError(
             f"{args.problem}: is no mission; expected one, or netsp solve for problems"
         )
-    return solve.run(args)
+    return solve.run_mission(args)

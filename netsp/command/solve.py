@@ -28,6 +28,12 @@ EXAMPLE = "netsp solve problems/wharf.json -o solution.json --plot wharf.png"
 
 def arguments(p: argparse.ArgumentParser) -> None:
     """Of the command line."""
+    for_all(p)
+    _for_problems(p.add_argument_group("for problems only"))
+
+
+def for_all(p: argparse.ArgumentParser) -> None:
+    """What problems and missions take."""
     p.add_argument(
         "problem", metavar="PROBLEM",
         help="problem file or mission file (JSON); a mission is written with its tour",
@@ -51,6 +57,32 @@ def arguments(p: argparse.ArgumentParser) -> None:
         help="an option of the solver, as docs/solvers.md lists them; may be repeated",
     )
     p.add_argument(
+        "--mip-backend", metavar="NAME", help="highs (default) or cbc, for the solvers built on mip"
+    )
+    p.add_argument(
+        "--time-limit",
+        type=seconds,
+        metavar="S",
+        help="seconds for roadmap, legs and solver together; default no limit, for missions 60",
+    )
+    p.add_argument(
+        "--iteration-limit",
+        type=positive,
+        metavar="N",
+        help="iterations of the solver; default no limit",
+    )
+    p.add_argument("--seed", type=natural, default=0, metavar="N", help="random seed; default 0")
+    p.add_argument(
+        "-o", "--output", metavar="FILE",
+        help="write the solution (the planned mission) to this file (default: stdout)",
+    )  # fmt: skip
+    p.add_argument("--plot", metavar="FILE", help="draw the solution (png, svg or pdf)")
+    p.add_argument("--quiet", action="store_true", help="no progress, no summary")
+
+
+def _for_problems(p: argparse._ArgumentGroup) -> None:
+    """What says nothing of missions."""
+    p.add_argument(
         "--roadmap",
         default="taut",
         metavar="NAME",
@@ -70,22 +102,6 @@ def arguments(p: argparse.ArgumentParser) -> None:
         metavar="N",
         help="taut: upper limit on the classes of all goals together",
     )
-    p.add_argument(
-        "--mip-backend", metavar="NAME", help="highs (default) or cbc, for the solvers built on mip"
-    )
-    p.add_argument(
-        "--time-limit",
-        type=seconds,
-        metavar="S",
-        help="seconds for roadmap, legs and solver together; default no limit, for missions 60",
-    )
-    p.add_argument(
-        "--iteration-limit",
-        type=positive,
-        metavar="N",
-        help="iterations of the solver; default no limit",
-    )
-    p.add_argument("--seed", type=natural, default=0, metavar="N", help="random seed; default 0")
     p.add_argument(
         "--keep-order", action="store_true",
         help="visit the goals in the order of the file; only their homotopy classes are chosen",
@@ -110,16 +126,21 @@ def arguments(p: argparse.ArgumentParser) -> None:
         help="start from this solution's tour, also one of an older version of the problem",
     )  # fmt: skip
     p.add_argument(
-        "-o", "--output", metavar="FILE",
-        help="write the solution (the planned mission) to this file (default: stdout)",
-    )  # fmt: skip
-    p.add_argument("--plot", metavar="FILE", help="draw the solution (png, svg or pdf)")
-    p.add_argument(
         "--plot-trace",
         metavar="FILE",
         help="plot length, bound and entanglement against iterations (png, svg or pdf)",
     )
-    p.add_argument("--quiet", action="store_true", help="no progress, no summary")
+
+
+def run_mission(args: argparse.Namespace) -> int:
+    """The same of a mission."""
+    from netsp.command import solve_mission
+
+    return solve_mission.solve(
+        args.problem, solver=args.solver, params=_params(args), time_limit=args.time_limit,
+        iteration_limit=args.iteration_limit, seed=args.seed, output=args.output, plot=args.plot,
+        quiet=args.quiet,
+    )  # fmt: skip
 
 
 def run(args: argparse.Namespace) -> int:
@@ -128,11 +149,7 @@ def run(args: argparse.Namespace) -> int:
 
     if solve_mission.is_mission(args.problem):
         solve_mission.check_flags(args, _defaults())
-        return solve_mission.solve(
-            args.problem, solver=args.solver, params=_params(args), time_limit=args.time_limit,
-            iteration_limit=args.iteration_limit, seed=args.seed, output=args.output,
-            plot=args.plot, quiet=args.quiet,
-        )  # fmt: skip
+        return run_mission(args)
     from netsp.command.progress import ProgressTable, summary
     from netsp.files import write_text
     from netsp.problem import Problem

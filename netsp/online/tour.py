@@ -29,12 +29,18 @@ class PlannedStop(Model):
         Of the taut tether there, metres.
     longest_tether : float
         Of the taut tether on the way there, metres.
+    given_as : int or None
+        Number of the waypoint in the mission that was planned.
     """
 
     path: Annotated[PathField, Field(description="from the stop before to the waypoint, m")]
     signature: Annotated[tuple[int, ...], Field(description="word of the tether there")] = ()
     tether_length: Annotated[NonNegative, Field(description="of the taut tether there, m")]
     longest_tether: Annotated[NonNegative, Field(description="of tether on the way there, m")]
+    given_as: Annotated[
+        Annotated[int, Field(ge=0)] | None,
+        Field(description="number of the waypoint in the mission that was planned"),
+    ] = None
 
 
 class PlannedTour(Model):

@@ -187,15 +187,16 @@ def _waypoints(mission: Mission, summary: dict[str, Any]) -> str:
     flown = {int(s["waypoint"]): s for s in summary.get("stops", ())}
     words = {int(s["waypoint"]): s for s in (summary.get("words") or {}).get("stops", ())}
     reasons = {int(w["waypoint"]): w["reason"] for w in summary.get("left_out", ())}
-    head = ["#", "position (m)", "heading (°)", "stay (s)", "leg (m)", "tether planned (m)",
-            "most on the way (m)"]  # fmt: skip
+    head = ["#", "given as", "position (m)", "heading (°)", "stay (s)", "leg (m)",
+            "tether planned (m)", "most on the way (m)"]  # fmt: skip
     head += ["tether flown (m)", "as planned"] if summary else []
     head.append("word")
     rows = []
     for k, w in enumerate(mission.waypoints):
         stop = tour.stops[k] if tour is not None and k < len(tour.stops) else None
         row = [
-            str(k), ", ".join(f"{v:.4g}" for v in w.position),
+            str(k), "–" if stop is None or stop.given_as is None else f"#{stop.given_as}",
+            ", ".join(f"{v:.4g}" for v in w.position),
             "–" if w.heading is None else f"{w.heading:g}", f"{w.dwell:g}",
             "–" if stop is None else f"{polylines.length(np.array(stop.path)):.4g}",
             "–" if stop is None else f"{stop.tether_length:.4g}",
@@ -214,7 +215,7 @@ def _waypoints(mission: Mission, summary: dict[str, Any]) -> str:
         '<p class="note">A word tells the class of the tether in the letters of this mission; '
         "[] is the class of the shortest way from the anchor.</p>"
     )
-    return briefing.table(head, rows, (1, last)) + note
+    return briefing.table(head, rows, (2, last)) + note
 
 
 def _repairs(summary: dict[str, Any]) -> str:

@@ -136,7 +136,7 @@ class SpacePlan:
             stops=tuple(
                 PlannedStop(
                     path=in_file(stop.path), signature=stop.word,
-                    tether_length=stop.tether, longest_tether=stop.most,
+                    tether_length=stop.tether, longest_tether=stop.most, given_as=stop.waypoint,
                 )
                 for stop in self.stops
             ),

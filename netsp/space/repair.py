@@ -325,8 +325,16 @@ class RepairPlanner(PredictivePlanner):
         """Take stops and waypoints for those that are left, whose numbers were `left`. The file of
         the tour has the first of them begin at the stop before."""
         old, n = self.mission.tour, self.index
+        file = self._as_given
+        assert file is not None
+        assert file.tour is not None
+        numbers = dict(enumerate(stop.given_as for stop in file.tour.stops))
         self.given = [*self.given[:n], *(self.given[k] for k in left)]
         assert old is not None
+        stops = tuple(
+            stop.model_copy(update={"given_as": numbers.get(self.given[n + k])})
+            for k, stop in enumerate(stops)
+        )
         self._first = (n, np.array(stops[0].path if stops else home))
         walked = in_file(np.vstack([np.array(self._walked), self._first[1]]))
         if stops:

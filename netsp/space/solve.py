@@ -334,6 +334,7 @@ def tour_of_flight(
             PlannedStop(
                 path=in_file(legs[k]), signature=word, tether_length=stop["tether"],
                 longest_tether=max(r.tether for r in parts[k]),
+                given_as=order[visited[k]],
             )
         )  # fmt: skip
     length = along(path)
