@@ -291,6 +291,29 @@ def test_a_robot_is_carried_no_farther_than_there_is_water_and_tether(planned):
     assert planned[2].distance([[r.x, r.y, r.z] for r in run.log]).min() > -0.05
 
 
+@pytest.mark.parametrize("planner", ["repair", "predictive"])
+@pytest.mark.parametrize("vehicle", ["kinematic", "bluerov2"])
+def test_a_tether_that_becomes_shorter_is_kept_to(planned, planner, vehicle):
+    mission, scene, field = planned
+    far = int(np.argmax([s.longest_tether for s in mission.tour.stops]))
+    longest, out = mission.tour.stops[far].longest_tether, mission.tour.stops[far].tether_length
+    before = sum(polylines.length(np.array(s.path)) for s in mission.tour.stops[: far + 1])
+    assert out > 5.0
+    run = simulate(
+        mission, planner, vehicle=vehicle, scene=scene, field=field,
+        surprises=events({"time": before / mission.speed - 1.0, "tether_length": 5.0}),
+        options=PlannerOptions(planning_limit=5.0),
+    )  # fmt: skip
+    s = run.summary
+    assert 5.0 < s["shortening_s"] <= (longest - 5.0) / mission.speed + 10.0
+    assert s["exceedance_s"] == 0.0
+    assert s["home"]["tether_free"]
+    after = [r for r in run.log if r.limit == 5.0 and not r.shortening]
+    assert max(r.payout for r in after) <= 5.0 * (1 + 1e-9)
+    for k in (w["waypoint"] for w in s["left_out"]):
+        assert np.linalg.norm(np.subtract(run.mission.waypoints[k].position, mission.anchor)) > 4.5
+
+
 def test_a_waypoint_that_is_not_there_cannot_be_cancelled(planned, tmp_path, capsys):
     mission, scene, _ = planned
     (tmp_path / "scene.json").write_text(scene.model_dump_json(exclude_none=True))

@@ -49,6 +49,10 @@ class LogRow:
         The same as if nothing stood in between.
     replan_s : float
         Seconds of CPU that planning took.
+    limit : float
+        Metres that must not be exceeded.
+    shortening : bool
+        Whether the limit was lowered below the tether, which has not been short enough since.
     """
 
     time: float
@@ -64,6 +68,8 @@ class LogRow:
     coverage: float
     coverage_through: float
     replan_s: float
+    limit: float
+    shortening: bool
 
 
 @dataclass(frozen=True, repr=False)
@@ -168,7 +174,8 @@ def describe_run(run: Run, units: str) -> str:
         f"time     {s['inspection_s']:.1f} s{_way_home(s['home'])}",
         f"home     {_home(s['home'], units)}",
         f"tether   longest {s['longest_tether']:.3f} of {s['tether_length']:g} {units}, "
-        f"over the limit for {s['exceedance_s']:.1f} s",
+        f"over the limit for {s['exceedance_s']:.1f} s"
+        + (f", shortened for {s['shortening_s']:.1f} s to a new one" if s["shortening_s"] else ""),
         f"planning {s['replans']} times, median {1e3 * s['replan_median_s']:.1f} ms, worst "
         f"{1e3 * s['replan_worst_s']:.0f} ms",
     ]

@@ -71,6 +71,8 @@ class Simulation:
         Row of the log and tether now and then, where the scene changes; else empty.
     contacts : int
         How often the robot has met a solid.
+    shortening : bool
+        Whether the limit was lowered below the tether, which is being shortened.
     log : list of LogRow
         One row per step.
     """
@@ -89,6 +91,7 @@ class Simulation:
     track: Track | None = None
     now: float = 0.0
     contacts: int = 0
+    shortening: bool = False
     tethers_seen: list[tuple[int, Tether]] = field(default_factory=list)
     log: list[LogRow] = field(default_factory=list)
     _was: Floats | None = None
@@ -135,12 +138,14 @@ class Simulation:
         seen = self.coverage
         if seen is not None and len(self.log) % FRAME == 0 and command.mode != HOME:
             seen.look(self.vehicle.position, self.vehicle.yaw)
+        limit, out = self.mission.tether_length, payout(self.tether, self.load)
+        self.shortening = self.shortening and out > limit
         row = LogRow(
             round(self.now, 6), x, y, z, self.vehicle.yaw, planner.index, command.mode,
-            self.tether.length, payout(self.tether, self.load),
+            self.tether.length, out,
             turning(self.tether, self.tethers.delta),
             seen.share if seen else 0.0, seen.share_through if seen else 0.0,
-            command.replan_s,
+            command.replan_s, limit, self.shortening,
         )  # fmt: skip
         if self.tethers_seen and len(self.log) % SEEN == 0:
             self.tethers_seen.append((len(self.log), self.tether))

@@ -22,7 +22,8 @@ def summarise(
     """The numbers of a run, as the papers give them.
 
     `exceedance_s` is the time in which more tether must be out than there is: the taut length and
-    what slack and sag add to it (`longest_payout`). `waited_s` is the
+    what slack and sag add to it (`longest_payout`); after the limit itself was lowered below that,
+    the time until it fits is `shortening_s`. `waited_s` is the
     time in which the robot waited for a moving anchor. `stops` tells of each waypoint visited, with
     the sum of turning angles and the factor e^(mu theta) that friction multiplies the tension by.
     `contacts` counts how often the robot met a solid.
@@ -78,7 +79,8 @@ def summarise(
         "tether_length": mission.tether_length,
         "longest_tether": float(lengths.max(initial=0.0)),
         "longest_payout": float(payouts.max(initial=0.0)),
-        "exceedance_s": float((payouts > mission.tether_length * (1 + 1e-9)).sum() * STEP),
+        "exceedance_s": STEP * sum(_over(r) and not r.shortening for r in log),
+        "shortening_s": STEP * sum(r.shortening for r in log),
         "friction": _friction(mission, turnings),
         "visited": len(planner.reached),
         "waypoints": len(mission.waypoints),
@@ -97,6 +99,10 @@ def summarise(
         "control_worst_s": max(control, default=0.0),
         "wall_s": wall,
     }
+
+
+def _over(row: LogRow) -> bool:
+    return row.payout > row.limit * (1 + 1e-9)
 
 
 def _home(planner: Planner, world: Simulation, since: float) -> dict[str, Any]:

@@ -7,13 +7,15 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 from pydantic import ConfigDict, Field, model_validator
 
 from netsp.errors import InputError
-from netsp.fields import Name, NonNegative, Point3
+from netsp.fields import Name, NonNegative, Point3, Positive
 from netsp.files import FileModel
 from netsp.models import Model
 from netsp.online.mission import WaypointLike
 from netsp.online.scene.scene import Scene, Solid
 
-KINDS = ("appear", "vanish", "move", "add_waypoint", "cancel_waypoint", "push")
+KINDS = (
+    "appear", "vanish", "move", "add_waypoint", "cancel_waypoint", "push", "tether_length",
+)  # fmt: skip
 """What may happen."""
 
 
@@ -44,6 +46,8 @@ class SceneEvent(Model):
         added come after all others.
     push : (x, y, z) or None
         How far the robot is carried off, metres.
+    tether_length : float or None
+        What the tether may be from now on, metres.
     """
 
     time: Annotated[NonNegative, Field(description="seconds after the start")]
@@ -59,6 +63,9 @@ class SceneEvent(Model):
     ] = None
     push: Annotated[
         Point3 | None, Field(description="(x, y, z) by which the robot is carried off, m")
+    ] = None
+    tether_length: Annotated[
+        Positive | None, Field(description="maximum length of the taut tether from now on, m")
     ] = None
 
     @property

@@ -191,6 +191,12 @@ class Surroundings:
             planner.add_waypoint(event.add_waypoint)
         elif event.cancel_waypoint is not None:
             planner.cancel_waypoint(event.cancel_waypoint)
+        elif event.tether_length is not None:
+            limit = event.tether_length
+            world.shortening = payout(world.tether, world.load) > limit
+            self.mission = self.mission.model_copy(update={"tether_length": limit})
+            world.mission = world.mission.model_copy(update={"tether_length": limit})
+            planner.take_limit(limit)
         elif event.push is not None:
             start = world.vehicle.position
             most = max(self.mission.tether_length, world.tether.length)

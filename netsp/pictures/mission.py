@@ -104,9 +104,13 @@ def draw_tether(runs: Sequence[Run], *, ax: Any = None, units: str = "m") -> Any
                 transform=ax.get_xaxis_transform(), label="tether recovery",
             )  # fmt: skip
         ax.plot(t, [r.payout for r in run.log], color=colour, lw=1.3, label=run.planner)
-    ax.axhline(runs[0].mission.tether_length, color=style.LIMIT, lw=1.0, ls="--", label="limit")
+    longest = max(runs, key=lambda run: len(run.log))
+    ax.plot(
+        [r.time for r in longest.log], [r.limit for r in longest.log], color=style.LIMIT, lw=1.0,
+        ls="--", label="limit",
+    )  # fmt: skip
     what = "payout" if any(r.payout > r.tether for run in runs for r in run.log) else "taut tether"
-    most = max(runs[0].mission.tether_length, *(r.payout for run in runs for r in run.log))
+    most = max(max(r.payout, r.limit) for run in runs for r in run.log)
     ax.set(xlabel="time (s)", ylabel=f"{what} ({units})", ylim=(0, 1.06 * most))
     ax.legend(loc="best", fontsize=8)
     return ax

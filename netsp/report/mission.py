@@ -102,7 +102,7 @@ def page(mission: Mission, scene: Scene, run: Path | None) -> str:
     if rows:
         lengths = np.array([float(r["payout"]) for r in rows])
         times = np.array([float(r["time"]) for r in rows])
-        limit = np.full(len(rows), mission.tether_length)
+        limit = np.array([float(r.get("limit", mission.tether_length)) for r in rows])
         parts += ["<h2>Tether over time</h2>", log.over_time(times, lengths, limit, scene.units)]
         parts += ["<h2>What happened</h2>", _repairs(summary)]
     return (

@@ -112,7 +112,7 @@ class RepairPlanner(PredictivePlanner):
         """See `Planner`; holds its place until a plan is due, however soon it was ready, so that
         the same seed gives the same flight."""
         self._walked.append(np.array(robot))
-        if self._asked_for and not self.done:
+        if self._asked_for and not self.done and self._shortened(tether) is None:
             self._asked_for = False
             begin = time.process_time()
             try:
@@ -154,6 +154,11 @@ class RepairPlanner(PredictivePlanner):
             update={"tour": tour.model_copy(update={"stops": tuple(stops), "home": home})}
         )
         self._asked_for = True
+
+    def take_limit(self, limit: float) -> None:
+        """See `Planner`."""
+        super().take_limit(limit)
+        self._asked_for = self.mission.tour is not None
 
     def carried_off(self) -> None:
         """See `Planner`."""

@@ -240,6 +240,16 @@ class Planner:
             self.path, self.mode = self.path[:0], NORMAL
         return k
 
+    def take_limit(self, limit: float) -> None:
+        """Keep to another length of tether from now on.
+
+        Parameters
+        ----------
+        limit : float
+            Metres.
+        """
+        self.mission = self.mission.model_copy(update={"tether_length": limit})
+
     def carried_off(self) -> None:
         """The robot is not where it was: what was planned does not begin there."""
         self.path = self.path[:0]

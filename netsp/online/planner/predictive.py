@@ -102,6 +102,13 @@ class PredictivePlanner(Planner):
             and not self._overtaken(robot, tether)
         ):
             return False
+        back = None if self.anchor_moves else self._shortened(tether)
+        if back is not None:
+            gone = np.linalg.norm(self.path[-1:] - robot) <= self.mission.reach
+            if not len(self.path) or gone:
+                self.path, self.mode = back[1:], RECOVERY
+                return True
+            return False
         first = self._planned != self.index
         self._planned, self._checked = self.index, self.now
         limit = self.limit
@@ -166,6 +173,20 @@ class PredictivePlanner(Planner):
             self._planned = -1
             self._without_stop(k)
         return k
+
+    def take_limit(self, limit: float) -> None:
+        """See `Planner`; where more is out, the robot first goes back along its tether."""
+        shorter = limit < self.mission.tether_length
+        super().take_limit(limit)
+        if shorter:
+            self.path, self._planned = self.path[:0], -1
+
+    def _shortened(self, tether: Tether) -> Floats | None:
+        """The way back along a tether that is too long, as far as need be; None for others."""
+        over = self.payout(tether) - self.limit
+        if over <= 0.0 or self.payout(tether) <= self.mission.tether_length:
+            return None
+        return polylines.part(self.back_along(tether), 0.0, over + self.mission.reach)
 
     def _without_stop(self, k: int) -> None:
         """Forget the tour, whose legs would lead to other waypoints."""
