@@ -249,7 +249,8 @@ def test_a_moved_solid_is_the_same_one_elsewhere(kind, by):
         ),
         (
             {"time": 0},
-            "expected one of appear, vanish, move, add_waypoint, cancel_waypoint, push, tether_length, got none",
+            "expected one of appear, vanish, move, add_waypoint, cancel_waypoint, push, "
+            "tether_length, got none",
         ),
         ({"time": -1, "vanish": "a"}, "time: expected a number >= 0"),
         ({"time": 0, "appear": {"post": {"center": [1, 1], "radius": -1}}}, "radius: expected"),
