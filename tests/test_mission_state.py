@@ -8,7 +8,7 @@ import pytest
 
 from netsp.command.main import main
 from netsp.cover import cover
-from netsp.errors import InputError
+from netsp.errors import InputError, LimitReachedError
 from netsp.geometry import polylines
 from netsp.online import Scene
 from netsp.online.equipment import Camera
@@ -22,7 +22,7 @@ from netsp.space.judge import verify_mission
 from netsp.space.plan import plan
 from netsp.space.repair import RepairPlanner
 from netsp.space.solve import solve_mission
-from netsp.space.water import Water
+from netsp.space.water import Water, has_room
 from tests.test_tour import written
 
 
@@ -399,6 +399,13 @@ def test_a_robot_is_not_sent_through_gaps_that_only_its_tether_fits_through(tmp_
     verdict = verify_mission(found.mission)
     assert verdict, str(verdict)
     assert len(found.tour.stops) == 2
+    # nor does any tour of states, whether one is found or not
+    field = mission.load_scene().field()
+    try:
+        stops = plan(mission, time_limit=20.0).stops
+    except (InputError, LimitReachedError):
+        return
+    assert all(has_room(field, stop.path, mission) for stop in stops)
 
 
 @pytest.mark.parametrize(
