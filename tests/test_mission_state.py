@@ -399,7 +399,16 @@ def test_a_robot_is_not_sent_through_gaps_that_only_its_tether_fits_through(tmp_
     verdict = verify_mission(found.mission)
     assert verdict, str(verdict)
     assert len(found.tour.stops) == 2
-    # nor does any tour of states, whether one is found or not
+
+
+@pytest.mark.parametrize("radius", [0.005, 0.06])
+def test_no_tour_of_states_leads_where_the_robot_has_no_room(radius, tmp_path):
+    """Whether one is found or not; a tether slips through bars as thin as the first."""
+    bars = [
+        {"capsule": {"a": [2, -3, z / 5], "b": [2, 3, z / 5], "radius": radius}}
+        for z in range(-15, 16)
+    ]
+    mission = small(tmp_path, [[4, 0, 0.1], [3, 2, 0]], bars)
     field = mission.load_scene().field()
     try:
         stops = plan(mission, time_limit=20.0).stops
