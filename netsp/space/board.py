@@ -102,17 +102,27 @@ class Board:
     _forbidden: set[tuple[int, int]] = field(default_factory=set)
     _cut: set[tuple[int, int]] = field(default_factory=set)
 
-    def take(self, legs: Legs) -> None:
-        """Legs as they are now, and ways from the start to all states.
+    def take(self, legs: Legs, clock: Clock) -> bool:
+        """Legs as they are now, and ways from the start to new states.
 
         Parameters
         ----------
         legs : Legs
             Those driven so far.
+        clock : Clock
+            When it is up, states that are left are reached by legs only.
+
+        Returns
+        -------
+        bool
+            Whether there was time for all of them.
         """
-        for s in self.states.all[len(self._out) :]:
-            line = np.vstack([self.water.laid.nodes[::-1], s.tether.nodes[1:]])
-            self._out.append(self._with_room(self.water.taut(line)))
+        whole = True
+        for v in range(len(self._out), len(self.states.all)):
+            # one way to each waypoint there must be
+            whole = whole and not clock.up
+            first = self.states.of[self.states.all[v].point][0] == v
+            self._out.append(self._own_way(v) if whole or first else None)
         if self.states.begin is not None and self._out[self.states.begin] is None:
             # the robot is there, and may go back along its tether whatever the clearance
             self._out[self.states.begin] = np.vstack(
@@ -127,6 +137,13 @@ class Board:
             if along(path) < self._home[v] + self._home[w]
             or self._via.get(v) == w or self._via.get(w) == v
         }  # fmt: skip
+        return whole
+
+    def _own_way(self, v: int) -> Floats | None:
+        """From the start along a state's own tether, pulled taut in its class."""
+        tether = self.states.all[v].tether
+        line = np.vstack([self.water.laid.nodes[::-1], tether.nodes[1:]])
+        return self._with_room(self.water.taut(line))
 
     def _with_room(self, path: Floats) -> Floats | None:
         """A path that has room; None for others: a tether goes through gaps that a robot does

@@ -51,9 +51,10 @@ ROUNDING = 1e-9
 MOST_AGAIN = 20
 """Times that a graph is solved again because legs were at fault."""
 
-STARTING, SEARCHING, GROWING, SOLVING = 0.3, 0.3, 0.5, 0.5
-"""Of the time left, what first states may take, then the search for ways, then states and legs, and
-the solver each time; the rest is for driving, and for solving again."""
+STARTING, SEARCHING, GROWING, WAYS_OUT, SOLVING = 0.3, 0.3, 0.5, 0.3, 0.5
+"""Of the time left, what first states may take, then the search for ways, then states and legs,
+their ways by the anchor, and the solver each time; the rest is for driving, and for solving
+again."""
 
 LEAST_GROWING, LEAST_SOLVING = 1.0, 0.5
 """Seconds that legs and the solver get even if the time is up: there would be no tour, or one by
@@ -249,19 +250,20 @@ def _planned(
     ways.prepare_all(clock.part(SEARCHING), tell)
     growth = Growth(states, ways)
     board = Board(water, states)
-    board.take(growth.legs)
+    board.take(growth.legs, clock.part(WAYS_OUT))
     if lacking := set(range(len(mission.waypoints))) - board.reached:
         tell("ways with room for the robot")
         states_with_room(states, lacking, effort.words)
-        board.take(growth.legs)
+        board.take(growth.legs, clock.part(WAYS_OUT))
     best: tuple[Result, Driven] | None = None
     complete = False
     for most in effort.states:
         begin = clock.elapsed
         enough = board.legs or GROWING * clock.left >= LEAST_GROWING
         growing = clock.part(GROWING) if enough else Clock(LEAST_GROWING)
-        complete = growth.go_on(most, growing, tell) or complete
-        board.take(growth.legs)
+        grown = growth.go_on(most, growing, tell)
+        tell("ways by the anchor")
+        complete = (board.take(growth.legs, clock.part(WAYS_OUT)) and grown) or complete
         found = _best_driven(board, clock, tell, None if best is None else best[1].tour, how)
         if found is not None and (best is None or found[1].length <= best[1].length):
             best = found
