@@ -38,6 +38,9 @@ PLANNING, BOUNDING, ORDERING = 0.7, 0.3, 0.3
 """Of the time left, what the tour of states and legs may take, then the bound, then the order by
 going straight on; the rest is for flights."""
 
+HURRY = 0.5
+"""Of the time limit: when less than that is left, flights that cannot be the best are cut short."""
+
 WORTH = 0.005
 """Share of its time that a flight must save to be taken instead of a tour of which more is known;
 what is saved by stopping within reach of the start is less."""
@@ -103,14 +106,20 @@ class _Flights:
             return self.planned.water
         return Water.of(self.mission, self.scene, self.field)
 
-    def of(self, mission: Mission, name: str) -> Run | None:
-        """A flight to its end; None if the time was up before."""
+    def of(self, mission: Mission, name: str, best: SolvedMission | None = None) -> Run | None:
+        """A flight to its end; None if the time was up before, or, where not much of it is left,
+        if the flight has taken longer than the best already: way home and all, it would be far from
+        it, and to plan the way home of a tether that is wound up takes longest."""
         if self.clock.up:
             return None
         self.tell(f"flying {name}")
 
-        def watch(*_: object) -> None:
-            if self.clock.up:
+        worth = np.inf if best is None or best.run is None else seconds_until_home(best.run)
+        limit = self.clock.limit or np.inf
+
+        def watch(row: LogRow, _: object) -> None:
+            hopeless = row.time > worth and self.clock.left < HURRY * limit
+            if self.clock.up or hopeless:
                 raise KeyboardInterrupt  # it ends a flight
 
         if all(w.heading is None for w in mission.waypoints):
@@ -119,7 +128,7 @@ class _Flights:
         run = simulate(
             mission,
             scene=self.scene, field=self.field, on_step=watch,
-            options=PlannerOptions(prepared=False),
+            options=PlannerOptions(prepared=False, clock=self.clock),
         )  # fmt: skip
         return None if run.summary["status"] == "interrupted" else run
 
@@ -194,7 +203,7 @@ def solve_mission(
             bound = bound_of_all(planned.ways, reached, clock.part(BOUNDING), seed)
             best = _of_plan(planned, name, seed, bound)
             best = replace(best, run=flights.of(best.mission, "the tour"))
-        given = flights.of(mission, "the order as given")
+        given = flights.of(mission, "the order as given", best)
         best = _or_as_given(best, given, flights, bound, seed)
         best = _or_going_on(best, flights, bound, seed)
         if best is None:
@@ -225,7 +234,7 @@ def _or_going_on(
     for direction, tour in (("forward", found), ("in reverse", found[::-1])):
         order = (*tour, *rest)
         there = mission.model_copy(update={"waypoints": tuple(mission.waypoints[n] for n in order)})
-        run = flights.of(there, f"that order {direction}")
+        run = flights.of(there, f"that order {direction}", best)
         if run is None:
             break
         if best is not None and not _better_than(run, best):

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from netsp.arrays import Floats
+from netsp.clock import Clock
 from netsp.errors import interrupted
 from netsp.geometry import polylines
 from netsp.online.mission import Mission, MissionWaypoint
@@ -82,6 +83,8 @@ class PlannerOptions:
     prepared : bool
         Whether shortest paths to all waypoints are found before the mission, which takes seconds
         where there are many; else when they are asked for.
+    clock : Clock, optional
+        When it is up, planning ends as at Ctrl-C, and so does the mission.
     """
 
     paths: str = "tree"
@@ -91,6 +94,7 @@ class PlannerOptions:
     metres: float = 15.0
     planning_limit: float = 10.0
     prepared: bool = True
+    clock: Clock | None = None
 
 
 @dataclass

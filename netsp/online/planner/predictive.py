@@ -387,6 +387,13 @@ class PredictivePlanner(Planner):
             limit += self.track.travelled(self.now, self.now + way)
         return self._longer_than(candidate.tether, limit / (1.0 + self.mission.tether.slack))
 
+    def _in_time(self, paths: Iterator[Floats]) -> Iterator[Floats]:
+        """The same, as long as there is time."""
+        for path in paths:
+            if self.options.clock is not None and self.options.clock.up:
+                raise KeyboardInterrupt
+            yield path
+
     @property
     def _looked_enough(self) -> bool:
         """Whether the best path so far is to be taken. Looks and their metres are counted and not
@@ -400,7 +407,7 @@ class PredictivePlanner(Planner):
         the less of a retreat is saved, the sooner it does. None where none is shorter than
         `least`."""
         best = None
-        paths = [p for p in self._ever_tauter(line) if polylines.length(p) < least]
+        paths = [p for p in self._in_time(self._ever_tauter(line)) if polylines.length(p) < least]
         while paths and not (self._looked_enough and (best is not None or least < np.inf)):
             middle = len(paths) // 2
             if self._fits(tether, paths[middle], limit):
