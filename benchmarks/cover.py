@@ -77,7 +77,7 @@ def main() -> None:
             mission, scene = external()
             visible = covered(
                 "external pipe, ours", mission, scene, camera=Camera(range=2.0), standoff=1.0,
-                tether_length=mission.tether_length, clearance=mission.clearance, share=0.95,
+                tether_length=mission.tether_length, clearance=mission.clearance,
             )  # fmt: skip
             cells = ["", f"{100 * visible:.1f}", str(len(mission.waypoints)), "", "", ""]
             flown("external pipe, FC-Planner's waypoints", mission, scene, visible, cells)

@@ -36,12 +36,16 @@ from netsp.travel.result import Result
 PLAIN, CLASSES = 0.4, 0.5
 """Of the time left: for the first bound, and for the classes of the second."""
 
-MOST_WORDS, LEAST_WORDS, MOST_ENTRIES, A_SECOND = 100, 4, 15_000_000, 500_000
+MOST_WORDS, LEAST_WORDS, MOST_ENTRIES, A_SECOND = 100, 4, 25_000_000, 600_000
 """Words of a cell that are sought, at most and at least; and of all cells together, at most (11
 bytes each), and in a second."""
 
 MOST_VERTICES = 3000
 """Classes of all waypoints together: of more there is the first bound only."""
+
+ACCURACY = 1e-3
+"""Share of a tether at rest that its length may be off by (docs/tether.md: a tenth of that, where
+an exact length is known)."""
 
 ANY = -1
 """In place of a word: of a class that was not found."""
@@ -85,12 +89,13 @@ def bound_of_all(
 @dataclass(frozen=True)
 class _Class:
     """A place, the number of the tether's word there, its least length, metres, and the tether;
-    None where nothing is known of that."""
+    None where nothing is known of that. One that was not found has none of the words that were."""
 
     point: int
     word: int
     length: float
     line: Floats | None = None
+    other_than: frozenset[int] = frozenset()
 
 
 def _classes(ways: Ways, some: list[int], clock: Clock) -> list[_Class] | None:
@@ -102,7 +107,11 @@ def _classes(ways: Ways, some: list[int], clock: Clock) -> list[_Class] | None:
     if not words.exact or most < LEAST_WORDS:
         return None
     root = int(np.ravel_multi_index(tuple(words.root), words.cells.flags.shape))
-    found = water.search(False, root, most, limit)
+    cells = {n: words.held(places.points[n]) for n in some if n != places.begin}
+    targets = {cell: limit for cell in cells.values() if cell is not None}
+    if not targets:
+        return None
+    found = water.search(False, root, most, targets)
     anchor = np.asarray(water.mission.anchor, dtype=float)[None]
     out: list[_Class] = []
     for n in some:
@@ -111,24 +120,32 @@ def _classes(ways: Ways, some: list[int], clock: Clock) -> list[_Class] | None:
             line = water.present.nodes
             out.append(_Class(n, ANY if number is None else number, 0.0, line))
             continue
-        cell = words.held(places.points[n])
+        cell = cells[n]
         there = [] if cell is None else water.ways(found, cell)
         known: dict[int, Tether] = {}
+        seen: set[int] = set()
+        # classes that were not found are no shorter than that; paths along cells are longer than
+        # those pulled taut by no more than that factor
+        beyond = along(there[-1][1]) / LONGER if len(there) >= most else np.inf
         for word, way in there:
-            if clock.up:
-                return None
+            least = along(way) / LONGER
+            if clock.up or least > limit + water.mission.delta:
+                beyond = min(beyond, least)
+                break
             tether = water.model.relaxed(np.vstack([anchor, way, places.points[n]]), ROUNDS)
-            if tether.length > limit + water.mission.delta:
-                continue
             number = water.number(tether.nodes)
             key = word if number is None else number
+            seen |= {word, key}
+            delta = water.mission.delta
+            at_rest = tether.residual <= delta / 200.0  # docs/tether.md
+            if tether.length > limit + (ACCURACY * limit if at_rest else delta):
+                continue
             if key not in known or tether.length < known[key].length:
                 known[key] = tether
         out += [_Class(n, word, t.length, t.nodes) for word, t in known.items()]
-        # paths along cells are longer than those pulled taut by no more than that factor
-        beyond = along(there[-1][1]) / LONGER if there else 0.0
-        if (len(there) >= most and beyond <= limit) or not known:
-            out.append(_Class(n, ANY, beyond if known else 0.0))
+        if beyond <= limit or not known:
+            least = beyond if known else 0.0
+            out.append(_Class(n, ANY, least, other_than=frozenset(seen)))
         if len(out) > MOST_VERTICES:
             return None
     return out
@@ -199,26 +216,36 @@ def _between(ways: Ways, own: list[_Class], others: list[_Class]) -> tuple[Float
     of ways that were found."""
     n, m = own[0].point, others[0].point
     straight = float(np.linalg.norm(ways.points[n] - ways.points[m]))
-    known = [(word, max(straight, along(path))) for word, path in ways.known(n, m)]
-    least = min((length for _, length in known), default=straight)
     # a tether, and on along the way to the next place, is no shorter than the taut one there
     here, there = (np.array([c.length for c in some]) for some in (own, others))
+    apart = np.abs(here[:, None] - there[None])
     far = max(straight, ways.beyond(n, m))
-    block = np.maximum(far, np.abs(here[:, None] - there[None]))
+    out, back = (
+        [(word, max(straight, along(path))) for word, path in ways.known(a, b)]
+        for a, b in ((n, m), (m, n))
+    )
+    block = np.maximum(far, apart)
     measured = np.zeros(block.shape, dtype=np.bool_)
-    column = {c.word: k for k, c in enumerate(others)}
+    column = {c.word: k for k, c in enumerate(others) if c.word != ANY}
     times = ways.water.words.times
+
+    def to_another(c: _Class, known: list[tuple[int, float]], other: _Class) -> float:
+        """The shortest way from a class to one that was not found."""
+        lengths = (d for w, d in known if times(c.word, w) not in other.other_than)
+        return min(lengths, default=far)
+
     for k, c in enumerate(own):
         if c.word == ANY:
-            block[k] = np.maximum(least, c.length - there)
             continue
-        for word, length in reversed(known):  # the shortest of a class comes last
+        for word, length in reversed(out):  # the shortest of a class comes last
             to = column.get(times(c.word, word))
             if to is not None:
                 block[k, to], measured[k, to] = length, True
-    if ANY in column:
-        k = column[ANY]
-        block[:, k] = np.maximum(least, others[k].length - here)
-        if own[-1].word == ANY:
-            block[-1, k] = least
+        if others[-1].word == ANY:
+            block[k, -1] = max(to_another(c, out, others[-1]), apart[k, -1])
+    if own[-1].word == ANY:
+        least = min((length for _, length in out), default=straight)
+        for k, c in enumerate(others):
+            nearest = least if c.word == ANY else to_another(c, back, own[-1])
+            block[-1, k] = max(nearest, 0.0 if c.word == ANY else apart[-1, k])
     return block, measured

@@ -133,6 +133,9 @@ class SpacePlan:
             The same mission, planned.
         """
         result = self.result
+        if bound is not None:
+            # its legs are pulled taut more finely than those of the tour
+            bound = min(bound, self.length)
         tour = PlannedTour(
             stops=tuple(
                 PlannedStop(

@@ -351,7 +351,7 @@ def tour_of_flight(
         ends = np.array([leg[-1] for leg in legs[:-1]]).reshape(-1, 3)
         off = np.linalg.norm(ends - mission.places[visited].reshape(-1, 3), axis=1)
         short_of_home = float(np.linalg.norm(legs[-1][-1] - np.array(mission.start)))
-        bound = max(0.0, bound - 2.0 * float(off.sum()) - short_of_home)
+        bound = min(length, max(0.0, bound - 2.0 * float(off.sum()) - short_of_home))
     tour = PlannedTour(
         stops=tuple(planned_stops), home=in_file(legs[-1]), status=Status.FEASIBLE, solver=name,
         seed=seed, length=length, bound_of_all=bound, gap_to_all=relative_gap(length, bound),
