@@ -153,7 +153,7 @@ def repair(
     """
     clock = Clock(limit)
     word = signature(tether[:, :2], problem.representative_points)
-    state = State(position=_outside(problem, robot), signature=word)
+    state = State(position=outside(problem, robot), signature=word)
     order, left_out = reachable(problem, left)
     if not order:
         legs = [_home(problem, state, FAR * max(problem.tether_length, polylines.length(tether)))]
@@ -203,7 +203,7 @@ def reachable(problem: Problem, left: list[int]) -> tuple[list[int], list[tuple[
     return [g for k, g in enumerate(order) if k not in beyond], left_out
 
 
-def _outside(problem: Problem, robot: Floats) -> tuple[float, float, float]:
+def outside(problem: Problem, robot: Floats) -> tuple[float, float, float]:
     """The robot's place, moved out of what the tether model's resolution has let it enter."""
     place = np.array(robot, dtype=float)
     for _ in range(10):

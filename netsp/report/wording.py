@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -11,7 +12,7 @@ import numpy.typing as npt
 from netsp.arrays import Floats
 from netsp.hsignature import Word
 from netsp.hsignature.rays import crossings
-from netsp.problem import Problem
+from netsp.problem import Circle, Polygon, Problem
 
 WINDS = (
     "north", "north-east", "east", "south-east", "south", "south-west", "west", "north-west"
@@ -120,13 +121,17 @@ def _touched(problem: Problem, point: Floats) -> int:
     """The obstacle that a corner of a taut tether lies on; -1 for none."""
     best, on = math.inf, -1
     for i, o in enumerate(problem.obstacles):
-        size = float(
-            np.ptp(np.array(o.shape(problem.clearance).bounds).reshape(2, 2), axis=0).max()
-        )
+        size = _size(o, problem.clearance)
         gap = abs(float(o.signed_distance(point[:2])) - problem.clearance) / size
         if gap < best:
             best, on = gap, i
     return on if best <= TOUCHING else -1
+
+
+@lru_cache(maxsize=4096)
+def _size(obstacle: Circle | Polygon, clearance: float) -> float:
+    """The longer side of its bounding box."""
+    return float(np.ptp(np.array(obstacle.shape(clearance).bounds).reshape(2, 2), axis=0).max())
 
 
 def listed(problem: Problem, run: list[Passage]) -> str:

@@ -1,0 +1,1 @@
+"""Beside the vehicle: what its tether does, while somebody else is driving it."""

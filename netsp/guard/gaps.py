@@ -1,0 +1,98 @@
+"""Which ways may a robot have gone that nobody saw?"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from netsp.arrays import Floats
+from netsp.execute.repair import outside
+from netsp.hsignature import Word, concatenate, crossings
+from netsp.problem import Problem
+from netsp.roadmap.tethers import Tethers
+
+MOST_WAYS = 12
+"""Ways that are kept, the shortest."""
+
+TRIES = 4
+"""Lengths up to which a way is looked for, each half as long again as the one before."""
+
+
+def ways_between(
+    problem: Problem, before: Floats, after: Floats, farthest: float
+) -> list[tuple[Word, float]]:
+    """The classes of paths from one place to another that are no longer than that.
+
+    Parameters
+    ----------
+    problem : Problem
+        The site. Obstacles count as they are, without the clearance.
+    before : ndarray, shape (3,)
+        Where the robot was, metres.
+    after : ndarray, shape (3,)
+        Where it is.
+    farthest : float
+        Metres that it can have gone; the shortest way counts whatever it is.
+
+    Returns
+    -------
+    list of (Word, float)
+        Words, and the lengths of the shortest paths, metres; shortest first.
+    """
+    bare = problem.model_copy(update={"clearance": 0.0, "bounds": None})
+    begin, end = outside(bare, before), outside(bare, after)
+    straight = math.dist(begin, end)
+    if straight <= 1e-6 * problem.scale:
+        end = begin
+    longest = max(farthest, 1.05 * straight, 1e-6 * problem.scale)
+    for _ in range(TRIES):
+        free = bare.model_copy(update={"base": begin, "goals": (), "tether_length": longest})
+        found = Tethers(free).classes(*end)[:MOST_WAYS]
+        if found:
+            return [(t.word, t.length) for t in found]
+        longest *= 1.5
+    # between obstacles that overlap there may be none: then it went straight
+    line = np.array([before, after])
+    return [(crossings(line, problem.representative_points), math.dist(before, after))]
+
+
+def after_gap(
+    problem: Problem, words: dict[Word, float], before: Floats, after: Floats, seconds: float,
+    speed: float, reach: float,
+) -> dict[Word, float]:  # fmt: skip
+    """Classes of the tether after a gap, with their costs: a way is the less likely the longer it
+    is than the shortest, in units of a quarter of what the robot can have gone.
+
+    Parameters
+    ----------
+    problem : Problem
+        The site.
+    words : dict of Word to float
+        Classes before, and their costs.
+    before : ndarray, shape (3,)
+        Where the robot was, metres.
+    after : ndarray, shape (3,)
+        Where it is.
+    seconds : float
+        Between the two.
+    speed : float
+        Of the robot, at most, m/s.
+    reach : float
+        How far off either place may be, metres.
+
+    Returns
+    -------
+    dict of Word to float
+        Classes now, and their costs.
+    """
+    gone = speed * seconds
+    ways = ways_between(problem, before, after, gone + reach)
+    scale = max(0.25 * gone, 0.5 * reach, 1e-9)
+    out: dict[Word, float] = {}
+    for word, cost in words.items():
+        for way, length in ways:
+            to = concatenate(word, way)
+            dearer = cost + (length - ways[0][1]) / scale
+            out[to] = min(out.get(to, np.inf), dearer)
+    return out

@@ -1,0 +1,351 @@
+"""The guardian of a tether: fixes in, reports out.
+
+fix → track (noise, gaps, jumps) → belief (classes) → taut tethers → ahead → alarms → report
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from netsp.arrays import Floats
+from netsp.errors import InputError
+from netsp.fields import checked_argument, checked_instance
+from netsp.guard import reasons
+from netsp.guard.ahead import Ahead, look_ahead
+from netsp.guard.alarms import Alarm, Alarms
+from netsp.guard.belief import Belief
+from netsp.guard.correct import corrected
+from netsp.guard.fix import Fix
+from netsp.guard.gaps import after_gap
+from netsp.guard.loops import Loop, loops_in
+from netsp.guard.report import ClassNow, Report
+from netsp.guard.tethers import Strand, Strands
+from netsp.guard.track import GAP, Motion, Track
+from netsp.hsignature import Word
+from netsp.problem import Problem
+from netsp.report.wording import listed, passages
+
+LEFT_OF_NOISE = 0.4
+"""Share of an estimate's noise that is left when it is smoothed, about."""
+
+LOOK_S = 0.3
+"""Seconds between two looks ahead."""
+
+MOST_TETHERS = 4
+"""Of the classes believed, the likeliest get a tether."""
+
+PAID_OUT = 1.05
+"""Times what the winch says it has let out; a class whose taut tether is longer is none."""
+
+
+@dataclass(frozen=True)
+class GuardOptions:
+    """What is known of the vehicle.
+
+    Parameters
+    ----------
+    noise : float
+        Standard deviation of one position estimate, metres.
+    drift : float
+        Standard deviation of how far estimates are off for minutes, metres.
+    speed : float
+        Fastest speed, m/s.
+    """
+
+    noise: float = 0.3
+    drift: float = 0.5
+    speed: float = 0.5
+
+
+class Guard:
+    """Keeps the class, the taut tether, and what the present motion leads to.
+
+    Parameters
+    ----------
+    problem : Problem
+        The site: base, obstacles and tether count.
+    options : GuardOptions, optional
+        What is known of the vehicle.
+
+    Raises
+    ------
+    InputError
+        Options out of range.
+
+    Examples
+    --------
+    >>> from netsp import Circle, Problem
+    >>> from netsp.guard.fix import Fix
+    >>> site = Problem(base=(0, 0), goals=[(5.5, 2)], tether_length=9,
+    ...                obstacles=[Circle(center=(5, 0), radius=1)])
+    >>> guard = Guard(site, GuardOptions(noise=0.0, drift=0.0))
+    >>> for t in range(21):
+    ...     report = guard.take(Fix(float(t), (0.3 * t, 0.1 * t, 0.0), estimate=True))
+    >>> report.classes[0].word, round(report.classes[0].slack, 2), report.loops
+    ((1,), 2.67, ())
+    """
+
+    def __init__(self, problem: Problem, options: GuardOptions | None = None) -> None:
+        checked_instance("problem", problem, Problem)
+        self.problem, self.options = problem, options or GuardOptions()
+        for name in ("noise", "drift"):
+            checked_argument(name, getattr(self.options, name), 0.0)
+        if not checked_argument("speed", self.options.speed, 0.0):
+            raise InputError("speed: expected a positive number, got 0")
+        o = self.options
+        self.track = Track(o.noise, o.speed)
+        self.belief = Belief(problem, o.drift, LEFT_OF_NOISE * o.noise)
+        self.strands = Strands(problem)
+        self.alarms = Alarms()
+        self._vouched: bool | None = None
+        self._last = Fix(0.0)
+        self._seen, self._looked = -np.inf, -np.inf
+        self._ahead = Ahead()
+        self._motion: Motion | None = None
+        self._restored: tuple[dict[Word, float], Floats, float] | None = None
+        self._previous: Motion | None = None
+        self.report: Report | None = None
+
+    def remember(self, words: dict[Word, float], position: Floats, seconds: float) -> None:
+        """Begin with the classes of an earlier run.
+
+        Parameters
+        ----------
+        words : dict of Word to float
+            Classes, and their costs.
+        position : ndarray, shape (3,)
+            Where the robot was, metres.
+        seconds : float
+            Since then.
+        """
+        self._restored = words, position, seconds
+
+    def correct(self, side: str, obstacle: int | str) -> Report | None:
+        """The operator says on which side of an obstacle the tether passes.
+
+        Parameters
+        ----------
+        side : str
+            North, east, south or west.
+        obstacle : int or str
+            Its index or name.
+
+        Returns
+        -------
+        Report or None
+            As it is now; None before the first fix.
+
+        Raises
+        ------
+        InputError
+            As of `netsp.guard.correct.corrected`; nothing is known of where the robot is.
+        """
+        if self.track.time is None or not self.strands.all:
+            raise InputError("side: nothing is known yet of where the robot is")
+        here = self.strands.all[0].tether.robot
+        words = {s.word: -float(np.log(max(s.likely, 1e-9))) for s in self.strands.all}
+        self.belief.begin(corrected(self.problem, words, here, side, obstacle))
+        return self._told(self._last)
+
+    def take(self, fix: Fix) -> Report:
+        """Something that the vehicle says.
+
+        Parameters
+        ----------
+        fix : Fix
+            What it says; what it does not, is as before.
+
+        Returns
+        -------
+        Report
+            As it is now.
+        """
+        self._last = replace(
+            fix,
+            heading=self._last.heading if fix.heading is None else fix.heading,
+            armed=self._last.armed if fix.armed is None else fix.armed,
+            mode=self._last.mode if fix.mode is None else fix.mode,
+            paid_out=self._last.paid_out if fix.paid_out is None else fix.paid_out,
+        )
+        self._seen = max(self._seen, fix.time)
+        if fix.estimate is not None:
+            self._vouched = fix.estimate
+            if not fix.estimate:
+                self.track.lose(fix.time)
+        if fix.position is not None and self._vouched is not False:
+            motion = self.track.take(fix)
+            if motion is not None:
+                self._moved(motion)
+        return self._told(self._last)
+
+    def wait(self, now: float) -> Report:
+        """Nothing has come for a while.
+
+        Parameters
+        ----------
+        now : float
+            Seconds, of the vehicle's clock as far as that goes on.
+
+        Returns
+        -------
+        Report
+            As it is now.
+        """
+        return self.take(Fix(max(now, self._seen)))
+
+    def restarted(self, fix: Fix) -> Report:
+        """The vehicle has started anew: its clock counts from 0 again, and its estimate begins
+        where it is now.
+
+        Parameters
+        ----------
+        fix : Fix
+            The first since.
+
+        Returns
+        -------
+        Report
+            As it is now.
+        """
+        shift = self._seen - fix.time
+        if self.track.time is not None:
+            self.track.shift(-shift)
+        if self._previous is not None:
+            self._previous = replace(self._previous, time=self._previous.time - shift)
+        self.alarms = Alarms()
+        self._seen = self._looked = -np.inf
+        self.track.lose(fix.time)
+        self._vouched = None
+        return self.take(fix)
+
+    @property
+    def words(self) -> dict[Word, float]:
+        """Classes that are believed, at the robot's place, and their costs."""
+        return {s.word: -float(np.log(max(s.likely, 1e-9))) for s in self.strands.all}
+
+    def _moved(self, motion: Motion) -> None:
+        o = self.options
+        reach = 2.0 * (o.drift + LEFT_OF_NOISE * o.noise)
+        first = self._motion is None
+        self._motion = motion
+        if first:
+            self._begin(motion, reach)
+        elif motion.lost_s:
+            words = {h.word: -float(np.log(h.likely)) for h in self.belief.classes()}
+            self.belief.begin(
+                after_gap(self.problem, words, motion.before, motion.after, motion.lost_s,
+                          o.speed, reach)
+            )  # fmt: skip
+        else:
+            before = motion.before if self._previous is None else self._previous.after
+            dt = motion.time - (self._previous.time if self._previous else motion.time)
+            self.belief.move(before[:2], motion.after[:2], dt)
+        self._previous = motion
+        strands = self.strands.follow(self.belief.classes(), motion.after, MOST_TETHERS)
+        if self._last.paid_out is not None:
+            self._not_longer_than(PAID_OUT * self._last.paid_out + reach, strands)
+
+    def _begin(self, motion: Motion, reach: float) -> None:
+        """With what is remembered, or a tether that is as short as can be."""
+        words: dict[Word, float] = {(): 0.0}
+        before, seconds = np.asarray(self.problem.base, dtype=float), 0.0
+        if self._restored is not None:
+            words, before, seconds = self._restored
+        self.belief.begin(
+            after_gap(self.problem, words, before, motion.after, seconds, self.options.speed, reach)
+        )
+
+    def _not_longer_than(self, most: float, strands: list[Strand]) -> None:
+        """The winch has let out less than some classes need."""
+        short = [s for s in strands if s.tether.length <= most]
+        if short and len(short) < len(strands):
+            total = sum(s.likely for s in short)
+            self.strands.all = [replace(s, likely=s.likely / total) for s in short]
+            self.belief.begin({s.word: -float(np.log(s.likely / total)) for s in short})
+
+    def _told(self, fix: Fix) -> Report:
+        """The report as things are."""
+        silent = self.track.silence(self._seen)
+        claims = self._motion is not None and self._vouched is not False and silent <= GAP
+        motion = self._motion
+        strands = self.strands.all if claims else []
+        classes = tuple(self._class(s) for s in strands)
+        loops: list[Loop] = []
+        if strands and motion is not None:
+            tether = strands[0].tether
+            loops = loops_in(self.problem, tether.nodes[:, :2])
+            if motion.time - self._looked >= LOOK_S or motion.time < self._looked:
+                self._looked = motion.time
+                self._ahead = look_ahead(
+                    self.problem, self.strands.field, self.strands.model, tether, motion,
+                    self.options.speed,
+                )  # fmt: skip
+        else:
+            self._ahead = Ahead()
+        raised = self.alarms.take(
+            self._seen, self._reasons(claims, silent, classes, loops, strands)
+        )
+        names = self.problem.obstacle_name
+        ahead = self._ahead
+        place = None if not strands else strands[0].tether.robot
+        if place is None and motion is not None:
+            place = motion.after
+        self.report = Report(
+            time=self._seen if np.isfinite(self._seen) else fix.time,
+            position=None if place is None else (float(place[0]), float(place[1]), float(place[2])),
+            heading=fix.heading,
+            speed=0.0 if motion is None else float(np.linalg.norm(motion.velocity)),
+            armed=fix.armed, mode=fix.mode, claims=claims, classes=classes,
+            home_s=classes[0].taut / self.options.speed if classes else None,
+            loop_s=ahead.loop_s,
+            loop_around=() if ahead.loop is None else tuple(map(names, ahead.loop.around)),
+            short_s=ahead.short_s,
+            loops=tuple(tuple(map(names, loop.around)) for loop in loops),
+            alarms=tuple(sorted(self.alarms.on.values(), key=lambda a: -a.level)),
+            raised=tuple(raised), paid_out=fix.paid_out,
+        )  # fmt: skip
+        return self.report
+
+    def _reasons(
+        self, claims: bool, silent: float, classes: Sequence[ClassNow], loops: Sequence[Loop],
+        strands: Sequence[Strand],
+    ) -> list[Alarm]:  # fmt: skip
+        if self._motion is None:
+            return []
+        if not claims:
+            why = (
+                "the vehicle does not vouch for its position" if self._vouched is False
+                else "the position has stood still to the last digit" if self.track.frozen
+                else "no position has come"
+            )  # fmt: skip
+            return [reasons.estimate_lost(silent, why)]
+        if not classes:
+            return []
+        robot, problem = strands[0].tether.robot, self.problem
+        closed = {loop.around for loop in loops}
+        ahead = self._ahead
+        again = ahead.loop is not None and ahead.loop.around in closed
+        return [
+            *reasons.in_doubt(classes), *reasons.little_left(problem, classes[0]),
+            *reasons.soon_short(problem, ahead),
+            *([] if again else reasons.soon_looped(problem, ahead, robot)),
+            *reasons.looped(problem, loops, robot),
+        ]  # fmt: skip
+
+    def _class(self, strand: Strand) -> ClassNow:
+        nodes = strand.tether.nodes
+        steps = np.diff(nodes[:, :2], axis=0)
+        steps = steps[np.hypot(*steps.T) > 1e-9]
+        u, v = steps[:-1], steps[1:]
+        turns = np.arctan2(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0], (u * v).sum(1))
+        run = passages(self.problem, nodes, strand.word)
+        return ClassNow(
+            strand.word, strand.likely, listed(self.problem, run), strand.tether.length,
+            self.problem.tether_length - strand.tether.length, float(np.abs(turns).sum()), nodes,
+        )  # fmt: skip
+
+
+__all__ = ["Guard", "GuardOptions"]

@@ -1,0 +1,127 @@
+"""Loops in a taut tether.
+
+In the plan a taut tether is a geodesic of its class. Where it meets itself, what lies between is a
+geodesic from a place to that same place; geodesics of a class being unique (../theory.md), a loop
+that could be pulled out would have length 0. So every such loop is around something, and has to be
+undone; and a robot that comes to a place where its own tether lies has just closed one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from netsp.arrays import Floats
+from netsp.hsignature import signature
+from netsp.problem import Problem
+
+
+@dataclass(frozen=True)
+class Loop:
+    """A loop of a tether.
+
+    Parameters
+    ----------
+    around : tuple of int
+        Indices of obstacles.
+    line : ndarray, shape (k, 2)
+        From where it closes around to there again, metres.
+    """
+
+    around: tuple[int, ...]
+    line: Floats
+
+
+def loop_of(problem: Problem, line: Floats) -> Loop | None:
+    """What a closed line is around.
+
+    Parameters
+    ----------
+    problem : Problem
+        The site.
+    line : ndarray, shape (k, 2)
+        Its ends are one.
+
+    Returns
+    -------
+    Loop or None
+        None where it is around nothing.
+    """
+    word = signature(line, problem.representative_points, closed=True)
+    if not word:
+        return None
+    wound = [0] * len(problem.obstacles)
+    for letter in word:
+        wound[abs(letter) - 1] += 1 if letter > 0 else -1
+    # winding numbers may all be zero (a commutator): then it is around what its word names
+    around = tuple(i for i, n in enumerate(wound) if n) or tuple(
+        sorted({abs(letter) - 1 for letter in word})
+    )
+    return Loop(around, line)
+
+
+def closed_by(problem: Problem, tether: Floats, step: Floats) -> Loop | None:
+    """The loop that a robot closes when it goes on in a straight line.
+
+    Parameters
+    ----------
+    problem : Problem
+        The site.
+    tether : ndarray, shape (n, 2)
+        Taut, to where the robot is; its last segment swings along.
+    step : ndarray, shape (2, 2)
+        From there to where it goes, metres.
+
+    Returns
+    -------
+    Loop or None
+        None where it closes none.
+    """
+    if len(tether) < 3:
+        return None
+    met = _crossings(tether[:-1], step)
+    for k, place in met[::-1]:
+        found = loop_of(problem, np.vstack([place, tether[k + 1 :], place]))
+        if found is not None:
+            return found
+    return None
+
+
+def loops_in(problem: Problem, tether: Floats) -> list[Loop]:
+    """The loops that a tether has, in the plan.
+
+    Parameters
+    ----------
+    problem : Problem
+        The site.
+    tether : ndarray, shape (n, 2)
+        Taut, metres.
+
+    Returns
+    -------
+    list of Loop
+        The last to be closed first; each around other obstacles than those before.
+    """
+    found: list[Loop] = []
+    for j in range(len(tether) - 2, 1, -1):
+        for k, place in _crossings(tether[: j + 1], tether[j : j + 2], apart=True):
+            loop = loop_of(problem, np.vstack([place, tether[k + 1 : j + 1], place]))
+            if loop is not None and all(loop.around != other.around for other in found):
+                found.append(loop)
+    return found
+
+
+def _crossings(line: Floats, step: Floats, apart: bool = False) -> list[tuple[int, Floats]]:
+    """Where a segment crosses a polyline: number of its segment, and the place. With `apart`, the
+    polyline's last point is where the segment begins, and does not count."""
+    a, d = line[:-1], np.diff(line, axis=0)
+    p, e = step[0], step[1] - step[0]
+    cross = d[:, 0] * e[1] - d[:, 1] * e[0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        s = ((p - a)[:, 0] * e[1] - (p - a)[:, 1] * e[0]) / cross
+        t = ((p - a)[:, 0] * d[:, 1] - (p - a)[:, 1] * d[:, 0]) / cross
+    hits = (np.abs(cross) > 1e-15) & (s >= 0.0) & (s <= 1.0) & (t >= 0.0) & (t <= 1.0)
+    if apart and len(hits):
+        hits[-1] = False
+    return [(int(k), a[k] + s[k] * d[k]) for k in np.flatnonzero(hits)]

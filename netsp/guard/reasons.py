@@ -1,0 +1,128 @@
+"""Why the operator should be told something, and in which words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from netsp.arrays import Floats
+from netsp.geometry import polylines
+from netsp.guard.ahead import Ahead
+from netsp.guard.alarms import Alarm, Level
+from netsp.guard.loops import Loop
+from netsp.guard.report import ClassNow
+from netsp.problem import Problem
+from netsp.report.wording import side
+
+LOOP_S = {Level.CAUTION: 30.0, Level.WARNING: 16.0}
+SHORT_S = {Level.CAUTION: 10.0, Level.WARNING: 4.0}
+"""Seconds ahead from which on something is that urgent; a robot that works at the end of its tether
+drives towards it all the time."""
+
+SLACK = {Level.CAUTION: 0.1, Level.WARNING: 0.03, Level.ALARM: 0.0}
+"""Shares of the tether that are left."""
+
+DOUBT = 0.05
+"""Share that a second class must have to be worth a word."""
+
+MOST_NAMES = 3
+
+
+def names_of(problem: Problem, around: Sequence[int]) -> str:
+    """Obstacles in a phrase: the first few by name."""
+    names = [problem.obstacle_name(i) for i in around[:MOST_NAMES]]
+    if len(around) > MOST_NAMES:
+        names[-1:] = [names[-1], f"{len(around) - MOST_NAMES} more"]
+    if len(names) == 1:
+        return names[0]
+    return f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+def estimate_lost(seconds: float, why: str) -> Alarm:
+    """Nothing is claimed any more."""
+    return Alarm(
+        "estimate", Level.ALARM,
+        f"{why} for {seconds:.0f} s: nothing is claimed about the tether until a position comes",
+    )  # fmt: skip
+
+
+def in_doubt(classes: Sequence[ClassNow]) -> list[Alarm]:
+    """The class is one of several."""
+    if len(classes) < 2 or classes[1].likely < DOUBT:
+        return []
+    told = "; or ".join(f"{c.passes} ({100 * c.likely:.0f} %)" for c in classes[:3])
+    return [Alarm("class", Level.NOTICE, f"the tether runs {told}")]
+
+
+def little_left(problem: Problem, now: ClassNow) -> list[Alarm]:
+    """The tether is nearly used up, or too short."""
+    share = now.slack / problem.tether_length
+    level = max((v for v, s in SLACK.items() if share < s), default=None)
+    if level is None:
+        return []
+    text = (
+        f"the taut tether is {now.taut:.1f} of {problem.tether_length:g} {problem.units}"
+        if now.slack >= 0.0
+        else f"the taut tether is {-now.slack:.1f} {problem.units} longer than there is: the class "
+        "is another, or the tether is under load; go back along it"
+    )
+    return [Alarm("slack", level, text)]
+
+
+def soon_short(problem: Problem, ahead: Ahead) -> list[Alarm]:
+    """Going on needs more tether than there is."""
+    if ahead.short_s is None:
+        return []
+    level = _level(SHORT_S, ahead.short_s)
+    if level is None:
+        return []
+    text = (
+        f"going on needs more than {problem.tether_length:g} {problem.units} of tether in "
+        f"{ahead.short_s:.0f} s"
+    )
+    return [Alarm("short", level, text)]
+
+
+def soon_looped(problem: Problem, ahead: Ahead, robot: Floats) -> list[Alarm]:
+    """Going on closes a loop."""
+    if ahead.loop_s is None or ahead.loop is None:
+        return []
+    level = _level(LOOP_S, ahead.loop_s)
+    if level is None:
+        return []
+    near = _nearest(problem, ahead.loop, robot)
+    keep = side(problem, robot[:2] - problem.representative_points[near])
+    names = names_of(problem, ahead.loop.around)
+    text = (
+        f"keep {keep} of {problem.obstacle_name(near)}: going on closes a loop around {names} in "
+        f"{ahead.loop_s:.0f} s; {_undo(problem, ahead.loop, near)}"
+    )
+    return [Alarm("loop-ahead", level, text)]
+
+
+def looped(problem: Problem, loops: Sequence[Loop], robot: Floats) -> list[Alarm]:
+    """A loop is closed."""
+    if not loops:
+        return []
+    loop = loops[0]
+    near = _nearest(problem, loop, robot)
+    text = f"a loop around {names_of(problem, loop.around)} is closed; {_undo(problem, loop, near)}"
+    return [Alarm("loop", Level.ALARM, text)]
+
+
+def _undo(problem: Problem, loop: Loop, near: int) -> str:
+    """Back along the tether: past the middle of the loop."""
+    length = polylines.length(loop.line)
+    half = polylines.points_along(loop.line, 0.5 * length + 1e-9)[1] if length else loop.line[0]
+    back = side(problem, half - problem.representative_points[near])
+    return f"to undo it go back {back} of {problem.obstacle_name(near)}"
+
+
+def _nearest(problem: Problem, loop: Loop, robot: Floats) -> int:
+    far = [float(problem.obstacles[i].signed_distance(robot[:2])) for i in loop.around]
+    return loop.around[int(np.argmin(far))]
+
+
+def _level(limits: dict[Level, float], seconds: float) -> Level | None:
+    return max((v for v, s in limits.items() if seconds <= s), default=None)

@@ -1,0 +1,183 @@
+"""Recordings: CSV files, telemetry logs of ground stations, and logs of ArduPilot's vehicles."""
+
+from __future__ import annotations
+
+import csv
+import gzip
+import io
+import math
+import struct
+import zlib
+from collections.abc import Iterator
+from pathlib import Path
+
+from netsp.errors import InputError
+from netsp.files import MOST_BYTES, check_file, read_bytes
+from netsp.guard.fix import Fix
+from netsp.link.dialect import dialect, parser
+from netsp.link.frame import Frame
+from netsp.link.messages import CONSTANT, HORIZONTAL, UNINITIALIZED, Listener
+from netsp.link.modes import mode_name
+from netsp.models import shown
+
+KINDS = ".csv, .csv.gz, .tlog or .bin"
+
+TRUE = {"1": True, "true": True, "yes": True, "0": False, "false": False, "no": False}
+
+MOST_PACKET = 300
+"""Bytes of a MAVLink message, at most."""
+
+
+def read_fixes(file: str | Path, frame: Frame, system: int | None = None) -> Iterator[Fix]:
+    """The fixes of a recording, in their order.
+
+    Parameters
+    ----------
+    file : str or Path
+        A table (columns t, x, y, z, or north, east, down; heading, armed, mode, estimate, paid_out
+        where it has them), a ground station's .tlog, or a .bin of ArduPilot.
+    frame : Frame
+        Of the site.
+    system : int, optional
+        System id of the vehicle; by default the first heard.
+
+    Yields
+    ------
+    Fix
+        One for each row or message.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, is of another kind, or has no positions.
+    """
+    name = str(file).lower()
+    check_file(file)
+    if name.endswith((".csv", ".csv.gz")):
+        found = _table(Path(file), frame)
+    elif name.endswith(".tlog"):
+        found = _tlog(Path(file), frame, system)
+    elif name.endswith(".bin"):
+        found = _dataflash(Path(file), frame)
+    else:
+        raise InputError(f"--replay: {file}: expected a file that ends in {KINDS}")
+    any_place = False
+    for fix in found:
+        any_place = any_place or fix.position is not None
+        yield fix
+    if not any_place:
+        raise InputError(f"--replay: {file}: has no positions")
+
+
+def _table(file: Path, frame: Frame) -> Iterator[Fix]:
+    packed = read_bytes(file)
+    try:
+        if file.suffix.lower() == ".gz":
+            with gzip.GzipFile(fileobj=io.BytesIO(packed)) as raw:
+                packed = raw.read(MOST_BYTES + 1)
+        if len(packed) > MOST_BYTES:
+            raise InputError(f"--replay: {file}: more than {MOST_BYTES / 2**20:g} MiB unpacked")
+        rows = csv.DictReader(io.StringIO(packed.decode("utf-8-sig"), newline=""))
+        columns = set(rows.fieldnames or ())
+        named = {"x", "y", "z"} <= columns
+        if "t" not in columns or not (named or {"north", "east", "down"} <= columns):
+            raise InputError(
+                f"--replay: {file}: expected columns t, x, y, z (or t, north, east, down), got "
+                f"{shown(', '.join(sorted(map(str, columns))))}"
+            )
+        for number, row in enumerate(rows, 2):
+            yield _row(row, frame, named, f"--replay: {file}: line {number}")
+    except (OSError, EOFError, UnicodeError, zlib.error, csv.Error) as error:
+        raise InputError(f"--replay: {file}: {error}") from None
+
+
+def _row(row: dict[str, str], frame: Frame, named: bool, where: str) -> Fix:
+    def number(column: str) -> float | None:
+        text = row.get(column)
+        if text is None or text.strip() == "":
+            return None
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value):
+            raise InputError(f"{where}: {column}: expected a number, got {shown(text)}")
+        return value
+
+    def yes(column: str) -> bool | None:
+        text = (row.get(column) or "").strip().lower()
+        if text and text not in TRUE:
+            raise InputError(f"{where}: {column}: expected 0 or 1, got {shown(text)}")
+        return TRUE.get(text)
+
+    time = number("t")
+    if time is None:
+        raise InputError(f"{where}: t: expected seconds, got nothing")
+    parts = [number(c) for c in (("x", "y", "z") if named else ("north", "east", "down"))]
+    place = None
+    if None not in parts:
+        a, b, c = (float(v) for v in parts if v is not None)
+        place = (a, b, c) if named else frame.from_local(a, b, c)
+    return Fix(
+        time, place, number("heading"), yes("armed"), row.get("mode") or None, yes("estimate"),
+        number("paid_out"),
+    )  # fmt: skip
+
+
+def _tlog(file: Path, frame: Frame, system: int | None) -> Iterator[Fix]:
+    """A time of eight bytes before each message (microseconds), as ground stations write them."""
+    data = read_bytes(file)
+    listener = Listener(frame, system)
+    error = dialect().MAVError
+    at = 0
+    while at + 8 < len(data):
+        reads = parser()
+        message = None
+        for k in range(at + 8, min(len(data), at + 8 + MOST_PACKET)):
+            try:
+                message = reads.parse_char(data[k : k + 1])
+            except (error, struct.error, ValueError):
+                break
+            if message is not None:
+                break
+        if message is None or message.get_type() == "BAD_DATA":
+            at += 1  # something is missing: on to where messages begin again
+            continue
+        at = k + 1
+        fix = listener.understand(message)
+        if fix is not None:
+            yield fix
+
+
+def _dataflash(file: Path, frame: Frame) -> Iterator[Fix]:
+    """A log of the vehicle itself: estimates of its first filter (XKF1), its status (XKF4), arming
+    and modes."""
+    try:
+        from pymavlink.DFReader import DFReader_binary
+    except ImportError:
+        raise InputError(
+            "--replay: a .bin needs pymavlink; install it with: pip install 'netsp[mavlink]'"
+        ) from None
+    try:
+        log = DFReader_binary(str(file))
+    except (OSError, ValueError, struct.error, IndexError, KeyError) as error:
+        raise InputError(f"--replay: {file}: no log of ArduPilot: {error}") from None
+    while True:
+        m = log.recv_match(type=["XKF1", "XKF4", "ARM", "MODE"])
+        if m is None:
+            return
+        time = m.TimeUS * 1e-6
+        kind = m.get_type()
+        if kind in ("XKF1", "XKF4") and getattr(m, "C", 0) != 0:
+            continue
+        if kind == "XKF1":
+            place = frame.from_local(m.PN, m.PE, m.PD)
+            yield Fix(time, position=place, heading=float(m.Yaw) % 360.0)
+        elif kind == "XKF4":
+            flags = int(m.SS)
+            good = bool(flags & HORIZONTAL) and not flags & (CONSTANT | UNINITIALIZED)
+            yield Fix(time, estimate=good)
+        elif kind == "ARM":
+            yield Fix(time, armed=bool(m.ArmState))
+        else:
+            yield Fix(time, mode=mode_name(int(m.ModeNum)))

@@ -1,0 +1,229 @@
+"""From position estimates to motion: what is noise, what is a gap, what is a jump.
+
+A Kalman filter of constant velocity smooths the estimates (white accelerations; e.g. Bar-Shalom,
+Li & Kirubarajan 2001, section 6.2). What it must not smooth is told apart before: after a gap, a
+freeze or a jump the robot may have gone any way there is.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+from netsp.arrays import Floats
+from netsp.guard.fix import Fix
+
+ACCELERATION = 0.15
+"""m/s²: standard deviation of what a work-class or smaller vehicle does between two estimates."""
+
+GAP = 2.0
+"""Seconds without an estimate that are one."""
+
+FROZEN = 3.0
+"""Seconds for which an estimate of a moving robot may repeat to the last digit."""
+
+MOVING = 0.1
+"""Share of the speed: slower than that a robot is at rest."""
+
+RESTART_S = 10.0
+"""Seconds that a vehicle takes to start anew, at least."""
+
+TURN_SPAN = 3.0
+"""Seconds: courses over two spans in a row tell how fast the robot turns."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """How the robot got to where it is.
+
+    Parameters
+    ----------
+    time : float
+        Seconds.
+    before : ndarray, shape (3,)
+        Where it was, smoothed, metres.
+    after : ndarray, shape (3,)
+        Where it is.
+    velocity : ndarray, shape (3,)
+        m/s.
+    turn : float
+        Radians per second, counter-clockwise; 0 where it is not known.
+    lost_s : float
+        Seconds for which nobody knows where it went; 0 for most.
+    reason : str
+        What happened then.
+    """
+
+    time: float
+    before: Floats
+    after: Floats
+    velocity: Floats
+    turn: float
+    lost_s: float = 0.0
+    reason: str = ""
+
+
+class Track:
+    """Smooths estimates, and says where they cannot be believed.
+
+    Parameters
+    ----------
+    noise : float
+        Standard deviation of one estimate, metres.
+    speed : float
+        Fastest speed of the robot, m/s.
+    """
+
+    def __init__(self, noise: float, speed: float) -> None:
+        self.noise, self.speed = max(noise, 1e-3), speed
+        self.time: float | None = None
+        self.frozen = False
+        self._state = np.zeros((2, 3))
+        self._spread = np.zeros((2, 2))
+        self._last: Floats | None = None
+        self._same_since = 0.0
+        self._doubt_since: float | None = None
+        self._past: deque[tuple[float, Floats]] = deque()
+
+    @property
+    def here(self) -> Floats:
+        """(3,) where the robot is, smoothed, metres."""
+        return np.array(self._state[0])
+
+    @property
+    def velocity(self) -> Floats:
+        """(3,) m/s."""
+        return np.array(self._state[1])
+
+    def begin(self, time: float, position: Floats) -> None:
+        """Begin at a place, at rest.
+
+        Parameters
+        ----------
+        time : float
+            Seconds.
+        position : ndarray, shape (3,)
+            Metres.
+        """
+        self.time, self._last, self._same_since = time, position, time
+        self._state = np.array([position, np.zeros(3)])
+        self._spread = np.diag([self.noise**2, self.speed**2])
+        self._past = deque([(time, position.copy())])
+        self.frozen, self._doubt_since = False, None
+
+    def shift(self, seconds: float) -> None:
+        """The vehicle's clock was set.
+
+        Parameters
+        ----------
+        seconds : float
+            That it is ahead of what it was.
+        """
+        if self.time is not None:
+            self.time += seconds - RESTART_S
+
+    def lose(self, time: float) -> None:
+        """The vehicle does not vouch for its estimates any more.
+
+        Parameters
+        ----------
+        time : float
+            Since when, seconds.
+        """
+        if self._doubt_since is None:
+            self._doubt_since = time
+
+    def silence(self, now: float) -> float:
+        """Seconds since the last estimate that could be believed.
+
+        Parameters
+        ----------
+        now : float
+            Seconds.
+
+        Returns
+        -------
+        float
+            Seconds.
+        """
+        since = self.time if self._doubt_since is None else self._doubt_since
+        return 0.0 if since is None else max(0.0, now - since)
+
+    def take(self, fix: Fix) -> Motion | None:
+        """One more estimate.
+
+        Parameters
+        ----------
+        fix : Fix
+            With a position.
+
+        Returns
+        -------
+        Motion or None
+            What the robot did; None for an estimate that is older than the last, or frozen.
+        """
+        assert fix.position is not None
+        position = np.array(fix.position, dtype=float)
+        if self.time is None:
+            self.begin(fix.time, position)
+            return Motion(fix.time, position, position, np.zeros(3), 0.0)
+        dt = fix.time - self.time
+        if dt <= 0.0:
+            return None
+        same = self._last is not None and bool(np.array_equal(position, self._last))
+        self._same_since = self._same_since if same else fix.time
+        was_moving = float(np.linalg.norm(self._state[1])) > MOVING * self.speed
+        if same and was_moving and not self.frozen and fix.time - self._same_since >= FROZEN:
+            self.frozen = True
+            self.lose(self._same_since)
+        if same and self.frozen:
+            return None
+        self._last = position
+        before = self.here
+        far = float(np.linalg.norm(position - before - self._state[1] * dt))
+        # what noise of four deviations and a robot at full speed cannot explain
+        most = self.speed * dt + 4.0 * math.sqrt(3.0) * self.noise + 0.5
+        lost_s, reason = 0.0, ""
+        if self._doubt_since is not None:
+            lost_s, reason = fix.time - self._doubt_since, "the estimate was lost"
+        elif dt > GAP:
+            lost_s, reason = dt, "no position came"
+        elif far > most:
+            lost_s, reason = dt, "the position jumped"
+        if lost_s:
+            self.begin(fix.time, position)
+            return Motion(fix.time, before, position, np.zeros(3), 0.0, lost_s, reason)
+        self._filter(position, dt)
+        self.time = fix.time
+        self._past.append((fix.time, self.here))
+        while len(self._past) > 2 and fix.time - self._past[1][0] >= 2.0 * TURN_SPAN:
+            self._past.popleft()
+        return Motion(fix.time, before, self.here, self.velocity, self._turn())
+
+    def _filter(self, position: Floats, dt: float) -> None:
+        step = np.array([[1.0, dt], [0.0, 1.0]])
+        shake = ACCELERATION**2 * np.array([[dt**4 / 4.0, dt**3 / 2.0], [dt**3 / 2.0, dt**2]])
+        self._state = step @ self._state
+        self._spread = step @ self._spread @ step.T + shake * (1.0 / max(dt, 0.1))
+        gain = self._spread[:, 0] / (self._spread[0, 0] + self.noise**2)
+        self._state = self._state + np.outer(gain, position - self._state[0])
+        self._spread = self._spread - np.outer(gain, self._spread[0])
+
+    def _turn(self) -> float:
+        """How fast the course changes, over twice the span; 0 where the robot went too little to
+        have one."""
+        now, here = self._past[-1]
+        times = np.array([t for t, _ in self._past])
+        if now - times[0] < 1.8 * TURN_SPAN:
+            return 0.0
+        k = int(np.searchsorted(times, now - TURN_SPAN))
+        middle = self._past[k][1]
+        first, second = (middle - self._past[0][1])[:2], (here - middle)[:2]
+        least = max(0.3, 2.0 * self.noise) * MOVING * 10.0 * self.speed * TURN_SPAN
+        if min(np.hypot(*first), np.hypot(*second)) < min(least, 0.5 * self.speed * TURN_SPAN):
+            return 0.0
+        cross = float(first[0] * second[1] - first[1] * second[0])
+        return math.atan2(cross, float(first @ second)) / TURN_SPAN
