@@ -185,6 +185,8 @@ class Execution(Drawn):
         Whether it was stopped.
     wall_s : float
         Seconds that the run took.
+    stopped : str
+        Why a vehicle that is not simulated had to stop; empty if it had not.
     """
 
     picture: ClassVar[str] = "netsp.pictures.execution:draw_map"
@@ -202,6 +204,7 @@ class Execution(Drawn):
     walked: float = 0.0
     interrupted: bool = False
     wall_s: float = 0.0
+    stopped: str = ""
 
     def __repr__(self) -> str:
         """In a line."""
@@ -223,7 +226,7 @@ class Execution(Drawn):
         goals = [a for a in self.arrivals if a.goal != HOME]
         return {
             "problem": self.problem.name,
-            "status": "interrupted" if self.interrupted else "done",
+            "status": "interrupted" if self.interrupted else "stopped" if self.stopped else "done",
             "time_s": self.rows[-1].time if self.rows else 0.0,
             "path": self.walked,
             "planned_path": self.solution.length,
@@ -261,7 +264,8 @@ def describe_execution(done: Execution) -> str:
     planned = s["planned_path"] or 0.0
     every_goal = not (s["cancelled"] or s["left_out"])
     lines = [
-        f"run      {s['problem']}: {s['status']} after {s['time_s']:.1f} s",
+        f"run      {s['problem']}: {s['status']} after {s['time_s']:.1f} s"
+        + (f": {done.stopped}" if done.stopped else ""),
         f"visited  {counted(s['visited'], 'goal')}{_class_of(done.arrivals)}",
         f"path     {s['path']:.6g} {units}"
         + (f", {_beside(s['path'] / planned)}" if planned and every_goal else ""),

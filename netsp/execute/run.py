@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from typing import Protocol
 
 import numpy as np
 
@@ -22,7 +23,7 @@ from netsp.online.scene.field import DistanceField, pushed_out
 from netsp.online.scene.scene import scene_of
 from netsp.online.tether import GeodesicTether, Tether
 from netsp.online.tether.resolution import coarsest_delta, suggested_delta
-from netsp.online.vehicle import make_vehicle
+from netsp.online.vehicle import Vehicle, make_vehicle
 from netsp.online.water import Water
 from netsp.problem import Problem
 from netsp.solution import Solution, Status
@@ -34,10 +35,48 @@ LEG_ALLOWANCE = 3.0
 """A goal is left out when its leg takes this many times as long as it should, and a minute."""
 
 
+LINKED_STEP = 0.2
+"""Seconds of a step of a vehicle that is not simulated."""
+
+
+class StopsFlightError(Exception):
+    """What a vehicle raises when a run must not go on.
+
+    Parameters
+    ----------
+    reason : str
+        Why.
+    """
+
+    def __init__(self, reason: str) -> None:
+        super().__init__(reason)
+        self.reason = reason
+
+
+class LiveVehicle(Vehicle, Protocol):
+    """A vehicle with a clock of its own, which goes on while we plan.
+
+    Attributes
+    ----------
+    time : float
+        Seconds since the run began.
+    """
+
+    @property
+    def time(self) -> float:
+        """s."""
+
+    def hold(self) -> None:
+        """Stay where it is, until it is told to go on."""
+
+
 class _Run:
     """A run in progress."""
 
-    def __init__(self, problem: Problem, solution: Solution, options: ExecutionOptions) -> None:
+    def __init__(
+        self, problem: Problem, solution: Solution, options: ExecutionOptions,
+        live: LiveVehicle | None = None,
+    ) -> None:  # fmt: skip
         self.out = Execution(problem, solution, options)
         self.problem, self.options = problem, options
         self.legs: list[Leg] = legs_of(problem, solution)
@@ -48,8 +87,11 @@ class _Run:
             self.tether = self.model.start(problem.base, problem.base)
         else:
             self.tether = self.model.lay(np.array(solution.start_tether))
-        self.vehicle = make_vehicle(options.vehicle, self.start, options.speed)
+        self.live = live
+        self.vehicle = live or make_vehicle(options.vehicle, self.start, options.speed)
         self.step = 0.1 if options.vehicle != "kinematic" else self.delta / options.speed
+        if live is not None:
+            self.step = LINKED_STEP
         self.water = Water(options.current, options.gusts, options.seed)
         self.now, self.mode, self.fresh, self.leg_s = 0.0, "tour", True, 0.0
         self.shorten = False
@@ -86,8 +128,9 @@ class _Run:
             self.path, self.step, self.vehicle.yaw, self.water(self.now), self.fresh
         )
         self.fresh = False
-        self.now += self.step
-        self.leg_s += self.step
+        took = self.step if self.live is None else self.live.time - self.now
+        self.now += took
+        self.leg_s += took
         for point in points:
             inside = float(self.scene.distance(point)) < -0.2 * self.delta
             if inside:
@@ -187,6 +230,16 @@ class _Run:
         else:
             self._mend(must, left, event.kind)
 
+    def asked(self, event: Event) -> None:
+        """An event that nobody could check before."""
+        try:
+            changed(self.problem, event)
+        except InputError as error:
+            self._enter_log(event.kind, "ignored", f"cannot be: {error}", 0.0)
+            return
+        if self.legs:
+            self.happen(event)
+
     def _in_reach_again(self) -> list[int]:
         """Goals that no tether reached, and one does now."""
         away = [g for g in self.unreachable if g in self.out.left_out]
@@ -239,6 +292,8 @@ class _Run:
             self.vehicle.stop_at(point)
 
     def _mend(self, why: str, left: list[int], event: str = "left out") -> None:
+        if self.live is not None:
+            self.live.hold()
         begin = time.perf_counter()
         try:
             made = repair(
@@ -267,6 +322,9 @@ class _Run:
     def _hold(self, seconds: float) -> None:
         """Stay where the robot is while a plan is made: until the plan is due, however soon it was
         ready, so that the same seed gives the same run."""
+        if self.live is not None:
+            self.now = max(self.now, self.live.time)  # it has held its place meanwhile
+            return
         mode, self.mode = self.mode, "hold"
         until = self.now + seconds
         while self.now < until:
@@ -285,6 +343,8 @@ def execute(
     *,
     surprises: Surprises | None = None,
     on_step: Callable[[ExecutionRow], None] | None = None,
+    vehicle: LiveVehicle | None = None,
+    incoming: Callable[[], list[Event]] | None = None,
 ) -> Execution:
     """Carry out a solution in the scene of its problem.
 
@@ -303,6 +363,10 @@ def execute(
     on_step : callable, optional
         Called with every row; a KeyboardInterrupt ends the run, and what was done till then is
         returned.
+    vehicle : LiveVehicle, optional
+        One that is not simulated; `StopsFlightError` of it ends the run as well.
+    incoming : callable, optional
+        Asked at every step for events that have come since.
 
     Returns
     -------
@@ -347,15 +411,17 @@ def execute(
             f"delta: expected at most {coarsest:.4g}, or the tether would slip through the "
             f"thinnest obstacle, got {options.delta!r}"
         )
-    if surprises.events and options.repair:
+    if (surprises.events or incoming is not None) and options.repair:
         make_ready()
     begin = time.perf_counter()
-    run = _Run(problem, solution, options)
+    run = _Run(problem, solution, options, vehicle)
     coming = sorted(surprises.events, key=lambda e: e.time)
     try:
         while run.legs:
             while coming and coming[0].time <= run.now:
                 run.happen(coming.pop(0))
+            for event in incoming() if incoming is not None else ():
+                run.asked(event)
             row = run.note()
             if on_step is not None:
                 on_step(row)
@@ -365,6 +431,9 @@ def execute(
             run.too_late(event)
     except KeyboardInterrupt:
         run.out.interrupted = True
+    except StopsFlightError as stop:
+        run.out.stopped = stop.reason
+        run.note()
     run.out.tethers.append((round(run.now, 6), run.tether.nodes.copy()))
     # a corner may have held it back for the few rounds of an update
     run.out.free = tether_is_free(run.model.refine(run.tether), run.delta)

@@ -1,0 +1,1 @@
+"""A tour carried out by a real vehicle, over MAVLink."""

@@ -1,0 +1,72 @@
+"""What must hold before a vehicle is moved."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from netsp.arrays import Floats
+from netsp.fly.stopped import RefusedError
+from netsp.link.dialect import dialect
+from netsp.link.modes import GUIDED, mode_name
+from netsp.link.session import Session
+
+WAIT_S = 10.0
+"""Seconds to wait for the vehicle to speak, and for all that is asked of it."""
+
+LOOK_S = 0.1
+
+
+def ready(session: Session, start: Floats, near: float) -> None:
+    """Have a vehicle ready to be told where to go, or refuse.
+
+    Parameters
+    ----------
+    session : Session
+        The vehicle.
+    start : ndarray, shape (3,)
+        Where the tour begins, metres.
+    near : float
+        Metres from there at most.
+
+    Raises
+    ------
+    RefusedError
+        It does not speak, has no position estimate, is away from the start or disarmed, or does
+        not take the mode GUIDED.
+    """
+    if not _until(session, lambda: session.silent_s < np.inf):
+        raise RefusedError(f"no vehicle has been heard for {WAIT_S:g} s: is the link right?")
+    session.ask_for_positions()
+    m = dialect()
+    placed = _until(
+        session, lambda: session.now.position is not None and session.now.estimate is not None
+    )
+    now = session.now
+    if not placed or now.position is None or not now.estimate:
+        raise RefusedError("the vehicle has no position estimate")
+    away = np.array(now.position) - start
+    if float(np.hypot(*away[:2])) > near:
+        raise RefusedError(
+            f"the vehicle is {float(np.hypot(*away[:2])):.1f} m from the start of the tour; "
+            f"expected at most {near:g} m: its first leg would be another"
+        )
+    if not now.armed:
+        raise RefusedError("the vehicle is not armed: arm it when all is clear, and call again")
+    if now.mode != mode_name(GUIDED):
+        session.command(m.MAV_CMD_DO_SET_MODE, 1, GUIDED)
+        if not _until(session, lambda: session.now.mode == mode_name(GUIDED)):
+            raise RefusedError(
+                f"the vehicle does not take the mode GUIDED: it is in {session.now.mode}"
+            )
+
+
+def _until(session: Session, holds: Callable[[], bool]) -> bool:
+    left = WAIT_S
+    while left > 0.0:
+        if holds():
+            return True
+        session.sleep(LOOK_S)
+        left -= LOOK_S
+    return holds()

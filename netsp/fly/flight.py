@@ -1,0 +1,95 @@
+"""A tour flown: `execute` with a vehicle at the other end of a link, and what stops it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from netsp.errors import InputError
+from netsp.execute.events import Event, Surprises
+from netsp.execute.log import Execution, ExecutionOptions, ExecutionRow
+from netsp.execute.run import StopsFlightError, execute
+from netsp.fly.checks import ready
+from netsp.fly.vehicle import LinkedVehicle
+from netsp.judge import verify
+from netsp.link.dialect import dialect
+from netsp.link.session import Session
+from netsp.problem import Problem
+from netsp.solution import Solution
+
+NEAR_START = 2.0
+"""Metres from the start at which a vehicle may be armed."""
+
+ALT_HOLD = 2
+"""The mode that a vehicle without an estimate is put in: it keeps its depth and goes nowhere."""
+
+
+def fly(
+    problem: Problem,
+    solution: Solution,
+    session: Session,
+    options: ExecutionOptions | None = None,
+    *,
+    surprises: Surprises | None = None,
+    incoming: Callable[[], list[Event]] | None = None,
+    on_step: Callable[[ExecutionRow], None] | None = None,
+) -> Execution:
+    """Carry a tour out with a vehicle.
+
+    Parameters
+    ----------
+    problem : Problem
+        What was solved.
+    solution : Solution
+        The plan.
+    session : Session
+        The vehicle.
+    options : ExecutionOptions, optional
+        Reach, speed and planning limit count.
+    surprises : Surprises, optional
+        Events that are known to come.
+    incoming : callable, optional
+        Asked at every step for events that have come since.
+    on_step : callable, optional
+        Called with every row; a KeyboardInterrupt ends the flight.
+
+    Returns
+    -------
+    Execution
+        What came of it; `stopped` says why it ended before the tour did.
+
+    Raises
+    ------
+    InputError
+        As of `execute`.
+    RefusedError
+        As of `netsp.fly.checks.ready`.
+    """
+    options = options or ExecutionOptions(reach=0.3)
+    judged = verify(problem, solution)
+    if not judged:
+        failed = next(c for c in judged.checks if not c.passed)
+        raise InputError(f"solution: fails its check {failed.name!r}: {failed.detail}")
+    start = np.array(problem.base if problem.state is None else problem.state.position)
+    ready(session, start, NEAR_START)
+    vehicle = LinkedVehicle(session, options.reach)
+    done = execute(
+        problem, solution, replace(options, vehicle="linked"), surprises=surprises,
+        on_step=on_step, vehicle=vehicle, incoming=incoming,
+    )  # fmt: skip
+    if done.stopped or done.interrupted:
+        _leave(session, vehicle)
+    return done
+
+
+def _leave(session: Session, vehicle: LinkedVehicle) -> None:
+    """Have the vehicle stay where it is, unless somebody else has it by now."""
+    try:
+        vehicle.check()
+    except StopsFlightError:
+        if session.now.estimate is False and session.now.mode == "GUIDED":
+            session.command(dialect().MAV_CMD_DO_SET_MODE, 1, ALT_HOLD)
+        return
+    vehicle.hold()

@@ -1,0 +1,203 @@
+"""A vehicle at the other end of a link, as `execute` drives it: position targets, vertex by vertex.
+
+ArduSub in GUIDED holds a position target for good, while one with a velocity times out; so only
+positions are sent, and sent again now and then, for datagrams get lost. It does not go above home
+and has taken an altitude of 0 for "keep the present one" (../export/write.py): targets are at least
+a decimetre deep.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from netsp.arrays import Floats
+from netsp.execute.run import StopsFlightError
+from netsp.export.write import altitude
+from netsp.fields import Point3
+from netsp.link.dialect import dialect
+from netsp.link.modes import GUIDED, mode_name
+from netsp.link.session import Session
+
+SILENT_S = 3.0
+"""Seconds without a heartbeat after which the link is lost."""
+
+AGAIN_S = 2.0
+"""Seconds after which a target is sent again."""
+
+POSITION_ONLY = 0x0DF8
+"""Type mask: velocities, accelerations, yaw and its rate do not count."""
+
+LOOK_S = 0.05
+"""Seconds between two looks at what came."""
+
+
+class LinkedVehicle:
+    """Drives a vehicle over a link; see `netsp.online.vehicle.Vehicle`.
+
+    Parameters
+    ----------
+    session : Session
+        With a position.
+    reach : float
+        A vertex this near is reached, metres.
+    """
+
+    def __init__(self, session: Session, reach: float) -> None:
+        self.session, self.reach = session, reach
+        self.control_s: list[float] = []
+        self._begin = session.now.time
+        self._position = self._told()
+        self._target: Point3 | None = None
+        self._sent = -np.inf
+        self.sent: list[tuple[float, Point3]] = []
+
+    def _told(self) -> Floats:
+        place = self.session.now.position
+        assert place is not None
+        return np.array(place, dtype=float)
+
+    @property
+    def position(self) -> Floats:
+        """(3,) where it said last that it is, metres."""
+        return self._position
+
+    @property
+    def yaw(self) -> float:
+        """Heading, radians from the x axis."""
+        heading = self.session.now.heading
+        return 0.0 if heading is None else float(np.radians(90.0 - heading))
+
+    @property
+    def time(self) -> float:
+        """Seconds since the flight began, by the vehicle's clock."""
+        return self.session.now.time - self._begin
+
+    def go(
+        self, path: Floats, seconds: float, yaw: float, water: Floats, fresh: bool,
+        pull: Floats | None = None,
+    ) -> tuple[list[Floats], int]:  # fmt: skip
+        """Follow a path for some seconds of the vehicle's clock.
+
+        Parameters
+        ----------
+        path : ndarray, shape (k, 3)
+            Vertices to pass, metres.
+        seconds : float
+            How long.
+        yaw : float
+            Has no effect: which way it looks is the pilot's.
+        water : ndarray, shape (3,)
+            Has no effect.
+        fresh : bool
+            Whether the path does not continue the one before.
+        pull : ndarray, shape (3,), optional
+            Has no effect.
+
+        Returns
+        -------
+        points : list of ndarray
+            Where it has said that it is meanwhile.
+        count : int
+            How many vertices are behind it.
+
+        Raises
+        ------
+        StopsFlightError
+            The link, the estimate, the mode or arming are not what they were.
+        """
+        del yaw, water, fresh, pull
+        until, passed = self.time + seconds, 0
+        points: list[Floats] = []
+        while True:
+            self.check()
+            while passed < len(path) and self._at(path[passed]):
+                passed += 1
+            # the last one is held until it is told to go on
+            self._send(path[min(passed, len(path) - 1)])
+            if self.time >= until:
+                break
+            self.session.sleep(LOOK_S)
+            for place in self.session.places():
+                points.append(place)
+                self._position = place
+        return points or [self._position.copy()], passed
+
+    def _at(self, vertex: Floats) -> bool:
+        there = np.array([*vertex[:2], altitude(float(vertex[2]))])
+        return float(np.linalg.norm(self._position - there)) <= self.reach
+
+    def hold(self) -> None:
+        """Stay where it is."""
+        self._position = self._told()
+        self._send(self._position)
+
+    def stop_at(self, place: Floats) -> None:
+        """Where a place differs from what it said, its estimate is off: that is not moved.
+
+        Parameters
+        ----------
+        place : ndarray, shape (3,)
+            Metres.
+        """
+        self._position = np.array(place, dtype=float)
+
+    def check(self) -> None:
+        """Whether the flight may go on.
+
+        Raises
+        ------
+        StopsFlightError
+            It may not.
+        """
+        now = self.session.now
+        if self.session.silent_s > SILENT_S:
+            raise StopsFlightError(
+                f"the link is lost: no heartbeat for {self.session.silent_s:.0f} s"
+            )
+        if now.estimate is False:
+            raise StopsFlightError("the vehicle has lost its position estimate")
+        if now.armed is False:
+            raise StopsFlightError("the vehicle was disarmed")
+        if now.mode != mode_name(GUIDED):
+            raise StopsFlightError(f"the pilot has taken over: the mode is {now.mode}")
+
+    def _send(self, place: Floats) -> None:
+        x, y, z = (float(v) for v in place)
+        target = (x, y, altitude(z))
+        now = self.time
+        if target == self._target and now - self._sent < AGAIN_S:
+            return
+        if target != self._target:
+            self.sent.append((now, target))
+        self._target, self._sent = target, now
+        self.session.link.send(target_message(self.session, target))
+
+
+def target_message(session: Session, target: Point3) -> object:
+    """A position target as it goes over the link.
+
+    Parameters
+    ----------
+    session : Session
+        The vehicle.
+    target : (x, y, z)
+        In the site, metres.
+
+    Returns
+    -------
+    MAVLink_message
+        SET_POSITION_TARGET_LOCAL_NED, or _GLOBAL_INT where the site knows where it is.
+    """
+    m, frame = dialect(), session.frame
+    boot, rest = int(session.now.time * 1000.0) & 0xFFFFFFFF, (0.0,) * 8
+    if frame.is_global:
+        lat, lon, alt = frame.to_global(target)
+        return m.MAVLink_set_position_target_global_int_message(
+            boot, session.system or 1, 1, m.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT, POSITION_ONLY,
+            lat, lon, alt, *rest,
+        )  # fmt: skip
+    north, east, down = frame.to_local(target)
+    return m.MAVLink_set_position_target_local_ned_message(
+        boot, session.system or 1, 1, m.MAV_FRAME_LOCAL_NED, POSITION_ONLY,
+        north, east, down, *rest,
+    )  # fmt: skip

@@ -1,0 +1,1439 @@
+"""A fake ArduSub for tests: it talks MAVLink, flies and fails as the real one was seen to do.
+
+It is a process of its own, so that a test meets it as it would meet a vehicle: over UDP. What the
+vehicle believes goes out as telemetry; what is true is told on standard output, as lines of JSON;
+what befalls it (a lost estimate, a push, the pilot's hand) comes in on standard input:
+
+    {"do": "lose_estimate"}, {"do": "restore_estimate"}, {"do": "mode", "mode": 19},
+    {"do": "arm"}, {"do": "disarm"}, {"do": "silence", "seconds": 5}, {"do": "jump", "by": [1, 0]},
+    {"do": "push", "by": [1, 0, 0]}, {"do": "place", "at": [0, 0, -1]}, {"do": "quit"}
+
+All durations are in simulated time, also those of failsafes: at a pace of 20 a ground station has
+to be heard every 150 ms. The parameter FS_GCS_TIMEOUT loosens that, and FS_PILOT_INPUT = 2 makes
+it want a pilot's input as well. A machine that is too slow for the pace slows the simulation down
+and nothing else.
+
+Inside, points are east, north, up; only messages have them as north, east, down.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import json
+import math
+import os
+import random
+import selectors
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+if TYPE_CHECKING:
+    import numpy as np
+
+Vec = tuple[float, float, float]
+
+STEP = 0.02
+"""Seconds of a step of the simulation."""
+
+BURST = 25
+"""Steps that are made up for at once; a machine farther behind lets simulated time slip."""
+
+LAG = (0.7, 0.8)
+"""Seconds from a new target to the first movement."""
+
+PAUSE = 0.9
+"""Seconds that a mission stands still at a waypoint."""
+
+RADIUS = 1.0
+"""Metres about a waypoint within which it counts as reached (WPNAV_RADIUS)."""
+
+ACCELERATION = 0.185
+"""At 0.5 m/s: a step of 2 m takes 7.4 s with the lag, and 6.7 s without."""
+
+GAIN = 0.8
+"""Metres per second of correction for a metre off the reference."""
+
+WANDER_S, WANDER, WANDER_MOST = 4.0, 0.062, 0.125
+"""How the vehicle strays off its reference: seconds of memory, metres of spread and at most."""
+
+CREEP, COAST_S, STOP_S = 0.047, 1.5, 1.0
+"""Speed of a vehicle left to itself, seconds to come down to it, seconds to stop when disarmed."""
+
+TIMEOUT = 3.0
+"""Seconds without a heartbeat, a pilot's input or another target with a velocity."""
+
+MOST_ITEMS, MOST_FENCE_POINTS = 655, 70
+GROUND_STATION = 255
+
+STABILIZE, ALT_HOLD, AUTO, GUIDED, SURFACE, POSHOLD, MANUAL = 0, 2, 3, 4, 9, 16, 19
+MODES = (STABILIZE, ALT_HOLD, AUTO, GUIDED, SURFACE, POSHOLD, MANUAL)
+STEERED = (AUTO, GUIDED, POSHOLD)
+
+POSITION_BITS, VELOCITY_BITS, YAW_BIT = 0x007, 0x038, 0x400
+RELATIVE_FRAMES = (
+    mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT,
+    mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT,
+)
+ABSOLUTE_FRAMES = (mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT)
+NAVIGATION = (
+    mavlink.MAV_CMD_NAV_WAYPOINT,
+    mavlink.MAV_CMD_NAV_LOITER_UNLIM,
+    mavlink.MAV_CMD_NAV_LOITER_TIME,
+    mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH,
+)
+FIRST_DO_COMMAND = 112
+FENCE_POLYGONS = (
+    mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION,
+    mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION,
+)
+FENCE_CIRCLES = (
+    mavlink.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION,
+    mavlink.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION,
+)
+FENCE_INCLUSIONS = (FENCE_POLYGONS[0], FENCE_CIRCLES[0])
+
+EKF_LOST = (
+    mavlink.EKF_ATTITUDE
+    | mavlink.EKF_VELOCITY_VERT
+    | mavlink.EKF_POS_VERT_ABS
+    | mavlink.EKF_CONST_POS_MODE
+)
+EKF_WELL = (
+    (EKF_LOST & ~mavlink.EKF_CONST_POS_MODE)
+    | mavlink.EKF_VELOCITY_HORIZ
+    | mavlink.EKF_POS_HORIZ_REL
+    | mavlink.EKF_POS_HORIZ_ABS
+    | mavlink.EKF_PRED_POS_HORIZ_REL
+    | mavlink.EKF_PRED_POS_HORIZ_ABS
+)
+SENSORS = (
+    mavlink.MAV_SYS_STATUS_SENSOR_3D_GYRO
+    | mavlink.MAV_SYS_STATUS_SENSOR_3D_ACCEL
+    | mavlink.MAV_SYS_STATUS_SENSOR_3D_MAG
+    | mavlink.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE
+)
+
+
+# vectors
+
+
+def plus(a: Vec, b: Vec, times: float = 1.0) -> Vec:
+    return a[0] + times * b[0], a[1] + times * b[1], a[2] + times * b[2]
+
+
+def minus(a: Vec, b: Vec) -> Vec:
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+def scaled(a: Vec, by: float) -> Vec:
+    return a[0] * by, a[1] * by, a[2] * by
+
+
+def size(a: Vec) -> float:
+    return math.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
+
+
+def limited(a: Vec, most: float) -> Vec:
+    length = size(a)
+    return a if length <= most else scaled(a, most / length)
+
+
+def ned(a: Vec) -> Vec:
+    """North, east, down of east, north, up; and back."""
+    return a[1], a[0], -a[2]
+
+
+def rounded(a: Vec) -> list[float]:
+    return [round(v, 4) for v in a]
+
+
+class Earth:
+    """The plane about the origin of the estimate, as ArduPilot lays it out."""
+
+    METRES = 0.011131884502145034
+    """Metres of 1e-7 degrees of latitude."""
+
+    def __init__(self, latitude: float, longitude: float) -> None:
+        self.latitude, self.longitude = round(latitude * 1e7), round(longitude * 1e7)
+
+    def _narrowing(self, latitude: float) -> float:
+        """Of a meridian: half way between the origin and a latitude."""
+        return max(math.cos(math.radians(0.5e-7 * (self.latitude + latitude))), 0.01)
+
+    def geographic(self, point: Vec) -> tuple[int, int]:
+        north = point[1] / self.METRES
+        east = point[0] / self.METRES / self._narrowing(self.latitude + north)
+        return self.latitude + round(north), self.longitude + round(east)
+
+    def local(self, latitude: int, longitude: int) -> tuple[float, float]:
+        """Metres to the east and to the north."""
+        east = (longitude - self.longitude) * self.METRES * self._narrowing(latitude)
+        return east, (latitude - self.latitude) * self.METRES
+
+
+# what the vehicle is and believes
+
+
+@dataclass(frozen=True)
+class Options:
+    """How the vehicle is set up."""
+
+    to: tuple[str, int]
+    seed: int = 0
+    pace: float = 1.0
+    speed: float = 0.5
+    noise: float = 0.0
+    smooth: float = 0.0
+    drift: float = 0.0
+    origin: tuple[float, ...] = (55.5, 12.7)
+    start: tuple[float, ...] = (0.0, 0.0, 0.0)
+    sysid: int = 1
+    estimate: bool = True
+    params: dict[str, float] = field(default_factory=dict)
+
+
+class Wandering:
+    """Noise with a memory (Ornstein-Uhlenbeck) of a spread that does not grow; without a memory
+    it is white."""
+
+    def __init__(self, chance: random.Random, spread: Vec, memory: float) -> None:
+        self.chance, self.spread = chance, spread
+        self.keep = math.exp(-STEP / memory) if memory > 0.0 else 0.0
+        self.fresh = math.sqrt(1.0 - self.keep**2)
+        self.value: Vec = (0.0, 0.0, 0.0)
+
+    def step(self) -> Vec:
+        if any(self.spread):
+            gauss, (x, y, z), (a, b, c) = self.chance.gauss, self.value, self.spread
+            self.value = (
+                self.keep * x + self.fresh * gauss(0.0, a),
+                self.keep * y + self.fresh * gauss(0.0, b),
+                self.keep * z + self.fresh * gauss(0.0, c),
+            )
+        return self.value
+
+
+class Estimate:
+    """Where the vehicle believes to be: the truth, noise, a slow drift and jumps.
+
+    Once lost it stays what it was. Depth comes from pressure and does not drift.
+    """
+
+    def __init__(self, options: Options, chance: random.Random) -> None:
+        n, d = options.noise, options.drift
+        self.noise = Wandering(chance, (n, n, n), options.smooth)
+        self.drift = Wandering(chance, (d, d, 0.0), 60.0)
+        self.jumped: Vec = (0.0, 0.0, 0.0)
+        self.ever = self.well = options.estimate
+        self.point: Vec = (0.0, 0.0, 0.0)
+        self.velocity: Vec = (0.0, 0.0, 0.0)
+
+    def update(self, body: Body) -> None:
+        error = plus(plus(self.noise.step(), self.drift.step()), self.jumped)
+        if self.well:
+            self.ever = True
+            self.point, self.velocity = plus(body.point, error), body.velocity
+        else:
+            self.velocity = (0.0, 0.0, 0.0)
+
+
+class Body:
+    """The vehicle in the water, and the reference that it follows as well as it can.
+
+    The reference speeds up and brakes along a straight line to the goal. The vehicle is held to
+    it by its own estimate, and carried off by the water.
+    """
+
+    def __init__(self, point: Vec, chance: random.Random) -> None:
+        self.point, self.chance = point, chance
+        self.velocity: Vec = (0.0, 0.0, 0.0)
+        self.yaw, self.bearing = 0.0, 0.0
+        self.speed = 0.5
+        self.reference, self.pace = point, self.velocity
+        self.goal: Vec | None = None
+        self.halt: Vec | None = None
+        self.following = False
+        self.creep: Vec | None = None
+        spread = WANDER * GAIN
+        self.wander = Wandering(chance, (spread, spread, 0.4 * spread), WANDER_S)
+
+    @property
+    def acceleration(self) -> float:
+        """Grows with the root of the speed, as if jerk were what is limited."""
+        return ACCELERATION * math.sqrt(max(self.speed, 0.02) / 0.5)
+
+    @property
+    def arrived(self) -> bool:
+        return self.following and self.goal == self.reference and not any(self.pace)
+
+    def place(self, point: Vec) -> None:
+        self.point, self.velocity = point, (0.0, 0.0, 0.0)
+        self.let_go()
+
+    def let_go(self) -> None:
+        self.following, self.creep, self.halt = False, None, None
+
+    def follow(self, believed: Vec) -> None:
+        """A step under control; without a goal, to a stop."""
+        if not self.following:
+            self.following, self.creep = True, None
+            self.reference, self.pace = believed, self.velocity
+        if self.goal is not None:
+            self.halt = None
+        elif self.halt is None:
+            self.halt = plus(self.reference, self.pace, 0.5 * size(self.pace) / self.acceleration)
+        self._advance(self.goal or self.halt or self.reference)
+        correction = limited(scaled(minus(self.reference, believed), GAIN), self.speed)
+        stray = limited(self.wander.step(), WANDER_MOST * GAIN)
+        self._move(plus(plus(self.pace, correction), stray))
+        turn = (self.bearing - self.yaw + math.pi) % (2.0 * math.pi) - math.pi
+        self.yaw += max(-0.6 * STEP, min(0.6 * STEP, turn))
+
+    def _advance(self, goal: Vec) -> None:
+        """Move the reference."""
+        a = self.acceleration
+        away = minus(goal, self.reference)
+        distance, fast = size(away), size(self.pace)
+        if distance <= 2.0 * a * STEP * STEP and fast <= 4.0 * a * STEP:
+            self.reference, self.pace = goal, (0.0, 0.0, 0.0)
+            return
+        wanted = min(self.speed, math.sqrt(2.0 * a * distance), distance / STEP)
+        change = minus(scaled(away, wanted / max(distance, 1e-9)), self.pace)
+        # braking harder than it speeds up, or it would circle about a goal to its side
+        self.pace = plus(self.pace, limited(change, (1.0 if wanted > fast else 2.0) * a * STEP))
+        self.reference = plus(self.reference, self.pace, STEP)
+
+    def coast(self, rise: float = 0.0) -> None:
+        """A step of a vehicle that is armed and left to itself: it comes to creep along."""
+        if self.creep is None:
+            east, north, _ = self.velocity
+            if math.hypot(east, north) < 0.05:
+                angle = self.chance.uniform(0.0, 2.0 * math.pi)
+                east, north = math.cos(angle), math.sin(angle)
+            self.let_go()
+            self.creep = scaled((east, north, 0.0), CREEP / math.hypot(east, north))
+        wanted = (self.creep[0], self.creep[1], rise)
+        self._move(plus(self.velocity, minus(wanted, self.velocity), STEP / COAST_S))
+
+    def stop(self) -> None:
+        """A step of a vehicle that is disarmed."""
+        self.let_go()
+        self._move(scaled(self.velocity, 1.0 - STEP / STOP_S))
+
+    def _move(self, velocity: Vec) -> None:
+        self.velocity = velocity
+        self.point = plus(self.point, velocity, STEP)
+
+
+@dataclass(frozen=True)
+class Target:
+    """A target of GUIDED."""
+
+    point: Vec
+    yaw: float | None
+    moving: bool
+    """Came with a velocity, and so has to be repeated."""
+
+
+class Item(NamedTuple):
+    """An item of a mission or a fence."""
+
+    frame: int
+    command: int
+    p1: float
+    p2: float
+    p3: float
+    p4: float
+    x: int
+    y: int
+    z: float
+
+
+@dataclass
+class Upload:
+    """A list that is coming in."""
+
+    kind: int
+    count: int
+    sender: tuple[int, int]
+    items: list[Item] = field(default_factory=list)
+    asked: float = 0.0
+    tries: int = 0
+
+
+@dataclass(frozen=True)
+class Fence:
+    """A polygon or a circle (with a radius) that the vehicle is to stay in, or out of."""
+
+    inside: bool
+    corners: list[tuple[float, float]]
+    radius: float = 0.0
+
+    def keeps(self, point: Vec) -> bool:
+        return self._contains(point[0], point[1]) == self.inside
+
+    def _contains(self, x: float, y: float) -> bool:
+        if self.radius > 0.0:
+            return math.dist(self.corners[0], (x, y)) <= self.radius
+        within = False
+        for i, (x1, y1) in enumerate(self.corners):
+            x0, y0 = self.corners[i - 1]
+            if (y0 > y) != (y1 > y) and x < x0 + (x1 - x0) * (y - y0) / (y1 - y0):
+                within = not within
+        return within
+
+
+# the link
+
+
+class Wire:
+    """The UDP socket; everyone who was heard hears everything."""
+
+    def __init__(self, to: tuple[str, int]) -> None:
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.bind(("127.0.0.1", 0))
+        self.socket.setblocking(False)
+        self.peers = {to}
+        self.silent = False
+
+    @property
+    def port(self) -> int:
+        return int(self.socket.getsockname()[1])
+
+    def write(self, data: bytes) -> None:
+        if not self.silent:
+            for peer in self.peers:
+                # a full buffer loses a message, as radio does
+                with contextlib.suppress(OSError):
+                    self.socket.sendto(data, peer)
+
+    def messages(self) -> Iterator[Any]:
+        """What has come in."""
+        while True:
+            try:
+                data, peer = self.socket.recvfrom(65536)
+            except OSError:
+                return
+            if self.silent:
+                continue
+            self.peers.add(peer)
+            # a parser for every datagram: garbage in one must not swallow the next
+            parser = mavlink.MAVLink(None)
+            parser.robust_parsing = True
+            yield from parser.parse_buffer(data) or []
+
+
+def tell(t: float, **what: object) -> None:
+    """A line to the test."""
+    sys.stdout.write(json.dumps({"t": round(t, 3), **what}) + "\n")
+    sys.stdout.flush()
+
+
+@dataclass
+class Stream:
+    """A message that is sent again and again."""
+
+    send: Callable[[], None]
+    default: float
+    """Seconds between two, 0 for never."""
+
+    group: int
+    interval: float = 0.0
+    due: float = 0.0
+
+
+class Vehicle:
+    """The autopilot: its state, what it does in a step, and what it answers."""
+
+    def __init__(self, options: Options, wire: Wire) -> None:
+        self.options, self.wire = options, wire
+        self.mav: Any = mavlink.MAVLink(wire, srcSystem=options.sysid, srcComponent=1)
+        self.chance = random.Random(options.seed)
+        self.earth = Earth(*options.origin)
+        self.body = Body((options.start[0], options.start[1], options.start[2]), self.chance)
+        self.estimate = Estimate(options, self.chance)
+        self.estimate.update(self.body)
+        self.home: Vec | None = self.estimate.point if self.estimate.well else None
+        self.steps = 0
+        self.armed, self.mode = False, MANUAL
+        self.heard = self.input = self.silent_until = 0.0
+        self.params = {
+            "WPNAV_SPEED": 100.0 * options.speed,
+            "FS_GCS_ENABLE": 2.0,
+            "FS_GCS_TIMEOUT": TIMEOUT,
+            "FS_PILOT_INPUT": 0.0,
+            "FS_PILOT_TIMEOUT": TIMEOUT,
+            "FENCE_ENABLE": 0.0,
+            **options.params,
+        }
+        self._reset_speed()
+        self.coming: deque[tuple[float, Target]] = deque()
+        self.target: Target | None = None
+        self.refreshed = 0.0
+        self.released = self.telling = False
+        self.items: list[Item] = []
+        self.current, self.flown, self.complete = 1, False, False
+        self.leg_begins = self.tick = 0.0
+        self.held: float | None = None
+        self.upload: Upload | None = None
+        self.fence_items: list[Item] = []
+        self.fences: list[Fence] = []
+        self.breached = False
+        self._make_streams()
+        self._make_commands()
+
+    @property
+    def t(self) -> float:
+        return self.steps * STEP
+
+    @property
+    def ms(self) -> int:
+        return round(self.t * 1000.0)
+
+    def event(self, name: str, **what: object) -> None:
+        tell(self.t, event=name, **what)
+
+    def say(self, text: str, severity: int = mavlink.MAV_SEVERITY_WARNING) -> None:
+        self.mav.statustext_send(severity, text.encode()[:50])
+
+    # a step
+
+    def step(self) -> None:
+        self.steps += 1
+        self.wire.silent = self.t < self.silent_until
+        self._watch()
+        self._take_targets()
+        if self.mode == AUTO:
+            self._fly_mission()
+        self._move()
+        self.estimate.update(self.body)
+        self._watch_fences()
+        self._repeat_request()
+        for stream in self.streams.values():
+            if stream.interval > 0.0 and self.t >= stream.due - 1e-9:
+                stream.due = max(stream.due, self.t - stream.interval) + stream.interval
+                stream.send()
+        if self.steps % 10 == 0:
+            self._row()
+
+    def _row(self) -> None:
+        goal = self.body.goal if self.target is not None or self.mode == AUTO else None
+        tell(
+            self.t,
+            true=rounded(self.body.point),
+            est=rounded(self.estimate.point),
+            armed=self.armed,
+            mode=self.mode,
+            target=None if goal is None or not self.armed else rounded(goal),
+        )
+
+    @property
+    def steered(self) -> bool:
+        return self.mode in STEERED and self.estimate.well and not self.released
+
+    def _move(self) -> None:
+        if not self.armed:
+            self.body.stop()
+        elif self.steered:
+            self.body.follow(self.estimate.point)
+            if self.telling and self.body.arrived and self.mode == GUIDED:
+                self.telling = False
+                self.event("arrived")
+        else:
+            up = self.mode == SURFACE and self.body.point[2] < -0.02
+            self.body.coast(0.3 if up else 0.0)
+
+    def _watch(self) -> None:
+        """The failsafes."""
+        if not self.armed:
+            return
+        lost = self.t - self.heard >= self.params["FS_GCS_TIMEOUT"]
+        if lost and self.params["FS_GCS_ENABLE"] == 2.0:
+            self.say("MYGCS: 255, heartbeat lost", mavlink.MAV_SEVERITY_CRITICAL)
+            self.disarm("no heartbeat of a ground station")
+            return
+        idle = self.t - self.input >= self.params["FS_PILOT_TIMEOUT"]
+        if idle and self.params["FS_PILOT_INPUT"] == 2.0:
+            self.say("Lost manual control", mavlink.MAV_SEVERITY_CRITICAL)
+            self.disarm("no input of a pilot")
+
+    # arming and modes
+
+    def arm(self, why: str) -> None:
+        if self.armed:
+            return
+        self.armed = True
+        self.heard = self.input = self.t
+        self._stand()
+        if self.estimate.well:
+            self.home = self.estimate.point
+        self.event("armed", by=why)
+        self.say("Arming motors", mavlink.MAV_SEVERITY_INFO)
+        self._send_home()
+        self._send_heartbeat()
+
+    def disarm(self, why: str) -> None:
+        if not self.armed:
+            return
+        self.armed = False
+        self._stand()
+        self.tick = self.t + 1.0
+        self.event("disarmed", why=why)
+        self.say("Disarming motors", mavlink.MAV_SEVERITY_INFO)
+        self._send_heartbeat()
+
+    def _stand(self) -> None:
+        """Forget what there was to do."""
+        self.coming.clear()
+        self.target, self.released, self.telling = None, False, False
+        self.body.goal = None
+        self.body.let_go()
+        self.leg_begins, self.held = self.t + PAUSE, None
+
+    def refusal(self, mode: int) -> str | None:
+        """Why a mode is not entered."""
+        if mode not in MODES:
+            return "no such mode"
+        if mode != self.mode and mode in STEERED and not self.estimate.well:
+            return "Mode requires position"
+        if mode == AUTO and len(self.items) < 2:
+            return "Mode change to AUTO failed: no mission"
+        return None
+
+    def enter(self, mode: int, by: str) -> None:
+        if mode == self.mode:
+            return
+        self.mode = mode
+        self._stand()
+        self._reset_speed()
+        if mode == AUTO:
+            if self.complete:
+                self.current, self.complete = 1, False
+            self.flown = False
+            self.tick = self.t + 1.0
+        self.event("mode", mode=mode, by=by)
+        self._send_heartbeat()
+
+    def _reset_speed(self) -> None:
+        self.body.speed = self.params["WPNAV_SPEED"] / 100.0
+
+    # GUIDED
+
+    def _on_set_position_target_local_ned(self, m: Any) -> None:
+        point = ned((m.x, m.y, m.z))
+        why = None
+        if m.coordinate_frame != mavlink.MAV_FRAME_LOCAL_NED:
+            why = "frame"
+        elif point[2] > 1e-3:
+            why = "above home"
+        self._receive(m, point, why)
+
+    def _on_set_position_target_global_int(self, m: Any) -> None:
+        above = self.home[2] if self.home is not None else 0.0
+        relative = m.coordinate_frame in RELATIVE_FRAMES
+        point = (*self.earth.local(m.lat_int, m.lon_int), m.alt + (above if relative else 0.0))
+        why = None
+        if not relative and m.coordinate_frame not in ABSOLUTE_FRAMES:
+            why = "frame"
+        elif m.alt > 1e-3:
+            why = "above home"
+        self._receive(m, point, why)
+
+    def _receive(self, m: Any, point: Vec, why: str | None) -> None:
+        """A target: refused, or to take effect after the lag."""
+        if m.type_mask & POSITION_BITS or not all(map(math.isfinite, point)):
+            self.event("target refused", at=None, why="no position")
+            return
+        if not self.armed:
+            why = "disarmed"
+        elif self.mode != GUIDED:
+            why = "not in GUIDED"
+        elif why == "above home":
+            self.say("Alt above home must be negative")
+        elif not why and self._outside(point):
+            why = "outside of the fence"
+            self.say("Target outside fence")
+        if why:
+            self.event("target refused", at=rounded(point), why=why)
+            return
+        moving = m.type_mask & VELOCITY_BITS == 0
+        yaw = None if m.type_mask & YAW_BIT else float(m.yaw)
+        due = self.t + self.chance.uniform(*LAG)
+        if self.coming:
+            due = max(due, self.coming[-1][0])
+        self.coming.append((due, Target(point, yaw, moving)))
+        self.refreshed = self.t
+        self.event("target", at=rounded(point), velocity=moving)
+
+    def _take_targets(self) -> None:
+        while self.coming and self.t >= self.coming[0][0] - 1e-9:
+            target = self.coming.popleft()[1]
+            again = self.target is not None and target.point == self.target.point
+            self.target = target
+            self.released = False
+            self.body.goal = target.point
+            self._face(target.point, target.yaw)
+            if not again:
+                self.telling = True
+                self.event("under way", at=rounded(target.point))
+        stale = self.t - self.refreshed >= TIMEOUT and not self.coming
+        if self.target is not None and self.target.moving and stale and not self.released:
+            self.released = True
+            self.body.let_go()
+            self.event("target timed out", at=rounded(self.target.point))
+
+    def _face(self, point: Vec, yaw: float | None) -> None:
+        east, north, _ = minus(point, self.estimate.point)
+        if yaw is not None:
+            self.body.bearing = yaw
+        elif math.hypot(east, north) > 0.2:
+            self.body.bearing = math.atan2(east, north)
+
+    # AUTO
+
+    def _fly_mission(self) -> None:
+        if not self.armed:
+            # it counts itself through its mission without moving
+            if self.current < len(self.items) and self.t >= self.tick:
+                self.tick = self.t + 1.0
+                self._reach()
+            return
+        if not self.estimate.well or self.t < self.leg_begins:
+            return
+        while self.current < len(self.items) and self.body.goal is None:
+            self._start_item(self.items[self.current])
+        if self.current < len(self.items) and self._leg_done(self.items[self.current]):
+            self.flown = True
+            self.leg_begins, self.held = self.t + PAUSE, None
+            self.body.goal = None
+            self._reach()
+
+    def _start_item(self, item: Item) -> None:
+        if item.command == mavlink.MAV_CMD_DO_CHANGE_SPEED:
+            if item.p3 == 0.0:
+                self._skip("Alt above home must be negative")
+                return
+            # the first leg sets the speed back to the parameter's
+            if self.flown and item.p2 > 0.0:
+                self.body.speed = item.p2
+        if item.command >= FIRST_DO_COMMAND:
+            self._reach()
+            return
+        if item.command == mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH:
+            goal = self.home or self.estimate.point
+        elif item.frame not in RELATIVE_FRAMES:
+            self._skip("Bad alt frame")
+            return
+        elif item.z > 0.0:
+            self._skip("Alt above home must be negative")
+            return
+        else:
+            goal = self._point_of(item)
+        self.body.goal = goal
+        self._face(goal, None)
+
+    def _point_of(self, item: Item) -> Vec:
+        up = (self.home[2] if self.home is not None else 0.0) + item.z
+        if item.x == 0 and item.y == 0:
+            return self.estimate.point[0], self.estimate.point[1], up
+        return (*self.earth.local(item.x, item.y), up)
+
+    def _leg_done(self, item: Item) -> bool:
+        if not self.body.arrived or item.command == mavlink.MAV_CMD_NAV_LOITER_UNLIM:
+            return False
+        if size(minus(self.estimate.point, self.body.reference)) > RADIUS:
+            return False
+        if self.held is None:
+            self.held = self.t
+        waits = item.command != mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH
+        return self.t - self.held >= (item.p1 if waits else 0.0) - 1e-9
+
+    def _skip(self, why: str) -> None:
+        self.say(why)
+        self.event("command refused", command=self.items[self.current].command, why=why)
+        self._next()
+
+    def _reach(self) -> None:
+        self.event("item reached", seq=self.current, armed=self.armed)
+        self.mav.mission_item_reached_send(self.current)
+        self._next()
+
+    def _next(self) -> None:
+        self.current += 1
+        if self.current >= len(self.items):
+            self.complete = True
+            self.event("mission complete", armed=self.armed)
+            self.say("Mission complete", mavlink.MAV_SEVERITY_INFO)
+        self._send_mission_current()
+
+    # lists: missions and fences
+
+    def _on_mission_count(self, m: Any) -> None:
+        most = {
+            mavlink.MAV_MISSION_TYPE_MISSION: MOST_ITEMS,
+            mavlink.MAV_MISSION_TYPE_FENCE: MOST_FENCE_POINTS,
+        }.get(m.mission_type)
+        if most is None:
+            self._acknowledge(m, mavlink.MAV_MISSION_UNSUPPORTED, m.mission_type)
+        elif m.count > most:
+            self.event("mission refused", items=m.count, why="no space")
+            self._acknowledge(m, mavlink.MAV_MISSION_NO_SPACE, m.mission_type)
+        else:
+            sender = (m.get_srcSystem(), m.get_srcComponent())
+            self.upload = Upload(m.mission_type, m.count, sender)
+            self._ask_or_finish(self.upload)
+
+    def _ask_or_finish(self, upload: Upload) -> None:
+        if len(upload.items) < upload.count:
+            upload.asked = self.t
+            self.mav.mission_request_int_send(*upload.sender, len(upload.items), upload.kind)
+            return
+        self.upload = None
+        if upload.kind == mavlink.MAV_MISSION_TYPE_FENCE:
+            self._take_fence(upload.items)
+        else:
+            self._take_mission(upload.items)
+        self.mav.mission_ack_send(*upload.sender, mavlink.MAV_MISSION_ACCEPTED, upload.kind)
+
+    def _take_mission(self, items: list[Item]) -> None:
+        self.items = items
+        self.current, self.complete, self.flown = 1, False, False
+        self.tick = self.t + 1.0
+        if self.mode == AUTO:
+            self._stand()
+        self.event("mission", items=len(items))
+
+    def _repeat_request(self) -> None:
+        upload = self.upload
+        if upload is None or self.t - upload.asked < 1.0:
+            return
+        upload.tries += 1
+        if upload.tries <= 8:
+            self._ask_or_finish(upload)
+        else:
+            self.upload = None
+            self.say("Mission upload timeout")
+            cancelled = mavlink.MAV_MISSION_OPERATION_CANCELLED
+            self.mav.mission_ack_send(*upload.sender, cancelled, upload.kind)
+
+    def _on_mission_item(self, m: Any) -> None:
+        self._take_item(m, round(m.x * 1e7), round(m.y * 1e7))
+
+    def _on_mission_item_int(self, m: Any) -> None:
+        self._take_item(m, m.x, m.y)
+
+    def _take_item(self, m: Any, x: int, y: int) -> None:
+        upload = self.upload
+        if upload is None or m.mission_type != upload.kind:
+            self._acknowledge(m, mavlink.MAV_MISSION_ERROR, m.mission_type)
+            return
+        if m.seq < len(upload.items):
+            return  # asked for twice, sent twice
+        if m.seq > len(upload.items):
+            self._acknowledge(m, mavlink.MAV_MISSION_INVALID_SEQUENCE, m.mission_type)
+            return
+        if not self._known(upload.kind, m.command):
+            self.upload = None
+            self.event("mission refused", items=upload.count, why=f"command {m.command}")
+            self._acknowledge(m, mavlink.MAV_MISSION_UNSUPPORTED, m.mission_type)
+            return
+        params = (m.param1, m.param2, m.param3, m.param4)
+        upload.items.append(Item(m.frame, m.command, *params, x, y, m.z))
+        upload.tries = 0
+        self._ask_or_finish(upload)
+
+    @staticmethod
+    def _known(kind: int, command: int) -> bool:
+        if kind == mavlink.MAV_MISSION_TYPE_FENCE:
+            return command in FENCE_POLYGONS or command in FENCE_CIRCLES
+        return command in NAVIGATION or FIRST_DO_COMMAND <= command < FENCE_POLYGONS[0]
+
+    def _acknowledge(self, m: Any, result: int, kind: int) -> None:
+        self.mav.mission_ack_send(m.get_srcSystem(), m.get_srcComponent(), result, kind)
+
+    def _list(self, kind: int) -> list[Item]:
+        if kind == mavlink.MAV_MISSION_TYPE_FENCE:
+            return self.fence_items
+        if kind != mavlink.MAV_MISSION_TYPE_MISSION or not self.items or self.home is None:
+            return self.items if kind == mavlink.MAV_MISSION_TYPE_MISSION else []
+        # item 0 is home, whatever was sent
+        x, y = self.earth.geographic(self.home)
+        home = Item(0, mavlink.MAV_CMD_NAV_WAYPOINT, 0.0, 0.0, 0.0, 0.0, x, y, self.home[2])
+        return [home, *self.items[1:]]
+
+    def _on_mission_request_list(self, m: Any) -> None:
+        count = len(self._list(m.mission_type))
+        sender = (m.get_srcSystem(), m.get_srcComponent())
+        self.mav.mission_count_send(*sender, count, m.mission_type)
+
+    def _on_mission_request_int(self, m: Any) -> None:
+        items = self._list(m.mission_type)
+        if m.seq >= len(items):
+            self._acknowledge(m, mavlink.MAV_MISSION_INVALID_SEQUENCE, m.mission_type)
+            return
+        item = items[m.seq]
+        self.mav.mission_item_int_send(
+            m.get_srcSystem(), m.get_srcComponent(), m.seq, item.frame, item.command,
+            int(m.seq == self.current), 1, *item[2:], m.mission_type,
+        )  # fmt: skip
+
+    _on_mission_request = _on_mission_request_int
+
+    def _on_mission_clear_all(self, m: Any) -> None:
+        self.upload = None
+        if m.mission_type in (mavlink.MAV_MISSION_TYPE_FENCE, mavlink.MAV_MISSION_TYPE_ALL):
+            self._take_fence([])
+        if m.mission_type in (mavlink.MAV_MISSION_TYPE_MISSION, mavlink.MAV_MISSION_TYPE_ALL):
+            self._take_mission([])
+        self._acknowledge(m, mavlink.MAV_MISSION_ACCEPTED, m.mission_type)
+
+    def _on_mission_set_current(self, m: Any) -> None:
+        self._set_current(m.seq)
+
+    def _set_current(self, seq: int) -> bool:
+        if not 0 <= seq < len(self.items):
+            return False
+        self.current, self.complete = max(seq, 1), False
+        if self.mode == AUTO:
+            self._stand()
+        self._send_mission_current()
+        return True
+
+    # fences
+
+    def _take_fence(self, items: list[Item]) -> None:
+        self.fence_items, self.fences, self.breached = items, [], False
+        corners: list[tuple[float, float]] = []
+        for item in items:
+            inside = item.command in FENCE_INCLUSIONS
+            corners.append(self.earth.local(item.x, item.y))
+            if item.command in FENCE_CIRCLES:
+                self.fences.append(Fence(inside, corners[-1:], item.p1))
+                corners = []
+            elif len(corners) >= item.p1:
+                self.fences.append(Fence(inside, corners))
+                corners = []
+        self.event("fence", points=len(items))
+
+    def _outside(self, point: Vec) -> bool:
+        enabled = self.params["FENCE_ENABLE"] != 0.0
+        return enabled and not all(fence.keeps(point) for fence in self.fences)
+
+    def _watch_fences(self) -> None:
+        """A breach is told, and nothing is done about it."""
+        breached = self.armed and self.estimate.well and self._outside(self.estimate.point)
+        if breached and not self.breached:
+            self.say("Fence Breached")
+            self.event("fence breached", at=rounded(self.estimate.point))
+        self.breached = breached
+
+    # commands
+
+    def _make_commands(self) -> None:
+        self.commands: dict[int, Callable[[Sequence[float]], int]] = {
+            mavlink.MAV_CMD_DO_SET_MODE: self._do_set_mode,
+            mavlink.MAV_CMD_COMPONENT_ARM_DISARM: self._do_arm,
+            mavlink.MAV_CMD_DO_CHANGE_SPEED: self._do_change_speed,
+            mavlink.MAV_CMD_DO_SET_MISSION_CURRENT: self._do_set_mission_current,
+            mavlink.MAV_CMD_DO_FENCE_ENABLE: self._do_fence_enable,
+            mavlink.MAV_CMD_SET_MESSAGE_INTERVAL: self._do_set_interval,
+            mavlink.MAV_CMD_REQUEST_MESSAGE: self._do_request_message,
+            mavlink.MAV_CMD_GET_HOME_POSITION: self._do_get_home,
+            mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: self._do_get_version,
+        }
+
+    def _on_command_long(self, m: Any) -> None:
+        do = self.commands.get(m.command)
+        params = [getattr(m, f"param{i}") for i in range(1, 5)]
+        result = mavlink.MAV_RESULT_UNSUPPORTED if do is None else do(params)
+        if do is None:
+            self.event("command refused", command=m.command, why="unsupported")
+        sender = (m.get_srcSystem(), m.get_srcComponent())
+        self.mav.command_ack_send(m.command, result, 0, 0, *sender)
+
+    _on_command_int = _on_command_long
+
+    def _refuse(self, command: int, why: str, result: int = mavlink.MAV_RESULT_DENIED) -> int:
+        self.say(why)
+        self.event("command refused", command=command, why=why)
+        return result
+
+    def _do_set_mode(self, p: Sequence[float]) -> int:
+        wanted = int(p[1]) if int(p[0]) & mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED else -1
+        why = self.refusal(wanted)
+        if why:
+            return self._refuse(mavlink.MAV_CMD_DO_SET_MODE, why)
+        self.enter(wanted, "command")
+        return int(mavlink.MAV_RESULT_ACCEPTED)
+
+    def _on_set_mode(self, m: Any) -> None:
+        # ArduPilot answers this message as if it were a command
+        result = self._do_set_mode((m.base_mode, m.custom_mode))
+        self.mav.command_ack_send(mavlink.MAVLINK_MSG_ID_SET_MODE, result)
+
+    def _do_arm(self, p: Sequence[float]) -> int:
+        if p[0] == 0.0:
+            self.disarm("command")
+        elif self.mode in STEERED and not self.estimate.well:
+            why, failed = "Arm: Mode requires position", mavlink.MAV_RESULT_FAILED
+            return self._refuse(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, why, failed)
+        else:
+            self.arm("command")
+        return int(mavlink.MAV_RESULT_ACCEPTED)
+
+    def _do_change_speed(self, p: Sequence[float]) -> int:
+        if p[2] == 0.0:
+            why = "Alt above home must be negative"
+            return self._refuse(mavlink.MAV_CMD_DO_CHANGE_SPEED, why)
+        if p[1] > 0.0:
+            self.body.speed = p[1]
+        return int(mavlink.MAV_RESULT_ACCEPTED)
+
+    def _do_set_mission_current(self, p: Sequence[float]) -> int:
+        done = self._set_current(int(p[0]))
+        return int(mavlink.MAV_RESULT_ACCEPTED if done else mavlink.MAV_RESULT_FAILED)
+
+    def _do_fence_enable(self, p: Sequence[float]) -> int:
+        self.params["FENCE_ENABLE"] = float(p[0] != 0.0)
+        return int(mavlink.MAV_RESULT_ACCEPTED)
+
+    def _do_set_interval(self, p: Sequence[float]) -> int:
+        stream = self.streams.get(int(p[0]))
+        if stream is None:
+            return int(mavlink.MAV_RESULT_FAILED)
+        self._set_interval(stream, stream.default if p[1] == 0.0 else p[1] * 1e-6)
+        return int(mavlink.MAV_RESULT_ACCEPTED)
+
+    def _do_request_message(self, p: Sequence[float]) -> int:
+        if int(p[0]) == mavlink.MAVLINK_MSG_ID_HOME_POSITION:
+            return self._do_get_home(p)
+        if int(p[0]) == mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION:
+            return self._do_get_version(p)
+        stream = self.streams.get(int(p[0]))
+        if stream is None:
+            return int(mavlink.MAV_RESULT_FAILED)
+        stream.send()
+        return int(mavlink.MAV_RESULT_ACCEPTED)
+
+    def _do_get_home(self, _: Sequence[float]) -> int:
+        sent = self._send_home()
+        return int(mavlink.MAV_RESULT_ACCEPTED if sent else mavlink.MAV_RESULT_FAILED)
+
+    def _do_get_version(self, _: Sequence[float]) -> int:
+        able = (
+            mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_INT
+            | mavlink.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
+            | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE
+            | mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_LOCAL_NED
+            | mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_GLOBAL_INT
+            | mavlink.MAV_PROTOCOL_CAPABILITY_MAVLINK2
+        )
+        version, nothing = 4 << 24 | 7 << 16, bytes(8)
+        self.mav.autopilot_version_send(
+            able, version, 0, 0, 0, nothing, nothing, nothing, 0, 0, self.options.sysid
+        )
+        return int(mavlink.MAV_RESULT_ACCEPTED)
+
+    # other messages
+
+    def receive(self, m: Any) -> None:
+        addressed = getattr(m, "target_system", 0) in (0, self.options.sysid)
+        handler = getattr(self, "_on_" + m.get_type().lower(), None)
+        if addressed and handler is not None:
+            handler(m)
+
+    def _on_heartbeat(self, m: Any) -> None:
+        if m.get_srcSystem() == GROUND_STATION:
+            self.heard = self.t
+
+    def _on_manual_control(self, m: Any) -> None:
+        if getattr(m, "target", self.options.sysid) == self.options.sysid:
+            self.input = self.t
+
+    _on_rc_channels_override = _on_manual_control
+
+    def _on_request_data_stream(self, m: Any) -> None:
+        rate = float(m.req_message_rate) if m.start_stop else 0.0
+        for stream in self.streams.values():
+            if stream.group and m.req_stream_id in (mavlink.MAV_DATA_STREAM_ALL, stream.group):
+                self._set_interval(stream, 1.0 / rate if rate > 0.0 else 0.0)
+
+    def _set_interval(self, stream: Stream, interval: float) -> None:
+        # negative for never; more than a message in a step there is not
+        stream.interval = max(interval, STEP) if interval > 0.0 else 0.0
+        stream.due = self.t + stream.interval
+
+    def _on_param_request_read(self, m: Any) -> None:
+        named = m.param_id if isinstance(m.param_id, str) else m.param_id.decode()
+        known = list(self.params)
+        name = known[m.param_index] if 0 <= m.param_index < len(known) else named
+        if name in self.params:
+            self._send_param(name)
+
+    def _on_param_request_list(self, _: Any) -> None:
+        for name in self.params:
+            self._send_param(name)
+
+    def _on_param_set(self, m: Any) -> None:
+        name = m.param_id if isinstance(m.param_id, str) else m.param_id.decode()
+        if name in self.params:
+            self.params[name] = float(m.param_value)
+            self.event("param", param=name, value=self.params[name])
+            if name == "WPNAV_SPEED":
+                self._reset_speed()
+            self._send_param(name)
+
+    def _send_param(self, name: str) -> None:
+        known = list(self.params)
+        kind = mavlink.MAV_PARAM_TYPE_REAL32
+        value, index = self.params[name], known.index(name)
+        self.mav.param_value_send(name.encode(), value, kind, len(known), index)
+
+    # telemetry
+
+    def _make_streams(self) -> None:
+        position, status = mavlink.MAV_DATA_STREAM_POSITION, mavlink.MAV_DATA_STREAM_EXTENDED_STATUS
+        attitude, rest = mavlink.MAV_DATA_STREAM_EXTRA1, mavlink.MAV_DATA_STREAM_EXTRA3
+        self.streams: dict[int, Stream] = {
+            mavlink.MAVLINK_MSG_ID_HEARTBEAT: Stream(self._send_heartbeat, 1.0, 0),
+            mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: Stream(self._send_local, 0.1, position),
+            mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: Stream(self._send_global, 0.1, position),
+            mavlink.MAVLINK_MSG_ID_ATTITUDE: Stream(self._send_attitude, 0.1, attitude),
+            mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT: Stream(self._send_ekf, 0.5, rest),
+            mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: Stream(self._send_time, 1.0, rest),
+            mavlink.MAVLINK_MSG_ID_SYS_STATUS: Stream(self._send_status, 1.0, status),
+            mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: Stream(self._send_mission_current, 1.0, status),
+        }
+        for stream in self.streams.values():
+            stream.interval = stream.default
+
+    def _send_heartbeat(self) -> None:
+        flags = (
+            mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | mavlink.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED
+        )
+        state = mavlink.MAV_STATE_STANDBY
+        if self.armed:
+            flags, state = flags | mavlink.MAV_MODE_FLAG_SAFETY_ARMED, mavlink.MAV_STATE_ACTIVE
+        kind, autopilot = mavlink.MAV_TYPE_SUBMARINE, mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA
+        self.mav.heartbeat_send(kind, autopilot, flags, self.mode, state)
+
+    def _send_local(self) -> None:
+        # until there is an origin there is nothing to send
+        if self.estimate.ever:
+            point, velocity = ned(self.estimate.point), ned(self.estimate.velocity)
+            self.mav.local_position_ned_send(self.ms, *point, *velocity)
+
+    def _send_global(self) -> None:
+        latitude, longitude, altitude, height = 0, 0, 0.0, 0.0
+        if self.estimate.ever:
+            latitude, longitude = self.earth.geographic(self.estimate.point)
+            altitude = self.estimate.point[2]
+            height = altitude - (self.home[2] if self.home is not None else 0.0)
+        speeds = [round(100.0 * v) for v in ned(self.estimate.velocity)]
+        heading = round(math.degrees(self.body.yaw) % 360.0 * 100.0) % 36000
+        self.mav.global_position_int_send(
+            self.ms, latitude, longitude, round(altitude * 1e3), round(height * 1e3),
+            *speeds, heading,
+        )  # fmt: skip
+
+    def _send_attitude(self) -> None:
+        yaw = (self.body.yaw + math.pi) % (2.0 * math.pi) - math.pi
+        self.mav.attitude_send(self.ms, 0.0, 0.0, yaw, 0.0, 0.0, 0.0)
+
+    def _send_ekf(self) -> None:
+        flags = EKF_WELL if self.estimate.well else EKF_LOST
+        self.mav.ekf_status_report_send(flags, 0.1, 0.1, 0.05, 0.1, 0.0)
+
+    def _send_time(self) -> None:
+        self.mav.system_time_send(0, self.ms)
+
+    def _send_status(self) -> None:
+        link = (0, 0, 0, 0, 0, 0)
+        self.mav.sys_status_send(SENSORS, SENSORS, SENSORS, 200, 15800, 500, 90, *link)
+
+    def _send_mission_current(self) -> None:
+        seq = max(min(self.current, len(self.items) - 1), 0)
+        self.mav.mission_current_send(seq)
+
+    def _send_home(self) -> bool:
+        if self.home is None:
+            return False
+        latitude, longitude = self.earth.geographic(self.home)
+        height = round(self.home[2] * 1e3)
+        level, nothing = (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+        self.mav.home_position_send(
+            latitude, longitude, height, *ned(self.home), level, *nothing, self.ms * 1000
+        )
+        return True
+
+    # what befalls it
+
+    def befall(self, line: bytes) -> bool:
+        """Obey a line of the test; false when it is the last."""
+        try:
+            what = json.loads(line)
+            return self._befall(what)
+        except (ValueError, TypeError, KeyError, IndexError) as error:
+            self.event("not understood", line=line.decode(errors="replace"), why=repr(error))
+            return True
+
+    def _befall(self, what: dict[str, Any]) -> bool:
+        do = what["do"]
+        if do == "quit":
+            return False
+        if do == "lose_estimate":
+            self.estimate.well = False
+            self.body.let_go()
+            self.event("estimate lost")
+            self.say("EKF3 stopped aiding", mavlink.MAV_SEVERITY_CRITICAL)
+        elif do == "restore_estimate":
+            self.estimate.well = True
+            self.estimate.update(self.body)
+            self.home = self.home or self.estimate.point
+            self.event("estimate restored")
+            self.say("EKF3 is using GPS", mavlink.MAV_SEVERITY_INFO)
+        elif do == "mode":
+            why = self.refusal(what["mode"])
+            if why:
+                self.event("mode refused", mode=what["mode"], why=why)
+            else:
+                self.enter(what["mode"], "pilot")
+        elif do == "arm":
+            self.arm("pilot")
+        elif do == "disarm":
+            self.disarm("pilot")
+        elif do == "silence":
+            self.silent_until = self.t + float(what["seconds"])
+            self.event("silence", seconds=float(what["seconds"]))
+        else:
+            self._shift(do, what)
+        return True
+
+    def _shift(self, do: str, what: dict[str, Any]) -> None:
+        """Move the vehicle, or only its estimate."""
+        if do == "jump":
+            east, north = what["by"]
+            self.estimate.jumped = plus(self.estimate.jumped, (east, north, 0.0))
+        elif do == "push":
+            east, north, up = what["by"]
+            self.body.point = plus(self.body.point, (east, north, up))
+        elif do == "place":
+            east, north, up = what["at"]
+            self.body.place((float(east), float(north), float(up)))
+        else:
+            raise ValueError(f"unknown: {do}")
+        self.estimate.update(self.body)
+        self.event(do, true=rounded(self.body.point), est=rounded(self.estimate.point))
+
+
+def serve(vehicle: Vehicle, wire: Wire, pace: float) -> None:
+    """Keep the simulation at its pace until standard input ends."""
+    selector = selectors.DefaultSelector()
+    selector.register(wire.socket, selectors.EVENT_READ)
+    selector.register(0, selectors.EVENT_READ)
+    rest = b""
+    due = time.monotonic()
+    while True:
+        for key, _ in selector.select(max(0.0, due - time.monotonic())):
+            if key.fileobj != 0:
+                continue
+            data = os.read(0, 65536)
+            *lines, rest = (rest + data).split(b"\n")
+            going = [vehicle.befall(line) for line in lines if line.strip()]
+            if not data or not all(going):
+                return
+        # read before every step, or what was sent in time would seem to have come late
+        now = time.monotonic()
+        for _ in range(BURST):
+            for message in wire.messages():
+                vehicle.receive(message)
+            if due > now:
+                break
+            vehicle.step()
+            due += STEP / pace
+        due = max(due, now)
+
+
+def numbers(count: int) -> Callable[[str], tuple[float, ...]]:
+    """Numbers of a command line, separated by commas."""
+
+    def parse(text: str) -> tuple[float, ...]:
+        values = tuple(float(v) for v in text.split(","))
+        if len(values) != count:
+            raise ValueError(text)
+        return values
+
+    return parse
+
+
+def address(text: str) -> tuple[str, int]:
+    host, port = text.rsplit(":", 1)
+    return host, int(port)
+
+
+def param(text: str) -> tuple[str, float]:
+    name, value = text.split("=")
+    return name, float(value)
+
+
+def options_of(arguments: Sequence[str]) -> Options:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    add = parser.add_argument
+    add("--to", type=address, required=True, metavar="HOST:PORT", help="the ground station")
+    add("--seed", type=int, default=0)
+    add("--pace", type=float, default=1.0, help="simulated seconds in a second")
+    add("--speed", type=float, default=0.5, help="m/s")
+    add("--noise", type=float, default=0.0, help="of the estimate: metres of spread")
+    add("--smooth", type=float, default=0.0, help="seconds of memory of that noise; 0: white")
+    add("--drift", type=float, default=0.0, help="of the estimate, slow: metres of spread")
+    add("--origin", type=numbers(2), default=(55.5, 12.7), metavar="LAT,LON")
+    add("--start", type=numbers(3), default=(0.0, 0.0, 0.0), metavar="E,N,U", help="--start=-1,0,0")
+    add("--sysid", type=int, default=1)
+    add("--no-estimate", dest="estimate", action="store_false", help="without a position")
+    add("--param", dest="params", type=param, action="append", default=[], metavar="NAME=VALUE")
+    given = vars(parser.parse_args(arguments))
+    return Options(**{**given, "params": dict(given["params"])})
+
+
+def main(arguments: Sequence[str]) -> int:
+    options = options_of(arguments)
+
+    def end(*_: object) -> None:
+        raise SystemExit(0)
+
+    signal.signal(signal.SIGTERM, end)
+    signal.signal(signal.SIGINT, end)
+    wire = Wire(options.to)
+    vehicle = Vehicle(options, wire)
+    vehicle.event("started", port=wire.port)
+    with contextlib.suppress(BrokenPipeError):
+        serve(vehicle, wire, options.pace)
+    return 0
+
+
+# for tests
+
+
+class Autopilot:
+    """The process, for a test: ``with Autopilot(pace=20) as a``.
+
+    Options are those of the command line; ``params`` is a dictionary. The ground station listens
+    on ``port``; ``own`` is the port of the vehicle itself.
+    """
+
+    def __init__(
+        self,
+        *,
+        port: int | None = None,
+        estimate: bool = True,
+        params: dict[str, float] | None = None,
+        **options: float | Sequence[float],
+    ) -> None:
+        self.port = port or free_port()
+        self.rows: list[dict[str, Any]] = []
+        self.events: list[dict[str, Any]] = []
+        self.own = 0
+        self.command = [sys.executable, str(Path(__file__)), f"--to=127.0.0.1:{self.port}"]
+        for name, value in {"pace": 20.0, **options}.items():
+            text = ",".join(map(str, value)) if isinstance(value, Sequence) else str(value)
+            self.command.append(f"--{name}={text}")
+        self.command += [f"--param={name}={value}" for name, value in (params or {}).items()]
+        self.command += [] if estimate else ["--no-estimate"]
+
+    def __enter__(self) -> Autopilot:
+        self.process = subprocess.Popen(
+            self.command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        )
+        self.reader = threading.Thread(target=self._read, daemon=True)
+        self.reader.start()
+        try:
+            self.own = self.event("started")["port"]
+        except BaseException:
+            self.__exit__()
+            raise
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        assert self.process.stdin is not None
+        assert self.process.stdout is not None
+        try:
+            with contextlib.suppress(OSError):
+                self.process.stdin.close()
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                self.process.wait(3.0)
+        finally:
+            self.process.kill()
+            self.process.wait()
+            self.reader.join(10.0)
+            self.process.stdout.close()
+
+    def _read(self) -> None:
+        assert self.process.stdout is not None
+        for line in self.process.stdout:
+            row = json.loads(line)
+            (self.events if "event" in row else self.rows).append(row)
+
+    def tell(self, **command: object) -> None:
+        """Send a line to the vehicle: ``tell(do="push", by=[1, 0, 0])``."""
+        assert self.process.stdin is not None
+        self.process.stdin.write(json.dumps(command) + "\n")
+        self.process.stdin.flush()
+
+    def truth(self) -> np.ndarray:
+        """Time, east, north and up of where the vehicle really was, a row each."""
+        import numpy as np  # not by the process, which has no need of it
+
+        return np.array([[r["t"], *r["true"]] for r in list(self.rows)]).reshape(-1, 4)
+
+    @property
+    def now(self) -> float:
+        """Simulated seconds, to the last row."""
+        return float(self.rows[-1]["t"]) if self.rows else 0.0
+
+    def until(self, condition: Callable[[], Any], seconds: float = 30.0) -> Any:
+        """Wait for something to come true; seconds are those of the wall."""
+        end = time.monotonic() + seconds
+        while True:
+            found = condition()
+            if found:
+                return found
+            assert self.process.poll() is None or self.reader.is_alive(), "the vehicle has ended"
+            assert time.monotonic() < end, f"waited in vain; events: {self.events[-10:]}"
+            time.sleep(0.004)
+
+    def event(self, name: str, seconds: float = 30.0, since: float = 0.0) -> dict[str, Any]:
+        """Wait for an event, not before a simulated time."""
+
+        def found() -> dict[str, Any] | None:
+            named = (e for e in list(self.events) if e["event"] == name and e["t"] >= since)
+            return next(named, None)
+
+        event: dict[str, Any] = self.until(found, seconds)
+        return event
+
+    def sleep(self, simulated: float) -> None:
+        """Wait for simulated time to go by."""
+        end = self.now + simulated
+        self.until(lambda: self.now >= end, 30.0 + simulated)
+
+
+def free_port() -> int:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as s:
+        s.bind(("127.0.0.1", 0))
+        return int(s.getsockname()[1])
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
