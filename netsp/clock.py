@@ -195,6 +195,16 @@ def until_interrupt(limit: TimeLimit) -> Iterator[Clock]:
         clock.close()
 
 
+@contextmanager
+def whole_or_interrupted() -> Iterator[None]:
+    """Work that is not broken off in the middle: Ctrl-C interrupts at its end. Compiled code that
+    hands over tuples calls Python for it, and an interrupt just then is more than it can take."""
+    with until_interrupt(None) as clock:
+        yield
+        if clock.stopped:
+            raise KeyboardInterrupt
+
+
 class _Stop:
     """Whether somebody asks for an end, and whose flags are then set."""
 

@@ -7,11 +7,16 @@ import numpy as np
 import pytest
 
 from netsp import Circle, Problem, solve
+from netsp.clock import Clock
+from netsp.command.main import main
 from netsp.errors import InputError
 from netsp.hsignature.wordtable import times, times_inverse
 from netsp.online import Scene
 from netsp.online.mission import Mission
 from netsp.online.scene.scene import scene_of
+from netsp.online.surprises import SceneSurprises
+from netsp.space.bound import bound_of_all
+from netsp.space.judge import verify_mission
 from netsp.space.labels import LENGTHS, STEPS, axes_of, lower_end, nth_axis, staircase
 from netsp.space.plan import plan
 from netsp.space.water import Water
@@ -153,3 +158,93 @@ def test_a_search_finds_the_shortest_words_of_each_cell(tmp_path):
         has = found.word[place] >= 0
         assert sorted(found.far[place][has].tolist()) == sorted(lengths)[:most]
         assert len(set(found.word[place][has].tolist())) == has.sum()
+
+
+# what a reviewer found
+
+
+BOX = Scene(
+    solids=[{"box": {"center": [0, 0, 0], "size": [2, 2, 2]}}], bounds=[-6, -6, -6, 6, 6, 6]
+)
+
+
+def about_a_box(**more) -> Mission:
+    return Mission(
+        scene="-",
+        anchor=(-5, 0, 0),
+        start=(-5, 0, 0),
+        waypoints=[(3, 0, 0.2)],
+        tether_length=20.0,
+        **more,
+    )
+
+
+def test_a_tour_with_no_clearance_goes_round_a_solid_and_not_through_it():
+    planned = plan(about_a_box(clearance=0.0), scene=BOX, time_limit=20).planned()
+    verdict = verify_mission(planned, scene=BOX)
+    assert verdict, str(verdict)
+
+
+def test_a_tour_that_leaves_the_scene_is_not_verified_and_one_far_off_is_told_at_once():
+    planned = plan(about_a_box(clearance=0.2), scene=BOX, time_limit=20).planned()
+    for beyond in ((-7.0, 0.0, 0.0), (0.0, 0.0, -1e9)):
+        home = (planned.tour.home[0], beyond, *planned.tour.home[1:])
+        tour = planned.tour.model_copy(update={"home": home}).mended()
+        failed = [
+            c.name
+            for c in verify_mission(planned.model_copy(update={"tour": tour}), scene=BOX).checks
+            if not c.passed
+        ]
+        assert failed == ["within the scene and the tether"]
+
+
+def test_two_stops_cannot_be_the_same_waypoint_of_the_file():
+    mission = about_a_box(clearance=0.2).model_copy(
+        update={"waypoints": Mission(
+            scene="-", anchor=(0, 0, 0), start=(0, 0, 0), waypoints=[(3, 0, 0.2), (3, 2, 0)],
+            tether_length=9,
+        ).waypoints}
+    )  # fmt: skip
+    planned = plan(mission, scene=BOX, time_limit=20).planned()
+    stops = tuple(s.model_copy(update={"given_as": 7}) for s in planned.tour.stops)
+    lied = planned.model_copy(update={"tour": planned.tour.model_copy(update={"stops": stops})})
+    assert not verify_mission(lied, scene=BOX)
+
+
+def test_a_tether_too_short_for_the_start_is_told_before_anything_is_sought():
+    mission = about_a_box(clearance=0.2).model_copy(
+        update={"start": (5.0, 0.0, 0.0), "tether_length": 6.0}
+    )
+    with pytest.raises(InputError, match="tether_length: 6 is shorter than the path"):
+        plan(mission, scene=BOX, time_limit=1)
+
+
+def test_surprises_that_cannot_be_are_refused_before_the_flight():
+    mission, field = about_a_box(clearance=0.2), BOX.field()
+    for event, field_name in (
+        ({"add_waypoint": [0, 0, 0]}, "add_waypoint"),
+        ({"add_waypoint": [0, 0, 30]}, "add_waypoint"),
+        ({"push": [1e9, 0, 0]}, "push"),
+    ):
+        told = {"schema_version": 1, "events": [{"time": 1.0, **event}]}
+        surprises = SceneSurprises.model_validate(told)
+        with pytest.raises(InputError, match=rf"events\[0\].{field_name}"):
+            surprises.check_places(mission, BOX, field)
+
+
+def test_a_flight_is_not_written_over_its_mission(tmp_path):
+    planned = plan(about_a_box(clearance=0.2), scene=BOX, time_limit=20).planned()
+    (tmp_path / "scene.json").write_text(BOX.model_dump_json(exclude_none=True))
+    data = {**planned.model_dump(mode="json", exclude_none=True), "scene": "scene.json"}
+    file = tmp_path / "mission.json"
+    file.write_text(json.dumps(data))
+    assert main(["execute", str(file), "-o", str(tmp_path), "--quiet"]) == 2
+    assert json.loads(file.read_text()) == data
+
+
+def test_a_bound_on_all_tours_is_found_among_classes_of_which_some_are_not_found():
+    mission = about_a_box(clearance=0.2)
+    found = plan(mission, scene=BOX, time_limit=20)
+    for seconds in (0.05, 5.0):
+        bound = bound_of_all(found.ways, sorted(found.order), Clock(seconds))
+        assert bound is None or bound <= found.length * 1.001

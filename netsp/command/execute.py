@@ -115,7 +115,8 @@ def _mission(args: argparse.Namespace) -> int:
         options = replace(options, planning_limit=args.planning_limit)
     (run,) = fly(
         mission, [planner], output=args.output, quiet=args.quiet, surprises=surprises,
-        source=args.surprise, check=True, vehicle=args.vehicle, options=options, seed=args.seed,
+        source=args.surprise, check=True, inputs=(args.problem, args.surprise),
+        vehicle=args.vehicle, options=options, seed=args.seed,
     )  # fmt: skip
     s = run.summary
     if s["defects"]:

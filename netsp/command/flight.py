@@ -9,7 +9,10 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from netsp.command.types import check_writable
+
 if TYPE_CHECKING:
+    from netsp.clock import Clock
     from netsp.online.log import LogRow, Run
     from netsp.online.mission import Mission
     from netsp.online.planner import Planner
@@ -17,13 +20,35 @@ if TYPE_CHECKING:
     from netsp.online.surprises import SceneSurprises
 
 
+WRITTEN = ("log.csv", "summary.json", "mission.json", "run.png", "run.html")
+"""Files of a flight."""
+
+
 def fly(
     mission: Mission, planners: Sequence[str], *, output: str | None, quiet: bool,
-    surprises: SceneSurprises | None, source: str | None, check: bool = False, **how: Any,
+    surprises: SceneSurprises | None, source: str | None, check: bool = False,
+    inputs: Sequence[str | None] = (), **how: Any,
 ) -> list[Run]:  # fmt: skip
     """Fly a mission by each of some planners, tell what came of it, and write the first run.
 
-    `check` has the mission's tour judged before; `how` is as of `simulate`."""
+    `check` has the mission's tour judged before; `inputs` are files that must not be overwritten;
+    `how` is as of `simulate`. Ctrl-C ends the flight, and what was flown is written."""
+    from netsp.clock import until_interrupt
+
+    if output is not None:
+        there = [str(Path(output) / name) for name in WRITTEN if (Path(output) / name).exists()]
+        check_writable(*there, inputs=inputs)
+    with until_interrupt(None) as clock:
+        return _flown(
+            mission, planners, clock, output=output, quiet=quiet, surprises=surprises,
+            source=source, check=check, **how,
+        )  # fmt: skip
+
+
+def _flown(
+    mission: Mission, planners: Sequence[str], clock: Clock, *, output: str | None, quiet: bool,
+    surprises: SceneSurprises | None, source: str | None, check: bool, **how: Any,
+) -> list[Run]:  # fmt: skip
     from netsp.command.compiling import compile_messages
     from netsp.command.plot_scene import tell, warn_of_scene
     from netsp.files import output_folder
@@ -39,10 +64,14 @@ def fly(
         if surprises is not None:
             surprises.check(scene, source or "", len(mission.waypoints))
         field = scene.field(on_progress=tell)
+        if surprises is not None:
+            surprises.check_places(mission, scene, field, source or "")
         if check:
             from netsp.space.judge import checked_mission
 
             checked_mission(mission, scene, field)
+        if clock.stopped:
+            raise KeyboardInterrupt
         if not quiet:
             warn_of_scene(
                 GeodesicTether(field, mission.delta), mission.delta, "lower the mission's delta"
@@ -50,7 +79,10 @@ def fly(
         for planner in planners:
             run = simulate(
                 mission, planner, scene=scene, field=field, surprises=surprises,
-                on_step=show_mission(mission, scene.units) if show else None, **how,
+                on_step=until_stopped(
+                    clock, show_mission(mission, scene.units) if show else None
+                ),
+                **how,
             )  # fmt: skip
             runs.append(run)
             if mission.tour is not None and not mission.track:
@@ -84,6 +116,20 @@ def draw_runs(runs: list[Run], scene: Scene, folder: Path) -> None:
     except ImportError:
         return
     flights.save_page(runs, scene, folder / "run.html")
+
+
+def until_stopped(
+    clock: Clock, on_step: Callable[[LogRow, Planner], None] | None
+) -> Callable[[LogRow, Planner], None]:
+    """The same, and the end of the flight at Ctrl-C."""
+
+    def step(row: LogRow, planner: Planner) -> None:
+        if clock.stopped:
+            raise KeyboardInterrupt
+        if on_step is not None:
+            on_step(row, planner)
+
+    return step
 
 
 def show_mission(mission: Mission, units: str) -> Callable[[LogRow, Planner], None]:

@@ -31,6 +31,8 @@ def run(args: argparse.Namespace) -> int:
     """Write the page, and return the exit code."""
     if not args.results.endswith((".jsonl", ".jsonl.gz")):
         check_writable(args.output, inputs=(args.results, args.problem))
+        if args.figures is not None:
+            raise InputError(f"--figures: is for comparisons, and {args.results} is none")
         if _of_mission(args.results):
             from netsp.report.mission import report_mission
 

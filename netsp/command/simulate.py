@@ -86,7 +86,8 @@ def run(args: argparse.Namespace) -> int:
     runs = fly(
         mission, [args.planner, args.compare] if args.compare else [args.planner],
         output=args.output, quiet=args.quiet, surprises=surprises, source=args.surprise,
-        vehicle=args.vehicle, tether=args.tether_model, snap=args.snap, seed=args.seed,
+        inputs=(args.mission, args.surprise), vehicle=args.vehicle, tether=args.tether_model,
+        snap=args.snap, seed=args.seed,
         options=PlannerOptions(args.paths, args.refine, args.seed),
     )  # fmt: skip
     if any(r.summary["defects"] for r in runs):

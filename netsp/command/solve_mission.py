@@ -75,9 +75,10 @@ def solve(
     compiling = contextlib.nullcontext() if quiet else compile_messages(sys.stderr)
     with stages or contextlib.nullcontext(), compiling:
         scene = mission.load_scene()
-        field = scene.field()
+        from netsp.command.plot_scene import tell, warn_of_scene
+
+        field = scene.field(on_progress=None if quiet else tell)
         if not quiet:
-            from netsp.command.plot_scene import warn_of_scene
             from netsp.online.tether import GeodesicTether
 
             warn_of_scene(
@@ -138,6 +139,8 @@ def summary(
         verdict = f"the shortest along {legs} of the tether"
     elif tour.lower_bound is not None:
         verdict = f"bound {tour.lower_bound:.6g} along {legs} of the tether"
+        if tour.gap is not None and tour.gap <= 1e-6:
+            verdict = f"the shortest along {legs} of the tether; there was no time for all legs"
     elif tour.solver == AS_GIVEN:
         verdict = "in the order given, for no better one was found"
     else:
@@ -145,8 +148,8 @@ def summary(
     lines = [f"tour     {tour.length:.6g} {units}, {verdict}"]
     if tour.bound_of_all is not None:
         lines.append(
-            f"bound    {tour.bound_of_all:.6g} {units} of all tours, whatever the tether does: gap "
-            f"{100 * (tour.gap_to_all or 0.0):.1f} %"
+            f"bound    {tour.bound_of_all:.6g} {units} of all tours to the waypoints themselves: "
+            f"gap {100 * (tour.gap_to_all or 0.0):.1f} %"
         )
     names = [f"#{n}" for n in found.order[: len(tour.stops)]]
     if len(names) > MOST_NAMED:

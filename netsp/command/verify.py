@@ -104,17 +104,17 @@ def _path_in_scene(args: argparse.Namespace) -> int:
 
 def _mission(args: argparse.Namespace) -> int:
     """Judge a planned mission."""
-    for name, flag in (
-        ("solution", "SOLUTION"),
-        ("measures", "--measures"),
-        ("margins", "--margins"),
-    ):
+    if args.solution:
+        raise InputError(f"SOLUTION: {args.problem} is a mission; expected nothing beside it")
+    for name, flag in (("measures", "--measures"), ("margins", "--margins")):
         if getattr(args, name):
-            raise InputError(f"{flag}: {args.problem} is a mission; expected nothing beside it")
+            raise InputError(f"{flag}: is for problems, and {args.problem} is a mission")
+    from netsp.clock import whole_or_interrupted
     from netsp.online.mission import Mission
     from netsp.space.judge import verify_mission
 
-    verdict = verify_mission(Mission.load(args.problem))
+    with whole_or_interrupted():
+        verdict = verify_mission(Mission.load(args.problem))
     if not args.quiet:
         print(verdict)
         print("verified" if verdict else "NOT VERIFIED")

@@ -79,6 +79,28 @@ def check_bounds(mission: Mission, scene: Scene) -> None:
             )
 
 
+def check_tether(mission: Mission, length: float) -> None:
+    """Refuse a tether that does not lead from the anchor to where the robot begins.
+
+    Parameters
+    ----------
+    mission : Mission
+        The mission.
+    length : float
+        Of the taut tether there, metres.
+
+    Raises
+    ------
+    InputError
+        It is longer than the mission's tether.
+    """
+    if length > mission.tether_length:
+        raise InputError(
+            f"tether_length: {mission.tether_length:g} is shorter than the path from anchor to "
+            f"start, {length:.4g}"
+        )
+
+
 def check_size(mission: Mission) -> None:
     """InputError for a mission that would take for ever, or whose measures make no sense."""
     for name, value in (("delta", mission.delta), ("reach", mission.reach)):

@@ -12,7 +12,7 @@ import numpy as np
 from netsp.errors import InputError, interrupted
 from netsp.online.coverage import Coverage, patches_of
 from netsp.online.laid import first_tether, present_tether
-from netsp.online.limits import check_bounds, check_names, check_size
+from netsp.online.limits import check_bounds, check_names, check_size, check_tether
 from netsp.online.log import LogRow, Run
 from netsp.online.mission import TURN_TIME, Mission, MissionWaypoint
 from netsp.online.paths.tree import Grid
@@ -157,11 +157,7 @@ def simulate(
         surprises.check(scene, "", len(mission.waypoints))
     if track is not None:
         track.check(field, mission.delta)
-    if taut.length > mission.tether_length:
-        raise InputError(
-            f"tether_length: {mission.tether_length:g} is shorter than the path from anchor to "
-            f"start, {taut.length:.4g}"
-        )
+    check_tether(mission, taut.length)
     robot = make_vehicle(vehicle, np.array(mission.begin), mission.speed)
     believed = None if tether == "geodesic" else make_tether(tether, field, mission.delta)
     chosen = make_planner(planner, mission, field, believed or tethers, grid, options)

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from typing import Annotated, Any, ClassVar, Literal, Self
 
+import numpy as np
 from pydantic import ConfigDict, Field, model_validator
 
 from netsp.errors import InputError
 from netsp.fields import Name, NonNegative, Point3, Positive
 from netsp.files import FileModel
 from netsp.models import Model
-from netsp.online.mission import WaypointLike
+from netsp.online.limits import check_bounds
+from netsp.online.mission import Mission, WaypointLike
+from netsp.online.scene.field import DistanceField
 from netsp.online.scene.scene import Scene, Solid
 
 KINDS = (
@@ -140,6 +143,45 @@ class SceneSurprises(FileModel):
             except InputError as error:
                 where = f"{source}: " if source else ""
                 raise InputError(f"{where}events[{k}]: {error}") from None
+
+    def check_places(
+        self, mission: Mission, scene: Scene, field: DistanceField, source: str = ""
+    ) -> None:
+        """Refuse waypoints that a mission file could not have either, and pushes farther than a
+        tether.
+
+        Parameters
+        ----------
+        mission : Mission
+            What is flown.
+        scene : Scene
+            The map; what has appeared by then does not count.
+        field : DistanceField
+            The scene's field.
+        source : str
+            What messages call these surprises; nothing if it is empty.
+
+        Raises
+        ------
+        InputError
+            A waypoint in a solid or out of bounds; a push of more than twice the tether.
+        """
+        for k, event in enumerate(self.events):
+            where = f"{source}: events[{k}]" if source else f"events[{k}]"
+            if event.add_waypoint is not None:
+                more = mission.model_copy(update={"waypoints": (event.add_waypoint,), "tour": None})
+                try:
+                    check_bounds(more, scene)
+                    more.checked_waypoints(field)
+                except InputError as error:
+                    raise InputError(f"{where}.add_waypoint: {error}") from None
+            if event.push is not None:
+                far = float(np.linalg.norm(event.push))
+                if far > 2.0 * mission.tether_length:
+                    raise InputError(
+                        f"{where}.push: carries the robot {far:.4g} m off; expected at most twice "
+                        f"the tether's length, {2.0 * mission.tether_length:g}"
+                    )
 
 
 def changed(solids: tuple[Solid, ...], event: SceneEvent) -> tuple[Solid, ...]:

@@ -137,6 +137,23 @@ class PlannedTour(Model):
         """Of the tether all along, but for the way home, metres."""
         return max((stop.longest_tether for stop in self.stops), default=0.0)
 
+    def mended(self) -> PlannedTour:
+        """The same paths, of which nothing is proven any more, and their length.
+
+        Returns
+        -------
+        PlannedTour
+            Feasible, without bounds.
+        """
+        legs = [*(stop.path for stop in self.stops), self.home]
+        return self.model_copy(
+            update={
+                "length": float(sum(polylines.length(np.array(leg)) for leg in legs)),
+                "status": Status.FEASIBLE, "lower_bound": None, "gap": None,
+                "bound_of_all": None, "gap_to_all": None,
+            }
+        )  # fmt: skip
+
     def against(self, begin: Point3, start: Point3, places: Floats, tolerance: float) -> str | None:
         """What does not match the mission that the tour is part of.
 

@@ -164,12 +164,19 @@ class Board:
         heapq.heapify(waiting)
         while waiting:
             far, v = heapq.heappop(waiting)
-            if far > self._home[v]:
+            if far > self._home[v] or not self._has_clearance(v):
                 continue
             for w, leg in beside.get(v, ()):
                 if self._out[w] is None and far + leg < self._home[w]:
                     self._home[w], self._via[w] = far + leg, v
                     heapq.heappush(waiting, (far + leg, w))
+
+    def _has_clearance(self, v: int) -> bool:
+        """Whether others may be reached by way of a state: its waypoint may be nearer to solids
+        than the clearance, and others' paths may not."""
+        place = self.states.places.points[self.states.all[v].point]
+        mission = self.water.mission
+        return float(self.water.field.distance(place)) >= mission.clearance - 0.5 * mission.delta
 
     @property
     def reached(self) -> set[int]:

@@ -105,6 +105,10 @@ def checked_mission(mission: Mission, scene: Scene, field: DistanceField) -> Non
         raise InputError(f"tour: fails its check {failed[0].name!r}: {failed[0].detail}")
 
 
+def _shown(point: Floats) -> str:
+    return f"({', '.join(f'{v:.4g}' for v in point)})"
+
+
 @dataclass
 class _Judge:
     mission: Mission
@@ -113,8 +117,12 @@ class _Judge:
     field: DistanceField
 
     def run(self) -> list[Check]:
+        within = self._within()
+        if not within.passed:  # nothing is known of the water there
+            return [self._joined(), within, self._length(), self._bounds()]
         return [
-            self._joined(), self._left_out(), self._clear(), *self._words(), *self._tethers(),
+            self._joined(), within, self._left_out(), self._clear(), *self._words(),
+            *self._tethers(),
             self._length(), self._bounds(),
         ]  # fmt: skip
 
@@ -132,6 +140,21 @@ class _Judge:
     def _name(self, leg: int) -> str:
         return "the way home" if leg == len(self.tour.stops) else f"the way to stop {leg}"
 
+    def _within(self) -> Check:
+        """No path leads where the scene ends, nor farther than any tether."""
+        line, mission, name = self.tour.line, self.mission, "within the scene and the tether"
+        if self.scene.bounds is not None:
+            low, high = np.array(self.scene.bounds[:3]), np.array(self.scene.bounds[3:])
+            out = np.flatnonzero(((line < low) | (line > high)).any(axis=1))
+            if len(out):
+                return Check(name, False, f"{_shown(line[out[0]])} is out of the scene's bounds")
+        far = np.linalg.norm(line - np.array(mission.anchor), axis=1)
+        k = int(far.argmax())
+        if far[k] > mission.tether_length * (1.0 + ROUNDING):
+            told = f"{_shown(line[k])} is {far[k]:.4g} m from the anchor"
+            return Check(name, False, f"{told}, the tether {mission.tether_length:g} long")
+        return Check(name, True, "all paths")
+
     def _joined(self) -> Check:
         """Validation asks the ends of each path; that one goes on where the other ended, here."""
         gaps = [float(np.linalg.norm(b[0] - a[-1])) for a, b in pairwise(self.legs)]
@@ -140,6 +163,13 @@ class _Judge:
         told = counted(len(self.tour.stops), "stop")
         told += f", {counted(left, 'waypoint')} left out" if left else ""
         good = off <= self.mission.reach
+        given = [stop.given_as for stop in self.tour.stops if stop.given_as is not None]
+        if len(set(given)) < len(given):
+            twice = next(n for n in given if given.count(n) > 1)
+            return Check(
+                "leads through the waypoints and home", False,
+                f"two stops say that they are waypoint #{twice} of the file",
+            )  # fmt: skip
         return Check(
             "leads through the waypoints and home", good,
             told if good else f"a leg begins {off:.3g} m from where the one before it ended",
@@ -171,6 +201,12 @@ class _Judge:
         tight = [k for k, leg in enumerate(self.legs) if not has_room(self.field, leg, mission)]
         free = all(self.field.line_of_sight(a, b, depth=1e-3) for a, b in pairwise(line))
         told = f"{room:.3g} m from the nearest, clearance {mission.clearance:g}"
+        if room < mission.clearance and not tight:
+            near = float(self.field.distance(np.vstack([mission.places, self.legs[0][:1]])).min())
+            told += (
+                f"; a waypoint or the start is {near:.3g} m from it" if near < mission.clearance
+                else f"; pulled taut, corners may be half of delta ({mission.delta:g}) nearer"
+            )  # fmt: skip
         if tight:
             told += f", which {self._name(tight[0])} does not keep within half of delta"
         return Check(

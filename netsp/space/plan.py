@@ -24,7 +24,7 @@ import numpy as np
 from netsp.arrays import Floats
 from netsp.clock import Clock, TimeLimit, until_interrupt
 from netsp.errors import InputError, LimitReachedError, counted
-from netsp.online.limits import check_bounds, check_size
+from netsp.online.limits import check_bounds, check_size, check_tether
 from netsp.online.mission import Mission
 from netsp.online.paths.tree import Grid
 from netsp.online.scene.field import DistanceField
@@ -239,11 +239,18 @@ def _planned(
     water = Water.within(mission, field, grid)
     # a robot that is farther out than the share may still come back
     limit = max(SHARE * mission.tether_length, water.present.length * (1.0 + ROUNDING))
+    check_tether(mission, water.present.length)
     tell("shortest tethers to each waypoint")
     effort = Effort.of(len(places))
     states = first_states(water, places, limit, effort, clock.part(STARTING))
     if not states.reached - {len(mission.waypoints)}:
         nearest = float(np.linalg.norm(mission.places - np.array(mission.anchor), axis=1).min())
+        if nearest <= limit:
+            raise InputError(
+                f"waypoints: no way in the water leads a tether of {limit:.4g} m to any of them, "
+                f"though the nearest is {nearest:.4g} m from the anchor as the crow flies: walls, "
+                f"or gaps narrower than a cell ({water.words.cells.cell:.3g} m)"
+            )
         raise InputError(
             f"waypoints: no tether within the limit reaches any of them: {limit:.4g} m "
             f"({100 * SHARE:g} % of tether_length), and the nearest is {nearest:.4g} m from the "

@@ -371,4 +371,6 @@ class RepairPlanner(PredictivePlanner):
         assert m is not None
         if m.tour is not None and m.tour.against(m.begin, m.start, m.places, m.reach):
             return m.model_copy(update={"tour": None})
+        if m.tour is not None and self.repairs and self._first is not None:
+            return m.model_copy(update={"tour": m.tour.mended()})
         return m

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from netsp.online.laid import first_tether, present_tether
 from netsp.online.mission import Mission
 from netsp.online.paths.tree import OPEN as ALL_FREE
 from netsp.online.paths.tree import Grid, free_cells, states_of, taut
-from netsp.online.scene.field import DistanceField
+from netsp.online.scene.field import DistanceField, pushed_out
 from netsp.online.scene.scene import Scene
 from netsp.online.simulate import grid_of
 from netsp.online.tether import GeodesicTether, Tether
@@ -27,6 +28,12 @@ LONGER = 1.35
 
 ROOM_STEP = 0.01
 """Metres that the room along a path may be overstated by."""
+
+DEEPEST = 1e-3
+"""Metres that a path may be inside a solid: as the judge has it."""
+
+LIFTS = 12
+"""Times that corners are led around the outside of what they cut off."""
 
 DIP = 0.15
 """Of delta: a tether's edges dip into a surface by an eighth of it (docs/tether.md)."""
@@ -230,7 +237,11 @@ class Water:
         ndarray, shape (m, 3)
             Metres.
         """
-        return taut(self.field, path, self.mission.clearance, self.mission.delta)
+        mission = self.mission
+        line = taut(self.field, path, mission.clearance, mission.delta)
+        if mission.clearance >= 0.5 * mission.delta:
+            return line
+        return lifted(self.field, line, min(mission.clearance, room_at_ends(self.field, path)))
 
     def driven(self, tether: Tether, path: Floats) -> tuple[Tether, float]:
         """A tether, once the robot has gone a path.
@@ -302,10 +313,61 @@ def has_room(field: DistanceField, path: Floats, mission: Mission) -> bool:
     bool
         Whether it does.
     """
-    return (
-        least_room(field, path)
-        >= min(mission.clearance, float(field.distance(path[[0, -1]]).min())) - 0.5 * mission.delta
+    return least_room(field, path) >= max(
+        min(mission.clearance, room_at_ends(field, path)) - 0.5 * mission.delta, -DEEPEST
     )
+
+
+def room_at_ends(field: DistanceField, path: Floats) -> float:
+    """How near the ends of a path are to solids.
+
+    Parameters
+    ----------
+    field : DistanceField
+        The scene.
+    path : ndarray, shape (k, 3)
+        Metres.
+
+    Returns
+    -------
+    float
+        Metres.
+    """
+    return float(field.distance(path[[0, -1]]).min())
+
+
+def lifted(field: DistanceField, path: Floats, room: float) -> Floats:
+    """A taut path whose corners dip below a clearance, led around the outside of them.
+
+    Parameters
+    ----------
+    field : DistanceField
+        The scene.
+    path : ndarray, shape (k, 3)
+        Metres.
+    room : float
+        Clearance that it is to keep, metres; its ends have it.
+
+    Returns
+    -------
+    ndarray, shape (m, 3)
+        The same class, longer by what arcs are longer than their chords.
+    """
+    for _ in range(LIFTS):
+        out, low = [path[0]], False
+        for a, b in pairwise(path):
+            between = polylines.dense(np.array([a, b]), ROOM_STEP)[:-1]
+            depth = field.distance(between) if len(between) else np.empty(0)
+            if len(depth) and depth.min() < room - 0.5 * DEEPEST:
+                lowest = between[int(depth.argmin())][None]
+                out.append(pushed_out(field, lowest, room + 0.1 * DEEPEST)[0])
+                low = True
+            out.append(b)
+        path = np.array(out)
+        path[1:-1] = pushed_out(field, path[1:-1], room + 0.1 * DEEPEST)
+        if not low:
+            break
+    return path
 
 
 def least_room(field: DistanceField, path: Floats) -> float:
