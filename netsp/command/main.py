@@ -131,6 +131,8 @@ COMMANDS = {
         "simulate": ("simulate", "run a mission in a scene with a taut tether"),
         "execute": ("execute", "carry a tour out online, and repair it on the way"),
         "order": ("order", "another name of solve, for missions"),
+        "fly": ("fly", "carry a tour out with a vehicle, over MAVLink"),
+        "guard": ("guard", "watch the tether of a vehicle that somebody else drives"),
     },
     "hand over": {
         "export": ("export", "write a tour as a mission file of a ground station"),

@@ -1,0 +1,253 @@
+"""`netsp fly`: a tour carried out by a vehicle, over MAVLink."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import queue
+import sys
+from collections.abc import Callable
+from contextlib import ExitStack, nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from netsp.command.guard import PORT
+from netsp.command.types import length, natural, seconds
+from netsp.errors import EXIT_DEFECT, EXIT_NOT_ALL, EXIT_NOT_VERIFIED, InputError
+
+if TYPE_CHECKING:
+    from netsp.execute.events import Event
+    from netsp.execute.log import Execution, ExecutionRow
+    from netsp.guard.page import Page
+    from netsp.link.frame import Frame
+    from netsp.problem import Problem
+    from netsp.solution import Solution
+
+EXAMPLE = "netsp fly problems/wharf.json tour.json --link udpin:14550 -o run"
+
+
+def arguments(p: argparse.ArgumentParser) -> None:
+    """Of the command line."""
+    p.add_argument("problem", metavar="PROBLEM", help="problem file (JSON)")
+    p.add_argument("solution", metavar="TOUR", help="its solution file (JSON)")
+    p.add_argument(
+        "--link", metavar="ADDRESS",
+        help="MAVLink over UDP: udpin:PORT (this machine only), udpin:HOST:PORT, udpout:HOST:PORT",
+    )  # fmt: skip
+    p.add_argument(
+        "--dry-run", action="store_true", help="show what would be sent, and send nothing"
+    )
+    p.add_argument(
+        "--system", type=natural, default=1, metavar="N",
+        help="system id of the vehicle; others are not listened to; default 1",
+    )  # fmt: skip
+    p.add_argument(
+        "--frame", metavar="NAME",
+        help="local (metres north, east, down of the base) or global; default global where the "
+        "problem has an origin",
+    )  # fmt: skip
+    p.add_argument(
+        "--speed", type=length, default=0.5, metavar="V",
+        help="what the vehicle is set to go at, m/s: for what a repair would save; default 0.5",
+    )  # fmt: skip
+    p.add_argument(
+        "--reach", type=length, default=0.3, metavar="R",
+        help="a vertex or goal this near is reached, m; default 0.3",
+    )  # fmt: skip
+    p.add_argument(
+        "--pace", type=length, default=1.0, metavar="F",
+        help="seconds of the vehicle for each of ours: 1, but in simulations that run faster",
+    )  # fmt: skip
+    p.add_argument("--surprise", metavar="FILE", help="surprise file (JSON): events on the way")
+    p.add_argument(
+        "--events", action="store_true",
+        help='take events from standard input, a JSON object a line: {"cancel_goal": "A3"}',
+    )  # fmt: skip
+    p.add_argument(
+        "--page", nargs="?", type=natural, const=PORT, metavar="PORT",
+        help=f"serve a page on this machine, which takes events too; default port {PORT}",
+    )  # fmt: skip
+    p.add_argument(
+        "--planning-limit", type=seconds, metavar="S",
+        help="seconds that a repair may take, while the vehicle holds its place; default 2",
+    )  # fmt: skip
+    p.add_argument("--seed", type=natural, default=0, metavar="N", help="of solvers; default 0")
+    p.add_argument("-o", "--output", metavar="RUN", help="folder for logs, summary and run.png")
+    p.add_argument("--quiet", action="store_true", help="no progress, no summary")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Fly the tour, write what happened, and return the exit code."""
+    if args.link is None and not args.dry_run:
+        raise InputError("--link: missing; expected the vehicle's address, or --dry-run")
+    from netsp.execute.events import Surprises
+    from netsp.judge import verify
+    from netsp.link.frame import Frame
+    from netsp.problem import Problem
+    from netsp.solution import Solution
+
+    problem, solution = Problem.load(args.problem), Solution.load(args.solution)
+    surprises = Surprises.load(args.surprise) if args.surprise else None
+    if surprises is not None:
+        surprises.check(problem, args.surprise)
+    judged = verify(problem, solution)
+    if not judged:
+        failed = next(c for c in judged.checks if not c.passed)
+        raise InputError(f"{args.solution}: fails its check {failed.name!r}: {failed.detail}")
+    frame = Frame(problem, args.frame)
+    if args.dry_run:
+        print_targets(problem, solution, frame)
+        return 0
+    done = _flown(args, problem, solution, frame, surprises)
+    if args.output is not None:
+        from netsp.execute.write import write_execution
+        from netsp.pictures.execution import save_execution
+
+        write_execution(done, args.output)
+        save_execution(done, Path(args.output) / "run.png")
+    else:
+        print(json.dumps(done.summary, indent=1, allow_nan=False))
+    if not args.quiet:
+        from netsp.execute.log import describe_execution
+
+        print(describe_execution(done), file=sys.stderr)
+        if done.stopped or done.interrupted:
+            print(way_home(done), file=sys.stderr)
+    s = done.summary
+    if s["defects"]:
+        return EXIT_DEFECT
+    if s["exceedance_s"] > 0.0 or (s["home"] and not s["tether_free"]):
+        return EXIT_NOT_VERIFIED
+    return EXIT_NOT_ALL if s["left_out"] or s["status"] != "done" else 0
+
+
+def _flown(
+    args: argparse.Namespace, problem: Problem, solution: Solution, frame: Frame, surprises: object
+) -> Execution:
+    from netsp.clock import until_interrupt
+    from netsp.command.compiling import compile_messages
+    from netsp.command.execute import show_execution
+    from netsp.execute.events import Surprises
+    from netsp.execute.log import ExecutionOptions
+    from netsp.execute.repair import REPLAN_S
+    from netsp.files import output_folder
+    from netsp.fly.flight import fly
+    from netsp.link.address import Address
+    from netsp.link.session import Session
+    from netsp.link.udp import UdpLink
+
+    def complain(text: str) -> None:
+        print(f"\nnetsp: {text}", file=sys.stderr)
+
+    options = ExecutionOptions(
+        speed=args.speed, reach=args.reach, seed=args.seed,
+        planning_limit=REPLAN_S if args.planning_limit is None else args.planning_limit,
+    )  # fmt: skip
+    with ExitStack() as stack:
+        stack.enter_context(output_folder(args.output))
+        stack.enter_context(nullcontext() if args.quiet else compile_messages(sys.stderr))
+        page, sources = None, []
+        if args.events:
+            from netsp.fly.inputs import events_of
+
+            sources.append(events_of(sys.stdin, complain))
+        if args.page is not None:
+            from netsp.guard.page import Page
+
+            page = stack.enter_context(Page(problem, args.page, takes_events=True))
+            print(f"the page is {page.address}", file=sys.stderr)
+            sources.append(_from(page, complain))
+        shows = not args.quiet and sys.stderr.isatty()
+        told = show_execution(problem) if shows else None
+        watched = None if page is None else _watched(problem, page, args.speed)
+        # the link last: while it is open, the vehicle counts on our heartbeats
+        session = Session(UdpLink(Address.parse(args.link)), frame, args.system, args.pace)
+        stack.callback(session.close)
+        clock = stack.enter_context(until_interrupt(None))
+
+        def on_step(row: ExecutionRow) -> None:
+            if clock.stopped:
+                raise KeyboardInterrupt
+            for text in session.texts():
+                if not args.quiet:
+                    print(f"\nthe vehicle says: {text}", file=sys.stderr)
+            for call in (told, watched):
+                if call is not None:
+                    call(row)
+
+        assert surprises is None or isinstance(surprises, Surprises)
+        done = fly(
+            problem, solution, session, options, surprises=surprises, on_step=on_step,
+            incoming=(lambda: [e for s in sources for e in s()]) if sources else None,
+        )  # fmt: skip
+        if done.stopped:
+            session.say(f"flight stopped: {done.stopped}", urgent=True)
+        return done
+
+
+def _from(page: Page, complain: Callable[[str], None]) -> Callable[[], list[Event]]:
+    """Events that pages have sent."""
+    from netsp.fly.inputs import event_of
+
+    def since() -> list[Event]:
+        found = []
+        while True:
+            try:
+                found.append(event_of(page.events.get_nowait()))
+            except queue.Empty:
+                return found
+            except InputError as error:
+                complain(f"not understood: {error}")
+
+    return since
+
+
+def _watched(problem: Problem, page: Page, speed: float) -> Callable[[ExecutionRow], None]:
+    """Has a page show what a guard makes of the flight."""
+    from netsp.guard.fix import Fix
+    from netsp.guard.guard import Guard, GuardOptions
+
+    guard = Guard(problem, GuardOptions(noise=0.05, drift=0.05, speed=max(speed, 0.1)))
+
+    def on_step(row: ExecutionRow) -> None:
+        place = (row.x, row.y, row.z)
+        page.tell(guard.take(Fix(row.time, place, mode=row.mode, estimate=True)).as_row())
+
+    return on_step
+
+
+def print_targets(problem: Problem, solution: Solution, frame: Frame) -> None:
+    """What would be sent, in its order."""
+    from netsp.execute.plan import HOME, legs_of
+    from netsp.export.write import altitude
+
+    head = ("latitude", "longitude", "above home") if frame.is_global else ("north", "east", "down")
+    print(f"{'target':>6}  {head[0]:>12} {head[1]:>12} {head[2]:>10}  what")
+    number = 0
+    for leg in legs_of(problem, solution):
+        for k, point in enumerate(leg.path[1:], 2):
+            place = (float(point[0]), float(point[1]), altitude(float(point[2])))
+            last = k == len(leg.path)
+            name = "the base" if leg.goal == HOME else problem.goal_label(leg.goal)
+            number += 1
+            if frame.is_global:
+                lat, lon, up = frame.to_global(place)
+                cells = f"{lat * 1e-7:>12.7f} {lon * 1e-7:>12.7f} {up:>10.2f}"
+            else:
+                cells = " ".join(
+                    f"{v:>{w}.2f}" for v, w in zip(frame.to_local(place), (12, 12, 10), strict=True)
+                )
+            print(f"{number:>6}  {cells}  {name if last else 'bend'}")
+
+
+def way_home(done: Execution) -> str:
+    """The path home in the class that the tether has, from where the vehicle was last."""
+    from netsp.geometry import polylines
+
+    line = done.tethers[-1][1][::-1]
+    bends = ", ".join(f"({x:.1f}, {y:.1f}, {z:.1f})" for x, y, z in line[1:])
+    seconds_home = polylines.length(line) / done.options.speed
+    return (
+        f"home     back along the tether: {polylines.length(line):.1f} {done.problem.units}, "
+        f"{seconds_home:.0f} s, by {bends}"
+    )

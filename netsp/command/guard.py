@@ -1,0 +1,197 @@
+"""`netsp guard`: watch a tether while somebody else drives."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from contextlib import ExitStack, nullcontext
+from typing import TYPE_CHECKING, Any, TextIO
+
+from netsp.command.types import check_writable, length, natural
+from netsp.errors import EXIT_NOT_ALL, EXIT_NOT_VERIFIED, InputError
+
+if TYPE_CHECKING:
+    from netsp.guard.report import Report
+    from netsp.problem import Problem
+
+EXAMPLE = "netsp guard problems/wharf.json --link udpin:14550 --page"
+
+PORT = 8650
+"""Of the page."""
+
+
+def arguments(p: argparse.ArgumentParser) -> None:
+    """Of the command line."""
+    p.add_argument("site", metavar="SITE", help="problem file (JSON): base, obstacles and tether")
+    source = p.add_argument_group("where it listens; nothing is ever told to the vehicle to do")
+    source.add_argument(
+        "--link", metavar="ADDRESS",
+        help="MAVLink over UDP: udpin:PORT (this machine only), udpin:HOST:PORT, udpout:HOST:PORT",
+    )  # fmt: skip
+    source.add_argument("--replay", metavar="LOG", help="a recording: .csv, .csv.gz, .tlog or .bin")
+    source.add_argument(
+        "--frame", metavar="NAME",
+        help="local (metres north, east, down of the base) or global; default global where the "
+        "site has an origin",
+    )  # fmt: skip
+    source.add_argument(
+        "--system", type=natural, metavar="N", help="the vehicle's system id; default the first"
+    )
+    vehicle = p.add_argument_group("what is known of the vehicle")
+    vehicle.add_argument(
+        "--noise", type=length, default=0.3, metavar="M",
+        help="standard deviation of one position, m; default 0.3",
+    )  # fmt: skip
+    vehicle.add_argument(
+        "--drift", type=length, default=0.5, metavar="M",
+        help="standard deviation of how far positions are off for minutes, m; default 0.5",
+    )  # fmt: skip
+    vehicle.add_argument(
+        "--speed", type=length, default=0.5, metavar="V", help="fastest speed, m/s; default 0.5"
+    )
+    p.add_argument(
+        "--state", metavar="FILE",
+        help="keep the class here, and go on from it when started again",
+    )  # fmt: skip
+    p.add_argument(
+        "--publish", action="store_true",
+        help="send tether, slack and alarms to the link (NAMED_VALUE_FLOAT, STATUSTEXT)",
+    )  # fmt: skip
+    p.add_argument(
+        "--page", nargs="?", type=natural, const=PORT, metavar="PORT",
+        help=f"serve a page on this machine; default port {PORT}",
+    )  # fmt: skip
+    p.add_argument(
+        "-o", "--output", metavar="FILE",
+        help="write every report as a line of JSON to this file; - is standard output",
+    )  # fmt: skip
+    p.add_argument("--quiet", action="store_true", help="no status line and no alarms in words")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Watch until the recording or the operator ends it, and return the exit code."""
+    if (args.link is None) == (args.replay is None):
+        raise InputError("--link, --replay: expected one of them")
+    if args.replay is not None and (args.publish or args.state):
+        raise InputError("--publish, --state: are for links; a recording is over")
+    output = None if args.output == "-" else args.output
+    check_writable(output, args.state, inputs=(args.site, args.replay))
+    from netsp.command.compiling import compile_messages
+    from netsp.guard.guard import Guard, GuardOptions
+    from netsp.link.frame import Frame
+    from netsp.problem import Problem
+
+    problem = Problem.load(args.site)
+    guard = Guard(problem, GuardOptions(args.noise, args.drift, args.speed))
+    frame = Frame(problem, args.frame)
+    told = _Told(problem, args.quiet)
+    with ExitStack() as stack:
+        stack.enter_context(nullcontext() if args.quiet else compile_messages(sys.stderr))
+        lines: TextIO | None = None
+        if args.output == "-":
+            lines = sys.stdout
+        elif args.output is not None:
+            lines = stack.enter_context(open(args.output, "w", encoding="utf-8"))
+        page = None
+        if args.page is not None:
+            from netsp.guard.page import Page
+
+            page = stack.enter_context(Page(problem, args.page))
+            print(f"the page is {page.address}", file=sys.stderr)
+
+        def take(report: Report) -> None:
+            told.take(report)
+            row = report.as_row() if lines is not None or page is not None else None
+            if lines is not None:
+                lines.write(json.dumps(row, allow_nan=False) + "\n")
+            if page is not None and row is not None:
+                page.tell(row)
+
+        try:
+            if args.replay is not None:
+                from netsp.guard.replay import read_fixes
+                from netsp.guard.stream import replayed
+
+                for report in replayed(guard, read_fixes(args.replay, frame, args.system)):
+                    take(report)
+            else:
+                from netsp.guard.live import watch
+
+                watch(
+                    guard, frame, args.link, take, system=args.system, state=args.state,
+                    publish=args.publish, corrections=None if page is None else page.corrections,
+                    say=None if args.quiet else told.say,
+                )  # fmt: skip
+        except KeyboardInterrupt:
+            told.say("stopped")
+    if args.output is None:
+        print(json.dumps(told.summary(), indent=1, allow_nan=False))
+    if told.last is None:
+        return EXIT_NOT_ALL
+    return EXIT_NOT_VERIFIED if told.last.loops else 0
+
+
+class _Told:
+    """What was said, in words and in sum."""
+
+    def __init__(self, problem: Problem, quiet: bool) -> None:
+        self.problem, self.quiet = problem, quiet
+        self.last: Report | None = None
+        self._count = self._doubt = 0
+        self._longest, self._at = 0.0, 0.0
+        self._raised: list[dict[str, Any]] = []
+        self._show = not quiet and sys.stderr.isatty()
+
+    def say(self, text: str) -> None:
+        """A line of text."""
+        if not self.quiet:
+            print(f"{self._clear()}{text}", file=sys.stderr, flush=True)
+
+    def _clear(self) -> str:
+        return "\r\033[K" if self._show else ""
+
+    def take(self, report: Report) -> None:
+        """One more report."""
+        self._count += 1
+        for alarm in report.raised:
+            self._raised.append({
+                "t": round(report.time, 1), "kind": alarm.kind,
+                "level": alarm.level.name.lower(), "text": alarm.text,
+            })  # fmt: skip
+            if not self.quiet and alarm.level > 1:
+                print(
+                    f"{self._clear()}{report.time:8.1f} s  {alarm.level.name:<7} {alarm.text}",
+                    file=sys.stderr, flush=True,
+                )  # fmt: skip
+        if report.classes:
+            self.last = report
+            self._doubt += len(report.classes) > 1
+            now = report.classes[0]
+            if now.taut > self._longest:
+                self._longest, self._at = now.taut, report.time
+            if self._show and self._count % 5 == 0:
+                units = self.problem.units
+                print(
+                    f"{self._clear()}{report.time:8.1f} s  tether {now.taut:.2f} of "
+                    f"{self.problem.tether_length:g} {units}, {now.passes}"[:110],
+                    end="", file=sys.stderr, flush=True,
+                )  # fmt: skip
+
+    def summary(self) -> dict[str, Any]:
+        """The numbers."""
+        last = self.last
+        return {
+            "site": self.problem.name,
+            "reports": self._count,
+            "in_doubt": self._doubt,
+            "longest_tether": round(self._longest, 4),
+            "longest_at_s": round(self._at, 2),
+            "tether_length": self.problem.tether_length,
+            "alarms": self._raised,
+            "at_the_end": None if last is None else {
+                "t": round(last.time, 2), "claims": last.claims,
+                "word": list(last.classes[0].word), "passes": last.classes[0].passes,
+                "taut": round(last.classes[0].taut, 4), "loops": [list(x) for x in last.loops],
+            },
+        }  # fmt: skip

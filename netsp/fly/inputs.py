@@ -1,0 +1,72 @@
+"""Events that come while a tour is flown: one JSON object a line, as in a surprise file."""
+
+from __future__ import annotations
+
+import json
+import queue
+import threading
+from collections.abc import Callable
+from typing import TextIO
+
+from pydantic import ValidationError
+
+from netsp.errors import InputError
+from netsp.execute.events import Event
+from netsp.models import explain
+
+MOST_LINE = 100_000
+"""Characters of a line."""
+
+
+def events_of(stream: TextIO, complain: Callable[[str], None]) -> Callable[[], list[Event]]:
+    """Events from a stream, which a thread of its own reads.
+
+    Parameters
+    ----------
+    stream : TextIO
+        Lines such as ``{"cancel_goal": "A3"}`` or ``{"appear": {"center": [3, 2], "radius": 1}}``;
+        a time is not needed, for they come about at once.
+    complain : callable
+        Called, from that thread, with what is wrong with a line.
+
+    Returns
+    -------
+    callable
+        Returns the events since it was last called.
+    """
+    waiting: queue.Queue[Event] = queue.Queue()
+
+    def read() -> None:
+        for line in stream:
+            if not line.strip():
+                continue
+            try:
+                if len(line) > MOST_LINE:
+                    raise InputError("line: too long")
+                waiting.put(event_of(line))
+            except InputError as error:
+                complain(f"not understood: {error}")
+
+    threading.Thread(target=read, daemon=True, name="netsp-events").start()
+
+    def since() -> list[Event]:
+        found = []
+        while not waiting.empty():
+            found.append(waiting.get_nowait())
+        return found
+
+    return since
+
+
+def event_of(line: str) -> Event:
+    """An event from a line of JSON; InputError for what is none."""
+    try:
+        data = json.loads(line)
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"event: no JSON: {error}") from None
+    if not isinstance(data, dict):
+        raise InputError("event: expected a JSON object")
+    try:
+        return Event.model_validate({"time": 0.0, **data})
+    except ValidationError as error:
+        raise InputError(f"event: {explain(error)}") from None

@@ -1,0 +1,148 @@
+"""A guard beside a vehicle: messages in, reports out, ten times a second, until it is ended."""
+
+from __future__ import annotations
+
+import queue
+import time
+from collections.abc import Callable
+
+from netsp.errors import InputError
+from netsp.guard.alarms import Level
+from netsp.guard.guard import Guard
+from netsp.guard.memory import restore, save
+from netsp.guard.report import Report
+from netsp.guard.stream import Stream
+from netsp.link.address import Address
+from netsp.link.dialect import dialect
+from netsp.link.frame import Frame
+from netsp.link.messages import Listener
+from netsp.link.udp import UdpLink
+
+SILENT_S = 0.5
+"""Seconds without a message after which that itself is reported, and how often."""
+
+SAVE_S = 1.0
+"""Seconds between two times that the class is written down."""
+
+PUBLISH_S = 1.0
+"""Seconds between two times that figures are sent."""
+
+SYSTEM = 245
+"""Our system id where we only listen: 255 is the ground station's."""
+
+
+def watch(
+    guard: Guard, frame: Frame, address: str, take: Callable[[Report], None], *,
+    system: int | None = None, state: str | None = None, publish: bool = False,
+    corrections: queue.Queue[tuple[str, str]] | None = None,
+    say: Callable[[str], None] | None = None, until: Callable[[], bool] | None = None,
+) -> None:  # fmt: skip
+    """Watch a vehicle.
+
+    Parameters
+    ----------
+    guard : Guard
+        A new one.
+    frame : Frame
+        Of the site.
+    address : str
+        Of the link.
+    take : callable
+        Called with every report.
+    system : int, optional
+        System id of the vehicle.
+    state : str, optional
+        File that the class is kept in.
+    publish : bool
+        Whether figures and alarms are sent to the link.
+    corrections : Queue of (side, obstacle), optional
+        What the operator says.
+    say : callable, optional
+        Called with a line of text now and then.
+    until : callable, optional
+        Asked whether to end.
+
+    Raises
+    ------
+    InputError
+        The link cannot be had, or the state file is not of this site.
+    """
+    tell = say or (lambda _: None)
+    if state is not None:
+        known = restore(guard, state)
+        if known is not None:
+            tell(f"going on from {state}, {known.age:.0f} s old")
+    link = UdpLink(Address.parse(address), SYSTEM)
+    listener, stream = Listener(frame, system), Stream(guard)
+    heard = saved = sent = told = time.monotonic()
+    try:
+        tell(f"listening on {address}")
+        while until is None or not until():
+            messages = link.hear(0.05)
+            now = time.monotonic()
+            for message, peer in messages:
+                fix = listener.understand(message)
+                if fix is None or message.get_srcSystem() != listener.system:
+                    continue
+                heard = now
+                link.answer(peer)
+                report = stream.take(fix)
+                if report is not None:
+                    told = now
+                    take(report)
+                    if publish and (report.raised or now - sent >= PUBLISH_S):
+                        sent = now
+                        _publish(link, report)
+            if now - heard >= SILENT_S and now - told >= SILENT_S and listener.time is not None:
+                told = now
+                report = stream.wait(listener.time + now - heard)
+                take(report)
+                if publish and report.raised:
+                    _publish(link, report)
+            if corrections is not None:
+                _correct(guard, corrections, tell)
+            if state is not None and now - saved >= SAVE_S:
+                saved = now
+                save(guard, state)
+    finally:
+        link.close()
+        if state is not None:
+            save(guard, state)
+
+
+def _correct(
+    guard: Guard, corrections: queue.Queue[tuple[str, str]], tell: Callable[[str], None]
+) -> None:
+    while True:
+        try:
+            side, obstacle = corrections.get_nowait()
+        except queue.Empty:
+            return
+        try:
+            guard.correct(side, obstacle)
+            tell(f"corrected: the tether passes {side} of {obstacle}")
+        except InputError as error:
+            tell(f"not corrected: {error}")
+
+
+def _publish(link: UdpLink, report: Report) -> None:
+    m = dialect()
+    boot = int(report.time * 1000.0) & 0xFFFFFFFF
+    figures: dict[bytes, float | None] = {b"loop_s": report.loop_s, b"short_s": report.short_s}
+    if report.classes:
+        figures |= {
+            b"tether": report.classes[0].taut, b"slack": report.classes[0].slack,
+            b"home_s": report.home_s, b"classes": float(len(report.classes)),
+        }  # fmt: skip
+    for name, value in figures.items():
+        # no seconds are left where nothing lies ahead: a number all the same, for graphs
+        link.send(m.MAVLink_named_value_float_message(boot, name, -1.0 if value is None else value))
+    for alarm in report.raised:
+        severity = {
+            Level.NOTICE: m.MAV_SEVERITY_NOTICE, Level.CAUTION: m.MAV_SEVERITY_WARNING,
+            Level.WARNING: m.MAV_SEVERITY_CRITICAL, Level.ALARM: m.MAV_SEVERITY_ALERT,
+        }[alarm.level]  # fmt: skip
+        text = alarm.text.encode("ascii", "replace")
+        for k in range(0, min(len(text), 250), 50):
+            part = text[k : k + 50]
+            link.send(m.MAVLink_statustext_message(severity, part, id=1, chunk_seq=k // 50))
