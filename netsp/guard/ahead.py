@@ -25,8 +25,13 @@ HORIZON_S = 40.0
 STEPS = 40
 """In them."""
 
-TURNING = 0.04
+TURNING = 0.06
 """Radians per second: slower turns are those of noise."""
+
+ORBIT, TANGENT, NEAR = 0.4, 0.75, 10.0
+"""A robot goes round an obstacle if it is no farther from it than so many metres, moves at right
+angles to it (share of its speed), and turns at least at that share of the rate of such a circle.
+Where it is tells the circle better than how fast it turns."""
 
 
 @dataclass(frozen=True)
@@ -78,6 +83,7 @@ def look_ahead(
     if pace < MOVING * speed:
         return Ahead()
     turns = [0.0] if abs(motion.turn) < TURNING else [0.0, motion.turn]
+    turns += _orbits(problem, tether.robot[:2], motion)
     found = [_along(problem, field, model, tether, motion.velocity, turn) for turn in turns]
     loops = [(a.loop_s, k) for k, a in enumerate(found) if a.loop_s is not None]
     shorts = [a.short_s for a in found if a.short_s is not None]
@@ -87,6 +93,22 @@ def look_ahead(
         None if first is None else found[first[1]].loop,
         min(shorts, default=None),
     )
+
+
+def _orbits(problem: Problem, place: Floats, motion: Motion) -> list[float]:
+    """Rates of turning, of the circles about obstacles that the robot may be on."""
+    pace = float(np.hypot(*motion.velocity[:2]))
+    out = []
+    for x, y in problem.representative_points:
+        away = place - (x, y)
+        far = float(np.hypot(*away))
+        if not 1e-6 < far < NEAR:
+            continue
+        across = float(away[0] * motion.velocity[1] - away[1] * motion.velocity[0]) / far
+        rate = math.copysign(pace / far, across)
+        if abs(across) >= TANGENT * pace and motion.turn * rate >= ORBIT * rate * rate:
+            out.append(rate)
+    return out
 
 
 def _along(

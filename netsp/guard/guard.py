@@ -103,7 +103,7 @@ class Guard:
         self._vouched: bool | None = None
         self._last = Fix(0.0)
         self._seen, self._looked = -np.inf, -np.inf
-        self._ahead = Ahead()
+        self._ahead, self._sure = Ahead(), 1.0
         self._motion: Motion | None = None
         self._restored: tuple[dict[Word, float], Floats, float] | None = None
         self._previous: Motion | None = None
@@ -245,8 +245,10 @@ class Guard:
             self.belief.move(before[:2], motion.after[:2], dt)
         self._previous = motion
         strands = self.strands.follow(self.belief.classes(), motion.after, MOST_TETHERS)
-        if self._last.paid_out is not None:
-            self._not_longer_than(PAID_OUT * self._last.paid_out + reach, strands)
+        out = self._last.paid_out
+        there_is = self.problem.tether_length
+        most = there_is if out is None else min(there_is, PAID_OUT * out)
+        self._not_longer_than(most + reach, strands)
 
     def _begin(self, motion: Motion, reach: float) -> None:
         """With what is remembered, or a tether that is as short as can be."""
@@ -259,7 +261,7 @@ class Guard:
         )
 
     def _not_longer_than(self, most: float, strands: list[Strand]) -> None:
-        """The winch has let out less than some classes need."""
+        """There is less tether, or the winch has let out less, than some classes need."""
         short = [s for s in strands if s.tether.length <= most]
         if short and len(short) < len(strands):
             total = sum(s.likely for s in short)
@@ -273,20 +275,17 @@ class Guard:
         motion = self._motion
         strands = self.strands.all if claims else []
         classes = tuple(self._class(s) for s in strands)
-        loops: list[Loop] = []
+        closed = [loops_in(self.problem, s.tether.nodes[:, :2]) for s in strands]
         if strands and motion is not None:
-            tether = strands[0].tether
-            loops = loops_in(self.problem, tether.nodes[:, :2])
             if motion.time - self._looked >= LOOK_S or motion.time < self._looked:
                 self._looked = motion.time
-                self._ahead = look_ahead(
-                    self.problem, self.strands.field, self.strands.model, tether, motion,
-                    self.options.speed,
-                )  # fmt: skip
+                self._look(strands, motion)
         else:
-            self._ahead = Ahead()
+            self._ahead, self._sure = Ahead(), 1.0
+        wound = sum(s.likely for s, found in zip(strands, closed, strict=True) if found)
+        loops = next((found for found in closed if found), []) if wound >= reasons.LIKELY else []
         raised = self.alarms.take(
-            self._seen, self._reasons(claims, silent, classes, loops, strands)
+            self._seen, self._reasons(claims, silent, classes, (wound, closed), strands)
         )
         names = self.problem.obstacle_name
         ahead = self._ahead
@@ -310,8 +309,8 @@ class Guard:
         return self.report
 
     def _reasons(
-        self, claims: bool, silent: float, classes: Sequence[ClassNow], loops: Sequence[Loop],
-        strands: Sequence[Strand],
+        self, claims: bool, silent: float, classes: Sequence[ClassNow],
+        wound: tuple[float, Sequence[Sequence[Loop]]], strands: Sequence[Strand],
     ) -> list[Alarm]:  # fmt: skip
         if self._motion is None:
             return []
@@ -325,15 +324,30 @@ class Guard:
         if not classes:
             return []
         robot, problem = strands[0].tether.robot, self.problem
+        share, found = wound
+        loops = next((loops for loops in found if loops), [])
         closed = {loop.around for loop in loops}
         ahead = self._ahead
         again = ahead.loop is not None and ahead.loop.around in closed
         return [
             *reasons.in_doubt(classes), *reasons.little_left(problem, classes[0]),
             *reasons.soon_short(problem, ahead),
-            *([] if again else reasons.soon_looped(problem, ahead, robot)),
-            *reasons.looped(problem, loops, robot),
+            *([] if again else reasons.soon_looped(problem, ahead, robot, self._sure)),
+            *reasons.looped(problem, loops, robot, share),
         ]  # fmt: skip
+
+    def _look(self, strands: Sequence[Strand], motion: Motion) -> None:
+        """Ahead, in each class that is worth it: the first loop, and in how likely classes one
+        closes."""
+        found = [
+            (s.likely, look_ahead(self.problem, self.strands.field, self.strands.model, s.tether,
+                                  motion, self.options.speed))
+            for k, s in enumerate(strands) if k == 0 or s.likely >= reasons.DOUBT
+        ]  # fmt: skip
+        closing = [(likely, a) for likely, a in found if a.loop_s is not None]
+        first = max(closing, key=lambda pair: pair[0], default=(0.0, found[0][1]))[1]
+        self._ahead = replace(first, short_s=found[0][1].short_s)
+        self._sure = sum(likely for likely, _ in closing) / sum(likely for likely, _ in found)
 
     def _class(self, strand: Strand) -> ClassNow:
         nodes = strand.tether.nodes

@@ -15,13 +15,17 @@ from netsp.guard.report import ClassNow
 from netsp.problem import Problem
 from netsp.report.wording import side
 
-LOOP_S = {Level.CAUTION: 30.0, Level.WARNING: 16.0}
+LOOP_S = {Level.CAUTION: 30.0, Level.WARNING: 20.0}
 SHORT_S = {Level.CAUTION: 10.0, Level.WARNING: 4.0}
 """Seconds ahead from which on something is that urgent; a robot that works at the end of its tether
 drives towards it all the time."""
 
 SLACK = {Level.CAUTION: 0.1, Level.WARNING: 0.03, Level.ALARM: 0.0}
 """Shares of the tether that are left."""
+
+LIKELY, POSSIBLE = 0.7, 0.2
+"""Shares of the classes in which there is, or will be, a loop: above the first it is spoken of as
+such, above the second as a possibility, and below of neither."""
 
 DOUBT = 0.05
 """Share that a second class must have to be worth a word."""
@@ -84,31 +88,40 @@ def soon_short(problem: Problem, ahead: Ahead) -> list[Alarm]:
     return [Alarm("short", level, text)]
 
 
-def soon_looped(problem: Problem, ahead: Ahead, robot: Floats) -> list[Alarm]:
-    """Going on closes a loop."""
-    if ahead.loop_s is None or ahead.loop is None:
+def soon_looped(problem: Problem, ahead: Ahead, robot: Floats, share: float = 1.0) -> list[Alarm]:
+    """Going on closes a loop, in that share of the classes."""
+    if ahead.loop_s is None or ahead.loop is None or share < POSSIBLE:
         return []
     level = _level(LOOP_S, ahead.loop_s)
     if level is None:
         return []
+    if share < LIKELY:
+        level = Level.CAUTION
     near = _nearest(problem, ahead.loop, robot)
     keep = side(problem, robot[:2] - problem.representative_points[near])
     names = names_of(problem, ahead.loop.around)
     text = (
         f"keep {keep} of {problem.obstacle_name(near)}: going on closes a loop around {names} in "
-        f"{ahead.loop_s:.0f} s; {_undo(problem, ahead.loop, near)}"
+        f"{ahead.loop_s:.0f} s{_unsure(share)}; {_undo(problem, ahead.loop, near)}"
     )
     return [Alarm("loop-ahead", level, text)]
 
 
-def looped(problem: Problem, loops: Sequence[Loop], robot: Floats) -> list[Alarm]:
-    """A loop is closed."""
-    if not loops:
+def looped(
+    problem: Problem, loops: Sequence[Loop], robot: Floats, share: float = 1.0
+) -> list[Alarm]:
+    """A loop is closed, in that share of the classes."""
+    if not loops or share < POSSIBLE:
         return []
     loop = loops[0]
     near = _nearest(problem, loop, robot)
-    text = f"a loop around {names_of(problem, loop.around)} is closed; {_undo(problem, loop, near)}"
-    return [Alarm("loop", Level.ALARM, text)]
+    names, sure = names_of(problem, loop.around), _unsure(share)
+    text = f"a loop around {names} is closed{sure}; {_undo(problem, loop, near)}"
+    return [Alarm("loop", Level.ALARM if share >= LIKELY else Level.CAUTION, text)]
+
+
+def _unsure(share: float) -> str:
+    return "" if share >= LIKELY else f" ({100.0 * share:.0f} % likely)"
 
 
 def _undo(problem: Problem, loop: Loop, near: int) -> str:

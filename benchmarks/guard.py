@@ -1,0 +1,353 @@
+"""A guard beside robots that are driven, with noise: what it misses, how early it warns, how often
+it is wrong, and how long an update takes; and a counter of turns on the same tracks.
+
+    python benchmarks/guard.py [--tracks 100] [--loops 10] [--jobs 2] [--keep]
+
+Tracks are tours of the shipped problems and of random worlds, flown by our vehicles, the recorded
+flights in `tests/data/ardusub`, and random pilots' drives, none of which closes a loop. Into each,
+loops are put at random moments: from there the robot drives round some obstacle in sight until its
+own tether has closed a loop. Positions get white noise (0.3 m) and a drift (0.5 m, forgotten in
+100 s).
+"""
+
+from __future__ import annotations
+
+import argparse
+import copy
+import csv
+import gzip
+import math
+import time
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from space import reachable_world
+from table import ROOT, head, heading, row
+
+from netsp import solve
+from netsp.execute.log import ExecutionOptions
+from netsp.execute.run import execute
+from netsp.guard.alarms import Level
+from netsp.guard.fix import Fix
+from netsp.guard.guard import Guard, GuardOptions
+from netsp.guard.loops import loops_in
+from netsp.guard.report import Report
+from netsp.guard.tethers import Strands
+from netsp.problem import Circle, Problem
+
+NOISE, DRIFT, DRIFT_S, SPEED, DT = 0.3, 0.5, 100.0, 0.5, 0.1
+RECORDED = ROOT / "tests" / "data" / "ardusub"
+SHIPPED = ("wharf", "pool", "oc4-jacket")
+LEAD, WINDOW = 10.0, 30.0
+MOST_S = 90.0
+
+
+@dataclass
+class Outcome:
+    """Of one track, and the loops put into it."""
+
+    kind: str
+    seconds: float = 0.0
+    warned: int = 0
+    wrong: int = 0
+    turned: int = 0
+    loops: int = 0
+    missed: int = 0
+    missed_by_turns: int = 0
+    leads: list[float] = field(default_factory=list)
+    allowed: list[float] = field(default_factory=list)
+    updates_ms: list[float] = field(default_factory=list)
+    home_ms: list[float] = field(default_factory=list)
+
+
+def problem_of(name: str) -> Problem:
+    if name in ("r1", "r4"):
+        return Problem.load(RECORDED / f"problem-{name}.json")
+    return Problem.load(ROOT / "problems" / f"{name}.json")
+
+
+def evenly(times: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """(n, 3) at ten a second."""
+    grid = np.arange(times[0], times[-1], DT)
+    return np.column_stack([np.interp(grid, times, places[:, k]) for k in range(3)])
+
+
+def recorded(name: str) -> tuple[Problem, np.ndarray]:
+    with gzip.open(RECORDED / f"ardusub-{name}.csv.gz", "rt") as text:
+        rows = list(csv.DictReader(text))
+    times = np.array([float(r["t"]) for r in rows])
+    return problem_of(name), evenly(
+        times, np.array([[float(r[k]) for k in "xyz"] for r in rows])
+    )  # fmt: skip
+
+
+def toured(problem: Problem, vehicle: str, seed: int) -> np.ndarray:
+    solution = solve(problem, time_limit=10.0, seed=seed)
+    done = execute(problem, solution, ExecutionOptions(speed=SPEED, vehicle=vehicle, seed=seed))
+    times = np.array([r.time for r in done.rows])
+    return evenly(times, np.array([[r.x, r.y, r.z] for r in done.rows]))
+
+
+def driven(problem: Problem, seed: int, seconds: float = 240.0) -> np.ndarray:
+    """A random pilot: straight to some place in sight, a pause, and on; never past the tether, and
+    no loop closed."""
+    rng = np.random.default_rng(seed)
+    strands = Strands(problem)
+    model, field_ = strands.model, strands.field
+    tether = model.start(problem.base, problem.base)
+    here, out = np.array(problem.base, dtype=float), []
+    spread = 0.6 * problem.tether_length
+    tries = 0
+    while len(out) * DT < seconds and tries < 2000:
+        tries += 1
+        there = here + np.array([*rng.normal(0.0, 0.35 * spread, 2), 0.0])
+        there[2] = problem.base[2] - rng.uniform(0.0, 3.0)
+        far = float(np.linalg.norm(there - here))
+        if far < 1.0 or not field_.line_of_sight(here, there, 0.0):
+            continue
+        steps = here + np.linspace(0.0, 1.0, int(far / (SPEED * DT)) + 2)[1:, None] * (there - here)
+        moved, lengths = model.drive(tether, steps)
+        looped = False
+        at = tether
+        for k in range(0, len(steps), 5):
+            at = model.update(at, steps[k])
+            looped = looped or bool(loops_in(problem, at.nodes[:, :2]))
+        # a pilot does not drive straight at the tether either: ten seconds more would close none
+        on = there + np.linspace(0, 1, 11)[1:, None] * (there - here) / far * 5.0
+        for place in on:
+            if not field_.line_of_sight(at.robot, place, 0.0):
+                break
+            at = model.update(at, place)
+            looped = looped or bool(loops_in(problem, at.nodes[:, :2]))
+        if looped or lengths.max() > 0.97 * problem.tether_length:
+            continue
+        out += list(steps) + [there] * int(rng.integers(0, 60))
+        here, tether = there, moved
+    return np.array(out)
+
+
+def tracks(count: int) -> Iterator[tuple[str, int]]:
+    """Names of tracks."""
+    kinds = ["recorded", "kinematic", "bluerov2", "pilot", "pilot"]
+    for k in range(count):
+        kind = kinds[k % len(kinds)]
+        yield kind, k // len(kinds)
+
+
+def track_of(kind: str, seed: int) -> tuple[Problem, np.ndarray]:
+    names = (*SHIPPED, "r1", "r4")
+    if kind == "recorded":
+        if seed < len(names):
+            return recorded(names[seed])
+        kind = "kinematic"
+    if seed % 2:
+        problem = problem_of(names[seed % len(names)])
+    else:
+        problem, _ = reachable_world(seed, goals=6, obstacles=7, tether_length=40.0)
+        problem = (
+            Problem.model_validate(
+                {**problem.model_dump(mode="json"), "clearance": 0.3, "bounds": None}
+            )
+            if False
+            else problem
+        )
+    if kind == "pilot":
+        return problem, driven(problem, seed)
+    return problem, toured(problem, kind, seed)
+
+
+def drifted(true: np.ndarray, rng: np.random.Generator, begin: np.ndarray) -> np.ndarray:
+    """(n, 3) what the vehicle says of it; the drift begins at `begin`."""
+    drift, out = begin.copy(), np.empty_like(true)
+    keep = math.exp(-DT / DRIFT_S)
+    kick = DRIFT * math.sqrt(1.0 - keep**2)
+    for k, place in enumerate(true):
+        drift = keep * drift + kick * rng.normal(size=2)
+        out[k] = place + rng.normal(0.0, NOISE, 3) * (1.0, 1.0, 0.3)
+        out[k, :2] += drift
+    begin[:] = drift
+    return out
+
+
+class TurnCounter:
+    """What ground stations have: full turns of the heading since the start."""
+
+    def __init__(self) -> None:
+        self.turned, self._before = 0.0, None
+
+    def take(self, step: np.ndarray) -> bool:
+        """Whether it says that there is a turn."""
+        if float(np.hypot(*step[:2])) > 0.5 * SPEED * DT:
+            course = math.atan2(step[1], step[0])
+            if self._before is not None:
+                self.turned += (course - self._before + math.pi) % (2.0 * math.pi) - math.pi
+            self._before = course
+        return abs(self.turned) >= 2.0 * math.pi
+
+
+def loop_path(problem: Problem, here: np.ndarray, rng: np.random.Generator) -> np.ndarray | None:
+    """Straight to some obstacle in sight and around it, once and a bit."""
+    strands = Strands(problem)
+    order = rng.permutation(len(problem.obstacles))
+    for i in order:
+        o = problem.obstacles[int(i)]
+        if not isinstance(o, Circle) or math.dist(o.center, here[:2]) > 25.0:
+            continue
+        radius = o.radius + problem.clearance + float(rng.uniform(0.6, 2.0))
+        way = 1.0 if rng.random() < 0.5 else -1.0
+        away = here[:2] - np.array(o.center)
+        far = float(np.hypot(*away))
+        if far < radius:
+            radius = max(far, o.radius + problem.clearance + 0.3)
+        begin = math.atan2(away[1], away[0])
+        turn = begin + way * math.acos(min(radius / max(far, 1e-9), 1.0)) * 1.0
+        angles = turn + way * np.arange(0.0, 2.6 * math.pi, SPEED * DT / radius)
+        ring = np.column_stack([
+            o.center[0] + radius * np.cos(angles), o.center[1] + radius * np.sin(angles),
+            np.full(len(angles), here[2]),
+        ])  # fmt: skip
+        if strands.field.distance(ring).min() < 0.1:
+            continue
+        if not strands.field.line_of_sight(here, ring[0], 0.0):
+            continue
+        steps = int(math.dist(here, ring[0]) / (SPEED * DT)) + 1
+        line = here + np.linspace(0.0, 1.0, steps + 1)[1:, None] * (ring[0] - here)
+        return np.vstack([line, ring])
+    return None
+
+
+def closes(problem: Problem, tether: object, path: np.ndarray, strands: Strands) -> int | None:
+    """At which point of a path the true tether has a loop."""
+    at = tether
+    for k, place in enumerate(path):
+        at = strands.model.update(at, place)
+        if loops_in(problem, at.nodes[:, :2]):
+            return k
+    return None
+
+
+def warned(report: Report, least: Level) -> bool:
+    return any(a.kind in ("loop", "loop-ahead") and a.level >= least for a in report.alarms)
+
+
+def one(job: tuple[str, int, int]) -> Outcome:
+    kind, seed, loops = job
+    problem, true = track_of(kind, seed)
+    out = Outcome(kind)
+    if len(true) < 50:
+        return out
+    rng = np.random.default_rng([seed, len(kind)])
+    drift = rng.normal(0.0, DRIFT, 2) * 0.3
+    told = drifted(true, rng, drift)
+    guard = Guard(problem, GuardOptions(NOISE, DRIFT, SPEED))
+    clear = Guard(problem, GuardOptions(0.01, 0.01, SPEED))
+    strands = clear.strands
+    counter = TurnCounter()
+    moments = sorted(rng.integers(30, len(true) - 10, loops).tolist())
+    was = turned = False
+    for k in range(len(true)):
+        begin = time.perf_counter()
+        report = guard.take(Fix(k * DT, tuple(told[k]), estimate=True))
+        out.updates_ms.append(1e3 * (time.perf_counter() - begin))
+        exact = clear.take(Fix(k * DT, tuple(true[k]), estimate=True))
+        now = warned(report, Level.WARNING)
+        if now and not was:
+            out.warned += 1
+            near = exact.loop_s is not None or exact.loops
+            out.wrong += not near
+        was = now
+        if k and counter.take(true[k] - true[k - 1]) and not turned:
+            turned = True
+            out.turned += 1
+            counter.turned = 0.0
+            turned = False
+        while moments and moments[0] == k:
+            moments.pop(0)
+            put_in(out, problem, guard, clear, counter, true[k], k * DT, drift, rng)
+    out.seconds = len(true) * DT
+    del strands
+    return out
+
+
+def put_in(
+    out: Outcome, problem: Problem, guard: Guard, clear: Guard, counter: TurnCounter,
+    here: np.ndarray, now: float, drift: np.ndarray, rng: np.random.Generator,
+) -> None:  # fmt: skip
+    """A loop that begins here, with copies of the guards."""
+    if not clear.strands.all or clear.report is None or clear.report.loops:
+        return
+    path = loop_path(problem, clear.strands.all[0].tether.robot, rng)
+    if path is None:
+        return
+    end = closes(problem, clear.strands.all[0].tether, path, clear.strands)
+    if end is None or end * DT > MOST_S:
+        return
+    path = path[: end + int(5.0 / DT)]
+    watching, seeing, turns = copy.deepcopy(guard), copy.deepcopy(clear), copy.deepcopy(counter)
+    turns.turned = 0.0
+    told = drifted(path, rng, drift.copy())
+    first = foreseen = by_turns = None
+    alarmed = False
+    before = here
+    for k, place in enumerate(path):
+        t = now + (k + 1) * DT
+        report = watching.take(Fix(t, tuple(told[k]), estimate=True))
+        exact = seeing.take(Fix(t, tuple(place), estimate=True))
+        if warned(report, Level.WARNING) and first is None:
+            first = k
+        if exact.loop_s is not None and exact.loop_s <= 16.0 and foreseen is None:
+            foreseen = k
+        alarmed = alarmed or warned(report, Level.WARNING)
+        if turns.take(place - before) and by_turns is None:
+            by_turns = k
+        before = place
+    out.loops += 1
+    out.missed += not alarmed
+    out.missed_by_turns += by_turns is None or by_turns > end
+    lead = -math.inf if first is None else (end - first) * DT
+    out.leads.append(lead)
+    # where even a guard that knows the position saw it coming ten seconds before
+    if foreseen is not None and (end - foreseen) * DT >= LEAD:
+        out.allowed.append(lead)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--tracks", type=int, default=100)
+    parser.add_argument("--loops", type=int, default=10)
+    parser.add_argument("--jobs", type=int, default=2)
+    args = parser.parse_args()
+    heading("A guard beside robots that are driven")
+    head("tracks", "hours", "loops put in", "missed", "missed by turns", "lead s, p5 / median",
+         "10 s of lead where foreseeable %", "warnings an hour", "false an hour",
+         "turn counter's an hour", "update ms, median / p99", name="guard")  # fmt: skip
+    jobs = [(kind, seed, args.loops) for kind, seed in tracks(args.tracks)]
+    with ProcessPoolExecutor(args.jobs) as pool:
+        outcomes = list(pool.map(one, jobs))
+    for kind in (*dict.fromkeys(o.kind for o in outcomes), None):
+        some = [o for o in outcomes if kind in (None, o.kind)]
+        told(kind or "all", some)
+    print()
+
+
+def told(name: str, some: list[Outcome]) -> None:
+    hours = sum(o.seconds for o in some) / 3600.0
+    leads = [v for o in some for v in o.leads]
+    allowed = [v for o in some for v in o.allowed]
+    ms = [v for o in some for v in o.updates_ms]
+    if not leads or not hours:
+        return
+    row(f"{len(some)} {name}", f"{hours:.2f}", str(len(leads)), str(sum(o.missed for o in some)),
+        str(sum(o.missed_by_turns for o in some)),
+        f"{np.percentile(leads, 5, method='lower'):.1f} / {np.median(leads):.1f}",
+        f"{100.0 * np.mean([v >= LEAD for v in allowed]):.1f} of {len(allowed)}" if allowed else "",
+        f"{sum(o.warned for o in some) / hours:.1f}", f"{sum(o.wrong for o in some) / hours:.1f}",
+        f"{sum(o.turned for o in some) / hours:.1f}",
+        f"{np.median(ms):.1f} / {np.percentile(ms, 99):.1f}")  # fmt: skip
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,242 @@
+"""A tour flown by a vehicle over MAVLink, and what stops it."""
+
+import json
+import random
+
+import numpy as np
+import pytest
+
+from netsp import Circle, Problem, solve
+from netsp.command.main import main
+from netsp.errors import InputError
+from netsp.execute.events import Surprises
+from netsp.execute.log import ExecutionOptions
+from netsp.fly.flight import fly
+from netsp.fly.inputs import event_of
+from netsp.fly.stopped import RefusedError
+from netsp.link.address import Address
+from netsp.link.dialect import dialect, parser
+from netsp.link.frame import Frame
+from netsp.link.messages import Listener
+from netsp.link.session import Session
+from netsp.link.udp import UdpLink, messages_in
+from tests.autopilot import Autopilot
+
+PACE = 8.0
+SITE = Problem(
+    base=(0, 0), goals=[(6, 2, -1), (6.5, -2, -1)], tether_length=12,
+    obstacles=[Circle(center=(4, 0), radius=0.6, name="pile")], clearance=0.4,
+)  # fmt: skip
+OPTIONS = ExecutionOptions(speed=0.5, reach=0.3)
+
+
+@pytest.fixture(scope="module")
+def tour():
+    return solve(SITE)
+
+
+class Flown:
+    """An autopilot, and our session with it."""
+
+    def __init__(self, arm=True, **how):
+        how = {"pace": PACE, "params": {"FS_GCS_TIMEOUT": 12}, **how}
+        self.autopilot = Autopilot(**how)
+        self.arm = arm
+
+    def __enter__(self):
+        self.autopilot.__enter__()
+        link = UdpLink(Address(True, "127.0.0.1", self.autopilot.port))
+        self.session = Session(link, Frame(SITE), 1, PACE)
+        assert self.autopilot.until(lambda: self.session.now.position is not None)
+        if self.arm:
+            self.session.command(400, 1)
+            assert self.autopilot.until(lambda: self.session.now.armed is True)
+        return self
+
+    def __exit__(self, *error):
+        self.session.close()
+        self.autopilot.__exit__(*error)
+
+    def fly(self, tour, **how):
+        return fly(SITE, tour, self.session, OPTIONS, **how)
+
+    @property
+    def targets(self):
+        return [e for e in self.autopilot.events if e.get("event") == "target"]
+
+
+def after(seconds, do):
+    """A step that does something once, so many seconds after the start."""
+    done = []
+
+    def on_step(row):
+        if row.time >= seconds and not done:
+            done.append(do())
+
+    return on_step
+
+
+def test_a_vehicle_visits_every_goal_in_the_class_of_the_plan_and_comes_home_free(tour):
+    with Flown(noise=0.02, drift=0.03, smooth=1.0) as flown:
+        done = flown.fly(tour)
+        s = done.summary
+        assert (s["status"], s["visited"], s["home"]) == ("done", 2, True)
+        assert s["arrivals_as_planned"] == 3
+        assert s["tether_free"]
+        assert s["exceedance_s"] == 0.0
+        true = flown.autopilot.truth()[:, 1:3]
+        assert min(float(o.signed_distance(p)) for o in SITE.obstacles for p in true) > 0.1
+
+
+def test_a_vehicle_that_is_not_ready_is_not_moved(tour):
+    for how, before, why in (
+        ({"arm": False}, {}, "not armed"),
+        ({"start": (5.0, 0.0, 0.0)}, {}, "from the start of the tour"),
+        ({}, {"do": "lose_estimate"}, "no position estimate"),
+    ):
+        with Flown(**how) as flown:
+            if before:
+                flown.autopilot.tell(**before)
+                assert flown.autopilot.until(lambda f=flown: f.session.now.estimate is False)
+            with pytest.raises(RefusedError, match=why):
+                flown.fly(tour)
+            assert flown.targets == []
+
+
+def test_a_link_with_nobody_at_the_other_end_is_told(tour):
+    session = Session(UdpLink(Address(True, "127.0.0.1", 0)), Frame(SITE), 1, 20.0)
+    try:
+        with pytest.raises(RefusedError, match="no vehicle has been heard"):
+            fly(SITE, tour, session, OPTIONS)
+    finally:
+        session.close()
+
+
+@pytest.mark.parametrize(
+    ("what", "why"),
+    [
+        ({"do": "mode", "mode": 19}, "the pilot has taken over"),
+        ({"do": "disarm"}, "disarmed"),
+        ({"do": "lose_estimate"}, "position estimate"),
+        ({"do": "silence", "seconds": 60}, "the link is lost"),
+    ],
+)
+def test_a_flight_stops_when_the_vehicle_is_not_ours_any_more_and_says_why(tour, what, why):
+    with Flown() as flown:
+        done = flown.fly(tour, on_step=after(6.0, lambda: flown.autopilot.tell(**what)))
+        assert done.summary["status"] == "stopped"
+        assert why in done.stopped
+        sent = len(flown.targets)
+        flown.autopilot.sleep(3.0)
+        assert len(flown.targets) == sent
+        if what["do"] == "lose_estimate":
+            assert flown.autopilot.until(lambda: flown.session.now.mode == "ALT_HOLD")
+
+
+def test_ctrl_c_has_the_vehicle_hold_its_place(tour):
+    def stop():
+        raise KeyboardInterrupt
+
+    with Flown() as flown:
+        done = flown.fly(tour, on_step=after(8.0, stop))
+        assert done.interrupted
+        flown.autopilot.sleep(8.0)
+        there = flown.autopilot.truth()[-1, 1:4]
+        # where it was when it was told, and what it takes to stop
+        assert np.linalg.norm(np.array(flown.targets[-1]["at"]) - there) < 0.5
+
+
+def test_what_appears_in_the_way_is_gone_round(tour):
+    told = {"schema_version": 1, "events": [
+        {"time": 3.0, "appear": {"center": [3.0, 1.6], "radius": 0.4, "name": "boat"}},
+        {"time": 6.0, "cancel_goal": 1},
+    ]}  # fmt: skip
+    with Flown() as flown:
+        done = flown.fly(tour, surprises=Surprises.model_validate(told))
+        s = done.summary
+        assert (s["status"], s["visited"], s["tether_free"]) == ("done", 1, True)
+        boat = Circle(center=(3.0, 1.6), radius=0.4)
+        late = flown.autopilot.truth()
+        assert min(float(boat.signed_distance(p[1:3])) for p in late) > 0.0
+
+
+def test_events_that_come_in_are_asked_first():
+    assert event_of('{"cancel_goal": "A3"}').kind == "cancel_goal"
+    for line in ("[]", "{", '{"appear": 3}', '{"tether_length": -1}', "{}"):
+        with pytest.raises(InputError, match="event"):
+            event_of(line)
+
+
+def test_nobody_else_is_listened_to():
+    listener = Listener(Frame(SITE), 1)
+    m = dialect()
+    for system, component, heard in ((1, 1, True), (2, 1, False), (1, 42, False)):
+        packs = parser(system, component)
+        message = m.MAVLink_local_position_ned_message(1000, 1.0, 2.0, 3.0, 0, 0, 0)
+        (read,) = messages_in(message.pack(packs))
+        assert (listener.understand(read) is not None) is heard
+    assert listener.strangers == 2
+
+
+def test_malformed_packets_neither_raise_nor_say_anything():
+    rng = random.Random(0)
+    m, packs = dialect(), parser(1, 1)
+    listener = Listener(Frame(SITE), 1)
+    whole = [
+        m.MAVLink_heartbeat_message(12, 3, 128, 4, 4, 3).pack(packs),
+        m.MAVLink_local_position_ned_message(1, 1.0, 2.0, 3.0, 0, 0, 0).pack(packs),
+        m.MAVLink_statustext_message(4, b"\xff\xfe").pack(packs),
+    ]
+    for _ in range(4000):
+        data = bytearray(rng.choice(whole))
+        for _ in range(rng.randint(1, 6)):
+            data[rng.randrange(len(data))] = rng.randrange(256)
+        data = data[: rng.randint(0, len(data))] + rng.randbytes(rng.randint(0, 20))
+        for message in messages_in(bytes(data)):
+            listener.understand(message)
+    for x in (float("nan"), float("inf"), 1e30):
+        (read,) = messages_in(m.MAVLink_local_position_ned_message(1, x, 0, 0, 0, 0, 0).pack(packs))
+        assert listener.understand(read) is None
+
+
+def test_links_are_this_machine_s_unless_told_otherwise():
+    assert Address.parse("udpin:14550") == Address(True, "127.0.0.1", 14550)
+    assert Address.parse("udpin:0.0.0.0:14550").host == "0.0.0.0"
+    for text in ("14550", "udpin:", "udpin:0", "udpout:1", "tcp:1.2.3.4:5", "udpin:70000"):
+        with pytest.raises(InputError, match="--link"):
+            Address.parse(text)
+
+
+def test_places_go_to_the_vehicle_and_back():
+    rng = np.random.default_rng(0)
+    turned = SITE.model_copy(
+        update={"origin": Problem.model_validate({
+            **SITE.model_dump(mode="json"),
+            "origin": {"latitude": 55.5, "longitude": 12.7, "heading": 30.0},
+        }).origin}
+    )  # fmt: skip
+    for site, kind in ((SITE, "local"), (turned, "local"), (turned, "global")):
+        frame = Frame(site, kind)
+        for _ in range(20):
+            x, y, z = rng.uniform(-50, 50, 3)
+            place = (float(x), float(y), -abs(float(z)))
+            back = (
+                frame.from_global(*frame.to_global(place)) if frame.is_global
+                else frame.from_local(*frame.to_local(place))
+            )  # fmt: skip
+            assert np.allclose(back, place, atol=0.02 if frame.is_global else 1e-9)
+
+
+def test_a_dry_run_shows_every_target_and_needs_no_link(tmp_path, capsys, tour):
+    problem, solution = tmp_path / "p.json", tmp_path / "s.json"
+    problem.write_text(SITE.to_json())
+    solution.write_text(tour.to_json())
+    assert main(["fly", str(problem), str(solution), "--dry-run"]) == 0
+    out = capsys.readouterr().out
+    assert out.count("goal") == 2
+    assert "the base" in out
+    broken = json.loads(tour.to_json())
+    broken["path"][1][0] += 3.0
+    solution.write_text(json.dumps(broken))
+    assert main(["fly", str(problem), str(solution), "--dry-run"]) == 2
+    assert main(["fly", str(problem), str(solution)]) == 2
