@@ -30,7 +30,7 @@ TURNING = 0.06
 
 ORBIT, TANGENT, NEAR = 0.4, 0.75, 10.0
 """A robot goes round an obstacle if it is no farther from it than so many metres, moves at right
-angles to it (share of its speed), and turns at least at that share of the rate of such a circle.
+angles to it (share of its speed), and turns at the rate of such a circle, give or take that share.
 Where it is tells the circle better than how fast it turns."""
 
 
@@ -46,11 +46,14 @@ class Ahead:
         That loop.
     short_s : float or None
         Seconds until the tether is longer than it may be; None within the horizon.
+    turning : bool
+        Whether it takes a turn that goes on for that, which is less sure than to go straight on.
     """
 
     loop_s: float | None = None
     loop: Loop | None = None
     short_s: float | None = None
+    turning: bool = False
 
 
 def look_ahead(
@@ -92,6 +95,7 @@ def look_ahead(
         None if first is None else first[0],
         None if first is None else found[first[1]].loop,
         min(shorts, default=None),
+        first is not None and first[1] > 0,
     )
 
 
@@ -106,7 +110,8 @@ def _orbits(problem: Problem, place: Floats, motion: Motion) -> list[float]:
             continue
         across = float(away[0] * motion.velocity[1] - away[1] * motion.velocity[0]) / far
         rate = math.copysign(pace / far, across)
-        if abs(across) >= TANGENT * pace and motion.turn * rate >= ORBIT * rate * rate:
+        turns_so = ORBIT <= motion.turn / rate <= 1.0 / ORBIT
+        if abs(across) >= TANGENT * pace and turns_so:
             out.append(rate)
     return out
 

@@ -16,6 +16,7 @@ from netsp.problem import Problem
 from netsp.report.wording import side
 
 LOOP_S = {Level.CAUTION: 30.0, Level.WARNING: 20.0}
+TURN_S = {Level.CAUTION: 20.0, Level.WARNING: 14.0}
 SHORT_S = {Level.CAUTION: 10.0, Level.WARNING: 4.0}
 """Seconds ahead from which on something is that urgent; a robot that works at the end of its tether
 drives towards it all the time."""
@@ -92,7 +93,7 @@ def soon_looped(problem: Problem, ahead: Ahead, robot: Floats, share: float = 1.
     """Going on closes a loop, in that share of the classes."""
     if ahead.loop_s is None or ahead.loop is None or share < POSSIBLE:
         return []
-    level = _level(LOOP_S, ahead.loop_s)
+    level = _level(TURN_S if ahead.turning else LOOP_S, ahead.loop_s)
     if level is None:
         return []
     if share < LIKELY:

@@ -84,7 +84,7 @@ class Track:
         self._state = np.zeros((2, 3))
         self._spread = np.zeros((2, 2))
         self._last: Floats | None = None
-        self._same_since = 0.0
+        self._same_since, self._was_moving = 0.0, False
         self._doubt_since: float | None = None
         self._past: deque[tuple[float, Floats]] = deque()
 
@@ -174,9 +174,10 @@ class Track:
         if dt <= 0.0:
             return None
         same = self._last is not None and bool(np.array_equal(position, self._last))
-        self._same_since = self._same_since if same else fix.time
-        was_moving = float(np.linalg.norm(self._state[1])) > MOVING * self.speed
-        if same and was_moving and not self.frozen and fix.time - self._same_since >= FROZEN:
+        if not same:
+            self._same_since = fix.time
+            self._was_moving = float(np.linalg.norm(self._state[1])) > MOVING * self.speed
+        if same and self._was_moving and not self.frozen and fix.time - self._same_since >= FROZEN:
             self.frozen = True
             self.lose(self._same_since)
         if same and self.frozen:

@@ -1,0 +1,473 @@
+"""A guard beside a vehicle: which class, how long, what it leads to, and what it does not know."""
+
+import csv
+import gzip
+import http.client
+import itertools
+import json
+import math
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from netsp import Circle, Problem
+from netsp.command.main import main
+from netsp.errors import InputError
+from netsp.guard.alarms import Alarm, Alarms, Level
+from netsp.guard.belief import Belief
+from netsp.guard.fix import Fix
+from netsp.guard.gaps import ways_between
+from netsp.guard.guard import Guard, GuardOptions
+from netsp.guard.live import watch
+from netsp.guard.loops import closed_by, loops_in
+from netsp.guard.memory import restore, save
+from netsp.guard.page import Page
+from netsp.guard.replay import read_fixes
+from netsp.guard.stream import replayed
+from netsp.guard.tethers import Strands
+from netsp.guard.track import Track
+from netsp.hsignature import concatenate, crossings, signature
+from netsp.link.frame import Frame
+from netsp.link.modes import GUIDED
+from netsp.solution import Solution
+from tests.autopilot import Autopilot
+
+RECORDED = Path(__file__).parent / "data" / "ardusub"
+PROBLEMS = Path(__file__).parent.parent / "problems"
+SITE = Problem(
+    base=(0, 0), goals=[(9, 0, -1)], tether_length=20,
+    obstacles=[
+        Circle(center=(5, 0), radius=0.5, name="A"), Circle(center=(9, 4), radius=0.5, name="B")
+    ],
+)  # fmt: skip
+EXACT = GuardOptions(noise=0.0, drift=0.0)
+
+
+def along(*corners, speed=0.5, begin=0.0):
+    """Fixes of a robot that goes from corner to corner, ten a second."""
+    t, out = begin, []
+    for a, b in itertools.pairwise(corners):
+        a, b = np.array(a, dtype=float), np.array(b, dtype=float)
+        n = max(1, round(float(np.linalg.norm(b - a)) / speed * 10))
+        for k in range(n):
+            x, y, z = a + (b - a) * k / n
+            out.append(Fix(t, (float(x), float(y), float(z)), estimate=True))
+            t += 0.1
+    return out
+
+
+def ring(center, radius, begin, turn, steps=60):
+    return [
+        (center[0] + radius * math.cos(begin + turn * k / steps),
+         center[1] + radius * math.sin(begin + turn * k / steps), 0.0)
+        for k in range(steps + 1)
+    ]  # fmt: skip
+
+
+ROUND_A = [(0, 0, 0), (3, 0.9, 0), *ring((5, 0), 1.5, math.pi - 0.6, -2.0 * math.pi)]
+
+
+# the recorded flights
+
+
+@pytest.mark.parametrize(
+    ("name", "goals", "longest"),
+    [("wharf", 8, 19.25), ("pool", 5, 11.66), ("oc4-jacket", 9, 24.52), ("r1", 6, None),
+     ("r4", 6, None)],
+)  # fmt: skip
+def test_recorded_flights_have_the_words_of_their_tours_at_every_goal(name, goals, longest):
+    own = RECORDED / f"problem-{name}.json"
+    problem = Problem.load(own if own.exists() else PROBLEMS / f"{name}.json")
+    tour = Solution.load(RECORDED / f"tour-{name}.json")
+    guard = Guard(problem, GuardOptions(noise=0.02, drift=0.01))
+    nearest, most = {}, 0.0
+    file = RECORDED / f"ardusub-{name}.csv.gz"
+    for report in replayed(guard, read_fixes(file, Frame(problem))):
+        now = report.classes[0]
+        most = max(most, now.taut)
+        for visit in tour.tour:
+            goal = np.array(problem.goals[visit.goal].position)
+            far = float(np.linalg.norm(np.array(report.position) - goal))
+            if far < nearest.get(visit.goal, (9.0, None))[0]:
+                step = np.array([report.position, goal])
+                word = concatenate(now.word, crossings(step, problem.representative_points))
+                nearest[visit.goal] = (far, word == visit.signature)
+        assert not report.loops
+    assert len(nearest) == goals
+    assert all(right for _, right in nearest.values())
+    assert report.classes[0].word == ()
+    if longest is not None:
+        assert abs(most - longest) <= 0.1
+
+
+def test_the_likeliest_class_is_right_under_noise_and_drift_on_a_recorded_flight():
+    problem = Problem.load(RECORDED / "problem-r4.json")
+    rng = np.random.default_rng(1)
+    with gzip.open(RECORDED / "ardusub-r4.csv.gz", "rt") as text:
+        rows = list(csv.DictReader(text))
+    guard, exact = Guard(problem), Guard(problem, GuardOptions(0.02, 0.01))
+    drift, right, held = np.zeros(2), 0, 0
+    for r in rows:
+        drift = 0.998 * drift + 0.5 * math.sqrt(1 - 0.998**2) * rng.normal(size=2)
+        x, y, z = (float(r[k]) for k in "xyz")
+        noisy = (x + drift[0] + 0.3 * rng.normal(), y + drift[1] + 0.3 * rng.normal(), z)
+        report = guard.take(Fix(float(r["t"]), noisy, estimate=True))
+        true = exact.take(Fix(float(r["t"]), (x, y, z), estimate=True)).classes[0]
+        end = np.array([report.position, (x, y, z)])
+        back = crossings(end, problem.representative_points)
+        words = [concatenate(c.word, back) for c in report.classes]
+        right += words[0] == true.word
+        held += true.word in words
+    assert right > 0.9 * len(rows)
+    assert held > 0.95 * len(rows)
+
+
+# loops
+
+
+def test_a_loop_is_foreseen_then_closed_then_undone():
+    guard, seen = Guard(SITE, EXACT), []
+    for fix in along(*ROUND_A):
+        report = guard.take(fix)
+        seen += [(a.kind, a.level, report.time) for a in report.raised if "loop" in a.kind]
+    kinds = [kind for kind, _, _ in seen]
+    assert "loop" in kinds
+    assert kinds.index("loop-ahead") < kinds.index("loop")
+    warning = next(t for kind, level, t in seen if (kind, level) == ("loop-ahead", Level.WARNING))
+    closed = next(t for kind, _, t in seen if kind == "loop")
+    assert closed - warning >= 10.0
+    text = guard.alarms.on["loop"].text
+    assert "a loop around A is closed" in text
+    assert "to undo it go back" in text
+    back = along(*ROUND_A[::-1], begin=report.time + 0.1)
+    for fix in back:
+        report = guard.take(fix)
+    for k in range(60):
+        place = (1e-4 * (k % 7), 0.0, 0.0)
+        report = guard.take(Fix(back[-1].time + 0.1 * (k + 1), place, estimate=True))
+    assert report.loops == ()
+    assert "loop" not in guard.alarms.on
+    assert report.classes[0].word == ()
+
+
+def test_passing_by_and_coming_back_the_same_way_raises_nothing():
+    guard = Guard(SITE, EXACT)
+    way = [(0, 0, 0), (5, 2, 0), (9, 0, 0), (5, 2, 0), (0, 0, 0)]
+    for fix in along(*way):
+        report = guard.take(fix)
+        assert not any("loop" in a.kind and a.level >= Level.WARNING for a in report.raised)
+    assert report.classes[0].word == ()
+
+
+def test_going_straight_home_past_the_other_side_of_a_pile_closes_a_loop():
+    strands = Strands(SITE)
+    tether = strands.model.start((0, 0, 0), (0, 0, 0))
+    for corner in ((5, 2, 0), (8, 0, 0), (6, -2, 0)):
+        tether = strands.model.update(tether, corner)
+    assert loops_in(SITE, tether.nodes[:, :2]) == []
+    found = closed_by(SITE, tether.nodes[:, :2], np.array([(6, -2), (-0.5, 0.3)]))
+    assert found is not None
+    assert found.around == (0,)
+
+
+@given(st.lists(st.tuples(st.floats(-3, 13), st.floats(-4, 8)), min_size=1, max_size=7))
+def test_a_taut_tether_has_no_loop_where_its_plan_does_not_cross_itself(places):
+    strands = Strands(SITE)
+    tether = strands.model.start((0, 0, 0), (0, 0, 0))
+    for x, y in places:
+        there = np.array([x, y, 0.0])
+        if strands.field.line_of_sight(tether.robot, there, 0.0):
+            tether = strands.model.update(tether, there)
+    line = tether.nodes[:, :2]
+    import shapely
+
+    loops = loops_in(SITE, line)
+    simple = len(line) < 3 or shapely.LineString(line).is_simple
+    assert not (loops and simple)
+    if loops:  # what it is around is in its word
+        letters = {abs(a) - 1 for a in signature(line, SITE.representative_points)}
+        assert letters or loops
+
+
+# what is not known
+
+
+def test_a_pile_within_the_error_leaves_two_classes_and_one_far_off_leaves_one():
+    near, far = Guard(SITE), Guard(SITE)
+    for fix in along((0, 0, 0), (5, 0.6, 0), (9, 0, 0)):
+        close = near.take(fix)
+    for fix in along((0, 0, 0), (2, 3, 0), (6, 3.4, 0), (7, 1.5, 0)):
+        away = far.take(fix)
+    assert {c.word for c in close.classes} >= {(), (1,)}
+    assert "class" in near.alarms.on
+    assert close.classes[0].word == (1,)
+    assert len(away.classes) == 1
+
+
+def test_the_operator_knows_better():
+    guard = Guard(SITE)
+    for fix in along((0, 0, 0), (5, 0.6, 0), (9, 0, 0)):
+        guard.take(fix)
+    report = guard.correct("south", "A")
+    report = guard.take(Fix(report.time + 0.1, (9.0, 0.0, 0.0), estimate=True))
+    assert [c.word for c in report.classes] == [()]
+    report = guard.correct("north", "A")
+    report = guard.take(Fix(report.time + 0.1, (9.0, 0.0, 0.0), estimate=True))
+    assert report.classes[0].word == (1,)
+    with pytest.raises(InputError, match="side"):
+        guard.correct("up", "A")
+    with pytest.raises(InputError, match="obstacle"):
+        guard.correct("north", "C")
+
+
+def test_a_gap_leaves_every_class_that_the_robot_can_have_reached():
+    short, long = Guard(SITE, EXACT), Guard(SITE, EXACT)
+    for guard in (short, long):
+        for fix in along((0, 0, 0), (3.8, 0.9, 0)):
+            report = guard.take(fix)
+    few = short.take(Fix(report.time + 3.0, (4.6, 1.2, 0.0), estimate=True))
+    many = long.take(Fix(report.time + 25.0, (6.2, 0.9, 0.0), estimate=True))
+    assert len(few.classes) == 1
+    assert {c.word for c in many.classes} >= {(), (1,)}
+
+
+def test_ways_are_those_no_longer_than_the_robot_can_have_gone():
+    a, b = np.array([3.0, 0.0, 0.0]), np.array([7.0, 0.0, 0.0])
+    assert {word for word, _ in ways_between(SITE, a, b, 4.6)} == {(), (1,)}
+    lengths = [length for _, length in ways_between(SITE, a, b, 12.0)]
+    assert lengths == sorted(lengths)
+    assert len(ways_between(SITE, a, b, 12.0)) > 2
+
+
+def test_nothing_is_claimed_while_the_position_is_lost_and_it_is_said_when_it_comes_back():
+    guard = Guard(SITE, EXACT)
+    for fix in along((0, 0, 0), (3, 2, 0)):
+        report = guard.take(fix)
+    assert report.claims
+    lost = guard.take(Fix(report.time + 1.0, (3.0, 2.0, 0.0), estimate=False))
+    assert not lost.claims
+    assert lost.classes == ()
+    lost = guard.take(Fix(report.time + 3.0, (3.0, 2.0, 0.0)))
+    assert any(a.kind == "estimate" and a.level == Level.ALARM for a in lost.alarms)
+    back = guard.take(Fix(report.time + 4.0, (3.2, 2.1, 0.0), estimate=True))
+    assert back.claims
+    assert back.classes[0].word == ()
+
+
+def test_silence_is_told_and_positions_frozen_to_the_last_digit_are_none():
+    guard = Guard(SITE, EXACT)
+    for fix in along((0, 0, 0), (4, 2, 0)):
+        report = guard.take(fix)
+    assert not guard.wait(report.time + 4.0).claims
+    frozen = Guard(SITE, EXACT)
+    for fix in along((0, 0, 0), (4, 2, 0)):
+        report = frozen.take(fix)
+    for k in range(1, 80):
+        report = frozen.take(Fix(fix.time + 0.1 * k, fix.position, estimate=True))
+    assert not report.claims
+
+
+def test_a_jump_is_no_motion():
+    track = Track(0.05, 0.5)
+    for fix in along((0, 0, 0), (4, 0, 0)):
+        motion = track.take(fix)
+    assert motion.lost_s == 0.0
+    jumped = track.take(Fix(fix.time + 0.1, (9.0, 5.0, 0.0), estimate=True))
+    assert jumped.reason == "the position jumped"
+    assert np.allclose(track.velocity, 0.0)
+
+
+@given(st.integers(0, 10_000))
+def test_a_belief_holds_the_class_of_a_robot_that_is_off_by_a_constant(seed):
+    rng = np.random.default_rng(seed)
+    offset = rng.uniform(-0.6, 0.6, 2)
+    belief = Belief(SITE, 0.5, 0.1)
+    here, word = np.zeros(2), ()
+    for _ in range(12):
+        there = here + rng.uniform(-1.5, 2.0, 2)
+        steps = here + np.linspace(0, 1, 30)[1:, None] * (there - here)
+        if min(float(o.signed_distance(p)) for o in SITE.obstacles for p in steps) < 0.0:
+            continue
+        for place in steps:
+            belief.move(here - offset, place - offset, 0.1)
+            word = concatenate(word, crossings(np.array([here, place]), SITE.representative_points))
+            here = place
+    ends = [
+        concatenate(h.word, crossings(
+            np.array([here - offset + h.offset, here]), SITE.representative_points))
+        for h in belief.classes()
+    ]  # fmt: skip
+    assert word in ends
+
+
+def test_the_winch_rules_classes_out():
+    guard = Guard(SITE)
+    for fix in along((0, 0, 0), (5, 0.8, 0), (9, 0.6, 0), (9, -3, 0)):
+        report = guard.take(fix)
+    assert len(report.classes) > 1
+    least = min(c.taut for c in report.classes)
+    for k in range(3):
+        report = guard.take(
+            Fix(fix.time + 0.1 * (k + 1), (9.0, -3.0, 0.0), estimate=True, paid_out=least / 1.4)
+        )
+    assert len(report.classes) <= len(guard.strands.all)
+    assert all(c.taut <= least + 2.5 for c in report.classes)
+
+
+# alarms
+
+
+def test_alarms_do_not_flicker():
+    alarms = Alarms()
+    reason = Alarm("loop-ahead", Level.WARNING, "because")
+    assert all(a.level == Level.NOTICE for a in alarms.take(0.0, [reason]))
+    (raised,) = alarms.take(0.6, [reason])
+    assert raised.level == Level.WARNING
+    for t in np.arange(0.7, 4.0, 0.1):
+        assert alarms.take(float(t), [reason] if int(10 * t) % 2 else []) == []
+    assert alarms.on
+    alarms.take(9.0, [])
+    assert not alarms.on
+
+
+# from one run to the next
+
+
+def test_a_class_survives_a_restart_and_no_other_site_takes_it(tmp_path):
+    guard = Guard(SITE, EXACT)
+    for fix in along((0, 0, 0), (5, 2, 0), (9, 0, 0)):
+        guard.take(fix)
+    save(guard, tmp_path / "state.json")
+    again = Guard(SITE, EXACT)
+    assert restore(again, tmp_path / "state.json") is not None
+    report = again.take(Fix(0.0, (9.0, 0.1, 0.0), estimate=True))
+    assert report.classes[0].word == (1,)
+    other = Guard(SITE.model_copy(update={"tether_length": 25.0}), EXACT)
+    with pytest.raises(InputError, match="another site"):
+        restore(other, tmp_path / "state.json")
+    for text in ("{", '{"schema_version": 1}', "[]"):
+        (tmp_path / "bad.json").write_text(text)
+        with pytest.raises(InputError):
+            restore(Guard(SITE, EXACT), tmp_path / "bad.json")
+
+
+# the command, the link and the page
+
+
+def test_a_replay_by_command_writes_lines_of_json(tmp_path, capsys):
+    lines = tmp_path / "reports.jsonl"
+    code = main([
+        "guard", str(PROBLEMS / "pool.json"), "--replay", str(RECORDED / "ardusub-pool.csv.gz"),
+        "--noise", "0.02", "--drift", "0.01", "-o", str(lines),
+    ])  # fmt: skip
+    assert code == 0
+    rows = [json.loads(line) for line in lines.read_text().splitlines()]
+    assert rows[-1]["classes"][0]["word"] == []
+    assert max(r["classes"][0]["taut"] for r in rows) == pytest.approx(11.66, abs=0.1)
+    assert "alarm" not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "says"),
+    [
+        ("a.csv", "t,x\n1,2\n", "expected columns"),
+        ("a.csv", "t,x,y,z\n1,2,nan,3\n", "line 2: y"),
+        ("a.csv", "t,x,y,z\n", "no positions"),
+        ("a.csv", "t,x,y,z,armed\n1,2,3,4,perhaps\n", "armed"),
+        ("a.csv.gz", "no gzip", "a.csv.gz"),
+        ("a.tlog", "rubbish" * 50, "no positions"),
+        ("a.xyz", "1", "ends in"),
+    ],
+)
+def test_a_recording_that_is_none_is_told_in_a_line(tmp_path, capsys, name, text, says):
+    (tmp_path / name).write_text(text)
+    assert main(["guard", str(PROBLEMS / "pool.json"), "--replay", str(tmp_path / name)]) == 2
+    err = capsys.readouterr().err.strip().splitlines()
+    assert len(err) == 1
+    assert says in err[0]
+
+
+def test_a_telemetry_log_is_read_as_it_was_heard(tmp_path):
+    import struct
+
+    from netsp.link.dialect import dialect, parser
+
+    m, packs = dialect(), parser(1, 1)
+    data = b"\x00rest of something"
+    for k in range(60):
+        for message in (
+            m.MAVLink_heartbeat_message(12, 3, 128, GUIDED, 4, 3),
+            m.MAVLink_local_position_ned_message(100 * k, 0.02 * k, 0.15 * k, 1.0, 0, 0, 0),
+            m.MAVLink_ekf_status_report_message(31, 0, 0, 0, 0, 0),
+        ):
+            data += struct.pack(">Q", 10**15 + k) + message.pack(packs)
+    (tmp_path / "log.tlog").write_bytes(data)
+    fixes = list(read_fixes(tmp_path / "log.tlog", Frame(SITE)))
+    places = [f.position for f in fixes if f.position is not None]
+    assert len(places) == 60
+    assert places[-1] == pytest.approx((8.85, 1.18, -1.0))
+    assert any(f.mode == "GUIDED" and f.armed for f in fixes)
+
+
+def test_a_guard_beside_a_vehicle_hears_it_and_tells_it_nothing_to_do(tmp_path):
+    guard, reports, ended = Guard(SITE), [], threading.Event()
+    state = tmp_path / "state.json"
+    with Autopilot(pace=8.0, noise=0.05, drift=0.1, smooth=1.0) as autopilot:
+        work = threading.Thread(
+            target=watch,
+            args=(guard, Frame(SITE), f"udpin:{autopilot.port}", reports.append),
+            kwargs={"system": 1, "state": str(state), "publish": True, "until": ended.is_set},
+        )
+        work.start()
+        assert autopilot.until(lambda: len(reports) > 40)
+        ended.set()
+        work.join(5.0)
+        told = {e["event"] for e in autopilot.events}
+    assert told <= {"started", "not understood"}
+    assert reports[-1].claims
+    assert reports[-1].classes[0].word == ()
+    assert state.exists()
+
+
+def test_the_page_is_for_who_has_the_token_and_takes_corrections_only():
+    with Page(SITE, 0) as page:
+
+        def ask(path, method="GET", body=None, **headers):
+            link = http.client.HTTPConnection("127.0.0.1", page.port, timeout=5)
+            link.request(method, path, body, headers)
+            answer = link.getresponse()
+            told = answer.status, answer.read()
+            link.close()
+            return told
+
+        assert ask("/")[0] == 404
+        assert ask("/wrong/site")[0] == 404
+        assert ask(f"/{page.token}/site", Host="evil.example")[0] == 404
+        status, data = ask(f"/{page.token}/site")
+        assert status == 200
+        assert [o["name"] for o in json.loads(data)["obstacles"]] == ["A", "B"]
+        for name in ("", "page.js", "page.css"):
+            assert ask(f"/{page.token}/{name}")[0] == 200
+        assert ask(f"/{page.token}/../pyproject.toml")[0] == 404
+        said = json.dumps({"side": "south", "obstacle": "A"})
+        assert ask(f"/{page.token}/correct", "POST", said)[0] == 200
+        assert page.corrections.get_nowait() == ("south", "A")
+        assert ask(f"/{page.token}/correct", "POST", said, Origin="http://evil.example")[0] == 400
+        for bad in (
+            "",
+            "[",
+            "{}",
+            '{"side": "up", "obstacle": "A"}',
+            '{"side": [], "obstacle": 1}',
+        ):
+            assert ask(f"/{page.token}/correct", "POST", bad)[0] in (400, 404)
+        assert ask(f"/{page.token}/event", "POST", "{}")[0] == 404
+
+
+def test_a_guard_asks_for_a_link_or_a_recording(capsys):
+    assert main(["guard", str(PROBLEMS / "pool.json")]) == 2
+    assert "--link" in capsys.readouterr().err
