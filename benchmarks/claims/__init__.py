@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from claims import command, offline, online, page, sites, space
+from claims import command, guard, offline, online, page, sites, space
 from claims.claim import Claim
 
 
@@ -21,4 +21,5 @@ def claims() -> Iterator[Claim]:
     yield from sites.claims()
     yield from page.claims()
     yield from space.claims()
+    yield from guard.claims()
     yield from command.running()

@@ -35,7 +35,10 @@ FILES = {
 MOST_BODY = 1000
 """Bytes that a page may send."""
 
-POLICY = "default-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'"
+POLICY = (
+    "default-src 'self'; img-src 'self' data:; frame-ancestors 'none'; base-uri 'none'; "
+    "form-action 'none'"
+)
 
 BACKLOG = 50
 """Reports that wait for a slow page; older ones are dropped."""

@@ -45,9 +45,9 @@ const thin = { "vector-effect": "non-scaling-stroke" };
 for (const o of site.obstacles) {
   add(map, "polygon", { points: points(o.grown), class: "grown", ...thin });
   add(map, "polygon", { points: points(o.rim), class: "rim" });
-  const text = add(map, "text", {
-    x: o.middle[0], y: -o.middle[1] + 5 * unit, "text-anchor": "middle", style: `font-size:${2.6 * unit}px`,
-  });
+  const below = Math.max(...o.rim.map((/** @type {number[]} */ p) => o.middle[1] - p[1])) + 3.5 * unit;
+  const text = add(map, "text", { x: o.middle[0], y: -o.middle[1] + below, "text-anchor": "middle" });
+  /** @type {SVGElement} */ (text).style.fontSize = `${2.6 * unit}px`;
   text.textContent = o.name;
 }
 for (const g of site.goals) {
@@ -175,3 +175,5 @@ byId("event").addEventListener("submit", async (event) => {
   const answer = await fetch("event", { method: "POST", body });
   byId("heard").textContent = answer.ok ? `told: ${body}` : "not taken";
 });
+
+export {};

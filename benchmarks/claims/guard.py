@@ -1,0 +1,82 @@
+"""Claims about the guard beside a vehicle, and tours flown."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+
+from table import ROOT
+
+from claims.claim import Claim
+
+sys.path.insert(0, str(ROOT))
+
+
+def recordings() -> tuple[str, bool]:
+    """Words at the goals of the recorded flights, and no loop told of."""
+    import guard as bench
+    import numpy as np
+
+    from netsp.guard.fix import Fix
+    from netsp.guard.guard import Guard, GuardOptions
+    from netsp.hsignature import concatenate, crossings
+    from netsp.solution import Solution
+
+    right = goals = loops = 0
+    for name in (*bench.SHIPPED, "r1", "r4"):
+        problem, true = bench.recorded(name)
+        tour = Solution.load(bench.RECORDED / f"tour-{name}.json")
+        watching = Guard(problem, GuardOptions(noise=0.02, drift=0.01))
+        nearest: dict[int, tuple[float, bool]] = {}
+        for k, place in enumerate(true):
+            report = watching.take(Fix(k * bench.DT, tuple(place), estimate=True))
+            loops += any(a.kind == "loop" for a in report.raised)
+            for visit in tour.tour:
+                goal = np.array(problem.goals[visit.goal].position)
+                far = float(np.linalg.norm(place - goal))
+                if far < nearest.get(visit.goal, (9.0, False))[0]:
+                    step = np.array([report.position, goal])
+                    word = concatenate(
+                        report.classes[0].word, crossings(step, problem.representative_points)
+                    )
+                    nearest[visit.goal] = far, word == visit.signature
+        goals += len(tour.tour)
+        right += sum(good for _, good in nearest.values())
+    return f"{right} of {goals} words, {loops} loops told of", right == goals and loops == 0
+
+
+def flown() -> tuple[str, bool]:
+    """The pool's tour on the fake autopilot."""
+    from netsp import solve
+    from netsp.execute.log import ExecutionOptions
+    from netsp.fly.flight import fly
+    from netsp.link.address import Address
+    from netsp.link.frame import Frame
+    from netsp.link.session import Session
+    from netsp.link.udp import UdpLink
+    from netsp.problem import Problem
+    from tests.autopilot import Autopilot
+
+    problem = Problem.load(ROOT / "problems" / "pool.json")
+    tour, pace = solve(problem), 8.0
+    with Autopilot(
+        pace=pace, noise=0.02, drift=0.03, smooth=1.0, params={"FS_GCS_TIMEOUT": 12}
+    ) as autopilot:
+        link = UdpLink(Address(True, "127.0.0.1", autopilot.port))
+        session = Session(link, Frame(problem), 1, pace)
+        try:
+            autopilot.until(lambda: session.now.position is not None)
+            session.command(400, 1)
+            autopilot.until(lambda: session.now.armed is True)
+            s = fly(problem, tour, session, ExecutionOptions(speed=0.5, reach=0.3)).summary
+        finally:
+            session.close()
+    good = s["status"] == "done" and s["visited"] == len(problem.goals) and s["tether_free"]
+    words = f"{s['arrivals_as_planned']} of {len(problem.goals) + 1} words"
+    return f"{s['visited']} goals, {words}", good and s["arrivals_as_planned"] == s["visited"] + 1
+
+
+def claims() -> Iterator[Claim]:
+    """All of this file."""
+    yield Claim("guard: words at the goals of five recorded flights", "34 of 34", recordings)
+    yield Claim("fly: the pool on a fake autopilot", "all, as planned, free", flown)
