@@ -1,5 +1,6 @@
 """A tour flown by a vehicle over MAVLink, and what stops it."""
 
+import io
 import json
 import random
 
@@ -240,3 +241,23 @@ def test_a_dry_run_shows_every_target_and_needs_no_link(tmp_path, capsys, tour):
     solution.write_text(json.dumps(broken))
     assert main(["fly", str(problem), str(solution), "--dry-run"]) == 2
     assert main(["fly", str(problem), str(solution)]) == 2
+
+
+def test_a_tour_is_flown_by_command_with_events_and_its_files_are_written(
+    tmp_path, tour, monkeypatch
+):
+    problem, solution, run = tmp_path / "p.json", tmp_path / "s.json", tmp_path / "run"
+    problem.write_text(SITE.to_json())
+    solution.write_text(tour.to_json())
+    monkeypatch.setattr("sys.stdin", io.StringIO('{"cancel_goal": 1}\nrubbish\n'))
+    with Autopilot(pace=PACE, params={"FS_GCS_ENABLE": 0}) as autopilot:
+        autopilot.tell(do="arm")
+        autopilot.event("armed")
+        code = main([
+            "fly", str(problem), str(solution), "--link", f"udpin:{autopilot.port}", "--pace",
+            str(PACE), "--events", "-o", str(run), "--quiet",
+        ])  # fmt: skip
+    assert code == 0
+    summary = json.loads((run / "summary.json").read_text())
+    assert (summary["status"], summary["visited"], summary["cancelled"]) == ("done", 1, [1])
+    assert {p.name for p in run.iterdir()} >= {"log.csv", "events.csv", "run.png", "visits.csv"}
