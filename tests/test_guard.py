@@ -304,6 +304,17 @@ def test_a_belief_holds_the_class_of_a_robot_that_is_off_by_a_constant(seed):
     assert word in ends
 
 
+def test_a_robot_is_not_believed_inside_a_pile():
+    belief = Belief(SITE, 0.5, 0.1)
+    for k in range(60):
+        belief.move(np.array([2.0 + 0.05 * k, 0.1]), np.array([2.05 + 0.05 * k, 0.1]), 0.1)
+    for _ in range(80):  # it stays there
+        belief.move(np.array([5.0, 0.1]), np.array([5.0, 0.1]), 0.1)
+    for h in belief.classes():
+        place = np.array([5.0, 0.1]) + h.offset
+        assert float(SITE.obstacles[0].signed_distance(place)) > -0.15
+
+
 def test_the_winch_rules_classes_out():
     guard = Guard(SITE)
     for fix in along((0, 0, 0), (5, 0.8, 0), (9, 0.6, 0), (9, -3, 0)):

@@ -274,7 +274,11 @@ def _or_as_given(
         return best
     again = flights.of(kept.mission, "it as it will be written")
     if again is None:
-        return kept if best is None or best.run is None else best
+        if best is not None and best.run is not None:
+            return best
+        # no time to fly what will be written, but to judge it
+        good = verify_mission(kept.mission, scene=flights.scene, field=flights.field)
+        return kept if good else best
     return replace(kept, run=again) if best is None or _better_than(again, best) else best
 
 
