@@ -315,7 +315,7 @@ def missions(names: list[str]) -> None:
         tour, flown = found.tour, run.summary
         row(name, len(mission.waypoints), WAYS.get(tour.solver, "states and legs"),
             f"{tour.length:.1f}", tour.status.value, f"{tour.bound_of_all or 0.0:.1f}",
-            f"{100 * (tour.gap_to_all or 1.0):.1f}",
+            f"{100 * (1.0 if tour.gap_to_all is None else tour.gap_to_all):.1f}",
             f"{tour.longest_tether:.2f} of {mission.tether_length:g}", f"{took:.0f}",
             f"{seconds_until_home(run):.1f}", f"{seconds_until_home(given):.1f}",
             f"{flown['exceedance_s']:.1f}", f"{flown['visited']} of {len(mission.waypoints)}",
