@@ -283,7 +283,7 @@ class Guard:
         else:
             self._ahead, self._sure = Ahead(), 1.0
         wound = sum(s.likely for s, found in zip(strands, closed, strict=True) if found)
-        loops = next((found for found in closed if found), []) if wound >= reasons.LIKELY else []
+        loops = next((found for found in closed if found), []) if wound >= reasons.LOOPED else []
         raised = self.alarms.take(
             self._seen, self._reasons(claims, silent, classes, (wound, closed), strands)
         )

@@ -24,9 +24,9 @@ drives towards it all the time."""
 SLACK = {Level.CAUTION: 0.1, Level.WARNING: 0.03, Level.ALARM: 0.0}
 """Shares of the tether that are left."""
 
-LIKELY, POSSIBLE = 0.7, 0.2
-"""Shares of the classes in which there is, or will be, a loop: above the first it is spoken of as
-such, above the second as a possibility, and below of neither."""
+LIKELY, LOOPED, POSSIBLE = 0.7, 0.5, 0.2
+"""Shares of the classes in which a loop will close, or has closed: above the first, or second, it
+is spoken of as such, above the third as a possibility, and below not at all."""
 
 DOUBT = 0.05
 """Share that a second class must have to be worth a word."""
@@ -118,7 +118,7 @@ def looped(
     near = _nearest(problem, loop, robot)
     names, sure = names_of(problem, loop.around), _unsure(share)
     text = f"a loop around {names} is closed{sure}; {_undo(problem, loop, near)}"
-    return [Alarm("loop", Level.ALARM if share >= LIKELY else Level.CAUTION, text)]
+    return [Alarm("loop", Level.ALARM if share >= LOOPED else Level.CAUTION, text)]
 
 
 def _unsure(share: float) -> str:
