@@ -261,3 +261,39 @@ def test_a_tour_is_flown_by_command_with_events_and_its_files_are_written(
     summary = json.loads((run / "summary.json").read_text())
     assert (summary["status"], summary["visited"], summary["cancelled"]) == ("done", 1, [1])
     assert {p.name for p in run.iterdir()} >= {"log.csv", "events.csv", "run.png", "visits.csv"}
+
+
+@pytest.mark.parametrize(
+    "what", [{"do": "push", "by": [-1.5, -2.5, 0]}, {"do": "jump", "by": [1, -4]}]
+)
+def test_a_vehicle_that_is_not_where_it_was_sent_is_stopped(tour, what):
+    with Flown() as flown:
+        done = flown.fly(tour, on_step=after(8.0, lambda: flown.autopilot.tell(**what)))
+        assert "off its path" in done.stopped
+
+
+def test_disarming_that_nobody_looked_at_in_time_is_not_forgotten(tour):
+    def rearm():
+        flown.autopilot.tell(do="disarm")
+        assert flown.autopilot.until(lambda: flown.session.now.armed is False)
+        flown.autopilot.tell(do="arm")
+        assert flown.autopilot.until(lambda: flown.session.now.armed is True)
+
+    with Flown(params={"FS_GCS_ENABLE": 0}) as flown:
+        done = flown.fly(tour, on_step=after(6.0, rearm))
+        assert "disarmed" in done.stopped
+
+
+def test_a_vehicle_that_tells_no_positions_any_more_is_stopped(tour):
+    def deaf():
+        flown.session._listener._local_position_ned = lambda message: None
+
+    with Flown() as flown:
+        done = flown.fly(tour, on_step=after(6.0, deaf))
+        assert "no position" in done.stopped
+
+
+def test_pushes_are_not_for_real_vehicles(tour):
+    told = {"schema_version": 1, "events": [{"time": 1.0, "push": [1, 0, 0]}]}
+    with pytest.raises(InputError, match="push"):
+        fly(SITE, tour, None, OPTIONS, surprises=Surprises.model_validate(told))

@@ -243,6 +243,18 @@ def test_ways_are_those_no_longer_than_the_robot_can_have_gone():
     assert len(ways_between(SITE, a, b, 12.0)) > 2
 
 
+def test_long_gaps_and_places_beyond_any_tether_take_no_time_to_think_about():
+    problem = Problem.load(PROBLEMS / "wharf.json")
+    guard = Guard(problem)
+    for fix in along((0, 0, 0), (3.8, 4.0, -1)):
+        report = guard.take(fix)
+    report = guard.take(Fix(report.time + 600.0, (12.0, 5.0, -1.0), estimate=True))
+    assert len(report.classes) > 1
+    report = guard.take(Fix(report.time + 0.1, (9e6, 9e6, 0.0), estimate=True))
+    report = guard.take(Fix(report.time + 3.0, (9e6, 9e6, 0.0), estimate=True))
+    assert not report.claims
+
+
 def test_nothing_is_claimed_while_the_position_is_lost_and_it_is_said_when_it_comes_back():
     guard = Guard(SITE, EXACT)
     for fix in along((0, 0, 0), (3, 2, 0)):

@@ -150,7 +150,7 @@ def _flown(
         if args.events:
             from netsp.fly.inputs import events_of
 
-            sources.append(events_of(sys.stdin, complain))
+            sources.append(events_of(getattr(sys.stdin, "buffer", sys.stdin), complain))
         if args.page is not None:
             from netsp.guard.page import Page
 
@@ -178,6 +178,7 @@ def _flown(
         assert surprises is None or isinstance(surprises, Surprises)
         done = fly(
             problem, solution, session, options, surprises=surprises, on_step=on_step,
+            should_stop=lambda: clock.stopped,
             incoming=(lambda: [e for s in sources for e in s()]) if sources else None,
         )  # fmt: skip
         if done.stopped:

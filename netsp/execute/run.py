@@ -233,6 +233,8 @@ class _Run:
     def asked(self, event: Event) -> None:
         """An event that nobody could check before."""
         try:
+            if event.kind == "push" and self.live is not None:
+                raise InputError("push: a real vehicle says itself where it is")
             changed(self.problem, event)
         except InputError as error:
             self._enter_log(event.kind, "ignored", f"cannot be: {error}", 0.0)

@@ -18,7 +18,9 @@ WAIT_S = 10.0
 LOOK_S = 0.1
 
 
-def ready(session: Session, start: Floats, near: float) -> None:
+def ready(
+    session: Session, start: Floats, near: float, should_stop: Callable[[], bool] = lambda: False
+) -> None:
     """Have a vehicle ready to be told where to go, or refuse.
 
     Parameters
@@ -29,6 +31,8 @@ def ready(session: Session, start: Floats, near: float) -> None:
         Where the tour begins, metres.
     near : float
         Metres from there at most.
+    should_stop : callable, optional
+        Asked while it waits; a KeyboardInterrupt is raised then.
 
     Raises
     ------
@@ -36,13 +40,15 @@ def ready(session: Session, start: Floats, near: float) -> None:
         It does not speak, has no position estimate, is away from the start or disarmed, or does
         not take the mode GUIDED.
     """
-    if not _until(session, lambda: session.silent_s < np.inf):
+
+    def until(holds: Callable[[], bool]) -> bool:
+        return _until(session, holds, should_stop)
+
+    if not until(lambda: session.silent_s < np.inf):
         raise RefusedError(f"no vehicle has been heard for {WAIT_S:g} s: is the link right?")
     session.ask_for_positions()
     m = dialect()
-    placed = _until(
-        session, lambda: session.now.position is not None and session.now.estimate is not None
-    )
+    placed = until(lambda: session.now.position is not None and session.now.estimate is not None)
     now = session.now
     if not placed or now.position is None or not now.estimate:
         raise RefusedError("the vehicle has no position estimate")
@@ -56,15 +62,17 @@ def ready(session: Session, start: Floats, near: float) -> None:
         raise RefusedError("the vehicle is not armed: arm it when all is clear, and call again")
     if now.mode != mode_name(GUIDED):
         session.command(m.MAV_CMD_DO_SET_MODE, 1, GUIDED)
-        if not _until(session, lambda: session.now.mode == mode_name(GUIDED)):
+        if not until(lambda: session.now.mode == mode_name(GUIDED)):
             raise RefusedError(
                 f"the vehicle does not take the mode GUIDED: it is in {session.now.mode}"
             )
 
 
-def _until(session: Session, holds: Callable[[], bool]) -> bool:
+def _until(session: Session, holds: Callable[[], bool], should_stop: Callable[[], bool]) -> bool:
     left = WAIT_S
     while left > 0.0:
+        if should_stop():
+            raise KeyboardInterrupt
         if holds():
             return True
         session.sleep(LOOK_S)

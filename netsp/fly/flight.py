@@ -22,6 +22,9 @@ from netsp.solution import Solution
 NEAR_START = 2.0
 """Metres from the start at which a vehicle may be armed."""
 
+LEAST_REACH = 0.15
+"""Metres: targets are a decimetre deep where the tour is at the surface, and it holds to 0.13."""
+
 ALT_HOLD = 2
 """The mode that a vehicle without an estimate is put in: it keeps its depth and goes nowhere."""
 
@@ -35,6 +38,7 @@ def fly(
     surprises: Surprises | None = None,
     incoming: Callable[[], list[Event]] | None = None,
     on_step: Callable[[ExecutionRow], None] | None = None,
+    should_stop: Callable[[], bool] = lambda: False,
 ) -> Execution:
     """Carry a tour out with a vehicle.
 
@@ -54,6 +58,8 @@ def fly(
         Asked at every step for events that have come since.
     on_step : callable, optional
         Called with every row; a KeyboardInterrupt ends the flight.
+    should_stop : callable, optional
+        Asked while the vehicle is not ready yet; a KeyboardInterrupt is raised then.
 
     Returns
     -------
@@ -72,8 +78,12 @@ def fly(
     if not judged:
         failed = next(c for c in judged.checks if not c.passed)
         raise InputError(f"solution: fails its check {failed.name!r}: {failed.detail}")
+    if surprises is not None and any(e.kind == "push" for e in surprises.events):
+        raise InputError("surprises: push: a real vehicle says itself where it is; expected none")
+    if options.reach < LEAST_REACH:
+        raise InputError(f"reach: expected at least {LEAST_REACH:g}, got {options.reach:g}")
     start = np.array(problem.base if problem.state is None else problem.state.position)
-    ready(session, start, NEAR_START)
+    ready(session, start, NEAR_START, should_stop)
     vehicle = LinkedVehicle(session, options.reach)
     done = execute(
         problem, solution, replace(options, vehicle="linked"), surprises=surprises,

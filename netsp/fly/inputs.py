@@ -6,7 +6,7 @@ import json
 import queue
 import threading
 from collections.abc import Callable
-from typing import TextIO
+from typing import BinaryIO, TextIO
 
 from pydantic import ValidationError
 
@@ -18,12 +18,14 @@ MOST_LINE = 100_000
 """Characters of a line."""
 
 
-def events_of(stream: TextIO, complain: Callable[[str], None]) -> Callable[[], list[Event]]:
+def events_of(
+    stream: TextIO | BinaryIO, complain: Callable[[str], None]
+) -> Callable[[], list[Event]]:
     """Events from a stream, which a thread of its own reads.
 
     Parameters
     ----------
-    stream : TextIO
+    stream : TextIO or BinaryIO
         Lines such as ``{"cancel_goal": "A3"}`` or ``{"appear": {"center": [3, 2], "radius": 1}}``;
         a time is not needed, for they come about at once.
     complain : callable
@@ -37,14 +39,13 @@ def events_of(stream: TextIO, complain: Callable[[str], None]) -> Callable[[], l
     waiting: queue.Queue[Event] = queue.Queue()
 
     def read() -> None:
-        for line in stream:
+        while line := stream.readline(MOST_LINE):
             if not line.strip():
                 continue
             try:
-                if len(line) > MOST_LINE:
-                    raise InputError("line: too long")
-                waiting.put(event_of(line))
-            except InputError as error:
+                text = line if isinstance(line, str) else line.decode()
+                waiting.put(event_of(text))
+            except (InputError, UnicodeError) as error:
                 complain(f"not understood: {error}")
 
     threading.Thread(target=read, daemon=True, name="netsp-events").start()

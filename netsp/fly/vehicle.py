@@ -14,12 +14,20 @@ from netsp.arrays import Floats
 from netsp.execute.run import StopsFlightError
 from netsp.export.write import altitude
 from netsp.fields import Point3
+from netsp.guard.fix import Fix
 from netsp.link.dialect import dialect
 from netsp.link.modes import GUIDED, mode_name
 from netsp.link.session import Session
 
 SILENT_S = 3.0
 """Seconds without a heartbeat after which the link is lost."""
+
+UNPLACED_S = 2.0
+"""Seconds without a position, of ten that come in each, after which there is none."""
+
+OFF_PATH = 1.0
+"""Metres off the line to its target at which a vehicle is not where it was sent; ArduSub keeps
+within 0.2 (0.35 where it brakes into a bend)."""
 
 AGAIN_S = 2.0
 """Seconds after which a target is sent again."""
@@ -50,6 +58,8 @@ class LinkedVehicle:
         self._target: Point3 | None = None
         self._sent = -np.inf
         self.sent: list[tuple[float, Point3]] = []
+        self._from = self._position
+        session.watch(_wrong)
 
     def _told(self) -> Floats:
         place = self.session.now.position
@@ -120,6 +130,7 @@ class LinkedVehicle:
             for place in self.session.places():
                 points.append(place)
                 self._position = place
+                self._check_path()
         return points or [self._position.copy()], passed
 
     def _at(self, vertex: Floats) -> bool:
@@ -127,7 +138,8 @@ class LinkedVehicle:
         return float(np.linalg.norm(self._position - there)) <= self.reach
 
     def hold(self) -> None:
-        """Stay where it is."""
+        """Stay where it is, if it is still ours."""
+        self.check()
         self._position = self._told()
         self._send(self._position)
 
@@ -149,17 +161,29 @@ class LinkedVehicle:
         StopsFlightError
             It may not.
         """
-        now = self.session.now
-        if self.session.silent_s > SILENT_S:
+        session = self.session
+        wrong = session.broken or _wrong(session.now)
+        if wrong is not None:
+            raise StopsFlightError(wrong)
+        if session.silent_s > SILENT_S:
+            raise StopsFlightError(f"the link is lost: no heartbeat for {session.silent_s:.0f} s")
+        if session.unplaced_s > UNPLACED_S:
             raise StopsFlightError(
-                f"the link is lost: no heartbeat for {self.session.silent_s:.0f} s"
+                f"the link is lost or carries no position: none for {session.unplaced_s:.0f} s"
             )
-        if now.estimate is False:
-            raise StopsFlightError("the vehicle has lost its position estimate")
-        if now.armed is False:
-            raise StopsFlightError("the vehicle was disarmed")
-        if now.mode != mode_name(GUIDED):
-            raise StopsFlightError(f"the pilot has taken over: the mode is {now.mode}")
+
+    def _check_path(self) -> None:
+        """That it is where it was sent: carried off, or its estimate set anew, what lies between
+        it and its target is not what was planned."""
+        if self._target is None:
+            return
+        a, b = self._from, np.array(self._target)
+        along = b - a
+        size = float(along @ along)
+        share = 0.0 if size == 0.0 else float(np.clip((self._position - a) @ along / size, 0, 1))
+        off = float(np.linalg.norm((self._position - a - share * along)[:2]))
+        if off > OFF_PATH:
+            raise StopsFlightError(f"the vehicle is {off:.1f} m off its path")
 
     def _send(self, place: Floats) -> None:
         x, y, z = (float(v) for v in place)
@@ -169,8 +193,20 @@ class LinkedVehicle:
             return
         if target != self._target:
             self.sent.append((now, target))
+            self._from = self._position
         self._target, self._sent = target, now
         self.session.link.send(target_message(self.session, target))
+
+
+def _wrong(now: Fix) -> str | None:
+    """What a flight must not go on after."""
+    if now.estimate is False:
+        return "the vehicle has lost its position estimate"
+    if now.armed is False:
+        return "the vehicle was disarmed"
+    if now.mode != mode_name(GUIDED):
+        return f"the pilot has taken over: the mode is {now.mode}"
+    return None
 
 
 def target_message(session: Session, target: Point3) -> object:

@@ -15,8 +15,8 @@ from netsp.roadmap.tethers import Tethers
 MOST_WAYS = 12
 """Ways that are kept, the shortest."""
 
-TRIES = 4
-"""Lengths up to which a way is looked for, each half as long again as the one before."""
+TRIES, GROWTH = 16, 1.25
+"""Lengths up to which ways are looked for, each longer by that than the one before."""
 
 
 def ways_between(
@@ -45,13 +45,21 @@ def ways_between(
     straight = math.dist(begin, end)
     if straight <= 1e-6 * problem.scale:
         end = begin
-    longest = max(farthest, 1.05 * straight, 1e-6 * problem.scale)
+    # ever longer, until there are enough: all ways at once may be more than anybody can count
+    longest, found = max(1.05 * straight, 1e-6 * problem.scale), []
     for _ in range(TRIES):
         free = bare.model_copy(update={"base": begin, "goals": (), "tether_length": longest})
-        found = Tethers(free).classes(*end)[:MOST_WAYS]
-        if found:
-            return [(t.word, t.length) for t in found]
-        longest *= 1.5
+        found = Tethers(free).classes(*end)
+        if len(found) >= MOST_WAYS or (found and longest >= farthest):
+            break
+        longest = (
+            min(GROWTH * longest + 0.5, max(farthest, longest + 0.5))
+            if found
+            else (GROWTH * longest + 0.5)
+        )
+    kept = [(t.word, t.length) for t in found if t.length <= max(farthest, found[0].length)]
+    if kept:
+        return kept[:MOST_WAYS]
     # between obstacles that overlap there may be none: then it went straight
     line = np.array([before, after])
     return [(crossings(line, problem.representative_points), math.dist(before, after))]

@@ -12,7 +12,7 @@ import numpy as np
 
 from netsp.arrays import Floats
 from netsp.errors import InputError
-from netsp.fields import checked_argument, checked_instance
+from netsp.fields import Point3, checked_argument, checked_instance
 from netsp.guard import reasons
 from netsp.guard.ahead import Ahead, look_ahead
 from netsp.guard.alarms import Alarm, Alarms
@@ -175,11 +175,18 @@ class Guard:
             self._vouched = fix.estimate
             if not fix.estimate:
                 self.track.lose(fix.time)
-        if fix.position is not None and self._vouched is not False:
+        if fix.position is not None and self._beyond(fix.position):
+            self.track.lose(fix.time)  # no robot on this tether is there
+        elif fix.position is not None and self._vouched is not False:
             motion = self.track.take(fix)
             if motion is not None:
                 self._moved(motion)
         return self._told(self._last)
+
+    def _beyond(self, place: Point3) -> bool:
+        """Whether a place is farther from the base than twice the tether."""
+        far = float(np.linalg.norm(np.array(place) - np.array(self.problem.base)))
+        return not far <= 2.0 * self.problem.tether_length + 4.0 * self.options.drift
 
     def wait(self, now: float) -> Report:
         """Nothing has come for a while.

@@ -24,6 +24,9 @@ SILENT_S = 0.5
 SAVE_S = 1.0
 """Seconds between two times that the class is written down."""
 
+BEAT_S = 1.0
+"""Seconds between two heartbeats to a vehicle that waits to be spoken to."""
+
 PUBLISH_S = 1.0
 """Seconds between two times that figures are sent."""
 
@@ -72,7 +75,11 @@ def watch(
         known = restore(guard, state)
         if known is not None:
             tell(f"going on from {state}, {known.age:.0f} s old")
-    link = UdpLink(Address.parse(address), SYSTEM)
+    where = Address.parse(address)
+    link = UdpLink(where, SYSTEM)
+    only = None if where.listens else link.peer
+    beat = dialect().MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3)  # a computer on board
+    beaten = float("-inf")
     listener, stream = Listener(frame, system), Stream(guard)
     heard = saved = sent = told = time.monotonic()
     try:
@@ -80,7 +87,12 @@ def watch(
         while until is None or not until():
             messages = link.hear(0.05)
             now = time.monotonic()
+            if only is not None and now - beaten >= BEAT_S:
+                beaten = now  # who waits to be spoken to answers nobody else
+                link.send(beat)
             for message, peer in messages:
+                if only is not None and peer != only:
+                    continue
                 fix = listener.understand(message)
                 if fix is None or message.get_srcSystem() != listener.system:
                     continue

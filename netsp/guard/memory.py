@@ -16,7 +16,7 @@ from netsp.errors import InputError
 from netsp.fields import Point3
 from netsp.files import FileModel, write_text
 from netsp.guard.guard import Guard
-from netsp.hsignature import Word
+from netsp.hsignature import Word, reduce
 from netsp.models import Model
 from netsp.problem import Problem
 
@@ -42,7 +42,9 @@ class GuardState(FileModel):
 
     schema_version: Annotated[Literal[1], Field(description="of the file format")] = 1
     site: Annotated[str, Field(description="sha256 of the site")]
-    saved: Annotated[float, Field(description="seconds since 1970")]
+    saved: Annotated[
+        float, Field(description="seconds since 1970", ge=0.0, le=1e11, allow_inf_nan=False)
+    ]
     position: Annotated[Point3, Field(description="of the robot, in the site's frame")]
     classes: Annotated[
         tuple[KnownClass, ...], Field(description="the likeliest first", min_length=1)
@@ -71,6 +73,10 @@ class GuardState(FileModel):
         most = len(problem.obstacles)
         if any(x == 0 or abs(x) > most for c in self.classes for x in c.word):
             raise InputError(f"--state: classes: expected letters from 1 to {most}")
+        if any(reduce(c.word) != c.word for c in self.classes):
+            raise InputError("--state: classes: expected reduced words")
+        if self.saved > time.time() + LONGEST_S:
+            raise InputError("--state: saved: lies in the future; is the clock right?")
         return {c.word: c.cost for c in self.classes}
 
     @property

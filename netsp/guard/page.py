@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import queue
 import secrets
+import sys
 import threading
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -83,7 +84,7 @@ class Page:
             owner = page
 
         try:
-            self._server = ThreadingHTTPServer(("127.0.0.1", port), Handler)
+            self._server = _Server(("127.0.0.1", port), Handler)
         except (OSError, OverflowError) as error:
             reason = getattr(error, "strerror", None) or error
             raise InputError(f"--page: port {port}: {reason}") from None
@@ -158,6 +159,13 @@ class Page:
         }  # fmt: skip
 
 
+class _Server(ThreadingHTTPServer):
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """A page that went away unread is none."""
+        if not isinstance(sys.exception(), OSError):
+            super().handle_error(request, client_address)
+
+
 class _Handler(BaseHTTPRequestHandler):
     owner: Page
     protocol_version = "HTTP/1.1"
@@ -196,7 +204,8 @@ class _Handler(BaseHTTPRequestHandler):
         """On which side of an obstacle the tether passes; an event."""
         length, asked = self.headers.get("Content-Length") or "", self._asked()
         taken = ("event",) if self.owner.takes_events else ("correct",)
-        if asked not in taken or not length.isdigit() or int(length) > MOST_BODY:
+        number = len(length) <= 5 and length.isascii() and length.isdigit()
+        if asked not in taken or not number or int(length) > MOST_BODY:
             self._answer(HTTPStatus.NOT_FOUND, b"not found\n", "text/plain")
             return
         origin = self.headers.get("Origin")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import gzip
 import io
@@ -10,6 +11,7 @@ import struct
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 from netsp.errors import InputError
 from netsp.files import MOST_BYTES, check_file, read_bytes
@@ -23,6 +25,9 @@ from netsp.models import shown
 KINDS = ".csv, .csv.gz, .tlog or .bin"
 
 TRUE = {"1": True, "true": True, "yes": True, "0": False, "false": False, "no": False}
+
+MOST = 1e9
+"""Of seconds and metres."""
 
 MOST_PACKET = 300
 """Bytes of a MAVLink message, at most."""
@@ -100,8 +105,10 @@ def _row(row: dict[str, str], frame: Frame, named: bool, where: str) -> Fix:
             value = float(text)
         except ValueError:
             value = math.nan
-        if not math.isfinite(value):
-            raise InputError(f"{where}: {column}: expected a number, got {shown(text)}")
+        if not abs(value) < MOST:
+            raise InputError(
+                f"{where}: {column}: expected a number below {MOST:g}, got {shown(text)}"
+            )
         return value
 
     def yes(column: str) -> bool | None:
@@ -158,21 +165,30 @@ def _dataflash(file: Path, frame: Frame) -> Iterator[Fix]:
         raise InputError(
             "--replay: a .bin needs pymavlink; install it with: pip install 'netsp[mavlink]'"
         ) from None
+    broken = (OSError, ValueError, TypeError, AttributeError, struct.error, IndexError, KeyError)
     try:
-        log = DFReader_binary(str(file))
-    except (OSError, ValueError, struct.error, IndexError, KeyError) as error:
+        # pymavlink tells on standard output what it makes of damaged logs
+        with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+            log = DFReader_binary(str(file))
+            found = list(_of_log(log, frame))
+    except broken as error:
         raise InputError(f"--replay: {file}: no log of ArduPilot: {error}") from None
+    yield from found
+
+
+def _of_log(log: Any, frame: Frame) -> Iterator[Fix]:
     while True:
         m = log.recv_match(type=["XKF1", "XKF4", "ARM", "MODE"])
         if m is None:
             return
-        time = m.TimeUS * 1e-6
+        time = float(m.TimeUS) * 1e-6
         kind = m.get_type()
         if kind in ("XKF1", "XKF4") and getattr(m, "C", 0) != 0:
             continue
         if kind == "XKF1":
-            place = frame.from_local(m.PN, m.PE, m.PD)
-            yield Fix(time, position=place, heading=float(m.Yaw) % 360.0)
+            north, east, down, yaw = (float(v) for v in (m.PN, m.PE, m.PD, m.Yaw))
+            if all(abs(v) < MOST for v in (north, east, down, yaw, time)):
+                yield Fix(time, position=frame.from_local(north, east, down), heading=yaw % 360.0)
         elif kind == "XKF4":
             flags = int(m.SS)
             good = bool(flags & HORIZONTAL) and not flags & (CONSTANT | UNINITIALIZED)

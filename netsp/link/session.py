@@ -9,6 +9,7 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
+from collections.abc import Callable
 from dataclasses import fields, replace
 from typing import Any
 
@@ -25,7 +26,10 @@ from netsp.link.udp import UdpLink
 HEARTBEAT_S = 0.5
 """Seconds between heartbeats: ArduSub disarms when it hears none for about 3."""
 
-POSITION_MS = 100_000
+BACKWARDS_S = 2.0
+"""Seconds by which the vehicle's clock may go back when messages overtake one another."""
+
+POSITION_US = 100_000
 """Microseconds between two positions that are asked for."""
 
 
@@ -53,6 +57,9 @@ class Session:
         self._lock = threading.Lock()
         self._now = Fix(0.0)
         self._heard: float | None = None
+        self._placed: float | None = None
+        self._holds: Callable[[Fix], str | None] | None = None
+        self._broken: str | None = None
         self._places: deque[tuple[float, Point3]] = deque(maxlen=2000)
         self._texts: deque[str] = deque(maxlen=200)
         self._acks: dict[int, int] = {}
@@ -87,6 +94,31 @@ class Session:
         with self._lock:
             heard = self._heard
         return float("inf") if heard is None else (time.monotonic() - heard) * self.pace
+
+    @property
+    def unplaced_s(self) -> float:
+        """Seconds of the vehicle since its last position came; infinite before the first."""
+        with self._lock:
+            placed = self._placed
+        return float("inf") if placed is None else (time.monotonic() - placed) * self.pace
+
+    def watch(self, holds: Callable[[Fix], str | None]) -> None:
+        """From now on, ask of all that the vehicle says whether something holds, so that nothing is
+        missed while nobody looks.
+
+        Parameters
+        ----------
+        holds : callable
+            Called, from the thread that reads, with what is known; returns what is wrong.
+        """
+        with self._lock:
+            self._holds, self._broken = holds, None
+
+    @property
+    def broken(self) -> str | None:
+        """What did not hold, the first time; None if all did."""
+        with self._lock:
+            return self._broken
 
     def places(self) -> list[Floats]:
         """Positions that came since this was last asked, each of shape (3,), metres."""
@@ -128,9 +160,9 @@ class Session:
             m.MAVLINK_MSG_ID_GLOBAL_POSITION_INT if self.frame.is_global
             else m.MAVLINK_MSG_ID_LOCAL_POSITION_NED
         )  # fmt: skip
-        self.command(m.MAV_CMD_SET_MESSAGE_INTERVAL, wanted, POSITION_MS)
+        self.command(m.MAV_CMD_SET_MESSAGE_INTERVAL, wanted, POSITION_US)
         self.command(
-            m.MAV_CMD_SET_MESSAGE_INTERVAL, m.MAVLINK_MSG_ID_EKF_STATUS_REPORT, 2 * POSITION_MS
+            m.MAV_CMD_SET_MESSAGE_INTERVAL, m.MAVLINK_MSG_ID_EKF_STATUS_REPORT, 2 * POSITION_US
         )
 
     def say(self, text: str, urgent: bool = False) -> None:
@@ -175,9 +207,14 @@ class Session:
                 f.name: getattr(self._now, f.name)
                 for f in fields(Fix) if getattr(fix, f.name) is None
             }  # fmt: skip
-            self._now = replace(fix, **kept)
+            before, self._now = self._now.time, replace(fix, **kept)
             if fix.position is not None:
+                self._placed = time.monotonic()
                 self._places.append((fix.time, fix.position))
+            if self._holds is not None and self._broken is None:
+                self._broken = self._holds(self._now)
+                if self._now.time < before - BACKWARDS_S:
+                    self._broken = "the vehicle has started anew"
 
     def _beat(self) -> None:
         m = dialect()
