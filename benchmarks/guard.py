@@ -315,7 +315,8 @@ def main() -> None:
     args = parser.parse_args()
     heading("A guard beside robots that are driven")
     head("tracks", "hours", "loops put in", "missed", "as possible", "missed by turns",
-         "lead s, p5 / median", "10 s of lead where foreseeable %", "warnings an hour", "false an hour",
+         "lead s, p5 / median", "10 s of lead where foreseeable %", "warnings an hour",
+         "false an hour",
          "turn counter's an hour", "update ms, median / p99", name="guard")  # fmt: skip
     jobs = [(kind, seed, args.loops) for kind, seed in tracks(args.tracks)]
     with ProcessPoolExecutor(args.jobs) as pool:
