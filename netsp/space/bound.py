@@ -29,7 +29,7 @@ from netsp.roadmap.from_state import from_state
 from netsp.solvers.solve import solve_graph
 from netsp.space.legs import Ways
 from netsp.space.states import ROUNDS
-from netsp.space.water import LONGER, along
+from netsp.space.water import LONGER, Water, along
 from netsp.travel.graph import TravelGraph
 from netsp.travel.result import Result
 
@@ -46,6 +46,9 @@ MOST_VERTICES = 3000
 ACCURACY = 1e-3
 """Share of a tether at rest that its length may be off by (docs/tether.md: a tenth of that, where
 an exact length is known)."""
+
+MOST_MEASURED = 24
+"""Words that a leg's is sought among."""
 
 ANY = -1
 """In place of a word: of a class that was not found."""
@@ -195,8 +198,8 @@ def _costs(ways: Ways, classes: list[_Class]) -> tuple[Floats, Bools]:
 def _measure(
     ways: Ways, classes: list[_Class], costs: Floats, measured: Bools, result: Result
 ) -> bool:
-    """Pull the legs of a tour taut that were only estimated, in their classes: back along one
-    tether, and out along the other. Whether any was longer."""
+    """Seek the shortest ways in the classes of those legs of a tour that were only estimated.
+    Whether any was longer."""
     assert result.tour is not None
     water, longer = ways.water, False
     for u, v in pairwise((*result.tour, 0)):
@@ -204,11 +207,31 @@ def _measure(
         if measured[u, v] or lines[0] is None or lines[1] is None:
             continue
         measured[u, v] = measured[v, u] = True
-        length = along(water.taut(np.vstack([lines[0][::-1], lines[1][1:]])))
+        length = _least(water, lines[0], lines[1])
         if length > costs[u, v] * (1.0 + 1e-9) + 1e-9:
             costs[u, v] = costs[v, u] = length
             longer = True
     return longer
+
+
+def _least(water: Water, one: Floats, other: Floats) -> float:
+    """Metres that ways in the class of the leg between two tethers are at least long. Back along
+    one and out along the other, pulled taut, is such a way, but need not be the shortest: in space
+    it may hang on something. So shorter ones are sought."""
+    there = water.taut(np.vstack([one[::-1], other[1:]]))
+    length, word = along(there), water.number(there)
+    begin, end = water.words.held(there[0]), water.words.held(there[-1])
+    if word is None or begin is None or end is None:
+        return float(np.linalg.norm(there[-1] - there[0]))
+    found = water.ways(water.search(True, begin, MOST_MEASURED, {end: length}), end)
+    same = [way for number, way in found if number == word]
+    if same:
+        return min(length, *(along(water.taut(np.vstack([there[0], way, there[-1]])))
+                             for way in same))  # fmt: skip
+    if len(found) < MOST_MEASURED:
+        return length  # there is none along cells that is pulled to less
+    # paths along cells are longer than those pulled taut by no more than that factor
+    return min(length, along(found[-1][1]) / LONGER)
 
 
 def _between(ways: Ways, own: list[_Class], others: list[_Class]) -> tuple[Floats, Bools]:

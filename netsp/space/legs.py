@@ -11,6 +11,7 @@ import numpy as np
 
 from netsp.arrays import Floats, Ints
 from netsp.clock import Clock
+from netsp.space.beside import ways_beside
 from netsp.space.places import Places
 from netsp.space.states import ROUNDS, Effort, State, States
 from netsp.space.water import LONGER, Water, along, straight
@@ -94,6 +95,14 @@ class Ways:
                     if word is not None and all(word != w for w, _ in ways):
                         ways.append((word, path))
             ways.sort(key=lambda way: along(way[1]))
+            classes = list(ways)
+            if found is not None and ways:
+                farther = self.effort.farther * float(self._apart[n, m])
+                for path in ways_beside(water, [way for _, way in ways], farther):
+                    word = water.number(path)
+                    if word is not None:
+                        ways.append((word, path))
+                ways.sort(key=lambda way: along(way[1]))
             back = []
             for _, path in ways:
                 word = water.number(path[::-1])
@@ -101,7 +110,7 @@ class Ways:
                     back.append((word, path[::-1]))
             self._known[n, m], self._known[m, n] = ways, back
             if found is not None and there is not None:
-                self._beyond[n, m] = self._beyond[m, n] = self._least_beyond(n, m, ways)
+                self._beyond[n, m] = self._beyond[m, n] = self._least_beyond(n, m, classes)
 
     def _least_beyond(self, n: int, m: int, ways: list[tuple[int, Floats]]) -> float:
         """Metres that ways of other classes than those found are at least long."""

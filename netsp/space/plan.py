@@ -38,6 +38,7 @@ from netsp.space.board import Board, Driven, Stop, with_status
 from netsp.space.legs import Growth, Ways
 from netsp.space.places import Places
 from netsp.space.states import Effort, first_states, states_with_room
+from netsp.space.trees import states_of_trees
 from netsp.space.water import Water
 from netsp.travel.graph import TravelGraph
 from netsp.travel.result import Result, relative_gap
@@ -51,10 +52,14 @@ ROUNDING = 1e-9
 MOST_AGAIN = 20
 """Times that a graph is solved again because legs were at fault."""
 
-STARTING, SEARCHING, GROWING, WAYS_OUT, SOLVING = 0.3, 0.3, 0.5, 0.3, 0.5
+STARTING, SEARCHING, PLANTING, GROWING, WAYS_OUT, SOLVING = 0.3, 0.3, 0.3, 0.5, 0.3, 0.5
 """Of the time left, what first states may take, then the search for ways, then states and legs,
 their ways by the anchor, and the solver each time; the rest is for driving, and for solving
 again."""
+
+EARLY = 0.1
+"""Of the time left, what the solver may take while there are more states to come: its tour is then
+where the next search starts."""
 
 LEAST_GROWING, LEAST_SOLVING = 1.0, 0.5
 """Seconds that legs and the solver get even if the time is up: there would be no tour, or one by
@@ -258,6 +263,8 @@ def _planned(
         )
     ways = Ways(water, places, effort)
     ways.prepare_all(clock.part(SEARCHING), tell)
+    tell("trees of legs")
+    states_of_trees(states, ways, clock.part(PLANTING))
     growth = Growth(states, ways)
     board = Board(water, states)
     board.take(growth.legs, clock.part(WAYS_OUT))
@@ -265,6 +272,7 @@ def _planned(
         tell("ways with room for the robot")
         states_with_room(states, lacking, effort.words)
         board.take(growth.legs, clock.part(WAYS_OUT))
+    growth.go_on(0, clock.part(PLANTING), tell)
     best: tuple[Result, Driven] | None = None
     complete = False
     for most in effort.states:
@@ -274,7 +282,9 @@ def _planned(
         grown = growth.go_on(most, growing, tell)
         tell("ways by the anchor")
         complete = (board.take(growth.legs, clock.part(WAYS_OUT)) and grown) or complete
-        found = _best_driven(board, clock, tell, None if best is None else best[1].tour, how)
+        share = SOLVING if most == effort.states[-1] else EARLY
+        warm = None if best is None else best[1].tour
+        found = _best_driven(board, clock, tell, warm, share, how)
         if found is not None and (best is None or found[1].length <= best[1].length):
             best = found
         if clock.left < clock.elapsed - begin:
@@ -314,7 +324,7 @@ def _try_out(solver: SolverLike, params: Mapping[str, Any] | None, seed: int) ->
 
 def _best_driven(
     board: Board, clock: Clock, tell: Callable[[str], None], warm: list[int] | None,
-    how: dict[str, Any],
+    share: float, how: dict[str, Any],
 ) -> tuple[Result, Driven] | None:  # fmt: skip
     """The best tour that was driven without fault. As long as there is time, the graph is solved
     again without the legs that were at fault; then the tour goes by way of the start there."""
@@ -322,7 +332,7 @@ def _best_driven(
     while again < MOST_AGAIN or clock.up:
         if found is None:
             tell("order" if again == 0 else f"order, {counted(again, 'leg')} at fault forbidden")
-            solving = Clock(LEAST_SOLVING) if clock.up else clock.part(SOLVING)
+            solving = Clock(LEAST_SOLVING) if clock.up else clock.part(share)
             found = board.solved(solving, warm, **how)
             if found is None:
                 return None
