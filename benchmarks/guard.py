@@ -33,6 +33,7 @@ from netsp.guard.alarms import Level
 from netsp.guard.fix import Fix
 from netsp.guard.guard import Guard, GuardOptions
 from netsp.guard.loops import loops_in
+from netsp.guard.plane import PlaneSite
 from netsp.guard.report import Report
 from netsp.guard.tethers import Strands
 from netsp.problem import Circle, Problem
@@ -95,8 +96,8 @@ def driven(problem: Problem, seed: int, seconds: float = 240.0) -> np.ndarray:
     """A random pilot: straight to some place in sight, a pause, and on; never past the tether, and
     no loop closed."""
     rng = np.random.default_rng(seed)
-    strands = Strands(problem)
-    model, field_ = strands.model, strands.field
+    strands = Strands(PlaneSite(problem))
+    model, field_ = strands.site.model, strands.site.field
     tether = model.start(problem.base, problem.base)
     here, out = np.array(problem.base, dtype=float), []
     spread = 0.6 * problem.tether_length
@@ -183,7 +184,7 @@ class TurnCounter:
 
 def loop_path(problem: Problem, here: np.ndarray, rng: np.random.Generator) -> np.ndarray | None:
     """Straight to some obstacle in sight and around it, once and a bit."""
-    strands = Strands(problem)
+    strands = Strands(PlaneSite(problem))
     order = rng.permutation(len(problem.obstacles))
     for i in order:
         o = problem.obstacles[int(i)]
@@ -202,9 +203,9 @@ def loop_path(problem: Problem, here: np.ndarray, rng: np.random.Generator) -> n
             o.center[0] + radius * np.cos(angles), o.center[1] + radius * np.sin(angles),
             np.full(len(angles), here[2]),
         ])  # fmt: skip
-        if strands.field.distance(ring).min() < 0.1:
+        if strands.site.field.distance(ring).min() < 0.1:
             continue
-        if not strands.field.line_of_sight(here, ring[0], 0.0):
+        if not strands.site.field.line_of_sight(here, ring[0], 0.0):
             continue
         steps = int(math.dist(here, ring[0]) / (SPEED * DT)) + 1
         line = here + np.linspace(0.0, 1.0, steps + 1)[1:, None] * (ring[0] - here)
@@ -216,7 +217,7 @@ def closes(problem: Problem, tether: object, path: np.ndarray, strands: Strands)
     """At which point of a path the true tether has a loop."""
     at = tether
     for k, place in enumerate(path):
-        at = strands.model.update(at, place)
+        at = strands.site.model.update(at, place)
         if loops_in(problem, at.nodes[:, :2]):
             return k
     return None

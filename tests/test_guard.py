@@ -27,6 +27,7 @@ from netsp.guard.live import watch
 from netsp.guard.loops import closed_by, loops_in
 from netsp.guard.memory import restore, save
 from netsp.guard.page import Page
+from netsp.guard.plane import PlaneSite, RayLetters
 from netsp.guard.replay import read_fixes
 from netsp.guard.stream import replayed
 from netsp.guard.tethers import Strands
@@ -165,10 +166,10 @@ def test_passing_by_and_coming_back_the_same_way_raises_nothing():
 
 
 def test_going_straight_home_past_the_other_side_of_a_pile_closes_a_loop():
-    strands = Strands(SITE)
-    tether = strands.model.start((0, 0, 0), (0, 0, 0))
+    strands = Strands(PlaneSite(SITE))
+    tether = strands.site.model.start((0, 0, 0), (0, 0, 0))
     for corner in ((5, 2, 0), (8, 0, 0), (6, -2, 0)):
-        tether = strands.model.update(tether, corner)
+        tether = strands.site.model.update(tether, corner)
     assert loops_in(SITE, tether.nodes[:, :2]) == []
     found = closed_by(SITE, tether.nodes[:, :2], np.array([(6, -2), (-0.5, 0.3)]))
     assert found is not None
@@ -187,12 +188,12 @@ def meets_itself(line):
 @given(st.lists(st.tuples(st.floats(-3, 13), st.floats(-4, 8)), min_size=1, max_size=7))
 @example([(0.0, -2.0), (7.0, 0.0), (0.0, 2.0), (0.0, 0.0)])
 def test_a_taut_tether_has_no_loop_where_its_plan_does_not_cross_itself(places):
-    strands = Strands(SITE)
-    tether = strands.model.start((0, 0, 0), (0, 0, 0))
+    strands = Strands(PlaneSite(SITE))
+    tether = strands.site.model.start((0, 0, 0), (0, 0, 0))
     for x, y in places:
         there = np.array([x, y, 0.0])
-        if strands.field.line_of_sight(tether.robot, there, 0.0):
-            tether = strands.model.update(tether, there)
+        if strands.site.field.line_of_sight(tether.robot, there, 0.0):
+            tether = strands.site.model.update(tether, there)
     line = tether.nodes[:, :2]
     loops = loops_in(SITE, line)
     assert not loops or meets_itself(line)
@@ -305,7 +306,7 @@ def test_a_jump_is_no_motion():
 def test_a_belief_holds_the_class_of_a_robot_that_is_off_by_a_constant(seed):
     rng = np.random.default_rng(seed)
     offset = rng.uniform(-0.6, 0.6, 2)
-    belief = Belief(SITE, 0.5, 0.1)
+    belief = Belief(RayLetters(SITE), 0.5, 0.1)
     here, word = np.zeros(2), ()
     for _ in range(12):
         there = here + rng.uniform(-1.5, 2.0, 2)
@@ -325,7 +326,7 @@ def test_a_belief_holds_the_class_of_a_robot_that_is_off_by_a_constant(seed):
 
 
 def test_a_robot_is_not_believed_inside_a_pile():
-    belief = Belief(SITE, 0.5, 0.1)
+    belief = Belief(RayLetters(SITE), 0.5, 0.1)
     for k in range(60):
         belief.move(np.array([2.0 + 0.05 * k, 0.1]), np.array([2.05 + 0.05 * k, 0.1]), 0.1)
     for _ in range(80):  # it stays there

@@ -8,12 +8,13 @@ import sys
 from contextlib import ExitStack, nullcontext
 from typing import TYPE_CHECKING, Any, TextIO
 
+from netsp.command.solve_mission import is_mission
 from netsp.command.types import check_writable, length, natural
 from netsp.errors import EXIT_NOT_ALL, EXIT_NOT_VERIFIED, InputError
 
 if TYPE_CHECKING:
     from netsp.guard.report import Report
-    from netsp.problem import Problem
+    from netsp.guard.site import Site
 
 EXAMPLE = "netsp guard problems/wharf.json --link udpin:14550 --page"
 
@@ -23,7 +24,12 @@ PORT = 8650
 
 def arguments(p: argparse.ArgumentParser) -> None:
     """Of the command line."""
-    p.add_argument("site", metavar="SITE", help="problem file (JSON): base, obstacles and tether")
+    p.add_argument(
+        "site",
+        metavar="SITE",
+        help="problem file or mission file (JSON); one of a planned mission also tells whether the "
+        "tether is as planned",
+    )
     source = p.add_argument_group("where it listens; nothing is ever told to the vehicle to do")
     source.add_argument(
         "--link", metavar="ADDRESS",
@@ -80,14 +86,16 @@ def run(args: argparse.Namespace) -> int:
     from netsp.command.compiling import compile_messages
     from netsp.guard.guard import Guard, GuardOptions
     from netsp.link.frame import Frame
+    from netsp.online.mission import Mission
     from netsp.problem import Problem
 
-    problem = Problem.load(args.site)
-    guard = Guard(problem, GuardOptions(args.noise, args.drift, args.speed))
-    frame = Frame(problem, args.frame)
-    told = _Told(problem, args.quiet)
+    told_of = Mission.load(args.site) if is_mission(args.site) else Problem.load(args.site)
+    options = GuardOptions(args.noise, args.drift, args.speed)
+    frame = Frame(told_of, args.frame)
     with ExitStack() as stack:
         stack.enter_context(nullcontext() if args.quiet else compile_messages(sys.stderr))
+        guard = Guard(told_of, options)
+        told = _Told(guard.site, args.quiet)
         lines: TextIO | None = None
         if args.output == "-":
             lines = sys.stdout
@@ -97,7 +105,7 @@ def run(args: argparse.Namespace) -> int:
         if args.page is not None:
             from netsp.guard.page import Page
 
-            page = stack.enter_context(Page(problem, args.page))
+            page = stack.enter_context(Page(guard.site, args.page))
             print(f"the page is {page.address}", file=sys.stderr)
 
         def take(report: Report) -> None:
@@ -135,8 +143,8 @@ def run(args: argparse.Namespace) -> int:
 class _Told:
     """What was said, in words and in sum."""
 
-    def __init__(self, problem: Problem, quiet: bool) -> None:
-        self.problem, self.quiet = problem, quiet
+    def __init__(self, site: Site, quiet: bool) -> None:
+        self.site, self.quiet = site, quiet
         self.last: Report | None = None
         self._count = self._doubt = 0
         self._longest, self._at = 0.0, 0.0
@@ -171,10 +179,10 @@ class _Told:
             if now.taut > self._longest:
                 self._longest, self._at = now.taut, report.time
             if self._show and self._count % 5 == 0:
-                units = self.problem.units
+                units = self.site.units
                 print(
                     f"{self._clear()}{report.time:8.1f} s  tether {now.taut:.2f} of "
-                    f"{self.problem.tether_length:g} {units}, {now.passes}"[:110],
+                    f"{self.site.tether_length:g} {units}, {now.passes}"[:110],
                     end="", file=sys.stderr, flush=True,
                 )  # fmt: skip
 
@@ -182,12 +190,12 @@ class _Told:
         """The numbers."""
         last = self.last
         return {
-            "site": self.problem.name,
+            "site": self.site.name,
             "reports": self._count,
             "in_doubt": self._doubt,
             "longest_tether": round(self._longest, 4),
             "longest_at_s": round(self._at, 2),
-            "tether_length": self.problem.tether_length,
+            "tether_length": self.site.tether_length,
             "alarms": self._raised,
             "at_the_end": None if last is None else {
                 "t": round(last.time, 2), "claims": last.claims,

@@ -13,11 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from netsp.arrays import Floats
-from netsp.guard.loops import Loop, closed_by
+from netsp.guard.site import Loop, Site
 from netsp.guard.track import MOVING, Motion
-from netsp.online.scene.field import DistanceField, pushed_out
-from netsp.online.tether import GeodesicTether, Tether
-from netsp.problem import Problem
+from netsp.online.scene.field import pushed_out
+from netsp.online.tether import Tether
 
 HORIZON_S = 40.0
 """Seconds that are looked ahead."""
@@ -57,19 +56,14 @@ class Ahead:
 
 
 def look_ahead(
-    problem: Problem, field: DistanceField, model: GeodesicTether, tether: Tether, motion: Motion,
-    speed: float,
+    site: Site, tether: Tether, motion: Motion, speed: float
 ) -> Ahead:  # fmt: skip
     """Where the present motion leads.
 
     Parameters
     ----------
-    problem : Problem
-        The site.
-    field : DistanceField
-        Its scene.
-    model : GeodesicTether
-        The tether's.
+    site : Site
+        Where.
     tether : Tether
         As it is.
     motion : Motion
@@ -86,8 +80,8 @@ def look_ahead(
     if pace < MOVING * speed:
         return Ahead()
     turns = [0.0] if abs(motion.turn) < TURNING else [0.0, motion.turn]
-    turns += _orbits(problem, tether.robot[:2], motion)
-    found = [_along(problem, field, model, tether, motion.velocity, turn) for turn in turns]
+    turns += _orbits(site.centres, tether.robot[:2], motion)
+    found = [_along(site, tether, motion.velocity, turn) for turn in turns]
     loops = [(a.loop_s, k) for k, a in enumerate(found) if a.loop_s is not None]
     shorts = [a.short_s for a in found if a.short_s is not None]
     first = min(loops, default=None)
@@ -99,11 +93,11 @@ def look_ahead(
     )
 
 
-def _orbits(problem: Problem, place: Floats, motion: Motion) -> list[float]:
+def _orbits(centres: Floats, place: Floats, motion: Motion) -> list[float]:
     """Rates of turning, of the circles about obstacles that the robot may be on."""
     pace = float(np.hypot(*motion.velocity[:2]))
     out = []
-    for x, y in problem.representative_points:
+    for x, y in centres:
         away = place - (x, y)
         far = float(np.hypot(*away))
         if not 1e-6 < far < NEAR:
@@ -116,10 +110,7 @@ def _orbits(problem: Problem, place: Floats, motion: Motion) -> list[float]:
     return out
 
 
-def _along(
-    problem: Problem, field: DistanceField, model: GeodesicTether, tether: Tether,
-    velocity: Floats, turn: float,
-) -> Ahead:  # fmt: skip
+def _along(site: Site, tether: Tether, velocity: Floats, turn: float) -> Ahead:
     dt = HORIZON_S / STEPS
     place, course = tether.robot.copy(), velocity.copy()
     most = abs(turn) * HORIZON_S
@@ -129,15 +120,14 @@ def _along(
     short = None
     for k in range(1, STEPS + 1):
         course[:2] = (c * course[0] - s * course[1], s * course[0] + c * course[1])
-        there = pushed_out(field, (place + dt * course)[None], 1e-3)[0]
-        step = np.array([place[:2], there[:2]])
-        loop = closed_by(problem, tether.nodes[:, :2], step)
+        there = pushed_out(site.field, (place + dt * course)[None], 1e-3)[0]
+        loop = site.closed_by(tether.nodes, there)
         if loop is not None:
             return Ahead(k * dt, loop, short)
-        if not field.line_of_sight(place, there, depth=0.2 * model.delta):
+        if not site.field.line_of_sight(place, there, depth=0.2 * site.model.delta):
             break  # it has run into something, or between obstacles that overlap
-        tether = model.update(tether, there)
-        if short is None and tether.length > problem.tether_length:
+        tether = site.model.update(tether, there)
+        if short is None and tether.length > site.tether_length:
             short = k * dt
         if float(np.linalg.norm(there - place)) < 0.1 * dt * float(np.linalg.norm(velocity)):
             break

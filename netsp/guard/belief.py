@@ -2,8 +2,8 @@
 
 The estimate is off by a drift that changes slowly and is normal with a standard deviation. It is
 put on a grid of offsets: a hypothesis is an offset and the word of the tether if the robot has been
-off by that. A step of the estimate moves all of them alike, and each writes the letters of the rays
-that it crosses; an offset goes over to one beside it at the cost of a random walk, an offset that
+off by that. A step of the estimate moves all of them alike, and each writes the letters of its
+way; an offset goes over to one beside it at the cost of a random walk, an offset that
 puts the robot into an obstacle costs by its depth, and what is left for each offset and word is the
 cheapest way there (Viterbi 1967, on the covering space in place of a line). Costs are negative
 logarithms of likelihoods. With no obstacle near, all offsets of a word are one.
@@ -17,8 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from netsp.arrays import Floats
-from netsp.hsignature import Word, concatenate, crossings
-from netsp.problem import Problem
+from netsp.guard.site import Letters
+from netsp.hsignature import Word
 
 RINGS = 4
 """Of the grid of offsets: 61 of them."""
@@ -63,23 +63,20 @@ class Belief:
 
     Parameters
     ----------
-    problem : Problem
-        The site.
+    letters : Letters
+        Of the site.
     drift : float
-        Standard deviation of how far the estimate is off, metres.
+        Standard deviation of how far the estimate is off in the plan, metres: depth is measured.
     noise : float
         Standard deviation of what is left of its noise, metres.
     """
 
-    def __init__(self, problem: Problem, drift: float, noise: float) -> None:
-        self.problem, self.rays = problem, problem.representative_points
+    def __init__(self, letters: Letters, drift: float, noise: float) -> None:
+        self.letters = letters
         self.drift, self.noise = max(drift, 1e-6), max(noise, 1e-2)
         self.reach = REACH * self.drift
         self.offsets, self._beside = _hexagonal(RINGS, self.reach / RINGS)
         self._prior = 0.5 * (self.offsets**2).sum(1) / self.drift**2
-        self._solids = [o.shape(0.0) for o in problem.obstacles]
-        boxes = np.array([s.bounds for s in self._solids]).reshape(-1, 4)
-        self._low, self._high = boxes[:, :2], boxes[:, 2:]
         # word at the place of each offset, or, where no obstacle is near, at the estimate alone
         self._costs: dict[Word, Floats] = {(): np.zeros(1)}
         self._spread = False
@@ -105,82 +102,86 @@ class Belief:
         """Of all classes that are believed."""
         return set(self._costs)
 
-    def near(self, points: Floats) -> bool:
-        """Whether some offset of some places may be in an obstacle, or beyond one.
-
-        Parameters
-        ----------
-        points : ndarray, shape (k, 2)
-            Metres.
-
-        Returns
-        -------
-        bool
-            Whether it may.
-        """
-        if not len(self._low):
-            return False
-        low, high = points.min(0) - self.reach, points.max(0) + self.reach
-        return bool(np.any(np.all((self._low <= high) & (self._high >= low), axis=1)))
-
-    def move(self, before: Floats, after: Floats, dt: float) -> None:
+    def move(self, before: Floats, after: Floats, dt: float) -> bool:
         """The estimate has moved in a straight line.
 
         Parameters
         ----------
-        before : ndarray, shape (2,)
+        before : ndarray, shape (2,) or (3,)
             Metres.
-        after : ndarray, shape (2,)
+        after : ndarray, shape (2,) or (3,)
             Metres.
         dt : float
             Seconds.
+
+        Returns
+        -------
+        bool
+            False where no robot can have gone so, wherever it is: then nothing has changed.
         """
+        known = dict(self._costs), self._spread
         step = np.array([before, after])
-        if not self.near(step):
-            self._gather(before)
-            letters = crossings(step, self.rays)
-            if letters:
-                self._costs = {concatenate(w, letters): c for w, c in self._costs.items()}
-            return
-        self._scatter(before)
-        self._translate(step)
+        if not self.letters.near(step, self.reach) and self._gather(before):
+            (letters,) = self.letters.written(step[:1], step[1:])
+            if letters is not None:
+                if letters:
+                    join = self.letters.join
+                    self._costs = {join(w, letters): c for w, c in self._costs.items()}
+                return True
+        if not (self._scatter(before) and self._translate(before, after)):
+            self._costs, self._spread = known
+            return False
         self._avoid(after, dt)
         self._mixed += dt
         if self._mixed >= MIX_S:
             self._mixed = 0.0
             self._mix(after)
         self._trim()
+        return True
 
-    def _scatter(self, place: Floats) -> None:
-        """From words at the estimate to words at all offsets from it."""
+    def _at(self, place: Floats) -> Floats:
+        """(k, d) where the robot is at each offset from a place."""
+        out = np.repeat(place[None], len(self.offsets), axis=0)
+        out[:, :2] += self.offsets
+        return out
+
+    def _scatter(self, place: Floats) -> bool:
+        """From words at the estimate to words at all offsets from it; whether there are any."""
         if self._spread:
-            return
-        groups: dict[Word, list[int]] = {}
-        for k, offset in enumerate(self.offsets):
-            letters = crossings(np.array([place, place + offset]), self.rays)
-            groups.setdefault(letters, []).append(k)
+            return True
+        there = self._at(place)
+        groups = _groups(self.letters.written(np.broadcast_to(place, there.shape), there))
         out: dict[Word, Floats] = {}
         for word, cost in self._costs.items():
             for letters, some in groups.items():
-                into = out.setdefault(concatenate(word, letters), self._nowhere())
+                into = out.setdefault(self.letters.join(word, letters), self._nowhere())
                 into[some] = np.minimum(into[some], cost[0] + self._prior[some])
         self._costs, self._spread = out, True
+        return bool(out)
 
-    def _gather(self, place: Floats) -> None:
-        """Back to words at the estimate, when no obstacle is near any more."""
+    def _gather(self, place: Floats) -> bool:
+        """Back to words at the estimate, when no obstacle is near any more; whether there are
+        any."""
         if not self._spread:
-            return
+            return True
+        there = self._at(place)
+        back = self.letters.written(there, np.broadcast_to(place, there.shape))
         out: dict[Word, Floats] = {}
         for word, cost in self._costs.items():
             for k in np.flatnonzero(np.isfinite(cost)):
-                back = crossings(np.array([place + self.offsets[k], place]), self.rays)
-                to = concatenate(word, back)
+                letters = back[int(k)]
+                if letters is None:
+                    continue
+                to = self.letters.join(word, letters)
                 # a drift that is believed less is believed again later: only what an obstacle
                 # has cost it stays
                 own = np.array([cost[k]])
                 out[to] = np.minimum(out.get(to, own), own)
+        if not out:
+            return False
         self._costs, self._spread = out, False
         self._trim()
+        return True
 
     def _nowhere(self) -> Floats:
         return np.full(len(self.offsets), np.inf)
@@ -200,39 +201,24 @@ class Belief:
         order = sorted(best, key=lambda w: (best[w][1], len(w), w))
         return [Hypothesis(w, weights[w] / total, self.offsets[best[w][0]]) for w in order]
 
-    def _translate(self, step: Floats) -> None:
-        """All offsets moved alike: each with the letters that it writes on the way."""
-        x = step[:, :1] + self.offsets[:, 0]  # (2, k)
-        right = x[:, :, None] >= self.rays[None, None, :, 0]
-        crossing = np.flatnonzero((right[0] != right[1]).any(axis=1))
-        if not len(crossing):
-            return
-        letters = {int(k): crossings(step + self.offsets[k], self.rays) for k in crossing}
+    def _translate(self, before: Floats, after: Floats) -> bool:
+        """All offsets moved alike: each with the letters that it writes on the way. Whether any
+        can have gone so."""
+        groups = _groups(self.letters.written(self._at(before), self._at(after)))
         moved: dict[Word, Floats] = {}
         for word, cost in self._costs.items():
-            groups: dict[tuple[int, ...], list[int]] = {}
-            for k, written in letters.items():
-                groups.setdefault(written, []).append(k)
-            still = np.ones(len(cost), dtype=bool)
-            still[list(letters)] = False
-            for written, some in [*groups.items(), ((), np.flatnonzero(still).tolist())]:
-                if not some:
+            for letters, some in groups.items():
+                if not np.isfinite(cost[some]).any():
                     continue
-                to = concatenate(word, written) if written else word
+                to = self.letters.join(word, letters)
                 into = moved.setdefault(to, self._nowhere())
                 into[some] = np.minimum(into[some], cost[some])
-        self._costs = moved
+        self._costs = moved or self._costs
+        return bool(moved)
 
     def _avoid(self, place: Floats, dt: float) -> None:
         """Offsets in obstacles cost by their depth, once for every second there."""
-        places = place + self.offsets
-        depth = np.zeros(len(places))
-        for i, o in enumerate(self.problem.obstacles):
-            if np.any(self._low[i] - self.reach > place) or np.any(
-                self._high[i] + self.reach < place
-            ):
-                continue
-            depth = np.maximum(depth, -np.asarray(o.signed_distance(places)))
+        depth = self.letters.depth(self._at(place))
         if not depth.any():
             return
         price = 0.5 * (depth / self.noise) ** 2 * min(dt, 1.0)
@@ -242,41 +228,37 @@ class Belief:
     def _mix(self, place: Floats) -> None:
         """The drift has changed a bit: each offset from those beside it, where that is cheaper."""
         pairs = self._beside
-        ends = place + self.offsets[pairs]  # (m, 2, 2)
-        right = ends[:, :, :1] >= self.rays[None, None, :, 0]
-        crossing = (right[:, 0] != right[:, 1]).any(axis=1)
-        written = {int(m): crossings(ends[m], self.rays) for m in np.flatnonzero(crossing)}
-        free = self._passable(ends)
+        there = self._at(place)
+        a, b = there[pairs[:, 0]], there[pairs[:, 1]]
+        free = self.letters.depth(0.5 * (a + b)) <= 0.0
+        groups = _groups(self.letters.written(a, b), free)
         mixed = {w: c.copy() for w, c in self._costs.items()}
-        plain = np.array([not written.get(m) for m in range(len(pairs))]) & free
         for word, cost in self._costs.items():
-            into = mixed[word]
-            np.minimum.at(into, pairs[plain, 1], cost[pairs[plain, 0]] + self._change)
-            np.minimum.at(into, pairs[plain, 0], cost[pairs[plain, 1]] + self._change)
-            for m, letters in written.items():
-                if not letters or not free[m]:
-                    continue
-                a, b = pairs[m]
-                for p, q, way in ((a, b, letters), (b, a, tuple(-x for x in reversed(letters)))):
-                    if not np.isfinite(cost[p]):
-                        continue
-                    to = mixed.setdefault(concatenate(word, way), self._nowhere())
-                    to[q] = min(to[q], cost[p] + self._change)
+            for letters, some in groups.items():
+                for way, p, q in (
+                    (letters, pairs[some, 0], pairs[some, 1]),
+                    (self.letters.back(letters), pairs[some, 1], pairs[some, 0]),
+                ):
+                    cheap = cost[p] + self._change
+                    if np.isfinite(cheap).any():
+                        to = self.letters.join(word, way)
+                        np.minimum.at(mixed.setdefault(to, self._nowhere()), q, cheap)
         self._costs = mixed
-
-    def _passable(self, ends: Floats) -> np.ndarray:
-        """(m,) whether the middle between two offsets is in no obstacle."""
-        middle = ends.mean(axis=1)
-        free = np.ones(len(middle), dtype=bool)
-        for o in self.problem.obstacles:
-            free &= np.asarray(o.signed_distance(middle)) >= 0.0
-        return free
 
     def _trim(self) -> None:
         least = min(float(c.min()) for c in self._costs.values())
         kept = {w: c - least for w, c in self._costs.items() if c.min() - least <= UNLIKELY}
         order = sorted(kept, key=lambda w: (float(kept[w].min()), len(w), w))[:MOST_WORDS]
         self._costs = {w: kept[w] for w in order}
+
+
+def _groups(written: list[Word | None], free: np.ndarray | None = None) -> dict[Word, list[int]]:
+    """Numbers of steps by what they write, less those that nothing can have gone."""
+    out: dict[Word, list[int]] = {}
+    for k, letters in enumerate(written):
+        if letters is not None and (free is None or free[k]):
+            out.setdefault(letters, []).append(k)
+    return out
 
 
 def _hexagonal(rings: int, spacing: float) -> tuple[Floats, np.ndarray]:

@@ -8,7 +8,8 @@ import numpy as np
 
 from netsp.arrays import Floats
 from netsp.execute.repair import outside
-from netsp.hsignature import Word, concatenate, crossings
+from netsp.guard.site import Site
+from netsp.hsignature import Word, crossings
 from netsp.problem import Problem
 from netsp.roadmap.tethers import Tethers
 
@@ -66,7 +67,7 @@ def ways_between(
 
 
 def after_gap(
-    problem: Problem, words: dict[Word, float], before: Floats, after: Floats, seconds: float,
+    site: Site, words: dict[Word, float], before: Floats, after: Floats, seconds: float,
     speed: float, reach: float,
 ) -> dict[Word, float]:  # fmt: skip
     """Classes of the tether after a gap, with their costs: a way is the less likely the longer it
@@ -74,8 +75,8 @@ def after_gap(
 
     Parameters
     ----------
-    problem : Problem
-        The site.
+    site : Site
+        Where.
     words : dict of Word to float
         Classes before, and their costs.
     before : ndarray, shape (3,)
@@ -95,12 +96,12 @@ def after_gap(
         Classes now, and their costs.
     """
     gone = speed * seconds
-    ways = ways_between(problem, before, after, gone + reach)
+    ways = site.ways(before, after, gone + reach)
     scale = max(0.25 * gone, 0.5 * reach, 1e-9)
     out: dict[Word, float] = {}
     for word, cost in words.items():
         for way, length in ways:
-            to = concatenate(word, way)
+            to = site.letters.join(word, way)
             dearer = cost + (length - ways[0][1]) / scale
             out[to] = min(out.get(to, np.inf), dearer)
     return out

@@ -12,21 +12,22 @@ import numpy as np
 
 from netsp.arrays import Floats
 from netsp.errors import InputError
-from netsp.fields import Point3, checked_argument, checked_instance
+from netsp.fields import Point3, checked_argument
 from netsp.guard import reasons
 from netsp.guard.ahead import Ahead, look_ahead
 from netsp.guard.alarms import Alarm, Alarms
 from netsp.guard.belief import Belief
-from netsp.guard.correct import corrected
 from netsp.guard.fix import Fix
 from netsp.guard.gaps import after_gap
-from netsp.guard.loops import Loop, loops_in
 from netsp.guard.report import ClassNow, Report
+from netsp.guard.site import Loop, Site
+from netsp.guard.sites import site_of
 from netsp.guard.tethers import Strand, Strands
 from netsp.guard.track import GAP, Motion, Track
 from netsp.hsignature import Word
+from netsp.online.mission import Mission
+from netsp.online.tether import Tether
 from netsp.problem import Problem
-from netsp.report.wording import listed, passages
 
 LEFT_OF_NOISE = 0.4
 """Share of an estimate's noise that is left when it is smoothed, about."""
@@ -65,8 +66,8 @@ class Guard:
 
     Parameters
     ----------
-    problem : Problem
-        The site: base, obstacles and tether count.
+    problem : Problem, Mission or Site
+        The site: where the tether is fixed, its length and what is in the way count.
     options : GuardOptions, optional
         What is known of the vehicle.
 
@@ -88,17 +89,18 @@ class Guard:
     ((1,), 2.67, ())
     """
 
-    def __init__(self, problem: Problem, options: GuardOptions | None = None) -> None:
-        checked_instance("problem", problem, Problem)
-        self.problem, self.options = problem, options or GuardOptions()
+    def __init__(
+        self, problem: Problem | Mission | Site, options: GuardOptions | None = None
+    ) -> None:
+        self.site, self.options = site_of(problem), options or GuardOptions()
         for name in ("noise", "drift"):
             checked_argument(name, getattr(self.options, name), 0.0)
         if not checked_argument("speed", self.options.speed, 0.0):
             raise InputError("speed: expected a positive number, got 0")
         o = self.options
         self.track = Track(o.noise, o.speed)
-        self.belief = Belief(problem, o.drift, LEFT_OF_NOISE * o.noise)
-        self.strands = Strands(problem)
+        self.belief = Belief(self.site.letters, o.drift, LEFT_OF_NOISE * o.noise)
+        self.strands = Strands(self.site)
         self.alarms = Alarms()
         self._vouched: bool | None = None
         self._last = Fix(0.0)
@@ -109,7 +111,10 @@ class Guard:
         self._previous: Motion | None = None
         self.report: Report | None = None
 
-    def remember(self, words: dict[Word, float], position: Floats, seconds: float) -> None:
+    def remember(
+        self, words: dict[Word, float], position: Floats, seconds: float,
+        tethers: dict[Word, Tether] | None = None,
+    ) -> None:  # fmt: skip
         """Begin with the classes of an earlier run.
 
         Parameters
@@ -120,8 +125,11 @@ class Guard:
             Where the robot was, metres.
         seconds : float
             Since then.
+        tethers : dict of Word to Tether, optional
+            How they hung.
         """
         self._restored = words, position, seconds
+        self.strands.all = [Strand(w, 1.0, t) for w, t in (tethers or {}).items()]
 
     def correct(self, side: str, obstacle: int | str) -> Report | None:
         """The operator says on which side of an obstacle the tether passes.
@@ -147,7 +155,12 @@ class Guard:
             raise InputError("side: nothing is known yet of where the robot is")
         here = self.strands.all[0].tether.robot
         words = {s.word: -float(np.log(max(s.likely, 1e-9))) for s in self.strands.all}
-        self.belief.begin(corrected(self.problem, words, here, side, obstacle))
+        known = self.site.corrected(words, here, side, obstacle)
+        assert self._motion is not None
+        estimate = self._motion.after
+        (step,) = self.site.letters.written(here[None], estimate[None])
+        self.belief.begin({self.site.letters.join(w, step or ()): c for w, c in known.items()})
+        self.strands.follow(self.belief.classes(), estimate, MOST_TETHERS)
         return self._told(self._last)
 
     def take(self, fix: Fix) -> Report:
@@ -185,8 +198,8 @@ class Guard:
 
     def _beyond(self, place: Point3) -> bool:
         """Whether a place is farther from the base than twice the tether."""
-        far = float(np.linalg.norm(np.array(place) - np.array(self.problem.base)))
-        return not far <= 2.0 * self.problem.tether_length + 4.0 * self.options.drift
+        far = float(np.linalg.norm(np.array(place) - self.site.anchor))
+        return not far <= 2.0 * self.site.tether_length + 4.0 * self.options.drift
 
     def wait(self, now: float) -> Report:
         """Nothing has come for a while.
@@ -243,28 +256,33 @@ class Guard:
         elif motion.lost_s:
             words = {h.word: -float(np.log(h.likely)) for h in self.belief.classes()}
             self.belief.begin(
-                after_gap(self.problem, words, motion.before, motion.after, motion.lost_s,
+                after_gap(self.site, words, motion.before, motion.after, motion.lost_s,
                           o.speed, reach)
             )  # fmt: skip
         else:
             before = motion.before if self._previous is None else self._previous.after
             dt = motion.time - (self._previous.time if self._previous else motion.time)
-            self.belief.move(before[:2], motion.after[:2], dt)
+            if not self.belief.move(before, motion.after, dt):
+                # no robot can have gone so: it went somehow
+                words = {h.word: -float(np.log(h.likely)) for h in self.belief.classes()}
+                self.belief.begin(
+                    after_gap(self.site, words, before, motion.after, dt, o.speed, reach)
+                )
         self._previous = motion
         strands = self.strands.follow(self.belief.classes(), motion.after, MOST_TETHERS)
         out = self._last.paid_out
-        there_is = self.problem.tether_length
+        there_is = self.site.tether_length
         most = there_is if out is None else min(there_is, PAID_OUT * out)
         self._not_longer_than(most + reach, strands)
 
     def _begin(self, motion: Motion, reach: float) -> None:
         """With what is remembered, or a tether that is as short as can be."""
-        words: dict[Word, float] = {(): 0.0}
-        before, seconds = np.asarray(self.problem.base, dtype=float), 0.0
+        words = {self.site.start_word(): 0.0}
+        before, seconds = self.site.start, 0.0
         if self._restored is not None:
             words, before, seconds = self._restored
         self.belief.begin(
-            after_gap(self.problem, words, before, motion.after, seconds, self.options.speed, reach)
+            after_gap(self.site, words, before, motion.after, seconds, self.options.speed, reach)
         )
 
     def _not_longer_than(self, most: float, strands: list[Strand]) -> None:
@@ -282,7 +300,7 @@ class Guard:
         motion = self._motion
         strands = self.strands.all if claims else []
         classes = tuple(self._class(s) for s in strands)
-        closed = [loops_in(self.problem, s.tether.nodes[:, :2]) for s in strands]
+        closed = [self.site.loops_in(s.tether.nodes) for s in strands]
         if strands and motion is not None:
             if motion.time - self._looked >= LOOK_S or motion.time < self._looked:
                 self._looked = motion.time
@@ -294,7 +312,7 @@ class Guard:
         raised = self.alarms.take(
             self._seen, self._reasons(claims, silent, classes, (wound, closed), strands)
         )
-        names = self.problem.obstacle_name
+        names = self.site.name_of
         ahead = self._ahead
         place = None if not strands else strands[0].tether.robot
         if place is None and motion is not None:
@@ -312,6 +330,7 @@ class Guard:
             loops=tuple(tuple(map(names, loop.around)) for loop in loops),
             alarms=tuple(sorted(self.alarms.on.values(), key=lambda a: -a.level)),
             raised=tuple(raised), paid_out=fix.paid_out,
+            as_planned=self._as_planned(strands),
         )  # fmt: skip
         return self.report
 
@@ -330,25 +349,33 @@ class Guard:
             return [reasons.estimate_lost(silent, why)]
         if not classes:
             return []
-        robot, problem = strands[0].tether.robot, self.problem
+        robot, site = strands[0].tether.robot, self.site
         share, found = wound
         loops = next((loops for loops in found if loops), [])
         closed = {loop.around for loop in loops}
         ahead = self._ahead
         again = ahead.loop is not None and ahead.loop.around in closed
         return [
-            *reasons.in_doubt(classes), *reasons.little_left(problem, classes[0]),
-            *reasons.soon_short(problem, ahead),
-            *([] if again else reasons.soon_looped(problem, ahead, robot, self._sure)),
-            *reasons.looped(problem, loops, robot, share),
+            *reasons.in_doubt(classes),
+            *reasons.otherwise(self._as_planned(strands), classes[0]),
+            *reasons.little_left(site, classes[0]),
+            *reasons.soon_short(site, ahead),
+            *([] if again else reasons.soon_looped(site, ahead, robot, self._sure)),
+            *reasons.looped(site, loops, robot, share),
         ]  # fmt: skip
+
+    def _as_planned(self, strands: Sequence[Strand]) -> bool | None:
+        if not strands:
+            return None
+        o, now = self.options, strands[0]
+        off = o.drift + LEFT_OF_NOISE * o.noise
+        return self.site.as_planned(now.tether.robot, now.word, off)
 
     def _look(self, strands: Sequence[Strand], motion: Motion) -> None:
         """Ahead, in each class that is worth it: the first loop, and in how likely classes one
         closes."""
         found = [
-            (s.likely, look_ahead(self.problem, self.strands.field, self.strands.model, s.tether,
-                                  motion, self.options.speed))
+            (s.likely, look_ahead(self.site, s.tether, motion, self.options.speed))
             for k, s in enumerate(strands) if k == 0 or s.likely >= reasons.DOUBT
         ]  # fmt: skip
         closing = [(likely, a) for likely, a in found if a.loop_s is not None]
@@ -357,15 +384,10 @@ class Guard:
         self._sure = sum(likely for likely, _ in closing) / sum(likely for likely, _ in found)
 
     def _class(self, strand: Strand) -> ClassNow:
-        nodes = strand.tether.nodes
-        steps = np.diff(nodes[:, :2], axis=0)
-        steps = steps[np.hypot(*steps.T) > 1e-9]
-        u, v = steps[:-1], steps[1:]
-        turns = np.arctan2(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0], (u * v).sum(1))
-        run = passages(self.problem, nodes, strand.word)
+        site, nodes = self.site, strand.tether.nodes
         return ClassNow(
-            strand.word, strand.likely, listed(self.problem, run), strand.tether.length,
-            self.problem.tether_length - strand.tether.length, float(np.abs(turns).sum()), nodes,
+            strand.word, strand.likely, site.passes(nodes, strand.word), strand.tether.length,
+            site.tether_length - strand.tether.length, site.turning(nodes), nodes,
         )  # fmt: skip
 
 

@@ -8,29 +8,12 @@ undone; and a robot that comes to a place where its own tether lies has just clo
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from netsp.arrays import Floats
+from netsp.guard.site import Loop
 from netsp.hsignature import signature
 from netsp.problem import Problem
-
-
-@dataclass(frozen=True)
-class Loop:
-    """A loop of a tether.
-
-    Parameters
-    ----------
-    around : tuple of int
-        Indices of obstacles.
-    line : ndarray, shape (k, 2)
-        From where it closes around to there again, metres.
-    """
-
-    around: tuple[int, ...]
-    line: Floats
 
 
 def loop_of(problem: Problem, line: Floats) -> Loop | None:

@@ -16,9 +16,13 @@ from netsp.errors import InputError
 from netsp.fields import Point3
 from netsp.files import FileModel, write_text
 from netsp.guard.guard import Guard
-from netsp.hsignature import Word, reduce
+from netsp.guard.site import Site
+from netsp.hsignature import Word
 from netsp.models import Model
-from netsp.problem import Problem
+from netsp.online.tether import Tether
+
+ROUNDS = 300
+"""Of pulling a tether taut that was written down."""
 
 LONGEST_S = 600.0
 """Seconds without us after which the robot may be anywhere: then the memory is of no use."""
@@ -31,6 +35,10 @@ class KnownClass(Model):
     cost: Annotated[
         float, Field(description="negative logarithm of its likelihood", ge=0.0, le=1e6)
     ]  # fmt: skip
+    tether: Annotated[
+        Annotated[tuple[Point3, ...], Field(min_length=2, max_length=100_000)] | None,
+        Field(description="(x, y, z) along the taut tether, from where it is fixed on, m"),
+    ] = None
 
 
 class GuardState(FileModel):
@@ -50,13 +58,13 @@ class GuardState(FileModel):
         tuple[KnownClass, ...], Field(description="the likeliest first", min_length=1)
     ]  # fmt: skip
 
-    def words(self, problem: Problem) -> dict[Word, float]:
+    def words(self, site: Site) -> dict[Word, float]:
         """Classes and their costs.
 
         Parameters
         ----------
-        problem : Problem
-            The site.
+        site : Site
+            Where.
 
         Returns
         -------
@@ -68,16 +76,46 @@ class GuardState(FileModel):
         InputError
             The state is of another site.
         """
-        if self.site != problem.sha256:
+        if self.site != site.identity:
             raise InputError("--state: is of another site; expected one of this, or a new file")
-        most = len(problem.obstacles)
-        if any(x == 0 or abs(x) > most for c in self.classes for x in c.word):
-            raise InputError(f"--state: classes: expected letters from 1 to {most}")
-        if any(reduce(c.word) != c.word for c in self.classes):
-            raise InputError("--state: classes: expected reduced words")
+        for known in self.classes:
+            try:
+                site.check_word(known.word)
+            except InputError as error:
+                raise InputError(f"--state: classes: {error}") from None
         if self.saved > time.time() + LONGEST_S:
             raise InputError("--state: saved: lies in the future; is the clock right?")
         return {c.word: c.cost for c in self.classes}
+
+    def tethers(self, site: Site) -> dict[Word, Tether]:
+        """How the tether hangs in each class, as far as it was written down.
+
+        Parameters
+        ----------
+        site : Site
+            Where.
+
+        Returns
+        -------
+        dict of Word to Tether
+            Pulled taut.
+
+        Raises
+        ------
+        InputError
+            One does not begin where the tether is fixed, or is of another class.
+        """
+        out = {}
+        for k, known in enumerate(self.classes):
+            if known.tether is None:
+                continue
+            nodes = np.array(known.tether, dtype=float)
+            apart = float(np.linalg.norm(nodes[0] - site.anchor))
+            tether = site.model.relaxed(np.vstack([site.anchor, nodes[1:]]), ROUNDS)
+            if apart > site.model.delta or site.word_of(tether.nodes) not in (known.word, None):
+                raise InputError(f"--state: classes[{k}].tether: is not of this site and class")
+            out[known.word] = tether
+        return out
 
     @property
     def age(self) -> float:
@@ -105,11 +143,14 @@ def save(guard: Guard, file: str | Path) -> None:
         return
     x, y, z = guard.strands.all[0].tether.robot.tolist()
     data = {
-        "schema_version": 1, "site": guard.problem.sha256, "saved": round(time.time(), 3),
+        "schema_version": 1, "site": guard.site.identity, "saved": round(time.time(), 3),
         "position": [x, y, z],
         "classes": [
-            {"word": list(w), "cost": round(max(0.0, c), 6)}
-            for w, c in words.items() if math.isfinite(c)
+            {
+                "word": list(s.word), "cost": round(max(0.0, words[s.word]), 6),
+                "tether": [[round(float(v), 6) for v in p] for p in s.tether.nodes],
+            }
+            for s in guard.strands.all if math.isfinite(words[s.word])
         ],
     }  # fmt: skip
     write_text(file, json.dumps(data, allow_nan=False) + "\n")
@@ -138,11 +179,11 @@ def restore(guard: Guard, file: str | Path) -> GuardState | None:
     if not Path(file).exists():
         return None
     state = GuardState.load(file)
-    words = state.words(guard.problem)
+    words = state.words(guard.site)
     if state.age > LONGEST_S:
         raise InputError(
             f"--state: {file}: is {state.age / 60.0:.0f} minutes old, and the robot may have gone "
             "anywhere since; delete it if the tether is free, and correct the class if it is not"
         )
-    guard.remember(words, state.place, state.age)
+    guard.remember(words, state.place, state.age, state.tethers(guard.site))
     return state

@@ -18,10 +18,10 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-import numpy as np
-
 from netsp.errors import InputError
-from netsp.guard.correct import SIDES
+from netsp.guard.site import Site
+from netsp.guard.sites import site_of
+from netsp.online.mission import Mission
 from netsp.problem import Problem
 
 STATIC = Path(__file__).parent / "static"
@@ -50,8 +50,8 @@ class Page:
 
     Parameters
     ----------
-    problem : Problem
-        The site.
+    site : Problem, Mission or Site
+        What it shows.
     port : int
         On this machine; 0 takes any.
     takes_events : bool
@@ -70,8 +70,10 @@ class Page:
         The port is taken.
     """
 
-    def __init__(self, problem: Problem, port: int, takes_events: bool = False) -> None:
-        self.problem, self.takes_events = problem, takes_events
+    def __init__(
+        self, site: Problem | Mission | Site, port: int, takes_events: bool = False
+    ) -> None:
+        self.shows, self.takes_events = site_of(site), takes_events
         self.events: queue.Queue[str] = queue.Queue(maxsize=20)
         self.corrections: queue.Queue[tuple[str, str]] = queue.Queue(maxsize=20)
         self.token = secrets.token_urlsafe(16)
@@ -142,20 +144,10 @@ class Page:
 
     def site(self) -> dict[str, Any]:
         """What the map shows of the site."""
-        problem = self.problem
-        obstacles = []
-        for i, o in enumerate(problem.obstacles):
-            rim = np.asarray(o.shape(0.0).exterior.coords)[:, :2]
-            grown = np.asarray(o.shape(problem.clearance).exterior.coords)[:, :2]
-            middle = problem.representative_points[i]
-            obstacles.append({
-                "name": problem.obstacle_name(i), "middle": [float(v) for v in middle],
-                "rim": rim.round(3).tolist(), "grown": grown.round(3).tolist(),
-            })  # fmt: skip
+        site = self.shows
         return {
-            "name": problem.name, "units": problem.units, "tether_length": problem.tether_length,
-            "base": list(problem.base), "obstacles": obstacles, "events": self.takes_events,
-            "goals": [{"name": g.name, "position": list(g.position)} for g in problem.goals],
+            "name": site.name, "units": site.units, "tether_length": site.tether_length,
+            "sides": list(site.sides), "events": self.takes_events, **site.shown(),
         }  # fmt: skip
 
 
@@ -229,10 +221,12 @@ class _Handler(BaseHTTPRequestHandler):
         """Whether it was taken."""
         try:
             said = json.loads(body)
-            side, obstacle = said["side"], said["obstacle"]
+            side, obstacle = str(said["side"]), said["obstacle"]
         except (ValueError, KeyError, TypeError, RecursionError):
             return False
-        if not (isinstance(side, str) and side in SIDES and isinstance(obstacle, str)):
+        if not (
+            isinstance(side, str) and side in self.owner.shows.sides and isinstance(obstacle, str)
+        ):
             return False
         try:
             self.owner.corrections.put_nowait((side, obstacle))

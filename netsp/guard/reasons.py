@@ -4,16 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from netsp.arrays import Floats
 from netsp.geometry import polylines
 from netsp.guard.ahead import Ahead
 from netsp.guard.alarms import Alarm, Level
-from netsp.guard.loops import Loop
 from netsp.guard.report import ClassNow
-from netsp.problem import Problem
-from netsp.report.wording import side
+from netsp.guard.site import Loop, Site, beside
 
 LOOP_S = {Level.CAUTION: 30.0, Level.WARNING: 20.0}
 TURN_S = {Level.CAUTION: 20.0, Level.WARNING: 14.0}
@@ -34,9 +30,9 @@ DOUBT = 0.05
 MOST_NAMES = 3
 
 
-def names_of(problem: Problem, around: Sequence[int]) -> str:
+def names_of(site: Site, around: Sequence[int]) -> str:
     """Obstacles in a phrase: the first few by name."""
-    names = [problem.obstacle_name(i) for i in around[:MOST_NAMES]]
+    names = [site.name_of(i) for i in around[:MOST_NAMES]]
     if len(around) > MOST_NAMES:
         names[-1:] = [names[-1], f"{len(around) - MOST_NAMES} more"]
     if len(names) == 1:
@@ -60,22 +56,30 @@ def in_doubt(classes: Sequence[ClassNow]) -> list[Alarm]:
     return [Alarm("class", Level.NOTICE, f"the tether runs {told}")]
 
 
-def little_left(problem: Problem, now: ClassNow) -> list[Alarm]:
+def otherwise(as_planned: bool | None, now: ClassNow) -> list[Alarm]:
+    """The tether is in another class than the tour means it to be in here."""
+    if as_planned is not False or now.likely < LIKELY:
+        return []
+    text = f"the tether is not as planned at this stop: it runs {now.passes}"
+    return [Alarm("plan", Level.CAUTION, text)]
+
+
+def little_left(site: Site, now: ClassNow) -> list[Alarm]:
     """The tether is nearly used up, or too short."""
-    share = now.slack / problem.tether_length
+    share = now.slack / site.tether_length
     level = max((v for v, s in SLACK.items() if share < s), default=None)
     if level is None:
         return []
     text = (
-        f"the taut tether is {now.taut:.1f} of {problem.tether_length:g} {problem.units}"
+        f"the taut tether is {now.taut:.1f} of {site.tether_length:g} {site.units}"
         if now.slack >= 0.0
-        else f"the taut tether is {-now.slack:.1f} {problem.units} longer than there is: the class "
+        else f"the taut tether is {-now.slack:.1f} {site.units} longer than there is: the class "
         "is another, or the tether is under load; go back along it"
     )
     return [Alarm("slack", level, text)]
 
 
-def soon_short(problem: Problem, ahead: Ahead) -> list[Alarm]:
+def soon_short(site: Site, ahead: Ahead) -> list[Alarm]:
     """Going on needs more tether than there is."""
     if ahead.short_s is None:
         return []
@@ -83,13 +87,13 @@ def soon_short(problem: Problem, ahead: Ahead) -> list[Alarm]:
     if level is None:
         return []
     text = (
-        f"going on needs more than {problem.tether_length:g} {problem.units} of tether in "
+        f"going on needs more than {site.tether_length:g} {site.units} of tether in "
         f"{ahead.short_s:.0f} s"
     )
     return [Alarm("short", level, text)]
 
 
-def soon_looped(problem: Problem, ahead: Ahead, robot: Floats, share: float = 1.0) -> list[Alarm]:
+def soon_looped(site: Site, ahead: Ahead, robot: Floats, share: float = 1.0) -> list[Alarm]:
     """Going on closes a loop, in that share of the classes."""
     if ahead.loop_s is None or ahead.loop is None or share < POSSIBLE:
         return []
@@ -98,26 +102,24 @@ def soon_looped(problem: Problem, ahead: Ahead, robot: Floats, share: float = 1.
         return []
     if share < LIKELY:
         level = Level.CAUTION
-    near = _nearest(problem, ahead.loop, robot)
-    keep = side(problem, robot[:2] - problem.representative_points[near])
-    names = names_of(problem, ahead.loop.around)
+    near = site.nearest(ahead.loop.around, robot)
+    keep = site.side_of(near, robot)
+    names = names_of(site, ahead.loop.around)
     text = (
-        f"keep {keep} of {problem.obstacle_name(near)}: going on closes a loop around {names} in "
-        f"{ahead.loop_s:.0f} s{_unsure(share)}; {_undo(problem, ahead.loop, near)}"
+        f"keep {beside(keep, site.name_of(near))}: going on closes a loop around {names} in "
+        f"{ahead.loop_s:.0f} s{_unsure(share)}; {_undo(site, ahead.loop, near)}"
     )
     return [Alarm("loop-ahead", level, text)]
 
 
-def looped(
-    problem: Problem, loops: Sequence[Loop], robot: Floats, share: float = 1.0
-) -> list[Alarm]:
+def looped(site: Site, loops: Sequence[Loop], robot: Floats, share: float = 1.0) -> list[Alarm]:
     """A loop is closed, in that share of the classes."""
     if not loops or share < POSSIBLE:
         return []
     loop = loops[0]
-    near = _nearest(problem, loop, robot)
-    names, sure = names_of(problem, loop.around), _unsure(share)
-    text = f"a loop around {names} is closed{sure}; {_undo(problem, loop, near)}"
+    near = site.nearest(loop.around, robot)
+    names, sure = names_of(site, loop.around), _unsure(share)
+    text = f"a loop around {names} is closed{sure}; {_undo(site, loop, near)}"
     return [Alarm("loop", Level.ALARM if share >= LOOPED else Level.CAUTION, text)]
 
 
@@ -125,17 +127,12 @@ def _unsure(share: float) -> str:
     return "" if share >= LIKELY else f" ({100.0 * share:.0f} % likely)"
 
 
-def _undo(problem: Problem, loop: Loop, near: int) -> str:
+def _undo(site: Site, loop: Loop, near: int) -> str:
     """Back along the tether: past the middle of the loop."""
     length = polylines.length(loop.line)
     half = polylines.points_along(loop.line, 0.5 * length + 1e-9)[1] if length else loop.line[0]
-    back = side(problem, half - problem.representative_points[near])
-    return f"to undo it go back {back} of {problem.obstacle_name(near)}"
-
-
-def _nearest(problem: Problem, loop: Loop, robot: Floats) -> int:
-    far = [float(problem.obstacles[i].signed_distance(robot[:2])) for i in loop.around]
-    return loop.around[int(np.argmin(far))]
+    back = site.side_of(near, half)
+    return f"to undo it go back {beside(back, site.name_of(near))}"
 
 
 def _level(limits: dict[Level, float], seconds: float) -> Level | None:

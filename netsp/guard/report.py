@@ -89,6 +89,9 @@ class Report:
         That were raised just now.
     paid_out : float or None
         By the winch.
+    as_planned : bool or None
+        Whether the likeliest class is the one that the tour means it to be in; None where the robot
+        is at none of its stops, or there is no tour.
     """
 
     time: float
@@ -107,6 +110,7 @@ class Report:
     alarms: tuple[Alarm, ...]
     raised: tuple[Alarm, ...]
     paid_out: float | None = None
+    as_planned: bool | None = None
 
     def as_row(self) -> dict[str, Any]:
         """For JSON lines and the page; no number is infinite or not one."""
@@ -125,7 +129,7 @@ class Report:
             },
             "loop_s": brief(self.loop_s), "loop_around": list(self.loop_around),
             "short_s": brief(self.short_s), "loops": [list(names) for names in self.loops],
-            "paid_out": brief(self.paid_out),
+            "paid_out": brief(self.paid_out), "as_planned": self.as_planned,
             "alarms": [
                 {"kind": a.kind, "level": a.level.name.lower(), "text": a.text}
                 for a in self.alarms

@@ -7,21 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from netsp.arrays import Floats
-from netsp.errors import InputError
 from netsp.guard.belief import Hypothesis
-from netsp.hsignature import Word, concatenate, crossings, signature
-from netsp.online.scene.field import DistanceField, pushed_out
-from netsp.online.scene.scene import scene_of
-from netsp.online.tether import GeodesicTether, Tether
-from netsp.online.tether.resolution import suggested_delta
-from netsp.problem import Problem
-from netsp.roadmap.tethers import Tethers
-
-ROUNDS = 300
-"""Of pulling a tether taut that was just found."""
-
-LONGER = 2.0
-"""Times the tether's length: longer ones of a class are not looked for."""
+from netsp.guard.site import Site
+from netsp.hsignature import Word
+from netsp.online.scene.field import pushed_out
+from netsp.online.tether import Tether
 
 
 @dataclass(frozen=True)
@@ -48,29 +38,13 @@ class Strands:
 
     Parameters
     ----------
-    problem : Problem
-        The site.
+    site : Site
+        Where.
     """
 
-    def __init__(self, problem: Problem) -> None:
-        self.problem, self.rays = problem, problem.representative_points
-        self.field: DistanceField = scene_of(problem).field()
-        self.model = GeodesicTether(self.field, suggested_delta(problem))
-        longer = problem.model_copy(
-            update={"tether_length": LONGER * problem.tether_length, "bounds": None}
-        )
-        self._exact = Tethers(longer)
+    def __init__(self, site: Site) -> None:
+        self.site = site
         self.all: list[Strand] = []
-
-    def begin(self, robot: Floats) -> None:
-        """One straight tether, of a robot near its anchor.
-
-        Parameters
-        ----------
-        robot : ndarray, shape (3,)
-            Where it is, metres.
-        """
-        self.all = self._of([Hypothesis((), 1.0, np.zeros(2))], robot, most=1)
 
     def follow(self, hypotheses: list[Hypothesis], robot: Floats, most: int) -> list[Strand]:
         """The tethers of what is believed now.
@@ -93,12 +67,15 @@ class Strands:
         return self.all
 
     def _of(self, hypotheses: list[Hypothesis], robot: Floats, most: int) -> list[Strand]:
-        out = []
+        site, out = self.site, []
         for h in hypotheses[:most]:
             there = robot.copy()
             there[:2] += h.offset
-            place = pushed_out(self.field, there[None], 1e-6)[0]
-            word = concatenate(h.word, crossings(np.array([there, place]), self.rays))
+            place = pushed_out(site.field, there[None], 1e-6)[0]
+            (step,) = site.letters.written(there[None], place[None])
+            if step is None:
+                continue
+            word = site.letters.join(h.word, step)
             tether = self._tether(word, place)
             if tether is not None:
                 out.append(Strand(word, h.likely, tether))
@@ -106,17 +83,16 @@ class Strands:
 
     def _tether(self, word: Word, place: Floats) -> Tether | None:
         """On from one that hangs already, or, if that is of another class, found anew."""
+        site = self.site
         for strand in self.all:
             step = np.array([strand.tether.robot, place])
-            if concatenate(strand.word, crossings(step, self.rays)) != word:
+            (letters,) = site.letters.written(step[:1], step[1:])
+            if letters is None or site.letters.join(strand.word, letters) != word:
                 continue
-            if not self.field.line_of_sight(step[0], step[1], 0.2 * self.model.delta):
+            if not site.field.line_of_sight(step[0], step[1], 0.2 * site.model.delta):
                 continue
-            moved = self.model.update(strand.tether, place)
-            if signature(moved.nodes, self.rays) == word:
+            moved = site.model.update(strand.tether, place)
+            hangs = site.word_of(moved.nodes)
+            if hangs is None or hangs == word:  # it dips too deep for a word, where it bends most
                 return moved
-        try:
-            found = self._exact.to(place[0], place[1], word, place[2])
-        except InputError:
-            return None
-        return None if found is None else self.model.relaxed(found.path, ROUNDS)
+        return site.found(word, place, [(s.word, s.tether) for s in self.all])

@@ -13,6 +13,7 @@ import numpy as np
 
 from netsp.errors import InputError
 from netsp.fields import Point3
+from netsp.online.mission import Mission
 from netsp.problem import Problem
 from netsp.site.projection import Projection
 
@@ -25,8 +26,8 @@ class Frame:
 
     Parameters
     ----------
-    problem : Problem
-        The site.
+    site : Problem or Mission
+        The site; a mission does not say where on the earth it is.
     kind : str, optional
         "local" or "global"; by default global where the site has an origin.
 
@@ -36,15 +37,17 @@ class Frame:
         Global, and the site does not say where it is; no such kind.
     """
 
-    def __init__(self, problem: Problem, kind: str | None = None) -> None:
+    def __init__(self, site: Problem | Mission, kind: str | None = None) -> None:
         if kind not in (None, "local", "global"):
             raise InputError(f"--frame: expected local or global, got {kind!r}")
-        projection = Projection.of(problem)
+        projection = Projection.of(site) if isinstance(site, Problem) else None
         if kind == "global" and projection is None:
             raise InputError("--frame: global needs an origin, and the site has none")
         self.projection = None if kind == "local" else projection
-        self.base = np.asarray(problem.base, dtype=float)
-        heading = math.radians(problem.origin.heading) if problem.origin else 0.0
+        origin = site.origin if isinstance(site, Problem) else None
+        base = site.base if isinstance(site, Problem) else site.start
+        self.base = np.asarray(base, dtype=float)
+        heading = math.radians(origin.heading) if origin else 0.0
         self._cos, self._sin = math.cos(heading), math.sin(heading)
 
     @property

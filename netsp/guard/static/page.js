@@ -60,6 +60,11 @@ const track = add(map, "polyline", { points: "", class: "track", ...thin });
 const others = add(map, "g", {});
 const tether = add(map, "polyline", { points: "", class: "tether", ...thin });
 const robot = add(map, "circle", { r: 1.4 * unit, cx: site.base[0], cy: -site.base[1], class: "robot" });
+for (const side of site.sides) {
+  const option = document.createElement("option");
+  option.textContent = side;
+  byId("side").append(option);
+}
 for (const o of site.obstacles) {
   const option = document.createElement("option");
   option.textContent = o.name;
