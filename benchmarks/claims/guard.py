@@ -76,7 +76,25 @@ def flown() -> tuple[str, bool]:
     return f"{s['visited']} goals, {words}", good and s["arrivals_as_planned"] == s["visited"] + 1
 
 
+def in_space() -> tuple[str, bool]:
+    """A planned mission, flown, with a guard beside."""
+    from guard import beside_flight
+    from sites import shipped
+
+    from netsp.online.simulate import simulate
+    from netsp.space.solve import solve_mission
+
+    mission, scene = shipped("basin")
+    found = solve_mission(mission, scene=scene)
+    log = (found.run or simulate(found.mission, scene=scene)).log
+    counts, longest, _, free = beside_flight(found.mission, scene, log, 0.0, 0.0)
+    flown = max(r.tether for r in log)
+    good = counts[0] == sum(counts) and free and abs(longest - flown) <= 0.05
+    return f"{counts[0]} of {sum(counts)} stops, {longest:.2f} of {flown:.2f} m", good
+
+
 def claims() -> Iterator[Claim]:
     """All of this file."""
     yield Claim("guard: words at the goals of five recorded flights", "34 of 34", recordings)
+    yield Claim("guard: stops of the flown basin mission as planned", "97 of 97", in_space)
     yield Claim("fly: the pool on a fake autopilot", "all, as planned, free", flown)

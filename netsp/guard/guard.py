@@ -106,6 +106,7 @@ class Guard:
         self._last = Fix(0.0)
         self._seen, self._looked = -np.inf, -np.inf
         self._ahead, self._sure = Ahead(), 1.0
+        self._on_plan = False
         self._motion: Motion | None = None
         self._restored: tuple[dict[Word, float], Floats, float] | None = None
         self._previous: Motion | None = None
@@ -353,15 +354,19 @@ class Guard:
         share, found = wound
         loops = next((loops for loops in found if loops), [])
         closed = {loop.around for loop in loops}
+        as_planned = self._as_planned(strands)
+        if as_planned is not None:
+            self._on_plan = as_planned
+        on_plan = self._on_plan
         ahead = self._ahead
         again = ahead.loop is not None and ahead.loop.around in closed
         return [
             *reasons.in_doubt(classes),
-            *reasons.otherwise(self._as_planned(strands), classes[0]),
+            *reasons.otherwise(as_planned, classes[0]),
             *reasons.little_left(site, classes[0]),
             *reasons.soon_short(site, ahead),
-            *([] if again else reasons.soon_looped(site, ahead, robot, self._sure)),
-            *reasons.looped(site, loops, robot, share),
+            *([] if again else reasons.soon_looped(site, ahead, robot, self._sure, on_plan)),
+            *reasons.looped(site, loops, robot, share, on_plan),
         ]  # fmt: skip
 
     def _as_planned(self, strands: Sequence[Strand]) -> bool | None:

@@ -93,14 +93,17 @@ def soon_short(site: Site, ahead: Ahead) -> list[Alarm]:
     return [Alarm("short", level, text)]
 
 
-def soon_looped(site: Site, ahead: Ahead, robot: Floats, share: float = 1.0) -> list[Alarm]:
-    """Going on closes a loop, in that share of the classes."""
+def soon_looped(
+    site: Site, ahead: Ahead, robot: Floats, share: float = 1.0, on_plan: bool = False
+) -> list[Alarm]:
+    """Going on closes a loop, in that share of the classes. Where the tether was as planned at the
+    last stop of a tour, the way on is more likely that of the plan than straight on."""
     if ahead.loop_s is None or ahead.loop is None or share < POSSIBLE:
         return []
     level = _level(TURN_S if ahead.turning else LOOP_S, ahead.loop_s)
     if level is None:
         return []
-    if share < LIKELY:
+    if share < LIKELY or on_plan:
         level = Level.CAUTION
     near = site.nearest(ahead.loop.around, robot)
     keep = site.side_of(near, robot)
@@ -112,13 +115,18 @@ def soon_looped(site: Site, ahead: Ahead, robot: Floats, share: float = 1.0) -> 
     return [Alarm("loop-ahead", level, text)]
 
 
-def looped(site: Site, loops: Sequence[Loop], robot: Floats, share: float = 1.0) -> list[Alarm]:
-    """A loop is closed, in that share of the classes."""
+def looped(
+    site: Site, loops: Sequence[Loop], robot: Floats, share: float = 1.0, on_plan: bool = False
+) -> list[Alarm]:
+    """A loop is closed, in that share of the classes. Tours close some that they undo later."""
     if not loops or share < POSSIBLE:
         return []
     loop = loops[0]
     near = site.nearest(loop.around, robot)
     names, sure = names_of(site, loop.around), _unsure(share)
+    if on_plan:
+        text = f"a loop around {names} is closed{sure}; the tether was as planned at the last stop"
+        return [Alarm("loop", Level.NOTICE, text)]
     text = f"a loop around {names} is closed{sure}; {_undo(site, loop, near)}"
     return [Alarm("loop", Level.ALARM if share >= LOOPED else Level.CAUTION, text)]
 

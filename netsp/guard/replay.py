@@ -33,14 +33,18 @@ MOST_PACKET = 300
 """Bytes of a MAVLink message, at most."""
 
 
+TIMES = ("t", "time")
+"""Names of the column of seconds; the second is that of our own runs."""
+
+
 def read_fixes(file: str | Path, frame: Frame, system: int | None = None) -> Iterator[Fix]:
     """The fixes of a recording, in their order.
 
     Parameters
     ----------
     file : str or Path
-        A table (columns t, x, y, z, or north, east, down; heading, armed, mode, estimate, paid_out
-        where it has them), a ground station's .tlog, or a .bin of ArduPilot.
+        A table (columns t or time, x, y, z, or north, east, down; heading, armed, mode, estimate,
+        paid_out where it has them), a ground station's .tlog, or a .bin of ArduPilot.
     frame : Frame
         Of the site.
     system : int, optional
@@ -85,7 +89,7 @@ def _table(file: Path, frame: Frame) -> Iterator[Fix]:
         rows = csv.DictReader(io.StringIO(packed.decode("utf-8-sig"), newline=""))
         columns = set(rows.fieldnames or ())
         named = {"x", "y", "z"} <= columns
-        if "t" not in columns or not (named or {"north", "east", "down"} <= columns):
+        if not columns & set(TIMES) or not (named or {"north", "east", "down"} <= columns):
             raise InputError(
                 f"--replay: {file}: expected columns t, x, y, z (or t, north, east, down), got "
                 f"{shown(', '.join(sorted(map(str, columns))))}"
@@ -117,9 +121,10 @@ def _row(row: dict[str, str], frame: Frame, named: bool, where: str) -> Fix:
             raise InputError(f"{where}: {column}: expected 0 or 1, got {shown(text)}")
         return TRUE.get(text)
 
-    time = number("t")
+    column = next(c for c in TIMES if c in row)
+    time = number(column)
     if time is None:
-        raise InputError(f"{where}: t: expected seconds, got nothing")
+        raise InputError(f"{where}: {column}: expected seconds, got nothing")
     parts = [number(c) for c in (("x", "y", "z") if named else ("north", "east", "down"))]
     place = None
     if None not in parts:

@@ -18,6 +18,7 @@ from netsp.guard.winding import TOUCHING, closing, loops_of
 from netsp.hsignature import Word
 from netsp.online.mission import Mission
 from netsp.online.scene.field import pushed_out
+from netsp.online.scene.scene import Scene
 from netsp.online.tether import Tether
 from netsp.report.wording import AXES
 from netsp.space.signature import SpaceSignature
@@ -89,6 +90,8 @@ class SpaceSite:
     ----------
     mission : Mission
         Anchor, start, scene and tether count; its state and its tour, if it has them, too.
+    scene : Scene, optional
+        Its scene, when it is at hand.
 
     Raises
     ------
@@ -98,10 +101,10 @@ class SpaceSite:
 
     sides: tuple[str, ...] = ("north", "east", "south", "west", "above", "below")
 
-    def __init__(self, mission: Mission) -> None:
+    def __init__(self, mission: Mission, scene: Scene | None = None) -> None:
         if mission.track:
             raise InputError("track: a moving anchor cannot be watched; expected one that stays")
-        scene = mission.load_scene()
+        scene = scene or mission.load_scene()
         self.mission = mission
         self.name, self.units = mission.name, scene.units
         self.tether_length = mission.tether_length
@@ -362,8 +365,6 @@ class SpaceSite:
 
 @lru_cache(maxsize=4096)
 def _alone(solid: Any) -> Any:
-    from netsp.online.scene.scene import Scene
-
     return Scene(solids=(solid,)).field()
 
 
