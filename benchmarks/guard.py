@@ -379,7 +379,8 @@ def beside_flight(
 def missions() -> None:
     """Planned missions, flown, with a guard beside: exact positions, and noise with drift."""
     head("mission", "stops", "as planned, exact", "longest tether m, guard / flight",
-         "free at home", "update ms, median / p99", "with noise: as planned", "otherwise", "not told",
+         "free at home", "update ms, median / p99", "with noise: as planned", "otherwise",
+         "not told",
          "update ms, median / p99 ", name="guard-space")  # fmt: skip
     for name in ("basin", "pipes", "jacket", "ring", "linked rings", "net pen"):
         mission, scene = mission_of(name) if name in SITES else shipped(name)

@@ -34,13 +34,26 @@ from netsp.online.mission import Mission
 from netsp.online.scene.field import DistanceField
 from netsp.online.scene.scene import scene_of
 from netsp.online.simulate import grid_of, simulate
+from netsp.solvers.solve import solve_graph
 from netsp.space.bound import bound_of_all
+from netsp.space.order import order_by_going_on
 from netsp.space.plan import SHARE, plan
 from netsp.space.signature import SpaceSignature
-from netsp.space.solve import AS_GIVEN, GOING_ON, seconds_until_home, solve_mission
+from netsp.space.solve import (
+    AS_GIVEN,
+    GOING_ON,
+    SolvedMission,
+    seconds_until_home,
+    solve_mission,
+)
+from netsp.space.water import along
+from netsp.travel.graph import TravelGraph
 from netsp.worlds import reachable_world
 
 MISSIONS = ("basin", "pipes", "jacket")
+LONGER_PEN = "net pen, 24 m of tether"
+"""Where the tether leads round the pen to what is behind it."""
+
 WAYS = {GOING_ON: "going straight on", AS_GIVEN: "the order given"}
 
 LOW, HIGH, ANCHOR = [-5.0] * 3, [5.0] * 3, [4.0, 0.3, 3.0]
@@ -279,9 +292,42 @@ def random_frame(seed: int) -> tuple[Mission, Scene]:
     return mission, scene
 
 
+def without_tether(found: SolvedMission) -> tuple[float, str]:
+    """Metres of the shortest tour along the shortest ways that are known, tether or not, and what
+    becomes of the tether on it."""
+    assert found.plan is not None
+    ways, water = found.plan.ways, found.plan.water
+    points, start = ways.points, water.laid.robot
+    ends = [start, *points]
+    paths: dict[tuple[int, int], np.ndarray] = {}
+    costs = np.zeros((len(ends), len(ends)))
+    for a, b in itertools.permutations(range(len(ends)), 2):
+        known = ways.known(a - 1, b - 1) if a and b else []
+        paths[a, b] = known[0][1] if known else np.array([ends[a], ends[b]])
+        costs[a, b] = along(paths[a, b])
+    costs = np.minimum(costs, costs.T)
+    graph = TravelGraph.from_costs(costs, list(range(len(ends))))
+    result = solve_graph(graph, "auto", time_limit=20.0)
+    assert result.tour is not None
+    tether, longest = water.present, 0.0
+    for a, b in itertools.pairwise((*result.tour, 0)):
+        tether, most = water.driven(tether, paths[a, b])
+        longest = max(longest, most)
+    word = water.words.product(
+        water.words.word(tether.nodes), water.words.inverse(water.words.word(water.laid.nodes))
+    )
+    hangs = "wound up, by its word" if word else "hangs on a bar"
+    free = abs(tether.length - water.laid.length) < water.mission.delta
+    told = "free" if free else f"{hangs}, {tether.length:.1f} m"
+    if longest > water.mission.tether_length:
+        told += f"; too long ({longest:.1f} m)"
+    return float(result.length or 0.0), told
+
+
 def frames() -> None:
     head("frame", "members", "group", "tour m", "status", "bound of all tours m", "gap %",
-         "solved in s", "home after s", "as given s", "over s", "visited",
+         "without a tether m", "tether left at the end of that", "solved in s", "home after s",
+         "as given s", "over s", "visited",
          name="space-frames")  # fmt: skip
     for seed in range(10):
         mission, scene = random_frame(seed)
@@ -294,27 +340,53 @@ def frames() -> None:
         tour, flown = found.tour, run.summary
         row(seed, len(scene.solids), "–" if words is None else shown(words.rank, words.relators),
             f"{tour.length:.1f}", tour.status.value, f"{tour.bound_of_all or 0.0:.1f}",
-            f"{100 * (tour.gap_to_all or 0.0):.1f}", f"{took:.0f}",
+            f"{100 * (tour.gap_to_all or 0.0):.1f}",
+            *(lambda far, told: (f"{far:.1f}", told))(*without_tether(found)), f"{took:.0f}",
             f"{seconds_until_home(run):.1f}", f"{seconds_until_home(given):.1f}",
             f"{flown['exceedance_s']:.1f}", f"{flown['visited']} of {len(mission.waypoints)}",
             )  # fmt: skip
     print()
 
 
+def by_going_on(mission: Mission, scene: Scene) -> str:
+    """Metres flown in the order by going straight on, in the better direction of those that come
+    home free and never exceed the tether."""
+    field = scene.field()
+    mission = mission.checked_waypoints(field)
+    order = order_by_going_on(
+        mission, field, grid_of(mission, scene, field), clock=Clock(60.0), seed=0
+    )
+    lengths = []
+    for there in (order, order[::-1]):
+        run = simulate(
+            mission.model_copy(update={"waypoints": tuple(mission.waypoints[n] for n in there)}),
+            scene=scene,
+        )
+        if run.summary["home"]["tether_free"] and run.summary["exceedance_s"] == 0.0:
+            lengths.append(along(np.array([[r.x, r.y, r.z] for r in run.log])))
+    return f"{min(lengths):.1f}" if lengths else "–"
+
+
 def missions(names: list[str]) -> None:
-    head("mission", "waypoints", "found by", "tour m", "status", "bound of all tours m", "gap %",
+    head("mission", "waypoints", "found by", "tour m", "by going straight on m", "status",
+         "bound of all tours m", "gap %",
          "longest tether m", "solved in s", "home after s", "as given s", "over s", "visited",
          name="space-missions")  # fmt: skip
     for name in names:
-        mission, scene = mission_of(name) if name in SITES else shipped(name)
+        site = "net pen" if name == LONGER_PEN else name
+        mission, scene = mission_of(site) if site in SITES else shipped(site)
+        if name == LONGER_PEN:
+            mission = mission.model_copy(update={"tether_length": 24.0})
         begin = time.perf_counter()
         found = solve_mission(mission, scene=scene)
         took = time.perf_counter() - begin
         run = found.run or simulate(found.mission, scene=scene)
         given = found.given or simulate(mission, scene=scene)
+        older = by_going_on(mission, scene)
         tour, flown = found.tour, run.summary
         row(name, len(mission.waypoints), WAYS.get(tour.solver, "states and legs"),
-            f"{tour.length:.1f}", tour.status.value, f"{tour.bound_of_all or 0.0:.1f}",
+            f"{tour.length:.1f}", older, tour.status.value,
+            f"{tour.bound_of_all or 0.0:.1f}",
             f"{100 * (1.0 if tour.gap_to_all is None else tour.gap_to_all):.1f}",
             f"{tour.longest_tether:.2f} of {mission.tether_length:g}", f"{took:.0f}",
             f"{seconds_until_home(run):.1f}", f"{seconds_until_home(given):.1f}",
@@ -327,7 +399,10 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--only", choices=("words", "loops", "prisms", "frames", "missions"))
     parser.add_argument(
-        "--missions", nargs="*", default=[*MISSIONS, *SITES], help="names of missions and sites"
+        "--missions",
+        nargs="*",
+        default=[*MISSIONS, *SITES, LONGER_PEN],
+        help="names of missions and sites",
     )
     parser.add_argument("--loops", type=int, default=10_000)
     parser.add_argument("--group", help=argparse.SUPPRESS)
