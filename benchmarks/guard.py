@@ -1,7 +1,8 @@
 """A guard beside robots that are driven, with noise: what it misses, how early it warns, how often
 it is wrong, and how long an update takes; and a counter of turns on the same tracks.
 
-    python benchmarks/guard.py [--only plane|space] [--tracks 100] [--loops 10] [--jobs 2] [--keep]
+    python benchmarks/guard.py [--only plane|space|hour] [--tracks 100] [--loops 10]
+                               [--jobs 2] [--keep]
 
 Tracks are tours of the shipped problems and of random worlds, flown by our vehicles, the recorded
 flights in `tests/data/ardusub`, and random pilots' drives, none of which closes a loop. Into each,
@@ -16,7 +17,9 @@ import argparse
 import copy
 import csv
 import gzip
+import json
 import math
+import resource
 import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -320,12 +323,13 @@ def main() -> None:
     parser.add_argument("--tracks", type=int, default=100)
     parser.add_argument("--loops", type=int, default=10)
     parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--only", choices=("plane", "space"))
+    parser.add_argument("--only", choices=("plane", "space", "hour"))
     args = parser.parse_args()
     heading("A guard beside robots that are driven")
-    if args.only != "plane":
-        missions()
-    if args.only == "space":
+    for name, measure in (("space", missions), ("hour", hour)):
+        if args.only in (None, name):
+            measure()
+    if args.only in ("space", "hour"):
         return
     head("tracks", "hours", "loops put in", "missed", "as possible", "missed by turns",
          "lead s, p5 / median", "10 s of lead where foreseeable %", "warnings an hour",
@@ -392,6 +396,39 @@ def missions() -> None:
             f"{longest:.2f} / {max(r.tether for r in log):.2f}", "yes" if free else "no",
             f"{np.median(ms):.1f} / {np.percentile(ms, 99):.1f}", *map(str, noisy),
             f"{np.median(slow):.1f} / {np.percentile(slow, 99):.1f}")  # fmt: skip
+    print()
+
+
+def resident() -> float:
+    """MiB of this process."""
+    with open("/proc/self/statm") as file:
+        return int(file.read().split()[1]) * resource.getpagesize() / 2**20
+
+
+def hour() -> None:
+    """A recorded flight over and over for an hour at ten a second, with noise and drift, each
+    update told as a line of JSON."""
+    head("flight", "updates", "update ms, median / p99 / worst", "path home with it, ms",
+         "MiB after 6 min", "after 60 min", name="guard-hour")  # fmt: skip
+    for name in SHIPPED:
+        problem, true = recorded(name)
+        guard, rng = Guard(problem, GuardOptions(NOISE, DRIFT, SPEED)), np.random.default_rng(0)
+        begin, updates, home, early, count = np.zeros(2), [], [], 0.0, 0
+        while count < 36_000:
+            for place in drifted(true, rng, begin):
+                began = time.perf_counter()
+                report = guard.take(Fix(count * DT, tuple(place), estimate=True))
+                updates.append(1e3 * (time.perf_counter() - began))
+                began = time.perf_counter()
+                json.dumps(report.as_row())
+                home.append(1e3 * (time.perf_counter() - began))
+                count += 1
+                if count == 3_600:
+                    early = resident()
+        ms = np.array(updates)
+        row(name, str(count),
+            f"{np.median(ms):.1f} / {np.percentile(ms, 99):.1f} / {ms.max():.0f}",
+            f"{np.percentile(home, 99):.2f}", f"{early:.0f}", f"{resident():.0f}")  # fmt: skip
     print()
 
 

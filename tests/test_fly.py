@@ -21,6 +21,7 @@ from netsp.link.frame import Frame
 from netsp.link.messages import Listener
 from netsp.link.session import Session
 from netsp.link.udp import UdpLink, messages_in
+from tests.ardusub import BINARY, REASON, ArduSub
 from tests.autopilot import Autopilot
 
 PACE = 8.0
@@ -87,6 +88,31 @@ def test_a_vehicle_visits_every_goal_in_the_class_of_the_plan_and_comes_home_fre
         assert s["exceedance_s"] == 0.0
         true = flown.autopilot.truth()[:, 1:3]
         assert min(float(o.signed_distance(p)) for o in SITE.obstacles for p in true) > 0.1
+
+
+@pytest.mark.skipif(not BINARY, reason=REASON)
+def test_ardusub_s_own_simulator_flies_a_tour_and_is_stopped_by_what_stops_the_fake_one(tour):
+    for stops in (None, "disarmed", "mode"):
+        with ArduSub() as vehicle:
+            link = UdpLink(Address(True, "127.0.0.1", vehicle.port))
+            session = Session(link, Frame(SITE), 1, 1.0)
+            try:
+                vehicle.until(lambda s=session: s.now.position is not None and s.now.estimate)
+                session.command(400, 1)
+                vehicle.until(lambda s=session: s.now.armed is True)
+                what = {
+                    None: None,
+                    "disarmed": after(5.0, lambda s=session: s.command(400, 0, 21196)),
+                    "mode": after(5.0, lambda s=session: s.command(176, 1, 19)),
+                }[stops]
+                summary = fly(SITE, tour, session, OPTIONS, on_step=what).summary
+            finally:
+                session.close()
+        if stops is None:
+            assert (summary["status"], summary["visited"], summary["home"]) == ("done", 2, True)
+            assert summary["tether_free"]
+        else:
+            assert summary["status"] == "stopped"
 
 
 def test_a_vehicle_that_is_not_ready_is_not_moved(tour):

@@ -56,6 +56,9 @@ def steps() -> Iterator[tuple[str, Callable[[], object]]]:
 
     from netsp.errors import InputError, LimitReachedError
     from netsp.execute import execute
+    from netsp.guard.fix import Fix
+    from netsp.guard.guard import Guard
+    from netsp.guard.space import SpaceSite
     from netsp.judge import verify
     from netsp.online import ReactTether, Scene
     from netsp.online.equipment import TetherPhysics
@@ -64,6 +67,7 @@ def steps() -> Iterator[tuple[str, Callable[[], object]]]:
     from netsp.problem import Problem
     from netsp.solvers.solve import solve
     from netsp.solvers.table import SOLVERS
+    from netsp.space.solve import solve_mission
     from netsp.worlds import random_world
 
     problem = random_world(1, goals=9, tether_length=450.0)
@@ -113,6 +117,20 @@ def steps() -> Iterator[tuple[str, Callable[[], object]]]:
             partial(simulate, plain, planner, vehicle=vehicle, scene=scene),
         )
     yield "a tether in a current", partial(simulate, mission, vehicle="bluerov2", scene=scene)
+
+    yield (
+        "tours in space",
+        partial(solve_mission, plain.model_copy(update={"waypoints": plain.waypoints[:4]}),
+                scene=scene, time_limit=20.0),
+    )  # fmt: skip
+
+    def guarded() -> None:
+        for site in (Guard(small), Guard(SpaceSite(plain, scene))):
+            for k in range(60):
+                place = site.site.start + np.array([0.05 * k, 0.04 * k, -0.01 * k])
+                site.take(Fix(0.1 * k, (place[0], place[1], place[2]), estimate=True))
+
+    yield "a guard", guarded
 
     def paper() -> None:
         model = ReactTether(scene.field(), 0.1)
