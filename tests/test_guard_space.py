@@ -14,11 +14,11 @@ from netsp.guard.guard import Guard, GuardOptions
 from netsp.guard.memory import restore, save
 from netsp.guard.page import Page
 from netsp.guard.silhouettes import silhouette
-from netsp.guard.sites import site_of
 from netsp.guard.space import SpaceSite
 from netsp.guard.winding import closing, loops_of
 from netsp.online.mission import Mission
 from netsp.online.scene.scene import Scene
+from netsp.online.simulate import simulate
 from netsp.space.solve import solve_mission
 
 EXACT = GuardOptions(noise=0.0, drift=0.0)
@@ -57,8 +57,18 @@ def mission(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
+def site(mission):
+    return SpaceSite(mission)
+
+
+@pytest.fixture(scope="module")
 def solved(mission):
-    return solve_mission(mission, time_limit=20.0)
+    return solve_mission(mission, time_limit=8.0)
+
+
+@pytest.fixture(scope="module")
+def flown(solved):
+    return solved.run or simulate(solved.mission)
 
 
 def along(*points, speed=0.5, t=0.0):
@@ -73,10 +83,10 @@ def along(*points, speed=0.5, t=0.0):
     return out
 
 
-def test_the_tether_is_as_planned_at_every_stop_of_the_flight_and_free_at_its_end(solved):
+def test_the_tether_is_as_planned_at_every_stop_of_the_flight_and_free_at_its_end(solved, flown):
     guard, told = Guard(solved.mission, EXACT), {}
     longest = 0.0
-    for row in solved.run.log:
+    for row in flown.log[::2]:
         report = guard.take(Fix(row.time, (row.x, row.y, row.z), estimate=True))
         for k, stop in enumerate(solved.tour.stops):
             if np.linalg.norm(np.array(report.position) - stop.path[-1]) <= 0.1:
@@ -122,14 +132,13 @@ def taut_along(site, *points):
     [(BY_THE_PILE[:2], []), (BY_THE_PILE, []), (ROUND_THE_PILE, [(0,)]),
      (ROUND_THE_MOORING, [(1,)])],
 )  # fmt: skip
-def test_loops_are_what_a_tether_is_wound_around_bodies_with_free_ends_too(mission, way, around):
-    site = site_of(mission)
+def test_loops_are_what_a_tether_is_wound_around_bodies_with_free_ends_too(site, way, around):
     tether = taut_along(site, tuple(site.start), *way)
     assert [loop.around for loop in loops_of(site.field, site.model, tether.nodes)] == around
 
 
-def test_a_loop_is_told_before_it_closes_and_is_gone_once_it_is_undone(mission):
-    guard, first, closed = Guard(mission, EXACT), None, None
+def test_a_loop_is_told_before_it_closes_and_is_gone_once_it_is_undone(mission, site):
+    guard, first, closed = Guard(site, EXACT), None, None
     for fix in along(tuple(mission.start), *ROUND_THE_PILE, (0, 1.5, -2.2)):
         report = guard.take(fix)
         if first is None and report.loop_s is not None and report.loop_around == ("pile",):
@@ -146,15 +155,14 @@ def test_a_loop_is_told_before_it_closes_and_is_gone_once_it_is_undone(mission):
     assert report.classes[0].word == guard.site.start_word()
 
 
-def test_a_robot_that_goes_straight_home_on_the_other_side_closes_a_loop(mission):
-    site = site_of(mission)
+def test_a_robot_that_goes_straight_home_on_the_other_side_closes_a_loop(site):
     tether = taut_along(site, tuple(site.start), *BY_THE_PILE)
     assert closing(site.field, site.model, tether.nodes, np.array([-2.0, -1.0, -2.0])) is None
     assert closing(site.field, site.model, tether.nodes, np.array([-3.0, 0.6, -1.5])) is not None
 
 
-def test_what_is_near_a_pile_is_in_doubt_and_what_is_far_from_all_is_not(mission):
-    near, far = Guard(mission), Guard(mission)
+def test_what_is_near_a_pile_is_in_doubt_and_what_is_far_from_all_is_not(mission, site):
+    near, far = Guard(site), Guard(site)
     for fix in along(tuple(mission.start), (-1, 0.6, -2), (2, 0.2, -2), (4, 0, -1)):
         one = near.take(fix)
     for fix in along(tuple(mission.start), (-4.5, -4, -2), (-4, -5, -2)):
@@ -163,8 +171,8 @@ def test_what_is_near_a_pile_is_in_doubt_and_what_is_far_from_all_is_not(mission
     assert len(other.classes) == 1
 
 
-def test_the_operator_says_on_which_side_of_a_solid_the_tether_passes(mission):
-    guard = Guard(mission)
+def test_the_operator_says_on_which_side_of_a_solid_the_tether_passes(mission, site):
+    guard = Guard(site)
     for fix in along(tuple(mission.start), (-1, 0.6, -2), (2, 0.2, -2), (3.5, 0, -1.5)):
         guard.take(fix)
     words = {}
@@ -179,12 +187,12 @@ def test_the_operator_says_on_which_side_of_a_solid_the_tether_passes(mission):
         guard.correct("inside", "pile")
 
 
-def test_the_class_outlives_a_restart(mission, tmp_path):
-    guard = Guard(mission, EXACT)
+def test_the_class_outlives_a_restart(mission, site, tmp_path):
+    guard = Guard(site, EXACT)
     for fix in along(tuple(mission.start), *BY_THE_PILE):
         report = guard.take(fix)
     save(guard, tmp_path / "state.json")
-    again = Guard(mission, EXACT)
+    again = Guard(SpaceSite(mission), EXACT)
     restore(again, tmp_path / "state.json")
     later = again.take(fix)
     assert later.classes[0].word == report.classes[0].word
@@ -193,7 +201,7 @@ def test_the_class_outlives_a_restart(mission, tmp_path):
     data["classes"][0]["word"] = [99]
     (tmp_path / "state.json").write_text(json.dumps(data))
     with pytest.raises(InputError, match="classes: expected letters from 1 to"):
-        restore(Guard(mission, EXACT), tmp_path / "state.json")
+        restore(Guard(site, EXACT), tmp_path / "state.json")
 
 
 def test_a_moving_anchor_is_refused(mission):
@@ -202,11 +210,11 @@ def test_a_moving_anchor_is_refused(mission):
         SpaceSite(moving)
 
 
-def test_the_page_shows_solids_from_above(mission):
-    with Page(mission, 0) as page:
-        site = page.site()
-    assert [o["name"] for o in site["obstacles"]] == ["pile", "mooring", "ring"]
-    assert "below" in site["sides"]
+def test_the_page_shows_solids_from_above(site):
+    with Page(site, 0) as page:
+        shown = page.site()
+    assert [o["name"] for o in shown["obstacles"]] == ["pile", "mooring", "ring"]
+    assert "below" in shown["sides"]
 
 
 @pytest.mark.parametrize(
@@ -225,14 +233,16 @@ def test_silhouettes_are_as_wide_as_their_solids(solid, size):
     assert np.ptp(rim, axis=0) == pytest.approx(size, rel=0.01)
 
 
-def test_a_recording_of_a_mission_is_replayed_by_the_command(solved, mission, tmp_path, capsys):
+def test_a_recording_of_a_mission_is_replayed_by_the_command(
+    solved, flown, mission, tmp_path, capsys
+):
     (tmp_path / "scene.json").write_text(mission.load_scene().model_dump_json(exclude_none=True))
     planned = solved.mission.model_copy(update={"scene": "scene.json"})
     (tmp_path / "planned.json").write_text(planned.model_dump_json(exclude_none=True))
     with open(tmp_path / "log.csv", "w", newline="") as file:
         rows = csv.writer(file)
         rows.writerow(["t", "x", "y", "z"])
-        rows.writerows([r.time, r.x, r.y, r.z] for r in solved.run.log)
+        rows.writerows([r.time, r.x, r.y, r.z] for r in flown.log[::3])
     code = main(
         ["guard", str(tmp_path / "planned.json"), "--replay", str(tmp_path / "log.csv"), "--quiet",
          "--noise", "0.05", "--drift", "0.05"]
