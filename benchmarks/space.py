@@ -46,7 +46,7 @@ from netsp.space.solve import (
     seconds_until_home,
     solve_mission,
 )
-from netsp.space.water import along
+from netsp.space.water import Water, along, straight
 from netsp.travel.graph import TravelGraph
 from netsp.worlds import reachable_world
 
@@ -292,6 +292,18 @@ def random_frame(seed: int) -> tuple[Mission, Scene]:
     return mission, scene
 
 
+def shortest_way(water: Water, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Straight, or the shortest that a search finds."""
+    if straight(water.field, a, b, water.mission.clearance):
+        return np.array([a, b])
+    begin, end = water.words.held(a), water.words.held(b)
+    assert begin is not None
+    assert end is not None
+    found = water.search(True, begin, 4, {end: 2.0 * float(np.linalg.norm(a - b))})
+    lines = [water.taut(np.vstack([a, way, b])) for _, way in water.ways(found, end)]
+    return min(lines, key=along)
+
+
 def without_tether(found: SolvedMission) -> tuple[float, str]:
     """Metres of the shortest tour along the shortest ways that are known, tether or not, and what
     becomes of the tether on it."""
@@ -302,10 +314,10 @@ def without_tether(found: SolvedMission) -> tuple[float, str]:
     paths: dict[tuple[int, int], np.ndarray] = {}
     costs = np.zeros((len(ends), len(ends)))
     for a, b in itertools.permutations(range(len(ends)), 2):
-        known = ways.known(a - 1, b - 1) if a and b else []
-        paths[a, b] = known[0][1] if known else np.array([ends[a], ends[b]])
+        known = [way for _, way in ways.known(a - 1, b - 1)] if a and b else []
+        paths[a, b] = known[0] if known else shortest_way(water, ends[a], ends[b])
         costs[a, b] = along(paths[a, b])
-    costs = np.minimum(costs, costs.T)
+    costs = np.minimum(costs, costs.T)  # the one way is the other, but for how it was found
     graph = TravelGraph.from_costs(costs, list(range(len(ends))))
     result = solve_graph(graph, "auto", time_limit=20.0)
     assert result.tour is not None
@@ -313,10 +325,9 @@ def without_tether(found: SolvedMission) -> tuple[float, str]:
     for a, b in itertools.pairwise((*result.tour, 0)):
         tether, most = water.driven(tether, paths[a, b])
         longest = max(longest, most)
-    word = water.words.product(
-        water.words.word(tether.nodes), water.words.inverse(water.words.word(water.laid.nodes))
-    )
-    hangs = "wound up, by its word" if word else "hangs on a bar"
+    path = np.vstack([paths[a, b] for a, b in itertools.pairwise((*result.tour, 0))])
+    word, broken = water.words.word_until(path, closed=True)
+    hangs = "wound up, by its word" if word or broken is not None else "hangs on a bar"
     free = abs(tether.length - water.laid.length) < water.mission.delta
     told = "free" if free else f"{hangs}, {tether.length:.1f} m"
     if longest > water.mission.tether_length:
