@@ -5,6 +5,7 @@ from __future__ import annotations
 import heapq
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -99,6 +100,7 @@ class Board:
     _out: list[Floats | None] = field(default_factory=list)
     _home: list[float] = field(default_factory=list)
     _via: dict[int, int] = field(default_factory=dict)
+    _one_way: dict[tuple[int, int], bool] = field(default_factory=dict)
     _forbidden: set[tuple[int, int]] = field(default_factory=set)
     _cut: set[tuple[int, int]] = field(default_factory=set)
 
@@ -128,15 +130,20 @@ class Board:
             self._out[self.states.begin] = np.vstack(
                 [self.water.laid.nodes[::-1], self.water.present.nodes[1:]]
             )
-        every = {
-            (v, w): path for v, w, path in legs.both_ways() if (v, w) not in self._forbidden
-        }  # fmt: skip
-        self._find_ways(every)
+        every, one_way = dict[tuple[int, int], Floats](), dict[tuple[int, int], bool]()
+        for v, w, path, both in legs.each():
+            pair = (min(v, w), max(v, w))
+            if pair not in self._forbidden:
+                every[pair] = path if v < w else path[::-1]
+                if not both:
+                    one_way[pair] = v < w
+        self._find_ways({pair: path for pair, path in every.items() if pair not in one_way})
         self.legs = {
             (v, w): path for (v, w), path in every.items()
             if along(path) < self._home[v] + self._home[w]
             or self._via.get(v) == w or self._via.get(w) == v
         }  # fmt: skip
+        self._one_way = one_way
         return whole
 
     def _own_way(self, v: int) -> Floats | None:
@@ -237,8 +244,8 @@ class Board:
         """
         if self.legs.pop(pair, None) is None:
             self._cut.add(pair)
-        else:
-            self._find_ways(self.legs)
+        elif pair not in self._one_way:
+            self._find_ways({p: path for p, path in self.legs.items() if p not in self._one_way})
         self._forbidden.add(pair)
         return pair not in self._cut
 
@@ -300,7 +307,8 @@ class Board:
         return result, [some[int(k) - 1] for k in result.tour[len(first) :]]
 
     def driven(self, tour: Sequence[int]) -> Driven:
-        """A tour, driven with the tether it begins with.
+        """A tour, driven with the tether it begins with, in the direction that is right for more of
+        its legs, and where that fails, in the other.
 
         Parameters
         ----------
@@ -310,8 +318,27 @@ class Board:
         Returns
         -------
         Driven
-            What came of it.
+            What came of it; where both directions fail, of the first.
         """
+        if self.states.begin is not None:
+            return self._driven(tour)  # it begins elsewhere than it ends
+        there, back = list(tour), list(tour)[::-1]
+        if self._wrong_way(there) > self._wrong_way(back):
+            there, back = back, there
+        first = self._driven(there)
+        if first.fault is None:
+            return first
+        second = self._driven(back)
+        return second if second.fault is None else first
+
+    def _wrong_way(self, tour: Sequence[int]) -> int:
+        """How many legs of a tour arrive in the other direction only."""
+        return sum(
+            self._one_way.get((min(v, w), max(v, w)), v < w) != (v < w) for v, w in pairwise(tour)
+        )
+
+    def _driven(self, tour: Sequence[int]) -> Driven:
+        """A tour, driven in the direction given."""
         states, water, places = self.states, self.water, self.states.places
         tether, before = water.present, -1 if states.begin is None else states.begin
         stops: list[Stop] = []

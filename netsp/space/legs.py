@@ -181,18 +181,24 @@ class Legs:
 
     arrives: dict[tuple[int, int], Floats] = field(default_factory=dict)
 
-    def both_ways(self) -> Iterator[tuple[int, int, Floats]]:
-        """Legs that were driven in both directions.
+    def each(self) -> Iterator[tuple[int, int, Floats, bool]]:
+        """Legs that arrive in one direction at least.
+
+        A tether may hang otherwise when the robot comes back: from there it then arrives in a state
+        that is none or another one.
 
         Yields
         ------
-        (int, int, ndarray)
-            The two states, the lower number first, and the shorter of the two paths.
+        (int, int, ndarray, bool)
+            The two states, the path from the first to the second, and whether the way back arrives,
+            too: the lower number is then the first, and the path the shorter of the two.
         """
         for (v, w), path in self.arrives.items():
             back = self.arrives.get((w, v))
-            if v < w and back is not None:
-                yield v, w, min(path, back[::-1], key=along)
+            if back is None:
+                yield v, w, path, False
+            elif v < w:
+                yield v, w, min(path, back[::-1], key=along), True
 
 
 @dataclass
