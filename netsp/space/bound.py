@@ -244,7 +244,7 @@ def _between(ways: Ways, own: list[_Class], others: list[_Class]) -> tuple[Float
     apart = np.abs(here[:, None] - there[None])
     far = max(straight, ways.beyond(n, m))
     out, back = (
-        [(word, max(straight, along(path))) for word, path in ways.known(a, b)]
+        [(word, max(straight, along(path))) for word, path in ways.sought(a, b)]
         for a, b in ((n, m), (m, n))
     )
     block = np.maximum(far, apart)

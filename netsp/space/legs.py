@@ -14,7 +14,10 @@ from netsp.clock import Clock
 from netsp.space.beside import ways_beside
 from netsp.space.places import Places
 from netsp.space.states import ROUNDS, Effort, State, States
-from netsp.space.water import LONGER, Water, along, straight
+from netsp.space.water import LONGER, Water, along, has_room, straight
+
+SEARCHING, PULLING = 0.3, 0.3
+"""Of the time left, what the search for ways may take, and then what those along tethers may."""
 
 NEIGHBOURS = 10
 """Waypoints nearest to each that legs are sought to; places, where some have alternatives."""
@@ -32,11 +35,15 @@ class Ways:
         The waypoints, and where else the robot may be.
     effort : Effort
         How many.
+    tethers : dict of int to list of ndarray of shape (k, 3)
+        Of some places, how tethers hang there: ways are made of these where there is no time for a
+        search, metres.
     """
 
     water: Water
     places: Places
     effort: Effort
+    tethers: dict[int, list[Floats]] = field(default_factory=dict)
     _known: dict[tuple[int, int], list[tuple[int, Floats]]] = field(default_factory=dict)
     _beyond: dict[tuple[int, int], float] = field(default_factory=dict)
 
@@ -56,15 +63,17 @@ class Ways:
         """(n, 3) the places, metres."""
         return self.places.points
 
-    def prepare(self, n: int, *, straight_only: bool = False) -> None:
+    def prepare(self, n: int, *, search: bool = True, pulling: Clock | None = None) -> None:
         """Seek the ways from a waypoint to those near it that have a greater number.
 
         Parameters
         ----------
         n : int
             The waypoint.
-        straight_only : bool
-            Look at the straight ways only, which takes no time.
+        search : bool
+            Search for all classes; else there are the straight ways, and those along tethers.
+        pulling : Clock, optional
+            When it is up, there are no more of those along tethers, either.
         """
         to = [int(m) for m in self.near[n] if m > n and (n, int(m)) not in self._known]
         if not to:
@@ -72,7 +81,7 @@ class Ways:
         water, words = self.water, self.water.words
         here = words.held(self.points[n])
         found = None
-        if here is not None and not straight_only:
+        if here is not None and search:
             ends = {m: words.held(self.points[m]) for m in to}
             limits = {
                 c: self.effort.farther * float(self._apart[n, m])
@@ -94,6 +103,8 @@ class Ways:
                     word = water.number(path)
                     if word is not None and all(word != w for w, _ in ways):
                         ways.append((word, path))
+            if found is None and not (pulling is not None and pulling.up):
+                self._add_along_tethers(n, m, ways)
             ways.sort(key=lambda way: along(way[1]))
             classes = list(ways)
             if found is not None and ways:
@@ -111,6 +122,22 @@ class Ways:
             self._known[n, m], self._known[m, n] = ways, back
             if found is not None and there is not None:
                 self._beyond[n, m] = self._beyond[m, n] = self._least_beyond(n, m, classes)
+
+    def _add_along_tethers(self, n: int, m: int, ways: list[tuple[int, Floats]]) -> None:
+        """The shortest ways back along a tether of one place and out along one of another, pulled
+        taut, each of a class of its own."""
+        found: dict[int, Floats] = {}
+        for back in self.tethers.get(n, ()):
+            for out in self.tethers.get(m, ()):
+                path = self.water.taut(np.vstack([back[::-1], out[1:]]))
+                word = self.water.number(path)
+                if word is None or not has_room(self.water.field, path, self.water.mission):
+                    continue
+                if word not in found or along(path) < along(found[word]):
+                    found[word] = path
+        for word, path in sorted(found.items(), key=lambda way: along(way[1])):
+            if len(ways) < self.effort.ways and all(word != w for w, _ in ways):
+                ways.append((word, path))
 
     def _least_beyond(self, n: int, m: int, ways: list[tuple[int, Floats]]) -> float:
         """Metres that ways of other classes than those found are at least long."""
@@ -143,13 +170,17 @@ class Ways:
         Parameters
         ----------
         clock : Clock
-            When it is up, straight ways are all that is looked at.
+            When a share of it is up, ways are made of tethers; when another is, straight ways are
+            all that is looked at.
         tell : callable
             Called with a line of text now and then.
         """
+        searching, pulling = clock.part(SEARCHING), None
         for n in range(len(self.points)):
             tell(f"ways of the robot from waypoint {n + 1} of {len(self.points)}")
-            self.prepare(n, straight_only=clock.up)
+            if searching.up and pulling is None:
+                pulling = clock.part(PULLING)
+            self.prepare(n, search=pulling is None, pulling=pulling)
 
     def known(self, n: int, m: int) -> list[tuple[int, Floats]]:
         """Ways from one waypoint to another that were found so far, shortest first.
@@ -167,6 +198,26 @@ class Ways:
             Number of the word, and the path, metres.
         """
         return self._known.get((n, m), [])
+
+
+    def sought(self, n: int, m: int) -> list[tuple[int, Floats]]:
+        """The same, of those that bounds may rest on: of a search, or straight. Where ways were
+        made of tethers, there may be shorter ones.
+
+        Parameters
+        ----------
+        n : int
+            Where they begin.
+        m : int
+            Where they end.
+
+        Returns
+        -------
+        list of (int, ndarray of shape (k, 3))
+            As of `known`.
+        """
+        found = self.known(n, m)
+        return found if (n, m) in self._beyond else [way for way in found if len(way[1]) == 2]
 
 
 @dataclass

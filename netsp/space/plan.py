@@ -52,10 +52,9 @@ ROUNDING = 1e-9
 MOST_AGAIN = 20
 """Times that a graph is solved again because legs were at fault."""
 
-STARTING, SEARCHING, PLANTING, GROWING, WAYS_OUT, SOLVING = 0.3, 0.3, 0.3, 0.5, 0.3, 0.5
-"""Of the time left, what first states may take, then the search for ways, then states and legs,
-their ways by the anchor, and the solver each time; the rest is for driving, and for solving
-again."""
+STARTING, PLANTING, GROWING, WAYS_OUT, SOLVING = 0.3, 0.3, 0.5, 0.3, 0.5
+"""Of the time left, what first states may take, then, once ways are known, states and legs, their
+ways by the anchor, and the solver each time; the rest is for driving, and for solving again."""
 
 EARLY = 0.1
 """Of the time left, what the solver may take while there are more states to come: its tour is then
@@ -261,8 +260,9 @@ def _planned(
             f"({100 * SHARE:g} % of tether_length), and the nearest is {nearest:.4g} m from the "
             "anchor as the crow flies"
         )
-    ways = Ways(water, places, effort)
-    ways.prepare_all(clock.part(SEARCHING), tell)
+    hanging = {n: [states.all[s].tether.nodes for s in of] for n, of in states.of.items()}
+    ways = Ways(water, places, effort, hanging)
+    ways.prepare_all(clock, tell)
     tell("trees of legs")
     states_of_trees(states, ways, clock.part(PLANTING))
     growth = Growth(states, ways)
