@@ -282,12 +282,11 @@ def _planned(
         grown = growth.go_on(most, growing, tell)
         tell("ways by the anchor")
         complete = (board.take(growth.legs, clock.part(WAYS_OUT)) and grown) or complete
-        share = SOLVING if most == effort.states[-1] else EARLY
-        warm = None if best is None else best[1].tour
-        found = _best_driven(board, clock, tell, warm, share, how)
-        if found is not None and (best is None or found[1].length <= best[1].length):
-            best = found
+        last = most == effort.states[-1]
+        best = _better(best, _best_driven(board, clock, tell, best, SOLVING if last else EARLY, how))
         if clock.left < clock.elapsed - begin:
+            if not last and not (best is not None and best[0].status is Status.OPTIMAL):
+                best = _better(best, _best_driven(board, clock, tell, best, SOLVING, how))
             break
     if not board.reached:
         raise InputError(
@@ -322,13 +321,23 @@ def _try_out(solver: SolverLike, params: Mapping[str, Any] | None, seed: int) ->
     )  # fmt: skip
 
 
+def _better(
+    best: tuple[Result, Driven] | None, found: tuple[Result, Driven] | None
+) -> tuple[Result, Driven] | None:
+    """The shorter of two tours; of equals the second, more was known when it was found."""
+    if best is None or (found is not None and found[1].length <= best[1].length):
+        return found
+    return best
+
+
 def _best_driven(
-    board: Board, clock: Clock, tell: Callable[[str], None], warm: list[int] | None,
-    share: float, how: dict[str, Any],
+    board: Board, clock: Clock, tell: Callable[[str], None],
+    best: tuple[Result, Driven] | None, share: float, how: dict[str, Any],
 ) -> tuple[Result, Driven] | None:  # fmt: skip
     """The best tour that was driven without fault. As long as there is time, the graph is solved
     again without the legs that were at fault; then the tour goes by way of the start there."""
     again, found = 0, None
+    warm = None if best is None else best[1].tour
     while again < MOST_AGAIN or clock.up:
         if found is None:
             tell("order" if again == 0 else f"order, {counted(again, 'leg')} at fault forbidden")

@@ -68,7 +68,7 @@ class Effort:
             # 0.03 % of the proven shortest among prisms with these (benchmarks/space.py)
             return cls(words=5, states=(7, 14), ways=6, farther=2.2)
         if waypoints <= 100:
-            return cls(words=4, states=(5, 10, 16), ways=4, farther=1.5)
+            return cls(words=4, states=(5, 10, 16, 32), ways=4, farther=1.5)
         return cls(words=3, states=(5, 10), ways=4, farther=1.5)
 
 
