@@ -30,6 +30,7 @@ from netsp import Problem, solve
 from netsp.clock import Clock
 from netsp.hsignature.rays import signature
 from netsp.online import Scene
+from netsp.online.log import Run
 from netsp.online.mission import Mission
 from netsp.online.scene.field import DistanceField
 from netsp.online.scene.scene import scene_of
@@ -359,6 +360,10 @@ def frames() -> None:
     print()
 
 
+def flown_metres(run: Run) -> float:
+    return along(np.array([[r.x, r.y, r.z] for r in run.log]))
+
+
 def by_going_on(mission: Mission, scene: Scene) -> str:
     """Metres flown in the order by going straight on, in the better direction of those that come
     home free and never exceed the tether."""
@@ -374,12 +379,12 @@ def by_going_on(mission: Mission, scene: Scene) -> str:
             scene=scene,
         )
         if run.summary["home"]["tether_free"] and run.summary["exceedance_s"] == 0.0:
-            lengths.append(along(np.array([[r.x, r.y, r.z] for r in run.log])))
+            lengths.append(flown_metres(run))
     return f"{min(lengths):.1f}" if lengths else "–"
 
 
 def missions(names: list[str]) -> None:
-    head("mission", "waypoints", "found by", "tour m", "by going straight on m", "status",
+    head("mission", "waypoints", "found by", "tour m", "flown m", "by going straight on, flown m", "status",
          "bound of all tours m", "gap %",
          "longest tether m", "solved in s", "home after s", "as given s", "over s", "visited",
          name="space-missions")  # fmt: skip
@@ -396,7 +401,7 @@ def missions(names: list[str]) -> None:
         older = by_going_on(mission, scene)
         tour, flown = found.tour, run.summary
         row(name, len(mission.waypoints), WAYS.get(tour.solver, "states and legs"),
-            f"{tour.length:.1f}", older, tour.status.value,
+            f"{tour.length:.1f}", f"{flown_metres(run):.1f}", older, tour.status.value,
             f"{tour.bound_of_all or 0.0:.1f}",
             f"{100 * (1.0 if tour.gap_to_all is None else tour.gap_to_all):.1f}",
             f"{tour.longest_tether:.2f} of {mission.tether_length:g}", f"{took:.0f}",

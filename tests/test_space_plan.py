@@ -1,6 +1,7 @@
 """Tours in space: the fewest metres, a tether that fits, and nothing that is wound up."""
 
 import heapq
+import itertools
 import json
 
 import numpy as np
@@ -15,11 +16,15 @@ from netsp.online import Scene
 from netsp.online.mission import Mission
 from netsp.online.scene.scene import scene_of
 from netsp.online.surprises import SceneSurprises
-from netsp.space.bound import bound_of_all
+from netsp.space.board import Board
+from netsp.space.bound import _least, bound_of_all
 from netsp.space.judge import verify_mission
 from netsp.space.labels import LENGTHS, STEPS, axes_of, lower_end, nth_axis, staircase
+from netsp.space.legs import Legs, Ways
+from netsp.space.places import Places
 from netsp.space.plan import plan
-from netsp.space.water import Water
+from netsp.space.states import Effort, first_states
+from netsp.space.water import Water, along, has_room
 
 POSTS = [
     Circle(center=(3.0, 0.4), radius=0.5),
@@ -248,3 +253,59 @@ def test_a_bound_on_all_tours_is_found_among_classes_of_which_some_are_not_found
     for seconds in (0.05, 5.0):
         bound = bound_of_all(found.ways, sorted(found.order), Clock(seconds))
         assert bound is None or bound <= found.length * 1.001
+
+
+def free_bar(**more) -> tuple[Mission, Water, Places]:
+    """Water about a bar with free ends, and two waypoints beyond it."""
+    bar = {"capsule": {"from": [0, -3, 0], "to": [0, 3, 0], "radius": 0.3}}
+    scene = Scene(solids=[bar], bounds=[-6, -6, -6, 6, 6, 6])
+    mission = Mission(
+        scene="-", anchor=(-4, 0, -0.5), start=(-4, 0, -0.5),
+        waypoints=[(2, 0, -0.5), (2, 1, -0.5)], tether_length=20.0, clearance=0.2, **more,
+    )  # fmt: skip
+    field = scene.field()
+    return mission, Water.of(mission, scene, field), Places.of(mission, field)
+
+
+def test_a_leg_is_bounded_by_the_shortest_of_its_class_and_not_by_a_way_that_hangs():
+    mission, water, _ = free_bar()
+    over = np.array([[-2, 0, -0.5], [-1, 0, 1.5], [1, 0, 1.5], [2, 0, -0.5]], dtype=float)
+    assert along(water.taut(over)) > 4.1  # it hangs on the bar, whose ends are free
+    assert water.number(over) == water.number(over[[0, -1]])
+    assert _least(water, over[1::-1], over[1:]) <= 4.01
+
+
+def test_a_leg_that_arrives_in_one_direction_only_is_gone_in_that_direction():
+    _, water, places = free_bar()
+    states = first_states(water, places, 19.8, Effort.of(2), Clock())
+    a, b = states.of[0][0], states.of[1][0]
+    line = places.points[[0, 1]]
+    for v, w, path in ((a, b, line), (b, a, line[::-1])):
+        board = Board(water, states)
+        board.take(Legs({(v, w): path}), Clock())
+        assert list(board.legs) == [(min(a, b), max(a, b))]
+        for tour in ([a, b], [b, a]):
+            driven = board.driven(tour)
+            assert driven.fault is None
+            assert driven.tour == [v, w]
+
+
+def test_ways_made_of_tethers_are_ways_of_their_words_and_no_bound_rests_on_them(posts):
+    _, mission = posts
+    scene = mission.load_scene()
+    field = scene.field()
+    water, places = Water.of(mission, scene, field), Places.of(mission, field)
+    effort = Effort.of(len(places))
+    states = first_states(water, places, mission.tether_length, effort, Clock())
+    tethers = {n: [states.all[s].tether.nodes for s in of] for n, of in states.of.items()}
+    ways = Ways(water, places, effort, tethers)
+    made = 0
+    for n in range(len(places)):
+        ways.prepare(n, search=False)
+    for n, m in itertools.permutations(range(len(places)), 2):
+        for word, path in ways.known(n, m):
+            assert water.number(path) == word
+            assert has_room(field, path, mission)
+            made += len(path) > 2
+        assert all(len(path) == 2 for _, path in ways.sought(n, m))
+    assert made
