@@ -384,8 +384,8 @@ def by_going_on(mission: Mission, scene: Scene) -> str:
 
 
 def missions(names: list[str]) -> None:
-    head("mission", "waypoints", "found by", "tour m", "flown m", "by going straight on, flown m", "status",
-         "bound of all tours m", "gap %",
+    head("mission", "waypoints", "found by", "tour m", "flown m", "by going straight on, flown m",
+         "status", "bound of all tours m", "gap %",
          "longest tether m", "solved in s", "home after s", "as given s", "over s", "visited",
          name="space-missions")  # fmt: skip
     for name in names:

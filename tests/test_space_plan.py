@@ -255,20 +255,20 @@ def test_a_bound_on_all_tours_is_found_among_classes_of_which_some_are_not_found
         assert bound is None or bound <= found.length * 1.001
 
 
-def free_bar(**more) -> tuple[Mission, Water, Places]:
+def free_bar() -> tuple[Water, Places]:
     """Water about a bar with free ends, and two waypoints beyond it."""
-    bar = {"capsule": {"from": [0, -3, 0], "to": [0, 3, 0], "radius": 0.3}}
+    bar = {"capsule": {"a": [0, -3, 0], "b": [0, 3, 0], "radius": 0.3}}
     scene = Scene(solids=[bar], bounds=[-6, -6, -6, 6, 6, 6])
     mission = Mission(
         scene="-", anchor=(-4, 0, -0.5), start=(-4, 0, -0.5),
-        waypoints=[(2, 0, -0.5), (2, 1, -0.5)], tether_length=20.0, clearance=0.2, **more,
+        waypoints=[(2, 0, -0.5), (2, 1, -0.5)], tether_length=20.0, clearance=0.2,
     )  # fmt: skip
     field = scene.field()
-    return mission, Water.of(mission, scene, field), Places.of(mission, field)
+    return Water.of(mission, scene, field), Places.of(mission, field)
 
 
 def test_a_leg_is_bounded_by_the_shortest_of_its_class_and_not_by_a_way_that_hangs():
-    mission, water, _ = free_bar()
+    water, _ = free_bar()
     over = np.array([[-2, 0, -0.5], [-1, 0, 1.5], [1, 0, 1.5], [2, 0, -0.5]], dtype=float)
     assert along(water.taut(over)) > 4.1  # it hangs on the bar, whose ends are free
     assert water.number(over) == water.number(over[[0, -1]])
@@ -276,7 +276,7 @@ def test_a_leg_is_bounded_by_the_shortest_of_its_class_and_not_by_a_way_that_han
 
 
 def test_a_leg_that_arrives_in_one_direction_only_is_gone_in_that_direction():
-    _, water, places = free_bar()
+    water, places = free_bar()
     states = first_states(water, places, 19.8, Effort.of(2), Clock())
     a, b = states.of[0][0], states.of[1][0]
     line = places.points[[0, 1]]

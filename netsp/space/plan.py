@@ -283,7 +283,8 @@ def _planned(
         tell("ways by the anchor")
         complete = (board.take(growth.legs, clock.part(WAYS_OUT)) and grown) or complete
         last = most == effort.states[-1]
-        best = _better(best, _best_driven(board, clock, tell, best, SOLVING if last else EARLY, how))
+        share = SOLVING if last else EARLY
+        best = _better(best, _best_driven(board, clock, tell, best, share, how))
         if clock.left < clock.elapsed - begin:
             if not last and not (best is not None and best[0].status is Status.OPTIMAL):
                 best = _better(best, _best_driven(board, clock, tell, best, SOLVING, how))
