@@ -36,7 +36,7 @@ from netsp.travel.result import Result
 PLAIN, CLASSES = 0.4, 0.5
 """Of the time left: for the first bound, and for the classes of the second."""
 
-MOST_WORDS, LEAST_WORDS, MOST_ENTRIES, A_SECOND = 100, 4, 25_000_000, 600_000
+MOST_WORDS, LEAST_WORDS, MOST_ENTRIES, A_SECOND = 100, 4, 25_000_000, 250_000
 """Words of a cell that are sought, at most and at least; and of all cells together, at most (11
 bytes each), and in a second."""
 
@@ -129,16 +129,20 @@ def _classes(ways: Ways, some: list[int], clock: Clock) -> list[_Class] | None:
         seen: set[int] = set()
         # classes that were not found are no shorter than that; paths along cells are longer than
         # those pulled taut by no more than that factor
-        beyond = along(there[-1][1]) / LONGER if len(there) >= most else np.inf
-        for word, way in there:
-            least = along(way) / LONGER
+        beyond = _least_of(water, there[-1][1], places.points[n]) if len(there) >= most else np.inf
+        for _, way in there:
+            least = _least_of(water, way, places.points[n])
             if clock.up or least > limit + water.mission.delta:
                 beyond = min(beyond, least)
                 break
-            tether = water.model.relaxed(np.vstack([anchor, way, places.points[n]]), ROUNDS)
-            number = water.number(tether.nodes)
-            key = word if number is None else number
-            seen |= {word, key}
+            path = np.vstack([anchor, way, places.points[n]])
+            tether = water.model.relaxed(path, ROUNDS)
+            # of whole paths: those of cells lack the letters between a place and its cell
+            key = water.number(path)
+            if key is None:
+                beyond = min(beyond, least)
+                continue
+            seen.add(key)
             delta = water.mission.delta
             at_rest = tether.residual <= delta / 200.0  # docs/tether.md
             if tether.length > limit + (ACCURACY * limit if at_rest else delta):
@@ -152,6 +156,13 @@ def _classes(ways: Ways, some: list[int], clock: Clock) -> list[_Class] | None:
         if len(out) > MOST_VERTICES:
             return None
     return out
+
+
+def _least_of(water: Water, way: Floats, place: Floats) -> float:
+    """Metres that tethers in the class of a way along cells are at least long. Such ways are longer
+    than taut ones by no more than a factor, and end in the middles of cells."""
+    ends = water.laid.nodes[0] - way[0], place - way[-1]
+    return along(way) / LONGER - float(np.linalg.norm(ends, axis=1).sum())
 
 
 def _solved(ways: Ways, classes: list[_Class], clock: Clock, seed: int) -> float | None:
@@ -242,6 +253,11 @@ def _between(ways: Ways, own: list[_Class], others: list[_Class]) -> tuple[Float
     # a tether, and on along the way to the next place, is no shorter than the taut one there
     here, there = (np.array([c.length for c in some]) for some in (own, others))
     apart = np.abs(here[:, None] - there[None])
+    # of classes that were not found, the length is only a least one
+    if own[-1].word == ANY:
+        apart[-1] = np.maximum(0.0, here[-1] - there)
+    if others[-1].word == ANY:
+        apart[:, -1] = np.maximum(0.0, there[-1] - here)
     far = max(straight, ways.beyond(n, m))
     out, back = (
         [(word, max(straight, along(path))) for word, path in ways.sought(a, b)]
@@ -253,9 +269,9 @@ def _between(ways: Ways, own: list[_Class], others: list[_Class]) -> tuple[Float
     times = ways.water.words.times
 
     def to_another(c: _Class, known: list[tuple[int, float]], other: _Class) -> float:
-        """The shortest way from a class to one that was not found."""
+        """The shortest way from a class to one that was not found, be it known or not."""
         lengths = (d for w, d in known if times(c.word, w) not in other.other_than)
-        return min(lengths, default=far)
+        return min([far, *lengths])
 
     for k, c in enumerate(own):
         if c.word == ANY:

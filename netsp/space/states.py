@@ -66,7 +66,7 @@ class Effort:
         if waypoints <= 24:
             # around a row of piles, a way is twice as long as the distance: tours were within
             # 0.03 % of the proven shortest among prisms with these (benchmarks/space.py)
-            return cls(words=5, states=(7, 14), ways=6, farther=2.2)
+            return cls(words=5, states=(7, 14, 28), ways=6, farther=2.2)
         if waypoints <= 100:
             return cls(words=4, states=(5, 10, 16, 32), ways=4, farther=1.5)
         return cls(words=3, states=(5, 10), ways=4, farther=1.5)
