@@ -16,13 +16,10 @@ from netsp.errors import InputError
 from netsp.fields import Point3
 from netsp.files import FileModel, write_text
 from netsp.guard.guard import Guard
-from netsp.guard.site import Site
+from netsp.guard.site import ROUNDS, Site
 from netsp.hsignature import Word
 from netsp.models import Model
 from netsp.online.tether import Tether
-
-ROUNDS = 300
-"""Of pulling a tether taut that was written down."""
 
 LONGEST_S = 600.0
 """Seconds without us after which the robot may be anywhere: then the memory is of no use."""

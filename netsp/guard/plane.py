@@ -12,7 +12,7 @@ from netsp.errors import InputError
 from netsp.guard.correct import SIDES, corrected
 from netsp.guard.gaps import ways_between
 from netsp.guard.loops import closed_by, loops_in
-from netsp.guard.site import Letters, Loop
+from netsp.guard.site import LONGER, ROUNDS, Letters, Loop
 from netsp.hsignature import Word, concatenate, crossings, reduce, signature
 from netsp.online.scene.scene import scene_of
 from netsp.online.tether import GeodesicTether, Tether
@@ -20,12 +20,6 @@ from netsp.online.tether.resolution import suggested_delta
 from netsp.problem import Problem
 from netsp.report.wording import listed, passages, side
 from netsp.roadmap.tethers import Tethers
-
-LONGER = 2.0
-"""Times the tether's length: longer ones of a class are not looked for."""
-
-ROUNDS = 300
-"""Of pulling a tether taut that was just found."""
 
 
 class RayLetters:
@@ -106,11 +100,6 @@ class PlaneSite:
     def start_word(self) -> Word:
         """The empty one."""
         return ()
-
-    def laid(self, robot: Floats) -> Tether:
-        """The shortest tether; to a place beside the base it is straight."""
-        word = crossings(np.array([self.start, robot]), self.rays)
-        return self.found(word, robot, ()) or self.model.start(self.start, robot)
 
     def found(
         self, word: Word, place: Floats, hanging: Sequence[tuple[Word, Tether]]

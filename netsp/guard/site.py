@@ -11,6 +11,12 @@ from netsp.hsignature import Word
 from netsp.online.scene.field import DistanceField
 from netsp.online.tether import GeodesicTether, Tether
 
+LONGER = 2.0
+"""Times the tether's length: longer ones of a class are not looked for."""
+
+ROUNDS = 300
+"""Of pulling a tether taut that was just found, or written down."""
+
 
 @dataclass(frozen=True)
 class Loop:
@@ -95,9 +101,6 @@ class Site(Protocol):
 
     def start_word(self) -> Word:
         """The word of the tether when it begins at the start."""
-
-    def laid(self, robot: Floats) -> Tether:
-        """The tether of a robot near the start, as short as can be."""
 
     def found(self, word: Word, place: Floats, hanging: Sequence[tuple[Word, Tether]]) -> (
         Tether | None

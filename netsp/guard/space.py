@@ -13,7 +13,7 @@ import numpy as np
 from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.guard.silhouettes import silhouette
-from netsp.guard.site import Letters, Loop, beside
+from netsp.guard.site import LONGER, ROUNDS, Letters, Loop, beside
 from netsp.guard.winding import TOUCHING, closing, loops_of
 from netsp.hsignature import Word
 from netsp.online.mission import Mission
@@ -24,9 +24,6 @@ from netsp.report.wording import AXES
 from netsp.space.signature import SpaceSignature
 from netsp.space.water import Water, along
 
-LONGER = 2.0
-"""Times the tether's length: longer ones of a class are not looked for."""
-
 MOST_WAYS = 12
 """Ways that are kept, the shortest."""
 
@@ -36,9 +33,6 @@ or so, and how many of them are looked at: more would take seconds."""
 
 AGAIN = 1.0
 """Metres that the robot goes before a class whose tether was not found is looked for again."""
-
-ROUNDS = 300
-"""Of pulling a tether taut that was just found."""
 
 UPRIGHT = 0.7
 """Share of a direction that must be vertical for it to be above or below."""
@@ -126,10 +120,6 @@ class SpaceSite:
     def start_word(self) -> Word:
         """Of the tether that the mission begins with."""
         return self.water.words.word(self._first.nodes)
-
-    def laid(self, robot: Floats) -> Tether:
-        """That which the mission begins with, taken along."""
-        return self.model.drive(self._first, robot[None])[0]
 
     def found(
         self, word: Word, place: Floats, hanging: Sequence[tuple[Word, Tether]]

@@ -16,7 +16,7 @@ import numpy as np
 
 from netsp.arrays import Floats
 from netsp.geometry import polylines
-from netsp.guard.site import Loop
+from netsp.guard.site import ROUNDS, Loop
 from netsp.online.scene.field import DistanceField
 from netsp.online.tether import GeodesicTether
 
@@ -29,9 +29,6 @@ TURN = 1.1 * math.pi
 
 STEP = 0.2
 """Metres between the places of a tether that are looked at."""
-
-ROUNDS = 300
-"""Of pulling a loop taut."""
 
 TOUCHING = 0.1
 """Of delta: nearer to a solid than that, a tether rests on it."""

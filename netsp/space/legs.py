@@ -199,7 +199,6 @@ class Ways:
         """
         return self._known.get((n, m), [])
 
-
     def sought(self, n: int, m: int) -> list[tuple[int, Floats]]:
         """The same, of those that bounds may rest on: of a search, or straight. Where ways were
         made of tethers, there may be shorter ones.
