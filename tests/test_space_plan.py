@@ -17,7 +17,7 @@ from netsp.online.mission import Mission
 from netsp.online.scene.scene import scene_of
 from netsp.online.surprises import SceneSurprises
 from netsp.space.board import Board
-from netsp.space.bound import _least, bound_of_all
+from netsp.space.bound import ANY, _classes, _costs, _least, bound_of_all
 from netsp.space.judge import verify_mission
 from netsp.space.labels import LENGTHS, STEPS, axes_of, lower_end, nth_axis, staircase
 from netsp.space.legs import Legs, Ways
@@ -309,3 +309,31 @@ def test_ways_made_of_tethers_are_ways_of_their_words_and_no_bound_rests_on_them
             made += len(path) > 2
         assert all(len(path) == 2 for _, path in ways.sought(n, m))
     assert made
+
+
+def test_what_is_not_known_of_classes_is_no_more_than_what_is_found_when_more_are_sought(
+    posts, monkeypatch
+):
+    mission = posts[1].model_copy(update={"tether_length": 12.0})
+    scene = mission.load_scene()
+    water = Water.of(mission, scene, scene.field())
+    places = Places.of(mission, water.field)
+    ways = Ways(water, places, Effort.of(len(places)))
+    ways.prepare_all(Clock(), lambda _: None)
+    some = list(range(len(places)))
+    few, many = [], []
+    for most, classes in ((4, few), (40, many)):
+        monkeypatch.setattr("netsp.space.bound.MOST_WORDS", most)
+        classes += _classes(ways, some, Clock(60.0))
+    least, exact = _costs(ways, few)[0], _costs(ways, many)[0]
+    number = {(c.point, c.word): k for k, c in enumerate(few, 1)}
+    unknown = 0
+    of = []
+    for c in many:
+        at = number.get((c.point, c.word))
+        unknown += at is None
+        of.append(number.get((c.point, ANY)) if at is None else at)
+    assert unknown
+    for (a, i), (b, j) in itertools.combinations(zip([0, *of], range(len(of) + 1), strict=True), 2):
+        if a is not None and b is not None:
+            assert least[a, b] <= exact[i, j] + 1e-6
