@@ -56,12 +56,11 @@ REPAIRS = ("local", "replan", "home")
 @contextmanager
 def vehicle(problem: Problem, pace: float, speed: float, seed: int) -> Iterator[Any]:
     """An autopilot that is armed at the base, and our session with it."""
-    start = tuple(float(v) for v in problem.base)
     with Autopilot(
-        pace=pace, speed=speed, seed=seed, noise=0.02, drift=0.03, smooth=1.0, start=start,
+        pace=pace, speed=speed, seed=seed, noise=0.02, drift=0.03, smooth=1.0,
         params={"FS_GCS_TIMEOUT": 30},
     ) as autopilot:  # fmt: skip
-        frame = Frame(problem)
+        frame = Frame(problem, "local")  # it begins at the base, wherever that is on earth
         session = Session(UdpLink(Address(True, "127.0.0.1", autopilot.port)), frame, 1, pace)
         try:
             autopilot.until(lambda: session.now.position is not None and session.now.estimate)
@@ -77,7 +76,9 @@ def truth(problem: Problem, autopilot: Autopilot, done: Execution) -> tuple[floa
     vehicle really was until it was stopped."""
     begin = autopilot.now - (done.rows[-1].time if done.rows else 0.0)
     rows = autopilot.truth()
-    places = rows[rows[:, 0] <= begin + (done.rows[-1].time if done.rows else 0.0) + 1.0, 1:]
+    told = rows[rows[:, 0] <= begin + (done.rows[-1].time if done.rows else 0.0) + 1.0, 1:]
+    frame = Frame(problem, "local")
+    places = np.array([frame.from_local(north, east, -up) for east, north, up in told])
     room = min(
         (float(o.signed_distance(p[:2])) for o in problem.obstacles for p in places[::5]),
         default=np.inf,
