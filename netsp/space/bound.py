@@ -36,9 +36,13 @@ from netsp.travel.result import Result
 PLAIN, CLASSES = 0.4, 0.5
 """Of the time left: for the first bound, and for the classes of the second."""
 
-MOST_WORDS, LEAST_WORDS, MOST_ENTRIES, A_SECOND = 100, 4, 25_000_000, 250_000
+MOST_WORDS, LEAST_WORDS, MOST_ENTRIES, A_SECOND = 100, 4, 25_000_000, 600_000
 """Words of a cell that are sought, at most and at least; and of all cells together, at most (11
 bytes each), and in a second."""
+
+SEARCHING = 0.4
+"""Of the time left, what a search for more words than the least may take; the rest is for pulling
+their tethers taut."""
 
 MOST_VERTICES = 3000
 """Classes of all waypoints together: of more there is the first bound only."""
@@ -106,9 +110,10 @@ def _classes(ways: Ways, some: list[int], clock: Clock) -> list[_Class] | None:
     water, places = ways.water, ways.places
     words, limit = water.words, water.mission.tether_length
     entries = min(MOST_ENTRIES, A_SECOND * clock.left)
-    most = min(MOST_WORDS, int(entries / words.cells.flags.size))
-    if not words.exact or most < LEAST_WORDS:
+    of_each = int(entries / words.cells.flags.size)
+    if not words.exact or of_each < LEAST_WORDS:
         return None
+    most = min(MOST_WORDS, max(LEAST_WORDS, int(SEARCHING * of_each)))
     root = int(np.ravel_multi_index(tuple(words.root), words.cells.flags.shape))
     cells = {n: words.held(places.points[n]) for n in some if n != places.begin}
     targets = {cell: limit for cell in cells.values() if cell is not None}
