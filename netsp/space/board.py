@@ -130,20 +130,20 @@ class Board:
             self._out[self.states.begin] = np.vstack(
                 [self.water.laid.nodes[::-1], self.water.present.nodes[1:]]
             )
-        every, one_way = dict[tuple[int, int], Floats](), dict[tuple[int, int], bool]()
+        every = dict[tuple[int, int], Floats]()
+        self._one_way = {}
         for v, w, path, both in legs.each():
             pair = (min(v, w), max(v, w))
             if pair not in self._forbidden:
                 every[pair] = path if v < w else path[::-1]
                 if not both:
-                    one_way[pair] = v < w
-        self._find_ways({pair: path for pair, path in every.items() if pair not in one_way})
+                    self._one_way[pair] = v < w
+        self._find_ways(every)
         self.legs = {
             (v, w): path for (v, w), path in every.items()
             if along(path) < self._home[v] + self._home[w]
             or self._via.get(v) == w or self._via.get(w) == v
         }  # fmt: skip
-        self._one_way = one_way
         return whole
 
     def _own_way(self, v: int) -> Floats | None:
@@ -159,9 +159,11 @@ class Board:
 
     def _find_ways(self, legs: dict[tuple[int, int], Floats]) -> None:
         """How far it is from the start to each state: along its own tether, or where the robot has
-        no room on that way, by way of others."""
+        no room on that way, by way of others, there and back."""
         beside: dict[int, list[tuple[int, float]]] = {}
         for (v, w), path in legs.items():
+            if (v, w) in self._one_way:
+                continue
             far = along(path)
             beside.setdefault(v, []).append((w, far))
             beside.setdefault(w, []).append((v, far))
@@ -244,8 +246,8 @@ class Board:
         """
         if self.legs.pop(pair, None) is None:
             self._cut.add(pair)
-        elif pair not in self._one_way:
-            self._find_ways({p: path for p, path in self.legs.items() if p not in self._one_way})
+        else:
+            self._find_ways(self.legs)
         self._forbidden.add(pair)
         return pair not in self._cut
 
