@@ -247,6 +247,21 @@ def test_a_flight_is_not_written_over_its_mission(tmp_path):
     assert json.loads(file.read_text()) == data
 
 
+@pytest.mark.parametrize(
+    ("right", "wrong"), [("waypoints", "waipoints"), ("anchor", "ancor")]
+)  # fmt: skip
+def test_a_mission_with_a_field_misspelt_is_read_as_a_mission(right, wrong, tmp_path, capsys):
+    data = about_a_box().model_dump(mode="json", exclude_none=True)
+    data[wrong] = data.pop(right)
+    file = tmp_path / "mission.json"
+    file.write_text(json.dumps(data))
+    for command in ("solve", "verify", "execute", "order"):
+        assert main([command, str(file)]) == 2
+        told = capsys.readouterr().err
+        assert f"{right}: missing" in told
+        assert wrong in told
+
+
 def test_a_bound_on_all_tours_is_found_among_classes_of_which_some_are_not_found():
     mission = about_a_box(clearance=0.2)
     found = plan(mission, scene=BOX, time_limit=20)

@@ -33,14 +33,17 @@ FOR_PROBLEMS = {
 
 
 def is_mission(file: str) -> bool:
-    """Whether a file is a mission; what cannot be read is left to who reads problems."""
+    """Whether a file is a mission, be it one that lacks a field or has it misspelt; what cannot be
+    read is left to who reads problems."""
     from netsp.files import read_text
-    from netsp.models import kind_of, parse_json_object
+    from netsp.models import MARKS, kind_of, parse_json_object
 
     try:
-        return kind_of(parse_json_object(read_text(file), file)) == "mission"
+        data = parse_json_object(read_text(file), file)
     except InputError:
         return False
+    kind = kind_of(data)
+    return kind == "mission" or (kind is None and not MARKS["mission"].isdisjoint(data))
 
 
 def check_flags(args: argparse.Namespace, parser_defaults: dict[str, Any]) -> None:
