@@ -17,7 +17,8 @@ from netsp.online.mission import Mission
 from netsp.online.scene.scene import scene_of
 from netsp.online.surprises import SceneSurprises
 from netsp.space.board import Board
-from netsp.space.bound import ANY, _classes, _costs, _least, bound_of_all
+from netsp.space.bound import LegLengths, _costs, _least, bound_of_all
+from netsp.space.classes import ANY, classes_within
 from netsp.space.judge import verify_mission
 from netsp.space.labels import LENGTHS, STEPS, axes_of, lower_end, nth_axis, staircase
 from netsp.space.legs import Legs, Ways
@@ -290,6 +291,44 @@ def test_a_leg_is_bounded_by_the_shortest_of_its_class_and_not_by_a_way_that_han
     assert _least(water, over[1::-1], over[1:]) <= 4.01
 
 
+def test_classes_that_legs_lead_to_are_those_that_a_longer_search_finds(posts, monkeypatch):
+    mission = posts[1].model_copy(update={"tether_length": 10.0})
+    scene = mission.load_scene()
+    water = Water.of(mission, scene, scene.field())
+    places = Places.of(mission, water.field)
+    ways = Ways(water, places, Effort.of(len(places)))
+    ways.prepare_all(Clock(), lambda _: None)
+    some = list(range(len(places)))
+    found = {}
+    for most, pulled in ((2, 0), (2, 40_000), (60, 0)):
+        monkeypatch.setattr("netsp.space.classes.MOST_WORDS", most)
+        monkeypatch.setattr("netsp.space.classes.MOST_PULLED", pulled)
+        found[most, pulled] = {
+            (c.point, c.word): c.length for c in classes_within(ways, some, Clock(60.0))
+            if c.word != ANY
+        }  # fmt: skip
+    searched, gone_on, more = found.values()
+    assert len(searched) < len(gone_on)
+    for key in gone_on.keys() & more.keys():
+        assert gone_on[key] == pytest.approx(more[key], abs=0.02)
+    assert gone_on.keys() <= more.keys()
+
+
+def test_a_detour_past_the_free_end_of_a_bar_saves_the_way_back_around_it(monkeypatch):
+    bar = {"capsule": {"a": [0, -3, 0], "b": [0, 0.5, 0], "radius": 0.15}}
+    scene = Scene(solids=[bar], bounds=[-6, -6, -6, 6, 6, 6])
+    mission = Mission(
+        scene="-", anchor=(-4, 0, -1), start=(-4, 0, -1), waypoints=[(2, 0, -1), (2, 0, 2)],
+        tether_length=12.0, clearance=0.2,
+    )  # fmt: skip
+    found = plan(mission, scene=scene)
+    assert verify_mission(found.planned(), scene=scene)
+    monkeypatch.setattr("netsp.space.plan.Detours.shortened", lambda *_: None)
+    taut = plan(mission, scene=scene)
+    assert taut.result.status.value == "optimal"
+    assert found.length < 0.98 * taut.length
+
+
 def test_a_leg_that_arrives_in_one_direction_only_is_gone_in_that_direction():
     water, places = free_bar()
     states = first_states(water, places, 19.8, Effort.of(2), Clock())
@@ -337,10 +376,16 @@ def test_what_is_not_known_of_classes_is_no_more_than_what_is_found_when_more_ar
     ways.prepare_all(Clock(), lambda _: None)
     some = list(range(len(places)))
     few, many = [], []
-    for most, classes in ((4, few), (40, many)):
-        monkeypatch.setattr("netsp.space.bound.MOST_WORDS", most)
-        classes += _classes(ways, some, Clock(60.0))
-    least, exact = _costs(ways, few)[0], _costs(ways, many)[0]
+    for most, pulled, classes in ((4, 0, few), (40, 40_000, many)):
+        monkeypatch.setattr("netsp.space.classes.MOST_WORDS", most)
+        monkeypatch.setattr("netsp.space.classes.MOST_PULLED", pulled)
+        classes += classes_within(ways, some, Clock(60.0))
+    known = LegLengths(ways)
+    least = _costs(known, few)[0]
+    for n, m in itertools.combinations(some, 2):
+        known.go_on(n, m)
+    assert (_costs(known, few)[0] >= least - 1e-9).all()
+    least, exact = _costs(known, few)[0], _costs(known, many)[0]
     number = {(c.point, c.word): k for k, c in enumerate(few, 1)}
     unknown = 0
     of = []

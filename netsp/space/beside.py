@@ -68,15 +68,31 @@ def _bent(begin: Floats, end: Floats, farthest: float) -> Iterator[Floats]:
     far = float(np.linalg.norm(step))
     if far < 1e-9 or farthest <= far:
         return
-    ahead = step / far
-    u = np.cross(ahead, np.eye(3)[int(np.argmin(np.abs(ahead)))])
-    u /= np.linalg.norm(u)
-    v = np.cross(ahead, u)
+    u, v = across(step)
     out = 0.5 * math.sqrt(farthest**2 - far**2)
     for share in BENDS:
         for angle in np.linspace(0.0, 2.0 * math.pi, SIDES, endpoint=False):
             away = share * out * (math.cos(angle) * u + math.sin(angle) * v)
             yield np.array([begin, begin + 0.5 * step + away, end])
+
+
+def across(step: Floats) -> tuple[Floats, Floats]:
+    """Two directions at right angles to one and to each other.
+
+    Parameters
+    ----------
+    step : ndarray, shape (3,)
+        The direction, of any length but 0.
+
+    Returns
+    -------
+    tuple of ndarray, shape (3,)
+        Of length 1.
+    """
+    ahead = step / np.linalg.norm(step)
+    u = np.cross(ahead, np.eye(3)[int(np.argmin(np.abs(ahead)))])
+    u /= np.linalg.norm(u)
+    return u, np.cross(ahead, u)
 
 
 def _free(water: Water, path: Floats) -> bool:

@@ -222,8 +222,23 @@ class Board:
             return np.vstack([self._way_out(v)[::-1], self._way_out(w)[1:]])
         return direct if v < w else direct[::-1]
 
+    def way_out(self, v: int) -> Floats | None:
+        """How the robot gets from the start to a state.
+
+        Parameters
+        ----------
+        v : int
+            Its number.
+
+        Returns
+        -------
+        ndarray, shape (k, 3), or None
+            Metres; None where no way has room.
+        """
+        return self._way_out(v) if np.isfinite(self._home[v]) else None
+
     def _way_out(self, v: int) -> Floats:
-        """(k, 3) from the start to a state."""
+        """(k, 3) from the start to a state that it gets to."""
         own = self._out[v] if v >= 0 else self.water.laid.nodes[-1:]
         if own is not None:
             return own

@@ -35,6 +35,7 @@ from netsp.solution import Status
 from netsp.solvers.solve import SolverLike, solve_graph
 from netsp.solvers.table import SOLVERS
 from netsp.space.board import Board, Driven, Stop, with_status
+from netsp.space.detours import Detours
 from netsp.space.legs import Growth, Ways
 from netsp.space.places import Places
 from netsp.space.states import Effort, first_states, states_with_room
@@ -55,6 +56,10 @@ MOST_AGAIN = 20
 STARTING, PLANTING, GROWING, WAYS_OUT, SOLVING = 0.3, 0.3, 0.5, 0.3, 0.5
 """Of the time left, what first states may take, then, once ways are known, states and legs, their
 ways by the anchor, and the solver each time; the rest is for driving, and for solving again."""
+
+TAUT = 0.6
+"""Of the time left once ways are known, what tours along taut ways may take; the rest is for those
+with detours."""
 
 EARLY = 0.1
 """Of the time left, what the solver may take while there are more states to come: its tour is then
@@ -273,26 +278,31 @@ def _planned(
         states_with_room(states, lacking, effort.words)
         board.take(growth.legs, clock.part(WAYS_OUT))
     growth.go_on(0, clock.part(PLANTING), tell)
+    taut = clock.part(TAUT)
     best: tuple[Result, Driven] | None = None
     complete = False
     for most in effort.states:
-        begin = clock.elapsed
-        enough = board.legs or GROWING * clock.left >= LEAST_GROWING
-        growing = clock.part(GROWING) if enough else Clock(LEAST_GROWING)
+        begin = taut.elapsed
+        enough = board.legs or GROWING * taut.left >= LEAST_GROWING
+        growing = taut.part(GROWING) if enough else Clock(LEAST_GROWING)
         grown = growth.go_on(most, growing, tell)
         tell("ways by the anchor")
-        complete = (board.take(growth.legs, clock.part(WAYS_OUT)) and grown) or complete
+        complete = (board.take(growth.legs, taut.part(WAYS_OUT)) and grown) or complete
         last = most == effort.states[-1]
         share = SOLVING if last else EARLY
-        best = _better(best, _best_driven(board, clock, tell, best, share, how))
-        if clock.left < clock.elapsed - begin:
+        best = _better(best, _best_driven(board, taut, tell, best, share, how))
+        if taut.left < taut.elapsed - begin:
             if not last and not (best is not None and best[0].status is Status.OPTIMAL):
-                best = _better(best, _best_driven(board, clock, tell, best, SOLVING, how))
+                best = _better(best, _best_driven(board, taut, tell, best, SOLVING, how))
             break
     if not board.reached:
         raise InputError(
             f"waypoints: the robot gets to none of them with its clearance of {mission.clearance:g}"
         )
+    shorter = Detours(board, ways).shortened(best and best[1], clock, tell, how["seed"])
+    if shorter is not None:
+        # what the solver knew of its graph says nothing of legs that are not in it
+        best = Result(None, shorter.length, None, Status.FEASIBLE), shorter
     if best is None:
         raise LimitReachedError(
             "waypoints: no tour was found whose tether stays within the limit all along"

@@ -42,12 +42,21 @@ class Effort:
         Classes of ways between two waypoints.
     farther : float
         Ways are no longer than so many times the distance.
+    detours : tuple of float
+        How much longer detours are, as shares of the leg.
+    sides : int
+        Directions of detours, evenly around a leg.
+    tethers : int
+        Kept after each leg of an order that is driven with detours.
     """
 
     words: int
     states: tuple[int, ...]
     ways: int
     farther: float
+    detours: tuple[float, ...]
+    sides: int
+    tethers: int
 
     @classmethod
     def of(cls, waypoints: int) -> Effort:
@@ -66,10 +75,18 @@ class Effort:
         if waypoints <= 24:
             # around a row of piles, a way is twice as long as the distance: tours were within
             # 0.03 % of the proven shortest among prisms with these (benchmarks/space.py)
-            return cls(words=5, states=(7, 14, 28), ways=6, farther=2.2)
+            return cls(
+                words=5, states=(7, 14, 28), ways=6, farther=2.2, detours=(0.02, 0.06, 0.15),
+                sides=8, tethers=8,
+            )  # fmt: skip
         if waypoints <= 100:
-            return cls(words=4, states=(5, 10, 16, 32), ways=4, farther=1.5)
-        return cls(words=3, states=(5, 10), ways=4, farther=1.5)
+            return cls(
+                words=4, states=(5, 10, 16, 32), ways=4, farther=1.5, detours=(0.02, 0.1),
+                sides=6, tethers=12,
+            )  # fmt: skip
+        return cls(
+            words=3, states=(5, 10), ways=4, farther=1.5, detours=(0.02, 0.1), sides=6, tethers=4
+        )
 
 
 @dataclass(frozen=True)
