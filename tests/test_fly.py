@@ -3,6 +3,9 @@
 import io
 import json
 import random
+import signal
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -287,6 +290,36 @@ def test_a_tour_is_flown_by_command_with_events_and_its_files_are_written(
     summary = json.loads((run / "summary.json").read_text())
     assert (summary["status"], summary["visited"], summary["cancelled"]) == ("done", 1, [1])
     assert {p.name for p in run.iterdir()} >= {"log.csv", "events.csv", "run.png", "visits.csv"}
+
+
+def test_ctrl_c_at_the_command_stops_the_vehicle_offers_the_way_home_and_keeps_the_log(
+    tmp_path, tour
+):
+    problem, solution, run = tmp_path / "p.json", tmp_path / "s.json", tmp_path / "run"
+    problem.write_text(SITE.to_json())
+    solution.write_text(tour.to_json())
+    with Autopilot(pace=PACE, params={"FS_GCS_ENABLE": 0}) as autopilot:
+        autopilot.tell(do="arm")
+        autopilot.event("armed")
+        command = subprocess.Popen(
+            [sys.executable, "-m", "netsp", "fly", problem, solution, "--link",
+             f"udpin:{autopilot.port}", "--pace", str(PACE), "-o", run],
+            stdin=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+        )  # fmt: skip
+        autopilot.event("target", seconds=90.0)
+        autopilot.sleep(6.0)
+        command.send_signal(signal.SIGINT)
+        told = command.communicate(timeout=60)[1]
+        sent = len(autopilot.events)
+        autopilot.sleep(8.0)
+        assert not [e for e in autopilot.events[sent:] if e.get("event") == "target"]
+        places = autopilot.truth()[-40:, 1:4]
+    assert command.returncode == 4, told
+    assert "Traceback" not in told
+    assert "back along the tether" in told
+    assert np.linalg.norm(places - places[-1], axis=1).max() < 0.3
+    assert json.loads((run / "summary.json").read_text())["status"] == "interrupted"
+    assert (run / "log.csv").read_text().count("\n") > 10
 
 
 @pytest.mark.parametrize(

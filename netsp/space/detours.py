@@ -17,13 +17,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 
 from netsp.arrays import Floats
 from netsp.clock import Clock
 from netsp.errors import InputError
+from netsp.geometry import polylines
 from netsp.online.tether import Tether
 from netsp.roadmap.from_state import from_state
 from netsp.solvers.solve import solve_graph
@@ -49,17 +50,26 @@ ORDERING = 0.2
 SAVED = 1e-3
 """Metres that a tour must be shorter to be taken."""
 
+OFF, STEPS = 0.15, (0.03, 0.02, 0.01)
+"""Metres that a robot may be off at the bends of a path, and of its steps: what a tether slips off
+in steps of a decimetre, it may stay on in finer ones. It must come to hang alike in all."""
+
+FAR = 2.0
+"""Metres: on longer legs steps are longer, too."""
+
 HOME = -1
 """In place of a place's number: the start."""
 
 
 @dataclass(frozen=True)
 class _Line:
-    """The beginning of a tour: how far it goes, the tether and the number of its word at the end,
-    and the last leg: where to, along which path, and the longest tether on it."""
+    """The beginning of a tour: how far it goes, the tether at its end, the same of a robot that is
+    not as exact, and the number of its word; and the last leg: where to, along which path, and the
+    longest tether on it."""
 
     length: float
     tether: Tether
+    flown: Tether
     word: int
     before: _Line | None = None
     place: int = HOME
@@ -263,7 +273,7 @@ class Detours:
         word = water.number(water.present.nodes)
         if word is None or rest[0] >= below:
             return None
-        levels = [[_Line(0.0, water.present, word)]]
+        levels = [[_Line(0.0, water.present, water.present, word)]]
         shared = 0
         while known and shared < len(order) and order[shared] == like[shared]:
             shared += 1
@@ -286,11 +296,57 @@ class Detours:
                     continue
                 if last and not self._is_free(tether, word):
                     continue
-                kept.append(_Line(far, tether, word, line, ends[k + 1], path, most))
+                flown = self._as_flown(line, path, tether)
+                if flown is None:
+                    continue
+                kept.append(_Line(far, tether, flown, word, line, ends[k + 1], path, most))
             if not kept:
                 return None
             levels.append(kept)
         return levels
+
+    def _as_flown(self, line: _Line, path: Floats, after: Tether) -> Tether | None:
+        """The tether of a robot that goes in fine steps and turns back within reach of each stop,
+        as flights do; None where it does not come to hang as it should. Where it slips off
+        something on the way, it must do so in steps of all sizes, and with bends that are farther
+        out, or less far."""
+        shares = np.linspace(0.0, 1.0, len(path))[1:-1, None]
+        away = path[1:-1] - (path[0] + shares * (path[-1] - path[0]))
+        aside = OFF * away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-9)
+        flown, slips = None, False
+        for before in (line.tether, line.flown):
+            flown, slipped = self._fine(before, path, after, STEPS[0])
+            if flown is None:
+                return None
+            slips = slips or slipped
+        if not slips:
+            return flown
+        for step, off in product(
+            STEPS, (0.0 * aside, aside, -aside) if len(path) > 2 else (aside,)
+        ):
+            other = np.vstack([path[:1], path[1:-1] + off, path[-1:]])
+            for before in (line.tether, line.flown):
+                if self._fine(before, other, after, step)[0] is None:
+                    return None
+        return flown
+
+    def _fine(
+        self, before: Tether, path: Floats, after: Tether, step: float
+    ) -> tuple[Tether | None, bool]:
+        """A tether, driven in steps along a path to within reach of its end, and whether it slipped
+        off something; None in its place where it is not like another at the end."""
+        water = self.ways.water
+        way = np.vstack([before.robot[None], path[1:]])
+        short = _cut(way, water.mission.reach)
+        step *= max(1.0, along(path) / FAR)
+        there, lengths = water.model.drive(before, polylines.dense(short, step))
+        end, most = water.driven(there, np.vstack([short[-1:], path[-1:]]))
+        longest = max(most, float(lengths.max(initial=0.0)))
+        delta = water.mission.delta
+        if longest > self.board.states.limit or not alike(end, after, delta):
+            return None, False
+        drops = -np.diff(lengths, prepend=before.length)
+        return there, bool((drops > step + delta).any())
 
     def _same(self, line: _Line, tether: Tether, word: int) -> bool:
         delta = self.ways.water.mission.delta
@@ -312,6 +368,16 @@ class Detours:
             for leg in legs
         ]  # fmt: skip
         return Driven([], stops, _path(home), line.length, True, None)
+
+
+def _cut(path: Floats, short: float) -> Floats:
+    """A path, less its last metres, or half of it where it is no longer than twice that."""
+    length = along(path)
+    keep = max(length - short, 0.5 * length)
+    lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
+    last = int(np.searchsorted(lengths, keep, side="left"))
+    share = (keep - lengths[last - 1]) / (lengths[last] - lengths[last - 1])
+    return np.vstack([path[:last], path[last - 1] + share * (path[last] - path[last - 1])])
 
 
 def _path(leg: _Line) -> Floats:

@@ -98,6 +98,8 @@ class SpacePlan:
         With the words.
     ways : Ways
         Of the robot between waypoints.
+    taut : SpacePlan, optional
+        Where legs make detours, the best tour without any.
     """
 
     mission: Mission
@@ -111,6 +113,7 @@ class SpacePlan:
     free: bool
     water: Water
     ways: Ways
+    taut: SpacePlan | None = None
 
     @property
     def order(self) -> tuple[int, ...]:
@@ -300,22 +303,29 @@ def _planned(
             f"waypoints: the robot gets to none of them with its clearance of {mission.clearance:g}"
         )
     shorter = Detours(board, ways).shortened(best and best[1], clock, tell, how["seed"])
-    if shorter is not None:
-        # what the solver knew of its graph says nothing of legs that are not in it
-        best = Result(None, shorter.length, None, Status.FEASIBLE), shorter
-    if best is None:
+    if best is None and shorter is None:
         raise LimitReachedError(
             "waypoints: no tour was found whose tether stays within the limit all along"
         )
-    result, driven = best
-    if not complete and result.status is Status.OPTIMAL:
-        result = replace(result, status=Status.FEASIBLE)  # there are more legs within reach
-    return SpacePlan(
-        mission, tuple(driven.stops), driven.home, driven.length, result, len(states.all),
-        len(board.legs),
-        tuple(n for n in range(len(mission.waypoints)) if n not in board.reached),
-        driven.free, water, ways,
-    )  # fmt: skip
+
+    def planned(result: Result, driven: Driven, taut: SpacePlan | None = None) -> SpacePlan:
+        unreached = (n for n in range(len(mission.waypoints)) if n not in board.reached)
+        return SpacePlan(
+            mission, tuple(driven.stops), driven.home, driven.length, result, len(states.all),
+            len(board.legs), tuple(unreached), driven.free, water, ways, taut,
+        )  # fmt: skip
+
+    along_taut = None
+    if best is not None:
+        result, driven = best
+        if not complete and result.status is Status.OPTIMAL:
+            result = replace(result, status=Status.FEASIBLE)  # there are more legs within reach
+        along_taut = planned(result, driven)
+    if shorter is None:
+        assert along_taut is not None
+        return along_taut
+    # what the solver knew of its graph says nothing of legs that are not in it
+    return planned(Result(None, shorter.length, None, Status.FEASIBLE), shorter, along_taut)
 
 
 def _try_out(solver: SolverLike, params: Mapping[str, Any] | None, seed: int) -> None:

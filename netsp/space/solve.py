@@ -203,6 +203,7 @@ def solve_mission(
             bound = bound_of_all(planned.ways, reached, clock.part(BOUNDING), seed)
             best = _of_plan(planned, name, seed, bound)
             best = replace(best, run=flights.of(best.mission, "the tour"))
+            best = _or_without_detours(best, planned.taut, flights, name, seed, bound)
         given = flights.of(mission, "the order as given", best)
         best = _or_as_given(best, given, flights, bound, seed)
         best = _or_going_on(best, flights, bound, seed)
@@ -214,6 +215,21 @@ def solve_mission(
 def _of_plan(planned: SpacePlan, solver: str, seed: int, bound: float | None) -> SolvedMission:
     mission = planned.planned(solver, seed, bound)
     return SolvedMission(mission, planned.every_waypoint, None, None, planned)
+
+
+def _or_without_detours(
+    best: SolvedMission, taut: SpacePlan | None, flights: _Flights, solver: str, seed: int,
+    bound: float | None,
+) -> SolvedMission:  # fmt: skip
+    """The better of a tour with detours and of the best one without: a tether that hangs otherwise
+    than it should after a detour may take long to come free."""
+    if taut is None or best.run is None:
+        return best
+    if seconds_until_home(best.run) <= taut.length / best.mission.speed:
+        return best
+    other = _of_plan(taut, solver, seed, bound)
+    run = flights.of(other.mission, "the tour without detours", best)
+    return best if run is None or not _better_than(run, best) else replace(other, run=run)
 
 
 def _or_going_on(

@@ -76,7 +76,7 @@ class Effort:
             # around a row of piles, a way is twice as long as the distance: tours were within
             # 0.03 % of the proven shortest among prisms with these (benchmarks/space.py)
             return cls(
-                words=5, states=(7, 14, 28), ways=6, farther=2.2, detours=(0.02, 0.06, 0.15),
+                words=5, states=(7, 14, 28), ways=6, farther=2.2, detours=(0.02, 0.06, 0.15, 0.35),
                 sides=8, tethers=8,
             )  # fmt: skip
         if waypoints <= 100:
