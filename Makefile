@@ -4,7 +4,7 @@ PYTHON ?= python3
 BIN     = $(VENV)/bin
 DEMO   ?= demo
 
-.PHONY: demo test accept tables lint bench js clean
+.PHONY: demo test accept docs tables lint bench js clean
 .DELETE_ON_ERROR:
 
 $(VENV)/.installed: pyproject.toml
@@ -33,6 +33,10 @@ js:
 # every figure of README and docs, measured on this commit
 accept: $(VENV)/.installed
 	$(BIN)/python benchmarks/accept.py
+
+# the pages as a site, in build/site; a warning is an error
+docs: $(VENV)/.installed
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 
 # the tables of the docs, written from the rows that the benchmarks keep
 tables: $(VENV)/.installed

@@ -302,7 +302,11 @@ def _planned(
         raise InputError(
             f"waypoints: the robot gets to none of them with its clearance of {mission.clearance:g}"
         )
-    shorter = Detours(board, ways).shortened(best and best[1], clock, tell, how["seed"])
+    # where words tell all, detours lead to the tethers that straight legs lead to
+    proven = best is not None and best[0].status is Status.OPTIMAL and complete
+    shorter = None
+    if states.hang_on_free_ends or not proven:
+        shorter = Detours(board, ways).shortened(best and best[1], clock, tell, how["seed"])
     if best is None and shorter is None:
         raise LimitReachedError(
             "waypoints: no tour was found whose tether stays within the limit all along"

@@ -207,6 +207,12 @@ class States:
         return None if self.places.begin is None else self.of[self.places.begin][0]
 
     @property
+    def hang_on_free_ends(self) -> bool:
+        """Whether tethers of one word hang in several ways at some waypoint."""
+        of_words = {(s.point, s.word) for s in self.all}
+        return len(of_words) < len(self.all)
+
+    @property
     def reached(self) -> set[int]:
         """The waypoints that have states; that of the mission's state counts as one more."""
         return {int(self.places.waypoint[n]) for n in self.of}

@@ -1,0 +1,99 @@
+"""What the site has that no page of `docs/` holds: the file formats, from their JSON Schemas, and
+the pages beside the shipped problems and scenes."""
+
+from __future__ import annotations
+
+import importlib
+import re
+from pathlib import Path
+from typing import Any
+
+from mkdocs.config.defaults import MkDocsConfig
+from mkdocs.structure.files import File, Files
+from mkdocs.structure.pages import Page
+
+ROOT = Path(__file__).parents[2]
+BESIDE = {"problems.md": "problems/README.md", "scenes.md": "scenes/README.md"}
+FORMATS = "<!-- formats -->"
+
+
+def on_files(files: Files, config: MkDocsConfig) -> Files:
+    """Pages that lie beside what they are about."""
+    for name, source in BESIDE.items():
+        files.append(File.generated(config, name, content=(ROOT / source).read_text()))
+    return files
+
+
+def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
+    """Links to those pages, and the formats where they belong."""
+    for name, source in BESIDE.items():
+        markdown = markdown.replace(f"](../{source}", f"]({name}")
+    if FORMATS in markdown:
+        markdown = markdown.replace(FORMATS, "\n".join(formats()))
+    return markdown
+
+
+def formats() -> list[str]:
+    """A section for every format, and in it a table for every kind of object."""
+    from netsp.command.schema import FORMATS as MODELS
+
+    out = []
+    for name, place in MODELS.items():
+        module, model = place.split(":")
+        schema = getattr(importlib.import_module(module), model).model_json_schema()
+        out += [f"## {name.capitalize().replace('-', ' ')}", "", told(schema), ""]
+        out += table(name, schema)
+        for part, fields in schema.get("$defs", {}).items():
+            if fields.get("properties"):
+                out += [f"### {part} {{ #{name}-{part.lower()} }}", "", told(fields), ""]
+                out += table(name, fields)
+    return out
+
+
+def told(schema: dict[str, Any]) -> str:
+    """The first paragraph of a description."""
+    text = schema.get("description", "").split("\n\n")[0].replace("\n", " ")
+    return re.sub(r"`([^`]+)`", r"`\1`", text)
+
+
+def table(name: str, schema: dict[str, Any]) -> list[str]:
+    """A row for each field."""
+    required = set(schema.get("required", ()))
+    out = ["| field | type | meaning | default |", "|---|---|---|---|"]
+    for field, what in schema["properties"].items():
+        default = "required" if field in required else f"`{what.get('default', 'none')}`"
+        if what.get("default", "") is None:
+            default = ""
+        meaning = what.get("description", "").replace("\n", " ").replace("|", "\\|")
+        out.append(f"| `{field}` | {kind(name, what)} | {meaning} | {default} |")
+    return [*out, ""]
+
+
+def kind(name: str, what: dict[str, Any]) -> str:
+    """A field's type in a few words."""
+    if "$ref" in what:
+        part = what["$ref"].rsplit("/", 1)[-1]
+        return f"[{part}](#{name}-{part.lower()})"
+    for several in ("anyOf", "oneOf"):
+        if several in what:
+            kinds = [kind(name, w) for w in what[several] if w.get("type") != "null"]
+            return " or ".join(dict.fromkeys(kinds))
+    if "enum" in what:
+        return ", ".join(f"`{v}`" for v in what["enum"])
+    if "const" in what:
+        return f"`{what['const']}`"
+    if what.get("type") == "array":
+        if "prefixItems" in what:
+            return f"({', '.join(kind(name, w) for w in what['prefixItems'])})"
+        size = what.get("maxItems")
+        count = f"{size} " if size is not None and size == what.get("minItems") else ""
+        return f"list of {count}{kind(name, what.get('items', {}))}"
+    return limits(what, what.get("type", "any"))
+
+
+def limits(what: dict[str, Any], type_: str) -> str:
+    """A number with the limits that it has."""
+    signs = {"exclusiveMinimum": ">", "minimum": "≥", "exclusiveMaximum": "<", "maximum": "≤"}
+    signs |= {"gt": ">", "ge": "≥", "lt": "<", "le": "≤"}
+    told = [f"{sign} {what[key]:g}" for key, sign in signs.items() if key in what]
+    return " ".join([type_, ", ".join(told)]).strip()
