@@ -4,6 +4,7 @@ import importlib
 import shlex
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -26,7 +27,7 @@ def test_the_example_of_every_command_is_one(name, capsys):
     command = importlib.import_module(f"netsp.command.{MODULES[name]}")
     words = shlex.split(command.EXAMPLE.split(" > ")[0])
     assert words[:2] == ["netsp", name]
-    assert _parser(name).parse_args(words[1:]).run is command.run
+    assert _parser({name}).parse_args(words[1:]).run is command.run
     with pytest.raises(SystemExit):
         main([name, "--help"])
     assert command.EXAMPLE in capsys.readouterr().out
@@ -52,3 +53,23 @@ def test_help_to_a_full_disk_fails_in_one_line():
         )
     assert done.returncode == 2
     assert len(done.stderr.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("words", "offered"),
+    [(("netsp", "so"), "solve"), (("netsp", "solve", "--ti"), "--time-limit"),
+     (("netsp", "schema", "sce"), "scene-surprises"), (("netsp", "plot", "prob"), "problems")],
+)  # fmt: skip
+def test_bash_completes_commands_options_choices_and_files(words, offered, tmp_path, capsys):
+    assert main(["completion", "bash"]) == 0
+    script = tmp_path / "netsp.bash"
+    script.write_text(capsys.readouterr().out)
+    asked = f"""
+        source {script}
+        COMP_WORDS=({" ".join(words)}) COMP_CWORD={len(words) - 1}
+        _shtab_netsp netsp {words[-1]} {words[-2]}
+        printf '%s\\n' "${{COMPREPLY[@]}}"
+    """
+    root = Path(__file__).parent.parent
+    done = subprocess.run(["bash", "-c", asked], capture_output=True, text=True, cwd=root)
+    assert offered in done.stdout.split(), done.stderr

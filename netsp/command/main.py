@@ -14,7 +14,7 @@ import importlib
 import io
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from typing import Any, NoReturn
 
 from netsp.command import messages
@@ -146,6 +146,7 @@ COMMANDS = {
     "tools": {
         "schema": ("schema", "print the JSON Schema of a file format"),
         "warm-up": ("warm_up", "compile everything ahead of the first use"),
+        "completion": ("completion", "print what a shell needs to complete netsp's commands"),
     },
 }
 """By what they are for: name → module of this package, and a line of help. Each module has
@@ -158,14 +159,25 @@ def _parsed(words: list[str], wanted: str | None) -> argparse.Namespace:
     names = [name for group in COMMANDS.values() for name in group]
     if wanted is not None and wanted not in names:
         raise InputError(f"unknown command {wanted!r}; expected one of {', '.join(names)}")
-    args, unknown = _parser(wanted).parse_known_args(words)
+    args, unknown = _parser({wanted}).parse_known_args(words)
     if unknown:
         raise InputError(f"unknown argument {unknown[0]!r} (netsp {wanted} --help)")
     return args
 
 
-def _parser(wanted: str | None) -> argparse.ArgumentParser:
-    """The parser of all commands, with the arguments of the one that is wanted."""
+def parser_of_all() -> argparse.ArgumentParser:
+    """The parser of all commands with all of their arguments.
+
+    Returns
+    -------
+    argparse.ArgumentParser
+        It imports every command's module.
+    """
+    return _parser({name for group in COMMANDS.values() for name in group})
+
+
+def _parser(wanted: Container[str | None]) -> argparse.ArgumentParser:
+    """The parser of all commands, with the arguments of those that are wanted."""
     width = max(len(name) for group in COMMANDS.values() for name in group)
     lines = ["commands, by what they are for:"]
     for purpose, group in COMMANDS.items():
@@ -186,10 +198,11 @@ def _parser(wanted: str | None) -> argparse.ArgumentParser:
         for name, (module, text) in group.items():
             p = commands.add_parser(
                 name,
+                help=text,
                 description=f"{text[0].upper()}{text[1:]}.",
                 formatter_class=argparse.RawDescriptionHelpFormatter,
             )
-            if name == wanted:
+            if name in wanted:
                 command = importlib.import_module(f"netsp.command.{module}")
                 command.arguments(p)
                 p.epilog = f"example:\n  {command.EXAMPLE}"
