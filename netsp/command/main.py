@@ -123,6 +123,7 @@ COMMANDS = {
         "verify": ("verify", "judge a solution independently of what found it"),
         "margins": ("margins", "find how far the world may be off before a tour does not fit"),
         "plot": ("plot", "draw a problem or a scene, with a solution or a tether"),
+        "animate": ("animate", "show a tour or a run as a moving picture"),
         "base": ("base", "find where to stand, among candidates for the base"),
         "tether": ("tether", "find how long a tether is needed, and what more of it saves"),
         "world": ("world", "draw a random problem; same seed, same problem on every machine"),

@@ -34,7 +34,7 @@ def draw(problem: Problem, solution: Solution | None = None) -> Any:
 
     visits = solution.tour if solution is not None else ()
     panels = len(visits)
-    xmin, ymin, xmax, ymax = _view(problem, solution)
+    xmin, ymin, xmax, ymax = view(problem, solution)
     aspect = (ymax - ymin) / (xmax - xmin)
     if panels == 0:
         figure, ax = _single(problem)
@@ -145,7 +145,7 @@ def save_classes(problem: Problem, goal: int, path: str | Path) -> None:
     roadmap = TautRoadmap(problem)
     rows = np.flatnonzero(roadmap.cluster == goal + 1)
     shown = rows[:30]
-    xmin, ymin, xmax, ymax = _view(problem, None)
+    xmin, ymin, xmax, ymax = view(problem, None)
     aspect = (ymax - ymin) / (xmax - xmin)
     columns = int(np.clip(round(np.sqrt(len(shown) * aspect * 1.4)), 1, 6))
     lines = -(-len(shown) // columns)
@@ -188,7 +188,7 @@ def _letter(i: int) -> str:
 def _single(problem: Problem) -> tuple[Any, Any]:
     from matplotlib.figure import Figure
 
-    xmin, ymin, xmax, ymax = _view(problem, None)
+    xmin, ymin, xmax, ymax = view(problem, None)
     aspect = (ymax - ymin) / (xmax - xmin)
     height = float(np.clip(8.0 * aspect + 0.8, 3.5, 11.0))
     figure = Figure(figsize=(8.0, height), layout="constrained")
@@ -320,7 +320,7 @@ def draw_obstacles(
     from matplotlib.patches import Circle as Disk
     from matplotlib.patches import Polygon as Patch
 
-    xmin, ymin, xmax, ymax = _view(problem, None)
+    xmin, ymin, xmax, ymax = view(problem, None)
     small = SMALL * max(xmax - xmin, ymax - ymin)
     for i, o in enumerate(problem.obstacles):
         look: dict[str, Any] = {"fc": style.OBSTACLE, "ec": style.EDGE, "lw": 0.6, "zorder": 1}
@@ -372,8 +372,21 @@ def _arrows(ax: Axes, path: Any, count: int) -> None:
         )  # fmt: skip
 
 
-def _view(problem: Problem, solution: Solution | None) -> tuple[float, float, float, float]:
-    """The box that holds everything of interest, with a margin."""
+def view(problem: Problem, solution: Solution | None = None) -> tuple[float, float, float, float]:
+    """The box that holds everything of interest, with a margin.
+
+    Parameters
+    ----------
+    problem : Problem
+        The site.
+    solution : Solution, optional
+        Whose path is of interest, too.
+
+    Returns
+    -------
+    xmin, ymin, xmax, ymax : float
+        In the problem's units.
+    """
     xy = [problem.points[:, :2]]
     if solution is not None and solution.path:
         xy.append(np.array(solution.path)[:, :2])
@@ -401,7 +414,7 @@ def _view(problem: Problem, solution: Solution | None) -> tuple[float, float, fl
 
 
 def _frame(ax: Axes, problem: Problem, solution: Solution | None) -> None:
-    xmin, ymin, xmax, ymax = _view(problem, solution)
+    xmin, ymin, xmax, ymax = view(problem, solution)
     ax.set_xlim(xmin, xmax)
     ax.set_ylim(ymin, ymax)
     ax.set_aspect("equal")

@@ -12,16 +12,13 @@ from typing import Any
 import numpy as np
 
 from netsp.errors import InputError, counted
-from netsp.execute.plan import HOME
-from netsp.files import read_text, write_text
-from netsp.geometry import polylines
+from netsp.files import write_text
 from netsp.hsignature.measures import measure
 from netsp.judge import verify
-from netsp.online.scene.scene import scene_of
-from netsp.online.tether import GeodesicTether
-from netsp.online.tether.resolution import suggested_delta
+from netsp.pictures.moments import moments_of_plan, moments_of_run
 from netsp.problem import Problem
 from netsp.report import briefing, chart, log
+from netsp.report.opened import json_of, opened
 from netsp.report.page import STYLE
 from netsp.solution import Solution, Status
 
@@ -76,37 +73,9 @@ def report_tour(source: str | Path, problem_file: str | Path | None, output: str
     InputError
         Files that cannot be read, or do not belong together.
     """
-    place = Path(source)
-    run = place if place.is_dir() else None
-    if run is not None:
-        problem_file = problem_file or run / "problem.json"
-        place = run / "solution.json"
-    solution = Solution.load(place)
-    if problem_file is None:
-        raise InputError(f"{source}: does not hold its problem; expected that file, too")
-    problem = Problem.load(problem_file)
-    if run is None and problem.sha256 != solution.problem.sha256:
-        raise InputError(f"{source}: solves another problem than {problem_file} (sha256 differs)")
-    if solution.length is None:
-        raise InputError(f"{source}: has no tour (status {solution.status.value})")
-    if len(solution.path) < 2:
-        raise InputError(f"{source}: path: expected at least 2 points, got {len(solution.path)}")
-    beyond = [v.goal for v in solution.tour if v.goal >= len(problem.goals)]
-    if beyond:
-        raise InputError(
-            f"{source}: tour: no goal #{beyond[0]}; expected #0 to #{len(problem.goals) - 1}"
-        )
-    drawn = polylines.length(np.array(solution.path))
-    if abs(drawn - solution.length) > 0.05 * max(drawn, solution.length):
-        raise InputError(
-            f"{source}: path: is {drawn:.4g} long; expected about length, {solution.length:.4g}"
-        )
-    rows = log.rows_of(run / "log.csv") if run else []
-    if run is not None and not rows:
-        raise InputError(f"{run / 'log.csv'}: holds no row")
-    tethers = _json(run / "tethers.json") if run else None
+    what = opened(source, problem_file)
     try:
-        text = page(problem, solution, rows, tethers, run)
+        text = page(what.problem, what.solution, what.rows, what.tethers, what.run)
     except (KeyError, IndexError, ValueError, TypeError) as error:
         raise InputError(
             f"{source}: a file of the run is damaged: {type(error).__name__}: {error}"
@@ -125,10 +94,11 @@ def page(
     rows, tethers
         Of a run, else empty.
     """
-    frames = (
-        _frames_of_run(problem, rows, tethers) if tethers else _frames_of_plan(problem, solution)
-    )
-    view = chart.View(problem, np.vstack([f["nodes"] for f in frames]))
+    moments = (
+        moments_of_run(problem, rows, tethers, FRAMES) if tethers
+        else moments_of_plan(problem, solution, FRAMES)
+    )  # fmt: skip
+    view = chart.View(problem, np.vstack([m.nodes for m in moments]))
     title = f"{problem.name}: {'a run' if run else 'a tour'}"
     fates = _fates(run)
     own = problem.sha256 == solution.problem.sha256
@@ -157,10 +127,10 @@ def page(
         parts += ["<h2>Log</h2>", _over_time(rows, problem.units), _events(run)]
     shown = [
         {
-            "t": view.points(f["nodes"]), "r": view.point(f["nodes"][-1]),
-            "p": view.points(f["path"]), "s": f["text"],
+            "t": view.points(m.nodes), "r": view.point(m.nodes[-1]),
+            "p": view.points(m.path), "s": m.text,
         }
-        for f in frames
+        for m in moments
     ]  # fmt: skip
     data = json.dumps(shown, allow_nan=False).replace("<", "\\u003c")
     return (
@@ -173,61 +143,6 @@ def page(
         + f'<script type="application/json" id="frames">{data}</script>'
         + f"<script>{SCRIPT}</script></body></html>\n"
     )
-
-
-def _frames_of_plan(problem: Problem, solution: Solution) -> list[dict[str, Any]]:
-    """The tether at even steps along the tour, by the model that watches it online."""
-    model = GeodesicTether(scene_of(problem).field(), suggested_delta(problem))
-    path = np.array(solution.path)
-    s = polylines.along(path)
-    if problem.state is None:
-        state = model.start(problem.base, problem.base)
-    else:
-        state = model.lay(np.array(solution.start_tether))
-    frames, at = [], 0
-    for u in np.linspace(0.0, s[-1], FRAMES + 1):
-        here = np.array([np.interp(u, s, path[:, k]) for k in range(3)])
-        passed = int(np.searchsorted(s, u))
-        state = model.drive(state, np.vstack([path[at:passed], here]))[0]
-        at = max(at, passed)
-        text = (
-            f"{u:.4g} of {s[-1]:.4g} {problem.units}; tether {state.length:.4g} of "
-            f"{problem.tether_length:g} {problem.units}"
-        )
-        frames.append(
-            {"nodes": state.nodes, "path": np.vstack([path[:passed], here]), "text": text}
-        )
-    return frames
-
-
-def _frames_of_run(
-    problem: Problem, rows: list[dict[str, str]], tethers: list[dict[str, Any]]
-) -> list[dict[str, Any]]:
-    times = np.array([float(r["time"]) for r in rows])
-    path = np.array([[float(r[k]) for k in "xyz"] for r in rows])
-    step = max(1, len(tethers) // FRAMES)
-    chosen = tethers[::step] + ([tethers[-1]] if (len(tethers) - 1) % step else [])
-    frames = []
-    for frame in chosen:
-        nodes = np.array(frame["nodes"], dtype=float)
-        k = min(int(np.searchsorted(times, frame["time"])), len(rows) - 1)
-        row = rows[k]
-        thin = max(1, k // 400)
-        text = (
-            f"{frame['time']:.4g} s; tether {float(row['tether']):.4g} of {float(row['limit']):g} "
-            f"{problem.units}; next: {_next(problem, int(row['goal']))}"
-        )
-        frames.append(
-            {"nodes": nodes, "path": np.vstack([path[:k:thin], nodes[-1:]]), "text": text}
-        )
-    return frames
-
-
-def _next(problem: Problem, goal: int) -> str:
-    """What a run calls where it is going; goals that were added on the way have their number."""
-    if goal == HOME:
-        return "the base"
-    return problem.goal_label(goal) if goal < len(problem.goals) else f"goal #{goal}"
 
 
 def _summary(problem: Problem, solution: Solution, run: Path | None) -> str:
@@ -245,7 +160,7 @@ def _summary(problem: Problem, solution: Solution, run: Path | None) -> str:
     if planned := briefing.planned_with(solution):
         lines.append(html.escape(planned))
     if run is not None:
-        s = _json(run / "summary.json")
+        s = json_of(run / "summary.json")
         lines.append(
             f"Carried out in {s['time_s']:.5g} s over {s['path']:.6g} {units}: "
             f"{counted(s['visited'], 'goal')} visited, longest tether "
@@ -259,7 +174,7 @@ def _fates(run: Path | None) -> dict[int, str]:
     """Goals that were not visited, and why not in two words."""
     if run is None:
         return {}
-    s = _json(run / "summary.json")
+    s = json_of(run / "summary.json")
     left_out = {int(x["goal"]): "left out" for x in s["left_out"]}
     return left_out | {int(g): "cancelled" for g in s["cancelled"]}
 
@@ -331,10 +246,3 @@ def _events(run: Path | None) -> str:
         for e in events
     )
     return f"<table>{top}{body}</table>"
-
-
-def _json(file: Path) -> Any:
-    try:
-        return json.loads(read_text(file))
-    except json.JSONDecodeError as error:
-        raise InputError(f"{file}: not JSON: {error.msg}") from None

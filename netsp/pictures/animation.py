@@ -1,0 +1,185 @@
+"""Moving pictures: the robot along its tour with the taut tether behind it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from netsp.errors import InputError
+from netsp.pictures import style
+from netsp.pictures.moments import Moment
+from netsp.pictures.problem import draw_map, view
+from netsp.problem import Problem
+
+FORMATS = (".gif", ".mp4")
+
+COLOURS = 64
+"""Of a GIF: pictures have few, and edges of lines need some between."""
+
+WIDTH, DPI = 6.4, 100
+"""Inches of a panel, and pixels in each."""
+
+HOLD_S = 1.5
+"""Seconds that the last picture stays."""
+
+
+@dataclass(frozen=True)
+class Film:
+    """What one panel shows.
+
+    Parameters
+    ----------
+    title : str
+        Above it.
+    problem : Problem
+        The site.
+    moments : sequence of Moment
+        At even steps.
+    length : float
+        Of it all: seconds of a run, or metres of a tour. Beside a longer one, it ends earlier.
+    """
+
+    title: str
+    problem: Problem
+    moments: Sequence[Moment]
+    length: float
+
+
+def save_animation(
+    films: Sequence[Film], file: str | Path, seconds: float = 12.0, fps: int = 15,
+    on_progress: Callable[[int, int], None] | None = None,
+) -> None:  # fmt: skip
+    """Write one film, or several side by side.
+
+    Parameters
+    ----------
+    films : sequence of Film
+        From left to right.
+    file : str or Path
+        Its ending says the format: .gif or .mp4.
+    seconds : float
+        How long it is, but for the last picture, which stays a little.
+    fps : int
+        Pictures a second.
+    on_progress : callable, optional
+        Called with how many pictures are drawn, and how many there are.
+
+    Raises
+    ------
+    InputError
+        Another ending, a file that cannot be written, `imageio-ffmpeg` not installed (for .mp4).
+    """
+    suffix = Path(file).suffix.lower()
+    if suffix not in FORMATS:
+        raise InputError(f"{file}: expected a name ending in {' or '.join(FORMATS)}")
+    write = _write_gif if suffix == ".gif" else _write_mp4
+    count = max(2, round(seconds * fps))
+    try:
+        write(file, _told(_pictures(films, count), count, on_progress), fps)
+    except OSError as error:
+        raise InputError(f"{file}: cannot be written: {error.strerror or error}") from None
+
+
+def _told(
+    pictures: Iterator[Any], count: int, on_progress: Callable[[int, int], None] | None
+) -> Iterator[Any]:
+    for k, picture in enumerate(pictures, 1):
+        if on_progress is not None:
+            on_progress(k, count)
+        yield picture
+
+
+def _pictures(films: Sequence[Film], count: int) -> Iterator[Any]:
+    """(h, w, 3) pixels of one picture after the other. What stands still is drawn once."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    height = max(map(_height, films))
+    figure = Figure(figsize=(WIDTH * len(films), height), dpi=DPI, layout="constrained")
+    canvas = FigureCanvasAgg(figure)
+    panels = np.atleast_1d(figure.subplots(1, len(films)))
+    moving = []
+    for ax, film in zip(panels, films, strict=True):
+        draw_map(film.problem, ax=ax)
+        ax.set_title(f"{film.title}\n", fontsize=10, loc="left")
+        (path,) = ax.plot([], [], color=style.PATH, lw=1.6, zorder=8, animated=True)
+        (tether,) = ax.plot([], [], color=style.TETHER, lw=2.4, zorder=9, animated=True)
+        (robot,) = ax.plot(
+            [], [], "o", ms=9, color=style.ROBOT, mec=style.BASE, mew=0.8, zorder=10, animated=True
+        )
+        text = ax.text(
+            0.0, 1.02, "", transform=ax.transAxes, fontsize=8, color=style.EDGE, animated=True
+        )
+        moving.append((path, tether, robot, text))
+    style.literal(figure)
+    longest = max(film.length for film in films)
+    canvas.draw()
+    still = canvas.copy_from_bbox(figure.bbox)
+    for k in range(count):
+        canvas.restore_region(still)
+        for film, (path, tether, robot, text) in zip(films, moving, strict=True):
+            share = min(k / max(count - 1, 1) * longest / film.length, 1.0)
+            moment = film.moments[round(share * (len(film.moments) - 1))]
+            path.set_data(moment.path[:, 0], moment.path[:, 1])
+            tether.set_data(moment.nodes[:, 0], moment.nodes[:, 1])
+            robot.set_data(moment.nodes[-1:, 0], moment.nodes[-1:, 1])
+            text.set_text(moment.text)
+            for artist in (path, tether, robot, text):
+                figure.draw_artist(artist)
+        yield np.asarray(canvas.buffer_rgba())[:, :, :3].copy()
+
+
+def _height(film: Film) -> float:
+    """Inches, so that the map fills its panel."""
+    xmin, ymin, xmax, ymax = view(film.problem)
+    return float(np.clip(WIDTH * (ymax - ymin) / (xmax - xmin) + 0.8, 2.5, 2.0 * WIDTH))
+
+
+def _palette(picture: Any) -> Any:
+    """The colours of a picture, and those of the roles, however small they are in it."""
+    from PIL import Image
+
+    roles = (style.ROBOT, style.TETHER, style.PATH, style.BASE, style.OBSTACLE, style.EDGE)
+    out = Image.new("RGB", (picture.width, picture.height + 20 * len(roles)))
+    out.paste(picture)
+    for k, colour in enumerate(roles):
+        out.paste(Image.new("RGB", (picture.width, 20), colour), (0, picture.height + 20 * k))
+    return out.quantize(COLOURS)
+
+
+def _write_gif(file: str | Path, pictures: Iterator[Any], fps: int) -> None:
+    from PIL import Image
+
+    drawn = [Image.fromarray(picture) for picture in pictures]
+    palette = _palette(drawn[len(drawn) // 2])
+    frames = [d.quantize(palette=palette, dither=Image.Dither.NONE) for d in drawn]
+    durations = [1000 // fps] * (len(frames) - 1) + [int(1000 * HOLD_S)]
+    frames[0].save(file, save_all=True, append_images=frames[1:], duration=durations, loop=0)
+
+
+def _write_mp4(file: str | Path, pictures: Iterator[Any], fps: int) -> None:
+    try:
+        import imageio_ffmpeg
+    except ImportError:
+        raise InputError(
+            f"{file}: films in .mp4 need imageio-ffmpeg: pip install 'netsp[video]'"
+        ) from None
+    first = next(pictures)
+    height, width = (n - n % 2 for n in first.shape[:2])
+    writer = imageio_ffmpeg.write_frames(
+        str(file), (width, height), fps=fps, macro_block_size=2, ffmpeg_log_level="error"
+    )
+    writer.send(None)
+    try:
+        last = first
+        for picture in (first, *pictures):
+            last = np.ascontiguousarray(picture[:height, :width])
+            writer.send(last)
+        for _ in range(int(HOLD_S * fps)):
+            writer.send(last)
+    finally:
+        writer.close()

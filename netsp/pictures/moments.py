@@ -1,0 +1,141 @@
+"""Moments of a tour or a run: where the robot is, what it has gone, and how its tether lies."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from netsp.arrays import Floats
+from netsp.execute.plan import HOME
+from netsp.geometry import polylines
+from netsp.online.scene.scene import scene_of
+from netsp.online.tether import GeodesicTether
+from netsp.online.tether.resolution import suggested_delta
+from netsp.problem import Problem
+from netsp.solution import Solution
+
+THIN = 400
+"""Points of what a run has gone so far, about."""
+
+
+@dataclass(frozen=True)
+class Moment:
+    """One of them.
+
+    Parameters
+    ----------
+    nodes : ndarray, shape (k, 3)
+        The tether, to where the robot is.
+    path : ndarray, shape (m, 3)
+        What was gone so far.
+    text : str
+        How far it is.
+    """
+
+    nodes: Floats
+    path: Floats
+    text: str
+
+
+def moments_of_plan(problem: Problem, solution: Solution, count: int) -> list[Moment]:
+    """The tether at even steps along the tour, by the model that watches it online.
+
+    Parameters
+    ----------
+    problem : Problem
+        The site.
+    solution : Solution
+        With a tour.
+    count : int
+        How many steps.
+
+    Returns
+    -------
+    list of Moment
+        One more than steps.
+    """
+    model = GeodesicTether(scene_of(problem).field(), suggested_delta(problem))
+    path = np.array(solution.path)
+    s = polylines.along(path)
+    if problem.state is None:
+        state = model.start(problem.base, problem.base)
+    else:
+        state = model.lay(np.array(solution.start_tether))
+    out, at = [], 0
+    for u in np.linspace(0.0, s[-1], count + 1):
+        here = np.array([np.interp(u, s, path[:, k]) for k in range(3)])
+        passed = int(np.searchsorted(s, u))
+        state = model.drive(state, np.vstack([path[at:passed], here]))[0]
+        at = max(at, passed)
+        text = (
+            f"{u:.4g} of {s[-1]:.4g} {problem.units}; tether {state.length:.4g} of "
+            f"{problem.tether_length:g} {problem.units}"
+        )
+        out.append(Moment(state.nodes, np.vstack([path[:passed], here]), text))
+    return out
+
+
+def moments_of_run(
+    problem: Problem, rows: Sequence[dict[str, str]], tethers: Sequence[dict[str, Any]], count: int
+) -> list[Moment]:
+    """Moments of a run that were recorded.
+
+    Parameters
+    ----------
+    problem : Problem
+        The site.
+    rows : sequence of dict
+        Of log.csv.
+    tethers : sequence of dict
+        Of tethers.json.
+    count : int
+        How many, about.
+
+    Returns
+    -------
+    list of Moment
+        The last one among them.
+
+    Raises
+    ------
+    KeyError, ValueError
+        Of files that are damaged.
+    """
+    times = np.array([float(r["time"]) for r in rows])
+    path = np.array([[float(r[k]) for k in "xyz"] for r in rows])
+    step = max(1, len(tethers) // count)
+    chosen = [*tethers[::step], *([tethers[-1]] if (len(tethers) - 1) % step else [])]
+    out = []
+    for frame in chosen:
+        nodes = np.array(frame["nodes"], dtype=float)
+        k = min(int(np.searchsorted(times, frame["time"])), len(rows) - 1)
+        row = rows[k]
+        text = (
+            f"{frame['time']:.4g} s; tether {float(row['tether']):.4g} of {float(row['limit']):g} "
+            f"{problem.units}; next: {next_of(problem, int(row['goal']))}"
+        )
+        out.append(Moment(nodes, np.vstack([path[: k : max(1, k // THIN)], nodes[-1:]]), text))
+    return out
+
+
+def next_of(problem: Problem, goal: int) -> str:
+    """What a run calls where it is going.
+
+    Parameters
+    ----------
+    problem : Problem
+        The site.
+    goal : int
+        Number of the goal; those that were added on the way have one, too.
+
+    Returns
+    -------
+    str
+        The goal's name or number, or the base.
+    """
+    if goal == HOME:
+        return "the base"
+    return problem.goal_label(goal) if goal < len(problem.goals) else f"goal #{goal}"

@@ -1,0 +1,102 @@
+"""A solution or the folder of a run, read with its problem, and found to belong together."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from netsp.errors import InputError
+from netsp.files import read_text
+from netsp.geometry import polylines
+from netsp.problem import Problem
+from netsp.report import log
+from netsp.solution import Solution
+
+
+@dataclass(frozen=True)
+class Opened:
+    """What was read.
+
+    Parameters
+    ----------
+    problem : Problem
+        The site.
+    solution : Solution
+        With a tour.
+    rows : list of dict
+        Of a run's log; empty for a solution.
+    tethers : list of dict or None
+        Of a run.
+    run : Path or None
+        Its folder.
+    """
+
+    problem: Problem
+    solution: Solution
+    rows: list[dict[str, str]]
+    tethers: list[dict[str, Any]] | None
+    run: Path | None
+
+
+def opened(source: str | Path, problem_file: str | Path | None) -> Opened:
+    """Read a solution file, whose problem is named, or the folder of a run.
+
+    Parameters
+    ----------
+    source : str or Path
+        The file or folder.
+    problem_file : str or Path, optional
+        The problem of a solution file; a run's folder holds its own.
+
+    Returns
+    -------
+    Opened
+        What is there.
+
+    Raises
+    ------
+    InputError
+        Files that cannot be read, or do not belong together.
+    """
+    place = Path(source)
+    run = place if place.is_dir() else None
+    if run is not None:
+        problem_file = problem_file or run / "problem.json"
+        place = run / "solution.json"
+    solution = Solution.load(place)
+    if problem_file is None:
+        raise InputError(f"{source}: does not hold its problem; expected that file, too")
+    problem = Problem.load(problem_file)
+    if run is None and problem.sha256 != solution.problem.sha256:
+        raise InputError(f"{source}: solves another problem than {problem_file} (sha256 differs)")
+    if solution.length is None:
+        raise InputError(f"{source}: has no tour (status {solution.status.value})")
+    if len(solution.path) < 2:
+        raise InputError(f"{source}: path: expected at least 2 points, got {len(solution.path)}")
+    beyond = [v.goal for v in solution.tour if v.goal >= len(problem.goals)]
+    if beyond:
+        raise InputError(
+            f"{source}: tour: no goal #{beyond[0]}; expected #0 to #{len(problem.goals) - 1}"
+        )
+    drawn = polylines.length(np.array(solution.path))
+    if abs(drawn - solution.length) > 0.05 * max(drawn, solution.length):
+        raise InputError(
+            f"{source}: path: is {drawn:.4g} long; expected about length, {solution.length:.4g}"
+        )
+    rows = log.rows_of(run / "log.csv") if run else []
+    if run is not None and not rows:
+        raise InputError(f"{run / 'log.csv'}: holds no row")
+    tethers = json_of(run / "tethers.json") if run else None
+    return Opened(problem, solution, rows, tethers, run)
+
+
+def json_of(file: Path) -> Any:
+    """What a file of a run holds; InputError if that is no JSON."""
+    try:
+        return json.loads(read_text(file))
+    except json.JSONDecodeError as error:
+        raise InputError(f"{file}: not JSON: {error.msg}") from None

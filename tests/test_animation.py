@@ -1,0 +1,95 @@
+"""Moving pictures of tours and runs."""
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from netsp import Circle, Problem, solve
+from netsp.command.main import main
+from netsp.execute.log import ExecutionOptions
+from netsp.execute.run import execute
+from netsp.execute.write import write_execution
+from netsp.pictures import style
+from netsp.pictures.moments import moments_of_plan
+
+SITE = Problem(
+    base=(0, 0), goals=[(6, 2, -1), (6.5, -2, -1)], tether_length=12,
+    obstacles=[Circle(center=(4, 0), radius=0.6, name="pile")], clearance=0.4,
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("animation")
+    tour = solve(SITE)
+    (folder / "p.json").write_text(SITE.to_json())
+    (folder / "s.json").write_text(tour.to_json())
+    (folder / "g.json").write_text(solve(SITE, solver="greedy").to_json())
+    write_execution(execute(SITE, tour, ExecutionOptions()), folder / "run")
+    return folder
+
+
+def seen(picture, colour):
+    """Pixels of about a colour."""
+    pixels = np.asarray(picture.convert("RGB"), dtype=int)
+    wanted = np.array([int(colour[k : k + 2], 16) for k in (1, 3, 5)])
+    return int((np.abs(pixels - wanted).sum(axis=2) < 24).sum())
+
+
+def test_the_tether_of_a_plan_is_taut_from_the_base_to_the_robot_and_gone_at_the_end(files):
+    tour = solve(SITE)
+    moments = moments_of_plan(SITE, tour, 40)
+    assert len(moments) == 41
+    for m in moments:
+        assert m.nodes[0] == pytest.approx(SITE.base)
+        assert m.nodes[-1] == pytest.approx(m.path[-1])
+    longest = max(np.linalg.norm(np.diff(m.nodes, axis=0), axis=1).sum() for m in moments)
+    assert longest <= max(v.tether_length for v in tour.tour) + 0.1
+    assert np.ptp(moments[-1].nodes, axis=0).max() < 1e-6
+
+
+def test_a_gif_shows_the_robot_with_its_tether_and_what_it_has_gone(files):
+    out = files / "tour.gif"
+    told = ["animate", str(files / "s.json"), "--problem", str(files / "p.json"), "-o", str(out)]
+    assert main([*told, "--seconds", "3", "--fps", "10", "--quiet"]) == 0
+    with Image.open(out) as film:
+        assert film.n_frames >= 25
+        shown = []
+        for k in (1, film.n_frames // 2, film.n_frames - 1):
+            film.seek(k)
+            shown.append([seen(film, c) for c in (style.PATH, style.TETHER, style.ROBOT)])
+    (begun, _, robot), (half, tether, _), (done, gone, _) = shown
+    assert begun < half < done
+    assert tether > 100 > gone
+    assert robot > 20
+
+
+def test_a_run_and_a_tour_stand_side_by_side_in_a_film(files):
+    pytest.importorskip("imageio_ffmpeg")
+    import imageio_ffmpeg
+
+    out = files / "both.mp4"
+    two = [str(files / "run"), str(files / "g.json")]
+    told = ["animate", *two, "--problem", str(files / "p.json"), "-o", str(out)]
+    assert main([*told, "--seconds", "2", "--quiet"]) == 0
+    frames, seconds = imageio_ffmpeg.count_frames_and_secs(str(out))
+    assert frames >= 30
+    assert 2.0 <= seconds <= 4.5
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [({"-o": "film.avi"}, "film.avi"), ({"source": ["no.json"]}, "no.json"),
+     ({"source": 4}, "expected 3 or fewer"), ({"--problem": None}, "problem")],
+)  # fmt: skip
+def test_what_cannot_be_animated_is_told_in_a_line(files, change, says, capsys, monkeypatch):
+    monkeypatch.chdir(files)
+    source = change.get("source", ["s.json"])
+    source = ["s.json"] * source if isinstance(source, int) else source
+    problem = change.get("--problem", "p.json")
+    words = ["animate", *source, *(["--problem", problem] if problem else [])]
+    assert main([*words, "-o", change.get("-o", "x.gif")]) == 2
+    told = capsys.readouterr().err
+    assert says in told
+    assert told.count("\n") == 1
+    assert not (files / "x.gif").exists()
