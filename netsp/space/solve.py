@@ -132,6 +132,11 @@ class _Flights:
         )  # fmt: skip
         return None if run.summary["status"] == "interrupted" else run
 
+    def judged(self, mission: Mission) -> bool:
+        """Whether the judge finds no fault with a tour."""
+        self.tell("judging the tour")
+        return bool(verify_mission(mission, scene=self.scene, field=self.field))
+
 
 def solve_mission(
     mission: Mission,
@@ -223,11 +228,13 @@ def _or_without_detours(
 ) -> SolvedMission:  # fmt: skip
     """The better of a tour with detours and of the best one without: a tether that hangs otherwise
     than it should after a detour may take long to come free."""
-    if taut is None or best.run is None:
-        return best
-    if seconds_until_home(best.run) <= taut.length / best.mission.speed:
+    if taut is None:
         return best
     other = _of_plan(taut, solver, seed, bound)
+    if not flights.judged(best.mission):
+        return replace(other, run=flights.of(other.mission, "the tour without detours"))
+    if best.run is None or seconds_until_home(best.run) <= taut.length / best.mission.speed:
+        return best
     run = flights.of(other.mission, "the tour without detours", best)
     return best if run is None or not _better_than(run, best) else replace(other, run=run)
 
@@ -256,7 +263,7 @@ def _or_going_on(
         if best is not None and not _better_than(run, best):
             continue
         kept = tour_of_flight(there, order, run, flights.field, flights.water, bound, seed)
-        if kept is None:
+        if kept is None or not flights.judged(kept.mission):
             continue
         again = flights.of(kept.mission, "it as it will be written")
         if again is None or (best is not None and not _better_than(again, best)):
@@ -277,7 +284,7 @@ def _or_as_given(
         # no time to fly it, but to judge it
         if best is not None and best.tour.length <= mission.tour.length:
             return best
-        good = verify_mission(mission, scene=flights.scene, field=flights.field)
+        good = flights.judged(mission)
         return SolvedMission(mission, order, None, None, None) if good else best
     if given is None or (best is not None and not _better_than(given, best)):
         return best
@@ -286,15 +293,13 @@ def _or_as_given(
     kept = tour_of_flight(
         mission, order, given, flights.field, flights.water, bound, seed, AS_GIVEN
     )
-    if kept is None:
+    if kept is None or not flights.judged(kept.mission):
         return best
     again = flights.of(kept.mission, "it as it will be written")
     if again is None:
         if best is not None and best.run is not None:
             return best
-        # no time to fly what will be written, but to judge it
-        good = verify_mission(kept.mission, scene=flights.scene, field=flights.field)
-        return kept if good else best
+        return kept  # there was no time to fly what will be written, but to judge it
     return replace(kept, run=again) if best is None or _better_than(again, best) else best
 
 
