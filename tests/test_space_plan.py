@@ -326,7 +326,7 @@ def test_a_detour_past_the_free_end_of_a_bar_saves_the_way_back_around_it(monkey
     monkeypatch.setattr("netsp.space.plan.Detours.shortened", lambda *_: None)
     taut = plan(mission, scene=scene)
     assert taut.result.status.value == "optimal"
-    assert found.length < 0.98 * taut.length
+    assert found.length < taut.length - 0.1
 
 
 def test_a_leg_that_arrives_in_one_direction_only_is_gone_in_that_direction():
