@@ -314,13 +314,30 @@ def test_classes_that_legs_lead_to_are_those_that_a_longer_search_finds(posts, m
     assert gone_on.keys() <= more.keys()
 
 
+BESIDE_A_BAR = {
+    "schema_version": 1, "scene": "scene.json", "anchor": [-4, 0, -1], "start": [-4, 0, -1],
+    "waypoints": [[2, 0, -1], [2, 0, 2]], "tether_length": 12.0, "clearance": 0.2,
+}  # fmt: skip
+A_BAR = Scene(
+    solids=[{"capsule": {"a": [0, -3, 0], "b": [0, 0.5, 0], "radius": 0.15}}],
+    bounds=[-6, -6, -6, 6, 6, 6],
+)
+
+
+def test_a_tour_with_detours_is_told_as_one(tmp_path, capsys):
+    (tmp_path / "scene.json").write_text(A_BAR.model_dump_json(exclude_none=True))
+    file, out = tmp_path / "mission.json", tmp_path / "planned.json"
+    file.write_text(json.dumps(BESIDE_A_BAR))
+    assert main(["solve", str(file), "--time-limit", "30", "-o", str(out)]) == 0
+    told = capsys.readouterr().err
+    assert "with detours past what it would hang on" in told
+    tour = json.loads(out.read_text())["tour"]
+    assert (tour["status"], tour.get("lower_bound")) == ("feasible", None)
+    assert main(["verify", str(out)]) == 0
+
+
 def test_a_detour_past_the_free_end_of_a_bar_saves_the_way_back_around_it(monkeypatch):
-    bar = {"capsule": {"a": [0, -3, 0], "b": [0, 0.5, 0], "radius": 0.15}}
-    scene = Scene(solids=[bar], bounds=[-6, -6, -6, 6, 6, 6])
-    mission = Mission(
-        scene="-", anchor=(-4, 0, -1), start=(-4, 0, -1), waypoints=[(2, 0, -1), (2, 0, 2)],
-        tether_length=12.0, clearance=0.2,
-    )  # fmt: skip
+    scene, mission = A_BAR, Mission.model_validate(BESIDE_A_BAR)
     found = plan(mission, scene=scene)
     assert verify_mission(found.planned(), scene=scene)
     monkeypatch.setattr("netsp.space.plan.Detours.shortened", lambda *_: None)

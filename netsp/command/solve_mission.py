@@ -134,7 +134,7 @@ def summary(
     units: str,
 ) -> str:  # fmt: skip
     """What was found, in a few lines."""
-    from netsp.space.solve import AS_GIVEN, seconds_until_home
+    from netsp.space.solve import AS_GIVEN, GOING_ON, seconds_until_home
 
     tour, status = found.tour, found.tour.status.value
     legs = f"{counted(tour.legs, 'leg')} between {counted(tour.states, 'state')}"
@@ -146,8 +146,10 @@ def summary(
             verdict = f"the shortest along {legs} of the tether; there was no time for all legs"
     elif tour.solver == AS_GIVEN:
         verdict = "in the order given, for no better one was found"
-    else:
+    elif tour.solver == GOING_ON:
         verdict = "found by going straight on"
+    else:
+        verdict = f"along {legs} of the tether, with detours past what it would hang on"
     lines = [f"tour     {tour.length:.6g} {units}, {verdict}"]
     if tour.bound_of_all is not None:
         lines.append(
