@@ -156,13 +156,13 @@ def failures(pace: float, moments: int) -> None:
     solution = solve(problem, time_limit=20.0)
     options = ExecutionOptions(speed=0.5, reach=0.3)
     head("failure", "flights", "stopped, with a reason", "path home offered", "targets after it",
-         "least room m", "longest tether of the limit", "seconds until stopped, worst",
+         "least room of targets m", "of the vehicle m", "longest tether of the limit",
          name="fly-failures")  # fmt: skip
     assert solution.length is not None
     for name, what in FAILURES.items():
         rng = np.random.default_rng(1)
         stopped = offered = later = 0
-        least, most, latest = np.inf, 0.0, 0.0
+        aimed, least, most = np.inf, np.inf, 0.0
         for k in range(moments):
             when = float(rng.uniform(2.0, 0.9 * solution.length / options.speed))
             begun: list[float] = []
@@ -175,11 +175,10 @@ def failures(pace: float, moments: int) -> None:
                 room, share = truth(problem, autopilot, done)
             stopped += bool(done.stopped or done.interrupted)
             offered += bool(way_home(done))
+            aimed = min(aimed, room_of_targets(problem, autopilot))
             least, most = min(least, room), max(most, share)
-            if begun and done.rows:
-                latest = max(latest, done.rows[-1].time - begun[0])
-        row(name, moments, stopped, offered, later, f"{least:.2f}", f"{most:.3f}",
-            f"{latest:.1f}")  # fmt: skip
+        row(name, moments, stopped, offered, later, f"{aimed:.2f}", f"{least:.2f}",
+            f"{most:.3f}")  # fmt: skip
     print()
 
 
@@ -200,6 +199,14 @@ def befall(autopilot: Autopilot, what: dict[str, Any] | None) -> None:
 
 def targets(autopilot: Autopilot) -> list[dict[str, Any]]:
     return [e for e in autopilot.events if e.get("event") == "target"]
+
+
+def room_of_targets(problem: Problem, autopilot: Autopilot) -> float:
+    """How near to an obstacle the vehicle was ever sent."""
+    frame = Frame(problem, "local")
+    sent = [frame.from_local(y, x, -z) for x, y, z in (e["at"] for e in targets(autopilot))]
+    return min((float(o.signed_distance(np.array(p[:2]))) for o in problem.obstacles for p in sent),
+               default=np.inf)  # fmt: skip
 
 
 def packets(count: int) -> None:
