@@ -298,20 +298,21 @@ def test_ctrl_c_at_the_command_stops_the_vehicle_offers_the_way_home_and_keeps_t
     problem, solution, run = tmp_path / "p.json", tmp_path / "s.json", tmp_path / "run"
     problem.write_text(SITE.to_json())
     solution.write_text(tour.to_json())
-    with Autopilot(pace=PACE, params={"FS_GCS_ENABLE": 0}) as autopilot:
+    slow = 2.0  # the flight must not be over before it is stopped
+    with Autopilot(pace=slow, params={"FS_GCS_ENABLE": 0}) as autopilot:
         autopilot.tell(do="arm")
         autopilot.event("armed")
         command = subprocess.Popen(
             [sys.executable, "-m", "netsp", "fly", problem, solution, "--link",
-             f"udpin:{autopilot.port}", "--pace", str(PACE), "-o", run],
+             f"udpin:{autopilot.port}", "--pace", str(slow), "-o", run],
             stdin=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
         )  # fmt: skip
         autopilot.event("target", seconds=90.0)
-        autopilot.sleep(6.0)
+        autopilot.sleep(4.0)
         command.send_signal(signal.SIGINT)
         told = command.communicate(timeout=60)[1]
         sent = len(autopilot.events)
-        autopilot.sleep(8.0)
+        autopilot.sleep(5.0)
         assert not [e for e in autopilot.events[sent:] if e.get("event") == "target"]
         places = autopilot.truth()[-40:, 1:4]
     assert command.returncode == 4, told

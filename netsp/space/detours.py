@@ -123,8 +123,10 @@ class Detours:
         Driven or None
             None where none was found.
         """
+        if clock.up and best is not None:
+            return None
         states = self.board.states
-        shortest = self._shortest()
+        shortest = self._shortest(clock)
         first = [] if best is None else [[states.all[v].point for v in best.tour]]
         free = self._without_tether(shortest, clock.part(ORDERING), seed)
         first += [] if free is None else [free]
@@ -210,16 +212,17 @@ class Detours:
         """(3,) where it is, metres."""
         return self.ways.water.laid.robot if n == HOME else self.ways.points[n]
 
-    def _shortest(self) -> Floats:
+    def _shortest(self, clock: Clock) -> Floats:
         """(n + 1, n + 1) metres between places, the last of which is the start; infinite where no
-        way is known."""
+        way is known, or there is no time to look whether places far apart see each other."""
         count = len(self.ways.points)
+        looking = clock.part(ORDERING)
         out = np.full((count + 1, count + 1), np.inf)
         for m in range(count):
             for n in (HOME, *range(m)):
                 known = self.ways.known(n, m) if n != HOME else []
                 far = along(known[0][1]) if known else np.inf
-                if not known:
+                if not known and not looking.up:
                     far = min(map(along, self._taut(n, m)), default=np.inf)
                 out[n, m] = out[m, n] = far
         return out
