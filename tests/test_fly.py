@@ -312,13 +312,15 @@ def test_ctrl_c_at_the_command_stops_the_vehicle_offers_the_way_home_and_keeps_t
         command.send_signal(signal.SIGINT)
         told = command.communicate(timeout=60)[1]
         sent = len(autopilot.events)
-        autopilot.sleep(5.0)
+        autopilot.sleep(8.0)
         assert not [e for e in autopilot.events[sent:] if e.get("event") == "target"]
-        places = autopilot.truth()[-40:, 1:4]
+        there = autopilot.truth()[-1, 1:4]
+        last = [e for e in autopilot.events if e.get("event") == "target"][-1]
     assert command.returncode == 4, told
     assert "Traceback" not in told
     assert "back along the tether" in told
-    assert np.linalg.norm(places - places[-1], axis=1).max() < 0.3
+    # where it was when it was told, and what it takes to stop
+    assert np.linalg.norm(np.array(last["at"]) - there) < 0.5
     assert json.loads((run / "summary.json").read_text())["status"] == "interrupted"
     assert (run / "log.csv").read_text().count("\n") > 10
 
