@@ -306,6 +306,8 @@ def test_ctrl_c_at_the_command_stops_the_vehicle_offers_the_way_home_and_keeps_t
             [sys.executable, "-m", "netsp", "fly", problem, solution, "--link",
              f"udpin:{autopilot.port}", "--pace", str(slow), "-o", run],
             stdin=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+            # tests that run in the background of a shell have it ignored
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
         )  # fmt: skip
         autopilot.event("target", seconds=90.0)
         autopilot.sleep(4.0)
