@@ -4,7 +4,6 @@ the pages beside the shipped problems and scenes."""
 from __future__ import annotations
 
 import importlib
-import re
 from pathlib import Path
 from typing import Any
 
@@ -52,8 +51,7 @@ def formats() -> list[str]:
 
 def told(schema: dict[str, Any]) -> str:
     """The first paragraph of a description."""
-    text = schema.get("description", "").split("\n\n")[0].replace("\n", " ")
-    return re.sub(r"`([^`]+)`", r"`\1`", text)
+    return schema.get("description", "").split("\n\n")[0].replace("\n", " ")
 
 
 def table(name: str, schema: dict[str, Any]) -> list[str]:

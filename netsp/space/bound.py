@@ -12,7 +12,7 @@ class that it must have. Of classes of tethers and of legs that no search has fo
 taken that they can be, and where the shortest tour goes along such legs, the search for them goes
 on. That tethers hang on bodies with free ends, and what they do on the way, it leaves aside.
 
-What is proven of either is the tour through these legs.
+What is proven of either is the tour through these lengths.
 """
 
 from __future__ import annotations
