@@ -73,7 +73,7 @@ class _Table:
     tethers : dict of int to (float, ndarray of shape (k, 3))
         By the number of the word, the length and the line of the shortest tether that fits, metres.
     seen : set of int
-        Words of those, and of tethers that are too long.
+        Words of those, and of tethers that are too long though a search found their way.
     """
 
     point: int
@@ -83,7 +83,6 @@ class _Table:
 
     def add(self, water: Water, word: int, line: Floats) -> bool:
         """A tether, pulled taut; whether it fits and there was none of its class that did."""
-        self.seen.add(word)
         tether = water.model.relaxed(line, ROUNDS)
         mission = water.mission
         at_rest = tether.residual <= mission.delta / 200.0  # docs/tether.md
@@ -167,13 +166,16 @@ def _searched(ways: Ways, some: list[int], most: int, clock: Clock) -> dict[int,
             if word is None:
                 table.beyond = min(table.beyond, least)
             else:
+                table.seen.add(word)
                 table.add(water, word, path)
     return tables
 
 
 def _go_on(ways: Ways, tables: dict[int, _Table], clock: Clock) -> None:
     """Classes that legs lead to from those that were found. With these, tours get to one that was
-    not found by a leg only that was not found, either."""
+    not found by a leg only that was not found, either, or that seems to be too long for it. What is
+    pulled taut from here may hang, where no search has found it: so one that does not fit is not
+    taken for seen, and one that does is not taken to be longer than what no search has found."""
     if all(table.beyond > ways.water.mission.tether_length for table in tables.values()):
         return
     times, count = ways.water.words.times, 0
@@ -195,7 +197,11 @@ def _go_on(ways: Ways, tables: dict[int, _Table], clock: Clock) -> None:
             look_on(n, word)
     while waiting and not clock.up and count < MOST_PULLED:
         _, _, m, to, line = heapq.heappop(waiting)
-        if to not in tables[m].tethers and tables[m].add(ways.water, to, line):
+        table = tables[m]
+        if to not in table.tethers and table.add(ways.water, to, line):
+            length, nodes = table.tethers[to]
+            table.tethers[to] = min(length, table.beyond), nodes
+            table.seen.add(to)
             look_on(m, to)
 
 
