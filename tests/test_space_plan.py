@@ -291,14 +291,20 @@ def test_a_leg_is_bounded_by_the_shortest_of_its_class_and_not_by_a_way_that_han
     assert _least(water, over[1::-1], over[1:]) <= 4.01
 
 
-def test_classes_that_legs_lead_to_are_those_that_a_longer_search_finds(posts, monkeypatch):
-    mission = posts[1].model_copy(update={"tether_length": 10.0})
+def ways_of(mission):
+    """All ways of the robot between waypoints."""
     scene = mission.load_scene()
     water = Water.of(mission, scene, scene.field())
     places = Places.of(mission, water.field)
     ways = Ways(water, places, Effort.of(len(places)))
     ways.prepare_all(Clock(), lambda _: None)
-    some = list(range(len(places)))
+    return ways
+
+
+def test_classes_that_legs_lead_to_are_those_that_a_longer_search_finds(posts, monkeypatch):
+    mission = posts[1].model_copy(update={"tether_length": 10.0})
+    ways = ways_of(mission)
+    some = list(range(len(ways.places)))
     found = {}
     for most, pulled in ((2, 0), (2, 40_000), (60, 0)):
         monkeypatch.setattr("netsp.space.classes.MOST_WORDS", most)
@@ -388,12 +394,8 @@ def test_what_is_not_known_of_classes_is_no_more_than_what_is_found_when_more_ar
     posts, monkeypatch
 ):
     mission = posts[1].model_copy(update={"tether_length": 12.0})
-    scene = mission.load_scene()
-    water = Water.of(mission, scene, scene.field())
-    places = Places.of(mission, water.field)
-    ways = Ways(water, places, Effort.of(len(places)))
-    ways.prepare_all(Clock(), lambda _: None)
-    some = list(range(len(places)))
+    ways = ways_of(mission)
+    some = list(range(len(ways.places)))
     few, many = [], []
     for most, pulled, classes in ((4, 0, few), (40, 40_000, many)):
         monkeypatch.setattr("netsp.space.classes.MOST_WORDS", most)

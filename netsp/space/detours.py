@@ -47,7 +47,8 @@ ORDERING = 0.2
 """Of the time left, what the order without a tether may take."""
 
 SAVED = 1e-3
-"""Metres that a tour must be shorter to be taken."""
+"""Share of its length that a tour must be shorter to be taken: more is known of one without
+detours."""
 
 OFF, STEPS = 0.15, (0.03, 0.02, 0.01)
 """Metres that a robot may be off at the bends of a path, and of its steps: what a tether slips off
@@ -130,7 +131,7 @@ class Detours:
         free = self._without_tether(shortest, clock.part(ORDERING), seed)
         first += [] if free is None else [free]
         found: list[list[_Line]] = []
-        below = np.inf if best is None else best.length - SAVED
+        below = np.inf if best is None else (1.0 - SAVED) * best.length
         for order in first:
             for there in (order, order[::-1]):
                 if clock.up or (there != order and states.begin is not None):
@@ -138,7 +139,7 @@ class Detours:
                 tell(f"detours along {len(order)} legs")
                 levels = self._driven(there, below, clock)
                 if levels is not None:
-                    found, below = levels, levels[-1][0].length - SAVED
+                    found, below = levels, (1.0 - SAVED) * levels[-1][0].length
         if not found and best is None:
             return None
         current = first[0] if not found else [leg.place for leg in found[-1][0].legs[:-1]]
@@ -152,10 +153,10 @@ class Detours:
                 if tuple(order) in seen:
                     continue
                 seen.add(tuple(order))
-                tell(f"detours, {len(seen)} orders, {below + SAVED:.1f} m")
+                tell(f"detours, {len(seen)} orders, {below:.1f} m")
                 levels = self._driven(order, below, clock, current, found)
                 if levels is not None:
-                    found, below = levels, levels[-1][0].length - SAVED
+                    found, below = levels, (1.0 - SAVED) * levels[-1][0].length
                     current, moved = order, True
                     break
         return self._as_driven(found[-1][0]) if found else None
