@@ -10,6 +10,7 @@ from netsp.execute.log import ExecutionOptions
 from netsp.execute.run import execute
 from netsp.execute.write import write_execution
 from netsp.pictures import style
+from netsp.pictures.animation import Film, save_animation
 from netsp.pictures.moments import moments_of_plan
 
 SITE = Problem(
@@ -75,6 +76,23 @@ def test_a_run_and_a_tour_stand_side_by_side_in_a_film(files):
     frames, seconds = imageio_ffmpeg.count_frames_and_secs(str(out))
     assert frames >= 30
     assert 2.0 <= seconds <= 4.5
+
+
+@pytest.mark.parametrize("suffix", ["gif", "mp4"])
+def test_what_ctrl_c_cuts_off_leaves_the_file_that_was_there(files, suffix, monkeypatch, capfd):
+    def stop(done, of):
+        if done == 5:
+            raise KeyboardInterrupt
+
+    site, tour = Problem.load(files / "p.json"), solve(SITE)
+    film = Film("a tour", site, moments_of_plan(site, tour, 20), tour.length)
+    out = files / f"kept.{suffix}"
+    out.write_text("before")
+    with pytest.raises(KeyboardInterrupt):
+        save_animation([film], out, seconds=2.0, on_progress=stop)
+    assert out.read_text() == "before"
+    assert not list(files.glob(".netsp-*"))
+    assert capfd.readouterr().err == ""
 
 
 @pytest.mark.parametrize(

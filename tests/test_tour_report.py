@@ -174,7 +174,7 @@ def test_what_does_not_belong_together_is_refused(pages, tmp_path, capsys):
     solution = str(pages[0].parent / "s.json")
     out = str(tmp_path / "x.html")
     assert main(["report", solution, "-o", out]) == 2
-    assert "expected that file, too" in capsys.readouterr().err
+    assert "expected --problem FILE" in capsys.readouterr().err
     other = str(next(p for p in PROBLEMS.glob("*.json") if p.stem != "wharf"))
     assert main(["report", solution, "--problem", other, "-o", out]) == 2
     assert "solves another problem" in capsys.readouterr().err

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -78,8 +80,13 @@ def save_animation(
         raise InputError(f"{file}: expected a name ending in {' or '.join(FORMATS)}")
     write = _write_gif if suffix == ".gif" else _write_mp4
     count = max(2, round(seconds * fps))
+    target = Path(file).resolve()
     try:
-        write(file, _told(_pictures(films, count), count, on_progress), fps)
+        # renamed into place when it is whole: Ctrl-C leaves what was there before
+        with tempfile.TemporaryDirectory(dir=target.parent, prefix=".netsp-") as folder:
+            part = Path(folder) / f"film{suffix}"
+            write(part, _told(_pictures(films, count), count, on_progress), fps)
+            part.replace(target)
     except OSError as error:
         raise InputError(f"{file}: cannot be written: {error.strerror or error}") from None
 
@@ -151,7 +158,7 @@ def _palette(picture: Any) -> Any:
     return out.quantize(COLOURS)
 
 
-def _write_gif(file: str | Path, pictures: Iterator[Any], fps: int) -> None:
+def _write_gif(file: Path, pictures: Iterator[Any], fps: int) -> None:
     from PIL import Image
 
     drawn = [Image.fromarray(picture) for picture in pictures]
@@ -161,13 +168,14 @@ def _write_gif(file: str | Path, pictures: Iterator[Any], fps: int) -> None:
     frames[0].save(file, save_all=True, append_images=frames[1:], duration=durations, loop=0)
 
 
-def _write_mp4(file: str | Path, pictures: Iterator[Any], fps: int) -> None:
+def _write_mp4(file: Path, pictures: Iterator[Any], fps: int) -> None:
     try:
         import imageio_ffmpeg
     except ImportError:
         raise InputError(
-            f"{file}: films in .mp4 need imageio-ffmpeg: pip install 'netsp[video]'"
+            "films in .mp4 need imageio-ffmpeg: pip install 'netsp[video]'; a .gif does not"
         ) from None
+    logging.getLogger("imageio_ffmpeg").setLevel(logging.ERROR)  # what Ctrl-C cuts off is not kept
     first = next(pictures)
     height, width = (n - n % 2 for n in first.shape[:2])
     writer = imageio_ffmpeg.write_frames(

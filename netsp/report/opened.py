@@ -65,11 +65,13 @@ def opened(source: str | Path, problem_file: str | Path | None) -> Opened:
     place = Path(source)
     run = place if place.is_dir() else None
     if run is not None:
+        if (run / "mission.json").exists() and not (run / "solution.json").exists():
+            raise InputError(f"{source}: is of a mission; expected a run of a problem")
         problem_file = problem_file or run / "problem.json"
         place = run / "solution.json"
     solution = Solution.load(place)
     if problem_file is None:
-        raise InputError(f"{source}: does not hold its problem; expected that file, too")
+        raise InputError(f"{source}: does not hold its problem; expected --problem FILE")
     problem = Problem.load(problem_file)
     if run is None and problem.sha256 != solution.problem.sha256:
         raise InputError(f"{source}: solves another problem than {problem_file} (sha256 differs)")
