@@ -18,11 +18,12 @@ from netsp.guard.track import MOVING, Motion
 from netsp.online.scene.field import pushed_out
 from netsp.online.tether import Tether
 
-HORIZON_S = 40.0
-"""Seconds that are looked ahead."""
+HORIZON_S, TURN_HORIZON_S = 36.0, 24.0
+"""Seconds that are looked ahead, straight on and turning on: a bit farther than what is spoken of
+(`netsp.guard.reasons`)."""
 
-STEPS = 40
-"""In them."""
+STEP_S = 1.0
+"""Seconds, about, between two places on the way."""
 
 TURNING = 0.06
 """Radians per second: slower turns are those of noise."""
@@ -55,10 +56,9 @@ class Ahead:
     turning: bool = False
 
 
-def look_ahead(
-    site: Site, tether: Tether, motion: Motion, speed: float
-) -> Ahead:  # fmt: skip
-    """Where the present motion leads.
+class Look:
+    """Where the present motion leads, found out a few steps at a time: all at once would take
+    longer than there is between two estimates.
 
     Parameters
     ----------
@@ -70,27 +70,53 @@ def look_ahead(
         Of the robot.
     speed : float
         Its fastest, m/s: slower than a tenth of it, it is at rest.
-
-    Returns
-    -------
-    Ahead
-        The sooner of what straight on and turning on lead to.
     """
-    pace = float(np.linalg.norm(motion.velocity[:2]))
-    if pace < MOVING * speed:
-        return Ahead()
-    turns = [0.0] if abs(motion.turn) < TURNING else [0.0, motion.turn]
-    turns += _orbits(site.centres, tether.robot[:2], motion)
-    found = [_along(site, tether, motion.velocity, turn) for turn in turns]
-    loops = [(a.loop_s, k) for k, a in enumerate(found) if a.loop_s is not None]
-    shorts = [a.short_s for a in found if a.short_s is not None]
-    first = min(loops, default=None)
-    return Ahead(
-        None if first is None else first[0],
-        None if first is None else found[first[1]].loop,
-        min(shorts, default=None),
-        first is not None and first[1] > 0,
-    )
+
+    def __init__(self, site: Site, tether: Tether, motion: Motion, speed: float) -> None:
+        self.site, self.velocity = site, motion.velocity
+        pace = float(np.linalg.norm(motion.velocity[:2]))
+        turns: list[float] = []
+        if pace >= MOVING * speed:
+            turns = [0.0] if abs(motion.turn) < TURNING else [0.0, motion.turn]
+            turns += _orbits(site.centres, tether.robot[:2], motion)
+        self._ways = [_Way(tether, motion.velocity, turn) for turn in turns]
+
+    def go_on(self, steps: int) -> int:
+        """Look a bit farther.
+
+        Parameters
+        ----------
+        steps : int
+            At most.
+
+        Returns
+        -------
+        int
+            Steps that are left of those: more than 0 when all is found out.
+        """
+        for way in self._ways:
+            while steps > 0 and not way.done:
+                way.step(self.site)
+                steps -= 1
+        return steps
+
+    @property
+    def done(self) -> bool:
+        """Whether all is found out."""
+        return all(way.done for way in self._ways)
+
+    @property
+    def ahead(self) -> Ahead:
+        """The sooner of what straight on and turning on lead to, as far as it is found out."""
+        loops = [(w.loop_s, k) for k, w in enumerate(self._ways) if w.loop_s is not None]
+        shorts = [w.short_s for w in self._ways if w.short_s is not None]
+        first = min(loops, default=None)
+        return Ahead(
+            None if first is None else first[0],
+            None if first is None else self._ways[first[1]].loop,
+            min(shorts, default=None),
+            first is not None and first[1] > 0,
+        )
 
 
 def _orbits(centres: Floats, place: Floats, motion: Motion) -> list[float]:
@@ -110,26 +136,42 @@ def _orbits(centres: Floats, place: Floats, motion: Motion) -> list[float]:
     return out
 
 
-def _along(site: Site, tether: Tether, velocity: Floats, turn: float) -> Ahead:
-    dt = HORIZON_S / STEPS
-    place, course = tether.robot.copy(), velocity.copy()
-    most = abs(turn) * HORIZON_S
-    if most > 2.0 * math.pi:
-        dt *= 2.0 * math.pi / most  # once around is enough
-    c, s = math.cos(turn * dt), math.sin(turn * dt)
-    short = None
-    for k in range(1, STEPS + 1):
-        course[:2] = (c * course[0] - s * course[1], s * course[0] + c * course[1])
-        there = pushed_out(site.field, (place + dt * course)[None], 1e-3)[0]
-        loop = site.closed_by(tether.nodes, there)
-        if loop is not None:
-            return Ahead(k * dt, loop, short)
-        if not site.field.line_of_sight(place, there, depth=0.2 * site.model.delta):
-            break  # it has run into something, or between obstacles that overlap
-        tether = site.model.update(tether, there)
-        if short is None and tether.length > site.tether_length:
-            short = k * dt
-        if float(np.linalg.norm(there - place)) < 0.1 * dt * float(np.linalg.norm(velocity)):
-            break
-        place = there
-    return Ahead(None, None, short)
+class _Way:
+    """One way on: straight, or turning at a rate (radians per second)."""
+
+    def __init__(self, tether: Tether, velocity: Floats, turn: float) -> None:
+        horizon = TURN_HORIZON_S if turn else HORIZON_S
+        if abs(turn) * horizon > 2.0 * math.pi:
+            horizon = 2.0 * math.pi / abs(turn)  # once around is enough
+        self._steps = math.ceil(horizon / STEP_S)
+        self._dt = horizon / self._steps
+        c, s = math.cos(turn * self._dt), math.sin(turn * self._dt)
+        self._turn = np.array([[c, -s], [s, c]])
+        self._course, self._least = velocity.copy(), 0.1 * self._dt * np.linalg.norm(velocity)
+        self._tether, self._k = tether, 0
+        self.loop_s: float | None = None
+        self.loop: Loop | None = None
+        self.short_s: float | None = None
+        self.done = False
+
+    def step(self, site: Site) -> None:
+        self._k += 1
+        place = self._tether.robot
+        self._course[:2] = self._turn @ self._course[:2]
+        there = pushed_out(site.field, (place + self._dt * self._course)[None], 1e-3)[0]
+        self.loop = site.closed_by(self._tether.nodes, there)
+        if self.loop is not None:
+            self.loop_s, self.done = self._k * self._dt, True
+            return
+        stopped = float(np.linalg.norm(there - place)) < self._least
+        # it has run into something, or between obstacles that overlap
+        if stopped or not site.field.line_of_sight(place, there, depth=0.2 * site.model.delta):
+            self.done = True
+            return
+        self._tether = site.model.update(self._tether, there)
+        if self.short_s is None and self._tether.length > site.tether_length:
+            self.short_s = self._k * self._dt
+        self.done = self._k == self._steps
+
+
+__all__ = ["Ahead", "Look"]

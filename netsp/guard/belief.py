@@ -3,15 +3,16 @@
 The estimate is off by a drift that changes slowly and is normal with a standard deviation. It is
 put on a grid of offsets: a hypothesis is an offset and the word of the tether if the robot has been
 off by that. A step of the estimate moves all of them alike, and each writes the letters of its
-way; an offset goes over to one beside it at the cost of a random walk, an offset that
-puts the robot into an obstacle costs by its depth, and what is left for each offset and word is the
-cheapest way there (Viterbi 1967, on the covering space in place of a line). Costs are negative
-logarithms of likelihoods. With no obstacle near, all offsets of a word are one.
+way; an offset goes over to one beside it as a random walk does that forgets, and what puts the
+robot into an obstacle becomes less likely by its depth. So this is the forward algorithm of a
+hidden Markov model (Rabiner 1989, section III.A) whose states are places of the covering space.
+With no obstacle near, all offsets of a word write alike, and one word stands for them.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,8 +24,9 @@ from netsp.hsignature import Word
 RINGS = 4
 """Of the grid of offsets: 61 of them."""
 
-REACH = 2.5
-"""Standard deviations of the drift that the grid reaches."""
+REACH, GRID = 3.2, 0.4
+"""Standard deviations of the drift that the grid reaches (in the plan, 0.6 % are beyond), and share
+of its spacing that a place is off."""
 
 DRIFT_S = 60.0
 """Seconds in which the drift forgets what it was."""
@@ -32,10 +34,10 @@ DRIFT_S = 60.0
 MIX_S = 2.0
 """Seconds between two exchanges of offsets."""
 
-UNLIKELY = 4.5
-"""Classes this much dearer than the best (three standard deviations) are given up."""
+UNLIKELY = 1e-3
+"""Classes that much less likely than the likeliest are given up."""
 
-MOST_WORDS = 8
+MOST_WORDS = 16
 """Classes that are kept at most."""
 
 
@@ -73,17 +75,28 @@ class Belief:
 
     def __init__(self, letters: Letters, drift: float, noise: float) -> None:
         self.letters = letters
-        self.drift, self.noise = max(drift, 1e-6), max(noise, 1e-2)
+        self.drift = max(drift, 1e-6)
         self.reach = REACH * self.drift
-        self.offsets, self._beside = _hexagonal(RINGS, self.reach / RINGS)
-        self._prior = 0.5 * (self.offsets**2).sum(1) / self.drift**2
-        # word at the place of each offset, or, where no obstacle is near, at the estimate alone
-        self._costs: dict[Word, Floats] = {(): np.zeros(1)}
+        spacing = self.reach / RINGS
+        self.noise = math.hypot(max(noise, 1e-2), GRID * spacing)
+        self.offsets, self._beside = _hexagonal(RINGS, spacing)
+        prior = np.exp(-0.5 * (self.offsets**2).sum(1) / self.drift**2)
+        self._prior = prior / prior.sum()
+        # of each word, how likely it is with each offset. The word is that to the place of the
+        # offset (spread), or to the estimate
+        self._likely: dict[Word, Floats] = {(): self._prior.copy()}
         self._spread = False
         self._mixed = 0.0
-        # from an offset to one beside it, in the time between two exchanges
-        spacing = self.reach / RINGS
-        self._change = spacing**2 / (4.0 * self.drift**2 / DRIFT_S * MIX_S)
+        self._charged = np.zeros(len(self.offsets))
+        # six neighbours, each with this chance, spread as far as the drift does meanwhile
+        chance = 2.0 * self.drift**2 * MIX_S / DRIFT_S / (3.0 * spacing**2)
+        a, b = self._beside.T
+        self._to = chance * np.minimum(1.0, self._prior[b] / self._prior[a])
+        self._back = chance * np.minimum(1.0, self._prior[a] / self._prior[b])
+        stays = np.ones(len(self.offsets))
+        np.subtract.at(stays, a, self._to)
+        np.subtract.at(stays, b, self._back)
+        self._stays = stays
 
     def begin(self, words: dict[Word, float]) -> None:
         """Begin anew with some classes.
@@ -91,16 +104,29 @@ class Belief:
         Parameters
         ----------
         words : dict of Word to float
-            Of the tether to the place of the estimate, and their costs.
+            Of the tether to the place of the estimate, and their costs: negative logarithms of how
+            likely they are.
         """
-        self._costs = {w: np.array([float(cost)]) for w, cost in words.items()}
+        least = min(words.values())
+        self._likely = {w: math.exp(least - cost) * self._prior for w, cost in words.items()}
         self._spread = False
+        self._trim()
+
+    def drop(self, words: set[Word]) -> None:
+        """Some classes are none, for another reason than where the robot is.
+
+        Parameters
+        ----------
+        words : set of Word
+            As of `classes`; not all of them.
+        """
+        self._likely = {w: p for w, p in self._likely.items() if w not in words}
         self._trim()
 
     @property
     def words(self) -> set[Word]:
         """Of all classes that are believed."""
-        return set(self._costs)
+        return set(self._likely)
 
     def move(self, before: Floats, after: Floats, dt: float) -> bool:
         """The estimate has moved in a straight line.
@@ -119,23 +145,30 @@ class Belief:
         bool
             False where no robot can have gone so, wherever it is: then nothing has changed.
         """
-        known = dict(self._costs), self._spread
+        known = self._likely, self._spread
         step = np.array([before, after])
+        self._mixed += dt
+        mixes = self._mixed >= MIX_S
+        if mixes:
+            self._mixed = 0.0
         if not self.letters.near(step, self.reach) and self._gather(before):
             (letters,) = self.letters.written(step[:1], step[1:])
             if letters is not None:
                 if letters:
                     join = self.letters.join
-                    self._costs = {join(w, letters): c for w, c in self._costs.items()}
+                    self._likely = {join(w, letters): p for w, p in self._likely.items()}
+                if mixes:
+                    self._mix({(): np.arange(len(self._beside))})
                 return True
         if not (self._scatter(before) and self._translate(before, after)):
-            self._costs, self._spread = known
+            self._likely, self._spread = known
             return False
-        self._avoid(after, dt)
-        self._mixed += dt
-        if self._mixed >= MIX_S:
-            self._mixed = 0.0
-            self._mix(after)
+        self._avoid(after)
+        if mixes:
+            there = self._at(after)
+            a, b = there[self._beside[:, 0]], there[self._beside[:, 1]]
+            free = self.letters.depth(0.5 * (a + b)) <= 0.0
+            self._mix(_groups(self.letters.written(a, b), free))
         self._trim()
         return True
 
@@ -150,41 +183,41 @@ class Belief:
         if self._spread:
             return True
         there = self._at(place)
-        groups = _groups(self.letters.written(np.broadcast_to(place, there.shape), there))
-        out: dict[Word, Floats] = {}
-        for word, cost in self._costs.items():
-            for letters, some in groups.items():
-                into = out.setdefault(self.letters.join(word, letters), self._nowhere())
-                into[some] = np.minimum(into[some], cost[0] + self._prior[some])
-        self._costs, self._spread = out, True
-        return bool(out)
+        return self._rewritten(
+            self.letters.written(np.broadcast_to(place, there.shape), there), spread=True
+        )
 
     def _gather(self, place: Floats) -> bool:
         """Back to words at the estimate, when no obstacle is near any more; whether there are
         any."""
         if not self._spread:
             return True
+        self._charged[:] = 0.0
         there = self._at(place)
         back = self.letters.written(there, np.broadcast_to(place, there.shape))
-        out: dict[Word, Floats] = {}
-        for word, cost in self._costs.items():
-            for k in np.flatnonzero(np.isfinite(cost)):
-                letters = back[int(k)]
-                if letters is None:
-                    continue
-                to = self.letters.join(word, letters)
-                # a drift that is believed less is believed again later: only what an obstacle
-                # has cost it stays
-                own = np.array([cost[k]])
-                out[to] = np.minimum(out.get(to, own), own)
-        if not out:
+        if not self._rewritten(back, spread=False):
             return False
-        self._costs, self._spread = out, False
         self._trim()
         return True
 
-    def _nowhere(self) -> Floats:
-        return np.full(len(self.offsets), np.inf)
+    def _translate(self, before: Floats, after: Floats) -> bool:
+        """All offsets moved alike: each with the letters that it writes on the way. Whether any
+        can have gone so."""
+        return self._rewritten(self.letters.written(self._at(before), self._at(after)), spread=True)
+
+    def _rewritten(self, written: list[Word | None], *, spread: bool) -> bool:
+        """The same offsets, each with letters more; whether any can have written them."""
+        groups = _groups(written)
+        out: dict[Word, Floats] = {}
+        for word, likely in self._likely.items():
+            for letters, some in groups.items():
+                if likely[some].any():
+                    to = self.letters.join(word, letters)
+                    out.setdefault(to, np.zeros(len(self.offsets)))[some] += likely[some]
+        if not out:
+            return False
+        self._likely, self._spread = out, spread
+        return True
 
     def classes(self) -> list[Hypothesis]:
         """What is believed, the likeliest first.
@@ -194,62 +227,60 @@ class Belief:
         list of Hypothesis
             Shares add up to 1.
         """
-        best = {w: (int(np.argmin(c)), float(c.min())) for w, c in self._costs.items()}
-        least = min(cost for _, cost in best.values())
-        weights = {w: math.exp(least - cost) for w, (_, cost) in best.items()}
-        total = sum(weights.values())
-        order = sorted(best, key=lambda w: (best[w][1], len(w), w))
-        return [Hypothesis(w, weights[w] / total, self.offsets[best[w][0]]) for w in order]
+        shares = {w: float(p.sum()) for w, p in self._likely.items()}
+        total = sum(shares.values())
+        order = sorted(shares, key=lambda w: (-shares[w], len(w), w))
+        # words are at the estimate until they are spread; the first offset is none
+        best = {w: int(np.argmax(self._likely[w])) if self._spread else 0 for w in order}
+        return [Hypothesis(w, shares[w] / total, self.offsets[best[w]]) for w in order]
 
-    def _translate(self, before: Floats, after: Floats) -> bool:
-        """All offsets moved alike: each with the letters that it writes on the way. Whether any
-        can have gone so."""
-        groups = _groups(self.letters.written(self._at(before), self._at(after)))
-        moved: dict[Word, Floats] = {}
-        for word, cost in self._costs.items():
-            for letters, some in groups.items():
-                if not np.isfinite(cost[some]).any():
-                    continue
-                to = self.letters.join(word, letters)
-                into = moved.setdefault(to, self._nowhere())
-                into[some] = np.minimum(into[some], cost[some])
-        self._costs = moved or self._costs
-        return bool(moved)
-
-    def _avoid(self, place: Floats, dt: float) -> None:
-        """Offsets in obstacles cost by their depth, once for every second there."""
+    def _avoid(self, place: Floats) -> None:
+        """Offsets in obstacles are less likely by their depth, once for each time that they are
+        there: what is left of the noise, and the drift, are the same from one moment to the
+        next."""
         depth = self.letters.depth(self._at(place))
-        if not depth.any():
+        price = 0.5 * (depth / self.noise) ** 2
+        more = np.maximum(price - self._charged, 0.0)
+        self._charged = np.where(depth > 0.0, np.maximum(self._charged, price), 0.0)
+        if not more.any():
             return
-        price = 0.5 * (depth / self.noise) ** 2 * min(dt, 1.0)
-        for cost in self._costs.values():
-            cost += price
+        among = np.any([p > 0.0 for p in self._likely.values()], axis=0)
+        less = np.exp(more[among].min() - more)
+        self._likely = {w: less * p for w, p in self._likely.items()}
 
-    def _mix(self, place: Floats) -> None:
-        """The drift has changed a bit: each offset from those beside it, where that is cheaper."""
-        pairs = self._beside
-        there = self._at(place)
-        a, b = there[pairs[:, 0]], there[pairs[:, 1]]
-        free = self.letters.depth(0.5 * (a + b)) <= 0.0
-        groups = _groups(self.letters.written(a, b), free)
-        mixed = {w: c.copy() for w, c in self._costs.items()}
-        for word, cost in self._costs.items():
-            for letters, some in groups.items():
-                for way, p, q in (
-                    (letters, pairs[some, 0], pairs[some, 1]),
-                    (self.letters.back(letters), pairs[some, 1], pairs[some, 0]),
+    def _mix(self, groups: dict[Word, Iterable[int]]) -> None:
+        """The drift has changed a bit: each offset gives some of its share to those beside it, and
+        to the middle more than away from it (Metropolis et al. 1953), so that it forgets. Pairs
+        are given by what the way from the first to the second writes; across what is in none of
+        them nothing goes."""
+        goes = [np.array(list(some)) for some in groups.values()]
+        through = np.concatenate(goes) if goes else np.zeros(0, dtype=np.int64)
+        stays = self._stays
+        if len(through) < len(self._beside):
+            stays = np.ones(len(self.offsets))
+            np.subtract.at(stays, self._beside[through, 0], self._to[through])
+            np.subtract.at(stays, self._beside[through, 1], self._back[through])
+        mixed = {w: stays * p for w, p in self._likely.items()}
+        for word, likely in self._likely.items():
+            for letters, some in zip(groups, goes, strict=True):
+                for way, (p, q), chance in (
+                    (letters, self._beside[some].T, self._to[some]),
+                    (self.letters.back(letters), self._beside[some, ::-1].T, self._back[some]),
                 ):
-                    cheap = cost[p] + self._change
-                    if np.isfinite(cheap).any():
+                    gone = chance * likely[p]
+                    if gone.any():
                         to = self.letters.join(word, way)
-                        np.minimum.at(mixed.setdefault(to, self._nowhere()), q, cheap)
-        self._costs = mixed
+                        into = mixed.setdefault(to, np.zeros(len(self.offsets)))
+                        np.add.at(into, q, gone)
+        self._likely = mixed
 
     def _trim(self) -> None:
-        least = min(float(c.min()) for c in self._costs.values())
-        kept = {w: c - least for w, c in self._costs.items() if c.min() - least <= UNLIKELY}
-        order = sorted(kept, key=lambda w: (float(kept[w].min()), len(w), w))[:MOST_WORDS]
-        self._costs = {w: kept[w] for w in order}
+        shares = {w: float(p.sum()) for w, p in self._likely.items()}
+        most = max(shares.values())
+        order = sorted(shares, key=lambda w: (-shares[w], len(w), w))[:MOST_WORDS]
+        kept = [w for w in order if shares[w] >= UNLIKELY * most]
+        total = sum(shares[w] for w in kept)
+        self._likely = {w: self._likely[w] / total for w in kept}
 
 
 def _groups(written: list[Word | None], free: np.ndarray | None = None) -> dict[Word, list[int]]:

@@ -14,7 +14,7 @@ from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.fields import Point3, checked_argument
 from netsp.guard import reasons
-from netsp.guard.ahead import Ahead, look_ahead
+from netsp.guard.ahead import Ahead, Look
 from netsp.guard.alarms import Alarm, Alarms
 from netsp.guard.belief import Belief
 from netsp.guard.fix import Fix
@@ -32,10 +32,11 @@ from netsp.problem import Problem
 LEFT_OF_NOISE = 0.4
 """Share of an estimate's noise that is left when it is smoothed, about."""
 
-LOOK_S = 0.3
-"""Seconds between two looks ahead."""
+LOOK_S, LOOK_STEPS = 0.3, 24
+"""Seconds between the beginnings of two looks ahead, at least, and steps of them in an update: an
+update is to take 50 ms at most."""
 
-MOST_TETHERS = 4
+MOST_TETHERS = 8
 """Of the classes believed, the likeliest get a tether."""
 
 PAID_OUT = 1.05
@@ -105,6 +106,7 @@ class Guard:
         self._vouched: bool | None = None
         self._last = Fix(0.0)
         self._seen, self._looked = -np.inf, -np.inf
+        self._looks: list[tuple[float, Look]] = []
         self._ahead, self._sure = Ahead(), 1.0
         self._on_plan = False
         self._motion: Motion | None = None
@@ -292,7 +294,7 @@ class Guard:
         if short and len(short) < len(strands):
             total = sum(s.likely for s in short)
             self.strands.all = [replace(s, likely=s.likely / total) for s in short]
-            self.belief.begin({s.word: -float(np.log(s.likely / total)) for s in short})
+            self.belief.drop({s.believed for s in strands} - {s.believed for s in short})
 
     def _told(self, fix: Fix) -> Report:
         """The report as things are."""
@@ -303,11 +305,9 @@ class Guard:
         classes = tuple(self._class(s) for s in strands)
         closed = [self.site.loops_in(s.tether.nodes) for s in strands]
         if strands and motion is not None:
-            if motion.time - self._looked >= LOOK_S or motion.time < self._looked:
-                self._looked = motion.time
-                self._look(strands, motion)
+            self._look(strands, motion)
         else:
-            self._ahead, self._sure = Ahead(), 1.0
+            self._looks, self._ahead, self._sure = [], Ahead(), 1.0
         wound = sum(s.likely for s, found in zip(strands, closed, strict=True) if found)
         loops = next((found for found in closed if found), []) if wound >= reasons.LOOPED else []
         raised = self.alarms.take(
@@ -365,7 +365,9 @@ class Guard:
             *reasons.otherwise(as_planned, classes[0]),
             *reasons.little_left(site, classes[0]),
             *reasons.soon_short(site, ahead),
-            *([] if again else reasons.soon_looped(site, ahead, robot, self._sure, on_plan)),
+            *([] if again else reasons.soon_looped(
+                site, ahead, robot, self._sure, on_plan, classes[0].likely
+            )),
             *reasons.looped(site, loops, robot, share, on_plan),
         ]  # fmt: skip
 
@@ -379,10 +381,20 @@ class Guard:
     def _look(self, strands: Sequence[Strand], motion: Motion) -> None:
         """Ahead, in each class that is worth it: the first loop, and in how likely classes one
         closes."""
-        found = [
-            (s.likely, look_ahead(self.site, s.tether, motion, self.options.speed))
-            for k, s in enumerate(strands) if k == 0 or s.likely >= reasons.DOUBT
-        ]  # fmt: skip
+        if not self._looks:
+            if 0.0 <= motion.time - self._looked < LOOK_S:
+                return
+            self._looked = motion.time
+            self._looks = [
+                (s.likely, Look(self.site, s.tether, motion, self.options.speed))
+                for k, s in enumerate(strands) if k == 0 or s.likely >= reasons.DOUBT
+            ]  # fmt: skip
+        steps = LOOK_STEPS
+        for _, look in self._looks:
+            steps = look.go_on(steps)
+        if not all(look.done for _, look in self._looks):
+            return
+        found, self._looks = [(likely, look.ahead) for likely, look in self._looks], []
         closing = [(likely, a) for likely, a in found if a.loop_s is not None]
         first = max(closing, key=lambda pair: pair[0], default=(0.0, found[0][1]))[1]
         self._ahead = replace(first, short_s=found[0][1].short_s)

@@ -24,6 +24,10 @@ LIKELY, LOOPED, POSSIBLE = 0.7, 0.5, 0.2
 """Shares of the classes in which a loop will close, or has closed: above the first, or second, it
 is spoken of as such, above the third as a possibility, and below not at all."""
 
+CLEAR = 0.6
+"""Share that the likeliest class must have for a warning of what is ahead: where it is anybody's
+guess how the tether runs, so is what closes a loop."""
+
 DOUBT = 0.05
 """Share that a second class must have to be worth a word."""
 
@@ -94,16 +98,18 @@ def soon_short(site: Site, ahead: Ahead) -> list[Alarm]:
 
 
 def soon_looped(
-    site: Site, ahead: Ahead, robot: Floats, share: float = 1.0, on_plan: bool = False
-) -> list[Alarm]:
-    """Going on closes a loop, in that share of the classes. Where the tether was as planned at the
-    last stop of a tour, the way on is more likely that of the plan than straight on."""
+    site: Site, ahead: Ahead, robot: Floats, share: float = 1.0, on_plan: bool = False,
+    clear: float = 1.0,
+) -> list[Alarm]:  # fmt: skip
+    """Going on closes a loop, in that share of the classes, the likeliest of which is so clear.
+    Where the tether was as planned at the last stop of a tour, the way on is more likely that of
+    the plan than straight on."""
     if ahead.loop_s is None or ahead.loop is None or share < POSSIBLE:
         return []
     level = _level(TURN_S if ahead.turning else LOOP_S, ahead.loop_s)
     if level is None:
         return []
-    if share < LIKELY or on_plan:
+    if share < LIKELY or clear < CLEAR or on_plan:
         level = Level.CAUTION
     near = site.nearest(ahead.loop.around, robot)
     keep = site.side_of(near, robot)

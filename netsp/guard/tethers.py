@@ -26,11 +26,14 @@ class Strand:
         Its share among those believed.
     tether : Tether
         Taut, to where the robot is in that class.
+    believed : Word
+        Of the class, as the belief has it: to where the robot is if it may be in obstacles, too.
     """
 
     word: Word
     likely: float
     tether: Tether
+    believed: Word = ()
 
 
 class Strands:
@@ -78,7 +81,7 @@ class Strands:
             word = site.letters.join(h.word, step)
             tether = self._tether(word, place)
             if tether is not None:
-                out.append(Strand(word, h.likely, tether))
+                out.append(Strand(word, h.likely, tether, h.word))
         return out
 
     def _tether(self, word: Word, place: Floats) -> Tether | None:
