@@ -7,10 +7,12 @@ import json
 import os
 import re
 import stat
+import sys
 import tempfile
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import lru_cache
 from pathlib import Path
 from typing import ClassVar, Self
 
@@ -20,6 +22,9 @@ from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.fields import LARGEST
 from netsp.models import Model, read_model, shown
+
+STANDARD = "-"
+"""The name of a file that stands for standard input, or output."""
 
 MOST_BYTES = 256 * 2**20
 """Largest file that is read, unpacked if it is packed: a problem of a million goals is smaller."""
@@ -32,6 +37,8 @@ _NUMBERS = re.compile(r"[-+0-9. eE]*")
 def check_file(path: str | Path, most: int = MOST_BYTES) -> None:
     """InputError unless this is a regular file of at most so many bytes, for readers that open it
     by themselves. Pipes and devices may never end, so they are refused."""
+    if path == STANDARD:
+        raise InputError("-: this is not read from standard input; expected the name of a file")
     try:
         status = os.stat(path)
     except (OSError, ValueError) as error:  # ValueError: a null character in the name
@@ -48,7 +55,10 @@ def check_file(path: str | Path, most: int = MOST_BYTES) -> None:
 
 
 def read_bytes(path: str | Path, most: int = MOST_BYTES) -> bytes:
-    """Contents of a regular file of at most so many bytes, or `InputError` in one line."""
+    """Contents of a regular file of at most so many bytes, or of standard input, or `InputError` in
+    one line."""
+    if path == STANDARD:
+        return _standard_input(most)
     check_file(path, most)
     try:
         with open(path, "rb") as stream:
@@ -58,6 +68,18 @@ def read_bytes(path: str | Path, most: int = MOST_BYTES) -> bytes:
     if len(data) > most:
         raise InputError(f"{path}: cannot be read: more than {most / 2**20:g} MiB")
     return data
+
+
+@lru_cache(maxsize=1)
+def _standard_input(most: int) -> bytes:
+    """All of it: it can be read but once, and is asked for by who looks what kind of file it is,
+    too."""
+    if sys.stdin is None or sys.stdin.isatty():
+        raise InputError("-: standard input is a terminal; expected a file piped in")
+    data = getattr(sys.stdin, "buffer", sys.stdin).read(most + 1)
+    if len(data) > most:
+        raise InputError(f"-: cannot be read: more than {most / 2**20:g} MiB")
+    return data if isinstance(data, bytes) else str(data).encode()
 
 
 def read_text(path: str | Path) -> str:
@@ -94,7 +116,11 @@ def read_gzip(path: str | Path, most: int = MOST_BYTES) -> bytes:
 
 def write_text(path: str | Path, text: str) -> None:
     """Write a file by renaming a finished one into place, so that it is never half there; through a
-    symbolic link, what it points to is replaced."""
+    symbolic link, what it points to is replaced. ``-`` is standard output."""
+    if path == STANDARD:
+        sys.stdout.write(text)
+        sys.stdout.flush()
+        return
     try:
         text.encode()
         target = Path(os.path.realpath(path)) if os.path.islink(path) else Path(path)
@@ -134,6 +160,8 @@ def make_folder(folder: str | Path) -> Path:
         It cannot be made, or nothing can be written there.
     """
     place = Path(folder)
+    if folder == STANDARD:
+        raise InputError("-: a run is several files; expected the name of a folder")
     if place.exists() and not place.is_dir():
         raise InputError(f"{folder}: expected a folder, and it is a file")
     try:

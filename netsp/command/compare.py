@@ -7,7 +7,7 @@ import sys
 import time
 from typing import TYPE_CHECKING, Any, TextIO
 
-from netsp.command import messages
+from netsp.command import messages, told
 from netsp.command.types import (
     length,
     natural,
@@ -72,6 +72,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
         "--scheduler", metavar="ADDRESS", help="run on the Dask cluster at tcp://host:port"
     )
     p.add_argument("--quiet", action="store_true", help="no progress, no summary")
+    told.json_flag(p)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -100,6 +101,11 @@ def run(args: argparse.Namespace) -> int:
             f"{tally.failed} failed",
             file=sys.stderr,
         )
+    if args.json:
+        told.tell({
+            "trials": tally.total, "done": tally.done, "new": tally.done - tally.begun,
+            "failed": tally.failed, "results": args.output,
+        })  # fmt: skip
     return 0
 
 

@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from netsp.command import told
 from netsp.command.types import check_writable, length, natural, seconds, vector
 from netsp.errors import InputError
 
@@ -71,10 +72,12 @@ def arguments(p: argparse.ArgumentParser) -> None:
     )
     p.add_argument("--plot", metavar="FILE", help="draw the waypoints (png, svg or pdf)")
     p.add_argument("--quiet", action="store_true", help="no progress, no summary")
+    told.json_flag(p)
 
 
 def run(args: argparse.Namespace) -> int:
     """Place waypoints, write the mission, and return the exit code."""
+    told.check_stdout(args)
     check_writable(args.output, args.plot, inputs=(args.scene,))
     if args.plot:
         from netsp.pictures import style
@@ -116,6 +119,12 @@ def run(args: argparse.Namespace) -> int:
         save(found, scene, args.plot)
     if not args.quiet:
         print(_summary(found, scene.units, args.output, args.plot), file=sys.stderr)
+    if args.json:
+        told.tell({
+            "waypoints": len(found.viewpoints), "fewest_possible": found.bound,
+            "seen": found.seen, "visible": found.visible, "candidates": found.candidates,
+            "tether_length": mission.tether_length, "units": scene.units,
+        })  # fmt: skip
     return 0
 
 

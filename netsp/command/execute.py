@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Callable
 from contextlib import nullcontext
@@ -11,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from netsp.command import told
 from netsp.command.types import (
     length,
     natural,
@@ -76,6 +76,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
     )
     p.add_argument("-o", "--output", metavar="RUN", help="folder for logs, summary and run.png")
     p.add_argument("--quiet", action="store_true", help="no progress, no summary")
+    told.json_flag(p)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -114,8 +115,8 @@ def _mission(args: argparse.Namespace) -> int:
     if args.planning_limit is not None:
         options = replace(options, planning_limit=args.planning_limit)
     (run,) = fly(
-        mission, [planner], output=args.output, quiet=args.quiet, surprises=surprises,
-        source=args.surprise, check=True, inputs=(args.problem, args.surprise),
+        mission, [planner], output=args.output, quiet=args.quiet, as_json=args.json,
+        surprises=surprises, source=args.surprise, check=True, inputs=(args.problem, args.surprise),
         vehicle=args.vehicle, options=options, seed=args.seed,
     )  # fmt: skip
     s = run.summary
@@ -164,8 +165,8 @@ def _problem(args: argparse.Namespace) -> int:
     if args.output is not None:
         write_execution(done, args.output)
         save_execution(done, Path(args.output) / "run.png")
-    else:
-        print(json.dumps(done.summary, indent=1, allow_nan=False))
+    if args.output is None or args.json:
+        told.tell(done.summary)
     if not args.quiet:
         print(describe_execution(done), file=sys.stderr)
     s = done.summary

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from netsp.command import told
 from netsp.command.types import check_writable
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ WRITTEN = ("log.csv", "summary.json", "mission.json", "run.png", "run.html")
 def fly(
     mission: Mission, planners: Sequence[str], *, output: str | None, quiet: bool,
     surprises: SceneSurprises | None, source: str | None, check: bool = False,
-    inputs: Sequence[str | None] = (), **how: Any,
+    as_json: bool = False, inputs: Sequence[str | None] = (), **how: Any,
 ) -> list[Run]:  # fmt: skip
     """Fly a mission by each of some planners, tell what came of it, and write the first run.
 
@@ -39,10 +39,13 @@ def fly(
         there = [str(Path(output) / name) for name in WRITTEN if (Path(output) / name).exists()]
         check_writable(*there, inputs=inputs)
     with until_interrupt(None) as clock:
-        return _flown(
+        runs = _flown(
             mission, planners, clock, output=output, quiet=quiet, surprises=surprises,
             source=source, check=check, **how,
         )  # fmt: skip
+    if output is None or as_json:
+        told.tell(runs[0].summary)
+    return runs
 
 
 def _flown(
@@ -96,9 +99,7 @@ def _flown(
                 )
             if run.summary["status"] == "interrupted":
                 break
-    if output is None:
-        print(json.dumps(runs[0].summary, indent=1, allow_nan=False))
-    else:
+    if output is not None:
         write_run(runs[0], output)
         if len(runs) > 1:
             write_run(runs[1], Path(output) / runs[1].planner)

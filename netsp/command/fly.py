@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import queue
 import sys
 from collections.abc import Callable
@@ -11,6 +10,7 @@ from contextlib import ExitStack, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from netsp.command import told
 from netsp.command.guard import PORT
 from netsp.command.types import length, natural, seconds
 from netsp.errors import EXIT_DEFECT, EXIT_NOT_ALL, EXIT_NOT_VERIFIED, InputError
@@ -74,6 +74,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument("--seed", type=natural, default=0, metavar="N", help="of solvers; default 0")
     p.add_argument("-o", "--output", metavar="RUN", help="folder for logs, summary and run.png")
     p.add_argument("--quiet", action="store_true", help="no progress, no summary")
+    told.json_flag(p)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -105,8 +106,8 @@ def run(args: argparse.Namespace) -> int:
 
         write_execution(done, args.output)
         save_execution(done, Path(args.output) / "run.png")
-    else:
-        print(json.dumps(done.summary, indent=1, allow_nan=False))
+    if args.output is None or args.json:
+        told.tell(done.summary)
     if not args.quiet:
         from netsp.execute.log import describe_execution
 

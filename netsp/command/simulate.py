@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 
+from netsp.command import told
 from netsp.command.types import (
     choices,
     length,
@@ -62,6 +63,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
         help="folder for log.csv, summary.json, run.png and (with plotly) run.html",
     )
     p.add_argument("--quiet", action="store_true", help="no progress, no summary")
+    told.json_flag(p)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -85,7 +87,8 @@ def run(args: argparse.Namespace) -> int:
     surprises = SceneSurprises.load(args.surprise) if args.surprise else None
     runs = fly(
         mission, [args.planner, args.compare] if args.compare else [args.planner],
-        output=args.output, quiet=args.quiet, surprises=surprises, source=args.surprise,
+        output=args.output, quiet=args.quiet, as_json=args.json, surprises=surprises,
+        source=args.surprise,
         inputs=(args.mission, args.surprise), vehicle=args.vehicle, tether=args.tether_model,
         snap=args.snap, seed=args.seed,
         options=PlannerOptions(args.paths, args.refine, args.seed),

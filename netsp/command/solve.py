@@ -7,7 +7,7 @@ import contextlib
 import sys
 from typing import TYPE_CHECKING
 
-from netsp.command import messages
+from netsp.command import messages, told
 from netsp.command.types import (
     check_writable,
     choices,
@@ -78,6 +78,7 @@ def for_all(p: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     p.add_argument("--plot", metavar="FILE", help="draw the solution (png, svg or pdf)")
     p.add_argument("--quiet", action="store_true", help="no progress, no summary")
+    told.json_flag(p)
 
 
 def _for_problems(p: argparse._ArgumentGroup) -> None:
@@ -134,12 +135,13 @@ def _for_problems(p: argparse._ArgumentGroup) -> None:
 
 def run_mission(args: argparse.Namespace) -> int:
     """The same of a mission."""
+    told.check_stdout(args)
     from netsp.command import solve_mission
 
     return solve_mission.solve(
         args.problem, solver=args.solver, params=_params(args), time_limit=args.time_limit,
         iteration_limit=args.iteration_limit, seed=args.seed, output=args.output, plot=args.plot,
-        quiet=args.quiet,
+        quiet=args.quiet, as_json=args.json,
     )  # fmt: skip
 
 
@@ -155,6 +157,7 @@ def run(args: argparse.Namespace) -> int:
     from netsp.problem import Problem
     from netsp.solution import Solution
 
+    told.check_stdout(args)
     problem = Problem.load(args.problem)
     warm = Solution.load(args.warm_start) if args.warm_start else None
     check_writable(args.output, args.plot, args.plot_trace, inputs=(args.problem, args.warm_start))
@@ -164,10 +167,10 @@ def run(args: argparse.Namespace) -> int:
 
         for picture in filter(None, (args.plot, args.plot_trace)):
             style.check_format(picture)
+    from netsp.solvers import warm as warm_starts
     from netsp.solvers.solve import solve
-    from netsp.solvers.warm import told
 
-    if warm is not None and (text := told(problem, warm)):
+    if warm is not None and (text := warm_starts.told(problem, warm)):
         messages.note(text)
 
     rows: list[Progress] = []
@@ -218,6 +221,8 @@ def run(args: argparse.Namespace) -> int:
         table.end()
         text = summary(problem, solution, args.output, args.plot, args.plot_trace)
         print(text, file=sys.stderr)
+    if args.json:
+        told.tell(told.of_solution(problem, solution))
     return _EXIT.get(solution.status.value, 0)
 
 

@@ -12,6 +12,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from netsp.command import told
 from netsp.command.types import check_writable
 from netsp.errors import EXIT_NOT_ALL, InputError, counted
 
@@ -58,6 +59,7 @@ def check_flags(args: argparse.Namespace, parser_defaults: dict[str, Any]) -> No
 def solve(
     file: str, *, solver: str, params: dict[str, str], time_limit: float | None,
     iteration_limit: int | None, seed: int, output: str | None, plot: str | None, quiet: bool,
+    as_json: bool = False,
 ) -> int:  # fmt: skip
     """Plan the mission, write it, and return the exit code."""
     check_writable(output, plot, inputs=(file,))
@@ -110,6 +112,8 @@ def solve(
             summary(mission, found, time.monotonic() - begin, output, plot, scene.units),
             file=sys.stderr,
         )
+    if as_json:
+        told.tell(told.of_mission(mission, found, scene.units))
     return EXIT_NOT_ALL if found.left_out else 0
 
 

@@ -106,6 +106,9 @@ def margins(text: str) -> tuple[float, float]:
 
 def check_writable(*paths: str | None, inputs: Sequence[str | None] = ()) -> None:
     """InputError before the work starts rather than after it; what is read is never written to."""
+    from netsp.files import STANDARD
+
+    paths = tuple(p for p in paths if p != STANDARD)
     read = {os.path.realpath(p) for p in inputs if p is not None}
     for path in paths:
         if path is not None and os.path.realpath(path) in read:

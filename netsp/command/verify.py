@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import argparse
+from typing import TYPE_CHECKING
 
+from netsp.command import told
 from netsp.command.types import load_pair
 from netsp.errors import EXIT_NOT_VERIFIED, InputError
+
+if TYPE_CHECKING:
+    from netsp.judge import Verification
 
 EXAMPLE = "netsp verify problems/wharf.json solution.json"
 
@@ -31,10 +36,15 @@ def arguments(p: argparse.ArgumentParser) -> None:
         help="print how far the world may be off, too (netsp margins)",
     )  # fmt: skip
     p.add_argument("--quiet", action="store_true", help="exit code only")
+    told.json_flag(p)
 
 
 def run(args: argparse.Namespace) -> int:
     """Judge, print, and return the exit code."""
+    if args.json:
+        for name in ("measures", "margins"):
+            if getattr(args, name):
+                raise InputError(f"--{name}: is told in words only; expected no --json")
     from netsp.command.plot import is_scene
     from netsp.command.solve_mission import is_mission
     from netsp.files import read_text
@@ -65,9 +75,7 @@ def run(args: argparse.Namespace) -> int:
     from netsp.judge import verify
 
     verdict = verify(problem, solution)
-    if not args.quiet:
-        print(verdict)
-        print("verified" if verdict else "NOT VERIFIED")
+    _tell(args, verdict)
     if args.measures and solution.path and not args.quiet:
         if solution.problem.sha256 != problem.sha256:
             return EXIT_NOT_VERIFIED
@@ -80,6 +88,14 @@ def run(args: argparse.Namespace) -> int:
 
         print(f"\n{describe(problem, margins(problem, solution))}")
     return 0 if verdict else EXIT_NOT_VERIFIED
+
+
+def _tell(args: argparse.Namespace, verdict: Verification) -> None:
+    if args.json:
+        told.tell(told.of_verdict(verdict))
+    elif not args.quiet:
+        print(verdict)
+        print("verified" if verdict else "NOT VERIFIED")
 
 
 def _path_in_scene(args: argparse.Namespace) -> int:
@@ -115,9 +131,7 @@ def _mission(args: argparse.Namespace) -> int:
 
     with whole_or_interrupted():
         verdict = verify_mission(Mission.load(args.problem))
-    if not args.quiet:
-        print(verdict)
-        print("verified" if verdict else "NOT VERIFIED")
+    _tell(args, verdict)
     return 0 if verdict else EXIT_NOT_VERIFIED
 
 

@@ -17,7 +17,7 @@ from typing import Any
 
 from netsp.errors import InputError
 from netsp.fields import LARGEST
-from netsp.files import read_bytes, read_gzip
+from netsp.files import STANDARD, read_bytes, read_gzip
 
 SCHEMA = "netsp-trial/1"
 TrialRow = dict[str, Any]
@@ -136,6 +136,8 @@ class RowsFile:
 
     def __init__(self, path: str | Path, study: str) -> None:
         self.path = Path(path)
+        if path == STANDARD:
+            raise InputError("-: a comparison resumes from its results; expected a file's name")
         try:
             if self.path.exists() and not self.path.is_file():
                 raise InputError(f"{path}: expected a file of results, not a folder or a device")

@@ -1,0 +1,102 @@
+"""Programs talk to the commands: `-` is standard input and output, `--json` a summary to be read."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from netsp import Problem, Solution, solve
+
+ROOT = Path(__file__).parent.parent
+WHARF = ROOT / "problems" / "wharf.json"
+
+
+def run(*args, stdin=""):
+    return subprocess.run(
+        [sys.executable, "-m", "netsp", *map(str, args)],
+        input=stdin, capture_output=True, text=True, timeout=120,
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def tour(tmp_path_factory):
+    file = tmp_path_factory.mktemp("streams") / "tour.json"
+    problem = Problem.load(WHARF)
+    solve(problem, solver="greedy").save(file)
+    return file
+
+
+def test_a_problem_comes_from_standard_input_and_its_tour_goes_to_standard_output():
+    done = run("solve", "-", "-o", "-", "--solver", "greedy", "--quiet", stdin=WHARF.read_text())
+    assert done.returncode == 0, done.stderr
+    found = Solution.from_json(done.stdout)
+    assert found.length == solve(Problem.load(WHARF), solver="greedy").length
+
+
+def test_a_mission_comes_from_standard_input_with_its_scene_beside_where_one_is():
+    mission = json.loads((ROOT / "missions" / "basin.json").read_text())
+    mission["scene"] = str(ROOT / "missions" / mission["scene"])
+    mission["waypoints"] = mission["waypoints"][:2]
+    done = run("simulate", "-", "--quiet", stdin=json.dumps(mission))
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["visited"] == 2
+
+
+def test_what_is_wrong_on_standard_input_is_told_in_a_line():
+    done = run("solve", "-", stdin='{"schema_version": 1, "base": [0, 0]}')
+    assert done.returncode == 2
+    assert done.stderr.startswith("netsp: -: ")
+    assert done.stderr.count("\n") == 1
+
+
+def test_the_summary_of_a_solution_is_that_of_its_file(tmp_path):
+    file = tmp_path / "tour.json"
+    done = run("solve", WHARF, "--solver", "greedy", "--json", "--quiet", "-o", file)
+    told, found = json.loads(done.stdout), Solution.load(file)
+    assert told["length"] == found.length
+    assert told["status"] == found.status.value
+    assert told["lower_bound"] == found.lower_bound
+    assert len(told["order"]) == len(found.tour)
+    assert told["longest_tether"] == max(v.tether_length for v in found.tour)
+
+
+def test_a_summary_and_data_do_not_share_standard_output():
+    for output in ((), ("-o", "-")):
+        done = run("solve", WHARF, "--json", *output)
+        assert done.returncode == 2
+        assert not done.stdout
+        assert "--json" in done.stderr
+
+
+def test_a_verdict_says_which_check_fails(tmp_path, tour):
+    good = run("verify", WHARF, tour, "--json")
+    assert good.returncode == 0
+    assert json.loads(good.stdout)["verified"] is True
+    data = json.loads(tour.read_text())
+    data["length"] += 1.0
+    (tmp_path / "wrong.json").write_text(json.dumps(data))
+    bad = run("verify", WHARF, tmp_path / "wrong.json", "--json")
+    assert bad.returncode == 5
+    told = json.loads(bad.stdout)
+    assert told["verified"] is False
+    assert "length is right" in [c["name"] for c in told["checks"] if not c["passed"]]
+
+
+def test_a_run_tells_the_summary_that_it_writes(tmp_path, tour):
+    done = run("execute", WHARF, tour, "--json", "--quiet", "-o", tmp_path / "run")
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout) == json.loads((tmp_path / "run" / "summary.json").read_text())
+
+
+def test_what_is_several_files_or_goes_on_later_does_not_go_to_standard_output(tour):
+    for args in (
+        ("execute", WHARF, tour, "-o", "-"),
+        ("compare", "-o", "-", "--goals", "3", "--tethers", "200", "--solvers", "greedy"),
+        ("plot", WHARF, "-o", "-"),
+    ):
+        done = run(*args)
+        assert done.returncode == 2, args
+        assert done.stderr.count("\n") == 1, done.stderr
+        assert not (Path.cwd() / "-").exists()
