@@ -10,6 +10,7 @@ import hashlib
 import json
 from collections.abc import Sequence
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
@@ -42,7 +43,7 @@ from netsp.fields import (
     checked_argument,
     checked_number,
 )
-from netsp.files import FileModel
+from netsp.files import FileModel, write_text
 from netsp.geometry.polygons import check_polygon, polygon_interior_point, polygon_signed_distance
 from netsp.models import Model, explain, shown
 from netsp.shorthand import Inspection, written_out
@@ -675,6 +676,21 @@ class Problem(Drawn, FileModel):
             if not goal["after"]:
                 del goal["after"]
         return json.dumps(data, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
+
+    def save(self, path: str | Path) -> None:
+        """Write the problem file, whole or not at all.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file; one that is there is replaced.
+
+        Raises
+        ------
+        InputError
+            The file cannot be written.
+        """
+        write_text(path, self.to_json())
 
     @property
     def sha256(self) -> str:

@@ -1,5 +1,5 @@
-"""What the site has that no page of `docs/` holds: the file formats, from their JSON Schemas, and
-the pages beside the shipped problems and scenes."""
+"""What the site has that no page of `docs/` holds: the file formats, from their JSON Schemas, the
+pages beside the shipped problems and scenes, and the notebooks, run while the site is built."""
 
 from __future__ import annotations
 
@@ -7,12 +7,16 @@ import importlib
 from pathlib import Path
 from typing import Any
 
+import nbformat
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
+from nbconvert import MarkdownExporter
+from nbconvert.preprocessors import ExecutePreprocessor
 
 ROOT = Path(__file__).parents[2]
 BESIDE = {"problems.md": "problems/README.md", "scenes.md": "scenes/README.md"}
+EXAMPLES = ROOT / "examples"
 FORMATS = "<!-- formats -->"
 
 
@@ -20,7 +24,22 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     """Pages that lie beside what they are about."""
     for name, source in BESIDE.items():
         files.append(File.generated(config, name, content=(ROOT / source).read_text()))
+    for notebook in sorted(EXAMPLES.glob("*.ipynb")):
+        for name, content in run(notebook).items():
+            files.append(File.generated(config, name, content=content))
     return files
+
+
+def run(notebook: Path) -> dict[str, str | bytes]:
+    """A notebook as a page with what its cells print, and its pictures."""
+    book = nbformat.read(notebook, as_version=4)
+    ExecutePreprocessor(timeout=120, extra_arguments=["--log-level=40"]).preprocess(book, {"metadata": {"path": str(EXAMPLES)}})
+    exporter = MarkdownExporter()
+    text, resources = exporter.from_notebook_node(
+        book, resources={"unique_key": f"{notebook.stem}-pictures",}
+    )
+    text = text.replace("](../docs/", "](").replace(".ipynb)", ".md)")
+    return {f"{notebook.stem}.md": text, **resources["outputs"]}
 
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:

@@ -13,7 +13,8 @@ from netsp.errors import InputError
 from netsp.online.scene.scene import Scene
 from netsp.online.scene.surfaces import extent
 from netsp.pictures import style
-from netsp.pictures.scene import layout, line_trace, mesh_trace, parts_of, plotly_objects
+from netsp.pictures.interactive import layout, line_trace, mesh_trace, plotly_objects
+from netsp.pictures.scene import parts_of
 
 
 def script() -> Path:

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from netsp.arrays import Floats
+from netsp.arrays import Bools, Floats
 
 
 def length(path: Floats) -> float:
@@ -42,6 +42,27 @@ def part(path: Floats, start: float, end: float) -> Floats:
     s = along(path)
     ends = np.column_stack([np.interp([start, end], s, path[:, k]) for k in range(path.shape[1])])
     return np.vstack([ends[:1], path[(s > start) & (s < end)], ends[1:]])
+
+
+def telling(path: Floats, tolerance: float) -> Bools:
+    """(k,) which points of a polyline it takes to be nowhere off by more than that (Douglas &
+    Peucker 1973)."""
+    kept = np.zeros(len(path), dtype=bool)
+    kept[[0, -1] if len(path) else []] = True
+    spans = [(0, len(path) - 1)]
+    while spans:
+        a, b = spans.pop()
+        if b - a < 2:
+            continue
+        begin, step = path[a], path[b] - path[a]
+        share = ((path[a + 1 : b] - begin) @ step) / max(float(step @ step), 1e-300)
+        nearest = begin + np.clip(share, 0.0, 1.0)[:, None] * step
+        off = np.linalg.norm(path[a + 1 : b] - nearest, axis=1)
+        k = int(off.argmax())
+        if off[k] > tolerance:
+            kept[a + 1 + k] = True
+            spans += [(a, a + 1 + k), (a + 1 + k, b)]
+    return kept
 
 
 def distance(path: Floats, point: Floats) -> float:

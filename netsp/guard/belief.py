@@ -12,7 +12,7 @@ With no obstacle near, all offsets of a word write alike, and one word stands fo
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -248,7 +248,7 @@ class Belief:
         less = np.exp(more[among].min() - more)
         self._likely = {w: less * p for w, p in self._likely.items()}
 
-    def _mix(self, groups: dict[Word, Iterable[int]]) -> None:
+    def _mix(self, groups: Mapping[Word, Iterable[int]]) -> None:
         """The drift has changed a bit: each offset gives some of its share to those beside it, and
         to the middle more than away from it (Metropolis et al. 1953), so that it forgets. Pairs
         are given by what the way from the first to the second writes; across what is in none of

@@ -11,7 +11,6 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.arrays import Floats
-from netsp.errors import InputError
 from netsp.online.laid import present_tether
 from netsp.online.log import Run
 from netsp.online.scene.scene import Scene
@@ -20,18 +19,23 @@ from netsp.online.simulate import grid_of
 from netsp.online.tether import GeodesicTether, Tether
 from netsp.online.track import Track
 from netsp.pictures import style
-from netsp.pictures.scene import (
-    Stops,
-    draw_space,
+from netsp.pictures.interactive import (
     layout,
     line_trace,
     mesh_trace,
-    parts_of,
     plotly_objects,
     point_trace,
+    seen,
+    write_figure,
+)
+from netsp.pictures.scene import (
+    Stops,
+    draw_space,
+    parts_of,
 )
 
-FRAMES = 120
+FRAMES, FILM_MS = 120, 12_000
+"""Of a page: moments that its slider knows, and milliseconds in which they go by."""
 
 
 def path_of(run: Run) -> Floats:
@@ -186,13 +190,13 @@ def save_page(runs: Sequence[Run], scene: Scene, file: str | Path) -> None:
             trace = mesh_trace(name, vertices, faces)
             trace.showlegend = False
             figure.add_trace(trace, row=1, col=k + 1)
+        told = seen(path)
         stamps = np.array([r.time for r in run.log])
         rows = np.minimum(np.searchsorted(stamps, times), len(stamps) - 1)
         tethers = tethers_along(run, scene, rows)
         for f, (row, tether) in enumerate(zip(rows, tethers, strict=True)):
-            thin = path[: row + 1 : max(1, len(path) // 1500)]
             moving = [
-                line_trace("path", thin, style.PATH, 3),
+                line_trace("path", path[[*told[told < row], row]], style.PATH, 3),
                 line_trace("tether", tether.nodes, style.TETHER, 6),
                 point_trace("robot", path[row], style.ROBOT),
                 point_trace("anchor", tether.anchor, style.BASE),
@@ -206,23 +210,33 @@ def save_page(runs: Sequence[Run], scene: Scene, file: str | Path) -> None:
         go.Frame(data=traces, traces=numbers, name=f"{t:.0f}")
         for t, traces in zip(times, changing, strict=True)
     ]
-    steps = [
-        {
-            "args": [[f"{t:.0f}"], {"frame": {"duration": 0, "redraw": True}, "mode": "immediate"}],
-            "label": f"{t:.0f}",
-            "method": "animate",
-        }
-        for t in times
-    ]
+    now = {"frame": {"duration": 0, "redraw": True}, "mode": "immediate"}
+    steps = [{"args": [[f"{t:.0f}"], now], "label": f"{t:.0f}", "method": "animate"} for t in times]
     base = layout(runs[0].mission.name, scene.units)
     scenes = {f"scene{k + 1 if k else ''}": base["scene"] for k in range(len(runs))}
     figure.update_layout(
-        title=base["title"], margin={"l": 0, "r": 0, "t": 70, "b": 0}, showlegend=False,
-        sliders=[{"steps": steps, "currentvalue": {"prefix": "time (s) "}, "pad": {"t": 20}}],
-        **scenes,
+        title=base["title"], margin={"l": 0, "r": 0, "t": 70, "b": 0}, legend=base["legend"],
+        sliders=[{
+            "steps": steps, "currentvalue": {"prefix": "time (s) "}, "pad": {"t": 20}, "x": 0.12,
+            "len": 0.86,
+        }],
+        updatemenus=[_play()], **scenes,
     )  # fmt: skip
-    try:
-        page = str(figure.to_html(include_plotlyjs=True, full_html=True, auto_play=False))
-        Path(file).write_text(page, encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"{file}: cannot be written: {error.strerror or error}") from None
+    write_figure(figure, runs[0].mission.name, file)
+
+
+def _play() -> dict[str, Any]:
+    """Buttons that have the frames go by."""
+    on = {
+        "frame": {"duration": FILM_MS // FRAMES, "redraw": True}, "fromcurrent": True,
+        "transition": {"duration": 0},
+    }  # fmt: skip
+    stop = {"frame": {"duration": 0, "redraw": False}, "mode": "immediate"}
+    buttons = [
+        {"label": "▶ play", "method": "animate", "args": [None, on]},
+        {"label": "❚❚ pause", "method": "animate", "args": [[None], stop]},
+    ]
+    return {
+        "type": "buttons", "direction": "left", "buttons": buttons, "showactive": False,
+        "x": 0.0, "xanchor": "left", "y": 0.0, "yanchor": "top", "pad": {"t": 40, "l": 8},
+    }  # fmt: skip

@@ -1,4 +1,4 @@
-"""Pictures of a scene with path and tether: a figure, or a page that can be turned in a browser."""
+"""Figures of a scene with path and tether; `netsp.pictures.interactive` has pages of it."""
 
 from __future__ import annotations
 
@@ -11,8 +11,6 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.arrays import Floats
-from netsp.errors import InputError
-from netsp.files import write_text
 from netsp.geometry import polylines
 from netsp.online.scene.scene import Scene
 from netsp.online.scene.shapes import HalfSpace
@@ -72,7 +70,9 @@ def save(
     parts = parts_of(scene, low, high)
     title = title or _title(scene, line, tether)
     if Path(file).suffix.lower() == INTERACTIVE:
-        write_text(file, _interactive(scene, parts, line, nodes, title, stops))
+        from netsp.pictures.interactive import write_scene
+
+        write_scene(scene, parts, line, nodes, title, stops, file)
     else:
         style.save(_figure(scene, parts, line, nodes, (low, high), title, stops), file)
 
@@ -235,83 +235,3 @@ def draw_lines(ax: Any, path: Floats, nodes: Floats, axes: tuple[int, ...]) -> N
         ends = (nodes[-1], style.ROBOT, "o", "robot"), (nodes[0], style.BASE, "*", "anchor")
         for point, colour, marker, name in ends:
             ax.plot(*point[columns][:, None], marker, color=colour, ms=8, label=name)
-
-
-def _interactive(
-    scene: Scene, parts: Sequence[tuple[str, Triangles]], path: Floats, nodes: Floats, title: str,
-    stops: Stops | None,
-) -> str:  # fmt: skip
-    go = plotly_objects()
-    figure = go.Figure()
-    for name, (vertices, faces) in parts:
-        figure.add_trace(mesh_trace(name, vertices, faces))
-    if scene.cloud is not None:
-        x, y, z = drawn_points(scene).T
-        marker = {"size": 1.2, "color": style.OBSTACLE}
-        figure.add_trace(go.Scatter3d(x=x, y=y, z=z, mode="markers", marker=marker, name="cloud"))
-    if len(path):
-        figure.add_trace(line_trace("path", path, style.PATH, 3))
-    if len(nodes):
-        figure.add_trace(line_trace("tether", nodes, style.TETHER, 6))
-        for name, point, colour in (
-            ("anchor", nodes[0], style.BASE),
-            ("robot", nodes[-1], style.ROBOT),
-        ):
-            figure.add_trace(point_trace(name, point, colour))
-    if stops is not None:
-        x, y, z = stops.places.T
-        names = [f"#{k}" for k in range(len(x))]
-        marker = {"size": 3, "color": style.VISITED}
-        figure.add_trace(
-            go.Scatter3d(x=x, y=y, z=z, mode="markers", marker=marker, text=names, name=stops.name)
-        )
-        if stops.anchor is not None:
-            figure.add_trace(point_trace("anchor", np.array(stops.anchor), style.BASE))
-    figure.update_layout(**layout(title, scene.units))
-    return str(figure.to_html(include_plotlyjs=True, full_html=True))
-
-
-def plotly_objects() -> Any:
-    """plotly's graph objects; InputError if plotly is not installed."""
-    try:
-        import plotly.graph_objects as go
-    except ImportError:
-        raise InputError("interactive pages need plotly: pip install 'netsp[online]'") from None
-    return go
-
-
-def mesh_trace(name: str, vertices: Floats, faces: npt.NDArray[np.int64]) -> Any:
-    """A part of the scene on an interactive page."""
-    x, y, z = np.round(vertices, 4).T
-    i, j, k = faces.T
-    return plotly_objects().Mesh3d(
-        x=x, y=y, z=z, i=i, j=j, k=k, color=style.OBSTACLE, flatshading=True, name=name,
-        hoverinfo="name", lighting={"ambient": 0.55, "diffuse": 0.7, "specular": 0.1},
-    )  # fmt: skip
-
-
-def line_trace(name: str, points: Floats, colour: str, width: float) -> Any:
-    """A polyline on an interactive page."""
-    x, y, z = np.round(points, 4).T
-    return plotly_objects().Scatter3d(
-        x=x, y=y, z=z, mode="lines", line={"color": colour, "width": width}, name=name
-    )
-
-
-def point_trace(name: str, point: Floats, colour: str) -> Any:
-    """A point on an interactive page."""
-    x, y, z = ([float(v)] for v in point)
-    return plotly_objects().Scatter3d(
-        x=x, y=y, z=z, mode="markers", marker={"size": 5, "color": colour}, name=name
-    )
-
-
-def layout(title: str, units: str) -> dict[str, Any]:
-    """The layout of an interactive page."""
-    axes = {f"{a}axis": {"title": {"text": f"{a} ({units})"}} for a in "xyz"}
-    return {
-        "title": {"text": title},
-        "scene": {"aspectmode": "data", **axes},
-        "margin": {"l": 0, "r": 0, "t": 50, "b": 0},
-        "legend": {"x": 0.01, "y": 0.99},
-    }

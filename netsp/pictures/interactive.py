@@ -1,0 +1,193 @@
+"""Pages with a picture in space that can be turned in a browser (plotly). They need nothing else,
+and are packed: plotly itself is 4.8 MB of text."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import html
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from netsp.arrays import Floats, Ints
+from netsp.errors import InputError
+from netsp.files import write_text
+from netsp.geometry import polylines
+from netsp.online.scene.scene import Scene
+from netsp.online.scene.surfaces import Triangles, drawn_points
+from netsp.pictures import style
+from netsp.pictures.scene import Stops
+
+SEEN = 1e-3
+"""Of the size of a picture: what a line is off by less is not seen."""
+
+DIGITS = 3
+"""Decimals of coordinates."""
+
+PAGE = """<!DOCTYPE html>
+<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">
+<title>{title}</title>
+<style>html, body, #figure {{ margin: 0; width: 100%; height: 100% }}
+body {{ font-family: sans-serif }} #wait {{ padding: 2em }}</style></head>
+<body><div id="figure"><p id="wait">unpacking {title} …</p></div>
+<script>
+const packed = {packed};
+async function unpack(text) {{
+  const bytes = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
+  return new Response(stream).text();
+}}
+(async () => {{
+  try {{
+    const [library, figure] = await Promise.all(packed.map(unpack));
+    const script = document.createElement("script");
+    script.textContent = library;
+    document.head.append(script);
+    document.getElementById("wait").remove();
+    await Plotly.newPlot("figure", JSON.parse(figure));
+  }} catch (error) {{
+    document.getElementById("wait").textContent =
+      `This page needs a browser of 2023 or later (${{error}}).`;
+  }}
+}})();
+</script></body></html>
+"""
+
+
+def write_figure(figure: Any, title: str, file: str | Path) -> None:
+    """Write a figure of plotly as a page.
+
+    Parameters
+    ----------
+    figure : plotly.graph_objects.Figure
+        With its frames, if it has any.
+    title : str
+        Of the page.
+    file : str or Path
+        The file; replaced when it is there.
+
+    Raises
+    ------
+    InputError
+        The file cannot be written.
+    """
+    from plotly.offline import get_plotlyjs
+
+    told = {
+        "data": figure.data, "layout": figure.layout, "frames": figure.frames,
+        "config": {"responsive": True, "displaylogo": False},
+    }  # fmt: skip
+    packed = json.dumps([_packed(get_plotlyjs()), _packed(json.dumps(_plain(told)))])
+    write_text(file, PAGE.format(title=html.escape(title), packed=packed))
+
+
+def _packed(text: str) -> str:
+    """The same text, the same bytes: without a time in them."""
+    return base64.b64encode(gzip.compress(text.encode(), 9, mtime=0)).decode()
+
+
+def _plain(value: Any) -> Any:
+    """What plotly draws as JSON has it: short numbers pack better than plotly's binary ones."""
+    if hasattr(value, "to_plotly_json"):
+        value = value.to_plotly_json()
+    if isinstance(value, dict):
+        return {str(k): _plain(v) for k, v in value.items()}
+    if isinstance(value, np.ndarray):
+        value = np.round(value, DIGITS).tolist() if value.dtype.kind == "f" else value.tolist()
+    if isinstance(value, list | tuple):
+        return [_plain(v) for v in value]
+    if isinstance(value, float):
+        return round(value, DIGITS)
+    return value
+
+
+def write_scene(
+    scene: Scene, parts: Sequence[tuple[str, Triangles]], path: Floats, nodes: Floats, title: str,
+    stops: Stops | None, file: str | Path,
+) -> None:  # fmt: skip
+    """A page of a scene, as of `netsp.pictures.scene.save`."""
+    go = plotly_objects()
+    figure = go.Figure()
+    for name, (vertices, faces) in parts:
+        figure.add_trace(mesh_trace(name, vertices, faces))
+    if scene.cloud is not None:
+        x, y, z = drawn_points(scene).T
+        marker = {"size": 1.2, "color": style.OBSTACLE}
+        figure.add_trace(go.Scatter3d(x=x, y=y, z=z, mode="markers", marker=marker, name="cloud"))
+    if len(path):
+        figure.add_trace(line_trace("path", path, style.PATH, 3))
+    if len(nodes):
+        figure.add_trace(line_trace("tether", nodes, style.TETHER, 6))
+        for name, point, colour in (
+            ("anchor", nodes[0], style.BASE),
+            ("robot", nodes[-1], style.ROBOT),
+        ):
+            figure.add_trace(point_trace(name, point, colour))
+    if stops is not None:
+        x, y, z = stops.places.T
+        names = [f"#{k}" for k in range(len(x))]
+        marker = {"size": 3, "color": style.VISITED}
+        figure.add_trace(
+            go.Scatter3d(x=x, y=y, z=z, mode="markers", marker=marker, text=names, name=stops.name)
+        )
+        if stops.anchor is not None:
+            figure.add_trace(point_trace("anchor", np.array(stops.anchor), style.BASE))
+    figure.update_layout(**layout(title, scene.units))
+    write_figure(figure, title, file)
+
+
+def plotly_objects() -> Any:
+    """plotly's graph objects; InputError if plotly is not installed."""
+    try:
+        import plotly.graph_objects as go
+    except ImportError:
+        raise InputError("interactive pages need plotly: pip install 'netsp[online]'") from None
+    return go
+
+
+def mesh_trace(name: str, vertices: Floats, faces: npt.NDArray[np.int64]) -> Any:
+    """A part of the scene on an interactive page."""
+    x, y, z = np.round(vertices, 4).T
+    i, j, k = faces.T
+    return plotly_objects().Mesh3d(
+        x=x, y=y, z=z, i=i, j=j, k=k, color=style.OBSTACLE, flatshading=True, name=name,
+        hoverinfo="name", lighting={"ambient": 0.55, "diffuse": 0.7, "specular": 0.1},
+    )  # fmt: skip
+
+
+def seen(points: Floats) -> Ints:
+    """Numbers of those points (k, 3) of a line that can be told on a picture of it."""
+    size = float(np.ptp(points, axis=0).max()) if len(points) else 0.0
+    return np.flatnonzero(polylines.telling(points, SEEN * size))
+
+
+def line_trace(name: str, points: Floats, colour: str, width: float) -> Any:
+    """A polyline on an interactive page."""
+    x, y, z = points[seen(points)].T
+    return plotly_objects().Scatter3d(
+        x=x, y=y, z=z, mode="lines", line={"color": colour, "width": width}, name=name
+    )
+
+
+def point_trace(name: str, point: Floats, colour: str) -> Any:
+    """A point on an interactive page."""
+    x, y, z = ([float(v)] for v in point)
+    return plotly_objects().Scatter3d(
+        x=x, y=y, z=z, mode="markers", marker={"size": 5, "color": colour}, name=name
+    )
+
+
+def layout(title: str, units: str) -> dict[str, Any]:
+    """The layout of an interactive page."""
+    axes = {f"{a}axis": {"title": {"text": f"{a} ({units})"}} for a in "xyz"}
+    return {
+        "title": {"text": title},
+        "scene": {"aspectmode": "data", **axes},
+        "margin": {"l": 0, "r": 0, "t": 50, "b": 0},
+        "legend": {"x": 0.01, "y": 0.99},
+    }
