@@ -4,7 +4,7 @@ PYTHON ?= python3
 BIN     = $(VENV)/bin
 DEMO   ?= demo
 
-.PHONY: demo test accept docs tables lint bench js clean
+.PHONY: demo test accept docs wheel tables lint bench js clean
 .DELETE_ON_ERROR:
 
 $(VENV)/.installed: pyproject.toml
@@ -37,6 +37,16 @@ accept: $(VENV)/.installed
 # the pages as a site, in build/site; a warning is an error
 docs: $(VENV)/.installed
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+
+# the wheel that a release would have, alone in a new environment, does the main job
+wheel: $(VENV)/.installed
+	rm -rf build/wheel && mkdir -p build/wheel
+	$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps -w build/wheel .
+	$(PYTHON) -m venv build/wheel/env
+	build/wheel/env/bin/pip install --quiet --disable-pip-version-check build/wheel/netsp-*.whl
+	cd build/wheel && env/bin/netsp --version
+	cd build/wheel && env/bin/netsp solve ../../problems/pool.json -o tour.json --plot tour.png --quiet
+	cd build/wheel && env/bin/netsp verify ../../problems/pool.json tour.json --quiet
 
 # the tables of the docs, written from the rows that the benchmarks keep
 tables: $(VENV)/.installed

@@ -1,4 +1,4 @@
-"""Programs talk to the commands: `-` is standard input and output, `--json` a summary to be read."""
+"""Programs talk to the commands: `-` is standard input and output, `--json` a summary."""
 
 import json
 import subprocess

@@ -4,6 +4,7 @@ pages beside the shipped problems and scenes, and the notebooks, run while the s
 from __future__ import annotations
 
 import importlib
+import runpy
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ from nbconvert.preprocessors import ExecutePreprocessor
 ROOT = Path(__file__).parents[2]
 BESIDE = {"problems.md": "problems/README.md", "scenes.md": "scenes/README.md"}
 EXAMPLES = ROOT / "examples"
-FORMATS = "<!-- formats -->"
+FORMATS, LICENCES = "<!-- formats -->", "<!-- licences -->"
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
@@ -33,10 +34,15 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 def run(notebook: Path) -> dict[str, str | bytes]:
     """A notebook as a page with what its cells print, and its pictures."""
     book = nbformat.read(notebook, as_version=4)
-    ExecutePreprocessor(timeout=120, extra_arguments=["--log-level=40"]).preprocess(book, {"metadata": {"path": str(EXAMPLES)}})
+    ExecutePreprocessor(timeout=120, extra_arguments=["--log-level=40"]).preprocess(
+        book, {"metadata": {"path": str(EXAMPLES)}}
+    )
     exporter = MarkdownExporter()
     text, resources = exporter.from_notebook_node(
-        book, resources={"unique_key": f"{notebook.stem}-pictures",}
+        book,
+        resources={
+            "unique_key": f"{notebook.stem}-pictures",
+        },
     )
     text = text.replace("](../docs/", "](").replace(".ipynb)", ".md)")
     return {f"{notebook.stem}.md": text, **resources["outputs"]}
@@ -48,6 +54,9 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
         markdown = markdown.replace(f"](../{source}", f"]({name}")
     if FORMATS in markdown:
         markdown = markdown.replace(FORMATS, "\n".join(formats()))
+    if LICENCES in markdown:
+        hook = runpy.run_path(str(Path(__file__).with_name("licences.py")))
+        markdown = markdown.replace(LICENCES, "\n".join(hook["table"]()))
     return markdown
 
 

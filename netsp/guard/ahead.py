@@ -18,7 +18,7 @@ from netsp.guard.track import MOVING, Motion
 from netsp.online.scene.field import pushed_out
 from netsp.online.tether import Tether
 
-HORIZON_S, TURN_HORIZON_S = 36.0, 24.0
+HORIZON_S, TURN_HORIZON_S = 36.0, 30.0
 """Seconds that are looked ahead, straight on and turning on: a bit farther than what is spoken of
 (`netsp.guard.reasons`)."""
 

@@ -38,6 +38,9 @@ class Alarm:
 RAISED_S = {Level.NOTICE: 0.0, Level.CAUTION: 1.0, Level.WARNING: 0.5, Level.ALARM: 0.3}
 """Seconds for which there must be a reason before an alarm is raised to a level."""
 
+AWAY_S = 0.7
+"""Seconds that a reason may be away meanwhile: what is ahead comes and goes with the noise."""
+
 LOWERED_S = 4.0
 """Seconds without a reason after which it is lowered."""
 
@@ -45,6 +48,7 @@ LOWERED_S = 4.0
 @dataclass
 class _Kept:
     since: dict[Level, float] = field(default_factory=dict)
+    seen: dict[Level, float] = field(default_factory=dict)
     shown: Alarm | None = None
     last: float = 0.0
 
@@ -83,12 +87,17 @@ class Alarms:
             kept = self._kept.setdefault(kind, _Kept())
             reason = by_kind.get(kind)
             for level in Level:
-                if reason is None or reason.level < level:
-                    kept.since.pop(level, None)
-                else:
+                if reason is not None and reason.level >= level:
                     kept.since.setdefault(level, now)
+                    kept.seen[level] = now
+                elif level in kept.since and now - kept.seen[level] > AWAY_S:
+                    del kept.since[level]
             new = max(
-                (v for v, t in kept.since.items() if now - t >= RAISED_S[v]), default=None
+                (
+                    v for v, t in kept.since.items()
+                    if reason is not None and reason.level >= v and now - t >= RAISED_S[v]
+                ),
+                default=None,
             )  # fmt: skip
             was = None if kept.shown is None else kept.shown.level
             if new is not None and (was is None or new >= was):

@@ -366,7 +366,7 @@ class Guard:
             *reasons.little_left(site, classes[0]),
             *reasons.soon_short(site, ahead),
             *([] if again else reasons.soon_looped(
-                site, ahead, robot, self._sure, on_plan, classes[0].likely
+                site, ahead, robot, self._sure, on_plan, classes[0].likely, self.options.noise
             )),
             *reasons.looped(site, loops, robot, share, on_plan),
         ]  # fmt: skip

@@ -24,6 +24,10 @@ LIKELY, LOOPED, POSSIBLE = 0.7, 0.5, 0.2
 """Shares of the classes in which a loop will close, or has closed: above the first, or second, it
 is spoken of as such, above the third as a possibility, and below not at all."""
 
+LATER = 1.3
+"""For each metre of a position's noise, the share by which a loop is seen to close later than it
+does: a course with noise goes round in a wider circle."""
+
 CLEAR = 0.6
 """Share that the likeliest class must have for a warning of what is ahead: where it is anybody's
 guess how the tether runs, so is what closes a loop."""
@@ -99,14 +103,15 @@ def soon_short(site: Site, ahead: Ahead) -> list[Alarm]:
 
 def soon_looped(
     site: Site, ahead: Ahead, robot: Floats, share: float = 1.0, on_plan: bool = False,
-    clear: float = 1.0,
+    clear: float = 1.0, noise: float = 0.0,
 ) -> list[Alarm]:  # fmt: skip
     """Going on closes a loop, in that share of the classes, the likeliest of which is so clear.
     Where the tether was as planned at the last stop of a tour, the way on is more likely that of
     the plan than straight on."""
     if ahead.loop_s is None or ahead.loop is None or share < POSSIBLE:
         return []
-    level = _level(TURN_S if ahead.turning else LOOP_S, ahead.loop_s)
+    limits = TURN_S if ahead.turning else LOOP_S
+    level = _level({v: most * (1.0 + LATER * noise) for v, most in limits.items()}, ahead.loop_s)
     if level is None:
         return []
     if share < LIKELY or clear < CLEAR or on_plan:
