@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 from netsp import Circle, Problem
 from netsp.command.main import main
 from netsp.errors import InputError
+from netsp.guard.ahead import Look
 from netsp.guard.alarms import Alarm, Alarms, Level
 from netsp.guard.belief import Belief
 from netsp.guard.fix import Fix
@@ -31,7 +32,7 @@ from netsp.guard.plane import PlaneSite, RayLetters
 from netsp.guard.replay import read_fixes
 from netsp.guard.stream import replayed
 from netsp.guard.tethers import Strands
-from netsp.guard.track import Track
+from netsp.guard.track import Motion, Track
 from netsp.hsignature import concatenate, crossings, signature
 from netsp.link.frame import Frame
 from netsp.link.modes import GUIDED
@@ -503,3 +504,89 @@ def test_the_page_is_for_who_has_the_token_and_takes_corrections_only():
 def test_a_guard_asks_for_a_link_or_a_recording(capsys):
     assert main(["guard", str(PROBLEMS / "pool.json")]) == 2
     assert "--link" in capsys.readouterr().err
+
+
+# what is believed, and what is ahead
+
+
+def test_a_class_that_is_too_long_takes_no_other_with_it(monkeypatch):
+    """Classes beyond those that have a tether of their own once went, too."""
+    monkeypatch.setattr("netsp.guard.guard.MOST_TETHERS", 2)
+    guard = Guard(SITE, GuardOptions(noise=0.1, drift=0.1))
+    for fix in along((0, 0, 0), (3, 1, 0), (9, 0.5, 0)):
+        report = guard.take(fix)
+    guard.belief.begin({(1,): 0.0, (1,) * 6: 0.1, (): 2.0})
+    for fix in along((9, 0.5, 0), (9.2, 0.5, 0), begin=report.time + 0.1):
+        guard.take(fix)
+    assert guard.belief.words == {(1,), ()}
+
+
+def test_a_drift_that_nothing_tells_of_is_believed_as_it_was_at_first():
+    """In open water exchanges of offsets change nothing: the walk of the drift has its own normal
+    distribution for an equilibrium."""
+    belief = Belief(RayLetters(SITE), 0.5, 0.1)
+    first = belief._likely[()].copy()
+    for k in range(200):
+        there = np.array([-20.0 - 0.1 * k, -20.0, 0.0])
+        assert belief.move(there, there - (0.1, 0.0, 0.0), 1.0)
+    np.testing.assert_allclose(belief._likely[()], first, rtol=1e-9)
+
+
+def test_a_drift_that_is_known_is_forgotten_in_its_time():
+    belief = Belief(RayLetters(SITE), 0.5, 0.1)
+    known = np.zeros(len(belief.offsets))
+    known[np.argmax(belief.offsets[:, 0])] = 1.0
+    belief._likely = {(): known}
+    means = []
+    for k in range(121):
+        there = np.array([-20.0 - 0.1 * k, -20.0, 0.0])
+        means.append(float(belief._likely[()] @ belief.offsets[:, 0]))
+        belief.move(there, there - (0.1, 0.0, 0.0), 1.0)
+    assert means[0] == belief.offsets[:, 0].max()
+    assert np.all(np.diff(means) <= 1e-12)
+    assert 0.0 < means[120] < 0.35 * means[0]
+
+
+def test_one_that_grazes_a_pile_is_charged_for_how_deep_and_not_for_how_long():
+    """Noise that puts a robot into a pile is the same at the next estimate."""
+    costs = []
+    for stay in (1, 100):
+        belief = Belief(RayLetters(SITE), 0.3, 0.1)
+        before = np.array([5.0, -1.0, 0.0])
+        for after in [(5.0, -0.6, 0.0)] * stay:
+            belief.move(before, np.array(after), 1e-3)
+            before = np.array(after)
+        inside = SITE.obstacles[0].signed_distance(before[:2] + belief.offsets) < 0.0
+        total = sum(belief._likely.values())
+        costs.append(float(total[inside].sum()) / float(belief._prior[inside].sum()))
+    assert costs[0] == pytest.approx(costs[1], rel=1e-6)
+    assert costs[0] < 0.8
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    x=st.floats(-1.0, 3.0), course=st.floats(-math.pi, math.pi), turn=st.floats(-0.4, 0.4),
+    pieces=st.integers(1, 7),
+)  # fmt: skip
+def test_a_look_in_pieces_sees_what_one_at_once_sees(x, course, turn, pieces):
+    site = PlaneSite(SITE)
+    tether = site.model.start((0, 0, 0), (x, 2.0, 0.0))
+    velocity = 0.5 * np.array([math.cos(course), math.sin(course), 0.0])
+    motion = Motion(0.0, tether.robot, tether.robot, velocity, turn)
+    once, often = (Look(site, tether, motion, 0.5) for _ in range(2))
+    assert once.go_on(10_000) > 0
+    while not often.done:
+        assert often.go_on(pieces) <= pieces
+    assert once.ahead == often.ahead
+
+
+def test_an_alarm_flickers_neither_on_nor_off():
+    alarms, warning = Alarms(), Alarm("loop-ahead", Level.WARNING, "x")
+    raised = []
+    for k in range(40):  # a reason at every second look
+        raised += alarms.take(0.3 * k, [warning] if k % 2 else [])
+    assert [a.level for a in raised] == [Level.NOTICE, Level.WARNING]
+    assert alarms.take(12.3, []) == []
+    assert "loop-ahead" in alarms.on
+    alarms.take(20.0, [])
+    assert not alarms.on
