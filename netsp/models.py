@@ -39,6 +39,12 @@ class Model(BaseModel):
     # names the whole path of a field
     __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
 
+    def __eq__(self, other: object) -> bool:
+        """By the fields: cached properties may be arrays, which are not equal or unequal."""
+        if not isinstance(other, Model) or type(self) is not type(other):
+            return NotImplemented
+        return all(getattr(self, name) == getattr(other, name) for name in type(self).model_fields)
+
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
         """A copy without the cached properties of the original, which may not hold of it."""
         copy = super().model_copy(update=update, deep=deep)

@@ -6,6 +6,7 @@ from PIL import Image
 
 from netsp import Circle, Problem, solve
 from netsp.command.main import main
+from netsp.execute.events import Event, Surprises
 from netsp.execute.log import ExecutionOptions
 from netsp.execute.run import execute
 from netsp.execute.write import write_execution
@@ -85,7 +86,7 @@ def test_what_ctrl_c_cuts_off_leaves_the_file_that_was_there(files, suffix, monk
             raise KeyboardInterrupt
 
     site, tour = Problem.load(files / "p.json"), solve(SITE)
-    film = Film("a tour", site, moments_of_plan(site, tour, 20), tour.length)
+    film = Film("a tour", moments_of_plan(site, tour, 20), tour.length)
     out = files / f"kept.{suffix}"
     out.write_text("before")
     with pytest.raises(KeyboardInterrupt):
@@ -111,3 +112,24 @@ def test_what_cannot_be_animated_is_told_in_a_line(files, change, says, capsys, 
     assert says in told
     assert told.count("\n") == 1
     assert not (files / "x.gif").exists()
+
+
+def test_an_obstacle_that_appears_is_in_the_film_from_then_on_and_not_before(files):
+    tour = solve(SITE)
+    boat = Circle(center=(2.0, 3.0), radius=0.9, name="boat")
+    run = execute(SITE, tour, surprises=Surprises(events=(Event(time=12, appear=boat),)))
+    write_execution(run, files / "changed")
+    out = files / "changed.gif"
+    told = ["animate", str(files / "changed"), "-o", str(out), "--seconds", "3", "--quiet"]
+    assert main(told) == 0
+    with Image.open(out) as film:
+        counts = []
+        for k in range(0, film.n_frames, 3):
+            film.seek(k)
+            counts.append(seen(film, style.OBSTACLE))
+    share = 12.0 / run.rows[-1].time
+    before = counts[: int(0.8 * share * len(counts))]
+    after = counts[int(1.2 * share * len(counts)) + 1 :]
+    assert before
+    assert after
+    assert min(after) > 1.5 * max(before)

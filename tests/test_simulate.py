@@ -27,6 +27,7 @@ from netsp.online.scene.field import pushed_out
 from netsp.online.sensing import Positions
 from netsp.online.simulate import simulate
 from netsp.online.vehicle.kinematic import advance
+from tests.pages import unpacked
 
 MISSIONS = Path(__file__).parent.parent / "missions"
 POST = Scene(solids=[{"post": {"center": [0, 0], "radius": 0.5}}], bounds=(-4, -4, -1, 4, 4, 1))
@@ -343,7 +344,12 @@ def test_two_planners_are_drawn_side_by_side(tmp_path):
     assert code == 0
     names = {p.relative_to(out).as_posix() for p in out.rglob("*.*")}
     assert {"log.csv", "summary.json", "run.png", "run.html", "none/log.csv"} <= names
-    assert "sliders" in (out / "run.html").read_text()
+    figure = unpacked(out / "run.html")
+    assert len(figure["frames"]) == 120
+    (slider,), (menu,) = figure["layout"]["sliders"], figure["layout"]["updatemenus"]
+    assert len(slider["steps"]) == 120
+    assert [b["label"] for b in menu["buttons"]] == ["▶ play", "❚❚ pause"]
+    assert {"scene", "scene2"} <= figure["layout"].keys()
 
 
 def test_planners_may_believe_the_papers_tether_and_the_log_tells_the_truth():

@@ -70,13 +70,13 @@ def _film(source: str, problem_file: str | None, count: int) -> Film:
     problem, solution = what.problem, what.solution
     if what.tethers:
         try:
-            moments = moments_of_run(problem, what.rows, what.tethers, count)
+            moments = moments_of_run(what.maps, what.rows, what.tethers, count)
             seconds = float(what.rows[-1]["time"])
         except (KeyError, ValueError, TypeError) as error:
             raise InputError(
                 f"{source}: a file of the run is damaged: {type(error).__name__}: {error}"
             ) from None
-        return Film(f"{problem.name}, carried out", problem, moments, seconds)
+        return Film(f"{problem.name}, carried out", moments, seconds)
     title = f"{problem.name}: {solution.solver}, {solution.length:.4g} {problem.units}"
     moments = moments_of_plan(problem, solution, count)
-    return Film(title, problem, moments, float(polylines.length(np.array(solution.path))))
+    return Film(title, moments, float(polylines.length(np.array(solution.path))))

@@ -187,6 +187,8 @@ class Execution(Drawn):
         Seconds that the run took.
     stopped : str
         Why a vehicle that is not simulated had to stop; empty if it had not.
+    maps : list of (float, Problem)
+        The problem as it was from some seconds on; the first from 0.
     """
 
     picture: ClassVar[str] = "netsp.pictures.execution:draw_map"
@@ -205,6 +207,7 @@ class Execution(Drawn):
     interrupted: bool = False
     wall_s: float = 0.0
     stopped: str = ""
+    maps: list[tuple[float, Problem]] = field(default_factory=list)
 
     def __repr__(self) -> str:
         """In a line."""

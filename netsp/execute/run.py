@@ -82,6 +82,7 @@ class _Run:
         self.legs: list[Leg] = legs_of(problem, solution)
         self.start = np.array(problem.base if problem.state is None else problem.state.position)
         self.delta = options.delta or suggested_delta(problem)
+        self.now = 0.0
         self._enter(problem)
         if problem.state is None:
             self.tether = self.model.start(problem.base, problem.base)
@@ -93,7 +94,7 @@ class _Run:
         if live is not None:
             self.step = LINKED_STEP
         self.water = Water(options.current, options.gusts, options.seed)
-        self.now, self.mode, self.fresh, self.leg_s = 0.0, "tour", True, 0.0
+        self.mode, self.fresh, self.leg_s = "tour", True, 0.0
         self.shorten = False
         self.unreachable: set[int] = set()
         self.path = self.legs[0].path
@@ -101,6 +102,7 @@ class _Run:
     def _enter(self, problem: Problem) -> None:
         """The scene of a problem."""
         self.problem = self.out.problem = problem
+        self.out.maps.append((round(self.now, 6), problem))
         self.scene: DistanceField = scene_of(problem).field()
         self.model = GeodesicTether(self.scene, self.delta)
 

@@ -15,7 +15,8 @@ from netsp.files import cell, make_folder, write_text
 
 
 def write_execution(done: Execution, folder: str | Path) -> None:
-    """log.csv, visits.csv, events.csv, tethers.json, summary.json, and the problem and solution."""
+    """log.csv, visits.csv, events.csv, tethers.json, summary.json, the problem at the end and the
+    solution; maps.json, the problem from some seconds on, where it changed."""
     place = make_folder(folder)
     write_text(place / "log.csv", _table([asdict(r) for r in done.rows]))
     visits = [
@@ -29,6 +30,9 @@ def write_execution(done: Execution, folder: str | Path) -> None:
     frames = [{"time": t, "nodes": [[round(float(v), 4) for v in p] for p in n]}
               for t, n in done.tethers]  # fmt: skip
     write_text(place / "tethers.json", json.dumps(frames, allow_nan=False) + "\n")
+    if len(done.maps) > 1:
+        maps = [{"time": t, "problem": json.loads(p.to_json())} for t, p in done.maps]
+        write_text(place / "maps.json", json.dumps(maps, allow_nan=False) + "\n")
     write_text(place / "problem.json", done.problem.to_json())
     write_text(place / "solution.json", done.solution.to_json())
 

@@ -37,8 +37,6 @@ class Film:
     ----------
     title : str
         Above it.
-    problem : Problem
-        The site.
     moments : sequence of Moment
         At even steps.
     length : float
@@ -46,7 +44,6 @@ class Film:
     """
 
     title: str
-    problem: Problem
     moments: Sequence[Moment]
     length: float
 
@@ -101,7 +98,8 @@ def _told(
 
 
 def _pictures(films: Sequence[Film], count: int) -> Iterator[Any]:
-    """(h, w, 3) pixels of one picture after the other. What stands still is drawn once."""
+    """(h, w, 3) pixels of one picture after the other. What stands still is drawn once for each
+    map."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -110,9 +108,7 @@ def _pictures(films: Sequence[Film], count: int) -> Iterator[Any]:
     canvas = FigureCanvasAgg(figure)
     panels = np.atleast_1d(figure.subplots(1, len(films)))
     moving = []
-    for ax, film in zip(panels, films, strict=True):
-        draw_map(film.problem, ax=ax)
-        ax.set_title(f"{film.title}\n", fontsize=10, loc="left")
+    for ax in panels:
         (path,) = ax.plot([], [], color=style.PATH, lw=1.6, zorder=8, animated=True)
         (tether,) = ax.plot([], [], color=style.TETHER, lw=2.4, zorder=9, animated=True)
         (robot,) = ax.plot(
@@ -124,13 +120,21 @@ def _pictures(films: Sequence[Film], count: int) -> Iterator[Any]:
         moving.append((path, tether, robot, text))
     style.literal(figure)
     longest = max(film.length for film in films)
-    canvas.draw()
-    still = canvas.copy_from_bbox(figure.bbox)
+    shown: list[Problem] = []
+    still = None
     for k in range(count):
+        shares = [min(k / max(count - 1, 1) * longest / film.length, 1.0) for film in films]
+        now = [
+            f.moments[round(s * (len(f.moments) - 1))] for f, s in zip(films, shares, strict=True)
+        ]
+        if [moment.problem for moment in now] != shown:
+            shown = [moment.problem for moment in now]
+            _draw_maps(panels, films, shown)
+            style.literal(figure)
+            canvas.draw()
+            still = canvas.copy_from_bbox(figure.bbox)
         canvas.restore_region(still)
-        for film, (path, tether, robot, text) in zip(films, moving, strict=True):
-            share = min(k / max(count - 1, 1) * longest / film.length, 1.0)
-            moment = film.moments[round(share * (len(film.moments) - 1))]
+        for moment, (path, tether, robot, text) in zip(now, moving, strict=True):
             path.set_data(moment.path[:, 0], moment.path[:, 1])
             tether.set_data(moment.nodes[:, 0], moment.nodes[:, 1])
             robot.set_data(moment.nodes[-1:, 0], moment.nodes[-1:, 1])
@@ -140,9 +144,30 @@ def _pictures(films: Sequence[Film], count: int) -> Iterator[Any]:
         yield np.asarray(canvas.buffer_rgba())[:, :, :3].copy()
 
 
+def _draw_maps(panels: Any, films: Sequence[Film], shown: Sequence[Problem]) -> None:
+    """All that stands still, in place of what stood there before."""
+    for ax, film, problem in zip(panels, films, shown, strict=True):
+        for artist in [*ax.patches, *ax.lines, *ax.texts, *ax.collections]:
+            if not artist.get_animated():
+                artist.remove()
+        draw_map(problem, ax=ax)
+        xmin, ymin, xmax, ymax = _view(film)
+        ax.set(xlim=(xmin, xmax), ylim=(ymin, ymax))
+        ax.set_title(f"{film.title}\n", fontsize=10, loc="left")
+
+
+def _view(film: Film) -> tuple[float, float, float, float]:
+    """What is seen of all its maps."""
+    views = np.array(
+        [view(p) for p in {m.problem.sha256: m.problem for m in film.moments}.values()]
+    )
+    low, high = views[:, :2].min(0), views[:, 2:].max(0)
+    return float(low[0]), float(low[1]), float(high[0]), float(high[1])
+
+
 def _height(film: Film) -> float:
     """Inches, so that the map fills its panel."""
-    xmin, ymin, xmax, ymax = view(film.problem)
+    xmin, ymin, xmax, ymax = _view(film)
     return float(np.clip(WIDTH * (ymax - ymin) / (xmax - xmin) + 0.8, 2.5, 2.0 * WIDTH))
 
 

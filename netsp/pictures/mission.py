@@ -78,7 +78,8 @@ def save_runs(runs: Sequence[Run], scene: Scene, file: str | Path) -> None:
         charts[0].set_xlabel("")
     axes = right.subplots(len(runs), 1, subplot_kw={"projection": "3d"}, squeeze=False)[:, 0]
     for run, ax in zip(runs, axes, strict=True):
-        left = tuple(int(left["waypoint"]) for left in run.summary["left_out"])
+        visited = {int(stop["waypoint"]) for stop in run.summary["stops"]}
+        left = tuple(set(range(len(run.mission.waypoints))) - visited)
         stops = Stops(run.mission.places, left, name="waypoint visited")
         draw_space(scene, path_of(run), run.tether.nodes, ax=ax, stops=stops)
         track = Track.of(run.mission)

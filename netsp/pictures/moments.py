@@ -33,11 +33,14 @@ class Moment:
         What was gone so far.
     text : str
         How far it is.
+    problem : Problem
+        The site, as it is then.
     """
 
     nodes: Floats
     path: Floats
     text: str
+    problem: Problem
 
 
 def moments_of_plan(problem: Problem, solution: Solution, count: int) -> list[Moment]:
@@ -74,19 +77,20 @@ def moments_of_plan(problem: Problem, solution: Solution, count: int) -> list[Mo
             f"{u:.4g} of {s[-1]:.4g} {problem.units}; tether {state.length:.4g} of "
             f"{problem.tether_length:g} {problem.units}"
         )
-        out.append(Moment(state.nodes, np.vstack([path[:passed], here]), text))
+        out.append(Moment(state.nodes, np.vstack([path[:passed], here]), text, problem))
     return out
 
 
 def moments_of_run(
-    problem: Problem, rows: Sequence[dict[str, str]], tethers: Sequence[dict[str, Any]], count: int
-) -> list[Moment]:
+    maps: Sequence[tuple[float, Problem]], rows: Sequence[dict[str, str]],
+    tethers: Sequence[dict[str, Any]], count: int,
+) -> list[Moment]:  # fmt: skip
     """Moments of a run that were recorded.
 
     Parameters
     ----------
-    problem : Problem
-        The site.
+    maps : sequence of (float, Problem)
+        The site as it is from some seconds on; the first from 0.
     rows : sequence of dict
         Of log.csv.
     tethers : sequence of dict
@@ -113,11 +117,13 @@ def moments_of_run(
         nodes = np.array(frame["nodes"], dtype=float)
         k = min(int(np.searchsorted(times, frame["time"])), len(rows) - 1)
         row = rows[k]
+        problem = [p for since, p in maps if since <= max(frame["time"], 0.0)][-1]
         text = (
             f"{frame['time']:.4g} s; tether {float(row['tether']):.4g} of {float(row['limit']):g} "
             f"{problem.units}; next: {next_of(problem, int(row['goal']))}"
         )
-        out.append(Moment(nodes, np.vstack([path[: k : max(1, k // THIN)], nodes[-1:]]), text))
+        gone = np.vstack([path[: k : max(1, k // THIN)], nodes[-1:]])
+        out.append(Moment(nodes, gone, text, problem))
     return out
 
 

@@ -22,6 +22,10 @@ SMALL = 0.012
 """Radius of the smallest circle that bears its own name, in units of the map."""
 
 
+TEXTURE = 1000.0
+"""Edges that are drawn at full strength."""
+
+
 def save(problem: Problem, solution: Solution | None, path: str | Path) -> None:
     """Draw a problem, with a solution if given, to a file; InputError if it cannot be written."""
     style.save(draw(problem, solution), path)
@@ -98,7 +102,11 @@ def save_roadmap(problem: Problem, roadmap: str, options: dict[str, Any], path: 
         counted = (
             f"{len(t.arcs)} arcs, {len(lines) // 2} tangents, {len(built.cluster) - 1} classes"
         )
-    ax.add_collection(LineCollection(list(lines), colors=style.PATH, lw=0.35, alpha=0.35, zorder=2))
+    # thousands of edges are a texture, and obstacles, goals and milestones are seen through it
+    alpha = float(np.clip(TEXTURE / max(len(lines), 1), 0.04, 0.35))
+    ax.add_collection(
+        LineCollection(list(lines), colors=style.PATH, lw=0.35, alpha=alpha, zorder=2)
+    )
     ax.set_title(f"{problem.name}: {roadmap} roadmap, {counted}", fontsize=10, loc="left")
     style.save(figure, path)
 

@@ -137,7 +137,6 @@ def _figure(
     draw_space(scene, path, nodes, ax=ax, stops=stops)
     cloud = drawn_points(scene) if scene.cloud is not None else np.zeros((0, 3))
     unit = scene.units
-    ax.set(xlabel=f"x ({unit})", ylabel=f"y ({unit})", zlabel=f"z ({unit})")
     names = ("x", "y", "z")
     views = ((0, 1, "from above"), (0, 2, "from the south"), (1, 2, "from the east"))
     for panel, (a, b, name) in zip(right.subplots(3, 1), views, strict=True):
@@ -183,9 +182,12 @@ def draw_space(
         draw_stops(ax, stops, (0, 1, 2))
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
     ax.set_box_aspect(high - low, zoom=0.85)  # room for the labels
-    ax.set(xlabel="x (m)", ylabel="y (m)", zlabel="z (m)")
-    ax.tick_params(labelsize=7)
+    # beyond the numbers of the ticks, along the longer sides farther
     widest = float((high - low).max())
+    for name, size in zip("xyz", high - low, strict=True):
+        label = getattr(ax, f"set_{name}label")
+        label(f"{name} ({scene.units})", labelpad=2.0 + 12.0 * float(size) / widest)
+    ax.tick_params(labelsize=7)
     for axis, size in zip((ax.xaxis, ax.yaxis, ax.zaxis), high - low, strict=True):
         axis.set_major_locator(MaxNLocator(5 if size > 0.5 * widest else 3))
     return ax
@@ -198,7 +200,7 @@ def draw_stops(ax: Any, stops: Stops, axes: tuple[int, ...]) -> None:
     some = np.isin(np.arange(len(stops.places)), stops.left_out)
     for chosen, look, label in (
         (~some, {"marker": "o", "ms": 4, "color": style.VISITED}, stops.name),
-        (some, {"marker": "x", "ms": 6, "mew": 1.8, "color": style.LEFT_OUT}, "left out"),
+        (some, {"marker": "x", "ms": 6, "mew": 1.8, "color": style.LEFT_OUT}, "not visited"),
     ):
         there = stops.places[chosen][:, columns]
         if len(there):

@@ -15,22 +15,22 @@ LINES, MARKERS = ("-", "--", "-.", ":"), "os^Dv<>"
 
 
 def _figure(columns: int = 1) -> tuple[Any, Any]:
-    import matplotlib
+    from matplotlib.figure import Figure
 
-    matplotlib.use("Agg")
-    from matplotlib import pyplot as plt
-
-    width = 4.2 * columns + 1.8
-    figure, axes = plt.subplots(
-        1, columns, figsize=(width, 3.6), sharey=True, squeeze=False, layout="constrained"
-    )
-    return figure, axes
+    figure = Figure(figsize=(4.2 * columns + 1.8, 3.6), layout="constrained")
+    return figure, figure.subplots(1, columns, sharey=True, squeeze=False)
 
 
 def _style(k: int) -> dict[str, Any]:
     colours = len(style.SERIES)
-    look = {"color": style.SERIES[k % colours], "linestyle": LINES[k // colours % len(LINES)]}
+    # curves that coincide are told apart by their dashes, in grey as well
+    look = {"color": style.SERIES[k % colours], "linestyle": LINES[k % len(LINES)]}
     return {**look, "marker": MARKERS[k % len(MARKERS)], "ms": 4.0}
+
+
+def _legend(panel: Any) -> None:
+    """Beside the panel, where it hides no curve."""
+    panel.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.02, 1.0), handlelength=3.0)
 
 
 def by_goals(
@@ -57,14 +57,16 @@ def by_goals(
                 spread = [mid - [s.low for _, s in points], [s.high for _, s in points] - mid]
                 panel.errorbar(at, mid, spread, label=name, capsize=2, lw=1.2, **_style(k))
         panel.set(
-            title=f"tether {tether:g}", xlabel="goals", xticks=sorted({c.goals for c in cells})
+            title=f"tether {tether:g}",
+            xlabel="number of goals",
+            xticks=sorted({c.goals for c in cells}),
         )
         panel.grid(alpha=0.3)
         if log:
             panel.set_yscale("log")
     axes[0][0].set_ylabel(label)
     if axes[0][-1].get_legend_handles_labels()[0]:
-        axes[0][-1].legend(fontsize="x-small", loc="upper left", bbox_to_anchor=(1.02, 1.0))
+        _legend(axes[0][-1])
     return figure
 
 
@@ -75,7 +77,9 @@ def lengths(cells: dict[Cell, list[TrialRow]], best: dict[str, float]) -> Any:
 
 def times(cells: dict[Cell, list[TrialRow]]) -> Any:
     """Seconds, roadmap and legs included, as Fig. 5d to f."""
-    return by_goals(cells, lambda r: r["total_s"] if r.get("length") else None, "seconds", log=True)
+    return by_goals(
+        cells, lambda r: r["total_s"] if r.get("length") else None, "time (s)", log=True
+    )
 
 
 def entanglements(cells: dict[Cell, list[TrialRow]]) -> Any | None:
@@ -88,9 +92,11 @@ def entanglements(cells: dict[Cell, list[TrialRow]]) -> Any | None:
 
 def performance(by_method: dict[str, list[TrialRow]]) -> Any | None:
     """Share of problems proven within a multiple of the fastest time; None if nothing is
-    proven, or there is only one method."""
+    fewer than two methods prove any."""
+    from matplotlib.ticker import NullFormatter, StrMethodFormatter
+
     ratios = profile(by_method)
-    if not ratios or len(by_method) < 2:
+    if sum(bool(np.isfinite(r).any()) for r in ratios.values()) < 2:
         return None
     figure, axes = _figure()
     panel = axes[0][0]
@@ -103,10 +109,12 @@ def performance(by_method: dict[str, list[TrialRow]]) -> Any | None:
         style = {**_style(k), "marker": ""}
         panel.plot(x, share, label=name, **style)
     panel.set(xscale="log", xlim=(1.0, most), ylim=(-0.02, 1.02), ylabel="share proven",
-              xlabel="time over that of the fastest")  # fmt: skip
+              xlabel="times the seconds of the fastest")  # fmt: skip
+    panel.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+    panel.xaxis.set_minor_formatter(NullFormatter())
     panel.grid(alpha=0.3)
     if panel.get_legend_handles_labels()[0]:
-        panel.legend(fontsize="x-small", loc="lower right")
+        _legend(panel)
     return figure
 
 
@@ -126,7 +134,7 @@ def anytime(by_method: dict[str, list[TrialRow]], best: dict[str, float]) -> Any
             drawn = True
     if not drawn:
         return None
-    panel.set(xscale="log", xlabel="seconds", ylabel="median % over the best known")
+    panel.set(xscale="log", xlabel="time (s)", ylabel="median % over the best known")
     panel.set_yscale("symlog", linthresh=0.1, linscale=0.5)
     panel.yaxis.set_major_locator(FixedLocator([0.0, *(10.0**k for k in range(-1, 7))]))
     panel.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
@@ -134,14 +142,5 @@ def anytime(by_method: dict[str, list[TrialRow]], best: dict[str, float]) -> Any
     panel.set_ylim(bottom=-0.02)
     panel.grid(alpha=0.3)
     if panel.get_legend_handles_labels()[0]:
-        panel.legend(fontsize="x-small", loc="upper left", bbox_to_anchor=(1.02, 1.0))
+        _legend(panel)
     return figure
-
-
-def svg(figure: Any) -> str:
-    """A figure as inline SVG."""
-    from matplotlib import pyplot as plt
-
-    text = style.svg(figure)
-    plt.close(figure)
-    return text

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -33,6 +34,8 @@ class Opened:
         Of a run.
     run : Path or None
         Its folder.
+    maps : sequence of (float, Problem)
+        The site as it was from some seconds on; the first from 0.
     """
 
     problem: Problem
@@ -40,6 +43,7 @@ class Opened:
     rows: list[dict[str, str]]
     tethers: list[dict[str, Any]] | None
     run: Path | None
+    maps: Sequence[tuple[float, Problem]]
 
 
 def opened(source: str | Path, problem_file: str | Path | None) -> Opened:
@@ -93,7 +97,21 @@ def opened(source: str | Path, problem_file: str | Path | None) -> Opened:
     if run is not None and not rows:
         raise InputError(f"{run / 'log.csv'}: holds no row")
     tethers = json_of(run / "tethers.json") if run else None
-    return Opened(problem, solution, rows, tethers, run)
+    maps = [(0.0, problem)]
+    if run is not None and (run / "maps.json").exists():
+        maps = _maps_of(run / "maps.json")
+    return Opened(problem, solution, rows, tethers, run, maps)
+
+
+def _maps_of(file: Path) -> list[tuple[float, Problem]]:
+    found = json_of(file)
+    try:
+        return [
+            (float(m["time"]), Problem.from_json(json.dumps(m["problem"]), source=str(file)))
+            for m in found
+        ]
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(f"{file}: expected times and problems: {error}") from None
 
 
 def json_of(file: Path) -> Any:

@@ -74,7 +74,7 @@ def write_report(results: str | Path, output: str | Path, pictures: str | None =
         if pictures:
             style.save(figure, output.with_name(f"{output.stem}-{name}.{pictures}"))
         caption = html.escape(CAPTIONS[name])
-        parts.append(f"<figure>{figures.svg(figure)}<figcaption>{caption}</figcaption></figure>")
+        parts.append(f"<figure>{style.svg(figure)}<figcaption>{caption}</figcaption></figure>")
     parts += [
         _cells_table(by_cell, best),
         _proofs_table(by_cell),

@@ -95,7 +95,7 @@ def page(
         Of a run, else empty.
     """
     moments = (
-        moments_of_run(problem, rows, tethers, FRAMES) if tethers
+        moments_of_run([(0.0, problem)], rows, tethers, FRAMES) if tethers
         else moments_of_plan(problem, solution, FRAMES)
     )  # fmt: skip
     view = chart.View(problem, np.vstack([m.nodes for m in moments]))
