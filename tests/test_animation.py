@@ -1,5 +1,9 @@
 """Moving pictures of tours and runs."""
 
+import json
+import shutil
+from pathlib import Path
+
 import numpy as np
 import pytest
 from PIL import Image
@@ -10,10 +14,15 @@ from netsp.execute.events import Event, Surprises
 from netsp.execute.log import ExecutionOptions
 from netsp.execute.run import execute
 from netsp.execute.write import write_execution
+from netsp.online.log import read_run, write_run
+from netsp.online.mission import Mission
+from netsp.online.simulate import simulate
 from netsp.pictures import style
 from netsp.pictures.animation import Film, save_animation
-from netsp.pictures.moments import moments_of_plan
+from netsp.pictures.moments import moments_of_flight, moments_of_plan
+from tests.pages import unpacked
 
+ROOT = Path(__file__).parent.parent
 SITE = Problem(
     base=(0, 0), goals=[(6, 2, -1), (6.5, -2, -1)], tether_length=12,
     obstacles=[Circle(center=(4, 0), radius=0.6, name="pile")], clearance=0.4,
@@ -133,3 +142,74 @@ def test_an_obstacle_that_appears_is_in_the_film_from_then_on_and_not_before(fil
     assert before
     assert after
     assert min(after) > 1.5 * max(before)
+
+
+@pytest.fixture(scope="module")
+def flight(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("flight")
+    mission = Mission.load(ROOT / "missions" / "basin.json")
+    mission = mission.model_copy(update={"waypoints": mission.waypoints[:6]})
+    scene = mission.load_scene()
+    run = simulate(mission, scene=scene)
+    write_run(run, folder / "run")
+    return folder, run, scene
+
+
+def test_a_flight_reads_back_as_it_was_written(flight):
+    folder, run, _ = flight
+    again = read_run(folder / "run")
+    assert again.planner == run.planner
+    assert again.summary == run.summary
+    assert len(again.log) == len(run.log)
+    for a, b in zip(again.log, run.log, strict=True):
+        assert (a.waypoint, a.mode, a.shortening) == (b.waypoint, b.mode, b.shortening)
+        assert (a.time, a.x, a.tether) == pytest.approx((b.time, b.x, b.tether), abs=1e-5)
+
+
+def test_the_tether_of_a_flight_is_as_long_as_its_log_says(flight):
+    _, run, scene = flight
+    stamps = np.array([r.time for r in run.log])
+    for moment in moments_of_flight(run, scene, 30):
+        time = float(moment.text.split(" s;")[0])
+        told = run.log[int(np.argmin(np.abs(stamps - time)))].tether
+        drawn = float(np.linalg.norm(np.diff(moment.nodes, axis=0), axis=1).sum())
+        assert drawn == pytest.approx(told, abs=0.06)
+
+
+def test_a_flight_is_shown_in_space_as_a_gif_and_as_a_page(flight):
+    folder, _, _ = flight
+    gif, page = folder / "f.gif", folder / "f.html"
+    assert main(["animate", str(folder / "run"), "-o", str(gif), "--seconds", "2", "--quiet"]) == 0
+    with Image.open(gif) as film:
+        film.seek(film.n_frames // 2)
+        assert seen(film, style.TETHER) > 50
+        assert seen(film, style.ROBOT) > 20
+    assert main(["animate", str(folder / "run"), "-o", str(page)]) == 0
+    assert len(unpacked(page)["frames"]) == 120
+
+
+def test_a_page_of_a_tour_has_a_button_that_plays(files):
+    page = files / "tour.html"
+    told = ["animate", str(files / "s.json"), "--problem", str(files / "p.json")]
+    assert main([*told, "-o", str(page)]) == 0
+    assert 'id="play"' in page.read_text()
+
+
+def test_a_flight_that_is_damaged_or_whose_map_changed_is_told_in_a_line(flight, tmp_path, capsys):
+    folder, run, _ = flight
+    for change, says in (
+        (lambda f: (f / "log.csv").write_text("time,x\n1,2\n"), "damaged"),
+        (lambda f: (f / "log.csv").write_text("time,x\n"), "holds no row"),
+        (lambda f: (f / "summary.json").write_text(
+            json.dumps({**run.summary, "surprises": {"appear": 1}})), "the map changed"),
+    ):  # fmt: skip
+        copy = tmp_path / says.split()[0]
+        shutil.copytree(folder / "run", copy)
+        data = json.loads((copy / "mission.json").read_text())
+        data["scene"] = str(ROOT / "scenes" / "basin.json")
+        (copy / "mission.json").write_text(json.dumps(data))
+        change(copy)
+        assert main(["animate", str(copy), "-o", str(tmp_path / "x.gif")]) == 2
+        told = capsys.readouterr().err
+        assert says in told
+        assert told.count("\n") == 1

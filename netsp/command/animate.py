@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,11 +21,16 @@ def arguments(p: argparse.ArgumentParser) -> None:
     """Of the command line."""
     p.add_argument(
         "source", metavar="SOURCE", nargs="+",
-        help="a solution, or the folder of a run of `netsp execute`; several stand side by side",
+        help="a solution, or the folder of a run of `netsp execute` or `netsp simulate`; several "
+        "stand side by side",
     )  # fmt: skip
     p.add_argument("--problem", metavar="FILE", help="the problem of solution files")
     p.add_argument(
-        "-o", "--output", required=True, metavar="FILE", help="gif, or mp4 (extra video)"
+        "-o",
+        "--output",
+        required=True,
+        metavar="FILE",
+        help="gif, mp4 (extra video), or a page (html) with a slider, of one",
     )
     p.add_argument(
         "--seconds", type=positive, default=12, metavar="N", help="how long it is; default 12"
@@ -33,7 +39,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument("--quiet", action="store_true", help="no progress")
 
 
-MOST_SIDE_BY_SIDE = 3
+MOST_SIDE_BY_SIDE, PAGE = 3, ".html"
 
 
 def run(args: argparse.Namespace) -> int:
@@ -41,12 +47,15 @@ def run(args: argparse.Namespace) -> int:
     check_writable(args.output, inputs=(*args.source, args.problem))
     from netsp.pictures.animation import FORMATS, save_animation
 
-    if Path(args.output).suffix.lower() not in FORMATS:
-        raise InputError(f"{args.output}: expected a name ending in {' or '.join(FORMATS)}")
+    kinds = (*FORMATS, PAGE)
+    if Path(args.output).suffix.lower() not in kinds:
+        raise InputError(f"{args.output}: expected a name ending in {', '.join(kinds)}")
     if len(args.source) > MOST_SIDE_BY_SIDE:
         raise InputError(
             f"SOURCE: {len(args.source)} of them; expected {MOST_SIDE_BY_SIDE} or fewer"
         )
+    if Path(args.output).suffix.lower() == PAGE:
+        return _page(args)
     count = args.seconds * args.fps
     films = [_film(source, args.problem, count) for source in args.source]
 
@@ -58,7 +67,47 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
+def _is_flight(source: str) -> bool:
+    """Whether it is the folder of a flight in space."""
+    place = Path(source)
+    return (place / "mission.json").exists() and not (place / "solution.json").exists()
+
+
+def _page(args: argparse.Namespace) -> int:
+    """A page that plays."""
+    flights = [_is_flight(source) for source in args.source]
+    if all(flights):
+        from netsp.online.log import read_run
+        from netsp.pictures.mission import save_page
+
+        runs = [read_run(source) for source in args.source]
+        save_page(runs, runs[0].mission.load_scene(), args.output)
+        return 0
+    if len(args.source) > 1:
+        raise InputError(f"{args.output}: a page shows one tour, or flights in space; expected one")
+    from netsp.report.tour import report_tour
+
+    report_tour(args.source[0], args.problem, args.output)
+    return 0
+
+
+def _flight(source: str, count: int) -> Film:
+    from netsp.online.log import read_run
+    from netsp.pictures.animation import Film, Space
+    from netsp.pictures.mission import stops_of
+    from netsp.pictures.moments import moments_of_flight
+
+    run = read_run(source)
+    scene = run.mission.load_scene()
+    title = f"{run.mission.name}, by {run.planner}"
+    stops = replace(stops_of(run), anchor=run.mission.anchor)
+    moments = moments_of_flight(run, scene, count)
+    return Film(title, moments, run.log[-1].time, Space(scene, stops))
+
+
 def _film(source: str, problem_file: str | None, count: int) -> Film:
+    if _is_flight(source):
+        return _flight(source, count)
     import numpy as np
 
     from netsp.geometry import polylines

@@ -6,15 +6,21 @@ import csv
 import io
 import json
 import os
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
+import numpy as np
+
 from netsp.drawn import Drawn
 from netsp.errors import InputError
+from netsp.files import read_text
+from netsp.models import parse_json_object
 from netsp.online.mission import Mission
 from netsp.online.scene.scene import Scene
 from netsp.online.tether import Tether
+from netsp.online.tether.strand import WIDTH
 
 
 @dataclass(frozen=True)
@@ -146,6 +152,59 @@ def write_run(run: Run, folder: str | Path) -> None:
         (place / "mission.json").write_text(mission + "\n", encoding="utf-8")
     except OSError as error:
         raise InputError(f"{folder}: cannot be written: {error.strerror or error}") from None
+
+
+def read_run(folder: str | Path) -> Run:
+    """A run from its files. How its tether hung is a matter of driving it again; here it is
+    straight.
+
+    Parameters
+    ----------
+    folder : str or Path
+        As of `write_run`.
+
+    Returns
+    -------
+    Run
+        As it was.
+
+    Raises
+    ------
+    InputError
+        Files that cannot be read or are damaged; a run whose map changed: how its tether hung
+        meanwhile is not kept.
+    """
+    place = Path(folder)
+    mission = Mission.load(place / "mission.json")
+    summary = parse_json_object(read_text(place / "summary.json"), str(place / "summary.json"))
+    file = place / "log.csv"
+    rows = list(csv.DictReader(read_text(file).splitlines()))
+    try:
+        log = tuple(LogRow(**{k: _KINDS[k](v) for k, v in row.items()}) for row in rows)
+        planner = str(summary["planner"])
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(f"{folder}: a file of the run is damaged: {error}") from None
+    if not log:
+        raise InputError(f"{file}: holds no row")
+    if summary.get("surprises"):
+        raise InputError(
+            f"{folder}: the map changed during this run, and how its tether hung meanwhile is not "
+            "kept; expected a run without surprises"
+        )
+    strand = np.zeros((2, WIDTH))
+    strand[:, :3] = mission.anchor, (log[-1].x, log[-1].y, log[-1].z)
+    return Run(mission, planner, log, Tether(strand, log[-1].tether), summary)
+
+
+def _yes(text: str) -> bool:
+    return text == "True"
+
+
+_KINDS: dict[str, Callable[[str], Any]] = {
+    **dict.fromkeys(LogRow.__dataclass_fields__, float), "waypoint": int, "mode": str,
+    "shortening": _yes,
+}  # fmt: skip
+"""What the columns of log.csv hold."""
 
 
 def _short(value: Any) -> Any:

@@ -12,9 +12,11 @@ from typing import Any
 import numpy as np
 
 from netsp.errors import InputError
+from netsp.online.scene.scene import Scene
 from netsp.pictures import style
 from netsp.pictures.moments import Moment
 from netsp.pictures.problem import draw_map, view
+from netsp.pictures.scene import Stops, draw_space
 from netsp.problem import Problem
 
 FORMATS = (".gif", ".mp4")
@@ -25,8 +27,27 @@ COLOURS = 64
 WIDTH, DPI = 6.4, 100
 """Inches of a panel, and pixels in each."""
 
+HIGH = 5.6
+"""Inches of a panel in space."""
+
 HOLD_S = 1.5
 """Seconds that the last picture stays."""
+
+
+@dataclass(frozen=True)
+class Space:
+    """A scene in space.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    stops : Stops
+        Waypoints.
+    """
+
+    scene: Scene
+    stops: Stops
 
 
 @dataclass(frozen=True)
@@ -41,11 +62,14 @@ class Film:
         At even steps.
     length : float
         Of it all: seconds of a run, or metres of a tour. Beside a longer one, it ends earlier.
+    space : Space, optional
+        What stands still in a picture in space; by default, the map of each moment.
     """
 
     title: str
     moments: Sequence[Moment]
     length: float
+    space: Space | None = None
 
 
 def save_animation(
@@ -106,21 +130,25 @@ def _pictures(films: Sequence[Film], count: int) -> Iterator[Any]:
     height = max(map(_height, films))
     figure = Figure(figsize=(WIDTH * len(films), height), dpi=DPI, layout="constrained")
     canvas = FigureCanvasAgg(figure)
-    panels = np.atleast_1d(figure.subplots(1, len(films)))
-    moving = []
-    for ax in panels:
-        (path,) = ax.plot([], [], color=style.PATH, lw=1.6, zorder=8, animated=True)
-        (tether,) = ax.plot([], [], color=style.TETHER, lw=2.4, zorder=9, animated=True)
-        (robot,) = ax.plot(
-            [], [], "o", ms=9, color=style.ROBOT, mec=style.BASE, mew=0.8, zorder=10, animated=True
-        )
-        text = ax.text(
+    panels: list[Any] = [
+        figure.add_subplot(1, len(films), k, projection="3d" if film.space else None)
+        for k, film in enumerate(films, 1)
+    ]
+    moving: list[tuple[Any, ...]] = []
+    for ax, film in zip(panels, films, strict=True):
+        none: tuple[list[float], ...] = ([], [], []) if film.space else ([], [])
+        (path,) = ax.plot(*none, color=style.PATH, lw=1.6, zorder=8, animated=True)
+        (tether,) = ax.plot(*none, color=style.TETHER, lw=2.4, zorder=9, animated=True)
+        look = {"marker": "o", "ms": 9, "color": style.ROBOT, "mec": style.BASE, "mew": 0.8}
+        (robot,) = ax.plot(*none, **look, zorder=10, animated=True)
+        write = ax.text2D if film.space else ax.text
+        text = write(
             0.0, 1.02, "", transform=ax.transAxes, fontsize=8, color=style.EDGE, animated=True
         )
         moving.append((path, tether, robot, text))
     style.literal(figure)
     longest = max(film.length for film in films)
-    shown: list[Problem] = []
+    shown: list[Problem | None] | None = None
     still = None
     for k in range(count):
         shares = [min(k / max(count - 1, 1) * longest / film.length, 1.0) for film in films]
@@ -135,18 +163,37 @@ def _pictures(films: Sequence[Film], count: int) -> Iterator[Any]:
             still = canvas.copy_from_bbox(figure.bbox)
         canvas.restore_region(still)
         for moment, (path, tether, robot, text) in zip(now, moving, strict=True):
-            path.set_data(moment.path[:, 0], moment.path[:, 1])
-            tether.set_data(moment.nodes[:, 0], moment.nodes[:, 1])
-            robot.set_data(moment.nodes[-1:, 0], moment.nodes[-1:, 1])
+            for line, points in (
+                (path, moment.path), (tether, moment.nodes), (robot, moment.nodes[-1:]),
+            ):  # fmt: skip
+                if line.axes.name == "3d":
+                    line.set_data_3d(*points.T)
+                else:
+                    line.set_data(*points.T[:2])
             text.set_text(moment.text)
             for artist in (path, tether, robot, text):
                 figure.draw_artist(artist)
         yield np.asarray(canvas.buffer_rgba())[:, :, :3].copy()
 
 
-def _draw_maps(panels: Any, films: Sequence[Film], shown: Sequence[Problem]) -> None:
+def _draw_space(ax: Any, film: Film, space: Space) -> None:
+    """A scene, seen as far as the robot goes."""
+    every = np.vstack([m.nodes for m in film.moments] + [film.moments[-1].path])
+    draw_space(space.scene, every, np.zeros((0, 3)), ax=ax, stops=space.stops)
+    for line in ax.lines:
+        if line.get_label() == "path" and not line.get_animated():
+            line.remove()
+    ax.set_title(f"{film.title}\n", fontsize=10, loc="left")
+
+
+def _draw_maps(panels: Any, films: Sequence[Film], shown: Sequence[Problem | None]) -> None:
     """All that stands still, in place of what stood there before."""
     for ax, film, problem in zip(panels, films, shown, strict=True):
+        if film.space is not None:
+            if not ax.collections:
+                _draw_space(ax, film, film.space)
+            continue
+        assert problem is not None
         for artist in [*ax.patches, *ax.lines, *ax.texts, *ax.collections]:
             if not artist.get_animated():
                 artist.remove()
@@ -158,15 +205,16 @@ def _draw_maps(panels: Any, films: Sequence[Film], shown: Sequence[Problem]) -> 
 
 def _view(film: Film) -> tuple[float, float, float, float]:
     """What is seen of all its maps."""
-    views = np.array(
-        [view(p) for p in {m.problem.sha256: m.problem for m in film.moments}.values()]
-    )
+    maps = {id(m.problem): m.problem for m in film.moments if m.problem is not None}
+    views = np.array([view(problem) for problem in maps.values()])
     low, high = views[:, :2].min(0), views[:, 2:].max(0)
     return float(low[0]), float(low[1]), float(high[0]), float(high[1])
 
 
 def _height(film: Film) -> float:
     """Inches, so that the map fills its panel."""
+    if film.space is not None:
+        return HIGH
     xmin, ymin, xmax, ymax = _view(film)
     return float(np.clip(WIDTH * (ymax - ymin) / (xmax - xmin) + 0.8, 2.5, 2.0 * WIDTH))
 

@@ -9,9 +9,9 @@ import numpy as np
 
 from netsp.errors import counted
 from netsp.execute.log import Execution
+from netsp.execute.passing import Maps, lasting, passing
 from netsp.pictures import style
 from netsp.pictures.problem import draw_obstacles
-from netsp.problem import Obstacle
 
 
 def save_execution(done: Execution, file: str | Path) -> None:
@@ -39,12 +39,10 @@ def draw_map(done: Execution, *, ax: Any = None) -> Any:
     if ax is None:
         ax = Figure(figsize=(7, 6), layout="constrained").subplots()
     few = len(problem.obstacles) <= 40
-    first = done.maps[0][1] if done.maps else problem
-    at_first = first.model_copy(update={
-        "obstacles": tuple(o for o in first.obstacles if _standing(done, o) is None)
-    })  # fmt: skip
+    maps = done.maps or [(0.0, problem)]
+    at_first = lasting(maps)
     draw_obstacles(ax, at_first, label=at_first.obstacle_name if few else None)
-    _draw_passing(ax, done)
+    _draw_passing(ax, maps)
     plan = np.array(done.solution.path).reshape(-1, 3)
     path = np.array([[r.x, r.y] for r in done.rows])
     ax.plot(plan[:, 0], plan[:, 1], color=style.PLAN, lw=1.0, ls="--", label="plan")
@@ -69,37 +67,15 @@ def draw_map(done: Execution, *, ax: Any = None) -> Any:
     return ax
 
 
-def _standing(done: Execution, obstacle: Obstacle) -> tuple[float, float | None] | None:
-    """From when until when an obstacle stood there; None for all the time."""
-    there = [obstacle in p.obstacles for _, p in done.maps]
-    if all(there):
-        return None
-    first = there.index(True)
-    gone = next(
-        (t for (t, _), on in zip(done.maps[first:], there[first:], strict=True) if not on), None
-    )
-    return done.maps[first][0], gone
-
-
-def _draw_passing(ax: Any, done: Execution) -> None:
+def _draw_passing(ax: Any, maps: Maps) -> None:
     """Obstacles that stood there for a time only, by their outline and their times."""
-    seen: list[Obstacle] = []
-    for _, problem in done.maps:
-        for k, obstacle in enumerate(problem.obstacles):
-            span = _standing(done, obstacle)
-            if span is None or obstacle in seen:
-                continue
-            seen.append(obstacle)
-            rim = np.asarray(obstacle.shape(0.0).exterior.coords)[:, :2]
-            ax.fill(*rim.T, fc=style.OBSTACLE, ec=style.EDGE, ls="--", lw=0.9, alpha=0.6, zorder=1)
-            begin, end = span
-            when = f"until {end:.0f} s" if end is not None else f"from {begin:.0f} s"
-            if end is not None and begin > 0.0:
-                when = f"{begin:.0f} to {end:.0f} s"
-            ax.annotate(
-                f"{problem.obstacle_name(k)}\n{when}", rim[:-1].mean(0), ha="center", va="center",
-                fontsize=6.5, path_effects=style.halo(), zorder=5,
-            )  # fmt: skip
+    for p in passing(maps):
+        rim = np.asarray(p.obstacle.shape(0.0).exterior.coords)[:, :2]
+        ax.fill(*rim.T, fc=style.OBSTACLE, ec=style.EDGE, ls="--", lw=0.9, alpha=0.6, zorder=1)
+        ax.annotate(
+            f"{p.name}\n{p.when}", rim[:-1].mean(0), ha="center", va="center", fontsize=6.5,
+            path_effects=style.halo(), zorder=5,
+        )  # fmt: skip
 
 
 def draw_tether(done: Execution, *, ax: Any = None) -> Any:

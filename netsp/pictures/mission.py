@@ -58,6 +58,13 @@ def title_of(run: Run) -> str:
     )
 
 
+def stops_of(run: Run) -> Stops:
+    """Its waypoints, and which of them were not visited."""
+    visited = {int(stop["waypoint"]) for stop in run.summary["stops"]}
+    left = tuple(sorted(set(range(len(run.mission.waypoints))) - visited))
+    return Stops(run.mission.places, left, name="waypoint visited")
+
+
 def save_runs(runs: Sequence[Run], scene: Scene, file: str | Path) -> None:
     """Tether length and coverage over time, and each run in space.
 
@@ -78,10 +85,7 @@ def save_runs(runs: Sequence[Run], scene: Scene, file: str | Path) -> None:
         charts[0].set_xlabel("")
     axes = right.subplots(len(runs), 1, subplot_kw={"projection": "3d"}, squeeze=False)[:, 0]
     for run, ax in zip(runs, axes, strict=True):
-        visited = {int(stop["waypoint"]) for stop in run.summary["stops"]}
-        left = tuple(set(range(len(run.mission.waypoints))) - visited)
-        stops = Stops(run.mission.places, left, name="waypoint visited")
-        draw_space(scene, path_of(run), run.tether.nodes, ax=ax, stops=stops)
+        draw_space(scene, path_of(run), run.tether.nodes, ax=ax, stops=stops_of(run))
         track = Track.of(run.mission)
         if track is not None:
             gone = track.between(0.0, run.log[-1].time)

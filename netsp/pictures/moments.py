@@ -11,9 +11,11 @@ import numpy as np
 from netsp.arrays import Floats
 from netsp.execute.plan import HOME
 from netsp.geometry import polylines
-from netsp.online.scene.scene import scene_of
+from netsp.online.log import Run
+from netsp.online.scene.scene import Scene, scene_of
 from netsp.online.tether import GeodesicTether
 from netsp.online.tether.resolution import suggested_delta
+from netsp.pictures.mission import path_of, tethers_along
 from netsp.problem import Problem
 from netsp.solution import Solution
 
@@ -33,14 +35,14 @@ class Moment:
         What was gone so far.
     text : str
         How far it is.
-    problem : Problem
-        The site, as it is then.
+    problem : Problem or None
+        The site, as it is then; None in space.
     """
 
     nodes: Floats
     path: Floats
     text: str
-    problem: Problem
+    problem: Problem | None = None
 
 
 def moments_of_plan(problem: Problem, solution: Solution, count: int) -> list[Moment]:
@@ -124,6 +126,39 @@ def moments_of_run(
         )
         gone = np.vstack([path[: k : max(1, k // THIN)], nodes[-1:]])
         out.append(Moment(nodes, gone, text, problem))
+    return out
+
+
+def moments_of_flight(run: Run, scene: Scene, count: int) -> list[Moment]:
+    """Moments of a flight in space: its tether is driven again along the path.
+
+    Parameters
+    ----------
+    run : Run
+        The flight.
+    scene : Scene
+        Its scene.
+    count : int
+        How many, about.
+
+    Returns
+    -------
+    list of Moment
+        The last one among them.
+    """
+    path = path_of(run)
+    stamps = np.array([r.time for r in run.log])
+    rows = np.searchsorted(stamps, np.linspace(0.0, stamps[-1], count))
+    rows = np.minimum(rows, len(stamps) - 1)
+    units, out = scene.units, []
+    for row, tether in zip(rows, tethers_along(run, scene, rows), strict=True):
+        r = run.log[row]
+        text = (
+            f"{r.time:.4g} s; tether {r.tether:.4g} of {r.limit:g} {units}; "
+            f"{min(r.waypoint, len(run.mission.waypoints))} of {len(run.mission.waypoints)} visited"
+        )
+        gone = np.vstack([path[: row : max(1, row // THIN)], path[row]])
+        out.append(Moment(np.vstack([tether.nodes[:-1], path[row]]), gone, text))
     return out
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.arrays import Floats
+from netsp.execute.passing import Maps, lasting, passing
 from netsp.pictures import style
 from netsp.problem import Circle, Problem
 from netsp.solution import Solution
@@ -78,7 +79,9 @@ class View:
         return " ".join(f"{x},{y}" for x, y in (self.point(p) for p in line))
 
 
-def draw(problem: Problem, solution: Solution, view: View, fates: dict[int, str]) -> str:
+def draw(
+    problem: Problem, solution: Solution, view: View, fates: dict[int, str], maps: Maps = ()
+) -> str:
     """The map as SVG, with the elements that the page's script moves.
 
     Parameters
@@ -91,6 +94,8 @@ def draw(problem: Problem, solution: Solution, view: View, fates: dict[int, str]
         Of the problem.
     fates : dict
         Of goals that were not visited.
+    maps : sequence of (float, Problem)
+        The problem as it was from some seconds on, where it changed.
 
     Returns
     -------
@@ -98,7 +103,8 @@ def draw(problem: Problem, solution: Solution, view: View, fates: dict[int, str]
         An element.
     """
     shapes = [
-        *_frame(problem, view), *_obstacles(problem, view), *_tour(solution, view),
+        *_frame(problem, view), *_obstacles(lasting(maps) if maps else problem, view),
+        *_passing(maps, view), *_tour(solution, view),
         f'<polyline id="done" fill="none" stroke="{style.PLAN}" stroke-width="3"/>',
         f'<polyline id="tether" fill="none" stroke="{style.TETHER}" stroke-width="3"/>',
         *_goals(problem, solution, view, fates),
@@ -210,6 +216,23 @@ def _obstacles(problem: Problem, view: View) -> list[str]:
         if len(problem.obstacles) <= MANY:
             out.append(f'<text x="{x}" y="{y + 4}" class="name" text-anchor="middle">'
                        f"{html.escape(problem.obstacle_name(i))}</text>")  # fmt: skip
+    return out
+
+
+def _passing(maps: Maps, view: View) -> list[str]:
+    """Obstacles that stood there for a time only."""
+    out = []
+    look = (
+        f'fill="{style.OBSTACLE}" fill-opacity="0.6" stroke="{style.EDGE}" stroke-dasharray="5 3"'
+    )
+    for p in passing(maps) if maps else ():
+        rim = np.asarray(p.obstacle.shape(0.0).exterior.coords)[:, :2]
+        x, y = view.point(p.obstacle.representative_point)
+        name = html.escape(f"{p.name}, {p.when}")
+        out.append(
+            f'<polygon points="{view.points(rim)}" {look}/>'
+            f'<text x="{x}" y="{y + 4}" class="name" text-anchor="middle">{name}</text>'
+        )
     return out
 
 

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from netsp.errors import InputError, counted
+from netsp.execute.passing import Maps
 from netsp.files import write_text
 from netsp.hsignature.measures import measure
 from netsp.judge import verify
@@ -58,9 +59,26 @@ function show(k) {
   document.getElementById("state").textContent = f.s;
 }
 slider.max = data.length - 1;
-slider.addEventListener("input", () => show(Number(slider.value)));
+slider.addEventListener("input", () => { stop(); show(Number(slider.value)); });
 slider.value = Math.floor(data.length / 3);
 show(Number(slider.value));
+const button = document.getElementById("play");
+let timer = null;
+function stop() {
+  clearInterval(timer);
+  timer = null;
+  button.textContent = "▶ play";
+}
+button.addEventListener("click", () => {
+  if (timer !== null) return stop();
+  if (Number(slider.value) >= data.length - 1) slider.value = 0;
+  button.textContent = "❚❚ pause";
+  timer = setInterval(() => {
+    slider.value = Number(slider.value) + 1;
+    show(Number(slider.value));
+    if (Number(slider.value) >= data.length - 1) stop();
+  }, 60);
+});
 """
 
 
@@ -75,7 +93,7 @@ def report_tour(source: str | Path, problem_file: str | Path | None, output: str
     """
     what = opened(source, problem_file)
     try:
-        text = page(what.problem, what.solution, what.rows, what.tethers, what.run)
+        text = page(what.problem, what.solution, what.rows, what.tethers, what.run, what.maps)
     except (KeyError, IndexError, ValueError, TypeError) as error:
         raise InputError(
             f"{source}: a file of the run is damaged: {type(error).__name__}: {error}"
@@ -85,7 +103,7 @@ def report_tour(source: str | Path, problem_file: str | Path | None, output: str
 
 def page(
     problem: Problem, solution: Solution, rows: list[dict[str, str]],
-    tethers: list[dict[str, Any]] | None, run: Path | None,
+    tethers: list[dict[str, Any]] | None, run: Path | None, maps: Maps = (),
 ) -> str:  # fmt: skip
     """The page as HTML.
 
@@ -93,9 +111,11 @@ def page(
     ----------
     rows, tethers
         Of a run, else empty.
+    maps : sequence of (float, Problem)
+        The site as it was from some seconds on; by default, as it is.
     """
     moments = (
-        moments_of_run([(0.0, problem)], rows, tethers, FRAMES) if tethers
+        moments_of_run(maps or [(0.0, problem)], rows, tethers, FRAMES) if tethers
         else moments_of_plan(problem, solution, FRAMES)
     )  # fmt: skip
     view = chart.View(problem, np.vstack([m.nodes for m in moments]))
@@ -106,8 +126,9 @@ def page(
     parts = [
         f"<h1>{html.escape(title)}</h1>",
         _summary(problem, solution, run),
-        "<h2>Map</h2>", chart.draw(problem, solution, view, fates), chart.legend(),
-        '<div class="noprint"><input id="slider" type="range" min="0" value="0" '
+        "<h2>Map</h2>", chart.draw(problem, solution, view, fates, maps), chart.legend(),
+        '<div class="noprint"><button id="play" type="button">▶ play</button>'
+        '<input id="slider" type="range" min="0" value="0" '
         'aria-label="position along the tour"><p class="note">Move the slider: the thick line is '
         "the tether, pulled taut round the obstacles as it is when the robot is there.</p>"
         '<p id="state" class="note"></p></div>',
