@@ -4,6 +4,7 @@ pages beside the shipped problems and scenes, and the notebooks, run while the s
 from __future__ import annotations
 
 import importlib
+import re
 import runpy
 from pathlib import Path
 from typing import Any
@@ -52,6 +53,7 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
     """Links to those pages, and the formats where they belong."""
     for name, source in BESIDE.items():
         markdown = markdown.replace(f"](../{source}", f"]({name}")
+    markdown = re.sub(r"\]\(\.\./examples/([\w-]+)\.ipynb", r"](\1.md", markdown)
     if FORMATS in markdown:
         markdown = markdown.replace(FORMATS, "\n".join(formats()))
     if LICENCES in markdown:
