@@ -15,7 +15,7 @@ import shapely
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from netsp import Circle, Problem
+from netsp import Circle, Polygon, Problem
 from netsp.command.main import main
 from netsp.errors import InputError
 from netsp.guard.ahead import Look
@@ -590,3 +590,35 @@ def test_an_alarm_flickers_neither_on_nor_off():
     assert "loop-ahead" in alarms.on
     alarms.take(20.0, [])
     assert not alarms.on
+
+
+@pytest.mark.parametrize("exact", [True, False])
+def test_a_robot_under_way_begins_with_the_tether_of_its_state(exact):
+    """Its word is not that of the shortest tether to where it is."""
+    state = {"position": (7.0, 0.3, 0.0), "signature": (1,)}
+    site = Problem.from_json(json.dumps({**json.loads(SITE.to_json()), "state": state}))
+    guard = Guard(site, EXACT if exact else None)
+    report = guard.take(Fix(0.0, (7.0, 0.3, 0.0), estimate=True))
+    assert report.classes[0].word == (1,)
+    for fix in along((7.0, 0.3, 0), (7.0, -1.5, 0), begin=0.1):
+        report = guard.take(fix)
+    assert report.classes[0].word == (1,)
+    assert report.classes[0].taut > math.dist((0, 0), (7.0, -1.5)) + 0.05
+
+
+def test_goals_with_alternatives_and_polygons_change_nothing_for_the_tether():
+    pier = Polygon(polygon=[(4, -1), (6, -1), (6, 1), (4, 1)], name="pier")
+    goals = [{"name": "g", "any_of": [[9, 0, -1], [9, 3, -1]]}]
+    sites = [
+        Problem(base=(0, 0), goals=g, tether_length=20, obstacles=[pier])
+        for g in (goals, [(9, 0, -1)])
+    ]  # fmt: skip
+    told = []
+    for site in sites:
+        guard = Guard(site, EXACT)
+        for fix in along((0, 0, 0), (4, 2, 0), (8, 0, 0)):
+            report = guard.take(fix)
+        told.append((report.classes[0].word, report.classes[0].taut))
+    assert told[0] == told[1]
+    assert told[0][0] == (1,)
+    assert told[0][1] == pytest.approx(math.hypot(4, 1) + 2.0 + math.hypot(2, 1), abs=0.06)

@@ -45,6 +45,21 @@ def recordings() -> tuple[str, bool]:
     return f"{right} of {goals} words, {loops} loops told of", right == goals and loops == 0
 
 
+def believed() -> tuple[str, bool]:
+    """The true class in noise: of the wharf's recording, in a case where it was once lost for good,
+    and of the pool's, where buoys stand as near to one another as the position is uncertain."""
+    import numpy as np
+    from belief import LITTLE, shares_of_truth
+
+    found = [shares_of_truth("recorded", seed, n) for seed, n in ((0, 1), (1, 1))]
+    every = np.concatenate(found)
+    below = 100.0 * float((every < LITTLE).mean())
+    ends = min(float(r[-1]) for r in found)
+    return f"below 5 % for {below:.1f} % of the time, at the end {ends:.2f}", (
+        below <= 5.0 and ends >= LITTLE
+    )
+
+
 def flown() -> tuple[str, bool]:
     """The pool's tour on the fake autopilot."""
     from netsp import solve
@@ -96,5 +111,6 @@ def in_space() -> tuple[str, bool]:
 def claims() -> Iterator[Claim]:
     """All of this file."""
     yield Claim("guard: words at the goals of five recorded flights", "34 of 34", recordings)
+    yield Claim("guard: share of the true class in noise", "5 %, 95 % of the time", believed)
     yield Claim("guard: stops of the flown basin mission as planned", "97 of 97", in_space)
     yield Claim("fly: the pool on a fake autopilot", "all, as planned, free", flown)

@@ -35,6 +35,24 @@ def drawn() -> tuple[str, bool]:
     return f"{tour:.0f} ms, tether at the cursor {tether:.0f} ms", tour <= 500.0 and tether <= 100.0
 
 
+def small() -> tuple[str, bool]:
+    """The page of the flown basin mission, of 97 waypoints."""
+    import tempfile
+    from pathlib import Path
+
+    from sites import shipped
+
+    from netsp.online.simulate import simulate
+    from netsp.pictures.mission import save_page
+
+    mission, scene = shipped("basin")
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "run.html"
+        save_page([simulate(mission, scene=scene)], scene, file)
+        size = file.stat().st_size / 1e6
+    return f"{size:.2f} MB for {len(mission.waypoints)} waypoints", size <= 3.0
+
+
 def smooth() -> tuple[str, bool]:
     """Frames while a crowded map is dragged about."""
     import numpy as np
@@ -54,6 +72,7 @@ def smooth() -> tuple[str, bool]:
 
 def claims() -> Iterator[Claim]:
     """All of this file."""
+    yield Claim("a page of a flight of 97 waypoints", "3 MB", small)
     yield Claim("the map: 150 edits, the server killed twice", "nothing lost", kept)
     yield Claim(
         "the map: drags of 20 goals, p95", "a tour in 500 ms, a tether in 100", drawn, timed=True

@@ -86,7 +86,9 @@ class PlaneSite:
         self.problem = problem
         self.name, self.units = problem.name, problem.units
         self.tether_length = problem.tether_length
-        self.anchor = self.start = np.asarray(problem.base, dtype=float)
+        self.anchor = np.asarray(problem.base, dtype=float)
+        state = problem.state
+        self.start = self.anchor if state is None else np.asarray(state.position, dtype=float)
         self.identity = problem.sha256
         self.rays = self.centres = problem.representative_points
         self.letters: Letters = RayLetters(problem)
@@ -98,8 +100,8 @@ class PlaneSite:
         self._exact = Tethers(longer)
 
     def start_word(self) -> Word:
-        """The empty one."""
-        return ()
+        """That of the problem's state; the empty one where there is none."""
+        return () if self.problem.state is None else tuple(self.problem.state.signature)
 
     def found(
         self, word: Word, place: Floats, hanging: Sequence[tuple[Word, Tether]]
