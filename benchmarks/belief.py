@@ -71,7 +71,7 @@ def main() -> None:
         every = np.concatenate(runs)
         row(name, str(len(runs)), f"{every.mean():.2f}", f"{100 * (every > 0.5).mean():.0f}",
             f"{100 * (every < LITTLE).mean():.1f}",
-            f"{-np.log(np.maximum(every, LEAST)).mean():.2f}",
+            f"{abs(np.log(np.clip(every, LEAST, 1.0)).mean()):.2f}",
             f"{sum(r[-1] < LITTLE for r in runs)} of {len(runs)}")  # fmt: skip
     print()
 

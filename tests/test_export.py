@@ -308,3 +308,18 @@ def test_wrong_flags_take_one_line(argv, capsys):
     err = capsys.readouterr().err
     assert len(err.strip().splitlines()) == 1
     assert err.startswith("netsp: ")
+
+
+def test_a_mission_file_is_in_metres_and_heights_above_the_water_are_told(tmp_path, capsys):
+    problem = Problem(base=(0, 0), goals=[(3, 4, 2), (4, 3, -2)], tether_length=8, units="ft")
+    problem.save(tmp_path / "p.json")
+    solve(problem).save(tmp_path / "s.json")
+    told = ["export", str(tmp_path / "s.json"), "--problem", str(tmp_path / "p.json"),
+            "--origin", "54,12", "-o", str(tmp_path / "x.plan")]  # fmt: skip
+    assert main(told) == 2
+    assert "units: format 'plan' is in metres" in capsys.readouterr().err
+    metric = problem.model_copy(update={"units": "m"})
+    metric.save(tmp_path / "p.json")
+    solve(metric).save(tmp_path / "s.json")
+    assert main(told) == 0
+    assert "1 goal above the water (#0)" in capsys.readouterr().err

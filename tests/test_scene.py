@@ -216,7 +216,7 @@ def test_a_sheet_of_points_is_solid_two_voxels_to_either_side():
 
 
 def test_clouds_and_meshes_are_read_from_files(tmp_path):
-    ball = trimesh.creation.icosphere(subdivisions=3, radius=1.0)
+    ball = trimesh.creation.icosphere(subdivisions=2, radius=1.0)
     ball.export(tmp_path / "ball.stl")
     np.savez(tmp_path / "cloud.npz", points=ball.vertices)
     np.savetxt(tmp_path / "cloud.csv", ball.vertices, delimiter=",", header="x,y,z", comments="")

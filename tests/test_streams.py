@@ -100,3 +100,17 @@ def test_what_is_several_files_or_goes_on_later_does_not_go_to_standard_output(t
         assert done.returncode == 2, args
         assert done.stderr.count("\n") == 1, done.stderr
         assert not (Path.cwd() / "-").exists()
+
+
+def test_what_has_no_tour_is_a_summary_too_with_the_tether_that_it_takes(tmp_path):
+    data = {**json.loads(WHARF.read_text()), "tether_length": 12.0}
+    (tmp_path / "short.json").write_text(json.dumps(data))
+    done = run("solve", tmp_path / "short.json", "--json", "-o", tmp_path / "x.json")
+    assert done.returncode == 3
+    told = json.loads(done.stdout)
+    assert told["status"] == "infeasible"
+    assert told["goal"] == "B4"  # of those out of reach, the farthest
+    assert done.stderr.strip().splitlines()[-1].startswith("netsp: goal B4 is out of reach")
+    data["tether_length"] = told["needed"] + 1e-3
+    (tmp_path / "enough.json").write_text(json.dumps(data))
+    assert run("solve", tmp_path / "enough.json", "--quiet", "-o", "-").returncode == 0

@@ -248,14 +248,15 @@ def test_a_page_of_a_hundred_waypoints_is_small_and_plays(tmp_path):
     mission = Mission.load(ROOT / "missions" / "basin.json")
     assert len(mission.waypoints) >= 97
     scene = mission.load_scene()
-    save_page([simulate(mission, scene=scene)], scene, tmp_path / "run.html")
+    run = simulate(mission, scene=scene)
+    save_page([run], scene, tmp_path / "run.html")
     text = (tmp_path / "run.html").read_text()
     assert len(text) < 3_000_000
     figure = unpacked(tmp_path / "run.html")
     names = {trace.get("name") for trace in figure["data"] if trace.get("showlegend", True)}
-    assert names == {"path", "tether", "robot", "anchor"}
+    assert names == {"path", "tether", "robot", "anchor", "waypoint visited"}
     assert all(figure["layout"]["scene"][f"{a}axis"]["title"]["text"] == f"{a} (m)" for a in "xyz")
-    save_page([simulate(mission, scene=scene)], scene, tmp_path / "again.html")
+    save_page([run], scene, tmp_path / "again.html")
     assert (tmp_path / "again.html").read_text() == text
 
 

@@ -179,4 +179,4 @@ def test_what_does_not_belong_together_is_refused(pages, tmp_path, capsys):
     assert main(["report", solution, "--problem", other, "-o", out]) == 2
     assert "solves another problem" in capsys.readouterr().err
     assert main(["report", str(tmp_path), "-o", out]) == 2
-    assert "cannot be read" in capsys.readouterr().err
+    assert "is not the folder of a run" in capsys.readouterr().err

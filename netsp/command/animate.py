@@ -60,10 +60,16 @@ def run(args: argparse.Namespace) -> int:
     films = [_film(source, args.problem, count) for source in args.source]
 
     def tell(done: int, of: int) -> None:
-        print(f"\r{done} of {of} pictures", end="" if done < of else "\n", file=sys.stderr)
+        print(f"\r{done} of {of} pictures", end="" if done < of else "\r\x1b[K", file=sys.stderr)
 
     loud = not args.quiet and sys.stderr.isatty()
     save_animation(films, args.output, args.seconds, args.fps, tell if loud else None)
+    return _told(args)
+
+
+def _told(args: argparse.Namespace) -> int:
+    if not args.quiet:
+        print(f"picture {args.output}", file=sys.stderr)
     return 0
 
 
@@ -82,13 +88,13 @@ def _page(args: argparse.Namespace) -> int:
 
         runs = [read_run(source) for source in args.source]
         save_page(runs, runs[0].mission.load_scene(), args.output)
-        return 0
+        return _told(args)
     if len(args.source) > 1:
         raise InputError(f"{args.output}: a page shows one tour, or flights in space; expected one")
     from netsp.report.tour import report_tour
 
     report_tour(args.source[0], args.problem, args.output)
-    return 0
+    return _told(args)
 
 
 def _flight(source: str, count: int) -> Film:

@@ -127,7 +127,18 @@ def run(args: argparse.Namespace) -> int:
                 f"the obstacles take {fence_points(problem)} fence points; the vehicle stores "
                 f"about {MOST_FENCE_POINTS} without a card"
             )
-        shallow = sum(p.position[2] > -SHALLOWEST for p in points)
+        above = [
+            problem.goal_name(p.goal)
+            for p in points
+            if p.goal is not None and p.goal >= 0 and p.position[2] > 0.0
+        ]
+        if above:
+            messages.warning(
+                f"{counted(len(above), 'goal')} above the water ({', '.join(above[:3])}"
+                f"{', …' if len(above) > 3 else ''}): heights are negative below it; moved to "
+                f"{SHALLOWEST} m of depth"
+            )
+        shallow = sum(p.position[2] > -SHALLOWEST for p in points) - len(above)
         if shallow:
             messages.note(
                 f"{counted(shallow, 'waypoint')} shallower than {SHALLOWEST} m moved to that depth"

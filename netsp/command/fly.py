@@ -91,6 +91,8 @@ def run(args: argparse.Namespace) -> int:
     surprises = Surprises.load(args.surprise) if args.surprise else None
     if surprises is not None:
         surprises.check(problem, args.surprise)
+    if problem.units != "m":
+        raise InputError(f"units: a vehicle goes by metres; expected m, got {problem.units!r}")
     judged = verify(problem, solution)
     if not judged:
         failed = next(c for c in judged.checks if not c.passed)

@@ -18,7 +18,7 @@ from netsp.command.types import (
     roadmap_options,
     seconds,
 )
-from netsp.errors import EXIT_NOT_ALL, EXIT_NOT_VERIFIED, InputError
+from netsp.errors import EXIT_NOT_ALL, EXIT_NOT_VERIFIED, InfeasibleError, InputError
 
 if TYPE_CHECKING:
     from netsp.travel.result import Progress
@@ -191,23 +191,28 @@ def run(args: argparse.Namespace) -> int:
     ):
         if table:
             table.begin(problem)
-        solution = solve(
-            problem,
-            args.solver,
-            roadmap=args.roadmap,
-            roadmap_options=roadmap_options(args),
-            time_limit=args.time_limit,
-            iteration_limit=args.iteration_limit,
-            seed=args.seed,
-            params=_params(args),
-            warm_start=warm,
-            margin=args.margin,
-            slack=args.slack,
-            friction=args.friction,
-            max_tension_ratio=args.max_tension_ratio,
-            keep_order=args.keep_order,
-            on_progress=listen,
-        )
+        try:
+            solution = solve(
+                problem,
+                args.solver,
+                roadmap=args.roadmap,
+                roadmap_options=roadmap_options(args),
+                time_limit=args.time_limit,
+                iteration_limit=args.iteration_limit,
+                seed=args.seed,
+                params=_params(args),
+                warm_start=warm,
+                margin=args.margin,
+                slack=args.slack,
+                friction=args.friction,
+                max_tension_ratio=args.max_tension_ratio,
+                keep_order=args.keep_order,
+                on_progress=listen,
+            )
+        except InfeasibleError as error:
+            if args.json:
+                told.tell(told.of_infeasible(problem, error))
+            raise
     if args.output:
         write_text(args.output, solution.to_json())
     else:

@@ -6,9 +6,10 @@ import argparse
 import json
 import sys
 from collections.abc import Mapping
+from math import isfinite
 from typing import TYPE_CHECKING, Any
 
-from netsp.errors import InputError
+from netsp.errors import InfeasibleError, InputError
 
 if TYPE_CHECKING:
     from netsp.judge import Verification
@@ -20,7 +21,10 @@ if TYPE_CHECKING:
 
 def json_flag(p: argparse.ArgumentParser) -> None:
     """The flag."""
-    p.add_argument("--json", action="store_true", help="print the summary as JSON on stdout")
+    p.add_argument(
+        "--json", action="store_true",
+        help="print the summary as JSON on stdout (data then needs -o FILE)",
+    )  # fmt: skip
 
 
 def check_stdout(args: argparse.Namespace) -> None:
@@ -48,6 +52,16 @@ def of_solution(problem: Problem, solution: Solution) -> dict[str, Any]:
         "entangled": [problem.obstacle_name(k) for k in solution.entangled],
         "roadmap": solution.roadmap, "solver": solution.solver,
         "timings": solution.timings.model_dump(mode="json"),
+    }  # fmt: skip
+
+
+def of_infeasible(problem: Problem, error: InfeasibleError) -> dict[str, Any]:
+    """What `netsp solve` says of a problem that has no tour."""
+    return {
+        "problem": problem.name, "units": problem.units, "status": "infeasible",
+        "message": str(error), "tether_length": problem.tether_length,
+        "goal": None if error.goal is None else problem.goal_name(error.goal),
+        "needed": error.needed if error.needed is not None and isfinite(error.needed) else None,
     }  # fmt: skip
 
 

@@ -110,8 +110,8 @@ def export(
     Raises
     ------
     InputError
-        An unknown kind, no projection, more waypoints than the format allows, waypoints that would
-        not be of the plan's class.
+        An unknown kind, units other than metres, no projection, more waypoints than the format
+        allows, waypoints that would not be of the plan's class.
     """
     checked_instance("problem", problem, Problem)
     checked_instance("solution", solution, Solution)
@@ -119,12 +119,19 @@ def export(
         raise InputError("solution: has no tour to export")
     if max(v.goal for v in solution.tour) >= len(problem.goals):
         raise InputError(f"solution: tour: expected goals #0 to #{len(problem.goals) - 1}")
+    if problem.units != "m" and kind != "csv":
+        raise InputError(
+            f"units: format {kind!r} is in metres; expected a problem in m, got {problem.units!r}"
+        )
     acceptance = checked_argument("acceptance", acceptance, 0.0)
     settings = settings or Settings()
     check_settings(kind, settings)
     projection = projection or Projection.of(problem)
     if projection is None and kind != "csv":
-        raise InputError(f"origin: format {kind!r} needs latitude and longitude of the base")
+        raise InputError(
+            f"origin: format {kind!r} needs latitude and longitude of the base; expected --origin "
+            "LAT,LON, or the field origin in the problem"
+        )
     points = [start_of(problem, solution), *waypoints_of(problem, solution, acceptance)]
     if len(points) > settings.max_waypoints and kind in ("plan", "wpl"):
         raise InputError(

@@ -129,16 +129,29 @@ def write_scene(
         ):
             figure.add_trace(point_trace(name, point, colour))
     if stops is not None:
-        x, y, z = stops.places.T
-        names = [f"#{k}" for k in range(len(x))]
-        marker = {"size": 3, "color": style.VISITED}
-        figure.add_trace(
-            go.Scatter3d(x=x, y=y, z=z, mode="markers", marker=marker, text=names, name=stops.name)
-        )
+        for trace in stop_traces(stops):
+            figure.add_trace(trace)
         if stops.anchor is not None:
             figure.add_trace(point_trace("anchor", np.array(stops.anchor), style.BASE))
     figure.update_layout(**layout(title, scene.units))
     write_figure(figure, title, file)
+
+
+def stop_traces(stops: Stops) -> list[Any]:
+    """Waypoints on an interactive page: those that were visited, and those that were not."""
+    out = []
+    left = np.isin(np.arange(len(stops.places)), stops.left_out)
+    for chosen, name, marker in (
+        (~left, stops.name, {"size": 3, "color": style.VISITED}),
+        (left, "not visited", {"size": 4, "color": style.LEFT_OUT, "symbol": "x"}),
+    ):
+        if chosen.any():
+            x, y, z = stops.places[chosen].T
+            names = [f"#{k}" for k in np.flatnonzero(chosen)]
+            out.append(plotly_objects().Scatter3d(
+                x=x, y=y, z=z, mode="markers", marker=marker, text=names, name=name
+            ))  # fmt: skip
+    return out
 
 
 def plotly_objects() -> Any:

@@ -26,6 +26,7 @@ from netsp.pictures.interactive import (
     plotly_objects,
     point_trace,
     seen,
+    stop_traces,
     write_figure,
 )
 from netsp.pictures.scene import (
@@ -195,6 +196,9 @@ def save_page(runs: Sequence[Run], scene: Scene, file: str | Path) -> None:
             trace = mesh_trace(name, vertices, faces)
             trace.showlegend = False
             figure.add_trace(trace, row=1, col=k + 1)
+        for trace in stop_traces(stops_of(run)):
+            trace.showlegend = k == 0
+            figure.add_trace(trace, row=1, col=k + 1)
         told = seen(path)
         stamps = np.array([r.time for r in run.log])
         rows = np.minimum(np.searchsorted(stamps, times), len(stamps) - 1)
@@ -208,6 +212,7 @@ def save_page(runs: Sequence[Run], scene: Scene, file: str | Path) -> None:
             ]
             if f == 0:
                 for trace in moving:
+                    trace.showlegend = k == 0
                     numbers.append(len(figure.data))
                     figure.add_trace(trace, row=1, col=k + 1)
             changing[f] += moving
@@ -220,10 +225,10 @@ def save_page(runs: Sequence[Run], scene: Scene, file: str | Path) -> None:
     base = layout(runs[0].mission.name, scene.units)
     scenes = {f"scene{k + 1 if k else ''}": base["scene"] for k in range(len(runs))}
     figure.update_layout(
-        title=base["title"], margin={"l": 0, "r": 0, "t": 70, "b": 0}, legend=base["legend"],
+        title=base["title"], margin={"l": 0, "r": 0, "t": 70, "b": 90}, legend=base["legend"],
         sliders=[{
-            "steps": steps, "currentvalue": {"prefix": "time (s) "}, "pad": {"t": 20}, "x": 0.12,
-            "len": 0.86,
+            "steps": steps, "currentvalue": {"prefix": "time (s) "}, "pad": {"t": 20}, "x": 0.17,
+            "len": 0.81,
         }],
         updatemenus=[_play()], **scenes,
     )  # fmt: skip

@@ -32,6 +32,7 @@ LEGEND = (
     (f'<rect x="1" y="2" width="14" height="12" fill="none" stroke="{style.EDGE}" '
      'stroke-dasharray="1 2"/>', "clearance"),
     (f'<path d="M0 8H16" stroke="{style.PATH}" stroke-width="2"/>', "tour"),
+    (f'<path d="M0 8H16" stroke="{style.PLAN}" stroke-width="3"/>', "gone so far"),
     (f'<path d="M0 8H16" stroke="{style.TETHER}" stroke-width="3"/>', "tether"),
 )  # fmt: skip
 

@@ -73,6 +73,8 @@ def opened(source: str | Path, problem_file: str | Path | None) -> Opened:
             raise InputError(f"{source}: is of a mission; expected a run of a problem")
         problem_file = problem_file or run / "problem.json"
         place = run / "solution.json"
+        if not place.exists():
+            raise InputError(f"{source}: is not the folder of a run; expected solution.json in it")
     solution = Solution.load(place)
     if problem_file is None:
         raise InputError(f"{source}: does not hold its problem; expected --problem FILE")

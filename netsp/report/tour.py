@@ -59,7 +59,8 @@ function show(k) {
   document.getElementById("state").textContent = f.s;
 }
 slider.max = data.length - 1;
-slider.addEventListener("input", () => { stop(); show(Number(slider.value)); });
+let fresh = true;
+slider.addEventListener("input", () => { fresh = false; stop(); show(Number(slider.value)); });
 slider.value = Math.floor(data.length / 3);
 show(Number(slider.value));
 const button = document.getElementById("play");
@@ -71,7 +72,8 @@ function stop() {
 }
 button.addEventListener("click", () => {
   if (timer !== null) return stop();
-  if (Number(slider.value) >= data.length - 1) slider.value = 0;
+  if (fresh || Number(slider.value) >= data.length - 1) slider.value = 0;
+  fresh = false;
   button.textContent = "❚❚ pause";
   timer = setInterval(() => {
     slider.value = Number(slider.value) + 1;

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from netsp.errors import InfeasibleError
+from netsp.errors import InfeasibleError, counted
 from netsp.problem import Circle, Problem
 from netsp.roadmap.outline import Outline
 from netsp.roadmap.shortest import ContactGraph
@@ -28,6 +28,7 @@ def unreached(problem: Problem, outline: Outline, missing: list[int]) -> Infeasi
     needed = np.hypot(planar, dz)
     parts: list[str] = []
     enclosing: tuple[int, ...] = ()
+    missing = sorted(missing, key=lambda g: -needed[g])  # the largest need first
     for g in missing[:3]:
         label = problem.goal_label(g - 1)
         if math.isinf(needed[g]):
@@ -42,7 +43,8 @@ def unreached(problem: Problem, outline: Outline, missing: list[int]) -> Infeasi
                 f"expected at least {shortest:.6f}"
             )
     if len(missing) > 3:
-        parts.append(f"{len(missing) - 3} more goals are out of reach")
+        more = len(missing) - 3
+        parts.append(f"{counted(more, 'more goal')} {'is' if more == 1 else 'are'} out of reach")
     first = missing[0]
     return InfeasibleError(
         "; ".join(parts), goal=first - 1, needed=float(needed[first]), enclosing=enclosing

@@ -146,6 +146,11 @@ class Result:
     walk: tuple[int, ...] | None = None
     trajectory: Trajectory | None = None
 
+    @property
+    def gap(self) -> float | None:
+        """(length - lower_bound) / length; None without a tour or a bound."""
+        return relative_gap(self.length, self.lower_bound)
+
     def __repr__(self) -> str:
         """In a line."""
         length = "no tour" if self.length is None else f"length {self.length:.6g}"
