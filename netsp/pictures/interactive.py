@@ -26,6 +26,9 @@ from netsp.pictures.scene import Stops
 SEEN = 1e-3
 """Of the size of a picture: what a line is off by less is not seen."""
 
+EYE = {"x": 1.5, "y": -1.6, "z": 1.0}
+"""Where a scene is looked at from, in its own size: from the south-east, as figures are."""
+
 DIGITS = 3
 """Decimals of coordinates."""
 
@@ -200,7 +203,7 @@ def layout(title: str, units: str) -> dict[str, Any]:
     axes = {f"{a}axis": {"title": {"text": f"{a} ({units})"}} for a in "xyz"}
     return {
         "title": {"text": title},
-        "scene": {"aspectmode": "data", **axes},
+        "scene": {"aspectmode": "data", "camera": {"eye": EYE}, **axes},
         "margin": {"l": 0, "r": 0, "t": 50, "b": 0},
         "legend": {"x": 0.01, "y": 0.99},
     }

@@ -225,7 +225,7 @@ def save_page(runs: Sequence[Run], scene: Scene, file: str | Path) -> None:
     base = layout(runs[0].mission.name, scene.units)
     scenes = {f"scene{k + 1 if k else ''}": base["scene"] for k in range(len(runs))}
     figure.update_layout(
-        title=base["title"], margin={"l": 0, "r": 0, "t": 70, "b": 90}, legend=base["legend"],
+        title=base["title"], margin={"l": 0, "r": 0, "t": 70, "b": 115}, legend=base["legend"],
         sliders=[{
             "steps": steps, "currentvalue": {"prefix": "time (s) "}, "pad": {"t": 20}, "x": 0.17,
             "len": 0.81,
