@@ -213,3 +213,13 @@ def test_a_flight_that_is_damaged_or_whose_map_changed_is_told_in_a_line(flight,
         told = capsys.readouterr().err
         assert says in told
         assert told.count("\n") == 1
+
+
+@pytest.mark.parametrize("maps", ["[]", "{}", '[{"time": 5, "problem": {}}]', "3", "[NaN]"])
+def test_damaged_maps_of_a_run_are_told_in_a_line(files, tmp_path, maps, capsys):
+    shutil.copytree(files / "run", tmp_path / "run")
+    (tmp_path / "run" / "maps.json").write_text(maps)
+    assert main(["animate", str(tmp_path / "run"), "-o", str(tmp_path / "x.gif")]) == 2
+    told = capsys.readouterr().err
+    assert "maps.json" in told
+    assert told.count("\n") == 1

@@ -159,7 +159,11 @@ def _parsed(words: list[str], wanted: str | None) -> argparse.Namespace:
     command whose help would tell, nor itself in one line."""
     names = [name for group in COMMANDS.values() for name in group]
     if wanted is not None and wanted not in names:
-        raise InputError(f"unknown command {wanted!r}; expected one of {', '.join(names)}")
+        import difflib
+
+        near = difflib.get_close_matches(wanted, names, 1)
+        meant = f"did you mean {near[0]}? " if near else ""
+        raise InputError(f"unknown command {wanted!r}; {meant}expected one of {', '.join(names)}")
     args, unknown = _parser({wanted}).parse_known_args(words)
     if unknown:
         raise InputError(f"unknown argument {unknown[0]!r} (netsp {wanted} --help)")

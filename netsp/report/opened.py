@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -108,12 +109,16 @@ def opened(source: str | Path, problem_file: str | Path | None) -> Opened:
 def _maps_of(file: Path) -> list[tuple[float, Problem]]:
     found = json_of(file)
     try:
-        return [
+        maps = [
             (float(m["time"]), Problem.from_json(json.dumps(m["problem"]), source=str(file)))
             for m in found
         ]
     except (KeyError, TypeError, ValueError) as error:
         raise InputError(f"{file}: expected times and problems: {error}") from None
+    times = [time for time, _ in maps]
+    if not times or times[0] != 0.0 or not all(a <= b for a, b in pairwise(times)):
+        raise InputError(f"{file}: expected times from 0 on, got {times[:4]}")
+    return maps
 
 
 def json_of(file: Path) -> Any:
