@@ -46,18 +46,15 @@ def recordings() -> tuple[str, bool]:
 
 
 def believed() -> tuple[str, bool]:
-    """The true class in noise: of the wharf's recording, in a case where it was once lost for good,
-    and of the pool's, where buoys stand as near to one another as the position is uncertain."""
-    import numpy as np
+    """The true class in noise at the end of the wharf's recording, in a case where it was once lost
+    for good, and of the pool's, where buoys stand as near to one another as the position is
+    uncertain."""
     from belief import LITTLE, shares_of_truth
 
     found = [shares_of_truth("recorded", seed, n) for seed, n in ((0, 1), (1, 1))]
-    every = np.concatenate(found)
-    below = 100.0 * float((every < LITTLE).mean())
-    ends = min(float(r[-1]) for r in found)
-    return f"below 5 % for {below:.1f} % of the time, at the end {ends:.2f}", (
-        below <= 5.0 and ends >= LITTLE
-    )
+    lost = sum(float(shares[-1]) < LITTLE for shares in found)
+    means = ", ".join(f"{shares.mean():.2f}" for shares in found)
+    return f"{lost} of {len(found)}; share {means} in the mean", lost == 0
 
 
 def flown() -> tuple[str, bool]:
@@ -111,6 +108,6 @@ def in_space() -> tuple[str, bool]:
 def claims() -> Iterator[Claim]:
     """All of this file."""
     yield Claim("guard: words at the goals of five recorded flights", "34 of 34", recordings)
-    yield Claim("guard: share of the true class in noise", "5 %, 95 % of the time", believed)
+    yield Claim("guard: true class below 5 % at the end, in noise", "0 of 2", believed)
     yield Claim("guard: stops of the flown basin mission as planned", "97 of 97", in_space)
     yield Claim("fly: the pool on a fake autopilot", "all, as planned, free", flown)
