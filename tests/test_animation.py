@@ -223,3 +223,29 @@ def test_damaged_maps_of_a_run_are_told_in_a_line(files, tmp_path, maps, capsys)
     told = capsys.readouterr().err
     assert "maps.json" in told
     assert told.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "change"),
+    [
+        ("log.csv", lambda rows: rows[:2]),
+        ("log.csv", lambda rows: [rows[0], *(["0" + r[r.index(","):] for r in rows[1:]])]),
+        ("log.csv", lambda rows: [*rows[:-1], "nan" + rows[-1][rows[-1].index(","):]]),
+        ("log.csv", lambda rows: [*rows[:-1], "inf" + rows[-1][rows[-1].index(","):]]),
+        ("tethers.json", lambda rows: ['[{"time": NaN, "nodes": [[0, 0, 0], [1, 1, 1]]}]']),
+        ("tethers.json", lambda rows: ['[{"time": 1, "nodes": 5}]']),
+        ("tethers.json", lambda rows: ["[" * 100_000]),
+        ("tethers.json", lambda rows: [f'[{{"time": {10**400}, "nodes": [[0, 0, 0]]}}]']),
+        ("maps.json", lambda rows: [f'[{{"time": {10**400}, "problem": {{}}}}]']),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("suffix", ["gif", "html"])
+def test_a_damaged_run_is_told_in_a_line_and_nothing_is_drawn(
+    files, tmp_path, name, change, suffix, capsys
+):
+    shutil.copytree(files / "run", tmp_path / "run")
+    file = tmp_path / "run" / name
+    file.write_text("\n".join(change(file.read_text().split("\n")[:-1] if file.exists() else [])))
+    assert main(["animate", str(tmp_path / "run"), "-o", str(tmp_path / f"x.{suffix}")]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+    assert not (tmp_path / f"x.{suffix}").exists()

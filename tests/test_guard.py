@@ -6,6 +6,8 @@ import http.client
 import itertools
 import json
 import math
+import subprocess
+import sys
 import threading
 from pathlib import Path
 
@@ -626,3 +628,40 @@ def test_goals_with_alternatives_and_polygons_change_nothing_for_the_tether():
     assert told[0] == told[1]
     assert told[0][0] == (1,)
     assert told[0][1] == pytest.approx(math.hypot(4, 1) + 2.0 + math.hypot(2, 1), abs=0.06)
+
+
+def test_a_recording_that_is_wrong_at_its_end_leaves_the_output_as_it_was(tmp_path, capsys):
+    out = tmp_path / "kept.jsonl"
+    out.write_text("before")
+    (tmp_path / "bad.csv").write_text("t,x,y,z\n0,0,0,0\n1,0.1,0,0\n2,nan,0,0\n")
+    told = ["guard", str(PROBLEMS / "wharf.json"), "-o", str(out), "--quiet", "--replay"]
+    for name in ("bad.csv", "missing.csv"):
+        assert main([*told, str(tmp_path / name)]) == 2
+        assert out.read_text() == "before"
+    assert capsys.readouterr().err.count("\n") == 2
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_shares_of_classes_add_to_one_however_uncertain_the_position_is(seed):
+    rng = np.random.default_rng(seed)
+    guard = Guard(Problem.load(PROBLEMS / "oc4-jacket.json"), GuardOptions(5.0, 10.0))
+    here = np.array([0.0, 0.0, -1.0])
+    for k in range(40):
+        here[:2] += rng.normal(0.0, 0.3, 2)
+        place = here + rng.normal(0.0, 1.0, 3)
+        report = guard.take(Fix(0.5 * k, tuple(place), estimate=True))
+        if report.classes:
+            assert sum(c.likely for c in report.classes) == pytest.approx(1.0)
+
+
+def test_a_log_that_is_none_is_told_in_a_line_whatever_its_reader_prints(tmp_path):
+    pytest.importorskip("pymavlink")
+    (tmp_path / "x.bin").write_bytes(np.random.default_rng(0).bytes(3000))
+    done = subprocess.run(
+        [sys.executable, "-m", "netsp", "guard", str(PROBLEMS / "wharf.json"), "--replay",
+         str(tmp_path / "x.bin"), "--quiet"],
+        capture_output=True, text=True, timeout=120,
+    )  # fmt: skip
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert not done.stdout

@@ -87,7 +87,13 @@ def _page(args: argparse.Namespace) -> int:
         from netsp.pictures.mission import save_page
 
         runs = [read_run(source) for source in args.source]
-        save_page(runs, runs[0].mission.load_scene(), args.output)
+        try:
+            save_page(runs, runs[0].mission.load_scene(), args.output)
+        except (KeyError, TypeError, ValueError) as error:
+            raise InputError(
+                f"{', '.join(args.source)}: a summary of the run is damaged: "
+                f"{type(error).__name__}: {error}"
+            ) from None
         return _told(args)
     if len(args.source) > 1:
         raise InputError(f"{args.output}: a page shows one tour, or flights in space; expected one")
@@ -127,7 +133,7 @@ def _film(source: str, problem_file: str | None, count: int) -> Film:
         try:
             moments = moments_of_run(what.maps, what.rows, what.tethers, count)
             seconds = float(what.rows[-1]["time"])
-        except (KeyError, ValueError, TypeError) as error:
+        except (KeyError, ValueError, TypeError, OverflowError) as error:
             raise InputError(
                 f"{source}: a file of the run is damaged: {type(error).__name__}: {error}"
             ) from None

@@ -79,6 +79,8 @@ def arguments(p: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Fly the tour, write what happened, and return the exit code."""
+    if args.dry_run and args.json:
+        raise InputError("--json: a dry run prints its targets as a table; expected no --json")
     if args.link is None and not args.dry_run:
         raise InputError("--link: missing; expected the vehicle's address, or --dry-run")
     from netsp.execute.events import Surprises

@@ -13,6 +13,7 @@ from netsp.command.types import check_writable, length, natural
 from netsp.errors import EXIT_NOT_ALL, EXIT_NOT_VERIFIED, InputError
 
 if TYPE_CHECKING:
+    from netsp.guard.fix import Fix
     from netsp.guard.report import Report
     from netsp.guard.site import Site
 
@@ -92,6 +93,12 @@ def run(args: argparse.Namespace) -> int:
     told_of = Mission.load(args.site) if is_mission(args.site) else Problem.load(args.site)
     options = GuardOptions(args.noise, args.drift, args.speed)
     frame = Frame(told_of, args.frame)
+    fixes: list[Fix] = []
+    if args.replay is not None:
+        from netsp.guard.replay import read_fixes
+
+        # all of it before anything is written: what is wrong may stand in its last line
+        fixes = list(read_fixes(args.replay, frame, args.system))
     with ExitStack() as stack:
         stack.enter_context(nullcontext() if args.quiet else compile_messages(sys.stderr))
         guard = Guard(told_of, options)
@@ -118,10 +125,9 @@ def run(args: argparse.Namespace) -> int:
 
         try:
             if args.replay is not None:
-                from netsp.guard.replay import read_fixes
                 from netsp.guard.stream import replayed
 
-                for report in replayed(guard, read_fixes(args.replay, frame, args.system)):
+                for report in replayed(guard, fixes):
                     take(report)
             else:
                 from netsp.guard.live import watch

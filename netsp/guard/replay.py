@@ -7,6 +7,7 @@ import csv
 import gzip
 import io
 import math
+import os
 import struct
 import zlib
 from collections.abc import Iterator
@@ -161,6 +162,24 @@ def _tlog(file: Path, frame: Frame, system: int | None) -> Iterator[Fix]:
             yield fix
 
 
+@contextlib.contextmanager
+def _silence() -> Iterator[None]:
+    """pymavlink tells what it makes of damaged logs, and its indexer does so from C: past what
+    Python calls standard output and error."""
+    with contextlib.ExitStack() as stack:
+        stack.enter_context(contextlib.redirect_stdout(io.StringIO()))
+        stack.enter_context(contextlib.redirect_stderr(io.StringIO()))
+        nothing = os.open(os.devnull, os.O_WRONLY)
+        stack.callback(os.close, nothing)
+        for number in (1, 2):
+            with contextlib.suppress(OSError):  # closed before we began
+                kept = os.dup(number)
+                stack.callback(os.close, kept)
+                stack.callback(os.dup2, kept, number)
+                os.dup2(nothing, number)
+        yield
+
+
 def _dataflash(file: Path, frame: Frame) -> Iterator[Fix]:
     """A log of the vehicle itself: estimates of its first filter (XKF1), its status (XKF4), arming
     and modes."""
@@ -172,8 +191,7 @@ def _dataflash(file: Path, frame: Frame) -> Iterator[Fix]:
         ) from None
     broken = (OSError, ValueError, TypeError, AttributeError, struct.error, IndexError, KeyError)
     try:
-        # pymavlink tells on standard output what it makes of damaged logs
-        with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+        with _silence():
             log = DFReader_binary(str(file))
             found = list(_of_log(log, frame))
     except broken as error:

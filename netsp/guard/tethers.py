@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -64,9 +64,12 @@ class Strands:
         Returns
         -------
         list of Strand
-            The likeliest first; classes without a tether of twice its length are left out.
+            The likeliest first; classes without a tether of twice its length are left out, and
+            shares are among the others.
         """
-        self.all = self._of(hypotheses, robot, most)
+        strands = self._of(hypotheses, robot, most)
+        total = sum(s.likely for s in strands)
+        self.all = [replace(s, likely=s.likely / total) for s in strands]
         return self.all
 
     def _of(self, hypotheses: list[Hypothesis], robot: Floats, most: int) -> list[Strand]:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import csv
 import io
 import json
+import math
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, ClassVar
@@ -15,8 +16,9 @@ import numpy as np
 
 from netsp.drawn import Drawn
 from netsp.errors import InputError
+from netsp.fields import LARGEST
 from netsp.files import read_text
-from netsp.models import parse_json_object
+from netsp.models import parse_json_object, shown
 from netsp.online.mission import Mission
 from netsp.online.scene.scene import Scene
 from netsp.online.tether import Tether
@@ -154,6 +156,44 @@ def write_run(run: Run, folder: str | Path) -> None:
         raise InputError(f"{folder}: cannot be written: {error.strerror or error}") from None
 
 
+FINITE = ("time", "x", "y", "z", "tether", "limit")
+"""Columns of every log whose numbers are drawn."""
+
+
+def check_log(rows: Sequence[dict[str, str]], file: Path) -> None:
+    """InputError for rows of a log with a number that is none, or times that do not go on.
+
+    Parameters
+    ----------
+    rows : sequence of dict
+        Of log.csv, of a flight or of a tour that was carried out.
+    file : Path
+        Where they are from.
+
+    Raises
+    ------
+    InputError
+        Naming line, column and value.
+    """
+    before = -math.inf
+    for number, row in enumerate(rows, 2):
+        for column in FINITE:
+            try:
+                value = float(row[column])
+            except (KeyError, TypeError, ValueError):
+                value = math.nan
+            if not abs(value) < LARGEST:
+                raise InputError(
+                    f"{file}: line {number}: {column}: expected a number, got "
+                    f"{shown(row.get(column))}"
+                )
+        if float(row["time"]) < before:
+            raise InputError(f"{file}: line {number}: time: expected no less than {before:g}")
+        before = float(row["time"])
+    if before <= 0.0:
+        raise InputError(f"{file}: time: expected a run of more than 0 s")
+
+
 def read_run(folder: str | Path) -> Run:
     """A run from its files. How its tether hung is a matter of driving it again; here it is
     straight.
@@ -186,6 +226,7 @@ def read_run(folder: str | Path) -> Run:
         raise InputError(f"{folder}: a file of the run is damaged: {error}") from None
     if not log:
         raise InputError(f"{file}: holds no row")
+    check_log(rows, file)
     if summary.get("surprises"):
         raise InputError(
             f"{folder}: the map changed during this run, and how its tether hung meanwhile is not "

@@ -116,10 +116,12 @@ def moments_of_run(
     chosen = [*tethers[::step], *([tethers[-1]] if (len(tethers) - 1) % step else [])]
     out = []
     for frame in chosen:
-        nodes = np.array(frame["nodes"], dtype=float)
+        nodes = np.array(frame["nodes"], dtype=float).reshape(-1, 3)
+        if not np.isfinite([frame["time"], *nodes.ravel()]).all():
+            raise ValueError(f"tethers.json: time {frame['time']}: expected numbers")
         k = min(int(np.searchsorted(times, frame["time"])), len(rows) - 1)
         row = rows[k]
-        problem = [p for since, p in maps if since <= max(frame["time"], 0.0)][-1]
+        problem = next(p for since, p in reversed(maps) if since <= max(frame["time"], 0.0))
         text = (
             f"{frame['time']:.4g} s; tether {float(row['tether']):.4g} of {float(row['limit']):g} "
             f"{problem.units}; next: {next_of(problem, int(row['goal']))}"

@@ -14,6 +14,7 @@ import numpy as np
 from netsp.errors import InputError
 from netsp.files import read_text
 from netsp.geometry import polylines
+from netsp.online.log import check_log
 from netsp.problem import Problem
 from netsp.report import log
 from netsp.solution import Solution
@@ -99,6 +100,8 @@ def opened(source: str | Path, problem_file: str | Path | None) -> Opened:
     rows = log.rows_of(run / "log.csv") if run else []
     if run is not None and not rows:
         raise InputError(f"{run / 'log.csv'}: holds no row")
+    if run is not None:
+        check_log(rows, run / "log.csv")
     tethers = json_of(run / "tethers.json") if run else None
     maps = [(0.0, problem)]
     if run is not None and (run / "maps.json").exists():
@@ -113,7 +116,7 @@ def _maps_of(file: Path) -> list[tuple[float, Problem]]:
             (float(m["time"]), Problem.from_json(json.dumps(m["problem"]), source=str(file)))
             for m in found
         ]
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise InputError(f"{file}: expected times and problems: {error}") from None
     times = [time for time, _ in maps]
     if not times or times[0] != 0.0 or not all(a <= b for a, b in pairwise(times)):
@@ -127,3 +130,5 @@ def json_of(file: Path) -> Any:
         return json.loads(read_text(file))
     except json.JSONDecodeError as error:
         raise InputError(f"{file}: not JSON: {error.msg}") from None
+    except (ValueError, RecursionError):
+        raise InputError(f"{file}: not JSON that netsp reads") from None

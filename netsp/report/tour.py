@@ -96,7 +96,7 @@ def report_tour(source: str | Path, problem_file: str | Path | None, output: str
     what = opened(source, problem_file)
     try:
         text = page(what.problem, what.solution, what.rows, what.tethers, what.run, what.maps)
-    except (KeyError, IndexError, ValueError, TypeError) as error:
+    except (KeyError, IndexError, ValueError, TypeError, OverflowError) as error:
         raise InputError(
             f"{source}: a file of the run is damaged: {type(error).__name__}: {error}"
         ) from None
