@@ -63,13 +63,15 @@ class Outcome:
     seconds: float = 0.0
     warned: int = 0
     wrong: int = 0
+    cautioned: int = 0
     turned: int = 0
     loops: int = 0
-    missed: int = 0
+    silent: int = 0
     possible: int = 0
     missed_by_turns: int = 0
     leads: list[float] = field(default_factory=list)
-    allowed: list[float] = field(default_factory=list)
+    allowed: list[tuple[float, float]] = field(default_factory=list)
+    """Of loops that can be foreseen in time: leads of the warning, and of the first word."""
     updates_ms: list[float] = field(default_factory=list)
     home_ms: list[float] = field(default_factory=list)
 
@@ -250,18 +252,19 @@ def one(job: tuple[str, int, int]) -> Outcome:
     clear = Guard(problem, GuardOptions(0.01, 0.01, SPEED))
     counter = TurnCounter()
     moments = sorted(rng.integers(30, len(true) - 10, loops).tolist())
-    was = turned = False
+    was = spoke = turned = False
     for k in range(len(true)):
         begin = time.perf_counter()
         report = guard.take(Fix(k * DT, tuple(told[k]), estimate=True))
         out.updates_ms.append(1e3 * (time.perf_counter() - begin))
         exact = clear.take(Fix(k * DT, tuple(true[k]), estimate=True))
-        now = warned(report, Level.WARNING)
+        now, speaks = warned(report, Level.WARNING), warned(report, Level.CAUTION)
+        near = exact.loop_s is not None or bool(exact.loops)
         if now and not was:
             out.warned += 1
-            near = exact.loop_s is not None or exact.loops
             out.wrong += not near
-        was = now
+        out.cautioned += speaks and not spoke and not near
+        was, spoke = now, speaks
         if k and counter.take(true[k] - true[k - 1]) and not turned:
             turned = True
             out.turned += 1
@@ -291,8 +294,7 @@ def put_in(
     watching, seeing, turns = copy.deepcopy(guard), copy.deepcopy(clear), copy.deepcopy(counter)
     turns.turned = 0.0
     told = drifted(path, rng, drift.copy())
-    first = foreseen = by_turns = None
-    alarmed = possible = False
+    first = spoken = foreseen = by_turns = None
     before = here
     for k, place in enumerate(path):
         t = now + (k + 1) * DT
@@ -300,22 +302,22 @@ def put_in(
         exact = seeing.take(Fix(t, tuple(place), estimate=True))
         if warned(report, Level.WARNING) and first is None:
             first = k
+        if warned(report, Level.CAUTION) and spoken is None:
+            spoken = k
         if exact.loop_s is not None and exact.loop_s <= 16.0 and foreseen is None:
             foreseen = k
-        alarmed = alarmed or warned(report, Level.WARNING)
-        possible = possible or warned(report, Level.CAUTION)
         if turns.take(place - before) and by_turns is None:
             by_turns = k
         before = place
     out.loops += 1
-    out.missed += not alarmed
-    out.possible += possible and not alarmed
+    out.silent += spoken is None
+    out.possible += spoken is not None and first is None
     out.missed_by_turns += by_turns is None or by_turns > end
-    lead = -math.inf if first is None else (end - first) * DT
+    lead, word = (-math.inf if k is None else (end - k) * DT for k in (first, spoken))
     out.leads.append(lead)
     # where even a guard that knows the position saw it coming ten seconds before
     if foreseen is not None and (end - foreseen) * DT >= LEAD:
-        out.allowed.append(lead)
+        out.allowed.append((lead, word))
 
 
 def main() -> None:
@@ -331,9 +333,10 @@ def main() -> None:
             measure()
     if args.only in ("space", "hour"):
         return
-    head("tracks", "hours", "loops put in", "missed", "as possible", "missed by turns",
-         "lead s, p5 / median", "10 s of lead where foreseeable %", "warnings an hour",
-         "false an hour",
+    head("tracks", "hours", "loops put in", "nothing said", "only as possible",
+         "missed by turns", "lead of the warning s, p5 / median",
+         "warned / told 10 s before where foreseeable %", "warnings an hour", "false an hour",
+         "false as possible an hour",
          "turn counter's an hour", "update ms, median / p99", name="guard")  # fmt: skip
     jobs = [(kind, seed, args.loops) for kind, seed in tracks(args.tracks)]
     with ProcessPoolExecutor(args.jobs) as pool:
@@ -439,12 +442,14 @@ def told(name: str, some: list[Outcome]) -> None:
     ms = [v for o in some for v in o.updates_ms]
     if not leads or not hours:
         return
-    row(f"{len(some)} {name}", f"{hours:.2f}", str(len(leads)), str(sum(o.missed for o in some)),
+    row(f"{len(some)} {name}", f"{hours:.2f}", str(len(leads)), str(sum(o.silent for o in some)),
         str(sum(o.possible for o in some)),
         str(sum(o.missed_by_turns for o in some)),
         f"{np.percentile(leads, 5, method='lower'):.1f} / {np.median(leads):.1f}",
-        f"{100.0 * np.mean([v >= LEAD for v in allowed]):.1f} of {len(allowed)}" if allowed else "",
+        " / ".join(f"{100.0 * v:.1f}" for v in (np.array(allowed) >= LEAD).mean(axis=0))
+        + f" of {len(allowed)}" if allowed else "",
         f"{sum(o.warned for o in some) / hours:.1f}", f"{sum(o.wrong for o in some) / hours:.1f}",
+        f"{sum(o.cautioned for o in some) / hours:.1f}",
         f"{sum(o.turned for o in some) / hours:.1f}",
         f"{np.median(ms):.1f} / {np.percentile(ms, 99):.1f}")  # fmt: skip
 

@@ -20,7 +20,7 @@ drives towards it all the time."""
 SLACK = {Level.CAUTION: 0.1, Level.WARNING: 0.03, Level.ALARM: 0.0}
 """Shares of the tether that are left."""
 
-LIKELY, LOOPED, POSSIBLE = 0.7, 0.5, 0.2
+LIKELY, LOOPED, POSSIBLE = 0.7, 0.5, 0.1
 """Shares of the classes in which a loop will close, or has closed: above the first, or second, it
 is spoken of as such, above the third as a possibility, and below not at all."""
 
