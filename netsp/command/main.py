@@ -126,6 +126,7 @@ COMMANDS = {
         "animate": ("animate", "show a tour or a run as a moving picture"),
         "base": ("base", "find where to stand, among candidates for the base"),
         "tether": ("tether", "find how long a tether is needed, and what more of it saves"),
+        "gtsp": ("gtsp", "solve any generalised TSP, in the format of GTSPLIB"),
         "world": ("world", "draw a random problem; same seed, same problem on every machine"),
     },
     "carry out": {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from typing import TextIO
+from typing import Protocol, TextIO
 
 from netsp.problem import Problem
 from netsp.solution import Solution, Status
@@ -22,6 +22,18 @@ EVERY = 0.2
 """Least seconds between two rows that bring nothing but a better bound."""
 
 
+class Named(Protocol):
+    """What is solved."""
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+
+    @property
+    def summary(self) -> str:
+        """In a line."""
+
+
 class ProgressTable:
     """Prints a row for every better tour and every new stage, and now and then for the bound."""
 
@@ -32,17 +44,25 @@ class ProgressTable:
         self._shown = 0.0
         self._held: tuple[float, Progress] | None = None
         self._begin = time.monotonic()
+        self._slow = ""
         self._patience = threading.Timer(QUIET_S, self._explain)
         self._patience.daemon = True
 
-    def begin(self, problem: Problem) -> None:
-        """Announce the problem."""
+    def begin(self, problem: Named, slow: str = "building the roadmap …") -> None:
+        """Announce the problem.
+
+        Parameters
+        ----------
+        slow
+            What is said if nothing else is for `QUIET_S` seconds.
+        """
+        self._slow = slow
         self._begin = time.monotonic()
         self._print(f"{problem.name}: {problem.summary}")
         self._patience.start()
 
     def _explain(self) -> None:
-        self._print("building the roadmap …")
+        self._print(self._slow)
 
     def __call__(self, row: Progress) -> None:
         """Print a row of progress, if it tells anything new."""

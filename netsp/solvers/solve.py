@@ -17,6 +17,7 @@ from netsp.models import shown
 from netsp.problem import Problem
 from netsp.registry import foreign, load
 from netsp.solution import ProblemReference, Solution, Timings, max_turning
+from netsp.solvers import without_base
 from netsp.solvers.answer import to_solution
 from netsp.solvers.custom import call, read_options, whole_numbers
 from netsp.solvers.in_order import solve_in_order
@@ -24,6 +25,7 @@ from netsp.solvers.table import ROADMAPS, SOLVERS
 from netsp.solvers.warm import old_tour, tour_from
 from netsp.solving.limits import Limits
 from netsp.solving.params import NoParams, read_params
+from netsp.travel.baseless import BaselessGraph
 from netsp.travel.graph import TravelGraph
 from netsp.travel.result import OnProgress, Result
 
@@ -187,6 +189,11 @@ def solve_graph(
     clock = Clock.of(time_limit)
     with graph.on_clock(clock):
         limits = Limits(clock, iteration_limit, rng, tour, graph.progress_listener(on_progress))
+        if isinstance(graph, BaselessGraph):
+            proves = isinstance(solver, str) and SOLVERS.named(solver).proves
+            return without_base.solve(
+                graph, lambda g, limits: _run(g, solver, params, limits), limits, proves=proves
+            )
         result = _run(graph, solver, params, limits)
     return graph.as_asked(result)
 

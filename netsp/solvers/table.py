@@ -26,6 +26,8 @@ class Solver:
         A baseline blind to the tether, whose tours may be `invalid`.
     ordered : bool
         Keeps precedences (`TravelGraph.before`).
+    proves : bool
+        Looks for a proof.
     """
 
     name: str
@@ -34,6 +36,7 @@ class Solver:
     geometric: bool = False
     blind: bool = False
     ordered: bool = False
+    proves: bool = False
 
     @property
     def ours(self) -> bool:
@@ -72,10 +75,13 @@ SOLVERS: Registry[Solver] = Registry(
         s.name: s
         for s in (
             Solver(
-                "auto", "netsp.solvers.auto:solve", "netsp.solvers.auto:Params", ordered=True
+                "auto", "netsp.solvers.auto:solve", "netsp.solvers.auto:Params", ordered=True,
+                proves=True,
             ),
-            Solver("mip", "netsp.mip.solve:solve", "netsp.mip.solve:Params"),
-            Solver("dp", "netsp.dp.solve:solve", "netsp.dp.solve:Params", ordered=True),
+            Solver("mip", "netsp.mip.solve:solve", "netsp.mip.solve:Params", proves=True),
+            Solver(
+                "dp", "netsp.dp.solve:solve", "netsp.dp.solve:Params", ordered=True, proves=True
+            ),
             Solver("reduced-mip", "netsp.mip.reduced:solve", "netsp.mip.reduced:ReducedParams"),
             Solver("lns", "netsp.lns.solve:solve", "netsp.lns.solve:Params", ordered=True),
             Solver("anneal", "netsp.anneal.icra2017:solve", "netsp.anneal.icra2017:Params"),

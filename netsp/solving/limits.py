@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -27,6 +28,9 @@ class Limits:
         A tour to start from, as vertices from 0 on.
     on_progress : callable, optional
         Called with a `netsp.travel.result.Progress` now and then.
+    cutoff : float
+        Length of a tour that is known from elsewhere: a proof that none is shorter is enough; inf
+        for none.
     """
 
     time: TimeLimit = None
@@ -34,3 +38,4 @@ class Limits:
     rng: np.random.Generator = field(default_factory=lambda: np.random.default_rng(0))
     warm_start: Sequence[int] | None = None
     on_progress: OnProgress | None = None
+    cutoff: float = math.inf

@@ -10,15 +10,21 @@ from typing import Any
 import numpy as np
 
 from netsp.clock import Clock
-from netsp.errors import LimitReachedError, MemoryLimitError
+from netsp.errors import InputError, LimitReachedError, MemoryLimitError
 from netsp.solution import Status
 from netsp.solving.limits import Limits
+from netsp.travel.baseless import BaselessGraph
 from netsp.travel.graph import UNTIMED, TravelGraph, least_tethers
 from netsp.travel.result import Progress, Result, proven
 
 
 class Stop(Exception):
     """A limit is reached."""
+
+
+SLIVER = 1e-4
+"""Where lengths are multiples of a grain, a bound is rounded up to the next, but not by so small a
+part of it: bounds are off by rounding themselves."""
 
 
 class SolverRun:
@@ -30,11 +36,16 @@ class SolverRun:
     ----------
     iterations
         How many the solver has done; each solver says what one is.
+    known
+        Length of a tour from elsewhere: a bound that reaches it is all that is wanted.
     """
 
     def __init__(self, graph: TravelGraph, limits: Limits | None = None) -> None:
         limits = limits or Limits()
+        if isinstance(graph, BaselessGraph):
+            raise InputError("graph: has no base; expected solve_graph to be called with it")
         self.graph = graph
+        self.known = limits.cutoff
         self.clock = Clock.of(limits.time)
         self.iterations = 0
         self.iteration_limit = math.inf if limits.iterations is None else limits.iterations
@@ -147,6 +158,9 @@ class SolverRun:
 
     def raise_bound(self, bound: float) -> None:
         """Take a lower bound if it is better; never above the incumbent."""
+        grain = self.graph.grain
+        if grain and np.isfinite(bound):
+            bound = max(bound, grain * float(np.ceil(bound / grain - SLIVER)))
         self.bound = min(max(self.bound or 0.0, bound), self.length)
 
     def check(self) -> None:
@@ -156,8 +170,10 @@ class SolverRun:
 
     @property
     def done(self) -> bool:
-        """Whether the incumbent is proven optimal."""
-        return self.tour is not None and self.bound is not None and proven(self.length, self.bound)
+        """Whether the incumbent is proven optimal, or no shorter than what is known."""
+        if self.tour is None or self.bound is None:
+            return False
+        return proven(min(self.length, self.known), self.bound)
 
     def report(self, stage: str, **more: Any) -> None:
         """Add a row to the trace and hand it on; `more` are further fields of `Progress`."""
@@ -179,5 +195,6 @@ class SolverRun:
         if self.tour is None:
             status = Status.INFEASIBLE if self.infeasible else Status.NO_SOLUTION_FOUND
             return Result(None, None, self.bound or None, status, tuple(self.trace))
-        status = Status.OPTIMAL if self.done else Status.FEASIBLE
+        optimal = self.bound is not None and proven(self.length, self.bound)
+        status = Status.OPTIMAL if optimal else Status.FEASIBLE
         return Result(self.tour, self.length, self.bound, status, tuple(self.trace), walk=self.walk)

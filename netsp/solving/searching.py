@@ -22,7 +22,7 @@ from netsp.lns.layers import Instance
 from netsp.lns.search import Search
 from netsp.solving.legcosts import MEASURE_AT_ONCE, LegCosts
 from netsp.solving.limits import Limits
-from netsp.solving.run import SolverRun, Stop
+from netsp.solving.run import SLIVER, SolverRun, Stop
 from netsp.travel.graph import TravelGraph, least_tethers
 from netsp.travel.result import OPTIMALITY_TOLERANCE
 
@@ -167,5 +167,7 @@ class SearchingRun(SolverRun):
 
     @property
     def cutoff(self) -> float:
-        """Tours no shorter than this are of no interest: half the tolerance below the incumbent."""
-        return self.length * (1.0 - 0.5 * OPTIMALITY_TOLERANCE)
+        """Tours no shorter than this are of no interest: half the tolerance below the incumbent, or
+        the next multiple of a grain."""
+        length, grain = min(self.length, self.known), self.graph.grain
+        return min(length * (1.0 - 0.5 * OPTIMALITY_TOLERANCE), length - grain * (1.0 - 2 * SLIVER))

@@ -39,8 +39,27 @@ class CostTable:
         raise InputError(f"no path from vertex {u} to {v}: this travel graph was made from costs")
 
 
-def checked_costs(costs: npt.ArrayLike, clusters: npt.ArrayLike) -> tuple[Floats, Ints]:
-    """The matrix with inf within clusters, and the clusters, or InputError with what is wrong."""
+LARGEST_WHOLE = 2.0**40
+"""Costs are sums of whole numbers as long as none is larger than this."""
+
+
+def grain_of(costs: Floats) -> float:
+    """1 if all costs are whole numbers, so that lengths of tours are, too; else 0."""
+    finite = costs[np.isfinite(costs)]
+    whole = bool((finite == np.rint(finite)).all()) and finite.max(initial=0.0) <= LARGEST_WHOLE
+    return 1.0 if whole else 0.0
+
+
+def checked_costs(
+    costs: npt.ArrayLike, clusters: npt.ArrayLike, *, base: bool = True
+) -> tuple[Floats, Ints]:
+    """The matrix with inf within clusters, and the clusters, or InputError with what is wrong.
+
+    Parameters
+    ----------
+    base
+        Whether vertex 0 must be alone in cluster 0.
+    """
     try:
         c = np.array(costs, dtype=float)
         numbers = np.array(clusters, dtype=float)
@@ -62,10 +81,10 @@ def checked_costs(costs: npt.ArrayLike, clusters: npt.ArrayLike) -> tuple[Floats
             "without gaps"
         )
     cluster = numbers.astype(np.int64)
-    if cluster[0] != 0 or (cluster == 0).sum() != 1:
+    if base and (cluster[0] != 0 or (cluster == 0).sum() != 1):
         raise InputError(
             "clusters: vertex 0, where the tour starts, must be alone in cluster 0; cluster 0 is "
-            f"{np.flatnonzero(cluster == 0).tolist()}"
+            f"{np.flatnonzero(cluster == 0).tolist()}; expected that, or base=None"
         )
     missing = sorted(set(range(int(cluster.max()) + 1)) - set(cluster.tolist()))
     if missing:
@@ -92,10 +111,13 @@ def checked_costs(costs: npt.ArrayLike, clusters: npt.ArrayLike) -> tuple[Floats
         )
     c = np.minimum(c, c.T)
     _, part = connected_components(csr_array(np.isfinite(c)), directed=False)
-    joined = set(cluster[part == part[0]].tolist())
-    cut_off = sorted(set(cluster.tolist()) - joined)
-    if cut_off:
+    every = set(cluster.tolist())
+    starts = [0] if base else np.unique(part, return_index=True)[1].tolist()
+    missed = [sorted(every - set(cluster[part == part[k]].tolist())) for k in starts]
+    if all(missed):
+        where = "vertex 0" if base else "the others"
         raise InputError(
-            f"costs: infinite costs cut cluster {cut_off[0]} off from vertex 0, so there is no tour"
+            f"costs: infinite costs cut cluster {min(missed, key=len)[0]} off from {where}, so "
+            "there is no tour"
         )
     return c, cluster

@@ -25,7 +25,7 @@ from netsp.clock import NEVER, Clock, Flag
 from netsp.drawn import Drawn
 from netsp.errors import InputError, counted
 from netsp.hsignature import Word
-from netsp.travel.costs import CostTable, checked_costs
+from netsp.travel.costs import CostTable, checked_costs, grain_of
 from netsp.travel.detours import Detours
 from netsp.travel.kept import within_kept
 from netsp.travel.legs import Legs
@@ -74,6 +74,8 @@ class TravelGraph(Drawn):
         The tether that is out at the start.
     bound_in_any_class : float
         No tour is shorter, whichever classes it takes, kept or left out; 0 while nothing is known.
+    grain : float
+        Lengths of tours are multiples of it; 0 where they may be anything.
     goal : ndarray of int, shape (V,)
         Number of each vertex's goal, from 1: the cluster, but for goals with alternatives.
     before : ndarray of bool, shape (c + 1, c + 1)
@@ -86,6 +88,7 @@ class TravelGraph(Drawn):
     start: int | None = None
     start_tether: Floats
     bound_in_any_class = 0.0
+    grain = 0.0
 
     def __init__(
         self,
@@ -117,7 +120,9 @@ class TravelGraph(Drawn):
         self._place: dict[tuple[int, Word], int] | None = None
 
     @classmethod
-    def from_costs(cls, costs: npt.ArrayLike, clusters: npt.ArrayLike) -> TravelGraph:
+    def from_costs(
+        cls, costs: npt.ArrayLike, clusters: npt.ArrayLike, base: int | None = 0
+    ) -> TravelGraph:
         """Any symmetric generalised TSP as a travel graph, for the solvers that need no geometry.
 
         Parameters
@@ -126,19 +131,22 @@ class TravelGraph(Drawn):
             Symmetric, not negative; inf where there is no leg. Costs within a cluster are never
             used.
         clusters : array_like of int, shape (V,)
-            Cluster of each vertex, numbered 0, 1, … without gaps. Vertex 0 is alone in cluster 0:
-            it is where the tour starts and ends.
+            Cluster of each vertex, numbered 0, 1, … without gaps.
+        base : 0 or None
+            0: vertex 0 is alone in cluster 0, and the tour starts and ends there. None: there is
+            no base; the tour takes one vertex of each cluster, cluster 0 among them.
 
         Returns
         -------
         TravelGraph
-            A graph without geometry beneath it.
+            A graph without geometry beneath it; without a base, one for `netsp.solve_graph` only
+            (`netsp.travel.baseless`).
 
         Raises
         ------
         InputError
-            Wrong shapes, asymmetric, negative or NaN costs, a missing cluster, or infinities that
-            leave no vertex of some cluster joined to vertex 0.
+            Wrong shapes, asymmetric, negative or NaN costs, a missing cluster, another base, or
+            infinities that leave no vertex of some cluster joined to vertex 0.
 
         Examples
         --------
@@ -146,9 +154,18 @@ class TravelGraph(Drawn):
         >>> TravelGraph.from_costs(costs, clusters=[0, 1, 2]).tour_length([0, 1, 2])
         12.0
         """
-        table = CostTable(*checked_costs(costs, clusters))
+        if base is not None and (isinstance(base, bool) or base != 0):
+            raise InputError(f"base: expected 0 or None, got {base!r}")
+        table = CostTable(*checked_costs(costs, clusters, base=base is not None))
         cluster = table.cluster
-        return cls(cluster, [()] * len(cluster), np.zeros(len(cluster)), table)
+        kind: type[TravelGraph] = cls
+        if base is None:
+            from netsp.travel.baseless import BaselessGraph
+
+            kind = BaselessGraph
+        graph = kind(cluster, [()] * len(cluster), np.zeros(len(cluster)), table)
+        graph.grain = grain_of(table.costs)
+        return graph
 
     def __repr__(self) -> str:
         """In a line."""
@@ -328,7 +345,7 @@ class TravelGraph(Drawn):
             _PartOfLegs(self, chosen),
             self.roadmap,
         )
-        part.goal, part.before = self.goal[chosen], self.before
+        part.goal, part.before, part.grain = self.goal[chosen], self.before, self.grain
         return part
 
     def unordered(self) -> TravelGraph:

@@ -1,0 +1,131 @@
+"""`netsp gtsp`: any symmetric generalised TSP in the format of GTSPLIB."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import sys
+import time
+from typing import TYPE_CHECKING
+
+from netsp.command import told
+from netsp.command.types import check_writable, natural, option, positive, seconds
+from netsp.errors import EXIT_INFEASIBLE, EXIT_NOT_ALL, InputError
+
+if TYPE_CHECKING:
+    from netsp.gtsplib import Instance
+    from netsp.travel.result import Result
+
+EXAMPLE = "netsp gtsp examples/7ring28.gtsp -o ring.tour --plot ring.png"
+
+
+def arguments(p: argparse.ArgumentParser) -> None:
+    """Of the command line."""
+    p.add_argument("instance", metavar="FILE", help="file in the format of TSPLIB or GTSPLIB")
+    p.add_argument(
+        "--solver", default="auto", metavar="NAME",
+        help="auto (default), mip, dp, reduced-mip, lns, anneal or greedy",
+    )  # fmt: skip
+    p.add_argument(
+        "--option", action="append", default=[], type=option, metavar="NAME=VALUE",
+        help="an option of the solver, as docs/solvers.md lists them; may be repeated",
+    )  # fmt: skip
+    p.add_argument(
+        "--time-limit", type=seconds, metavar="S",
+        help="seconds; the best tour by then is written; default no limit",
+    )  # fmt: skip
+    p.add_argument(
+        "--iteration-limit", type=positive, metavar="N",
+        help="iterations of the solver; default no limit",
+    )  # fmt: skip
+    p.add_argument("--seed", type=natural, default=0, metavar="N", help="random seed; default 0")
+    p.add_argument(
+        "-o", "--output", metavar="FILE",
+        help="write the tour, in TSPLIB's format, to this file (default: stdout)",
+    )  # fmt: skip
+    p.add_argument("--plot", metavar="FILE", help="draw the tour (png, svg or pdf)")
+    p.add_argument("--quiet", action="store_true", help="no progress, no summary")
+    told.json_flag(p)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Solve, write, and return the exit code."""
+    told.check_stdout(args)
+    check_writable(args.output, args.plot, inputs=(args.instance,))
+    from netsp.command.compiling import compile_messages
+    from netsp.command.progress import ProgressTable
+    from netsp.files import write_text
+    from netsp.gtsplib import load
+    from netsp.gtsplib.tour import tour_text
+    from netsp.solvers.solve import solve_graph
+
+    if args.plot:
+        from netsp.pictures import style
+
+        style.check_format(args.plot)
+    if len(dict(args.option)) < len(args.option):
+        raise InputError("--option: the same option is given twice")
+    instance = load(args.instance)
+    if args.plot and instance.places is None:
+        raise InputError(
+            f"--plot: {args.instance} is given by its distances, so there is nothing to draw"
+        )
+    graph = instance.to_travel_graph()
+    begin = time.monotonic()
+    table = None if args.quiet else ProgressTable(sys.stderr)
+    with (
+        table or contextlib.nullcontext(),
+        compile_messages(sys.stderr) if table else contextlib.nullcontext(),
+    ):
+        if table:
+            table.begin(instance, "looking for a first tour …")
+        result = solve_graph(
+            graph, args.solver, time_limit=args.time_limit, iteration_limit=args.iteration_limit,
+            seed=args.seed, params=dict(args.option), on_progress=table,
+        )  # fmt: skip
+    if result.tour is not None:
+        write_text(args.output or "-", tour_text(instance, result))
+    if args.plot:
+        from netsp.pictures import style
+        from netsp.pictures.gtsp import draw_gtsp
+
+        style.save(draw_gtsp(instance, result).figure, args.plot)
+    spent = time.monotonic() - begin
+    if table:
+        table.end()
+        print(_summary(result, spent, args.output, args.plot), file=sys.stderr)
+    if args.json:
+        told.tell(_told(instance, result, spent))
+    if result.tour is None:
+        return EXIT_INFEASIBLE if result.status.value == "infeasible" else EXIT_NOT_ALL
+    return 0
+
+
+def _summary(result: Result, spent: float, output: str | None, plot: str | None) -> str:
+    """What was found, in a few lines."""
+    if result.length is None:
+        why = "there is no tour" if result.status.value == "infeasible" else "no tour found"
+        return f"{why} ({spent:.2f} s)"
+    if result.status.value == "optimal":
+        verdict = "proven optimal"
+    elif result.lower_bound is None:
+        verdict = "no bound"
+    else:
+        verdict = f"bound {result.lower_bound:.10g}, gap {100 * (result.gap or 0.0):.3f} %"
+    lines = [f"tour     {result.length:.10g}, {verdict}", f"time     {spent:.2f} s"]
+    if output:
+        lines.append(f"written  {output}")
+    if plot:
+        lines.append(f"picture  {plot}")
+    return "\n".join(lines)
+
+
+def _told(instance: Instance, result: Result, spent: float) -> dict[str, object]:
+    """For programs."""
+    return {
+        "instance": instance.name, "vertices": len(instance.clusters),
+        "clusters": int(instance.clusters.max()) + 1, "status": result.status.value,
+        "length": result.length, "lower_bound": result.lower_bound, "gap": result.gap,
+        "tour": None if result.tour is None else [v + 1 for v in result.tour],
+        "seconds": round(spent, 3),
+    }  # fmt: skip
