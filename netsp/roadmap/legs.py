@@ -20,12 +20,21 @@ from netsp.memory import ask
 from netsp.roadmap.classes import TetherTree
 from netsp.roadmap.explore import run_explore
 from netsp.roadmap.paths import TautPaths
-from netsp.roadmap.slits import Slits, build_slits, slit_lengths
+from netsp.roadmap.slits import Ends, Slits, flattened, gates_for, slit_length, slit_lengths
 from netsp.roadmap.trie import CORE, LETTER, PARENT, Trie, add_child, trie_child
 from netsp.travel.graph import UNTIMED
 
 BLOCK = 256
 """Rows of a matrix that are worked on at a time, so that what is in between stays small."""
+
+
+EXCESS, WORTH = 0.1, 0.7
+"""A search costs far more the longer the paths may be, and no class has two taut paths. Legs are
+first sought up to the first share beyond their lengths among slits, which they rarely exceed, if
+the longest path that is then allowed is at most the second share of what the tethers allow."""
+
+GOAL, FOLLOWING, NODE = range(3)
+"""Columns of an entry: goal, the next entry of the same node, node of the trie."""
 
 
 class Tethers(NamedTuple):
@@ -64,7 +73,6 @@ class TautLegs:
         self.paths, self.cluster, self.planar = paths, cluster, planar
         self.signatures = list(signatures)
         self._z = paths.problem.points[:, 2]
-        self._slits: Slits | None = None
         nothing = np.zeros(1, dtype=np.int64)
         self._tree = tree or TetherTree(np.zeros_like(cluster), nothing - 1, np.zeros(1))
 
@@ -90,9 +98,7 @@ class TautLegs:
         count = len(vertices) ** 2 if asked is None else int(asked.sum())
         stop = clock.flag if clock is not None and count > UNTIMED**2 else NEVER
         out = np.full((len(vertices), len(vertices)), np.inf)
-        flat = [np.array(self.signatures[v], dtype=np.int64) for v in vertices]
-        row = np.concatenate([[0], np.cumsum([len(w) for w in flat])]).astype(np.int64)
-        letters = np.concatenate(flat).astype(np.int64) if row[-1] else np.zeros(0, np.int64)
+        letters, row = flattened([self.signatures[v] for v in vertices])
         tethers = Tethers(
             letters, row, cluster, self.planar[vertices], self._tree.last[vertices],
             self._tree.parent, self._tree.depth, self._tree.length,
@@ -127,21 +133,29 @@ class TautLegs:
         self, g: int, here: Ints, there: Ints, asked: Bools, tethers: Tethers, stop: Flag
     ) -> Floats:
         """(len(here), len(there)) planar lengths of all legs from the classes of goal g."""
-        nodes, limit, size, head, entry_goal, entry_next, pair = _wanted(
-            here, there, asked, tethers, self.paths.margin, self.paths.tangents.pending
+        paths = self.paths
+        margin, pending = paths.margin, paths.tangents.pending
+        places, cluster = paths.outline.places, tethers.cluster
+        cells = paths.slits.cells(places[:, 0])
+        ends = Ends(places[cluster], cells[cluster], tethers.letters, tethers.row)
+        nodes, size, head, entry, low, most, pair = _wanted(
+            here, there, asked, tethers, margin, ends, paths.slits
         )
-        hits = run_explore(
-            self.paths.tangents,
-            g,
-            Trie(nodes, limit, size),
-            margin=self.paths.outline.margin,
-            stop=stop,
-        )
-        if hits.capped:  # the time is up; the caller says so
-            return np.full((len(here), len(there)), np.inf)
-        found = _match(
-            hits.goal, hits.word, hits.length, head[:size], entry_goal, entry_next, len(entry_goal)
-        )
+        found = np.full(len(entry), np.inf)
+        likely = np.minimum(most, (1.0 + EXCESS) * low + margin)
+        first = likely.max(initial=0.0) <= WORTH * most.max(initial=0.0)
+        for longest in (likely, most) if first else (most,):
+            left = np.flatnonzero(np.isinf(found))
+            if not len(left):
+                break
+            limit = _limits(nodes, size, entry[left, NODE], longest[left], pending)
+            hits = run_explore(
+                paths.tangents, g, Trie(nodes.copy(), limit, size), margin=paths.outline.margin,
+                stop=stop,
+            )  # fmt: skip
+            if hits.capped:  # the time is up; the caller says so
+                return np.full((len(here), len(there)), np.inf)
+            _match(hits.goal, hits.word, hits.length, head, entry, found)
         if np.isinf(found).any():
             k = int(np.argmax(np.isinf(found)))
             a, b = np.argwhere(pair == k)[0]
@@ -173,8 +187,6 @@ class TautLegs:
             (r,) positions among the vertices; then (r, k).
         """
         vertices = np.asarray(vertices, dtype=np.int64)
-        if self._slits is None:
-            self._slits = build_slits(self.paths.problem)
         cluster, planar, z = self.cluster[vertices], self.planar[vertices], self._z
         own = np.arange(len(vertices)) if rows is None else np.asarray(rows, dtype=np.int64)
         ask(
@@ -184,7 +196,7 @@ class TautLegs:
         )
         stop = NEVER if clock is None else clock.flag
         words = [self.signatures[v] for v in vertices]
-        low = slit_lengths(self._slits, self.paths.outline.places, cluster, words, rows, stop)
+        low = slit_lengths(self.paths.slits, self.paths.outline.places, cluster, words, rows, stop)
         if stop[0]:
             raise LimitReachedError(
                 f"time limit reached while bounding the legs between {len(vertices)} homotopy "
@@ -262,29 +274,38 @@ def _shared(u: int, v: int, letters: Ints, row: Ints) -> int:
 def _entry(goal: int, node: int, head: Ints, entry: Ints) -> int:
     """The entry of a goal in a node's list, -1 if there is none."""
     e = head[node, 0]
-    while e >= 0 and entry[e, 0] != goal:
-        e = entry[e, 1]
+    while e >= 0 and entry[e, GOAL] != goal:
+        e = entry[e, FOLLOWING]
     return int(e)
 
 
 @kernel
 def _wanted(
-    here: Ints, there: Ints, asked: Bools, tethers: Tethers, margin: float, pending: Floats
-) -> tuple[Ints, Floats, int, Ints, Ints, Ints, Ints]:
+    here: Ints, there: Ints, asked: Bools, tethers: Tethers, margin: float, ends: Ends,
+    slits: Slits,
+) -> tuple[Ints, int, Ints, Ints, Floats, Floats, Ints]:  # fmt: skip
     """The trie of all relative words between two lists of vertices.
 
-    Returns the trie, per node the head of a list of (goal, entry), and the entry of each pair.
+    Returns the trie and its size; per node the head of a list of entries; the entries, each of
+    which is a goal and a relative word, with the bounds of its leg from below (among slits) and
+    above (along the tethers); and the entry of each pair.
     """
     letters, row, cluster, planar = tethers.letters, tethers.row, tethers.cluster, tethers.planar
     last, parent, depth, length = tethers.last, tethers.parent, tethers.depth, tethers.length
     trie = np.full((256, 5), -1, dtype=np.int64)
-    limit = np.zeros(256)
     trie[0, LETTER], trie[0, CORE] = 0, 1
     zero, one = int(np.int64(0)), int(np.int64(1))  # no literals: callees are compiled once
     size = one
     head = np.full((256, 1), -1, dtype=np.int64)
-    entry = np.empty((1024, 2), dtype=np.int64)
+    entry = np.empty((1024, 3), dtype=np.int64)
+    low, most = np.empty(1024), np.empty(1024)
     entries = zero
+    longest_word = zero
+    for v in here:
+        longest_word = max(longest_word, row[v + 1] - row[v])
+    for v in there:
+        longest_word = max(longest_word, row[v + 1] - row[v])
+    gate = gates_for(longest_word, slits)
     pair = np.full((len(here), len(there)), -1, dtype=np.int64)
     for a in range(len(here)):
         u = here[a]
@@ -299,10 +320,8 @@ def _wanted(
             back, on = row[u + 1] - row[u] - shared, row[v + 1] - row[v] - shared
             while size + back + on >= len(trie):
                 trie = more_int_rows(trie)
-                limit = longer(limit)
                 head = more_int_rows(head)
             node = zero
-            limit[0] = max(limit[0], bound)
             for k in range(back + on):
                 if k < back:
                     x = -letters[row[u + 1] - 1 - k]
@@ -312,48 +331,55 @@ def _wanted(
                 if c < 0:
                     c = size
                     add_child(node, x, one, c, trie)
-                    limit[c] = bound
                     head[c, 0] = -1
                     size += 1
-                elif limit[c] < bound:
-                    limit[c] = bound
                 node = c
             e = _entry(cluster[v], node, head, entry)
             if e < 0:
                 if entries == len(entry):
                     entry = more_int_rows(entry)
+                    low, most = longer(low), longer(most)
                 e = entries
                 entries += 1
-                entry[e, 0], entry[e, 1] = cluster[v], head[node, 0]
+                entry[e, GOAL], entry[e, FOLLOWING], entry[e, NODE] = (
+                    cluster[v], head[node, 0], node
+                )  # fmt: skip
                 head[node, 0] = e
+                low[e], most[e] = slit_length(u, v, ends, slits, gate), bound
+            most[e] = min(most[e], bound)
             pair[a, b] = e
+    return trie, size, head[:size, 0], entry[:entries], low[:entries], most[:entries], pair
+
+
+@kernel
+def _limits(trie: Ints, size: int, node: Ints, longest: Floats, pending: Floats) -> Floats:
+    """Per node of the trie, the longest path that may stand there on its way to a word that is
+    sought, given the nodes of these and how long their paths may be; -1 if there is none."""
+    limit = np.full(len(trie), -1.0)
+    for k in range(len(node)):
+        c = node[k]
+        while c >= 0 and limit[c] < longest[k]:
+            limit[c] = longest[k]
+            c = trie[c, PARENT]
     # a path may stand on a longer word whose last letters it will still cancel
     for c in range(1, size):
         x = trie[c, LETTER]
         side, i = (0, x - 1) if x > 0 else (1, -x - 1)
         if pending[side, i, 0] <= pending[side, i, 2]:
             limit[c] = max(limit[c], limit[trie[c, PARENT]])
-    return trie, limit, size, head[:, 0], entry[:entries, 0], entry[:entries, 1], pair
+    return limit
 
 
 @kernel
 def _match(
-    goal: Ints,
-    node: Ints,
-    length: Floats,
-    head: Ints,
-    entry_goal: Ints,
-    entry_next: Ints,
-    entries: int,
-) -> Floats:
-    """Shortest hit of every entry; inf where there is none."""
-    out = np.full(entries, np.inf)
+    goal: Ints, node: Ints, length: Floats, head: Ints, entry: Ints, found: Floats
+) -> None:  # fmt: skip
+    """The shortest hit of every entry, into `found`."""
     for i in range(len(goal)):
         if node[i] < len(head):
             e = head[node[i]]
             while e >= 0:
-                if entry_goal[e] == goal[i]:
-                    out[e] = min(out[e], length[i])
+                if entry[e, GOAL] == goal[i]:
+                    found[e] = min(found[e], length[i])
                     break
-                e = entry_next[e]
-    return out
+                e = entry[e, FOLLOWING]

@@ -15,6 +15,7 @@ from netsp.problem import Problem
 from netsp.roadmap.explore import run_explore
 from netsp.roadmap.outline import Outline, build_outline, is_free
 from netsp.roadmap.shortest import ContactGraph
+from netsp.roadmap.slits import Slits, build_slits, slit_lengths
 from netsp.roadmap.tangents import ARC_STEP, TangentGraph, build_tangents
 from netsp.roadmap.trie import Trie
 
@@ -52,6 +53,11 @@ class TautPaths:
         """Shortest paths in any class over the same tangents."""
         return ContactGraph(self.outline, self.tangents)
 
+    @cached_property
+    def slits(self) -> Slits:
+        """What bounds lengths from below."""
+        return build_slits(self.problem)
+
     def length(self, a: int, b: int, word: Word) -> float:
         """3D length of the taut path of a word from point a to point b."""
         return math.hypot(self.planar_length(a, b, word), float(self._z[b] - self._z[a]))
@@ -65,6 +71,24 @@ class TautPaths:
             That it is known not to exceed.
         """
         return self._pieces(a, b, word, longest)[0]
+
+    def planar_length_within(self, a: int, b: int, word: Word, longest: float) -> float | None:
+        """Length in the plan of the taut path of a word from point a to point b; None if it is
+        longer than so much."""
+        key = (a, b, tuple(word))
+        if key not in self._known:
+            found = self._sought(a, b, word, longest)
+            if found is None:
+                return None
+            self._known[key] = found
+        planar = self._known[key][0]
+        return planar if planar <= longest + self.margin else None
+
+    def slit_length(self, a: int, b: int, word: Word) -> float:
+        """No more than the length in the plan of the taut path of a word from point a to point
+        b."""
+        places, cluster = self.outline.places, np.array([a, b])
+        return float(slit_lengths(self.slits, places, cluster, [(), tuple(word)])[0, 1])
 
     def turning(self, a: int, b: int, word: Word) -> float:
         """Sum of the angles (radians) by which the taut path of a word from point a to point b
@@ -122,6 +146,15 @@ class TautPaths:
     def _search(
         self, a: int, b: int, word: Word, longest: float | None
     ) -> tuple[float, list[tuple[int, float]]]:
+        found = self._sought(a, b, word, longest)
+        if found is None:
+            raise NetspError(f"internal: no taut path of word {word} from {a} to {b}")
+        return found
+
+    def _sought(
+        self, a: int, b: int, word: Word, longest: float | None
+    ) -> tuple[float, list[tuple[int, float]]] | None:
+        """Length and pieces; None if there is no path so short."""
         most = (self._longest if longest is None else longest) + self.margin
         apart = math.dist(self.outline.points[a], self.outline.points[b])
         # a search costs far more the longer the paths may be, and no class has two taut paths
@@ -134,7 +167,7 @@ class TautPaths:
                 best = int(wanted[np.argmin(found.length[wanted])])
                 return float(found.length[best]), found.pieces(best)
             if limit >= most:
-                raise NetspError(f"internal: no taut path of word {word} from {a} to {b}")
+                return None
             step = min(step**2, DEEPEST)
             limit = min(max(step * limit, LEAST * most), most)
 

@@ -53,9 +53,9 @@ class Slits(NamedTuple):
     bottom: Floats
     top: Floats
 
-    def cell(self, x: float) -> int:
-        """The strip a point lies in: how many lines are at or left of it."""
-        return int(np.searchsorted(self.x, x, side="right"))
+    def cells(self, x: Floats) -> Ints:
+        """The strips that points lie in: how many lines are at or left of each."""
+        return np.searchsorted(self.x, x, side="right").astype(np.int64)
 
 
 class Ends(NamedTuple):
@@ -111,14 +111,11 @@ def slit_lengths(
         Of a clock; unfinished when it is set.
     """
     n = len(cluster)
-    flat = [np.array(w, dtype=np.int64) for w in signatures]
-    row = np.concatenate([[0], np.cumsum([len(w) for w in flat])]).astype(np.int64)
-    letters = np.concatenate(flat).astype(np.int64) if row[-1] else np.zeros(0, np.int64)
-    cell = np.array([slits.cell(x) for x in places[:, 0]], dtype=np.int64)
+    letters, row = flattened(signatures)
     whole = rows is None
     asked: Ints = np.arange(n) if rows is None else rows
     out = np.zeros((len(asked), n))
-    ends = Ends(places[cluster], cell[cluster], letters, row)
+    ends = Ends(places[cluster], slits.cells(places[:, 0])[cluster], letters, row)
     args = (asked, whole, cluster, ends, slits, out, stop)
     blocks = [(k, min(k + ROWS, len(asked))) for k in range(0, len(asked), ROWS)]
     if len(blocks) < 4:
@@ -127,6 +124,13 @@ def slit_lengths(
         with ThreadPoolExecutor(os.cpu_count()) as pool:
             list(pool.map(lambda b: _rows(b[0], b[1], *args), blocks))
     return out
+
+
+def flattened(signatures: Sequence[Word]) -> tuple[Ints, Ints]:
+    """Words as one array of letters, and where each begins in it and the last ends."""
+    flat = [np.array(w, dtype=np.int64) for w in signatures]
+    row = np.concatenate([[0], np.cumsum([len(w) for w in flat])]).astype(np.int64)
+    return (np.concatenate(flat).astype(np.int64) if row[-1] else np.zeros(0, np.int64)), row
 
 
 @kernel
@@ -146,7 +150,7 @@ def _rows(
     longest = 0
     for v in range(len(cluster)):
         longest = max(longest, ends.row[v + 1] - ends.row[v])
-    gate = np.empty(((2 * longest + 2) * (len(slits.x) + 2) + 2, 3))
+    gate = gates_for(longest, slits)
     for k in range(first, last):
         if stop[0] != 0:
             return
@@ -154,13 +158,19 @@ def _rows(
         for v in range(u + 1 if whole else 0, len(cluster)):
             if cluster[u] == cluster[v]:
                 continue
-            out[k, v] = _length(u, v, ends, slits, gate)
+            out[k, v] = slit_length(u, v, ends, slits, gate)
             if whole:
                 out[v, k] = out[k, v]
 
 
 @kernel
-def _length(u: int, v: int, ends: Ends, slits: Slits, gate: Floats) -> float:
+def gates_for(longest: int, slits: Slits) -> Floats:
+    """Room for the gates of legs between words of at most so many letters."""
+    return np.empty(((2 * longest + 2) * (len(slits.x) + 2) + 2, 3))
+
+
+@kernel
+def slit_length(u: int, v: int, ends: Ends, slits: Slits, gate: Floats) -> float:
     """Length of the path from u to v of the word inverse(word of u) times (word of v)."""
     letters, row = ends.letters, ends.row
     rank, x, bottom, top = slits.rank, slits.x, slits.bottom, slits.top

@@ -8,6 +8,8 @@ else; obstacles are vertical, so a 3D length is ``hypot(planar taut length, dz)`
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable, Iterable
 from functools import partial
 
 import numpy as np
@@ -15,8 +17,9 @@ import numpy as np
 from netsp.arrays import Floats
 from netsp.clock import Clock, TimeLimit
 from netsp.errors import InputError
+from netsp.hsignature import Word, is_looping, signature
 from netsp.problem import Problem
-from netsp.roadmap.classes import find_classes
+from netsp.roadmap.classes import TetherTree, find_classes
 from netsp.roadmap.detours import taut_detours
 from netsp.roadmap.explore import ALL, NON_LOOPING
 from netsp.roadmap.legs import TautLegs
@@ -79,7 +82,8 @@ class TautRoadmap:
         self.cluster, self.signatures, self.planar = found.cluster, found.signatures, found.planar
         self.complete, self.least_left_out = found.complete, found.least_left_out
         self.tethers: Floats = np.hypot(self.planar, self._z[self.cluster] - self._z[0])
-        self.legs = TautLegs(self.paths, self.cluster, self.signatures, self.planar, found.tree)
+        self._tree = found.tree
+        self.legs = TautLegs(self.paths, self.cluster, self.signatures, self.planar, self._tree)
 
     def to_travel_graph(self) -> TravelGraph:
         """The travel graph over this roadmap; legs are computed when first asked for."""
@@ -93,4 +97,53 @@ class TautRoadmap:
             between=lambda up: self.paths.contacts.between(self.problem.points[:, 2], up),
             classes=self.rule if self.complete else "shortest",
             least_left_out=self.least_left_out,
+            carrier=None if self.complete else self,
         )
+
+    def ways(self, goal: int, most: int) -> list[tuple[int, Word]]:
+        """As `netsp.travel.graph.Carrier.ways`."""
+        contacts = self.paths.contacts
+        length, before = contacts.tree(goal)
+        near = np.argsort(length[: contacts.points], kind="stable")
+        rays = self.outline.rays
+        return [
+            (k, signature(contacts.draw(goal, k, before), rays))
+            for k in [k for k in near.tolist() if k not in (0, goal)][:most]
+            if np.isfinite(length[k])
+        ]
+
+    def with_classes(
+        self, wanted: Iterable[tuple[int, Word]], up: Callable[[], bool]
+    ) -> TravelGraph:
+        """As `netsp.travel.graph.Carrier.with_classes`; the classes are in this roadmap from then
+        on."""
+        known = set(zip(self.cluster.tolist(), self.signatures, strict=True))
+        more = [
+            (goal, word, length)
+            for goal, word in dict.fromkeys(wanted)
+            if not up()
+            and (goal, word) not in known
+            and (length := self._tether(goal, word)) is not None
+        ]
+        cluster = np.array([*self.cluster, *(g for g, _, _ in more)], dtype=np.int64)
+        order = np.argsort(cluster, kind="stable")
+        signatures = [*self.signatures, *(w for _, w, _ in more)]
+        planar = np.array([*self.planar, *(length for _, _, length in more)])
+        tree = self._tree
+        # nothing is known of where these tethers part from others but at the base
+        last = np.r_[tree.last, np.zeros(len(more), dtype=np.int64)]
+        self._tree = TetherTree(last[order], tree.parent, tree.length)
+        self.cluster, self.planar = cluster[order], planar[order]
+        self.signatures = [signatures[k] for k in order.tolist()]
+        self.tethers = np.asarray(np.hypot(self.planar, self._z[self.cluster] - self._z[0]))
+        self.legs = TautLegs(self.paths, self.cluster, self.signatures, self.planar, self._tree)
+        return self.to_travel_graph()
+
+    def _tether(self, goal: int, word: Word) -> float | None:
+        """Planar length of the taut tether of a class; None if it is too long."""
+        rise = float(self._z[goal] - self._z[0])
+        longest = math.sqrt(max(self.problem.tether_length**2 - rise**2, 0.0))
+        bound = self.paths.slit_length(0, goal, word)
+        if bound > longest + self._margin or (self.rule == "non-looping" and is_looping(word)):
+            return None
+        return self.paths.planar_length_within(0, goal, word, longest)

@@ -52,7 +52,7 @@ FEW_SHARE = 0.4
 """Part of the time that this may take."""
 
 SHARE = 0.6
-"""Part of the time that the search has where it shares it with the bound from the goals."""
+"""Part of the time that the search has at least where it shares it with a bound that is weak."""
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,8 @@ def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | Non
     if len(graph.before):
         return _in_part_ordered(graph, limits, chosen.backend)
     clock = Clock.of(limits.time)
-    if not graph.complete and graph.roadmapped and graph.goal_count > FEW_GOALS:
+    few = not graph.complete and limits.warm_start is None
+    if few and graph.roadmapped and graph.goal_count > FEW_GOALS:
         limits = _from_few(graph, replace(limits, time=clock), chosen.backend)
     if len(graph) <= PROVABLE:
         rounds = max(500, ROUNDS_PER_GOAL * graph.goal_count)
@@ -95,28 +96,30 @@ def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | Non
     limits = replace(limits, time=clock)
     if graph.goal_count <= FEW_GOALS and graph.roadmapped:
         return _over_shortest(graph, limits, chosen.backend)
-    share = Clock(SHARE * clock.left, within=clock) if clock.limit else clock
-    found = search(graph, limits=replace(limits, time=share))
-    if found.length is None:
-        return found
-    length = found.length
-    rows: list[Progress] = list(found.trace)
+    rows: list[Progress] = []
 
     def tell(row: Progress) -> None:
-        rows.append(replace(row, stage="goals", incumbent=length, tour=found.tour))
+        rows.append(replace(row, stage="goals", incumbent=None, tour=None))
         if limits.on_progress:
             limits.on_progress(rows[-1])
 
+    share = Clock((1.0 - SHARE) * clock.left, within=clock) if clock.limit else clock
     bound = bound_over_goals(
-        graph,
-        lambda g, limits: prove(g, limits=limits),
-        Limits(clock, rng=limits.rng, on_progress=tell),
-    )
-    return replace(
-        found,
-        lower_bound=min(length, bound),
-        trace=tuple(rows),
-    )
+        graph, lambda g, limits: prove(g, limits=limits),
+        Limits(share, rng=limits.rng, on_progress=tell),
+    )  # fmt: skip
+
+    def tell_both(row: Progress) -> None:
+        rows.append(replace(row, bound=min(bound, row.incumbent or bound)))
+        if limits.on_progress:
+            limits.on_progress(rows[-1])
+
+    found = search(graph, limits=replace(limits, time=clock, on_progress=tell_both))
+    if found.length is None:
+        return found
+    bound = min(found.length, bound)
+    status = Status.OPTIMAL if proven(found.length, bound) else found.status
+    return replace(found, lower_bound=bound, status=status, trace=tuple(rows))
 
 
 def _in_part_ordered(graph: TravelGraph, limits: Limits, backend: str) -> Result:

@@ -19,6 +19,7 @@ from netsp.registry import foreign, load
 from netsp.solution import ProblemReference, Solution, Timings, max_turning
 from netsp.solvers import without_base
 from netsp.solvers.answer import to_solution
+from netsp.solvers.carried import with_carried
 from netsp.solvers.custom import call, read_options, whole_numbers
 from netsp.solvers.in_order import solve_in_order
 from netsp.solvers.table import ROADMAPS, SOLVERS
@@ -40,6 +41,9 @@ LONGEST_S = 1e9
 SPARE = 0.4
 """Of a time limit, what is kept for drawing the tour when a roadmap was cut short; a second at
 most."""
+
+CARRIED = ("auto", "lns")
+"""Solvers for which a roadmap that had to leave classes out gets those along good tours."""
 
 DEFAULT_SOLVER = "auto"
 DEFAULT_ROADMAP = "taut"
@@ -355,6 +359,11 @@ def solve(
             )
         # what is too large for its time takes long to draw, too
         spare = 0.0 if graph.complete else min(SPARE * (time_limit or 0.0), 1.0)
+        start = None if warm_start is None else warm_start
+        found_on_way: tuple[int, ...] | None = None
+        if solver in CARRIED and start is None:
+            carried = with_carried(graph, clock, np.random.default_rng(seed))
+            graph, found_on_way = carried.graph, carried.tour
         result = solve_graph(
             graph,
             solver,
@@ -362,7 +371,7 @@ def solve(
             iteration_limit=iteration_limit,
             seed=seed,
             params=params,
-            warm_start=tour_from(problem, warm_start, graph) if warm_start is not None else None,
+            warm_start=found_on_way if start is None else tour_from(problem, start, graph),
             on_progress=on_progress,
         )
         timings = _timings(clock, built, graph)

@@ -12,9 +12,9 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -33,6 +33,20 @@ from netsp.travel.legs import Legs
 if TYPE_CHECKING:
     from netsp.solution import KeptClasses
     from netsp.travel.result import OnProgress, Result
+
+
+class Carrier(Protocol):
+    """Classes that tethers come into when the robot goes on to a goal near by."""
+
+    def ways(self, goal: int, most: int) -> list[tuple[int, Word]]:
+        """The nearest goals to one (from 1; 0 is the base), and the words of the shortest ways
+        there."""
+
+    def with_classes(
+        self, wanted: Iterable[tuple[int, Word]], up: Callable[[], bool]
+    ) -> TravelGraph:
+        """The travel graph with more classes, given by goal (from 1) and word: those of them that
+        the tether reaches, and that are looked at before the time is up."""
 
 
 UNTIMED = 50
@@ -63,6 +77,8 @@ class TravelGraph(Drawn):
         Which homotopy classes the roadmap holds.
     least_left_out : float
         No class left out for want of time or room has a shorter tether; inf if none is left out.
+    carrier : Carrier, optional
+        Adds classes that were left out.
 
     Attributes
     ----------
@@ -101,7 +117,9 @@ class TravelGraph(Drawn):
         between: Callable[[Callable[[], bool]], Floats] | None = None,
         classes: KeptClasses | None = None,
         least_left_out: float = math.inf,
+        carrier: Carrier | None = None,
     ) -> None:
+        self.carrier = carrier
         self.cluster: Ints = np.asarray(cluster, dtype=np.int64)
         self.signatures = tuple(signatures)
         self.tethers: Floats = np.asarray(tethers, dtype=float)

@@ -1,0 +1,138 @@
+"""Roadmaps that had to leave classes out: classes along good tours are put back.
+
+Such a roadmap holds the classes of least tether. Over open water with many thin obstacles these are
+all much alike: they differ in the side on which a tether passes obstacles half way, and tours among
+them keep coming back towards the base. A good tour goes on from goal to goal, and the tether comes
+along. So from the classes of a tour each goal near by is gone on to the shortest way; the classes
+that the tether comes into there join the graph, a search over these few finds a better tour, and so
+on until none is found.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from netsp.arrays import Ints
+from netsp.clock import Clock
+from netsp.errors import LimitReachedError
+from netsp.hsignature import Word, concatenate
+from netsp.lns.layers import Instance
+from netsp.lns.search import Search
+from netsp.travel.graph import TravelGraph, least_tethers
+
+SHARE = 0.5
+"""Of the time, at most."""
+
+NEAR = 8
+"""Goals near by that are gone on to."""
+
+ROUNDS_PER_GOAL, MOST_ROUNDS = 60, 4000
+"""Of ruin and recreate, in each search."""
+
+FEW = 2
+"""Classes of least tether of each goal that are looked at besides."""
+
+MOST_CLASSES, MOST_PER_GOAL = 2000, 40
+"""Looked at in one search, in all and times the number of goals: with more, only those along the
+last tour are; with half as many, a search in vain goes on from all of them."""
+
+IN_VAIN = 4
+"""Searches that bring neither a better tour nor a new class, then it ends."""
+
+Class = tuple[int, Word]
+"""Goal, from 1, and word."""
+
+
+@dataclass(frozen=True)
+class Carried:
+    """A travel graph with the classes along a good tour, and the tour; None without any."""
+
+    graph: TravelGraph
+    tour: tuple[int, ...] | None = None
+
+
+def with_carried(graph: TravelGraph, clock: Clock, rng: np.random.Generator) -> Carried:
+    """The graph with the classes along good tours.
+
+    Parameters
+    ----------
+    graph : TravelGraph
+        From a roadmap that left classes out; another is given back as it is.
+    clock : Clock
+        Of the run.
+    rng : numpy.random.Generator
+        Of the searches.
+
+    Returns
+    -------
+    Carried
+        The graph and the best tour found in it.
+    """
+    carrier = graph.carrier
+    if graph.complete or carrier is None or graph.goal_count < 3:
+        return Carried(graph)
+    share = clock.part(SHARE)
+    most = min(MOST_CLASSES, MOST_PER_GOAL * graph.goal_count)
+    ways = {0: carrier.ways(0, graph.goal_count)}
+    least = least_tethers(graph.costs_to_base, graph.cluster, FEW)
+    looked = dict.fromkeys(_classes(graph, least))
+    best: list[Class] = []
+    shortest, vain = np.inf, 0
+    while not share.up and vain < IN_VAIN:
+        try:
+            with graph.on_clock(share):
+                length, classes = _searched(graph, list(looked), best, rng, share)
+        except LimitReachedError:
+            break
+        improved = length < shortest * (1.0 - 1e-9)
+        if improved:
+            shortest, best = length, classes
+        if not best:
+            break
+        if len(looked) > most:
+            looked = dict.fromkeys(_classes(graph, least))
+        before = len(looked)
+        looked |= dict.fromkeys([*best, *classes])
+        wanted: dict[Class, None] = {}
+        from_all = not improved and len(looked) < most // 2
+        for goal, word in [(0, ()), *(looked if from_all else (*best, *classes))]:
+            if goal not in ways and not share.up:
+                ways[goal] = carrier.ways(goal, NEAR)
+            wanted |= dict.fromkeys((k, concatenate(word, way)) for k, way in ways.get(goal, ()))
+        new = [c for c in wanted if c not in looked]
+        order = graph.before
+        graph = carrier.with_classes(new, lambda: share.up)
+        graph.before = order
+        there = set(_classes(graph, np.arange(1, len(graph))))
+        looked |= dict.fromkeys(c for c in new if c in there)
+        vain = 0 if improved or len(looked) > before else vain + 1
+    return Carried(graph, _vertices(graph, best) if best else None)
+
+
+def _classes(graph: TravelGraph, vertices: Ints) -> list[Class]:
+    return [(int(graph.cluster[v]), graph.signatures[v]) for v in vertices.tolist() if v]
+
+
+def _vertices(graph: TravelGraph, classes: list[Class]) -> tuple[int, ...]:
+    found = graph.vertices_of([g for g, _ in classes], [w for _, w in classes])
+    assert found is not None, "classes of the graph"
+    return (0, *found)
+
+
+def _searched(
+    graph: TravelGraph, looked: list[Class], best: list[Class], rng: np.random.Generator,
+    clock: Clock,
+) -> tuple[float, list[Class]]:  # fmt: skip
+    """Length and classes of a good tour among some classes, by the bounds of legs: among thin
+    obstacles these are next to nothing less than the legs, which take long to measure."""
+    core = np.sort(np.array(_vertices(graph, looked)))
+    low = graph.lower_bounds(core)
+    low[0] = low[:, 0] = graph.costs_to_base[core]
+    start = [0, *(g for g, _ in best)] if best else None
+    search = Search(Instance(graph.cluster[core], low, core, graph.before), rng, start, clock)
+    search.settle()
+    search.run(min(ROUNDS_PER_GOAL * graph.goal_count, MOST_ROUNDS), clock)
+    _, tour = search.best()
+    return graph.tour_length(tour), _classes(graph, np.array(tour, dtype=np.int64))

@@ -1,0 +1,98 @@
+"""Classes along good tours, where a roadmap had to leave classes out."""
+
+import numpy as np
+import pytest
+
+from netsp import Circle, Problem, solve, travel_graph, verify
+from netsp.clock import Clock
+from netsp.roadmap import legs
+from netsp.roadmap.taut import TautRoadmap
+from netsp.solvers import solve as by_name
+from netsp.solvers.carried import Carried, with_carried
+
+
+def windfarm(side=4, share=1.3, seed=0, radius=1.0):
+    """Thin piles far apart, a goal beside each, and more tether than the goals need."""
+    rng = np.random.default_rng(seed)
+    places = [
+        (100.0 * c + 50.0 * (r % 2) + rng.uniform(-10, 10), 80.0 * r + rng.uniform(-10, 10))
+        for r in range(side) for c in range(side)
+    ]  # fmt: skip
+    goals = [(x + radius + 2.0, y + rng.choice([-2.0, 2.0])) for x, y in places]
+    base = (-60.0, -60.0)
+    longest = max(np.hypot(x - base[0], y - base[1]) for x, y in goals)
+    return Problem(
+        base=base, goals=goals, tether_length=share * longest,
+        obstacles=[Circle(center=p, radius=radius) for p in places],
+    )  # fmt: skip
+
+
+def few(problem, most=40):
+    return travel_graph(problem, max_classes=most)
+
+
+def test_classes_that_are_put_back_have_the_tethers_of_the_whole_roadmap():
+    problem = windfarm(3, 1.02, radius=15.0)
+    whole, part = travel_graph(problem), few(problem, 20)
+    assert whole.complete
+    assert not part.complete
+    every = [(int(whole.cluster[v]), whole.signatures[v]) for v in range(1, len(whole))]
+    again = part.carrier.with_classes(every, lambda: False)
+    assert len(again) == len(whole)
+    tethers = dict(zip(zip(whole.cluster, whole.signatures, strict=True), whole.tethers,
+                       strict=True))  # fmt: skip
+    for v in range(len(again)):
+        there = tethers[again.cluster[v], again.signatures[v]]
+        assert again.tethers[v] == pytest.approx(there, abs=1e-6)
+
+
+def test_classes_that_the_tether_does_not_reach_are_not_put_back():
+    problem = windfarm(3, 1.02, radius=15.0)
+    part = few(problem, 20)
+    twice = (1, 1)  # around the first pile and once more
+    assert len(part.carrier.with_classes([(9, (*twice, 2, 3, -2, 4))], lambda: False)) == len(part)
+
+
+def test_nothing_is_put_back_once_the_time_is_up():
+    part = few(windfarm(3, 1.02, radius=15.0), 20)
+    wanted = [(k, (1,)) for k in range(1, 10)]
+    assert len(part.carrier.with_classes(wanted, lambda: True)) == len(part)
+
+
+def test_a_tour_along_carried_classes_is_verified_and_much_shorter(monkeypatch):
+    problem = windfarm()
+    how = {"roadmap_options": {"max_classes": 100}, "seed": 3}
+    carried = solve(problem, **how)
+    assert verify(problem, carried)
+    assert carried.lower_bound <= carried.length
+    monkeypatch.setattr(by_name, "with_carried", lambda graph, *_: Carried(graph))
+    before = solve(problem, **how)
+    assert carried.length < 0.9 * before.length
+
+
+def test_the_same_seed_carries_to_the_same_classes():
+    problem = windfarm()
+    tours = []
+    for _ in range(2):
+        found = with_carried(few(problem), Clock(), np.random.default_rng(5))
+        assert found.graph.is_tour(found.tour)
+        tours.append([found.graph.signatures[v] for v in found.tour])
+    assert tours[0] == tours[1]
+
+
+def test_a_whole_graph_is_given_back_as_it_is():
+    graph = travel_graph(windfarm(2, 1.1))
+    assert with_carried(graph, Clock(), np.random.default_rng(0)).graph is graph
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_legs_sought_within_the_slits_first_are_the_same_legs(monkeypatch, seed):
+    problem = windfarm(3, 1.3, seed)
+    found = TautRoadmap(problem, max_classes=60)
+    some = np.arange(len(found.cluster))
+    quick = found.legs.lengths(some)
+    monkeypatch.setattr(legs, "WORTH", -1.0)  # at once as long as the tethers allow
+    assert (found.legs.lengths(some) == quick).all()
+    monkeypatch.setattr(legs, "WORTH", np.inf)
+    monkeypatch.setattr(legs, "EXCESS", 1e-9)  # hardly any leg is found at first
+    assert (found.legs.lengths(some) == quick).all()
