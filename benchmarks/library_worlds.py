@@ -47,9 +47,11 @@ def numbered(stem: str, count: int, make: Callable[[str, int], Problem]) -> Iter
 
 def recipes() -> Iterator[Recipe]:
     """All problems."""
-    for goals, tether, count in ((5, 350, 4), (10, 300, 4), (20, 300, 4), (20, 350, 4), (50, 300, 4),
-                                 (50, 350, 4), (100, 300, 4), (100, 350, 2), (200, 300, 2),
-                                 (60, 500, 2)):  # fmt: skip
+    sizes = (
+        (5, 350, 4), (10, 300, 4), (20, 300, 4), (20, 350, 4), (50, 300, 4), (50, 350, 4),
+        (100, 300, 4), (100, 350, 2), (200, 300, 2), (60, 500, 2),
+    )  # fmt: skip
+    for goals, tether, count in sizes:
         yield from numbered(f"random-{goals}-{tether}", count, drawn("icra2017", goals, tether, 20))
     yield from numbered("random-500-300", 2, drawn("icra2017", 500, 300, 50))
     for family in ("clustered", "harbour"):
@@ -150,10 +152,12 @@ def jacket(legs: int, goals: int) -> Callable[[str, int], Problem]:
         for k in range(legs):
             a, b = corners[k], corners[(k + 1) % legs]
             share = 0.15 + 0.3 * draw.random()
-            for t in (share, 1.0 - share):
-                round_.append(((a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])), 0.3))
-        for k in range(int(3 * draw.random())):
-            round_.append(((1.8 * k - 1.8, 1.2 * draw.random()), 0.5))
+            round_ += [
+                ((a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])), 0.3)
+                for t in (share, 1.0 - share)
+            ]  # fmt: skip
+        conductors = range(int(3 * draw.random()))
+        round_ += [((1.8 * k - 1.8, 1.2 * draw.random()), 0.5) for k in conductors]
         places, k = [], 0
         while len(places) < goals:
             centre, radius = round_[k % len(round_)]

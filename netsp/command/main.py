@@ -142,6 +142,7 @@ COMMANDS = {
     },
     "compare": {
         "compare": ("compare", "solvers side by side over random worlds, resumable"),
+        "library": ("library", "list, check and rank on the library of problems"),
         "combine": ("combine", "join the results of shards of one study"),
         "report": ("report", "one page about a comparison, a solution or a run"),
     },

@@ -1,0 +1,190 @@
+"""`netsp library`: problems for the field, what is known of them, and how solvers rank."""
+
+from __future__ import annotations
+
+import argparse
+import fnmatch
+import sys
+import time
+from typing import TYPE_CHECKING
+
+from netsp.command import told
+from netsp.command.types import check_writable, natural, seconds
+from netsp.errors import EXIT_NOT_VERIFIED, InputError
+
+if TYPE_CHECKING:
+    from netsp.library import Library
+
+EXAMPLE = "netsp library rank --solver lns --time-limit 5 --only 'jetty-*' -o rows.jsonl"
+
+FOLDER = "problems/library"
+
+
+def arguments(p: argparse.ArgumentParser) -> None:
+    """Of the command line."""
+    p.add_argument(
+        "action", choices=("list", "check", "rank"),
+        help="list the problems with the best known of each; check solutions against them; rank "
+        "solvers",
+    )  # fmt: skip
+    p.add_argument("files", nargs="*", metavar="FILE", help="check: solution files (JSON)")
+    p.add_argument(
+        "--folder", default=FOLDER, metavar="DIR", help=f"where the library is; default {FOLDER}"
+    )
+    p.add_argument(
+        "--only", default="*", metavar="PATTERN", help="list, rank: only problems named so"
+    )
+    p.add_argument("--keep", action="store_true", help="check: write better tours to the records")
+    p.add_argument("--by", default="a contributor", metavar="NAME", help="check: who found them")
+    who = p.add_mutually_exclusive_group()
+    who.add_argument(
+        "--solver", metavar="NAME",
+        help="rank: a solver, or a function of a travel graph as module:function",
+    )  # fmt: skip
+    who.add_argument(
+        "--command", metavar="CMD",
+        help="rank: a command with {problem}, {solution} and perhaps {seconds} in it",
+    )  # fmt: skip
+    p.add_argument("--label", metavar="NAME", help="rank: what the solver is called")
+    p.add_argument(
+        "--time-limit", type=seconds, default=10.0, metavar="S",
+        help="rank: seconds for each problem; default 10",
+    )  # fmt: skip
+    p.add_argument("--seed", type=natural, default=0, metavar="N", help="random seed; default 0")
+    p.add_argument(
+        "-o", "--output", metavar="FILE",
+        help="rank: file of rows; those that are there are ranked, too, and not run again",
+    )  # fmt: skip
+    p.add_argument("--quiet", action="store_true", help="no progress")
+    p.add_argument("--json", action="store_true", help="print the answer as JSON on stdout")
+
+
+def run(args: argparse.Namespace) -> int:
+    """List, check or rank, and return the exit code."""
+    from netsp.library import Library
+
+    if args.files and args.action != "check":
+        raise InputError(f"FILE: expected none with {args.action}, got {args.files[0]!r}")
+    library = Library(args.folder)
+    return {"list": _list, "check": _check, "rank": _rank}[args.action](args, library)
+
+
+def _chosen(args: argparse.Namespace, library: Library) -> list[str]:
+    names = [name for name in library if fnmatch.fnmatchcase(name, args.only)]
+    if not names:
+        raise InputError(f"--only: no problem of {args.folder} is named {args.only!r}")
+    return names
+
+
+def _list(args: argparse.Namespace, library: Library) -> int:
+    names = _chosen(args, library)
+    if args.json:
+        told.tell({"problems": [
+            {"problem": name} | (
+                {"length": r.length, "lower_bound": r.lower_bound, "gap": r.gap,
+                 "solver": r.solver, "by": r.by, "date": r.date}
+                if (r := library.records.get(name)) else {}
+            ) for name in names
+        ]})  # fmt: skip
+        return 0
+    print(f"{'problem':<20} {'goals':>6} {'best':>12} {'bound':>12} {'gap':>9}  found by")
+    for name in names:
+        goals = library.problem(name).visits
+        r = library.records.get(name)
+        if r is None:
+            print(f"{name:<20} {goals:>6} {'-':>12} {'-':>12} {'-':>9}")
+            continue
+        gap = "proven" if r.proven else "-" if r.gap is None else f"{100 * r.gap:.3f} %"
+        bound = "-" if r.lower_bound is None else f"{r.lower_bound:.6g}"
+        print(f"{name:<20} {goals:>6} {r.length:>12.6g} {bound:>12} {gap:>9}  {r.solver}, {r.by}")
+    return 0
+
+
+def _check(args: argparse.Namespace, library: Library) -> int:
+    from netsp.solution import Solution
+
+    if not args.files:
+        raise InputError("FILE: expected solutions to check, got none")
+    failed, answers, kept = False, [], False
+    for file in args.files:
+        solution = Solution.load(file)
+        found = library.compared(solution)
+        record = found.record
+        if not found.verification or found.length is None:
+            failed = True
+            why = next((c.name for c in found.verification.checks if not c.passed), "no tour")
+            text = f"not verified: {why}"
+        elif record is None or found.above is None:
+            text = f"{found.length:.9g}, verified; nothing was known of this problem"
+        elif found.better:
+            text = f"{found.length:.9g}, verified, {-100 * found.above:.4f} % shorter than known"
+        else:
+            proven = ", which is proven" if record.proven else ""
+            text = (
+                f"{found.length:.9g}, verified, {100 * max(found.above, 0.0):.4f} % above the "
+                f"best known, {record.length:.9g}{proven}"
+            )
+        if args.keep and found.better:
+            library.take(solution, args.by)
+            kept = True
+        answers.append({
+            "file": file, "problem": found.name, "verified": bool(found.verification),
+            "length": found.length, "best_known": None if record is None else record.length,
+            "better": found.better,
+        })  # fmt: skip
+        if not args.json:
+            print(f"{file}: {found.name}: {text}")
+    if kept:
+        library.save()
+    if args.json:
+        told.tell({"checked": answers})
+    return EXIT_NOT_VERIFIED if failed else 0
+
+
+def _rank(args: argparse.Namespace, library: Library) -> int:
+    from netsp.library import rank
+
+    output = args.output or f"{args.folder}/ranking.jsonl"
+    rows = rank.read_rows(output)
+    if args.solver or args.command:
+        check_writable(args.output)
+        solve = (
+            rank.by_name(args.solver, args.seed) if args.solver else rank.by_command(args.command)
+        )  # fmt: skip
+        label = args.label or args.solver or args.command.split()[0].rsplit("/", 1)[-1]
+        there = {(r.solver, r.limit, r.problem) for r in rows}
+        names = [
+            n for n in _chosen(args, library) if (label, args.time_limit, n) not in there
+        ]  # fmt: skip
+        begin = time.monotonic()
+        for k, row in enumerate(rank.run(library, names, label, solve, args.time_limit), 1):
+            rows.append(row)
+            if args.output:
+                rank.append_row(args.output, row)
+            if not args.quiet:
+                left = (time.monotonic() - begin) / k * (len(names) - k)
+                record = library.records.get(row.problem)
+                what = row.message or "no tour"
+                if row.verified and row.length is not None:
+                    what = f"{row.length:.6g}"
+                    if record:
+                        what += f", {100 * (row.length / record.length - 1):.3f} % above the best"
+                print(
+                    f"[{k}/{len(names)}] {row.problem}: {what}, {row.seconds:.1f} s; "
+                    f"{left / 60:.1f} min left", file=sys.stderr, flush=True,
+                )  # fmt: skip
+    entries = rank.ranking(library, rows)
+    if args.json:
+        told.tell({"ranking": entries})
+        return 0
+    if not entries:
+        raise InputError(f"{output}: there is nothing to rank; expected --solver or --command")
+    print(f"{'solver':<16} {'limit s':>8} {'problems':>9} {'verified':>9} {'as the best':>12} "
+          f"{'above, mean %':>14} {'worst %':>9} {'median s':>9}")  # fmt: skip
+    for e in entries:
+        print(
+            f"{e['solver']:<16.16} {e['limit']:>8g} {e['problems']:>9} {e['verified']:>9} "
+            f"{e['best']:>12} {100 * e['above']:>14.3f} {100 * e['worst']:>9.2f} "
+            f"{e['seconds']:>9.2f}"
+        )
+    return 0
