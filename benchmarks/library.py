@@ -55,7 +55,8 @@ def tables() -> None:
     library = Library(FOLDER)
     heading("The library of problems")
     head("family", "problems", "goals", "with a verified tour", "proven",
-         "gap of the others, mean %", "worst %", "seconds, median", "worst", name="library")  # fmt: skip
+         "gap of the others, mean %", "worst %", "seconds, median", "worst",
+         name="library")  # fmt: skip
     families: dict[str, list[str]] = {}
     for name in library:
         families.setdefault(name.split("-")[0], []).append(name)

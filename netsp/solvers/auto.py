@@ -193,4 +193,12 @@ def _over_shortest(graph: TravelGraph, limits: Limits, backend: str) -> Result:
         return found
     whole = replace(found, tour=tuple(int(core[v]) for v in found.tour))
     least = float(graph.tethers[others].min(initial=np.inf))
-    return within_kept(whole, graph.least_by_way_of(least))
+    otherwise = graph.least_by_way_of(min(least, graph.least_left_out))
+    clock = Clock.of(limits.time)
+    if otherwise < (whole.length or 0.0) and not clock.up:
+        # of few goals the shortest tour in any class is soon known
+        bound_over_goals(
+            graph, lambda g, limits: prove(g, limits=limits), Limits(clock, rng=limits.rng)
+        )
+        otherwise = max(otherwise, graph.bound_in_any_class)
+    return within_kept(whole, otherwise)
