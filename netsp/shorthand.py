@@ -162,7 +162,8 @@ def _with_goals(data: Mapping[str, Any]) -> Mapping[str, Any]:
         try:
             made = inspection.goals(obstacle)
         except (KeyError, TypeError, ValueError):
-            return data  # the obstacle is not one: that will be said
+            # the obstacle is not one: that will be said, and nothing of the goals about it
+            made = [{"name": inspection.inspect, "position": [0.0, 0.0]}]
         inspected.setdefault(inspection.inspect, []).extend(g["name"] for g in made)
         out += made
     return {**data, "goals": [_after_all_of(inspected, g) for g in out]}

@@ -237,3 +237,11 @@ def test_solvers_that_cannot_keep_an_order_say_so():
     for solver in ("mip", "greedy-tsp", "anneal-2016"):
         with pytest.raises(InputError, match="expected one of auto, dp, lns"):
             solve(problem, solver)
+
+
+def test_a_damaged_obstacle_is_blamed_and_not_the_goals_that_inspect_it():
+    with pytest.raises(InputError, match=r"obstacles\[0\].center: expected a number, got 'a'"):
+        Problem(
+            base=(0, 0), goals=[{"inspect": "pile", "standoff": 1}], tether_length=20,
+            obstacles=[{"name": "pile", "center": [5, "a"], "radius": 1}],
+        )  # fmt: skip

@@ -14,7 +14,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
@@ -34,6 +34,7 @@ GRACE = 10.0
 class Row(Model):
     """What a solver found for a problem."""
 
+    schema_version: Annotated[Literal[1], Field(description="of the row's format")] = 1
     solver: Annotated[Name, Field(description="what it is called in the ranking")]
     problem: Annotated[Name, Field(description="name of the problem")]
     limit: Annotated[NonNegative, Field(description="seconds that it was given")]

@@ -13,6 +13,12 @@ from netsp.execute.passing import Maps, lasting, passing
 from netsp.pictures import style
 from netsp.pictures.problem import draw_obstacles
 
+RESPONSES = {
+    "local": "mended on the spot", "replan": "planned anew", "home": "went home",
+    "kept": "plan kept", "defect": "defect, went home",
+}  # fmt: skip
+"""What is said of what a robot did about an event."""
+
 
 def save_execution(done: Execution, file: str | Path) -> None:
     """Draw a run. InputError if the file cannot be written."""
@@ -90,7 +96,8 @@ def draw_tether(done: Execution, *, ax: Any = None) -> Any:
     ax.plot(t, [r.limit for r in done.rows], color=style.LIMIT, lw=1.0, ls="--", label="limit")
     for e in done.entries:
         ax.axvline(e.time, color=style.EVENT, lw=1.0)
-        ax.annotate(f"{e.event}: {e.response}", (e.time, 0), xytext=(3, 4), rotation=90,
+        what = f"{e.event.replace('_', ' ')}: {RESPONSES.get(e.response, e.response)}"
+        ax.annotate(what, (e.time, 0), xytext=(3, 4), rotation=90,
                     textcoords="offset points", fontsize=8, color=style.EDGE)  # fmt: skip
     ax.set(xlabel="time (s)", ylabel=f"length ({done.problem.units})", ylim=(0, None))
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.1), ncols=2, fontsize=8, frameon=False)
