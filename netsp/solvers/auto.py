@@ -51,6 +51,9 @@ FEW_CLASSES = 3
 FEW_SHARE = 0.4
 """Part of the time that this may take."""
 
+GOALS_SHARE = 0.2
+"""Part of the time that a first bound from the goals may take."""
+
 SHARE = 0.6
 """Part of the time that the search has at least where it shares it with a bound that is weak."""
 
@@ -86,6 +89,13 @@ def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | Non
     if len(graph.before):
         return _in_part_ordered(graph, limits, chosen.backend)
     clock = Clock.of(limits.time)
+    limits = replace(limits, time=clock)
+    if not graph.complete and graph.roadmapped:
+        # a roadmap that left classes out says that a proof over those kept may not come to an end
+        bound_over_goals(
+            graph, lambda g, limits: prove(g, limits=limits),
+            Limits(clock.part(GOALS_SHARE), rng=limits.rng),
+        )  # fmt: skip
     few = not graph.complete and limits.warm_start is None
     if few and graph.roadmapped and graph.goal_count > FEW_GOALS:
         limits = _from_few(graph, replace(limits, time=clock), chosen.backend)

@@ -27,7 +27,7 @@ from netsp.errors import InputError, counted
 from netsp.hsignature import Word
 from netsp.travel.costs import CostTable, checked_costs, grain_of
 from netsp.travel.detours import Detours
-from netsp.travel.kept import within_kept
+from netsp.travel.kept import with_bound, within_kept
 from netsp.travel.legs import Legs
 
 if TYPE_CHECKING:
@@ -542,7 +542,7 @@ class TravelGraph(Drawn):
             The same, with a bound that holds for the classes that were left out, too.
         """
         otherwise = max(self.least_by_way_of(self.least_left_out), self.bound_in_any_class)
-        return within_kept(result, otherwise)
+        return with_bound(within_kept(result, otherwise), self.bound_in_any_class)
 
     def least_by_way_of(self, tether: float) -> float:
         """No tour by way of a class with so long a tether is shorter: it goes there and back.
