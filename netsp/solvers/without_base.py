@@ -86,7 +86,8 @@ def solve(graph: BaselessGraph, run: Run, limits: Limits, *, proves: bool) -> Re
         return replace(best, status=status, lower_bound=None, trace=tuple(rows))
     bound = min(bound, best.length)
     status = Status.OPTIMAL if proven(best.length, bound) else Status.FEASIBLE
-    return replace(best, status=status, lower_bound=bound or None, trace=tuple(rows))
+    told = None if bound == 0.0 and status is not Status.OPTIMAL else bound
+    return replace(best, status=status, lower_bound=told, trace=tuple(rows))
 
 
 def _given(graph: BaselessGraph, limits: Limits) -> Result:
