@@ -55,6 +55,26 @@ def max_turning(friction: float, max_tension_ratio: float | None) -> float:
     return math.log(max_tension_ratio) / friction
 
 
+def above_shortest(gap: float | None, shortest: str = "the shortest") -> str:
+    """How much longer than the shortest a tour may be: the gap is a share of the tour itself.
+
+    Parameters
+    ----------
+    gap : float or None
+        (length - bound) / length; None, or 1, where nothing is known.
+    shortest : str
+        What the bound is of.
+
+    Returns
+    -------
+    str
+        A phrase.
+    """
+    if gap is None or gap >= 1.0:
+        return "no bound"
+    return f"at most {100.0 * gap / (1.0 - gap):.3g} % above {shortest}"
+
+
 class ProblemReference(Model):
     """Which problem a solution belongs to."""
 

@@ -1,12 +1,17 @@
 """Classes along good tours, where a roadmap had to leave classes out."""
 
+import signal
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
-from netsp import Circle, Problem, solve, travel_graph, verify
+from netsp import Circle, Problem, Solution, solve, travel_graph, verify
 from netsp.clock import Clock
 from netsp.roadmap import legs
 from netsp.roadmap.taut import TautRoadmap
+from netsp.solvers import carried
 from netsp.solvers import solve as by_name
 from netsp.solvers.carried import Carried, with_carried
 
@@ -62,12 +67,12 @@ def test_nothing_is_put_back_once_the_time_is_up():
 def test_a_tour_along_carried_classes_is_verified_and_much_shorter(monkeypatch):
     problem = windfarm()
     how = {"roadmap_options": {"max_classes": 100}, "seed": 3}
-    carried = solve(problem, **how)
-    assert verify(problem, carried)
-    assert carried.lower_bound <= carried.length
+    found = solve(problem, **how)
+    assert verify(problem, found)
+    assert found.lower_bound <= found.length
     monkeypatch.setattr(by_name, "with_carried", lambda graph, *_: Carried(graph))
     before = solve(problem, **how)
-    assert carried.length < 0.9 * before.length
+    assert found.length < 0.9 * before.length
 
 
 def test_the_same_seed_carries_to_the_same_classes():
@@ -96,3 +101,28 @@ def test_legs_sought_within_the_slits_first_are_the_same_legs(monkeypatch, seed)
     monkeypatch.setattr(legs, "WORTH", np.inf)
     monkeypatch.setattr(legs, "EXCESS", 1e-9)  # hardly any leg is found at first
     assert (found.legs.lengths(some) == quick).all()
+
+
+def test_ctrl_c_while_classes_are_carried_keeps_the_best_tour(tmp_path):
+    path, out = tmp_path / "farm.json", tmp_path / "tour.json"
+    path.write_text(windfarm(5).to_json())
+    run = subprocess.Popen(
+        [sys.executable, "-m", "netsp", "solve", str(path), "-o", str(out), "--max-classes", "200"],
+        stderr=subprocess.PIPE, text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )  # fmt: skip
+    for line in run.stderr:
+        if "carried" in line:
+            run.send_signal(signal.SIGINT)
+            break
+    run.communicate()
+    assert run.returncode == 0
+    assert verify(Problem.load(path), Solution.load(out))
+
+
+def test_searches_in_vain_end_although_there_is_no_end_of_classes(monkeypatch):
+    # so few may be looked at that each search begins anew with those of least tether
+    monkeypatch.setattr(carried, "MOST_PER_GOAL", 4)
+    graph = few(windfarm())
+    found = with_carried(graph, Clock(), np.random.default_rng(1))
+    assert found.graph.is_tour(found.tour)

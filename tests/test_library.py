@@ -2,6 +2,8 @@
 
 import json
 import shutil
+import signal
+import subprocess
 import sys
 from pathlib import Path
 
@@ -231,3 +233,23 @@ def test_a_tour_of_the_record_is_judged_when_it_is_drawn_again():
         list(record.tour), [*reversed(record.tour)]
     )  # fmt: skip
     assert verify(problem, found)
+
+
+def test_ctrl_c_ends_a_ranking_and_what_it_cut_short_has_no_row(small, tour, tmp_path):
+    with_records(small, tour)
+    rows = tmp_path / "rows.jsonl"
+    shutil.copy(FOLDER / "windfarm-9-0.json", small)
+    run = subprocess.Popen(
+        [sys.executable, "-m", "netsp", "library", "rank", "--folder", str(small), "-o", str(rows),
+         "--solver", "lns", "--time-limit", "5"],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )  # fmt: skip
+    for line in run.stderr:
+        if line.startswith("[1/3]"):
+            run.send_signal(signal.SIGINT)
+            break
+    out, _ = run.communicate()
+    assert run.returncode == 0
+    assert len(read_rows(rows)) == 1
+    assert "lns" in out

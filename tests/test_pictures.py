@@ -14,6 +14,7 @@ from netsp.online import Scene
 from netsp.online.mission import Mission
 from netsp.online.simulate import simulate
 from netsp.pictures import style
+from netsp.solution import above_shortest
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -92,3 +93,8 @@ def test_colours_that_stand_side_by_side_can_be_told_apart():
         for k, a in enumerate(together):
             for b in together[:k]:
                 assert math.dist(seen(a, matrix), seen(b, matrix)) > 0.08, (a, b)
+
+
+def test_a_picture_tells_the_excess_over_the_bound_and_not_the_gap():
+    assert above_shortest(0.2) == "at most 25 % above the shortest"
+    assert above_shortest(1.0) == above_shortest(None) == "no bound"

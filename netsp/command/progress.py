@@ -138,7 +138,7 @@ def summary(
         )
     elif solution.status is Status.INVALID:
         verdict = "INVALID: the solver is blind to the tether"
-    elif solution.lower_bound is None:
+    elif not solution.lower_bound:
         verdict = "no bound"
     else:
         verdict = f"bound {solution.lower_bound:.6g}, gap {100 * (solution.gap or 0.0):.2f} %"

@@ -18,6 +18,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
+from netsp.clock import Clock, until_interrupt
 from netsp.errors import InputError, NetspError
 from netsp.fields import Name, NonNegative, Total
 from netsp.files import read_text
@@ -45,8 +46,8 @@ class Row(Model):
     date: Annotated[Name, Field(description="when")] = "unknown"
 
 
-Solve = Callable[[Problem, Path, float], Solution]
-"""Problem, its file and seconds → solution."""
+Solve = Callable[[Problem, Path, float, Callable[[], bool]], Solution]
+"""Problem, its file, seconds, and whether to stop → solution."""
 
 
 def by_name(name: str, seed: int) -> Solve:
@@ -70,7 +71,9 @@ def by_name(name: str, seed: int) -> Solve:
         finally:
             sys.path.remove(os.getcwd())
     check_solver(solver, None)
-    return lambda problem, _, limit: solve(problem, solver, time_limit=limit, seed=seed)
+    return lambda problem, _, limit, should_stop: solve(
+        problem, solver, time_limit=limit, seed=seed, should_stop=should_stop
+    )
 
 
 def by_command(command: str) -> Solve:
@@ -87,7 +90,9 @@ def by_command(command: str) -> Solve:
         if not any(place in w for w in words):
             raise InputError(f"--command: expected {place} in it, got {command!r}")
 
-    def solve(problem: Problem, path: Path, limit: float) -> Solution:
+    def solve(
+        problem: Problem, path: Path, limit: float, should_stop: Callable[[], bool]
+    ) -> Solution:
         with tempfile.TemporaryDirectory() as folder:
             out = Path(folder) / "solution.json"
             filled = [
@@ -114,7 +119,8 @@ def by_command(command: str) -> Solve:
 def run(
     library: Library, names: Sequence[str], label: str, solve: Solve, limit: float
 ) -> Iterator[Row]:
-    """Run a solver over problems, one after the other.
+    """Run a solver over problems, one after the other. Ctrl-C ends it; what was cut short by it has
+    no row.
 
     Parameters
     ----------
@@ -139,28 +145,39 @@ def run(
     InputError
         A command that cannot be run at all.
     """
-    for name in names:
-        problem = library.problem(name)
-        begin = time.perf_counter()
-        row: dict[str, Any] = {"solver": label, "problem": name, "limit": limit,
-                               "date": str(datetime.date.today())}  # fmt: skip
-        try:
-            solution = solve(problem, library.paths[name], limit)
-            row["seconds"] = round(time.perf_counter() - begin, 3)
-            if solution.length is None:
-                row["message"] = solution.status.value
-            elif solution.problem.sha256 != problem.sha256:
-                row["message"] = "a solution of another problem"
-            else:
-                verdict = verify(problem, solution)
-                row |= {"length": solution.length, "verified": bool(verdict)}
-                if not verdict:
-                    row["message"] = next(c.name for c in verdict.checks if not c.passed)
-        except NetspError as error:
-            if isinstance(error, InputError) and str(error).startswith("--"):
-                raise
-            row |= {"seconds": round(time.perf_counter() - begin, 3), "message": str(error)[:200]}
-        yield Row(**row)
+    with until_interrupt(None) as clock:
+        for name in names:
+            row = _run(library, name, label, solve, limit, clock)
+            if clock.stopped:
+                return
+            yield row
+
+
+def _run(
+    library: Library, name: str, label: str, solve: Solve, limit: float, clock: Clock
+) -> Row:  # fmt: skip
+    """Of one problem."""
+    problem = library.problem(name)
+    begin = time.perf_counter()
+    row: dict[str, Any] = {"solver": label, "problem": name, "limit": limit,
+                           "date": str(datetime.date.today())}  # fmt: skip
+    try:
+        solution = solve(problem, library.paths[name], limit, lambda: clock.stopped)
+        row["seconds"] = round(time.perf_counter() - begin, 3)
+        if solution.length is None:
+            row["message"] = solution.status.value
+        elif solution.problem.sha256 != problem.sha256:
+            row["message"] = "a solution of another problem"
+        else:
+            verdict = verify(problem, solution)
+            row |= {"length": solution.length, "verified": bool(verdict)}
+            if not verdict:
+                row["message"] = next(c.name for c in verdict.checks if not c.passed)
+    except NetspError as error:
+        if isinstance(error, InputError) and str(error).startswith("--"):
+            raise
+        row |= {"seconds": round(time.perf_counter() - begin, 3), "message": str(error)[:200]}
+    return Row(**row)
 
 
 def read_rows(path: str | Path) -> list[Row]:

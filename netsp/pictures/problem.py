@@ -11,7 +11,7 @@ import numpy as np
 from netsp.pictures import style
 from netsp.problem import Circle, Problem
 from netsp.roadmap.paths import TautPaths
-from netsp.solution import Solution, Status
+from netsp.solution import Solution, Status, above_shortest
 from netsp.travel.result import Progress
 
 if TYPE_CHECKING:
@@ -296,10 +296,8 @@ def _title(problem: Problem, solution: Solution | None) -> str:
     if solution.status is Status.OPTIMAL:
         exact = solution.roadmap == "taut"
         proof = "proven shortest" if exact else f"shortest over its {solution.roadmap} roadmap"
-    elif solution.gap is not None:
-        proof = f"at most {100 * solution.gap:.2f} % above the shortest"
     else:
-        proof = "no bound"
+        proof = above_shortest(solution.gap)
     longest = max((v.tether_length for v in solution.tour), default=0.0)
     kind = "non-entangling tour"
     if solution.status is Status.INVALID:

@@ -24,6 +24,7 @@ from netsp.pictures import style
 from netsp.pictures.scene import Stops, figure_of
 from netsp.report import briefing, log
 from netsp.report.page import STYLE
+from netsp.solution import above_shortest
 from netsp.space.judge import verify_mission
 
 
@@ -153,16 +154,15 @@ def _planned(tour: PlannedTour, mission: Mission, unit: str) -> str:
     """What is known of a tour: what is proven is about the states and legs that were found."""
     proof = "found"
     if tour.gap is not None:
-        proof = (
+        shortest = (
             f"the shortest along {counted(tour.legs, 'leg')} between "
             f"{counted(tour.states, 'state')} of the tether"
-            if tour.status.value == "optimal"
-            else f"at most {100 * tour.gap:.2g} % above the shortest along "
-            f"{counted(tour.legs, 'leg')} between {counted(tour.states, 'state')} of the tether"
         )
+        optimal = tour.status.value == "optimal"
+        proof = shortest if optimal else above_shortest(tour.gap, shortest)
     all_of = ""
     if tour.gap_to_all is not None:
-        all_of = f", and {100 * tour.gap_to_all:.2g} % above a bound on all tours"
+        all_of = f", and {above_shortest(tour.gap_to_all, 'a bound on all tours')}"
     return (
         f"The tour is {tour.length:.5g} {unit} long: {proof} (solver {html.escape(tour.solver)})"
         f"{all_of}. At {mission.speed:g} m/s it takes {tour.length / mission.speed:.0f} s, stops "

@@ -21,7 +21,7 @@ from netsp.problem import Problem
 from netsp.report import briefing, chart, log
 from netsp.report.opened import json_of, opened
 from netsp.report.page import STYLE
-from netsp.solution import Solution, Status
+from netsp.solution import Solution, Status, above_shortest
 
 FRAMES = 240
 
@@ -174,7 +174,7 @@ def _summary(problem: Problem, solution: Solution, run: Path | None) -> str:
     if solution.status is Status.OPTIMAL:
         proof = "proven optimal"
     elif solution.gap is not None:
-        proof += f", at most {100 * solution.gap:.2g} % above the shortest"
+        proof += f", {above_shortest(solution.gap)}"
     lines = [
         f"{html.escape(problem.summary)}. The plan is {solution.length:.6g} "
         f"{units} long ({proof}; solver {html.escape(solution.solver)}). "

@@ -235,10 +235,12 @@ class _Search:
         trie = Trie.root(reach)
         within = np.full(self.goals + 1, -1.0)
         within[g] = reach
-        found = run_explore(
-            self.paths.tangents, 0, trie, margin=self.paths.outline.margin, rule=self.rule,
-            keep=True, cap=max(20_000, STATES_PER_CLASS * share), toward=(g, rest), within=within,
-            most=8 * share + 64, stop=self.clock.flag,
+        found = self.clock.interruptible(
+            lambda: run_explore(
+                self.paths.tangents, 0, trie, margin=self.paths.outline.margin, rule=self.rule,
+                keep=True, cap=max(20_000, STATES_PER_CLASS * share), toward=(g, rest),
+                within=within, most=8 * share + 64, stop=self.clock.flag,
+            )
         )  # fmt: skip
         if found.capped:
             return None, []

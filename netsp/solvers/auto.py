@@ -91,19 +91,14 @@ def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | Non
     clock = Clock.of(limits.time)
     limits = replace(limits, time=clock)
     if not graph.complete and graph.roadmapped:
-        # a roadmap that left classes out says that a proof over those kept may not come to an end
-        bound_over_goals(
-            graph, lambda g, limits: prove(g, limits=limits),
-            Limits(clock.part(GOALS_SHARE), rng=limits.rng),
-        )  # fmt: skip
-    few = not graph.complete and limits.warm_start is None
-    if few and graph.roadmapped and graph.goal_count > FEW_GOALS:
-        limits = _from_few(graph, replace(limits, time=clock), chosen.backend)
+        # it says that a proof over the classes that were kept may not come to an end
+        _bound_by_goals(graph, Limits(clock.part(GOALS_SHARE), rng=limits.rng))
+        if graph.goal_count > FEW_GOALS and limits.warm_start is None:
+            limits = _from_few(graph, limits, chosen.backend)
     if len(graph) <= PROVABLE:
         rounds = max(500, ROUNDS_PER_GOAL * graph.goal_count)
         run = MipRun(graph, limits, search_rounds=rounds)
         return run.solve(chosen.backend, limits.warm_start, walks=graph.goal_count <= FEW_GOALS)
-    limits = replace(limits, time=clock)
     if graph.goal_count <= FEW_GOALS and graph.roadmapped:
         return _over_shortest(graph, limits, chosen.backend)
     rows: list[Progress] = []
@@ -113,11 +108,8 @@ def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | Non
         if limits.on_progress:
             limits.on_progress(rows[-1])
 
-    share = Clock((1.0 - SHARE) * clock.left, within=clock) if clock.limit else clock
-    bound = bound_over_goals(
-        graph, lambda g, limits: prove(g, limits=limits),
-        Limits(share, rng=limits.rng, on_progress=tell),
-    )  # fmt: skip
+    share = clock.part(1.0 - SHARE)
+    bound = _bound_by_goals(graph, Limits(share, rng=limits.rng, on_progress=tell))
 
     def tell_both(row: Progress) -> None:
         rows.append(replace(row, bound=min(bound, row.incumbent or bound)))
@@ -157,6 +149,13 @@ def _in_part_ordered(graph: TravelGraph, limits: Limits, backend: str) -> Result
     return replace(found, lower_bound=bound, status=status)
 
 
+def _bound_by_goals(graph: TravelGraph, limits: Limits) -> float:
+    """A bound on the tours in any class; the one that is known if there is one."""
+    if not graph.bound_in_any_class:
+        bound_over_goals(graph, lambda g, limits: prove(g, limits=limits), limits)
+    return graph.bound_in_any_class
+
+
 def _from_few(graph: TravelGraph, limits: Limits, backend: str) -> Limits:
     """The limits with a tour to start from, the shortest over few classes. A roadmap that had to
     leave classes out has long words, whose legs take long: with all that it kept, a search would
@@ -164,22 +163,15 @@ def _from_few(graph: TravelGraph, limits: Limits, backend: str) -> Limits:
     core = least_tethers(graph.costs_to_base, graph.cluster, FEW_CLASSES)
     if len(core) == len(graph):
         return limits
-    given = limits.warm_start
-    clock = Clock.of(limits.time)
-    share = Clock(FEW_SHARE * clock.left, within=clock) if clock.limit is not None else clock
+    share = Clock.of(limits.time).part(FEW_SHARE)
     found = MipRun(
         graph.subgraph(core),
-        replace(
-            limits, time=share, warm_start=None, on_progress=of_part(limits.on_progress, core)
-        ),
+        replace(limits, time=share, on_progress=of_part(limits.on_progress, core)),
         search_rounds=max(500, ROUNDS_PER_GOAL * graph.goal_count),
     ).solve(backend, None)  # fmt: skip
     if found.tour is None:
         return limits
-    tour = [int(core[v]) for v in found.tour]
-    if given is not None and graph.tour_length(given) <= graph.tour_length(tour):
-        return limits
-    return replace(limits, warm_start=tour)
+    return replace(limits, warm_start=[int(core[v]) for v in found.tour])
 
 
 def _over_shortest(graph: TravelGraph, limits: Limits, backend: str) -> Result:
@@ -207,8 +199,5 @@ def _over_shortest(graph: TravelGraph, limits: Limits, backend: str) -> Result:
     clock = Clock.of(limits.time)
     if otherwise < (whole.length or 0.0) and not clock.up:
         # of few goals the shortest tour in any class is soon known
-        bound_over_goals(
-            graph, lambda g, limits: prove(g, limits=limits), Limits(clock, rng=limits.rng)
-        )
-        otherwise = max(otherwise, graph.bound_in_any_class)
+        otherwise = max(otherwise, _bound_by_goals(graph, Limits(clock, rng=limits.rng)))
     return within_kept(whole, otherwise)

@@ -21,6 +21,7 @@ from netsp.hsignature import Word, concatenate
 from netsp.lns.layers import Instance
 from netsp.lns.search import Search
 from netsp.travel.graph import TravelGraph, least_tethers
+from netsp.travel.result import OnProgress, Progress
 
 SHARE = 0.5
 """Of the time, at most."""
@@ -39,7 +40,8 @@ MOST_CLASSES, MOST_PER_GOAL = 2000, 40
 last tour are; with half as many, a search in vain goes on from all of them."""
 
 IN_VAIN = 4
-"""Searches that bring neither a better tour nor a new class, then it ends."""
+"""Searches one after the other that bring no better tour, then it ends: there is no end of classes
+to go on to."""
 
 Class = tuple[int, Word]
 """Goal, from 1, and word."""
@@ -53,7 +55,10 @@ class Carried:
     tour: tuple[int, ...] | None = None
 
 
-def with_carried(graph: TravelGraph, clock: Clock, rng: np.random.Generator) -> Carried:
+def with_carried(
+    graph: TravelGraph, clock: Clock, rng: np.random.Generator,
+    on_progress: OnProgress | None = None,
+) -> Carried:  # fmt: skip
     """The graph with the classes along good tours.
 
     Parameters
@@ -64,6 +69,9 @@ def with_carried(graph: TravelGraph, clock: Clock, rng: np.random.Generator) -> 
         Of the run.
     rng : numpy.random.Generator
         Of the searches.
+    on_progress : callable, optional
+        Told the length of the best tour after each search; the tour itself is one of a graph that
+        is still growing.
 
     Returns
     -------
@@ -89,11 +97,12 @@ def with_carried(graph: TravelGraph, clock: Clock, rng: np.random.Generator) -> 
         improved = length < shortest * (1.0 - 1e-9)
         if improved:
             shortest, best = length, classes
+        if on_progress and best:
+            on_progress(Progress(clock.elapsed, "carried", shortest, vertices=len(looked)))
         if not best:
             break
         if len(looked) > most:
             looked = dict.fromkeys(_classes(graph, least))
-        before = len(looked)
         looked |= dict.fromkeys([*best, *classes])
         wanted: dict[Class, None] = {}
         from_all = not improved and len(looked) < most // 2
@@ -107,7 +116,7 @@ def with_carried(graph: TravelGraph, clock: Clock, rng: np.random.Generator) -> 
         graph.before = order
         there = set(_classes(graph, np.arange(1, len(graph))))
         looked |= dict.fromkeys(c for c in new if c in there)
-        vain = 0 if improved or len(looked) > before else vain + 1
+        vain = 0 if improved else vain + 1
     return Carried(graph, _vertices(graph, best) if best else None)
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from netsp.clock import Clock, TimeLimit
+from netsp.clock import Clock, TimeLimit, until_interrupt
 from netsp.errors import InputError
 from netsp.fields import checked_argument
 from netsp.models import shown
@@ -359,19 +359,24 @@ def solve(
             )
         # what is too large for its time takes long to draw, too
         spare = 0.0 if graph.complete else min(SPARE * (time_limit or 0.0), 1.0)
-        start = None if warm_start is None else warm_start
-        found_on_way: tuple[int, ...] | None = None
-        if solver in CARRIED and start is None:
-            carried = with_carried(graph, clock, np.random.default_rng(seed))
-            graph, found_on_way = carried.graph, carried.tour
+        start: Sequence[int] | None = None
+        rest = clock
+        if warm_start is not None:
+            start = tour_from(problem, warm_start, graph)
+        elif solver in CARRIED:
+            rng = np.random.default_rng(seed)
+            with until_interrupt(clock) as stoppable:
+                carried = with_carried(graph, stoppable, rng, on_progress)
+            graph, start = carried.graph, carried.tour
+            rest = stoppable if stoppable.stopped else clock
         result = solve_graph(
             graph,
             solver,
-            time_limit=Clock(clock.left - spare, within=clock) if spare else clock,
+            time_limit=Clock(rest.left - spare, within=rest) if spare else rest,
             iteration_limit=iteration_limit,
             seed=seed,
             params=params,
-            warm_start=found_on_way if start is None else tour_from(problem, start, graph),
+            warm_start=start,
             on_progress=on_progress,
         )
         timings = _timings(clock, built, graph)

@@ -103,13 +103,11 @@ def _searched(
 ) -> tuple[Result, Ints]:
     """A first tour from each root; the best of all, and the roots, that of the shortest first."""
     lengths = []
-    assert isinstance(limits.time, Clock)
+    clock = Clock.of(limits.time).part(FIRST_SHARE)
+    rounds = max(1, ROUNDS_PER_CLUSTER // len(roots)) * graph.cluster_count
     for k, root in enumerate(roots.tolist()):
         part, vertices = graph.rooted(root)
-        share = Limits(
-            limits.time.part(FIRST_SHARE / (len(roots) - k)),
-            max(1, ROUNDS_PER_CLUSTER // len(roots)) * graph.cluster_count, limits.rng,
-        )  # fmt: skip
+        share = Limits(clock.part(1.0 / (len(roots) - k)), rounds, limits.rng)
         found = search(part, SearchParams(), share)
         lengths.append(math.inf if found.length is None else found.length)
         if lengths[-1] < (best.length or math.inf):

@@ -56,10 +56,7 @@ class BaselessGraph(TravelGraph):
         bool
             True for a tour.
         """
-        t = [int(v) for v in tour]
-        return all(0 <= v < len(self) for v in t) and sorted(self.cluster[t].tolist()) == list(
-            range(self.cluster_count)
-        )
+        return self.takes_one_of_each(tour)
 
     def rooted(self, root: int) -> tuple[TravelGraph, Ints]:
         """The tours through a vertex, as those from a base.

@@ -506,10 +506,27 @@ class TravelGraph(Drawn):
         return (
             bool(t)
             and t[0] == 0
-            and all(0 <= v < len(self) for v in t)
-            and sorted(self.cluster[t].tolist()) == list(range(self.goal_count + 1))
+            and self.takes_one_of_each(t)
             and keeps(self.cluster[t].tolist(), self.before)
         )
+
+    def takes_one_of_each(self, vertices: Sequence[int]) -> bool:
+        """Whether vertices are exactly one of every cluster, in any order.
+
+        Parameters
+        ----------
+        vertices : sequence of int
+            Vertices.
+
+        Returns
+        -------
+        bool
+            True if so.
+        """
+        v = np.asarray(vertices, dtype=np.int64)
+        inside = bool(((v >= 0) & (v < len(self))).all())
+        clusters = int(self.cluster.max(initial=0)) + 1
+        return inside and sorted(self.cluster[v].tolist()) == list(range(clusters))
 
     def path(self, u: int, v: int) -> Floats:
         """The leg from one vertex to another.
