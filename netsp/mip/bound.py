@@ -112,18 +112,19 @@ def fixing_costs(
     and what its two vertices cost above the best of their clusters; per vertex the latter alone."""
     bound = _vertex_part(vertex_costs, cluster, duals) + _negative_legs(leg_costs)
     bound -= rounding(leg_costs, duals)
-    above = vertex_costs - _least(vertex_costs, cluster)[cluster]
+    above = vertex_costs - least_of_clusters(vertex_costs, cluster)[cluster]
     return bound, np.maximum(leg_costs, 0.0) + above[:, None] + above[None, :], above
 
 
-def _least(vertex_costs: Floats, cluster: npt.NDArray[np.int64]) -> Floats:
+def least_of_clusters(vertex_costs: Floats, cluster: npt.NDArray[np.int64]) -> Floats:
+    """(m + 1,) the least cost of any vertex, by cluster."""
     least = np.full(int(cluster.max()) + 1, np.inf)
     np.minimum.at(least, cluster, vertex_costs)
     return least
 
 
 def _vertex_part(vertex_costs: Floats, cluster: npt.NDArray[np.int64], duals: Duals) -> float:
-    return float((duals.cluster + _least(vertex_costs, cluster)).sum()) + duals.constant
+    return float((duals.cluster + least_of_clusters(vertex_costs, cluster)).sum()) + duals.constant
 
 
 def _negative_legs(leg_costs: Floats) -> float:

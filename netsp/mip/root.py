@@ -14,8 +14,8 @@ import numpy as np
 
 from netsp.arrays import Bools, Floats, Ints
 from netsp.mip.blossoms import blossom_cuts
-from netsp.mip.bound import dual_bound, fixing_costs, reduced_costs
 from netsp.mip.cuts import Cut
+from netsp.mip.prices import Prices
 from netsp.mip.program import Point, Relaxation
 from netsp.mip.subtours import branches, fractional_cuts
 from netsp.solving.legcosts import LegCosts
@@ -139,6 +139,7 @@ class Root:
         relaxation: Callable[[Ints, Ints, Floats], Relaxation],
         round_point: Callable[[Root, Point], None],
         warm: Warm | None = None,
+        over_goals: Sequence[Cut] = (),
     ) -> None:
         self.run, self.costs, self.round_point = run, costs, round_point
         graph = costs.graph
@@ -151,7 +152,9 @@ class Root:
         self.lp = relaxation(costs.cluster, legs, costs.values[legs[:, 0], legs[:, 1]])
         if warm is not None:
             self.lp.add_cuts(warm.cuts_over(costs))
+            self.lp.add_cuts([replace(c, inside=c.inside[costs.cluster]) for c in over_goals])
         self.point: Point | None = None
+        self._highest = 0.0
 
     # the incumbent among the vertices left
 
@@ -212,10 +215,12 @@ class Root:
         before, legs = run.bound or 0.0, len(self.lp.legs)
         priced = self._price(point)
         risen = (run.bound or 0.0) - before
+        self._highest, highest = max(self._highest, point.objective), self._highest
         # where vertices were forgotten the legs are counted anew
         brought = len(self.lp.legs) - legs if self.point is not None else legs
         pace.note_look(idle=brought < HARDLY * legs and risen < WORTH * (run.length - before))
-        return priced, risen > RISEN * abs(before)
+        risen_lp = point.objective > highest * (1.0 + RISEN)
+        return priced, risen_lp or risen > RISEN * abs(before)
 
     def measure(self) -> None:
         """Measure all legs that are not ruled out."""
@@ -273,49 +278,30 @@ class Root:
         """Raise the bound, eliminate, bring in legs of negative reduced cost; whether any came."""
         run, cluster = self.run, self.costs.cluster
         assert point.duals is not None
-        legs, vertices = reduced_costs(self.costs.values, cluster, self.lp.cuts, point.duals)
-        legs[self.dead] = np.inf
-        bound = dual_bound(legs, vertices, cluster, point.duals)
+        prices = Prices(self.costs.values, self.dead, cluster, self.lp.cuts, point.duals)
         # a tour with a dead leg is no shorter than the cutoff
-        run.raise_bound(min(bound, run.cutoff))
-        self._eliminate(*fixing_costs(legs, vertices, cluster, point.duals))
-        tour = tour_legs(self.tour())
-        candidate = np.where(self.dead, np.inf, legs)
-        candidate[tour[:, 0], tour[:, 1]] = legs[tour[:, 0], tour[:, 1]]
-        candidate[np.tril_indices(len(candidate))] = np.inf
-        candidate[self.lp.legs[:, 0], self.lp.legs[:, 1]] = np.inf
+        run.raise_bound(min(prices.bound, run.cutoff))
+        prices.rule_out(run.cutoff)
         scale = run.length if run.tour is not None else float(self.costs.values[0, 1:].max())
-        new = self._most_negative(candidate, TINY * scale)
+        new = self._most_negative(*prices.cheapest(TINY * scale))
         if len(new):
             self.lp.add_legs(new, self.costs.values[new[:, 0], new[:, 1]])
         self._forget()
         return len(new) > 0
 
-    def _most_negative(self, candidate: Floats, tolerance: float) -> Ints:
-        rows, cols = np.nonzero(candidate < -tolerance)
-        order = np.argsort(candidate[rows, cols], kind="stable")
-        taken = np.zeros(len(candidate), dtype=np.int64)
+    def _most_negative(self, legs: Ints, price: Floats) -> Ints:
+        """Of legs (k, 2) with their prices those to bring into the LP, the cheapest first: a few of
+        each vertex."""
+        missing = ~np.isin(self._keys(legs), self._keys(self.lp.legs))
+        legs, price = legs[missing], price[missing]
+        taken = np.zeros(len(self.costs), dtype=np.int64)
         chosen = []
-        for u, v in zip(rows[order].tolist(), cols[order].tolist(), strict=True):
+        for u, v in legs[np.argsort(price, kind="stable")].tolist():
             if taken[u] < PRICED_PER_VERTEX or taken[v] < PRICED_PER_VERTEX:
                 chosen.append((u, v))
                 taken[u] += 1
                 taken[v] += 1
         return np.array(chosen, dtype=np.int64).reshape(-1, 2)
-
-    def _eliminate(self, bound: float, rise: Floats, above: Floats) -> None:
-        """Legs and vertices that cost more than what is missing to the cutoff are dead: a tour
-        through a vertex uses two of its legs, and pays once for the vertex itself."""
-        missing = self.run.cutoff - bound
-        if not np.isfinite(missing):
-            return
-        self.dead |= rise > missing
-        left = np.where(self.dead, np.inf, rise)
-        two = np.partition(left, 1, axis=1)[:, :2].sum(axis=1) if len(left) > 2 else left.min(1)
-        gone = two - above > missing
-        gone[0] = False
-        self.dead[gone] = True
-        self.dead[:, gone] = True
 
     def _forget(self) -> None:
         """Drop dead legs from the LP, and dead vertices altogether once they are many."""

@@ -16,6 +16,7 @@ import numpy as np
 from netsp.clock import Clock
 from netsp.dp.solve import bound_by_walks
 from netsp.lns import Search
+from netsp.mip.cuts import Cut
 from netsp.mip.overgoals import bound_over_goals
 from netsp.mip.program import IntegerProgram, Point
 from netsp.mip.root import Root, Warm, tour_legs
@@ -112,6 +113,7 @@ class MipRun(SearchingRun):
     """
 
     root: Root | None = None
+    _over_goals: Sequence[Cut] = ()
 
     def solve(
         self, backend: str, warm_start: Sequence[int] | None, *, walks: bool = False
@@ -152,7 +154,11 @@ class MipRun(SearchingRun):
         """A first bound for who stops the run before the proof over all classes has one."""
 
         def prove(graph: TravelGraph, limits: Limits) -> Result:
-            return MipRun(graph, limits).solve(backend, None)
+            run = MipRun(graph, limits)
+            result = run.solve(backend, None)
+            if run.root is not None:
+                self._over_goals = run.root.lp.cuts
+            return result
 
         share = (
             Clock(GOALS_SHARE * self.clock.left, within=self.clock)
@@ -175,7 +181,7 @@ class MipRun(SearchingRun):
         """Root and integer rounds over what is left of the vertices."""
         self._gap_searched = self.length
         relaxation, integer = (_load(path) for path in BACKENDS[backend])
-        self.root = root = Root(self, costs, relaxation, self.round, warm)
+        self.root = root = Root(self, costs, relaxation, self.round, warm, self._over_goals)
         root.solve()
         if not self.done and root.point is not None:
             used = np.flatnonzero(root.point.x > 1e-6)

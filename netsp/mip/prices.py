@@ -1,0 +1,221 @@
+"""The prices of all legs at dual values: one pass for the bound, one for what it rules out.
+
+Reduced costs are never held. With thousands of classes a matrix of them, and those that are in
+between, would take more memory than the costs themselves, and more time to write than to compute:
+classes that lie in the same sets of all cuts pay the same for these, so that part is computed once
+for each two groups of such classes.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import NamedTuple
+
+import numpy as np
+
+from netsp.arrays import Bools, Floats, Ints
+from netsp.compiled.kernel import kernel
+from netsp.mip.bound import ROUNDING, least_of_clusters
+from netsp.mip.cuts import Cut
+from netsp.mip.program import Duals
+
+ROWS = 256
+"""Rows of a matrix that a thread works on at a time."""
+
+CHEAPEST = 8
+"""Legs of negative reduced cost that are kept for each vertex."""
+
+
+class Terms(NamedTuple):
+    """What a reduced cost is made of, c - π_u - π_v + shared - bitten, for the kernels.
+
+    `group` is that of each vertex, of vertices that the same cuts hold; `shared` (groups, groups)
+    what the cuts that hold both ends cost; `bitten` (m + 1, m + 1) what teeth between two clusters
+    do; `above` what each vertex costs above the cheapest of its cluster.
+    """
+
+    costs: Floats
+    dead: Bools
+    cluster: Ints
+    degree: Floats
+    group: Ints
+    shared: Floats
+    bitten: Floats
+    above: Floats
+
+
+class Prices:
+    """The reduced costs of `netsp.mip.bound` over a matrix of costs.
+
+    Parameters
+    ----------
+    costs : ndarray, shape (V, V)
+        Of legs; inf where there is none.
+    dead : ndarray of bool, shape (V, V)
+        Legs that are of no interest.
+    cluster : ndarray of int, shape (V,)
+        Of the vertices.
+    cuts : sequence of Cut
+        Of the program.
+    duals : Duals
+        Any; the better they are, the better the bound.
+
+    Attributes
+    ----------
+    bound : float
+        No tour without a dead leg is shorter.
+    """
+
+    def __init__(
+        self, costs: Floats, dead: Bools, cluster: Ints, cuts: Sequence[Cut], duals: Duals
+    ) -> None:
+        self._size = len(cluster)
+        active = np.flatnonzero(duals.cut < 0.0)
+        inside = np.array([cuts[k].inside for k in active], dtype=bool).reshape(-1, self._size)
+        first, group = _alike(inside)
+        mu = duals.cut[active]
+        # the product of a matrix with its own transpose takes BLAS half the work
+        root = inside[:, first] * np.sqrt(-mu)[:, None]
+        m = int(cluster.max(initial=0)) + 1
+        bitten = np.zeros((m, m))
+        for k in active:
+            for g, h in cuts[k].teeth:
+                bitten[g, h] += duals.cut[k]
+                bitten[h, g] += duals.cut[k]
+        vertices = 2.0 * duals.degree - duals.cluster[cluster]
+        for k in active:
+            vertices[cuts[k].inside & (cluster != cuts[k].cluster)] += duals.cut[k]
+        least = least_of_clusters(vertices, cluster)
+        self._terms = Terms(
+            costs, dead, cluster, duals.degree, group, root.T @ root, bitten,
+            vertices - least[cluster],
+        )  # fmt: skip
+        negative, lowest, longest = np.empty((3, self._size))
+        self._by_rows(lambda a, b: _scan(a, b, self._terms, negative, lowest, longest))
+        size = float(np.abs(duals.cluster).sum() + np.abs(duals.cut).sum() - duals.constant)
+        most = float(longest.max(initial=0.0)) + float(np.abs(duals.degree).max(initial=0.0))
+        rounding = ROUNDING * (size + len(duals.cluster) * most)
+        fixed = float((duals.cluster + least).sum()) + duals.constant - rounding
+        all_negative = float(negative.sum()) / 2.0
+        self._sure = fixed + all_negative
+        self.bound = fixed + max(all_negative, m * min(0.0, float(lowest.min(initial=0.0))))
+
+    def rule_out(self, cutoff: float) -> None:
+        """Mark as dead the legs and vertices that are in no tour shorter than the cutoff: a tour
+        through a vertex uses two of its legs, and pays once for the vertex itself."""
+        missing = cutoff - self._sure
+        if not np.isfinite(missing):
+            return
+        terms, two = self._terms, np.empty(self._size)
+        self._by_rows(lambda a, b: _rule_out(a, b, terms, missing, two))
+        gone = two - terms.above > missing
+        gone[0] = False
+        terms.dead[gone] = True
+        terms.dead[:, gone] = True
+
+    def cheapest(self, tolerance: float) -> tuple[Ints, Floats]:
+        """(k, 2) legs u < v of reduced costs below minus the tolerance, and these: of each vertex
+        the `CHEAPEST` at most."""
+        other = np.full((self._size, CHEAPEST), -1, dtype=np.int64)
+        price = np.zeros((self._size, CHEAPEST))
+        self._by_rows(lambda a, b: _cheapest(a, b, self._terms, tolerance, other, price))
+        u, k = np.nonzero(other >= 0)
+        pairs = np.sort(np.column_stack([u, other[u, k]]), axis=1)
+        legs, where = np.unique(pairs.reshape(-1, 2), axis=0, return_index=True)
+        return legs, price[u, k][where]
+
+    def _by_rows(self, work: Callable[[int, int], None]) -> None:
+        blocks = [(k, min(k + ROWS, self._size)) for k in range(0, self._size, ROWS)]
+        if len(blocks) < 4:
+            work(0, self._size)
+            return
+        with ThreadPoolExecutor(os.cpu_count()) as pool:
+            list(pool.map(lambda block: work(*block), blocks))
+
+
+def _alike(inside: Bools) -> tuple[Ints, Ints]:
+    """The first of every group of columns that are the same, and the group of each column."""
+    if not len(inside):
+        return np.zeros(1, dtype=np.int64), np.zeros(inside.shape[1], dtype=np.int64)
+    packed = np.ascontiguousarray(np.packbits(inside, axis=0).T)
+    rows = packed.view(np.dtype((np.void, packed.shape[1]))).ravel()
+    _, first, group = np.unique(rows, return_index=True, return_inverse=True)
+    return first, group
+
+
+@kernel
+def _scan(
+    first: int, last: int, terms: Terms, negative: Floats, lowest: Floats, longest: Floats
+) -> None:
+    """Per row the sum of the negative reduced costs, the least, and the largest size of any."""
+    n = len(terms.cluster)
+    for u in range(first, last):
+        cu, pu, gu = terms.cluster[u], terms.degree[u], terms.group[u]
+        total = low = size = 0.0
+        for v in range(n):
+            if terms.dead[u, v] or not np.isfinite(terms.costs[u, v]):
+                continue
+            r = (
+                terms.costs[u, v] - (pu + terms.degree[v])
+                + terms.shared[gu, terms.group[v]] - terms.bitten[cu, terms.cluster[v]]
+            )  # fmt: skip
+            total += min(r, 0.0)
+            low = min(low, r)
+            size = max(size, abs(r))
+        negative[u], lowest[u], longest[u] = total, low, size
+
+
+@kernel
+def _rule_out(first: int, last: int, terms: Terms, missing: float, two: Floats) -> None:
+    """Mark the legs that cost more than what is missing; per row what its two cheapest come to."""
+    n = len(terms.cluster)
+    for u in range(first, last):
+        cu, pu, gu, au = terms.cluster[u], terms.degree[u], terms.group[u], terms.above[u]
+        least = second = np.inf
+        for v in range(n):
+            if terms.dead[u, v]:
+                continue
+            r = (
+                terms.costs[u, v] - (pu + terms.degree[v])
+                + terms.shared[gu, terms.group[v]] - terms.bitten[cu, terms.cluster[v]]
+            )  # fmt: skip
+            rise = max(r, 0.0) + au + terms.above[v]
+            if rise > missing:
+                terms.dead[u, v] = True
+            elif rise < least:
+                least, second = rise, least
+            elif rise < second:
+                second = rise
+        two[u] = least + second if n > 2 else least
+
+
+@kernel
+def _cheapest(
+    first: int, last: int, terms: Terms, tolerance: float, other: Ints, price: Floats
+) -> None:  # fmt: skip
+    """Per row the legs of least reduced cost, if it is negative, in no order."""
+    n, most = len(terms.cluster), other.shape[1]
+    for u in range(first, last):
+        cu, pu, gu = terms.cluster[u], terms.degree[u], terms.group[u]
+        held, worst = 0, 0
+        for v in range(n):
+            if terms.dead[u, v]:
+                continue
+            r = (
+                terms.costs[u, v] - (pu + terms.degree[v])
+                + terms.shared[gu, terms.group[v]] - terms.bitten[cu, terms.cluster[v]]
+            )  # fmt: skip
+            if r >= -tolerance or (held == most and r >= price[u, worst]):
+                continue
+            at = worst
+            if held < most:
+                at = held
+                held += 1
+            other[u, at], price[u, at] = v, r
+            if held == most:
+                worst = 0
+                for k in range(most):
+                    if price[u, k] > price[u, worst]:
+                        worst = k
