@@ -72,7 +72,7 @@ class Prices:
         self, costs: Floats, dead: Bools, cluster: Ints, cuts: Sequence[Cut], duals: Duals
     ) -> None:
         self._size = len(cluster)
-        active = np.flatnonzero(duals.cut < 0.0)
+        active = np.flatnonzero(duals.cut < 0.0).tolist()
         inside = np.array([cuts[k].inside for k in active], dtype=bool).reshape(-1, self._size)
         first, group = _alike(inside)
         mu = duals.cut[active]
@@ -125,6 +125,14 @@ class Prices:
         pairs = np.sort(np.column_stack([u, other[u, k]]), axis=1)
         legs, where = np.unique(pairs.reshape(-1, 2), axis=0, return_index=True)
         return legs, price[u, k][where]
+
+    def of(self, legs: Ints) -> Floats:
+        """(k,) the reduced costs of legs (k, 2)."""
+        t, (u, v) = self._terms, legs.T
+        return np.asarray(
+            t.costs[u, v] - (t.degree[u] + t.degree[v])
+            + t.shared[t.group[u], t.group[v]] - t.bitten[t.cluster[u], t.cluster[v]]
+        )  # fmt: skip
 
     def _by_rows(self, work: Callable[[int, int], None]) -> None:
         blocks = [(k, min(k + ROWS, self._size)) for k in range(0, self._size, ROWS)]

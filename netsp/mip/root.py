@@ -25,8 +25,8 @@ from netsp.solving.searching import SearchingRun
 NEAREST = 4
 """Legs per vertex in the first LP."""
 
-PRICED_PER_VERTEX = 3
-"""Most legs per vertex that one pricing round brings in."""
+PRICED_PER_VERTEX, MOST_PRICED = 3, 3000
+"""Most legs per vertex, and in all, that one pricing round brings in."""
 
 PRICE_EVERY, PRICE_SELDOM = 4, 32
 """Rounds of cuts between two looks at the prices of all legs, unless no cut is found; every look
@@ -41,6 +41,14 @@ SHRINK = 0.85
 
 LEAN = 0.3
 """Dead legs leave the LP when they are more than this share of it."""
+
+MANY, LEAN_EVERY, DEAR = 2000, 4, 0.01
+"""With more vertices than the first, every so many looks those legs leave the LP whose reduced cost
+is more than the last share of the incumbent: there the first prices bring in far more than stays of
+use, and LPs take all the time."""
+
+USED = 0.05
+"""Legs that a point uses that much are measured."""
 
 PATIENCE, MEASURED_PATIENCE, WORTH = 15, 60, 0.02
 """On bounds of legs, the root ends when so many looks at the prices closed less than this share of
@@ -64,12 +72,15 @@ class Pace:
         Of the LP since the last look.
     every
         So many make the next one due.
+    looks
+        So far.
     gaps
         After every look.
     """
 
     rounds: int = 0
     every: int = PRICE_EVERY
+    looks: int = 0
     gaps: list[float] = field(default_factory=list)
 
     @property
@@ -80,6 +91,7 @@ class Pace:
     def note_look(self, *, idle: bool) -> None:
         """Looks that bring nothing become seldom."""
         self.rounds = 1
+        self.looks += 1
         self.every = min(2 * self.every, PRICE_SELDOM) if idle else PRICE_EVERY
 
     def stalled(self, gap: float, patience: int) -> bool:
@@ -94,11 +106,13 @@ class Pace:
 @dataclass(frozen=True)
 class Warm:
     """A program over some of the vertices: their numbers in the graph, legs (k, 2) by these
-    numbers, and cuts over the vertices in their order."""
+    numbers, and cuts over the vertices in their order; `measured` are vertices all of whose legs to
+    one another have been measured."""
 
     vertices: Ints
     legs: Ints
     cuts: list[Cut]
+    measured: Ints
 
     def cuts_over(self, costs: LegCosts) -> list[Cut]:
         """The cuts over all vertices left: a vertex that is not in the program goes with the one
@@ -154,7 +168,7 @@ class Root:
             self.lp.add_cuts(warm.cuts_over(costs))
             self.lp.add_cuts([replace(c, inside=c.inside[costs.cluster]) for c in over_goals])
         self.point: Point | None = None
-        self._highest = 0.0
+        self._objective = 0.0
 
     # the incumbent among the vertices left
 
@@ -209,18 +223,18 @@ class Root:
         return point
 
     def _look(self, point: Point, pace: Pace) -> tuple[bool, bool]:
-        """Look at the prices of all legs; whether any came into the LP, and whether the bound has
-        risen."""
+        """Look at the prices of all legs; whether any came into the LP, and whether the bound or the
+        LP's optimum has risen since the last look."""
         run = self.run
         before, legs = run.bound or 0.0, len(self.lp.legs)
-        priced = self._price(point)
+        priced = self._price(point, lean=pace.looks % LEAN_EVERY == 0)
         risen = (run.bound or 0.0) - before
-        self._highest, highest = max(self._highest, point.objective), self._highest
+        self._objective, last = point.objective, self._objective
         # where vertices were forgotten the legs are counted anew
         brought = len(self.lp.legs) - legs if self.point is not None else legs
         pace.note_look(idle=brought < HARDLY * legs and risen < WORTH * (run.length - before))
-        risen_lp = point.objective > highest * (1.0 + RISEN)
-        return priced, risen_lp or risen > RISEN * abs(before)
+        climbs = point.objective > last * (1.0 + RISEN)
+        return priced, climbs or risen > RISEN * abs(before)
 
     def measure(self) -> None:
         """Measure all legs that are not ruled out."""
@@ -274,7 +288,7 @@ class Root:
         """One number for each leg."""
         return np.asarray(legs[:, 0] * len(self.costs) + legs[:, 1])
 
-    def _price(self, point: Point) -> bool:
+    def _price(self, point: Point, *, lean: bool) -> bool:
         """Raise the bound, eliminate, bring in legs of negative reduced cost; whether any came."""
         run, cluster = self.run, self.costs.cluster
         assert point.duals is not None
@@ -286,8 +300,31 @@ class Root:
         new = self._most_negative(*prices.cheapest(TINY * scale))
         if len(new):
             self.lp.add_legs(new, self.costs.values[new[:, 0], new[:, 1]])
+        longer = self._measure_used(point)
+        if lean and len(self.costs) > MANY:
+            self._drop_dear(prices.of(self.lp.legs), point)
         self._forget()
-        return len(new) > 0
+        return len(new) > 0 or longer
+
+    def _measure_used(self, point: Point) -> bool:
+        """Measure the legs that the point uses and that are only bounded; whether there were any.
+        What is missing in these bounds is missing in the LP's."""
+        if not self.costs.measure_legs(point.legs[point.y > USED]):
+            return False
+        legs = self.lp.legs
+        self.lp.set_costs(self.costs.values[legs[:, 0], legs[:, 1]])
+        return True
+
+    def _drop_dear(self, price: Floats, point: Point) -> None:
+        """Take out of the LP the legs that are far from being used; pricing brings them back if
+        need be."""
+        dear = price > DEAR * self.run.length
+        old = len(point.y)
+        dear[old:] = False
+        dear[:old] &= point.y <= TINY
+        dear &= ~np.isin(self._keys(self.lp.legs), self._keys(tour_legs(self.tour())))
+        if dear.sum() > LEAN * len(dear):
+            self.lp.keep_legs(~dear)
 
     def _most_negative(self, legs: Ints, price: Floats) -> Ints:
         """Of legs (k, 2) with their prices those to bring into the LP, the cheapest first: a few of
@@ -301,6 +338,8 @@ class Root:
                 chosen.append((u, v))
                 taken[u] += 1
                 taken[v] += 1
+                if len(chosen) == MOST_PRICED:
+                    break
         return np.array(chosen, dtype=np.int64).reshape(-1, 2)
 
     def _forget(self) -> None:

@@ -175,11 +175,14 @@ class MipRun(SearchingRun):
         if self.root is None or self.outer is None:
             return None
         core = self.outer[1][self.root.costs.vertices]
-        return Warm(core, core[self.root.lp.legs], list(self.root.lp.cuts))
+        return Warm(core, core[self.root.lp.legs], list(self.root.lp.cuts), self.outer[1])
 
     def cut(self, costs: LegCosts, backend: str, warm: Warm | None) -> None:
         """Root and integer rounds over what is left of the vertices."""
         self._gap_searched = self.length
+        if warm is not None:
+            # a core is proven over lengths; over their bounds its cuts would prove less
+            costs.measure(np.searchsorted(costs.vertices, warm.measured))
         relaxation, integer = (_load(path) for path in BACKENDS[backend])
         self.root = root = Root(self, costs, relaxation, self.round, warm, self._over_goals)
         root.solve()

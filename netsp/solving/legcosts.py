@@ -17,8 +17,8 @@ MEASURE_AT_ONCE = 400
 """So many vertices or fewer are measured altogether: that takes a second at most."""
 
 
-BYTES_PER_LEG = 50.0
-"""Of memory that a proof takes: the values, reduced costs, and what is in between."""
+BYTES_PER_LEG = 24.0
+"""Of memory that a proof takes: the values, what is known of them, and what is in between."""
 
 
 class LegCosts:
@@ -70,6 +70,22 @@ class LegCosts:
         grid = np.ix_(open_rows, open_rows)
         self.values[grid] = self.graph.costs_among(self.vertices[open_rows])
         self.exact[grid] = True
+
+    def measure_legs(self, legs: Ints) -> bool:
+        """Measure legs (k, 2), rows; whether any of them was only bounded."""
+        if self.exact is None or not len(legs):
+            return False
+        u, v = legs[~self.exact[legs[:, 0], legs[:, 1]]].T
+        if not len(u):
+            return False
+        chosen, at = np.unique(np.concatenate([u, v]), return_inverse=True)
+        i, j = at[: len(u)], at[len(u) :]
+        asked = np.zeros((len(chosen), len(chosen)), dtype=bool)
+        asked[i, j] = asked[j, i] = True
+        lengths = self.graph.costs_among(self.vertices[chosen], asked)[i, j]
+        self.values[u, v] = self.values[v, u] = lengths
+        self.exact[u, v] = self.exact[v, u] = True
+        return True
 
     def measure_all(self, asked: Bools) -> None:
         """Measure everything asked for (symmetric); what is neither measured nor asked for counts
