@@ -14,7 +14,7 @@ from netsp.dp import walks as walks_module
 from netsp.dp.labels import translate
 from netsp.dp.memory import MOST, Memory
 from netsp.dp.walks import Walks
-from netsp.mip.bound import fixing_costs
+from netsp.mip.prices import Prices
 from netsp.mip.program import Duals
 from tests.brute import brute_tour
 from tests.test_contract import random_graph
@@ -187,11 +187,15 @@ def test_legs_a_million_times_the_tour_end_the_walks_all_the_same(solver):
     assert solver == "dp" or result.status is Status.OPTIMAL
 
 
-def test_what_a_vertex_costs_is_paid_once():
+def test_a_tour_through_a_vertex_pays_what_it_costs_above_the_cheapest_of_its_cluster():
     cluster = np.array([0, 1, 1, 2])
-    duals = Duals(np.zeros(3), np.zeros(4), np.zeros(0))
-    vertices = np.array([0.0, 0.0, 5.0, 0.0])
-    legs = np.where(cluster[:, None] == cluster[None, :], np.inf, 0.0)
-    _, rise, above = fixing_costs(legs, vertices, cluster, duals)
-    two = np.sort(rise[2])[:2].sum() - above[2]
-    assert two == 5.0
+    duals = Duals(np.zeros(3), np.array([0.0, 0.0, 2.5, 0.0]), np.zeros(0))
+    costs = np.where(cluster[:, None] == cluster[None, :], np.inf, 0.0)
+    costs[2], costs[:, 2] = costs[2] + 2.5, costs[:, 2] + 2.5
+    for cutoff, gone in ((5.1, False), (4.9, True)):
+        dead = ~np.isfinite(costs)
+        prices = Prices(costs, dead, cluster, [], duals)
+        assert prices.bound == pytest.approx(0.0, abs=1e-9)
+        prices.rule_out(cutoff)
+        assert bool(dead[2].all()) is gone
+        assert not dead[1, 0]

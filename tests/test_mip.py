@@ -1,6 +1,7 @@
 """The mip solver proves what brute force finds, and is honest when it cannot."""
 
 import time
+from dataclasses import replace
 
 import numpy as np
 import psutil
@@ -8,16 +9,18 @@ import pytest
 
 from netsp import travel_graph
 from netsp.mip import solve as mip
-from netsp.mip.bound import dual_bound, exact_bound, fixing_costs, reduced_costs
+from netsp.mip.bound import exact_bound
 from netsp.mip.cbc_program import CbcRelaxation
 from netsp.mip.cuts import Cut
 from netsp.mip.highs import HighsRelaxation
+from netsp.mip.prices import Prices
 from netsp.mip.solve import Params
 from netsp.mip.subtours import components, fractional_cuts
 from netsp.roadmap.taut import TautRoadmap
 from netsp.solution import Status
 from netsp.solving.legcosts import MEASURE_AT_ONCE
 from netsp.solving.limits import Limits
+from netsp.travel.graph import TravelGraph
 from netsp.worlds import random_world as far_world
 from tests.brute import brute_tour as brute
 from tests.test_contract import random_graph
@@ -85,12 +88,44 @@ def test_any_dual_values_give_a_valid_bound(backend):
                 duals.degree + scale * rng.normal(size=duals.degree.shape),
                 np.minimum(duals.cut + scale * rng.normal(size=duals.cut.shape), 0.0),
             )
-            r = reduced_costs(graph.costs, graph.cluster, program.cuts, shaken)
-            assert dual_bound(*r, graph.cluster, shaken) <= best + 1e-9
-    r = reduced_costs(graph.costs, graph.cluster, program.cuts, duals)
-    assert dual_bound(*r, graph.cluster, duals) == pytest.approx(
-        program.solve(60.0).objective, abs=1e-5
-    )
+            assert priced(graph, program.cuts, shaken).bound <= best + 1e-9
+    assert priced(graph, program.cuts, duals).bound >= program.solve(60.0).objective - 1e-5
+
+
+def priced(graph, cuts, duals):
+    """All legs of a graph at dual values, none of them dead."""
+    return Prices(graph.costs, ~np.isfinite(graph.costs), graph.cluster, cuts, duals)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_what_prices_rule_out_is_in_no_shorter_tour(seed):
+    """Every tour below the cutoff is found among the legs that are left, whatever the duals, and
+    good duals leave few others."""
+    graph = random_graph(seed, goals=5)
+    best = brute(graph)
+    legs = np.argwhere(np.triu(np.isfinite(graph.costs), 1))
+    program = HighsRelaxation(graph.cluster, legs, graph.costs[legs[:, 0], legs[:, 1]])
+    for _ in range(8):
+        point = program.solve(60.0)
+        program.add_cuts(fractional_cuts(point.x, point.legs, point.y, graph.cluster))
+    point = program.solve(60.0)
+    rng = np.random.default_rng(seed)
+    for scale in (0.0, 0.03, 0.3):
+        shaken = replace(
+            point.duals,
+            degree=point.duals.degree + scale * rng.normal(size=point.duals.degree.shape),
+            cut=np.minimum(
+                point.duals.cut + scale * rng.normal(size=point.duals.cut.shape), 0.0
+            ),
+        )  # fmt: skip
+        dead = ~np.isfinite(graph.costs)
+        prices = Prices(graph.costs, dead, graph.cluster, program.cuts, shaken)
+        before = dead.sum()
+        prices.rule_out(1.0001 * best)
+        left = np.where(dead, np.inf, graph.costs)
+        assert brute(TravelGraph.from_costs(left, graph.cluster)) == pytest.approx(best)
+        assert scale > 0.0 or dead.sum() > before
+        assert (dead == dead.T).all()
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -193,12 +228,10 @@ def test_the_certificate_in_exact_rationals_is_no_lower_than_the_bound_claimed(s
             np.minimum(duals.cut + scale * rng.normal(size=duals.cut.shape), 0.0),
         )
         exact = exact_bound(graph.costs, graph.cluster, program.cuts, shaken)
-        r = reduced_costs(graph.costs, graph.cluster, program.cuts, shaken)
-        claimed = dual_bound(*r, graph.cluster, shaken)
+        claimed = priced(graph, program.cuts, shaken).bound
         assert claimed <= exact
         assert float(exact) - claimed <= 1e-9 * max(1.0, scale)
         assert exact <= best * (1 + 1e-12)
-        assert fixing_costs(*r, graph.cluster, shaken)[0] <= exact
 
 
 def test_a_long_tether_is_solved_without_measuring_most_legs():

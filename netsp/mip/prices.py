@@ -1,5 +1,8 @@
 """The prices of all legs at dual values: one pass for the bound, one for what it rules out.
 
+The bound is that of `netsp.mip.bound`. A tour through a given vertex, or along a given leg, pays
+what these cost above the cheapest of their clusters.
+
 Reduced costs are never held. With thousands of classes a matrix of them, and those that are in
 between, would take more memory than the costs themselves, and more time to write than to compute:
 classes that lie in the same sets of all cuts pay the same for these, so that part is computed once
@@ -17,7 +20,7 @@ import numpy as np
 
 from netsp.arrays import Bools, Floats, Ints
 from netsp.compiled.kernel import kernel
-from netsp.mip.bound import ROUNDING, least_of_clusters
+from netsp.mip.bound import least_of_clusters, rounding
 from netsp.mip.cuts import Cut
 from netsp.mip.program import Duals
 
@@ -33,7 +36,8 @@ class Terms(NamedTuple):
 
     `group` is that of each vertex, of vertices that the same cuts hold; `shared` (groups, groups)
     what the cuts that hold both ends cost; `bitten` (m + 1, m + 1) what teeth between two clusters
-    do; `above` what each vertex costs above the cheapest of its cluster.
+    do; `vertex` r_v; `least` and
+    `second` are r_uv of the two cheapest legs of each vertex.
     """
 
     costs: Floats
@@ -43,7 +47,9 @@ class Terms(NamedTuple):
     group: Ints
     shared: Floats
     bitten: Floats
-    above: Floats
+    vertex: Floats
+    least: Floats
+    second: Floats
 
 
 class Prices:
@@ -84,33 +90,28 @@ class Prices:
             for g, h in cuts[k].teeth:
                 bitten[g, h] += duals.cut[k]
                 bitten[h, g] += duals.cut[k]
-        vertices = 2.0 * duals.degree - duals.cluster[cluster]
+        vertex = 2.0 * duals.degree - duals.cluster[cluster]
         for k in active:
-            vertices[cuts[k].inside & (cluster != cuts[k].cluster)] += duals.cut[k]
-        least = least_of_clusters(vertices, cluster)
-        self._terms = Terms(
-            costs, dead, cluster, duals.degree, group, root.T @ root, bitten,
-            vertices - least[cluster],
-        )  # fmt: skip
-        negative, lowest, longest = np.empty((3, self._size))
-        self._by_rows(lambda a, b: _scan(a, b, self._terms, negative, lowest, longest))
-        size = float(np.abs(duals.cluster).sum() + np.abs(duals.cut).sum() - duals.constant)
-        most = float(longest.max(initial=0.0)) + float(np.abs(duals.degree).max(initial=0.0))
-        rounding = ROUNDING * (size + len(duals.cluster) * most)
-        fixed = float((duals.cluster + least).sum()) + duals.constant - rounding
-        all_negative = float(negative.sum()) / 2.0
-        self._sure = fixed + all_negative
-        self.bound = fixed + max(all_negative, m * min(0.0, float(lowest.min(initial=0.0))))
+            vertex[cuts[k].inside & (cluster != cuts[k].cluster)] += duals.cut[k]
+        least, second, longest = np.empty((3, self._size))
+        terms = self._terms = Terms(
+            costs, dead, cluster, duals.degree, group, root.T @ root, bitten, vertex, least, second
+        )
+        self._by_rows(lambda a, b: _scan(a, b, terms, longest))
+        self._cost = vertex + 0.5 * (least + second)
+        self._cheapest = least_of_clusters(self._cost, cluster)
+        fixed = float((duals.cluster + self._cheapest).sum()) + duals.constant
+        self.bound = fixed - rounding(duals, float(longest.max(initial=0.0)))
 
     def rule_out(self, cutoff: float) -> None:
-        """Mark as dead the legs and vertices that are in no tour shorter than the cutoff: a tour
-        through a vertex uses two of its legs, and pays once for the vertex itself."""
-        missing = cutoff - self._sure
+        """Mark as dead the legs and vertices that are in no tour shorter than the cutoff."""
+        missing = cutoff - self.bound
         if not np.isfinite(missing):
             return
-        terms, two = self._terms, np.empty(self._size)
-        self._by_rows(lambda a, b: _rule_out(a, b, terms, missing, two))
-        gone = two - terms.above > missing
+        terms = self._terms
+        above = terms.vertex - self._cheapest[terms.cluster]
+        self._by_rows(lambda a, b: _rule_out(a, b, terms, above, missing))
+        gone = self._cost - self._cheapest[terms.cluster] > missing
         gone[0] = False
         terms.dead[gone] = True
         terms.dead[:, gone] = True
@@ -154,14 +155,13 @@ def _alike(inside: Bools) -> tuple[Ints, Ints]:
 
 
 @kernel
-def _scan(
-    first: int, last: int, terms: Terms, negative: Floats, lowest: Floats, longest: Floats
-) -> None:
-    """Per row the sum of the negative reduced costs, the least, and the largest size of any."""
+def _scan(first: int, last: int, terms: Terms, longest: Floats) -> None:
+    """Per row the two least reduced costs, and the largest size of any."""
     n = len(terms.cluster)
     for u in range(first, last):
         cu, pu, gu = terms.cluster[u], terms.degree[u], terms.group[u]
-        total = low = size = 0.0
+        least = second = np.inf
+        size = 0.0
         for v in range(n):
             if terms.dead[u, v] or not np.isfinite(terms.costs[u, v]):
                 continue
@@ -169,19 +169,21 @@ def _scan(
                 terms.costs[u, v] - (pu + terms.degree[v])
                 + terms.shared[gu, terms.group[v]] - terms.bitten[cu, terms.cluster[v]]
             )  # fmt: skip
-            total += min(r, 0.0)
-            low = min(low, r)
             size = max(size, abs(r))
-        negative[u], lowest[u], longest[u] = total, low, size
+            if r < least:
+                least, second = r, least
+            elif r < second:
+                second = r
+        terms.least[u], terms.second[u], longest[u] = least, second, size
 
 
 @kernel
-def _rule_out(first: int, last: int, terms: Terms, missing: float, two: Floats) -> None:
-    """Mark the legs that cost more than what is missing; per row what its two cheapest come to."""
+def _rule_out(first: int, last: int, terms: Terms, above: Floats, missing: float) -> None:
+    """Mark the legs whose ends cost more than what is missing if they are used: an end pays for
+    half of the leg, and half of its cheapest other one."""
     n = len(terms.cluster)
     for u in range(first, last):
-        cu, pu, gu, au = terms.cluster[u], terms.degree[u], terms.group[u], terms.above[u]
-        least = second = np.inf
+        cu, pu, gu = terms.cluster[u], terms.degree[u], terms.group[u]
         for v in range(n):
             if terms.dead[u, v]:
                 continue
@@ -189,14 +191,10 @@ def _rule_out(first: int, last: int, terms: Terms, missing: float, two: Floats) 
                 terms.costs[u, v] - (pu + terms.degree[v])
                 + terms.shared[gu, terms.group[v]] - terms.bitten[cu, terms.cluster[v]]
             )  # fmt: skip
-            rise = max(r, 0.0) + au + terms.above[v]
-            if rise > missing:
+            on = terms.second[u] if r <= terms.least[u] else terms.least[u]
+            back = terms.second[v] if r <= terms.least[v] else terms.least[v]
+            if above[u] + above[v] + r + 0.5 * (on + back) > missing:
                 terms.dead[u, v] = True
-            elif rise < least:
-                least, second = rise, least
-            elif rise < second:
-                second = rise
-        two[u] = least + second if n > 2 else least
 
 
 @kernel

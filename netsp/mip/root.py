@@ -47,6 +47,10 @@ MANY, LEAN_EVERY, DEAR = 2000, 4, 0.01
 is more than the last share of the incumbent: there the first prices bring in far more than stays of
 use, and LPs take all the time."""
 
+SETTLE, SETTLED = 0.5, 0.1
+"""Where the LP is so far above the bound, as a share of the gap, cuts wait until the prices of all
+legs leave it no farther than the second share."""
+
 USED = 0.05
 """Legs that a point uses that much are measured."""
 
@@ -183,17 +187,17 @@ class Root:
     def solve(self) -> None:
         """Rounds of LP, pricing, elimination and separation, until there is nothing to add or
         progress stalls."""
-        run, pace = self.run, Pace()
+        run, pace, settling = self.run, Pace(), False
         while not run.done:
             point = self._relaxed()
-            if not pace.look_is_due:
+            if not (settling or pace.look_is_due):
                 pace.rounds += 1
                 cuts = self._separate(point)
                 if cuts:
                     self._purge(point, risen=False)
                     self.lp.add_cuts(cuts)
                     continue
-            priced, risen = self._look(point, pace)
+            priced, risen = self._look(point, pace, lean=not settling)
             if self.point is not None:
                 self.round_point(self, point)
             run.report("root", **self.size())
@@ -201,6 +205,9 @@ class Root:
                 return
             if self.point is None or self._missing_tour_legs():
                 continue  # vertices were forgotten, or a new incumbent came with legs of its own
+            settling = priced and self._promises(point, SETTLED if settling else SETTLE)
+            if settling:
+                continue
             cuts = self._separate(point)
             patience = PATIENCE if self.costs.exact is not None else MEASURED_PATIENCE
             stalled = pace.stalled(run.length - (run.bound or 0.0), patience)
@@ -222,12 +229,20 @@ class Root:
         self.point = point
         return point
 
-    def _look(self, point: Point, pace: Pace) -> tuple[bool, bool]:
-        """Look at the prices of all legs; whether any came into the LP, and whether the bound or the
-        LP's optimum has risen since the last look."""
+    def _promises(self, point: Point, share: float) -> bool:
+        """Whether prices alone would close that share of the gap: with thousands of classes it is
+        long until no cut is found, and until then there would be no bound, nor anything to rule
+        out."""
+        bound = self.run.bound or 0.0
+        much = point.objective - bound > share * (self.run.length - bound)
+        return much and len(self.costs) > MANY
+
+    def _look(self, point: Point, pace: Pace, *, lean: bool) -> tuple[bool, bool]:
+        """Look at the prices of all legs; whether any came into the LP, and whether the bound has
+        risen, or the LP's optimum since the last look."""
         run = self.run
         before, legs = run.bound or 0.0, len(self.lp.legs)
-        priced = self._price(point, lean=pace.looks % LEAN_EVERY == 0)
+        priced = self._price(point, lean=lean and pace.looks % LEAN_EVERY == 0)
         risen = (run.bound or 0.0) - before
         self._objective, last = point.objective, self._objective
         # where vertices were forgotten the legs are counted anew
@@ -295,6 +310,8 @@ class Root:
         prices = Prices(self.costs.values, self.dead, cluster, self.lp.cuts, point.duals)
         # a tour with a dead leg is no shorter than the cutoff
         run.raise_bound(min(prices.bound, run.cutoff))
+        if run.done:
+            return False
         prices.rule_out(run.cutoff)
         scale = run.length if run.tour is not None else float(self.costs.values[0, 1:].max())
         new = self._most_negative(*prices.cheapest(TINY * scale))
@@ -316,7 +333,7 @@ class Root:
         return True
 
     def _drop_dear(self, price: Floats, point: Point) -> None:
-        """Take out of the LP the legs that are far from being used; pricing brings them back if
+        """Take the legs out of the LP that are far from being used; pricing brings them back if
         need be."""
         dear = price > DEAR * self.run.length
         old = len(point.y)
