@@ -13,6 +13,7 @@ from netsp.command.main import main
 from netsp.execute import ExecutionOptions, Surprises, execute
 from netsp.execute.plan import HOME, legs_of
 from netsp.execute.repair import broken
+from netsp.online.vehicle import make_vehicle
 from netsp.worlds import random_world
 
 PROBLEMS = Path(__file__).parent.parent / "problems"
@@ -410,3 +411,46 @@ def test_a_goal_that_was_left_out_may_still_be_cancelled():
     run = execute(problem, solve(problem), surprises=events)
     assert run.left_out == {}
     assert run.cancelled == {1}
+
+
+class GoesOn:
+    """A vehicle with a clock of its own that takes half a metre to hold its place."""
+
+    control_s = ()
+
+    def __init__(self, start):
+        self._own, self.time = make_vehicle("kinematic", np.array(start), 0.5), 0.0
+        self._on = np.zeros(3)
+
+    position = property(lambda self: self._own.position)
+    yaw = property(lambda self: self._own.yaw)
+
+    def go(self, path, seconds, *more):
+        before = self.position.copy()
+        self.time += seconds
+        done = self._own.go(path, seconds, *more)
+        self._on = self.position - before
+        return done
+
+    def hold(self):
+        size = float(np.linalg.norm(self._on))
+        self.stop_at(self.position + (0.5 * self._on / size if size else 0.0))
+
+    def stop_at(self, place):
+        self._own.stop_at(place)
+
+
+@pytest.mark.parametrize("when", [20.2, 20.6, 21.0, 21.4, 21.8, 22.2])
+def test_a_repair_knows_on_which_side_of_an_obstacle_the_robot_came_to_rest(when):
+    """On its way to a goal the robot goes past the buoy at (9.4, 3.3) while it comes to a halt. A
+    tether that stays behind meanwhile would be planned for as if it passed on the other side."""
+    problem = Problem.load(PROBLEMS / "pool.json")
+    solution = solve(problem, seed=0, time_limit=20.0)
+    boat = {"center": [10.765, 2.379], "radius": 0.2527}
+    run = execute(
+        problem, solution, ExecutionOptions(speed=0.5), vehicle=GoesOn(problem.base),
+        surprises=events({"time": when, "appear": boat}),
+    )  # fmt: skip
+    assert [a.word for a in run.arrivals] == [a.planned for a in run.arrivals]
+    assert run.summary["home"] and run.summary["tether_free"]
+    assert run.summary["longest_tether"] <= problem.tether_length

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Protocol
 
 import numpy as np
@@ -125,7 +125,6 @@ class _Run:
 
     def go(self) -> None:
         """One step along the path; arrives where the leg ends."""
-        before = self.vehicle.position
         points, passed = self.vehicle.go(
             self.path, self.step, self.vehicle.yaw, self.water(self.now), self.fresh
         )
@@ -133,14 +132,7 @@ class _Run:
         took = self.step if self.live is None else self.live.time - self.now
         self.now += took
         self.leg_s += took
-        for point in points:
-            inside = float(self.scene.distance(point)) < -0.2 * self.delta
-            if inside:
-                point = pushed_out(self.scene, point, 0.0)[0]
-                self.vehicle.stop_at(point)
-            self.out.walked += float(np.linalg.norm(point - before))
-            self.tether = self.model.update(self.tether, point)
-            before = point
+        self._follow(points)
         end = self.path[-1]
         self.path = self.path[min(passed, len(self.path) - 1) :]
         near = (
@@ -150,6 +142,15 @@ class _Run:
             self._arrive()
         elif self.leg_s > 60.0 + LEG_ALLOWANCE * self.legs[0].length / self.options.speed:
             self._leave_out(self.legs[0].goal, "not reached in time")
+
+    def _follow(self, points: Iterable[Floats]) -> None:
+        """The tether goes where the robot has been."""
+        for point in points:
+            if float(self.scene.distance(point)) < -0.2 * self.delta:
+                point = pushed_out(self.scene, point, 0.0)[0]
+                self.vehicle.stop_at(point)
+            self.out.walked += float(np.linalg.norm(point - self.tether.robot))
+            self.tether = self.model.update(self.tether, point)
 
     def _arrive(self) -> None:
         leg = self.legs.pop(0)
@@ -297,7 +298,10 @@ class _Run:
 
     def _mend(self, why: str, left: list[int], event: str = "left out") -> None:
         if self.live is not None:
+            # it has gone on since its tether was last looked at, perhaps past an obstacle
             self.live.hold()
+            way = np.array([self.tether.robot, self.vehicle.position])
+            self._follow(polylines.dense(way, 0.5 * self.delta)[1:])
         begin = time.perf_counter()
         try:
             made = repair(
