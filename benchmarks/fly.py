@@ -37,7 +37,7 @@ from netsp.online.tether import GeodesicTether
 from netsp.solution import Solution
 from tests.autopilot import Autopilot
 
-SPEEDS = {"wharf": 0.5, "pool": 0.5, "oc4-jacket": 0.5, "wec-array": 1.5, "lillgrund-part": 3.0}
+SPEEDS = {"wharf": 0.5, "pool": 0.5, "oc4-jacket": 0.5, "wec-array": 1.5, "lillgrund-part": 1.5}
 """m/s: among wind turbines tours are kilometres long."""
 
 FAILURES: dict[str, dict[str, Any] | None] = {

@@ -452,5 +452,6 @@ def test_a_repair_knows_on_which_side_of_an_obstacle_the_robot_came_to_rest(when
         surprises=events({"time": when, "appear": boat}),
     )  # fmt: skip
     assert [a.word for a in run.arrivals] == [a.planned for a in run.arrivals]
-    assert run.summary["home"] and run.summary["tether_free"]
+    assert run.summary["home"]
+    assert run.summary["tether_free"]
     assert run.summary["longest_tether"] <= problem.tether_length
