@@ -36,8 +36,7 @@ class Terms(NamedTuple):
 
     `group` is that of each vertex, of vertices that the same cuts hold; `shared` (groups, groups)
     what the cuts that hold both ends cost; `bitten` (m + 1, m + 1) what teeth between two clusters
-    do; `vertex` r_v; `least` and
-    `second` are r_uv of the two cheapest legs of each vertex.
+    do; `vertex` r_v; `least` and `second` are r_uv of the two cheapest legs of each vertex.
     """
 
     costs: Floats
@@ -60,7 +59,7 @@ class Prices:
     costs : ndarray, shape (V, V)
         Of legs; inf where there is none.
     dead : ndarray of bool, shape (V, V)
-        Legs that are of no interest.
+        Legs that are of no interest, and those that there are none of.
     cluster : ndarray of int, shape (V,)
         Of the vertices.
     cuts : sequence of Cut
@@ -129,11 +128,7 @@ class Prices:
 
     def of(self, legs: Ints) -> Floats:
         """(k,) the reduced costs of legs (k, 2)."""
-        t, (u, v) = self._terms, legs.T
-        return np.asarray(
-            t.costs[u, v] - (t.degree[u] + t.degree[v])
-            + t.shared[t.group[u], t.group[v]] - t.bitten[t.cluster[u], t.cluster[v]]
-        )  # fmt: skip
+        return _of(legs, self._terms)
 
     def _by_rows(self, work: Callable[[int, int], None]) -> None:
         blocks = [(k, min(k + ROWS, self._size)) for k in range(0, self._size, ROWS)]
@@ -155,20 +150,26 @@ def _alike(inside: Bools) -> tuple[Ints, Ints]:
 
 
 @kernel
+def _reduced(u: int, v: int, terms: Terms) -> float:
+    """r_uv; its terms in an order that makes it the same as r_vu."""
+    return float(
+        terms.costs[u, v] - (terms.degree[u] + terms.degree[v])
+        + terms.shared[terms.group[u], terms.group[v]]
+        - terms.bitten[terms.cluster[u], terms.cluster[v]]
+    )  # fmt: skip
+
+
+@kernel
 def _scan(first: int, last: int, terms: Terms, longest: Floats) -> None:
     """Per row the two least reduced costs, and the largest size of any."""
     n = len(terms.cluster)
     for u in range(first, last):
-        cu, pu, gu = terms.cluster[u], terms.degree[u], terms.group[u]
         least = second = np.inf
         size = 0.0
         for v in range(n):
-            if terms.dead[u, v] or not np.isfinite(terms.costs[u, v]):
+            if terms.dead[u, v]:
                 continue
-            r = (
-                terms.costs[u, v] - (pu + terms.degree[v])
-                + terms.shared[gu, terms.group[v]] - terms.bitten[cu, terms.cluster[v]]
-            )  # fmt: skip
+            r = _reduced(u, v, terms)
             size = max(size, abs(r))
             if r < least:
                 least, second = r, least
@@ -183,14 +184,10 @@ def _rule_out(first: int, last: int, terms: Terms, above: Floats, missing: float
     half of the leg, and half of its cheapest other one."""
     n = len(terms.cluster)
     for u in range(first, last):
-        cu, pu, gu = terms.cluster[u], terms.degree[u], terms.group[u]
         for v in range(n):
             if terms.dead[u, v]:
                 continue
-            r = (
-                terms.costs[u, v] - (pu + terms.degree[v])
-                + terms.shared[gu, terms.group[v]] - terms.bitten[cu, terms.cluster[v]]
-            )  # fmt: skip
+            r = _reduced(u, v, terms)
             on = terms.second[u] if r <= terms.least[u] else terms.least[u]
             back = terms.second[v] if r <= terms.least[v] else terms.least[v]
             if above[u] + above[v] + r + 0.5 * (on + back) > missing:
@@ -204,15 +201,11 @@ def _cheapest(
     """Per row the legs of least reduced cost, if it is negative, in no order."""
     n, most = len(terms.cluster), other.shape[1]
     for u in range(first, last):
-        cu, pu, gu = terms.cluster[u], terms.degree[u], terms.group[u]
         held, worst = 0, 0
         for v in range(n):
             if terms.dead[u, v]:
                 continue
-            r = (
-                terms.costs[u, v] - (pu + terms.degree[v])
-                + terms.shared[gu, terms.group[v]] - terms.bitten[cu, terms.cluster[v]]
-            )  # fmt: skip
+            r = _reduced(u, v, terms)
             if r >= -tolerance or (held == most and r >= price[u, worst]):
                 continue
             at = worst
@@ -225,3 +218,12 @@ def _cheapest(
                 for k in range(most):
                     if price[u, k] > price[u, worst]:
                         worst = k
+
+
+@kernel
+def _of(legs: Ints, terms: Terms) -> Floats:
+    """The reduced cost of each leg."""
+    out = np.empty(len(legs))
+    for k in range(len(legs)):
+        out[k] = _reduced(legs[k, 0], legs[k, 1], terms)
+    return out

@@ -1,9 +1,9 @@
 """Finding violated subtour cuts.
 
 At integer points by sight: the components of the support. At fractional points by components, too,
-by the branches of the cover (for every prefix of a word, the vertices whose
-word begins with it: sets that belong together in space and need no search) and by minimum cuts, one
-for every cluster, which find a violated cut if there is one.
+by the branches of the cover (for every prefix of a word, the vertices whose word begins with it:
+sets that belong together in space and need no search) and by minimum cuts, one for every cluster,
+which find a violated cut if there is one.
 """
 
 from __future__ import annotations
