@@ -8,6 +8,7 @@ import psutil
 import pytest
 
 from netsp import travel_graph
+from netsp.mip import root
 from netsp.mip import solve as mip
 from netsp.mip.bound import exact_bound
 from netsp.mip.cbc_program import CbcRelaxation
@@ -18,7 +19,7 @@ from netsp.mip.solve import Params
 from netsp.mip.subtours import components, fractional_cuts
 from netsp.roadmap.taut import TautRoadmap
 from netsp.solution import Status
-from netsp.solving.legcosts import MEASURE_AT_ONCE
+from netsp.solving.legcosts import MEASURE_AT_ONCE, LegCosts
 from netsp.solving.limits import Limits
 from netsp.travel.graph import TravelGraph
 from netsp.worlds import random_world as far_world
@@ -252,3 +253,37 @@ def test_a_long_tether_is_solved_without_measuring_most_legs():
     assert a.status is b.status is Status.OPTIMAL
     assert a.length == pytest.approx(b.length, rel=2e-6)
     assert sum(asked) < 0.2 * len(whole) ** 2 / 2
+
+
+def test_legs_that_an_lp_uses_are_measured_and_no_others():
+    graph = travel_graph(far_world(0, goals=5, tether_length=500.0))
+    costs = LegCosts(graph)
+    bounds = costs.values.copy()
+    goals = graph.cluster[:, None] != graph.cluster[None, :]
+    legs = np.argwhere(np.triu(goals, 1) & ~costs.exact)[:: len(bounds)]
+    assert costs.measure_legs(legs)
+    assert not costs.measure_legs(legs)
+    u, v = legs.T
+    np.testing.assert_allclose(costs.values[u, v], graph.costs[u, v], rtol=1e-12)
+    assert (costs.values[u, v] > bounds[u, v] + 1e-3).any()
+    assert (costs.values == costs.values.T).all()
+    others = ~costs.exact
+    np.testing.assert_array_equal(costs.values[others], bounds[others])
+
+
+def test_what_is_done_with_thousands_of_classes_only_proves_the_same_with_hundreds(monkeypatch):
+    problem = far_world(1, goals=25, tether_length=300.0)
+    plain = solve(travel_graph(problem))
+    monkeypatch.setattr(root, "MANY", 0)
+    monkeypatch.setattr(root, "MOST_PRICED", 40)
+    monkeypatch.setattr(root, "LEAN_EVERY", 1)
+    monkeypatch.setattr(root, "SETTLE", 0.05)
+    left = []
+    drop = root.Root._drop_dear
+    monkeypatch.setattr(
+        root.Root, "_drop_dear", lambda self, *more: (drop(self, *more), left.append(self))
+    )
+    lean = solve(travel_graph(problem))
+    assert left
+    assert plain.status is lean.status is Status.OPTIMAL
+    assert lean.length == pytest.approx(plain.length, rel=2e-6)
