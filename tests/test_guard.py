@@ -205,6 +205,18 @@ def test_a_taut_tether_has_no_loop_where_its_plan_does_not_cross_itself(places):
     assert all(letters & set(loop.around) for loop in loops)
 
 
+GRID = st.tuples(st.integers(3, 11), st.integers(-3, 6))
+
+
+@given(st.lists(st.one_of(GRID, st.tuples(st.floats(3, 11), st.floats(-3, 6))), max_size=9))
+def test_a_line_has_a_loop_exactly_if_one_of_its_steps_closes_one(corners):
+    line = np.array(corners, dtype=float).reshape(-1, 2)
+    closing = [closed_by(SITE, line[: j + 1], line[j : j + 2]) for j in range(len(line) - 1)]
+    around = {loop.around for loop in loops_in(SITE, line)}
+    assert bool(around) == any(closing)
+    assert {loop.around for loop in closing if loop} <= around
+
+
 # what is not known
 
 

@@ -87,17 +87,32 @@ def loops_in(problem: Problem, tether: Floats) -> list[Loop]:
         The last to be closed first; each around other obstacles than those before.
     """
     found: list[Loop] = []
-    for j in range(len(tether) - 2, 1, -1):
-        for k, place in _crossings(tether[: j + 1], tether[j : j + 2], apart=True):
+    for j in _crossed(tether):
+        for k, place in _crossings(tether[:j], tether[j : j + 2]):
             loop = loop_of(problem, np.vstack([place, tether[k + 1 : j + 1], place]))
             if loop is not None and all(loop.around != other.around for other in found):
                 found.append(loop)
     return found
 
 
-def _crossings(line: Floats, step: Floats, apart: bool = False) -> list[tuple[int, Floats]]:
-    """Where a segment crosses a polyline: number of its segment, and the place. With `apart`, the
-    polyline's last point is where the segment begins, and does not count."""
+def _crossed(line: Floats) -> list[int]:
+    """The segments of a polyline that may cross one before them, the last first: those whose ends
+    are not on one side of such a segment, nor that one's ends on one side of them."""
+    if len(line) < 4:
+        return []
+    d = np.diff(line, axis=0)
+    # of each segment (row) each vertex (column): on which side of the segment's line it is
+    side = d[:, :1] * line[:, 1] - d[:, 1:] * line[:, 0]
+    side -= (d[:, 0] * line[:-1, 1] - d[:, 1] * line[:-1, 0])[:, None]
+    slack = 1e-12 * max(1.0, float(np.abs(line).max())) * np.abs(d).sum(1, keepdims=True)
+    parted = np.minimum(side[:, :-1], side[:, 1:]) <= slack
+    parted &= np.maximum(side[:, :-1], side[:, 1:]) >= -slack
+    meet = np.triu(parted & parted.T, 2)  # neighbours share a vertex
+    return np.flatnonzero(meet.any(axis=0))[::-1].tolist()
+
+
+def _crossings(line: Floats, step: Floats) -> list[tuple[int, Floats]]:
+    """Where a segment crosses a polyline: number of its segment, and the place."""
     a, d = line[:-1], np.diff(line, axis=0)
     p, e = step[0], step[1] - step[0]
     cross = d[:, 0] * e[1] - d[:, 1] * e[0]
@@ -105,6 +120,4 @@ def _crossings(line: Floats, step: Floats, apart: bool = False) -> list[tuple[in
         s = ((p - a)[:, 0] * e[1] - (p - a)[:, 1] * e[0]) / cross
         t = ((p - a)[:, 0] * d[:, 1] - (p - a)[:, 1] * d[:, 0]) / cross
     hits = (np.abs(cross) > 1e-15) & (s >= 0.0) & (s <= 1.0) & (t >= 0.0) & (t <= 1.0)
-    if apart and len(hits):
-        hits[-1] = False
     return [(int(k), a[k] + s[k] * d[k]) for k in np.flatnonzero(hits)]

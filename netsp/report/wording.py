@@ -98,15 +98,18 @@ def passages(problem: Problem, tether: Floats, word: Word) -> list[Passage]:
             out.append(Passage(on, side(problem, away), True))
             run.clear()
 
+    lies_on = _touched(problem, tether[:-1])
+    right = tether[:, :1] >= rays[:, 0]
+    may_cross = (right[1:] != right[:-1]).any(axis=1)
     for k in range(len(tether) - 1):
         if k > 0:
-            here = _touched(problem, tether[k])
+            here = int(lies_on[k])
             if here != on:
                 leave()
             on = here
             if here >= 0:
                 run.append(k)
-        for a in crossings(tether[k : k + 2], rays):
+        for a in crossings(tether[k : k + 2], rays) if may_cross[k] else ():
             i = abs(a) - 1
             known = i == on or (out and out[-1].obstacle == i)
             if i + 1 in letters and not known:
@@ -117,15 +120,17 @@ def passages(problem: Problem, tether: Floats, word: Word) -> list[Passage]:
     return out
 
 
-def _touched(problem: Problem, point: Floats) -> int:
-    """The obstacle that a corner of a taut tether lies on; -1 for none."""
-    best, on = math.inf, -1
-    for i, o in enumerate(problem.obstacles):
-        size = _size(o, problem.clearance)
-        gap = abs(float(o.signed_distance(point[:2])) - problem.clearance) / size
-        if gap < best:
-            best, on = gap, i
-    return on if best <= TOUCHING else -1
+def _touched(problem: Problem, points: Floats) -> npt.NDArray[np.intp]:
+    """(k,) the obstacles that corners (k, 3) of a taut tether lie on; -1 for none."""
+    if not problem.obstacles:
+        return np.full(len(points), -1, dtype=np.intp)
+    clearance = problem.clearance
+    gaps = np.array([
+        np.abs(o.signed_distance(points[:, :2]) - clearance) / _size(o, clearance)
+        for o in problem.obstacles
+    ])  # fmt: skip
+    on = gaps.argmin(axis=0)
+    return np.where(gaps.min(axis=0) <= TOUCHING, on, -1)
 
 
 @lru_cache(maxsize=4096)
