@@ -108,7 +108,7 @@ def _crossed(line: Floats) -> list[int]:
     parted = np.minimum(side[:, :-1], side[:, 1:]) <= slack
     parted &= np.maximum(side[:, :-1], side[:, 1:]) >= -slack
     meet = np.triu(parted & parted.T, 2)  # neighbours share a vertex
-    return np.flatnonzero(meet.any(axis=0))[::-1].tolist()
+    return [int(j) for j in np.flatnonzero(meet.any(axis=0))[::-1]]
 
 
 def _crossings(line: Floats, step: Floats) -> list[tuple[int, Floats]]:
