@@ -87,7 +87,8 @@ def test_the_taut_string_is_the_least_of_a_convex_program(gates, start):
         [(a, g[1], np.inf) if g[2] else (a, -np.inf, g[1]) for a, g in zip(s, gates, strict=True)]
     )
     rows[-1, 1:] = gates[-1][1]
-    length = _taut(start, rows, len(rows))
+    corner = np.empty((len(rows), 2), dtype=np.int64)
+    length, _ = _taut(start, np.column_stack([rows, rows]), len(rows), corner)
     xs = np.concatenate([[0.0], rows[:, 0]])
     best = math.inf
     for first in (-3.0, 0.0, 3.0):

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -20,7 +20,8 @@ from netsp.memory import ask
 from netsp.roadmap.classes import TetherTree
 from netsp.roadmap.explore import run_explore
 from netsp.roadmap.paths import TautPaths
-from netsp.roadmap.slits import Ends, Slits, flattened, gates_for, slit_length, slit_lengths
+from netsp.roadmap.pulled import Arcs, path_for, pull, pull_each
+from netsp.roadmap.slits import Ends, Slits, flattened, room_for, slit_lengths, string
 from netsp.roadmap.trie import CORE, LETTER, PARENT, Trie, add_child, trie_child
 from netsp.travel.graph import UNTIMED
 
@@ -134,10 +135,25 @@ class TautLegs:
     ) -> Floats:
         """(len(here), len(there)) planar lengths of all legs from the classes of goal g."""
         paths = self.paths
-        margin, pending = paths.margin, paths.tangents.pending
         places, cluster = paths.outline.places, tethers.cluster
         cells = paths.slits.cells(places[:, 0])
         ends = Ends(places[cluster], cells[cluster], tethers.letters, tethers.row)
+        out = np.full((len(here), len(there)), np.inf)
+        left = _pulled(here, there, asked, cluster, ends, paths.slits, paths.arcs, out, stop)
+        if left and not stop[0]:
+            asked = asked[np.ix_(here, there)] & np.isinf(out)
+            found = self._sought(g, here, there, asked, tethers, ends, stop)
+            np.minimum(out, found, out=out)
+        return out
+
+    def _sought(
+        self, g: int, here: Ints, there: Ints, asked: Bools, tethers: Tethers, ends: Ends,
+        stop: Flag,
+    ) -> Floats:  # fmt: skip
+        """As `_legs_from`, by one search for all relative words of those asked, which is as large
+        as the block."""
+        paths = self.paths
+        margin, pending = paths.margin, paths.tangents.pending
         nodes, size, head, entry, low, most, pair = _wanted(
             here, there, asked, tethers, margin, ends, paths.slits
         )
@@ -235,17 +251,72 @@ class TautLegs:
         return float(self.planar[u] + self.planar[v] - 2.0 * tree.length[s])
 
     def _few(self, vertices: Ints, asked: Bools) -> Floats:
-        """As `lengths`, for a few legs: each is a search of its own."""
+        """As `lengths`, for a few legs; those that cannot be pulled are searches of their own."""
         out = np.full(asked.shape, np.inf)
-        for i, j in np.argwhere(np.triu(asked, 1)):
-            u, v = int(vertices[i]), int(vertices[j])
+        rows, columns = np.nonzero(np.triu(asked, 1) | np.tril(asked, -1).T)
+        us, vs = vertices[rows], vertices[columns]
+        apart = self.cluster[us] != self.cluster[vs]
+        rows, columns, us, vs = rows[apart], columns[apart], us[apart], vs[apart]
+        planar = self._each(us, vs)
+        for k in np.flatnonzero(planar < 0.0).tolist():
+            u, v = int(us[k]), int(vs[k])
             a, b = int(self.cluster[u]), int(self.cluster[v])
-            if a == b:
-                continue
-            word, longest = self.relative_word(u, v), self._longest(u, v)
-            planar = self.paths.planar_length(a, b, word, longest)
-            out[i, j] = out[j, i] = math.hypot(planar, self._z[a] - self._z[b])
+            planar[k] = self.paths.planar_length(
+                a, b, self.relative_word(u, v), self._longest(u, v)
+            )
+        out[rows, columns] = np.hypot(planar, self._z[self.cluster[us]] - self._z[self.cluster[vs]])
+        out[columns, rows] = out[rows, columns]
         return out
+
+    def _each(self, us: Ints, vs: Ints) -> Floats:
+        """(k,) planar lengths of legs, negative where they could not be pulled."""
+        paths, (ends, point) = self.paths, self._ends
+        out = np.empty(len(us))
+        pull_each(us, vs, ends, point, paths.slits, paths.arcs, out)
+        return out
+
+    @cached_property
+    def _ends(self) -> tuple[Ends, Ints]:
+        """Of all vertices, and their points."""
+        places, point = self.paths.outline.places, np.asarray(self.cluster, dtype=np.int64)
+        letters, row = flattened(self.signatures)
+        return Ends(places[point], self.paths.slits.cells(places[:, 0])[point], letters, row), point
+
+
+@kernel
+def _pulled(
+    here: Ints, there: Ints, asked: Bools, cluster: Ints, ends: Ends, slits: Slits, arcs: Arcs,
+    out: Floats, stop: Ints,
+) -> int:  # fmt: skip
+    """The planar lengths of legs between two lists of vertices, into (len(here), len(there)) `out`;
+    how many of those asked for could not be pulled."""
+    longest_word = _longest_word(here, there, ends.row)
+    room, path = room_for(longest_word, slits), path_for(longest_word)
+    left = 0
+    for a in range(len(here)):
+        if stop[0] != 0:
+            break
+        u = here[a]
+        for b in range(len(there)):
+            v = there[b]
+            if asked[u, v]:
+                length, _, _ = pull(u, v, ends, cluster, slits, arcs, room, path)
+                if length >= 0.0:
+                    out[a, b] = length
+                else:
+                    left += 1
+    return left
+
+
+@kernel
+def _longest_word(here: Ints, there: Ints, row: Ints) -> int:
+    """Most letters of a vertex of two lists."""
+    longest = int(np.int64(0))  # no literal: callees are compiled once
+    for v in here:
+        longest = max(longest, row[v + 1] - row[v])
+    for v in there:
+        longest = max(longest, row[v + 1] - row[v])
+    return longest
 
 
 @kernel
@@ -300,18 +371,14 @@ def _wanted(
     entry = np.empty((1024, 3), dtype=np.int64)
     low, most = np.empty(1024), np.empty(1024)
     entries = zero
-    longest_word = zero
-    for v in here:
-        longest_word = max(longest_word, row[v + 1] - row[v])
-    for v in there:
-        longest_word = max(longest_word, row[v + 1] - row[v])
-    gate = gates_for(longest_word, slits)
+    longest_word = _longest_word(here, there, row)
+    room = room_for(longest_word, slits)
     pair = np.full((len(here), len(there)), -1, dtype=np.int64)
     for a in range(len(here)):
         u = here[a]
         for b in range(len(there)):
             v = there[b]
-            if not asked[u, v]:
+            if not asked[a, b]:
                 continue
             # the tethers run together up to where they part, and a leg need not go back so far
             part = length[_together(u, v, last, parent, depth)]
@@ -345,7 +412,7 @@ def _wanted(
                     cluster[v], head[node, 0], node
                 )  # fmt: skip
                 head[node, 0] = e
-                low[e], most[e] = slit_length(u, v, ends, slits, gate), bound
+                (low[e], _), most[e] = string(u, v, ends, slits, room), bound
             most[e] = min(most[e], bound)
             pair[a, b] = e
     return trie, size, head[:size, 0], entry[:entries], low[:entries], most[:entries], pair

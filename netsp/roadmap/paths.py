@@ -8,14 +8,15 @@ from functools import cached_property
 
 import numpy as np
 
-from netsp.arrays import Floats
+from netsp.arrays import Floats, Ints
 from netsp.errors import InputError, NetspError
 from netsp.hsignature import Word
 from netsp.problem import Problem
 from netsp.roadmap.explore import run_explore
 from netsp.roadmap.outline import Outline, build_outline, is_free
+from netsp.roadmap.pulled import Arcs, arcs_of, pull_one
 from netsp.roadmap.shortest import ContactGraph
-from netsp.roadmap.slits import Slits, build_slits, slit_lengths
+from netsp.roadmap.slits import Ends, Slits, build_slits, flattened, slit_lengths
 from netsp.roadmap.tangents import ARC_STEP, TangentGraph, build_tangents
 from netsp.roadmap.trie import Trie
 
@@ -52,6 +53,11 @@ class TautPaths:
     def contacts(self) -> ContactGraph:
         """Shortest paths in any class over the same tangents."""
         return ContactGraph(self.outline, self.tangents)
+
+    @cached_property
+    def arcs(self) -> Arcs:
+        """What a path of a word is pulled over."""
+        return arcs_of(self.problem, self.outline, self.tangents)
 
     @cached_property
     def slits(self) -> Slits:
@@ -155,6 +161,17 @@ class TautPaths:
         self, a: int, b: int, word: Word, longest: float | None
     ) -> tuple[float, list[tuple[int, float]]] | None:
         """Length and pieces; None if there is no path so short."""
+        if any(abs(letter) > len(self.outline.rays) for letter in word):
+            return None
+        length, edges, slid = self._pulled(a, b, word)
+        if length >= 0.0:
+            return length, list(zip(edges.tolist(), slid.tolist(), strict=True))
+        return self._searched(a, b, word, longest)
+
+    def _searched(
+        self, a: int, b: int, word: Word, longest: float | None = None
+    ) -> tuple[float, list[tuple[int, float]]] | None:
+        """As `_sought`, by a search."""
         most = (self._longest if longest is None else longest) + self.margin
         apart = math.dist(self.outline.points[a], self.outline.points[b])
         # a search costs far more the longer the paths may be, and no class has two taut paths
@@ -170,6 +187,14 @@ class TautPaths:
                 return None
             step = min(step**2, DEEPEST)
             limit = min(max(step * limit, LEAST * most), most)
+
+    def _pulled(self, a: int, b: int, word: Word) -> tuple[float, Ints, Floats]:
+        """As of `netsp.roadmap.pulled.pull_one`."""
+        points = np.array([a, b])
+        letters, row = flattened([(), word])
+        places = self.outline.places[points]
+        ends = Ends(places, self.slits.cells(places[:, 0]), letters, row)
+        return pull_one(ends, points, self.slits, self.arcs)
 
     def _polyline(self, a: int, b: int, pieces: Sequence[tuple[int, float]]) -> Floats:
         """Tangents and circumscribed arcs as one polyline, finer where a gap is narrow."""

@@ -44,11 +44,12 @@ class Slits(NamedTuple):
     ----------
     rank
         (n,) place of each obstacle's line from left to right, ties by number.
-    x, bottom, top
+    obstacle, x, bottom, top
         (n,) by rank.
     """
 
     rank: Ints
+    obstacle: Ints
     x: Floats
     bottom: Floats
     top: Floats
@@ -56,6 +57,26 @@ class Slits(NamedTuple):
     def cells(self, x: Floats) -> Ints:
         """The strips that points lie in: how many lines are at or left of each."""
         return np.searchsorted(self.x, x, side="right").astype(np.int64)
+
+
+class Room(NamedTuple):
+    """Where the string between two ends is worked out.
+
+    Attributes
+    ----------
+    gate
+        (g, 4) columns `PLACE` … `LINE`.
+    corner
+        (g, 2) the gates that it bends at, and whether at their `HIGH` end.
+    """
+
+    gate: Floats
+    corner: Ints
+
+
+PLACE, LOW, HIGH, LINE = range(4)
+"""Columns of a gate: distance travelled in x, its lower and its upper end, and the number of its
+line plus 1, negative where it is passed from right to left."""
 
 
 class Ends(NamedTuple):
@@ -90,7 +111,7 @@ def build_slits(problem: Problem) -> Slits:
     order = np.argsort(points[:, 0], kind="stable") if len(points) else np.zeros(0, dtype=np.int64)
     rank = np.empty(len(points), dtype=np.int64)
     rank[order] = np.arange(len(points))
-    return Slits(rank, points[order, 0], ends[order, 0], ends[order, 1])
+    return Slits(rank, order, points[order, 0], ends[order, 0], ends[order, 1])
 
 
 def slit_lengths(
@@ -150,7 +171,7 @@ def _rows(
     longest = 0
     for v in range(len(cluster)):
         longest = max(longest, ends.row[v + 1] - ends.row[v])
-    gate = gates_for(longest, slits)
+    room = room_for(longest, slits)
     for k in range(first, last):
         if stop[0] != 0:
             return
@@ -158,22 +179,25 @@ def _rows(
         for v in range(u + 1 if whole else 0, len(cluster)):
             if cluster[u] == cluster[v]:
                 continue
-            out[k, v] = slit_length(u, v, ends, slits, gate)
+            out[k, v], _ = string(u, v, ends, slits, room)
             if whole:
                 out[v, k] = out[k, v]
 
 
 @kernel
-def gates_for(longest: int, slits: Slits) -> Floats:
-    """Room for the gates of legs between words of at most so many letters."""
-    return np.empty(((2 * longest + 2) * (len(slits.x) + 2) + 2, 3))
+def room_for(longest: int, slits: Slits) -> Room:
+    """For the strings of words of at most twice so many letters."""
+    gates = (2 * longest + 2) * (len(slits.x) + 2) + 2
+    return Room(np.empty((gates, 4)), np.empty((gates, 2), dtype=np.int64))
 
 
 @kernel
-def slit_length(u: int, v: int, ends: Ends, slits: Slits, gate: Floats) -> float:
-    """Length of the path from u to v of the word inverse(word of u) times (word of v)."""
+def string(u: int, v: int, ends: Ends, slits: Slits, room: Room) -> tuple[float, int]:
+    """Length of the path from u to v of the word inverse(word of u) times (word of v), and how
+    often it bends; where is in `room`."""
     letters, row = ends.letters, ends.row
     rank, x, bottom, top = slits.rank, slits.x, slits.bottom, slits.top
+    gate = room.gate
     a, a_end, b, b_end = row[u], row[u + 1], row[v], row[v + 1]
     shared = 0
     while a + shared < a_end and b + shared < b_end and letters[a + shared] == letters[b + shared]:
@@ -198,51 +222,52 @@ def slit_length(u: int, v: int, ends: Ends, slits: Slits, gate: Floats) -> float
             line = at if target > at else at - 1
             s += abs(x[line] - before)
             before = x[line]
-            gate[k, 0], gate[k, 1], gate[k, 2] = s, -np.inf, bottom[line]
+            gate[k, PLACE], gate[k, LOW], gate[k, HIGH] = s, -np.inf, bottom[line]
+            gate[k, LINE] = line + 1 if target > at else -line - 1
             k += 1
             at += 1 if target > at else -1
         if letter != 0:
             line = at if letter > 0 else at - 1
             s += abs(x[line] - before)
             before = x[line]
-            gate[k, 0], gate[k, 1], gate[k, 2] = s, top[line], np.inf
+            gate[k, PLACE], gate[k, LOW], gate[k, HIGH] = s, top[line], np.inf
+            gate[k, LINE] = line + 1 if letter > 0 else -line - 1
             k += 1
             at += 1 if letter > 0 else -1
     s += abs(ends.place[v, 0] - before)
-    gate[k, 0], gate[k, 1], gate[k, 2] = s, ends.place[v, 1], ends.place[v, 1]
-    return _taut(ends.place[u, 1], gate, k + 1)
+    gate[k, PLACE], gate[k, LOW], gate[k, HIGH] = s, ends.place[v, 1], ends.place[v, 1]
+    return _taut(ends.place[u, 1], gate, k + 1, room.corner)
 
 
 @kernel
-def _taut(y: float, gate: Floats, count: int) -> float:
-    """Length of the taut string from (0, y) through the first `count` gates (s, low, high)."""
+def _taut(y: float, gate: Floats, count: int, corner: Ints) -> tuple[float, int]:
+    """Length of the taut string from (0, y) through the first `count` gates, and how often it
+    bends."""
     s = 0.0
     total = 0.0
-    k = 0
+    k = bends = 0
     low_k = high_k = 0
     low, high = -np.inf, np.inf
     while k < count:
-        ds = gate[k, 0] - s
-        bottom, top = gate[k, 1], gate[k, 2]
+        ds = gate[k, PLACE] - s
+        bottom, top = gate[k, LOW], gate[k, HIGH]
         if ds <= 0.0:
             to = min(max(y, bottom), top)
             total += abs(to - y)
             if to != y:
+                corner[bends, 0], corner[bends, 1] = k, 0 if to > y else 1
+                bends += 1
                 y = to
                 low, high = -np.inf, np.inf
             k += 1
             continue
         a, b = (bottom - y) / ds, (top - y) / ds
-        if a > high:
-            corner_s, corner_y = gate[high_k, 0], gate[high_k, 2]
-            total += math.hypot(corner_s - s, corner_y - y)
-            s, y, k = corner_s, corner_y, high_k + 1
-            low, high = -np.inf, np.inf
-            continue
-        if b < low:
-            corner_s, corner_y = gate[low_k, 0], gate[low_k, 1]
-            total += math.hypot(corner_s - s, corner_y - y)
-            s, y, k = corner_s, corner_y, low_k + 1
+        if a > high or b < low:
+            at, end = (high_k, HIGH) if a > high else (low_k, LOW)
+            corner[bends, 0], corner[bends, 1] = at, end - LOW
+            bends += 1
+            total += math.hypot(gate[at, PLACE] - s, gate[at, end] - y)
+            s, y, k = gate[at, PLACE], gate[at, end], at + 1
             low, high = -np.inf, np.inf
             continue
         if a >= low:
@@ -250,5 +275,4 @@ def _taut(y: float, gate: Floats, count: int) -> float:
         if b <= high:
             high, high_k = b, k
         k += 1
-    end = gate[count - 1]
-    return total + math.hypot(end[0] - s, end[1] - y)
+    return total + math.hypot(gate[count - 1, PLACE] - s, gate[count - 1, LOW] - y), bends
