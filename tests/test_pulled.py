@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp import Circle, Polygon, Problem
+from netsp.errors import NetspError
 from netsp.hsignature import signature
 from netsp.roadmap.outline import is_free
 from netsp.roadmap.paths import TautPaths
@@ -109,3 +110,14 @@ def test_a_goal_straight_above_an_obstacle_is_reached_on_the_side_of_its_word():
         a, b = int(roadmap.cluster[u[k]]), int(roadmap.cluster[v[k]])
         word = roadmap.legs.relative_word(int(u[k]), int(v[k]))
         assert lengths[k] == pytest.approx(roadmap.paths._searched(a, b, word)[0], rel=1e-12)
+
+
+def test_lengths_in_bulk_are_those_of_single_paths_and_unknown_words_have_none():
+    paths = TautPaths(TURNS, longest=100.0)
+    words = [(), (1,), (-2,), (1, 1), (2, -1)]
+    found = paths.lengths([0] * 5, [1, 2, 1, 2, 1], words)
+    alone = [paths.length(0, b, w) for b, w in zip([1, 2, 1, 2, 1], words, strict=True)]
+    assert np.allclose(found, alone, rtol=1e-12)
+    assert len(paths.lengths([], [], [])) == 0
+    with pytest.raises(NetspError, match="no taut path"):
+        paths.lengths([0], [1], [(3,)])

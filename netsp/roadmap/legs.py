@@ -28,6 +28,8 @@ from netsp.travel.graph import UNTIMED
 BLOCK = 256
 """Rows of a matrix that are worked on at a time, so that what is in between stays small."""
 
+FEW = 20_000
+"""So many entries of a matrix are pulled one by one, hundredths of a second; more by both cores."""
 
 EXCESS, WORTH = 0.1, 0.7
 """A search costs far more the longer the paths may be, and no class has two taut paths. Legs are
@@ -88,7 +90,7 @@ class TautLegs:
         """
         vertices = np.asarray(vertices, dtype=np.int64)
         cluster = self.cluster[vertices]
-        if asked is not None and asked.sum() <= 2 * len(vertices):
+        if asked is not None and asked.sum() <= max(FEW, 2 * len(vertices)):
             return self._few(vertices, asked)
         ask(
             2.0 * 8.0 * len(vertices) ** 2,

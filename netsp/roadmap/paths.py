@@ -14,7 +14,7 @@ from netsp.hsignature import Word
 from netsp.problem import Problem
 from netsp.roadmap.explore import run_explore
 from netsp.roadmap.outline import Outline, build_outline, is_free
-from netsp.roadmap.pulled import Arcs, arcs_of, pull_one
+from netsp.roadmap.pulled import Arcs, arcs_of, pull_each, pull_one
 from netsp.roadmap.shortest import ContactGraph
 from netsp.roadmap.slits import Ends, Slits, build_slits, flattened, slit_lengths
 from netsp.roadmap.tangents import ARC_STEP, TangentGraph, build_tangents
@@ -67,6 +67,41 @@ class TautPaths:
     def length(self, a: int, b: int, word: Word) -> float:
         """3D length of the taut path of a word from point a to point b."""
         return math.hypot(self.planar_length(a, b, word), float(self._z[b] - self._z[a]))
+
+    def lengths(self, a: Sequence[int], b: Sequence[int], words: Sequence[Word]) -> Floats:
+        """3D lengths of many taut paths at once.
+
+        Parameters
+        ----------
+        a, b
+            (k,) numbers of the points from and to which they lead.
+        words
+            (k,) of each.
+
+        Returns
+        -------
+        ndarray, shape (k,)
+            In the problem's units.
+
+        Raises
+        ------
+        NetspError
+            A word without a path within the longest that this was made for.
+        """
+        from_, to = np.asarray(a, dtype=np.int64), np.asarray(b, dtype=np.int64)
+        known = len(self.outline.rays)
+        points = np.concatenate([from_, to])
+        letters, row = flattened([
+            *[()] * len(from_), *(w if max(map(abs, w), default=0) <= known else () for w in words)
+        ])  # fmt: skip
+        places = self.outline.places[points]
+        ends = Ends(places, self.slits.cells(places[:, 0]), letters, row)
+        out, pairs = np.empty(len(from_)), np.arange(len(from_))
+        pull_each(pairs, pairs + len(pairs), ends, points, self.slits, self.arcs, out)
+        for k, (p, q, word) in enumerate(zip(from_.tolist(), to.tolist(), words, strict=True)):
+            if out[k] < 0.0 or max(map(abs, word), default=0) > known:
+                out[k] = self.planar_length(p, q, word)
+        return np.asarray(np.hypot(out, self._z[to] - self._z[from_]))
 
     def planar_length(self, a: int, b: int, word: Word, longest: float | None = None) -> float:
         """Length in the plan of the taut path of a word from point a to point b.
