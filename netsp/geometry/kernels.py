@@ -116,13 +116,23 @@ def enters_obstacle(ax: float, ay: float, bx: float, by: float, o: int, blockers
     if circles[o, 2] >= 0.0:
         d = point_segment_distance(circles[o, 0], circles[o, 1], ax, ay, bx, by)
         return bool(d < circles[o, 2] - blockers.eps)
-    for e in range(edge_start[o], edge_start[o + 1]):
+    growth = blockers.grow[o] - blockers.eps
+    return enters_polygon(ax, ay, bx, by, edges, edge_start[o], edge_start[o + 1], growth)
+
+
+@kernel
+def enters_polygon(
+    ax: float, ay: float, bx: float, by: float, edges: Floats, start: int, stop: int, growth: float
+) -> bool:
+    """Whether a segment comes nearer than `growth` to the polygon of edges (n, 4) start to
+    stop - 1."""
+    for e in range(start, stop):
         d = segment_segment_distance(
             ax, ay, bx, by, edges[e, 0], edges[e, 1], edges[e, 2], edges[e, 3]
         )
-        if d < blockers.grow[o] - blockers.eps:
+        if d < growth:
             return True
-    return point_in_polygon(ax, ay, edges, edge_start[o], edge_start[o + 1])
+    return point_in_polygon(ax, ay, edges, start, stop)
 
 
 @kernel

@@ -57,7 +57,7 @@ class TautPaths:
     @cached_property
     def arcs(self) -> Arcs:
         """What a path of a word is pulled over."""
-        return arcs_of(self.problem, self.outline, self.tangents)
+        return arcs_of(self.problem, self.outline, self.tangents, self.slits)
 
     @cached_property
     def slits(self) -> Slits:

@@ -24,7 +24,7 @@ import numpy as np
 
 from netsp.arrays import Floats, Ints
 from netsp.compiled.kernel import kernel
-from netsp.geometry.kernels import TWO_PI, Blockers, enters_obstacle
+from netsp.geometry.kernels import TWO_PI, enters_polygon
 from netsp.problem import Circle, Problem
 from netsp.roadmap.outline import Outline
 from netsp.roadmap.slits import HIGH, LINE, LOW, Ends, Room, Slits, room_for, string
@@ -36,8 +36,14 @@ MOST_NODES = 256
 SAME_ANGLE = 1e-6
 """Radians, between angles that are one."""
 
-ON_LINE = 1e3
-"""A string that runs along the line of a slit is taken so many times the tolerance off it."""
+ON_LINE = 1e-9
+"""A string that runs along the line of a slit is taken off it by that share of its length."""
+
+TOUCH = 1e-9
+"""Share of a circle's radius that goes no deeper than touching."""
+
+LITTLE_BACK = 0.5
+"""Radians that a string may seem to go back on an arc on which it bends twice in a row."""
 
 NOT_PULLED = -1.0
 """Instead of a length."""
@@ -46,54 +52,66 @@ CX, CY, RADIUS, BEGIN, END = range(5)
 """Columns of a disk: a directed arc, or a point of no radius. BEGIN to END are the angles that
 show; END is infinite where all do."""
 
+STARTS, LETTERS, AFTER_LETTERS, OWNER = range(4)
+"""Columns of whole numbers of a node: its first departure, where the letters of its whole arc begin
+and end, and an obstacle whose arc it is, -1 for points."""
+
 LENGTH, LEAVES, ARRIVES, TURN, ALONG = range(5)
 """Columns of a departure: length, angles at both ends, angle from the arrival to the first
 departure there, and from the first departure of its own arc to itself."""
 
 FIRST, SEGMENT, AFTER_SEGMENT, ARRIVAL, AFTER_ARRIVAL, GAPS = range(6)
-"""And of these numbers: the first departure at its end, and rows into the letters: of the segment,
+"""And of whole numbers: the first departure at its end, and rows into the letters: of the segment,
 of the arc to that departure, and of the arc before itself."""
+
+XMIN, YMIN, XMAX, YMAX, ROUND, RAY_X, RAY_Y, RANK = range(8)
+FIRST_EDGE, AFTER_EDGES, GROWTH, MIDDLE_X, MIDDLE_Y = range(8, 13)
+"""Columns of an obstacle: its box; radius of a circle, negative for a polygon; representative
+point and rank of its line; its edges, and by how much they are grown; centre of a circle."""
+
+ARRIVING, LEAVING, X_IN, Y_IN, X_OUT, Y_OUT, STRIP, SLID = range(8)
+"""Columns of a node of a path: angles on its arc where the string first and last bends (arrival and
+departure are less than half a turn from them, so that whole turns are counted); where the string is
+then, and the strip that it comes from; and the angle slid before the departure."""
+
+NODE, EDGE = range(2)
+"""And of whole numbers: directed arc or point, and departure."""
 
 
 class Arcs(NamedTuple):
-    """The tangent graph as paths are pulled over it.
+    """The tangent graph as paths are pulled over it. There are few arrays and many columns, for
+    compiled functions hand each array over in seven parts and more.
 
     Attributes
     ----------
     of, row
         Arcs of each obstacle: of[row[o]] … of[row[o + 1] - 1].
-    owner
-        (nodes,) an obstacle of each directed arc, -1 for points.
-    disk
-        (nodes, 5) columns CX … END.
+    disk, span
+        (nodes, 5) and (nodes, 4) columns CX … and STARTS ….
     table
         (slots, 2) hash table of departures by `source * nodes + target`, -1 where empty.
     real, whole
         (e, 5) and (e, 6) columns LENGTH … and FIRST … of the departures.
-    span
-        (nodes, 3) first departure of each node, and where the letters of its whole arc begin and
-        end.
     letters
         Of segments and arcs.
-    rays
-        (n, 2) representative points.
-    blockers
-        Obstacles.
+    solid
+        (n, 13) columns XMIN ….
+    edges
+        (k, 4) of polygons.
     points
         How many nodes are directed arcs; points follow.
     """
 
     of: Ints
     row: Ints
-    owner: Ints
     disk: Floats
+    span: Ints
     table: Ints
     real: Floats
     whole: Ints
-    span: Ints
     letters: Ints
-    rays: Floats
-    blockers: Blockers
+    solid: Floats
+    edges: Floats
     points: int
 
 
@@ -102,24 +120,14 @@ class Path(NamedTuple):
 
     Attributes
     ----------
-    node
-        (k,) directed arcs between two points.
-    facing
-        (k, 2) angles on each arc where the string first and last bends: arrival and departure are
-        less than half a turn from them, so that whole turns are counted.
-    spot
-        (k, 5) where the string first and last bends there, and the strip that it comes from.
-    edge, slid
-        (k,) departures, and the angle slid before each.
+    real, whole
+        (k, 8) and (k, 2) columns ARRIVING … and NODE ….
     word
         (w,) letters written, reduced as they come; their number first.
     """
 
-    node: Ints
-    facing: Floats
-    spot: Floats
-    edge: Ints
-    slid: Floats
+    real: Floats
+    whole: Ints
     word: Ints
 
 
@@ -127,13 +135,12 @@ class Path(NamedTuple):
 def path_for(longest: int) -> Path:
     """For words of at most twice so many letters."""
     return Path(
-        np.empty(MOST_NODES, dtype=np.int64), np.empty((MOST_NODES, 2)),
-        np.empty((MOST_NODES, 5)), np.empty(MOST_NODES, dtype=np.int64), np.empty(MOST_NODES),
+        np.empty((MOST_NODES, 8)), np.empty((MOST_NODES, 2), dtype=np.int64),
         np.empty(2 * longest + 64, dtype=np.int64),
     )  # fmt: skip
 
 
-def arcs_of(problem: Problem, outline: Outline, graph: TangentGraph) -> Arcs:
+def arcs_of(problem: Problem, outline: Outline, graph: TangentGraph, slits: Slits) -> Arcs:
     """What paths are pulled over."""
     arcs, nodes = len(graph.arcs), len(graph.start) - 1
     disk = np.zeros((nodes, 5))
@@ -156,18 +163,20 @@ def arcs_of(problem: Problem, outline: Outline, graph: TangentGraph) -> Arcs:
         of.append(own)
         row.append(row[-1] + len(own))
     source = np.repeat(np.arange(nodes), np.diff(graph.start))
-    real = np.column_stack(
-        [graph.length, graph.angle, graph.turn, np.zeros(len(source))]
-    )  # fmt: skip
-    gap_letters, gaps, span = _gap_letters(graph)
-    real[:, ALONG] = _along(graph)
-    whole = np.column_stack([graph.first, graph.segment_row, graph.arrival_row, gaps])
+    gap_letters, gaps, begin = _gap_letters(graph)
+    real = np.column_stack([graph.length, graph.angle, graph.turn, _along(graph)])
     table = np.full((1 << max(4, (3 * len(source)).bit_length()), 2), -1, dtype=np.int64)
     _fill(source * nodes + graph.target, table)
+    whole = np.column_stack([graph.first, graph.segment_row, graph.arrival_row, gaps])
+    blockers = outline.blockers
+    solid = np.column_stack([
+        blockers.box, blockers.circles[:, 2], graph.rays, slits.rank, blockers.edge_start[:-1],
+        blockers.edge_start[1:], blockers.grow - blockers.eps, blockers.circles[:, :2],
+    ])  # fmt: skip
     return Arcs(
-        np.concatenate(of), np.array(row), owner, disk, table, real, whole, span,
-        np.concatenate([graph.letters.astype(np.int64), gap_letters]), graph.rays,
-        outline.blockers, 2 * arcs,
+        np.concatenate(of), np.array(row), disk, np.column_stack([begin, owner]), table, real,
+        whole, np.concatenate([graph.letters.astype(np.int64), gap_letters]), solid,
+        blockers.edges, 2 * arcs,
     )  # fmt: skip
 
 
@@ -181,7 +190,7 @@ def _along(graph: TangentGraph) -> Floats:
 
 def _gap_letters(graph: TangentGraph) -> tuple[Ints, Ints, Ints]:
     """The letters of whole arcs, each in one row, to come after those of the graph; (e,) where in
-    them each departure is; and (nodes, 3) as in `Arcs`."""
+    them each departure is; and (nodes, 3) columns STARTS … of the nodes."""
     count = graph.gap_row[:, 1] - graph.gap_row[:, 0]
     base = len(graph.letters)
     begin = base + np.concatenate([[0], np.cumsum(count)]).astype(np.int64)
@@ -237,67 +246,26 @@ def pull(
         it has. These, and the angles slid before them, are in `path`.
     """
     low, bends = string(u, v, ends, slits, room)
-    # taken out once: to take an array out of a tuple costs a count of its references
-    of, row, owner, disk, table = arcs.of, arcs.row, arcs.owner, arcs.disk, arcs.table
-    real, rank, rays = arcs.real, slits.rank, arcs.rays
-    node, facing, spot, edge, slid = path.node, path.facing, path.spot, path.edge, path.slid
-    nodes = len(disk)
     count = _named(
-        u, v, bends, arcs.points + point[u], arcs.points + point[v], ends, slits, of, row, disk,
-        room, node, facing, spot,
+        u, v, bends, arcs.points + point[u], arcs.points + point[v], ends.place, ends.cell,
+        slits.obstacle, slits.x, room.gate, room.corner, arcs.of, arcs.row, arcs.disk, path.real,
+        path.whole,
     )  # fmt: skip
-    slid[0] = 0.0
-    i, left = 0, 16 + 8 * count
-    while i + 1 < count:
-        left -= 1
-        if left < 0 or count + 1 >= MOST_NODES:
-            return NOT_PULLED, low, 0
-        a, b = node[i], node[i + 1]
-        if a == b:
-            facing[i, 1] = _near(facing[i + 1, 1], facing[i, 1])
-            spot[i, 2], spot[i, 3] = spot[i + 1, 2], spot[i + 1, 3]
-            for k in range(i + 1, count - 1):
-                _copy(k + 1, k, node, facing, spot)
-            count -= 1
-            continue
-        e = _tangent(a * nodes + b, table)
-        if e < 0:
-            new, at = _between(a, b, i, spot, rank, rays, of, row, owner, disk, arcs.blockers)
-            if new < 0 or new in (a, b):
-                return NOT_PULLED, low, 0
-            for k in range(count, i + 1, -1):
-                _copy(k - 1, k, node, facing, spot)
-            node[i + 1], facing[i + 1, 0], facing[i + 1, 1] = new, at, at
-            _note(
-                i + 1, disk[new, CX] + disk[new, RADIUS] * math.cos(at),
-                disk[new, CY] + disk[new, RADIUS] * math.sin(at), spot[i, 4], spot,
-            )  # fmt: skip
-            count += 1
-            continue
-        if i > 0:
-            arrival = _near(real[edge[i - 1], ARRIVES], facing[i, 0])
-            departure = _near(real[e, LEAVES], facing[i, 1])
-            slid[i] = departure - arrival if a % 2 == 0 else arrival - departure
-            if slid[i] < -SAME_ANGLE:
-                for k in range(i, count - 1):
-                    _copy(k + 1, k, node, facing, spot)
-                count -= 1
-                i -= 1
-                continue
-        edge[i] = e
-        i += 1
-    length = _written(
-        count - 1, node, edge, slid, real, arcs.whole, arcs.span, arcs.letters, disk, path.word
-    )
-    if count < 2 or length < 0.0 or not _is_word(u, v, ends.letters, ends.row, path.word):
-        return NOT_PULLED, low, 0
+    count = _tightened(
+        count, arcs.of, arcs.row, arcs.disk, arcs.span, arcs.table, arcs.real, arcs.solid,
+        arcs.edges, path.real, path.whole,
+    )  # fmt: skip
+    length = _proven(
+        u, v, count, ends.letters, ends.row, arcs.disk, arcs.span, arcs.real, arcs.whole,
+        arcs.letters, path.real, path.whole, path.word,
+    )  # fmt: skip
     return length, low, count - 1
 
 
 @kernel
 def pull_each(
     us: Ints, vs: Ints, ends: Ends, point: Ints, slits: Slits, arcs: Arcs, out: Floats
-) -> None:  # fmt: skip
+) -> None:
     """The lengths of (k,) taut paths as of `pull`, into `out`."""
     longest = int(np.int64(0))  # no literal: callees are compiled once
     for v in range(len(ends.cell)):
@@ -308,32 +276,121 @@ def pull_each(
 
 
 @kernel
-def pull_one(
-    ends: Ends, point: Ints, slits: Slits, arcs: Arcs
-) -> tuple[float, Ints, Floats]:  # fmt: skip
+def pull_one(ends: Ends, point: Ints, slits: Slits, arcs: Arcs) -> tuple[float, Ints, Floats]:
     """The taut path between two ends: its length as of `pull`, departures and angles slid before
     them."""
     longest = max(ends.row[1] - ends.row[0], ends.row[2] - ends.row[1])
     path = path_for(longest)
     length, _, count = pull(0, 1, ends, point, slits, arcs, room_for(longest, slits), path)
-    return length, path.edge[:count].copy(), path.slid[:count].copy()
+    return length, path.whole[:count, EDGE].copy(), path.real[:count, SLID].copy()
+
+
+@kernel
+def _tightened(
+    count: int, of: Ints, row: Ints, disk: Floats, span: Ints, table: Ints, real: Floats,
+    solid: Floats, edges: Floats, at: Floats, on: Ints,
+) -> int:  # fmt: skip
+    """How many nodes a path has when it is pulled taut; 0 where it could not be.
+
+    Parameters
+    ----------
+    of, row, disk, span, table, real, solid, edges
+        Of `Arcs`.
+    at, on
+        `Path.real` and `Path.whole`.
+    """
+    nodes = len(disk)
+    at[0, SLID] = 0.0
+    i, left = 0, 16 + 8 * count
+    while i + 1 < count:
+        left -= 1
+        if left < 0 or count + 1 >= MOST_NODES:
+            return 0
+        a, b = on[i, NODE], on[i + 1, NODE]
+        if a == b:
+            # on along the arc, from where it was left to where it was met again
+            sense = 1.0 - 2.0 * (a % 2)
+            on_by = sense * (at[i + 1, ARRIVING] - at[i, LEAVING])
+            turns = math.floor((on_by + LITTLE_BACK) / TWO_PI)
+            at[i, LEAVING] = at[i + 1, LEAVING] - sense * turns * TWO_PI
+            at[i, X_OUT], at[i, Y_OUT] = at[i + 1, X_OUT], at[i + 1, Y_OUT]
+            _close_up(i + 1, count, at, on)
+            count -= 1
+            continue
+        e = _tangent(a * nodes + b, table)
+        if e < 0:
+            new, angle = _between(a, b, i, of, row, disk, span, solid, edges, at)
+            if new < 0 or new in (a, b):
+                return 0
+            for k in range(count, i + 1, -1):
+                _copy(k - 1, k, at, on)
+            on[i + 1, NODE], at[i + 1, ARRIVING], at[i + 1, LEAVING] = new, angle, angle
+            _note(
+                i + 1, disk[new, CX] + disk[new, RADIUS] * math.cos(angle),
+                disk[new, CY] + disk[new, RADIUS] * math.sin(angle), at[i, STRIP], at,
+            )  # fmt: skip
+            count += 1
+            continue
+        if i > 0:
+            arrival = _near(real[on[i - 1, EDGE], ARRIVES], at[i, ARRIVING])
+            departure = _near(real[e, LEAVES], at[i, LEAVING])
+            by = departure - arrival if a % 2 == 0 else arrival - departure
+            if by < -SAME_ANGLE:
+                _close_up(i, count, at, on)
+                count -= 1
+                i -= 1
+                continue
+            at[i, SLID] = by
+        on[i, EDGE] = e
+        i += 1
+    return count
+
+
+@kernel
+def _close_up(i: int, count: int, at: Floats, on: Ints) -> None:
+    """Node i is none any more."""
+    for k in range(i, count - 1):
+        _copy(k + 1, k, at, on)
+
+
+@kernel
+def _copy(k: int, to: int, at: Floats, on: Ints) -> None:
+    on[to, NODE] = on[k, NODE]
+    for c in range(SLID):
+        at[to, c] = at[k, c]
+
+
+@kernel
+def _note(i: int, x: float, y: float, strip: float, at: Floats) -> None:
+    at[i, X_IN], at[i, Y_IN], at[i, X_OUT], at[i, Y_OUT], at[i, STRIP] = x, y, x, y, strip
+
+
+@kernel
+def _near(angle: float, to: float) -> float:
+    """The same angle, but for whole turns, within half a turn of another."""
+    return angle - TWO_PI * math.floor((angle - to + math.pi) / TWO_PI)
+
+
+@kernel
+def _facing(node: int, ux: float, uy: float) -> float:
+    """The angle on a directed arc that a line along (ux, uy) touches it at."""
+    return math.atan2(-ux, uy) if node % 2 == 0 else math.atan2(ux, -uy)
 
 
 @kernel
 def _named(
-    u: int, v: int, bends: int, from_: int, to: int, ends: Ends, slits: Slits, of: Ints, row: Ints,
-    disk: Floats, room: Room, node: Ints, facing: Floats, spot: Floats,
+    u: int, v: int, bends: int, from_: int, to: int, place: Floats, cell: Ints, obstacle: Ints,
+    line_x: Floats, gate: Floats, corner: Ints, of: Ints, row: Ints, disk: Floats, at: Floats,
+    on: Ints,
 ) -> int:  # fmt: skip
     """The directed arcs that the bends of a string name, between its two ends; how many, 0 where
     that is not known."""
-    gate, corner, place = room.gate, room.corner, ends.place
-    obstacle, line_x = slits.obstacle, slits.x
     if bends and gate[corner[bends - 1, 0], LOW] == gate[corner[bends - 1, 0], HIGH]:
         bends -= 1  # that is its end
-    node[0] = from_
-    _note(0, place[u, 0], place[u, 1], ends.cell[u], spot)
-    count = 1
+    on[0, NODE] = from_
     x, y = place[u, 0], place[u, 1]
+    _note(0, x, y, cell[u], at)
+    count = 1
     before = -1
     for c in range(bends):
         k, high = corner[c, 0], corner[c, 1]
@@ -347,11 +404,11 @@ def _named(
         here_x, here_y = line_x[line], gate[k, LOW + high]
         if disk[new, END] == np.inf:
             if new == before:  # on, to the other end of the slit
-                facing[count - 1, 1] += math.pi if ccw else -math.pi
-                spot[count - 1, 2], spot[count - 1, 3] = here_x, here_y
+                at[count - 1, LEAVING] += math.pi if ccw else -math.pi
+                at[count - 1, X_OUT], at[count - 1, Y_OUT] = here_x, here_y
                 x, y = here_x, here_y
                 continue
-            at = -0.5 * math.pi if high == 1 else 0.5 * math.pi
+            angle = -0.5 * math.pi if high == 1 else 0.5 * math.pi
         else:
             # what stands out from a line past it
             to_x, to_y = place[v, 0], place[v, 1]
@@ -364,16 +421,16 @@ def _named(
             if far > 0.0:
                 ux, uy = (to_x - x) / far, (to_y - y) / far
             new, _ = _standing_out(o, not ccw, x, y, ux, uy, -1, -1, of, row, disk)
-            at = _facing(new, ux, uy)
-        node[count], facing[count, 0], facing[count, 1] = new, at, at
-        _note(count, here_x, here_y, line + (0.0 if rightward else 1.0), spot)
+            angle = _facing(new, ux, uy)
+        on[count, NODE], at[count, ARRIVING], at[count, LEAVING] = new, angle, angle
+        _note(count, here_x, here_y, line + (0.0 if rightward else 1.0), at)
         count += 1
         before = new
         x, y = here_x, here_y
         if count + 2 >= MOST_NODES:
             return 0
-    node[count] = to
-    _note(count, place[v, 0], place[v, 1], ends.cell[v], spot)
+    on[count, NODE] = to
+    _note(count, place[v, 0], place[v, 1], cell[v], at)
     return count + 1
 
 
@@ -405,13 +462,13 @@ def _standing_out(
 
 @kernel
 def _between(
-    a: int, b: int, i: int, spot: Floats, rank: Ints, rays: Floats, of: Ints, row: Ints,
-    owner: Ints, disk: Floats, blockers: Blockers,
+    a: int, b: int, i: int, of: Ints, row: Ints, disk: Floats, span: Ints, solid: Floats,
+    edges: Floats, at: Floats,
 ) -> tuple[int, float]:  # fmt: skip
     """The directed arc that a path from node a to node b, number i and the one after it, has to
     pass in between, -1 if it is not known; and the angle at which it stands out."""
-    ra = 0.0 if owner[a] < 0 else disk[a, RADIUS] * (1.0 - 2.0 * (a % 2))
-    rb = 0.0 if owner[b] < 0 else disk[b, RADIUS] * (1.0 - 2.0 * (b % 2))
+    ra = 0.0 if span[a, OWNER] < 0 else disk[a, RADIUS] * (1.0 - 2.0 * (a % 2))
+    rb = 0.0 if span[b, OWNER] < 0 else disk[b, RADIUS] * (1.0 - 2.0 * (b % 2))
     dx, dy = disk[b, CX] - disk[a, CX], disk[b, CY] - disk[a, CY]
     apart, k = math.hypot(dx, dy), rb - ra
     if apart <= abs(k):
@@ -421,28 +478,31 @@ def _between(
     px, py = disk[a, CX] + ra * uy, disk[a, CY] - ra * ux
     qx, qy = disk[b, CX] + rb * uy, disk[b, CY] - rb * ux
     x0, x1, y0, y1 = min(px, qx), max(px, qx), min(py, qy), max(py, qy)
-    box, circles, eps = blockers.box, blockers.circles, blockers.eps
     best, farthest = -1, 0.0
-    for o in range(len(box)):
-        if x1 < box[o, 0] or x0 > box[o, 2] or y1 < box[o, 1] or y0 > box[o, 3]:
+    for o in range(len(solid)):
+        if x1 < solid[o, XMIN] or x0 > solid[o, XMAX] or y1 < solid[o, YMIN] or y0 > solid[o, YMAX]:
             continue
-        if circles[o, 2] >= 0.0:
-            cx, cy = circles[o, 0] - px, circles[o, 1] - py
+        if solid[o, ROUND] >= 0.0:
+            cx, cy = solid[o, MIDDLE_X] - px, solid[o, MIDDLE_Y] - py
             t = min(max(cx * ux + cy * uy, 0.0), length)
-            if math.hypot(cx - t * ux, cy - t * uy) >= circles[o, 2] - eps:
+            if math.hypot(cx - t * ux, cy - t * uy) >= solid[o, ROUND] - TOUCH * solid[o, ROUND]:
                 continue
-        elif not enters_obstacle(px, py, qx, qy, o, blockers):
+        elif not enters_polygon(
+            px, py, qx, qy, edges, int(solid[o, FIRST_EDGE]), int(solid[o, AFTER_EDGES]),
+            solid[o, GROWTH],
+        ):  # fmt: skip
             continue
-        if owner[a] == o:
+        if span[a, OWNER] == o:
             left = a % 2 == 1
-        elif owner[b] == o:
+        elif span[b, OWNER] == o:
             left = b % 2 == 1
         else:
             # past the side on which the string has not its representative point; where it runs
             # straight along its line, the strip that it is in tells
-            shift = ON_LINE * eps if rank[o] < spot[i + 1, 4] else -ON_LINE * eps
-            sx, sy = spot[i + 1, 0] - spot[i, 2], spot[i + 1, 1] - spot[i, 3]
-            rx, ry = rays[o, 0] - spot[i, 2] - shift, rays[o, 1] - spot[i, 3]
+            sx, sy = at[i + 1, X_IN] - at[i, X_OUT], at[i + 1, Y_IN] - at[i, Y_OUT]
+            shift = ON_LINE * (abs(sx) + abs(sy))
+            shift = shift if solid[o, RANK] < at[i + 1, STRIP] else -shift
+            rx, ry = solid[o, RAY_X] - at[i, X_OUT] - shift, solid[o, RAY_Y] - at[i, Y_OUT]
             left = sx * ry - sy * rx < 0.0
         new, out = _standing_out(o, left, px, py, ux, uy, a, b, of, row, disk)
         if new >= 0 and out > farthest:
@@ -451,68 +511,64 @@ def _between(
 
 
 @kernel
-def _facing(node: int, ux: float, uy: float) -> float:
-    """The angle on a directed arc that a line along (ux, uy) touches it at."""
-    return math.atan2(-ux, uy) if node % 2 == 0 else math.atan2(ux, -uy)
-
-
-@kernel
-def _near(angle: float, to: float) -> float:
-    """The same angle, but for whole turns, within half a turn of another."""
-    return angle - TWO_PI * math.floor((angle - to + math.pi) / TWO_PI)
-
-
-@kernel
-def _copy(k: int, to: int, node: Ints, facing: Floats, spot: Floats) -> None:
-    node[to], facing[to, 0], facing[to, 1] = node[k], facing[k, 0], facing[k, 1]
-    for c in range(5):
-        spot[to, c] = spot[k, c]
-
-
-@kernel
-def _note(i: int, x: float, y: float, strip: float, spot: Floats) -> None:
-    spot[i, 0], spot[i, 1], spot[i, 2], spot[i, 3], spot[i, 4] = x, y, x, y, strip
-
-
-@kernel
-def _written(
-    count: int, node: Ints, edge: Ints, slid: Floats, real: Floats, whole: Ints, span: Ints,
-    letters: Ints, disk: Floats, word: Ints,
+def _proven(
+    u: int, v: int, count: int, letters: Ints, row: Ints, disk: Floats, span: Ints, real: Floats,
+    whole: Ints, written: Ints, at: Floats, on: Ints, word: Ints,
 ) -> float:  # fmt: skip
-    """Length of a path of so many tangents; its word is written. `NOT_PULLED` where it does not
-    slide forwards."""
+    """Length of a path of so many nodes if it is taut and has the word of the leg from u to v;
+    else `NOT_PULLED`.
+
+    Parameters
+    ----------
+    letters, row
+        Of `Ends`.
+    disk, span, real, whole, written
+        Of `Arcs`, the last its letters.
+    at, on, word
+        Of `Path`.
+    """
+    if count < 2:
+        return NOT_PULLED
     n, total = 0, 0.0
-    for i in range(count):
-        e = edge[i]
+    for i in range(count - 1):
+        e = on[i, EDGE]
+        first, last = whole[e, SEGMENT], whole[e, AFTER_SEGMENT]
         if i > 0:
-            arrived = edge[i - 1]
+            arrived, node = on[i - 1, EDGE], on[i, NODE]
             f = whole[arrived, FIRST]
-            if f < 0:
-                return NOT_PULLED
-            n = _append(whole[arrived, ARRIVAL], whole[arrived, AFTER_ARRIVAL], letters, word, n)
-            on = node[i]
             by = real[arrived, TURN] + real[e, ALONG] - real[f, ALONG]
-            turns = round((slid[i] - by) / TWO_PI)
-            if turns < 0 or (turns == 0 and e < f) or (turns and disk[on, END] < np.inf):
-                return NOT_PULLED
-            if turns == 0:
-                n = _append(whole[f, GAPS], whole[e, GAPS], letters, word, n)
-            else:
-                n = _append(whole[f, GAPS], span[on, 2], letters, word, n)
-                for _ in range(turns - 1):
-                    n = _append(span[on, 1], span[on, 2], letters, word, n)
-                n = _append(span[on, 1], whole[e, GAPS], letters, word, n)
+            turns = round((at[i, SLID] - by) / TWO_PI)
             by += turns * TWO_PI
-            if by < -ANGLE_TOLERANCE:
+            whole_circle = disk[node, END] == np.inf
+            if f < 0 or turns < 0 or by < -ANGLE_TOLERANCE:
                 return NOT_PULLED
-            slid[i] = max(by, 0.0)
-            total += disk[on, RADIUS] * slid[i]
-        n = _append(whole[e, SEGMENT], whole[e, AFTER_SEGMENT], letters, word, n)
+            if (turns and not whole_circle) or (turns == 0 and e < f):
+                return NOT_PULLED
+            at[i, SLID] = max(by, 0.0)
+            total += disk[node, RADIUS] * at[i, SLID]
+            n = _append(whole[arrived, ARRIVAL], whole[arrived, AFTER_ARRIVAL], written, word, n)
+            begin = whole[f, GAPS]
+            for _ in range(turns):
+                n = _append(begin, span[node, AFTER_LETTERS], written, word, n)
+                begin = span[node, LETTERS]
+            n = _append(begin, whole[e, GAPS], written, word, n)
+        n = _append(first, last, written, word, n)
         total += real[e, LENGTH]
         if n < 0:
             return NOT_PULLED
-    word[0] = n
-    return total
+    # inverse(word of u) times (word of v)
+    a, a_end, b, b_end = row[u], row[u + 1], row[v], row[v + 1]
+    while a < a_end and b < b_end and letters[a] == letters[b]:
+        a += 1
+        b += 1
+    back, ahead = a_end - a, b_end - b
+    same = n == back + ahead
+    if same:
+        for k in range(back):
+            same = same and word[1 + k] == -letters[a_end - 1 - k]
+        for k in range(ahead):
+            same = same and word[1 + back + k] == letters[b + k]
+    return total if same else NOT_PULLED
 
 
 @kernel
@@ -528,19 +584,3 @@ def _append(first: int, last: int, letters: Ints, word: Ints, n: int) -> int:
             n += 1
             word[n] = a
     return n
-
-
-@kernel
-def _is_word(u: int, v: int, letters: Ints, row: Ints, word: Ints) -> bool:
-    """Whether the word written is inverse(word of u) times (word of v)."""
-    a, a_end, b, b_end = row[u], row[u + 1], row[v], row[v + 1]
-    while a < a_end and b < b_end and letters[a] == letters[b]:
-        a += 1
-        b += 1
-    back, on = a_end - a, b_end - b
-    same = bool(word[0] == back + on)
-    for k in range(back):
-        same = same and word[1 + k] == -letters[a_end - 1 - k]
-    for k in range(on):
-        same = same and word[1 + back + k] == letters[b + k]
-    return same
