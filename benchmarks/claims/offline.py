@@ -232,6 +232,23 @@ def any_gtsp() -> tuple[str, bool]:
     return f"{same} of {count}", same == count
 
 
+def pulled() -> tuple[str, bool]:
+    """Legs pulled along their words: share that failed, off a search, and microseconds each."""
+    import legs
+
+    failed = worst = longest = 0.0
+    for _, problem in legs.problems():
+        roadmap = legs.TautRoadmap(problem)
+        pairs, chosen = legs.some_legs(roadmap, 500)
+        share, off = legs.off(roadmap.paths, chosen[:100])
+        each = legs.microseconds(
+            functools.partial(roadmap.legs._each, pairs[:, 0], pairs[:, 1]), len(pairs)
+        )
+        failed, worst, longest = max(failed, share), max(worst, off), max(longest, each)
+    held = failed <= 0.01 and worst <= 1e-9 and longest <= 20.0
+    return f"{100 * failed:.1f} % failed, {worst:.0e} off, {longest:.1f} µs at most", held
+
+
 def claims() -> Iterator[Claim]:
     """All of these."""
     cells = [(n, t) for n in (5, 10, 15, 20) for t in (200, 250, 300, 350)]
@@ -242,6 +259,7 @@ def claims() -> Iterator[Claim]:
     yield seconds_of(100, 300.0, 1, 15.0)
     yield Claim("proposals of anneal", "as published (/ 3)", proposals, timed=True)
     yield Claim("beyond a time limit of 1 s, every solver", "1 s", overrun, timed=True)
+    yield Claim("legs pulled along their words", "1 %, 1e-9, 20 µs", pulled, timed=True)
     yield Claim("the README's wharf", "51.964548, tether 19.1393, proven", wharf)
     yield Claim(
         "Table I: proven and verified", "48 of 48 worlds", functools.partial(proofs, cells, 3, 60.0)
