@@ -51,6 +51,9 @@ SETTLE, SETTLED = 0.5, 0.1
 """Where the LP is so far above the bound, as a share of the gap, cuts wait until the prices of all
 legs leave it no farther than the second share."""
 
+PRICINGS = 4
+"""Times that legs are sought whose measured length has a negative price, before cuts are."""
+
 USED = 0.05
 """Legs that a point uses that much are measured."""
 
@@ -167,6 +170,8 @@ class Root:
         usable = run.tour is not None and warm and np.isin(warm.vertices, costs.vertices).all()
         warm = warm if usable else None
         legs = self._first_legs() if warm is None else self._warm_legs(warm)
+        if graph.quick_legs:
+            costs.measure_legs(legs)
         self.lp = relaxation(costs.cluster, legs, costs.values[legs[:, 0], legs[:, 1]])
         if warm is not None:
             self.lp.add_cuts(warm.cuts_over(costs))
@@ -314,10 +319,10 @@ class Root:
             return False
         prices.rule_out(run.cutoff)
         scale = run.length if run.tour is not None else float(self.costs.values[0, 1:].max())
-        new = self._most_negative(*prices.cheapest(TINY * scale))
+        new, longer = self._most_negative(prices, TINY * scale)
         if len(new):
             self.lp.add_legs(new, self.costs.values[new[:, 0], new[:, 1]])
-        longer = self._measure_used(point)
+        longer |= self._measure_used(point)
         if lean and len(self.costs) > MANY:
             self._drop_dear(prices.of(self.lp.legs), point)
         self._forget()
@@ -343,11 +348,25 @@ class Root:
         if dear.sum() > LEAN * len(dear):
             self.lp.keep_legs(~dear)
 
-    def _most_negative(self, legs: Ints, price: Floats) -> Ints:
-        """Of legs (k, 2) with their prices those to bring into the LP, the cheapest first: a few of
-        each vertex."""
-        missing = ~np.isin(self._keys(legs), self._keys(self.lp.legs))
-        legs, price = legs[missing], price[missing]
+    def _most_negative(self, prices: Prices, tolerance: float) -> tuple[Ints, bool]:
+        """The legs to bring into the LP, those of most negative reduced cost first, a few of each
+        vertex; and whether any leg was longer than its bound. Where legs are quickly measured,
+        those that would come in are, first: else the LP fills with legs that are none."""
+        longer = False
+        for _ in range(PRICINGS):
+            legs, price = prices.cheapest(tolerance)
+            missing = ~np.isin(self._keys(legs), self._keys(self.lp.legs))
+            legs, price = legs[missing], price[missing]
+            if self.costs.graph.quick_legs and self.costs.measure_legs(legs):
+                longer, price = True, prices.of(legs)
+            negative = price < -tolerance
+            new = self._a_few(legs[negative], price[negative])
+            if len(new) or not len(legs):
+                break
+        return new, longer
+
+    def _a_few(self, legs: Ints, price: Floats) -> Ints:
+        """Of legs (k, 2) with their prices the cheapest, a few of each vertex."""
         taken = np.zeros(len(self.costs), dtype=np.int64)
         chosen = []
         for u, v in legs[np.argsort(price, kind="stable")].tolist():
