@@ -271,6 +271,21 @@ def test_legs_that_an_lp_uses_are_measured_and_no_others():
     np.testing.assert_array_equal(costs.values[others], bounds[others])
 
 
+def test_no_leg_comes_into_an_lp_that_is_only_bounded(monkeypatch):
+    seen = []
+    few = root.Root._a_few
+
+    def note(self, legs, price):
+        if self.costs.exact is not None and len(legs):
+            seen.append(bool(self.costs.exact[legs[:, 0], legs[:, 1]].all()))
+        return few(self, legs, price)
+
+    monkeypatch.setattr(root.Root, "_a_few", note)
+    assert solve(travel_graph(far_world(0, goals=5, tether_length=500.0))).status is Status.OPTIMAL
+    assert seen
+    assert all(seen)
+
+
 def test_what_is_done_with_thousands_of_classes_only_proves_the_same_with_hundreds(monkeypatch):
     problem = far_world(1, goals=25, tether_length=300.0)
     plain = solve(travel_graph(problem))
