@@ -6,6 +6,8 @@ from dataclasses import replace
 import numpy as np
 import psutil
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from netsp import travel_graph
 from netsp.mip import root
@@ -19,8 +21,10 @@ from netsp.mip.solve import Params
 from netsp.mip.subtours import components, fractional_cuts
 from netsp.roadmap.taut import TautRoadmap
 from netsp.solution import Status
+from netsp.solving import legcosts, searching
 from netsp.solving.legcosts import MEASURE_AT_ONCE, LegCosts
 from netsp.solving.limits import Limits
+from netsp.solving.run import Stop
 from netsp.travel.graph import TravelGraph
 from netsp.worlds import random_world as far_world
 from tests.brute import brute_tour as brute
@@ -286,6 +290,68 @@ def test_no_leg_comes_into_an_lp_that_is_only_bounded(monkeypatch):
     assert all(seen)
 
 
+@pytest.mark.parametrize("rounded_from", [10, 300])
+def test_rounded_costs_prove_the_same(monkeypatch, rounded_from):
+    problem = far_world(0, goals=7, tether_length=450.0)
+    plain = solve(travel_graph(problem))
+    monkeypatch.setattr(legcosts, "ROUNDED_FROM", rounded_from)
+    monkeypatch.setattr(legcosts, "ROWS", 100)
+    monkeypatch.setattr(legcosts, "MEASURE_AT_ONCE", 5)
+    monkeypatch.setattr(searching, "MEASURE_AT_ONCE", 5)
+    graph = travel_graph(problem)
+    costs = LegCosts(graph)
+    assert costs.rounded
+    assert costs.values.dtype == np.float32
+    assert (costs.values[1:, 1:] <= graph.lower_bounds()[1:, 1:]).all()
+    found = solve(graph)
+    assert found.status is plain.status is Status.OPTIMAL
+    assert found.length == pytest.approx(plain.length, rel=2e-6)
+    assert found.length == pytest.approx(graph.tour_length(found.tour), rel=1e-12)
+    assert found.lower_bound <= plain.length * (1 + 1e-9)
+
+
+def test_what_is_measured_of_rounded_costs_is_as_long_as_it_is(monkeypatch):
+    monkeypatch.setattr(legcosts, "ROUNDED_FROM", 10)
+    monkeypatch.setattr(legcosts, "ROWS", 50)
+    monkeypatch.setattr(legcosts, "MEASURE_AT_ONCE", 5)
+    graph = travel_graph(far_world(0, goals=5, tether_length=400.0))
+    costs, rng = LegCosts(graph), np.random.default_rng(0)
+    asked = rng.random(costs.values.shape) < 0.5
+    asked = (asked | asked.T) & np.isfinite(costs.values)
+    costs.measure_all(asked)
+    held, known = costs.values[asked], graph.costs[asked]
+    assert (held <= known).all()
+    assert (held >= known * (1 - 2e-7)).all()
+    base = np.zeros_like(asked)
+    base[0] = base[:, 0] = True
+    assert np.isinf(costs.values[~(asked | base)]).all()
+    keep = np.arange(len(costs)) % 7 > 0
+    keep[0] = True
+    before = costs.values.copy()
+    costs.restrict(keep)
+    assert (costs.values == before[np.ix_(keep, keep)]).all()
+    costs.restrict(np.arange(len(costs)) < 5)
+    assert not costs.rounded
+    lengths = graph.costs[np.ix_(costs.vertices, costs.vertices)]
+    held = np.isfinite(costs.values)
+    np.testing.assert_allclose(costs.values[held], lengths[held], rtol=1e-12)
+
+
+@given(
+    st.lists(st.floats(0.0, 1e6) | st.just(float("inf")), min_size=9, max_size=9),
+    st.lists(st.booleans(), min_size=3, max_size=3),
+)
+def test_rounding_is_down_and_squeezing_keeps_what_is_kept(numbers, keep):
+    matrix = np.array(numbers).reshape(3, 3)
+    rounded = legcosts.rounded_down(matrix)
+    assert (rounded <= matrix).all()
+    assert (rounded >= matrix * (1 - 2e-7) - 1e-40).all()
+    kept = np.array(keep)
+    np.testing.assert_array_equal(
+        legcosts.squeezed(matrix.copy(), kept), matrix[np.ix_(kept, kept)]
+    )
+
+
 def test_what_is_done_with_thousands_of_classes_only_proves_the_same_with_hundreds(monkeypatch):
     problem = far_world(1, goals=25, tether_length=300.0)
     plain = solve(travel_graph(problem))
@@ -302,3 +368,27 @@ def test_what_is_done_with_thousands_of_classes_only_proves_the_same_with_hundre
     assert left
     assert plain.status is lean.status is Status.OPTIMAL
     assert lean.length == pytest.approx(plain.length, rel=2e-6)
+
+
+def test_looking_at_prices_can_be_stopped_half_way():
+    graph = travel_graph(far_world(0, goals=6, tether_length=400.0))
+    vertices = len(graph)
+    assert vertices > 10
+    duals = HighsRelaxation(graph.cluster, *first_legs(graph)).solve(None).duals
+    dead, seen = ~np.isfinite(graph.costs), []
+
+    def stop():
+        seen.append(1)
+        if len(seen) > 2:
+            raise Stop
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("netsp.mip.prices.ROWS", max(1, vertices // 6))
+        with pytest.raises(Stop):
+            Prices(graph.costs, dead, graph.cluster, [], duals, stop)
+
+
+def first_legs(graph):
+    """All legs and their costs."""
+    legs = np.argwhere(np.triu(np.isfinite(graph.costs), 1))
+    return legs, graph.costs[legs[:, 0], legs[:, 1]]

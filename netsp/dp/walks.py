@@ -100,7 +100,7 @@ class Walks:
         """Change the costs of legs."""
         if (np.diff(self.cluster) < 0).any():
             values = values[np.ix_(self.order, self.order)]
-        self.values: Floats = np.ascontiguousarray(values)
+        self.values: Floats = np.ascontiguousarray(values, dtype=np.float64)
         self.longest = float(np.abs(values).max(where=np.isfinite(values), initial=0.0))
 
     def restrict(self, keep: Bools) -> None:

@@ -66,6 +66,8 @@ class Prices:
         Of the program.
     duals : Duals
         Any; the better they are, the better the bound.
+    check : callable
+        Called every few million legs, from several threads; may raise to stop.
 
     Attributes
     ----------
@@ -74,8 +76,10 @@ class Prices:
     """
 
     def __init__(
-        self, costs: Floats, dead: Bools, cluster: Ints, cuts: Sequence[Cut], duals: Duals
-    ) -> None:
+        self, costs: Floats, dead: Bools, cluster: Ints, cuts: Sequence[Cut], duals: Duals,
+        check: Callable[[], None] = lambda: None,
+    ) -> None:  # fmt: skip
+        self._check = check
         self._size = len(cluster)
         active = np.flatnonzero(duals.cut < 0.0).tolist()
         inside = np.array([cuts[k].inside for k in active], dtype=bool).reshape(-1, self._size)
@@ -135,8 +139,13 @@ class Prices:
         if len(blocks) < 4:
             work(0, self._size)
             return
+
+        def checked(block: tuple[int, int]) -> None:
+            self._check()
+            work(*block)
+
         with ThreadPoolExecutor(os.cpu_count()) as pool:
-            list(pool.map(lambda block: work(*block), blocks))
+            list(pool.map(checked, blocks))
 
 
 def _alike(inside: Bools) -> tuple[Ints, Ints]:

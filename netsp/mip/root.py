@@ -18,7 +18,7 @@ from netsp.mip.cuts import Cut
 from netsp.mip.prices import Prices
 from netsp.mip.program import Point, Relaxation
 from netsp.mip.subtours import branches, fractional_cuts
-from netsp.solving.legcosts import LegCosts
+from netsp.solving.legcosts import LegCosts, squeezed
 from netsp.solving.run import Stop
 from netsp.solving.searching import SearchingRun
 
@@ -31,6 +31,9 @@ PRICED_PER_VERTEX, MOST_PRICED = 3, 3000
 PRICE_EVERY, PRICE_SELDOM = 4, 32
 """Rounds of cuts between two looks at the prices of all legs, unless no cut is found; every look
 that brings hardly a leg and raises the bound by little doubles the first, up to the second."""
+
+ROWS = 512
+"""Of a matrix whose places are sorted at a time."""
 
 MIX = 0.6
 """Cuts are first sought between the LP's point and the incumbent: those found there go deeper
@@ -165,14 +168,14 @@ class Root:
         self.run, self.costs, self.round_point = run, costs, round_point
         graph = costs.graph
         self.branch = branches([graph.signatures[v] for v in costs.vertices])
-        self.dead: Bools = ~np.isfinite(costs.values)
+        self.dead: Bools = np.isinf(costs.values)
         # without an incumbent, a program with some of the legs may be infeasible when a tour exists
         usable = run.tour is not None and warm and np.isin(warm.vertices, costs.vertices).all()
         warm = warm if usable else None
         legs = self._first_legs() if warm is None else self._warm_legs(warm)
         if graph.quick_legs:
             costs.measure_legs(legs)
-        self.lp = relaxation(costs.cluster, legs, costs.values[legs[:, 0], legs[:, 1]])
+        self.lp = relaxation(costs.cluster, legs, costs.of(legs))
         if warm is not None:
             self.lp.add_cuts(warm.cuts_over(costs))
             self.lp.add_cuts([replace(c, inside=c.inside[costs.cluster]) for c in over_goals])
@@ -260,13 +263,13 @@ class Root:
         """Measure all legs that are not ruled out."""
         self.costs.measure_all(~self.dead)
         legs = self.lp.legs
-        self.lp.set_costs(self.costs.values[legs[:, 0], legs[:, 1]])
+        self.lp.set_costs(self.costs.of(legs))
 
     def size(self) -> dict[str, int]:
         """For the report."""
         return {
             "cuts": len(self.lp.cuts),
-            "legs": int((~self.dead).sum()) // 2,
+            "legs": (self.dead.size - int(np.count_nonzero(self.dead))) // 2,
             "vertices": len(self.costs),
         }
 
@@ -279,7 +282,10 @@ class Root:
         if self.run.tour is None:
             return np.argwhere(np.triu(np.isfinite(values), 1))
         k = min(NEAREST, len(values) - 1)
-        near = np.argpartition(values, k - 1, axis=1)[:, :k]
+        near = np.concatenate([
+            np.argpartition(values[first : first + ROWS], k - 1, axis=1)[:, :k]
+            for first in range(0, len(values), ROWS)
+        ])  # fmt: skip
         others = np.arange(1, len(values))
         pairs = np.vstack(
             [
@@ -301,7 +307,7 @@ class Root:
         tour = tour_legs(self.tour())
         new = tour[~np.isin(self._keys(tour), self._keys(self.lp.legs))]
         if len(new):
-            self.lp.add_legs(new, self.costs.values[new[:, 0], new[:, 1]])
+            self.lp.add_legs(new, self.costs.of(new))
         return len(new) > 0
 
     def _keys(self, legs: Ints) -> Ints:
@@ -312,7 +318,7 @@ class Root:
         """Raise the bound, eliminate, bring in legs of negative reduced cost; whether any came."""
         run, cluster = self.run, self.costs.cluster
         assert point.duals is not None
-        prices = Prices(self.costs.values, self.dead, cluster, self.lp.cuts, point.duals)
+        prices = Prices(self.costs.values, self.dead, cluster, self.lp.cuts, point.duals, run.check)
         # a tour with a dead leg is no shorter than the cutoff
         run.raise_bound(min(prices.bound, run.cutoff))
         if run.done:
@@ -321,7 +327,7 @@ class Root:
         scale = run.length if run.tour is not None else float(self.costs.values[0, 1:].max())
         new, longer = self._most_negative(prices, TINY * scale)
         if len(new):
-            self.lp.add_legs(new, self.costs.values[new[:, 0], new[:, 1]])
+            self.lp.add_legs(new, self.costs.of(new))
         longer |= self._measure_used(point)
         if lean and len(self.costs) > MANY:
             self._drop_dear(prices.of(self.lp.legs), point)
@@ -334,7 +340,7 @@ class Root:
         if not self.costs.measure_legs(point.legs[point.y > USED]):
             return False
         legs = self.lp.legs
-        self.lp.set_costs(self.costs.values[legs[:, 0], legs[:, 1]])
+        self.lp.set_costs(self.costs.of(legs))
         return True
 
     def _drop_dear(self, price: Floats, point: Point) -> None:
@@ -395,7 +401,7 @@ class Root:
         self.lp.keep_legs(np.asarray(alive[self.lp.legs].all(axis=1)))
         self.costs.restrict(alive)
         self.lp.restrict(alive)
-        self.dead = self.dead[np.ix_(alive, alive)]
+        self.dead = squeezed(self.dead, alive)
         self.branch = self.branch[:, alive]
         self.branch = np.unique(self.branch[self.branch.sum(axis=1) > 1], axis=0)
         self.point = None

@@ -238,7 +238,7 @@ class MipRun(SearchingRun):
             self.instance(costs, np.flatnonzero(point.x > 1e-6)), self.rng, order, self.clock
         )
         search.settle()
-        self.take(search)
+        self.take(search, rounded=costs.rounded)
 
     # the end
 
@@ -248,9 +248,7 @@ class MipRun(SearchingRun):
         legs = np.argwhere(np.triu(~root.dead, 1))
         legs = np.unique(np.vstack([legs, tour_legs(root.tour())]), axis=0)
         vertices = np.unique(np.concatenate([[0], legs.ravel()]))
-        model: IntegerProgram = program(
-            costs.cluster, vertices, legs, costs.values[legs[:, 0], legs[:, 1]], root.lp.cuts
-        )
+        model: IntegerProgram = program(costs.cluster, vertices, legs, costs.of(legs), root.lp.cuts)
         size = {"legs": len(legs), "vertices": len(vertices)}
         self.report("fixed", cuts=len(model.cuts), **size)
         while not self.done:

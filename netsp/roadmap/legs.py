@@ -259,6 +259,11 @@ class TautLegs:
         us, vs = vertices[rows], vertices[columns]
         apart = self.cluster[us] != self.cluster[vs]
         rows, columns, us, vs = rows[apart], columns[apart], us[apart], vs[apart]
+        out[rows, columns] = out[columns, rows] = self.pairs(us, vs)
+        return out
+
+    def pairs(self, us: Ints, vs: Ints) -> Floats:
+        """(k,) 3D lengths of legs between vertices of different goals."""
         planar = self._each(us, vs)
         for k in np.flatnonzero(planar < 0.0).tolist():
             u, v = int(us[k]), int(vs[k])
@@ -266,15 +271,22 @@ class TautLegs:
             planar[k] = self.paths.planar_length(
                 a, b, self.relative_word(u, v), self._longest(u, v)
             )
-        out[rows, columns] = np.hypot(planar, self._z[self.cluster[us]] - self._z[self.cluster[vs]])
-        out[columns, rows] = out[rows, columns]
-        return out
+        return np.asarray(np.hypot(planar, self._z[self.cluster[us]] - self._z[self.cluster[vs]]))
 
     def _each(self, us: Ints, vs: Ints) -> Floats:
         """(k,) planar lengths of legs, negative where they could not be pulled."""
         paths, (ends, point) = self.paths, self._ends
         out = np.empty(len(us))
-        pull_each(us, vs, ends, point, paths.slits, paths.arcs, out)
+
+        def some(first: int) -> None:
+            k = slice(first, first + FEW)
+            pull_each(us[k], vs[k], ends, point, paths.slits, paths.arcs, out[k])
+
+        if len(us) <= FEW:
+            some(0)
+        else:
+            with ThreadPoolExecutor(os.cpu_count()) as pool:
+                list(pool.map(some, range(0, len(us), FEW)))
         return out
 
     @cached_property

@@ -33,8 +33,8 @@ from netsp.travel.graph import TravelGraph, least_tethers
 from netsp.travel.kept import within_kept
 from netsp.travel.result import Progress, Result, of_part, proven
 
-PROVABLE = 14_000
-"""Most vertices of a travel graph that `mip` is asked to bound: about 4 GiB of matrices."""
+PROVABLE = 20_000
+"""Most vertices of a travel graph that `mip` is asked to bound: about 3 GiB of matrices."""
 
 MOST_KEPT = 3_000
 """With more vertices and few goals, about so many, those of least tether, are proven over."""

@@ -139,7 +139,8 @@ class SearchingRun(SolverRun):
         tether, the incumbent's, and more."""
         if costs.exact is None:
             if self._core is None or self._core[0] != len(costs):
-                whole = Instance(costs.cluster, costs.values, costs.vertices, self.graph.before)
+                values = np.asarray(costs.values, dtype=np.float64)
+                whole = Instance(costs.cluster, values, costs.vertices, self.graph.before)
                 self._core = len(costs), whole
             return self._core[1]
         least = least_tethers(costs.values[0], costs.cluster, self.classes_per_goal)
@@ -147,8 +148,8 @@ class SearchingRun(SolverRun):
         core = np.unique(np.concatenate([least, own, more]))
         costs.measure(core)
         return Instance(
-            costs.cluster[core], costs.values[np.ix_(core, core)], costs.vertices[core],
-            self.graph.before,
+            costs.cluster[core], costs.values[np.ix_(core, core)].astype(np.float64),
+            costs.vertices[core], self.graph.before,
         )  # fmt: skip
 
     def search(self, costs: LegCosts, more: Ints | None = None) -> None:
@@ -158,12 +159,13 @@ class SearchingRun(SolverRun):
         search = Search(instance, self.rng, start, self.clock)
         search.settle()
         search.run(self.search_rounds, self.clock)
-        self.take(search)
+        self.take(search, rounded=costs.rounded)
 
-    def take(self, search: Search) -> None:
-        """Offer what a search found; its legs are measured, so its length is known."""
+    def take(self, search: Search, *, rounded: bool = False) -> None:
+        """Offer what a search found; its legs are measured, so its length is known unless they were
+        rounded."""
         length, tour = search.best()
-        self.update_incumbent(tour, length=length)
+        self.update_incumbent(tour, length=None if rounded else length)
 
     @property
     def cutoff(self) -> float:

@@ -240,6 +240,36 @@ class TravelGraph(Drawn):
             return np.asarray(self._costs[np.ix_(chosen, chosen)])
         return self._measured(chosen, asked)
 
+    def costs_of(self, us: Ints, vs: Ints) -> Floats:
+        """Costs of single legs.
+
+        Parameters
+        ----------
+        us : ndarray of int, shape (k,)
+            Vertices that the legs begin at.
+        vs : ndarray of int, shape (k,)
+            Those at other ends, of other clusters.
+
+        Returns
+        -------
+        ndarray, shape (k,)
+            Their costs.
+        """
+        if self._costs is not None:
+            return np.asarray(self._costs[us, vs])
+        pairs = getattr(self._legs, "pairs", None)
+        if pairs is not None:
+            begin = time.monotonic()
+            try:
+                return np.asarray(pairs(us, vs))
+            finally:
+                self.legs_s += time.monotonic() - begin
+        chosen, at = np.unique(np.concatenate([us, vs]), return_inverse=True)
+        i, j = at[: len(us)], at[len(us) :]
+        asked = np.zeros((len(chosen), len(chosen)), dtype=bool)
+        asked[i, j] = asked[j, i] = True
+        return np.asarray(self.costs_among(chosen, asked)[i, j])
+
     @contextmanager
     def on_clock(self, clock: Clock | None) -> Iterator[None]:
         """While a solver runs, its clock ends the measuring of legs, too.
@@ -611,6 +641,9 @@ class _PartOfLegs:
     ) -> Floats:
         with self.graph.on_clock(clock or self.graph.clock):
             return self.graph.costs_among(self.chosen[vertices], asked)
+
+    def pairs(self, us: Ints, vs: Ints) -> Floats:
+        return self.graph.costs_of(self.chosen[us], self.chosen[vs])
 
     def to_base(self) -> Floats:
         return np.asarray(self.graph.costs_to_base[self.chosen])
