@@ -48,35 +48,35 @@ def numbered(stem: str, count: int, make: Callable[[str, int], Problem]) -> Iter
 def recipes() -> Iterator[Recipe]:
     """All problems."""
     sizes = (
-        (5, 350, 4), (10, 300, 4), (20, 300, 4), (20, 350, 4), (50, 300, 4), (50, 350, 4),
+        (5, 350, 5), (10, 300, 5), (20, 300, 5), (20, 350, 5), (50, 300, 5), (50, 350, 5),
         (100, 300, 4), (100, 350, 2), (200, 300, 2), (60, 500, 2),
     )  # fmt: skip
     for goals, tether, count in sizes:
         yield from numbered(f"random-{goals}-{tether}", count, drawn("icra2017", goals, tether, 20))
     yield from numbered("random-500-300", 2, drawn("icra2017", 500, 300, 50))
     for family in ("clustered", "harbour"):
-        for goals, count in ((10, 6), (20, 6), (50, 5), (100, 3)):
+        for goals, count in ((10, 7), (20, 7), (50, 6), (100, 4)):
             yield from numbered(f"{family}-{goals}", count, drawn(family, goals, 300, 20))
-    for side, count in ((3, 5), (4, 5), (5, 5), (7, 4), (9, 3)):
+    for side, count in ((3, 6), (4, 6), (5, 5), (7, 4), (9, 3)):
         yield from numbered(f"windfarm-{side * side}", count, windfarm(side))
     for rows, columns, count in (
-        (2, 4, 4),
-        (2, 7, 4),
-        (3, 6, 4),
+        (2, 4, 7),
+        (2, 7, 5),
+        (3, 6, 5),
         (3, 10, 4),
         (4, 12, 3),
         (5, 20, 2),
     ):
         yield from numbered(f"jetty-{rows * columns}", count, jetty(rows, columns))
-    for legs, goals, count in ((3, 6, 6), (4, 8, 6), (4, 16, 6), (4, 32, 4)):
+    for legs, goals, count in ((3, 6, 7), (4, 8, 8), (4, 16, 7), (4, 32, 5)):
         yield from numbered(f"jacket-{goals}", count, jacket(legs, goals))
     for side, goals, count in (
-        (3, 5, 5),
-        (4, 10, 5),
-        (5, 15, 5),
-        (6, 20, 5),
-        (8, 30, 4),
-        (10, 50, 3),
+        (3, 5, 6),
+        (4, 10, 6),
+        (5, 15, 6),
+        (6, 20, 6),
+        (8, 30, 5),
+        (10, 50, 4),
     ):
         yield from numbered(f"maze-{goals}", count, maze(side, goals))
 

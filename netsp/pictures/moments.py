@@ -122,9 +122,12 @@ def moments_of_run(
         k = min(int(np.searchsorted(times, frame["time"])), len(rows) - 1)
         row = rows[k]
         problem = next(p for since, p in reversed(maps) if since <= max(frame["time"], 0.0))
+        where = f"next: {next_of(problem, int(row['goal']))}"
+        if k == len(rows) - 1:
+            where = "the end"
         text = (
             f"{frame['time']:.4g} s; tether {float(row['tether']):.4g} of {float(row['limit']):g} "
-            f"{problem.units}; next: {next_of(problem, int(row['goal']))}"
+            f"{problem.units}; {where}"
         )
         gone = np.vstack([path[: k : max(1, k // THIN)], nodes[-1:]])
         out.append(Moment(nodes, gone, text, problem))
