@@ -47,6 +47,10 @@ GOALS_SHARE = 0.1
 SEARCH_AGAIN = 0.5
 """Share of the last gap at which the classes that the LP visits are searched once more."""
 
+MANY = 3000
+"""With more vertices a first bound, and a proof over a core of them, come before all are bounded,
+also where goals are few."""
+
 MOST_LEGS, TRIES = 30_000, 6
 """With more legs left the integer program would end nowhere; so many more searches may find a tour
 that rules legs out, else the run ends."""
@@ -124,11 +128,11 @@ class MipRun(SearchingRun):
             if not self.trivial():
                 self.begin()
                 warm: Warm | None = None
-                if not walks:
+                if not walks or len(self.graph) > MANY:
                     with self.core() as core:
                         if core is not None:
                             self.bound_by_goals(backend)
-                            core.prove(backend)
+                            core.prove(backend, walks=walks)
                     warm = core.program() if core is not None else None
                 self.prove(backend, walks=walks, warm=warm)
         return self.finish("proven" if self.done else "open")
