@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from netsp import travel_graph
+from netsp import solve_graph, travel_graph
 from netsp.mip import root
 from netsp.mip import solve as mip
 from netsp.mip.bound import exact_bound
@@ -350,6 +350,27 @@ def test_rounding_is_down_and_squeezing_keeps_what_is_kept(numbers, keep):
     np.testing.assert_array_equal(
         legcosts.squeezed(matrix.copy(), kept), matrix[np.ix_(kept, kept)]
     )
+
+
+def test_with_many_classes_of_few_goals_a_bound_comes_before_all_legs_are_bounded(monkeypatch):
+    graph = travel_graph(far_world(0, goals=8, tether_length=500.0))
+    held = []
+
+    class OfSome(LegCosts):
+        def __init__(self, part):
+            if len(part) == len(graph):
+                raise Stop
+            held.append(len(part))
+            super().__init__(part)
+
+    monkeypatch.setattr("netsp.mip.solve.LegCosts", OfSome)
+    monkeypatch.setattr("netsp.mip.solve.MANY", 10)
+    monkeypatch.setattr(searching, "LARGER", 2)
+    assert len(graph) > MEASURE_AT_ONCE
+    found = solve_graph(graph, "auto")
+    assert held
+    assert found.status is Status.FEASIBLE
+    assert found.lower_bound > 0.5 * found.length
 
 
 def test_what_is_done_with_thousands_of_classes_only_proves_the_same_with_hundreds(monkeypatch):
