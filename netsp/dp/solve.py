@@ -114,8 +114,9 @@ def fits(graph: TravelGraph) -> bool:
     return (graph.goal_count + 1) ** 2 * len(graph) <= MOST_CELLS
 
 
-def bound_by_walks(run: SearchingRun, costs: LegCosts) -> None:
-    """Raise the bound of a run and forget vertices, until the proof is done or progress stalls."""
+def bound_by_walks(run: SearchingRun, costs: LegCosts, *, few_legs: int = 0) -> None:
+    """Raise the bound of a run and forget vertices, until the proof is done or progress stalls, or
+    few legs are left that are all measured: what is proven of those is up to the caller."""
     before = run.graph.before
     walks = Walks(costs.cluster, costs.values, run.clock.flag, before)
     prices = first_prices(run, costs)
@@ -162,6 +163,8 @@ def bound_by_walks(run: SearchingRun, costs: LegCosts) -> None:
             best, step = -np.inf, STEP
             history.clear()
         elif stalls:
+            return
+        if costs.exact is None and len(costs) * (len(costs) - 1) // 2 <= few_legs:
             return
         widened = walk.labels < MOST_LABELS and walks.memory.widen(goals.tolist())
         if once:  # in an order that is not allowed, which prices cannot mend

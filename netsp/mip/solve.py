@@ -47,6 +47,9 @@ GOALS_SHARE = 0.1
 SEARCH_AGAIN = 0.5
 """Share of the last gap at which the classes that the LP visits are searched once more."""
 
+FEW_LEGS = 600
+"""So few legs are left to cuts, where walks that remember ever more take long over them."""
+
 MANY = 3000
 """With more vertices a first bound, and a proof over a core of them, come before all are bounded,
 also where goals are few."""
@@ -150,7 +153,7 @@ class MipRun(SearchingRun):
             self.search(costs)
             self.report("heuristic", vertices=len(costs))
         if walks:
-            bound_by_walks(self, costs)
+            bound_by_walks(self, costs, few_legs=FEW_LEGS)
         if not (self.done or self.infeasible):
             self.cut(costs, backend, warm)
 
