@@ -74,7 +74,9 @@ def read_bytes(path: str | Path, most: int = MOST_BYTES) -> bytes:
 def _standard_input(most: int) -> bytes:
     """All of it: it can be read but once, and is asked for by who looks what kind of file it is,
     too."""
-    if sys.stdin is None or sys.stdin.isatty():
+    if sys.stdin is None:
+        raise InputError("-: standard input is closed; expected a file piped in")
+    if sys.stdin.isatty():
         raise InputError("-: standard input is a terminal; expected a file piped in")
     data = getattr(sys.stdin, "buffer", sys.stdin).read(most + 1)
     if len(data) > most:
