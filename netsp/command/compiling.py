@@ -60,13 +60,16 @@ def steps() -> Iterator[tuple[str, Callable[[], object]]]:
     from netsp.guard.guard import Guard
     from netsp.guard.space import SpaceSite
     from netsp.judge import verify
+    from netsp.mip.prices import Prices
+    from netsp.mip.program import Duals
     from netsp.online import ReactTether, Scene
     from netsp.online.equipment import TetherPhysics
     from netsp.online.mission import Mission
     from netsp.online.simulate import simulate
     from netsp.problem import Problem
-    from netsp.solvers.solve import solve
+    from netsp.solvers.solve import solve, travel_graph
     from netsp.solvers.table import SOLVERS
+    from netsp.solving.legcosts import rounded_down
     from netsp.space.solve import solve_mission
     from netsp.worlds import random_world
 
@@ -85,6 +88,16 @@ def steps() -> Iterator[tuple[str, Callable[[], object]]]:
         "solver dp, to the end",
         partial(solve, random_world(2, goals=12, tether_length=300.0), "dp", iteration_limit=30),
     )
+
+    def rounded() -> None:
+        graph = travel_graph(fewer)
+        costs, clusters = rounded_down(graph.costs), int(graph.cluster.max()) + 1
+        duals = Duals(np.zeros(clusters), np.zeros(len(costs)), np.zeros(0))
+        prices = Prices(costs, np.isinf(costs), graph.cluster, [], duals)
+        prices.rule_out(1.0)
+        prices.of(prices.cheapest(-1.0)[0])
+
+    yield "thousands of classes", rounded
     yield "polygons and the judge", lambda: verify(polygons, solve(polygons))
 
     def sampled() -> None:
