@@ -1,7 +1,9 @@
 """The mip solver proves what brute force finds, and is honest when it cannot."""
 
+import gc
 import sys
 import time
+import weakref
 from dataclasses import replace
 
 import numpy as np
@@ -373,6 +375,27 @@ def test_with_many_classes_of_few_goals_a_bound_comes_before_all_legs_are_bounde
     assert held
     assert found.status is Status.FEASIBLE
     assert found.lower_bound > 0.5 * found.length
+
+
+def test_the_matrices_of_a_proof_go_when_it_ends(monkeypatch):
+    made = []
+    module = sys.modules["netsp.mip.solve"]  # the function of that name hides it
+
+    class Noted(LegCosts):
+        def __init__(self, graph):
+            super().__init__(graph)
+            made.append(weakref.ref(self))
+
+    monkeypatch.setattr(module, "LegCosts", Noted)
+    gc.disable()
+    try:
+        found = solve(travel_graph(far_world(1, goals=25, tether_length=300.0)))
+        left = [ref for ref in made if ref() is not None]
+    finally:
+        gc.enable()
+    assert found.status is Status.OPTIMAL
+    assert made
+    assert not left
 
 
 def test_what_is_done_with_thousands_of_classes_only_proves_the_same_with_hundreds(monkeypatch):

@@ -116,10 +116,13 @@ class MipRun(SearchingRun):
     Attributes
     ----------
     root
-        Once there is one.
+        While there is one: it knows the run, and matrices would wait for the collector of cycles.
+    cuts
+        That it had in the end.
     """
 
     root: Root | None = None
+    cuts: Sequence[Cut] = ()
     _over_goals: Sequence[Cut] = ()
 
     def solve(
@@ -138,6 +141,8 @@ class MipRun(SearchingRun):
                             core.prove(backend, walks=walks)
                     warm = core.program() if core is not None else None
                 self.prove(backend, walks=walks, warm=warm)
+        if self.root is not None:
+            self.cuts, self.root = self.root.lp.cuts, None
         return self.finish("proven" if self.done else "open")
 
     def prove(self, backend: str, *, walks: bool = False, warm: Warm | None = None) -> None:
@@ -163,8 +168,7 @@ class MipRun(SearchingRun):
         def prove(graph: TravelGraph, limits: Limits) -> Result:
             run = MipRun(graph, limits)
             result = run.solve(backend, None)
-            if run.root is not None:
-                self._over_goals = run.root.lp.cuts
+            self._over_goals = run.cuts
             return result
 
         share = (
