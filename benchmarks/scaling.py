@@ -4,7 +4,8 @@
 
 Random worlds of the 2017 paper's recipe, one thing varied at a time: goals (tether 300, 20
 obstacles), classes (20 goals, tether 200 to 550), obstacles (20 goals, tether 300, as many to the
-area). Each measurement is a process of its own, whose peak memory it is. An exponent is the slope
+area). Each measurement is a process of its own; memory is its peak beyond what it had, with all
+code read, before. An exponent is the slope
 of a line through the logarithms of all points, by least squares; proofs that did not come to an end
 within the limit are left out of it, and counted.
 """
@@ -34,8 +35,8 @@ GOALS = (10, 20, 40, 80, 160, 320)
 TETHERS = (200, 250, 300, 350, 400, 450, 500, 550)
 OBSTACLES = (10, 20, 40, 80, 160)
 ROUNDS = 2000
-LEAST_S = 0.01
-"""Shorter times are those of the clock and of reading compiled code."""
+LEAST_S, LEAST_MIB = 0.002, 10.0
+"""Less is rounding: of the clock, and of what the process has anyway."""
 
 WHAT = {
     "roadmap": "taut: all classes",
@@ -75,6 +76,7 @@ def measured(job: tuple[str, float, int, float]) -> Sample:
     for solver in ("lns", "auto"):
         solve_graph(warm, solver, iteration_limit=5)
     problem = world(varied, value, seed)
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     seconds: dict[str, float] = {}
 
     def clocked(name: str, run: Any) -> Any:
@@ -86,7 +88,7 @@ def measured(job: tuple[str, float, int, float]) -> Sample:
     roadmap = clocked("roadmap", lambda: TautRoadmap(problem))
     graph: TravelGraph = roadmap.to_travel_graph()
     found = clocked("auto", lambda: solve_graph(graph, "auto", time_limit=limit))
-    mib = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**10
+    mib = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 2**10
     proven = found.status is Status.OPTIMAL
     if len(graph) <= 4000:
         again = TautRoadmap(problem).to_travel_graph()
@@ -95,9 +97,9 @@ def measured(job: tuple[str, float, int, float]) -> Sample:
     return Sample(varied, value, len(graph), seconds, proven, mib)
 
 
-def exponent(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
+def exponent(x: np.ndarray, y: np.ndarray, least: float) -> tuple[float, float]:
     """Slope of the line through the logarithms, and the share of the variance that it explains."""
-    held = np.isfinite(y) & (y >= LEAST_S)
+    held = np.isfinite(y) & (y >= least)
     if held.sum() < 3 or np.ptp(x[held]) == 0.0:
         return math.nan, math.nan
     u, v = np.log(x[held]), np.log(y[held])
@@ -123,29 +125,28 @@ def drawn(samples: list[Sample], path: str) -> None:
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(10, 6), layout="constrained")
-    panels = figure.subplots(2, 3, sharex="col")
+    panels = figure.subplots(2, 3, sharex="col", sharey="row")
     for k, varied in enumerate(("goals", "classes", "obstacles")):
-        above, below = panels[0][k], panels[1][k]
-        for (what, name), marker, colour in zip(
-            WHAT.items(), "os^D", SERIES, strict=False
-        ):  # fmt: skip
+        curves = [(panels[0][k], what, LEAST_S, name) for what, name in WHAT.items()]
+        for n, (panel, what, least, name) in enumerate(
+            [*curves, (panels[1][k], "memory", LEAST_MIB, "peak memory")]
+        ):
             x, y = against(samples, varied, what)
-            held = np.isfinite(y) & (y >= 1e-3)
-            above.plot(x[held], y[held], marker, color=colour, markersize=4, label=name)
-            slope, _ = exponent(x, y)
+            held = np.isfinite(y) & (y >= least)
+            look = {"color": SERIES[n] if what != "memory" else "#000000"}
+            panel.plot(x[held], y[held], "os^Dv"[n], markersize=4, label=name, **look)
+            slope, _ = exponent(x, y, least)
             if math.isfinite(slope):
                 fit = np.polyfit(np.log(x[held]), np.log(y[held]), 1)
                 ends = np.array([x[held].min(), x[held].max()])
-                above.plot(ends, np.exp(np.polyval(fit, np.log(ends))), color=colour, lw=1)
-        x, y = against(samples, varied, "memory")
-        below.plot(x, y, "o", color="#555555", markersize=4)
-        below.set(xscale="log", yscale="log", xlabel=varied)
-        above.set(xscale="log", yscale="log")
-        for panel in (above, below):
-            panel.grid(alpha=0.3, which="both")
+                panel.plot(ends, np.exp(np.polyval(fit, np.log(ends))), lw=1, **look)
+            panel.set(xscale="log", yscale="log")
+            panel.grid(alpha=0.3)
+        panels[1][k].set(xlabel=varied)
     panels[0][0].set(ylabel="seconds")
-    panels[1][0].set(ylabel="peak memory, MiB")
-    panels[0][0].legend(fontsize=8)
+    panels[1][0].set(ylabel="peak memory, MiB more")
+    names, labels = panels[0][1].get_legend_handles_labels()
+    figure.legend(names, labels, fontsize=8, loc="outside upper center", ncols=len(labels))
     save(figure, path)
 
 
@@ -174,12 +175,13 @@ def main() -> None:
         classes = [s.classes for s in some]
         for what in (*WHAT, "memory"):
             x, y = against(samples, varied, what)
-            slope, share = exponent(x, y)
+            slope, share = exponent(x, y, LEAST_MIB if what == "memory" else LEAST_S)
             last = y[int(np.argmax(np.where(np.isfinite(y), x, -1.0)))]
             unit = "MiB" if what == "memory" else "s"
             open_ = sum(not s.proven for s in some) if what == "auto" else ""
+            fitted = ["", ""] if math.isnan(slope) else [f"{slope:.2f}", f"{share:.2f}"]
             row(varied, f"{x.min():g}", f"{x.max():g}", f"{min(classes)} to {max(classes)}",
-                WHAT.get(what, "peak memory"), f"{slope:.2f}", f"{share:.2f}",
+                WHAT.get(what, "peak memory"), *fitted,
                 f"{last:.3g} {unit}", open_)  # fmt: skip
     print()
     if args.plot:
