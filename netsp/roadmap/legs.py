@@ -17,10 +17,11 @@ from netsp.compiled.kernel import kernel
 from netsp.errors import LimitReachedError, NetspError
 from netsp.hsignature import Word, concatenate, invert
 from netsp.memory import ask
+from netsp.roadmap.arcs import Arcs
 from netsp.roadmap.classes import TetherTree
 from netsp.roadmap.explore import run_explore
 from netsp.roadmap.paths import TautPaths
-from netsp.roadmap.pulled import Arcs, path_for, pull, pull_each
+from netsp.roadmap.pulled import path_for, pull, pull_each
 from netsp.roadmap.slits import Ends, Slits, flattened, room_for, slit_lengths, string
 from netsp.roadmap.trie import CORE, LETTER, PARENT, Trie, add_child, trie_child
 from netsp.travel.graph import UNTIMED

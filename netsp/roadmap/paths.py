@@ -12,9 +12,10 @@ from netsp.arrays import Floats, Ints
 from netsp.errors import InputError, NetspError
 from netsp.hsignature import Word
 from netsp.problem import Problem
+from netsp.roadmap.arcs import Arcs, arcs_of
 from netsp.roadmap.explore import run_explore
 from netsp.roadmap.outline import Outline, build_outline, is_free
-from netsp.roadmap.pulled import Arcs, arcs_of, pull_each, pull_one
+from netsp.roadmap.pulled import pull_each, pull_one
 from netsp.roadmap.shortest import ContactGraph
 from netsp.roadmap.slits import Ends, Slits, build_slits, flattened, slit_lengths
 from netsp.roadmap.tangents import ARC_STEP, TangentGraph, build_tangents

@@ -25,10 +25,44 @@ import numpy as np
 from netsp.arrays import Floats, Ints
 from netsp.compiled.kernel import kernel
 from netsp.geometry.kernels import TWO_PI, enters_polygon
-from netsp.problem import Circle, Problem
-from netsp.roadmap.outline import Outline
+from netsp.roadmap.arcs import (
+    AFTER_ARRIVAL,
+    AFTER_EDGES,
+    AFTER_LETTERS,
+    AFTER_SEGMENT,
+    ALONG,
+    ARRIVAL,
+    ARRIVES,
+    BEGIN,
+    CX,
+    CY,
+    END,
+    FIRST,
+    FIRST_EDGE,
+    GAPS,
+    GROWTH,
+    LEAVES,
+    LENGTH,
+    LETTERS,
+    MIDDLE_X,
+    MIDDLE_Y,
+    OWNER,
+    RADIUS,
+    RANK,
+    RAY_X,
+    RAY_Y,
+    ROUND,
+    SEGMENT,
+    TURN,
+    XMAX,
+    XMIN,
+    YMAX,
+    YMIN,
+    Arcs,
+    tangent,
+)
 from netsp.roadmap.slits import HIGH, LINE, LOW, Ends, Room, Slits, room_for, string
-from netsp.roadmap.tangents import ANGLE_TOLERANCE, TangentGraph
+from netsp.roadmap.tangents import ANGLE_TOLERANCE
 
 MOST_NODES = 256
 """Arcs that a path may bend around; longer ones are searched for."""
@@ -48,27 +82,6 @@ LITTLE_BACK = 0.5
 NOT_PULLED = -1.0
 """Instead of a length."""
 
-CX, CY, RADIUS, BEGIN, END = range(5)
-"""Columns of a disk: a directed arc, or a point of no radius. BEGIN to END are the angles that
-show; END is infinite where all do."""
-
-STARTS, LETTERS, AFTER_LETTERS, OWNER = range(4)
-"""Columns of whole numbers of a node: its first departure, where the letters of its whole arc begin
-and end, and an obstacle whose arc it is, -1 for points."""
-
-LENGTH, LEAVES, ARRIVES, TURN, ALONG = range(5)
-"""Columns of a departure: length, angles at both ends, angle from the arrival to the first
-departure there, and from the first departure of its own arc to itself."""
-
-FIRST, SEGMENT, AFTER_SEGMENT, ARRIVAL, AFTER_ARRIVAL, GAPS = range(6)
-"""And of whole numbers: the first departure at its end, and rows into the letters: of the segment,
-of the arc to that departure, and of the arc before itself."""
-
-XMIN, YMIN, XMAX, YMAX, ROUND, RAY_X, RAY_Y, RANK = range(8)
-FIRST_EDGE, AFTER_EDGES, GROWTH, MIDDLE_X, MIDDLE_Y = range(8, 13)
-"""Columns of an obstacle: its box; radius of a circle, negative for a polygon; representative
-point and rank of its line; its edges, and by how much they are grown; centre of a circle."""
-
 ARRIVING, LEAVING, X_IN, Y_IN, X_OUT, Y_OUT, STRIP, SLID = range(8)
 """Columns of a node of a path: angles on its arc where the string first and last bends (arrival and
 departure are less than half a turn from them, so that whole turns are counted); where the string is
@@ -76,43 +89,6 @@ then, and the strip that it comes from; and the angle slid before the departure.
 
 NODE, EDGE = range(2)
 """And of whole numbers: directed arc or point, and departure."""
-
-
-class Arcs(NamedTuple):
-    """The tangent graph as paths are pulled over it. There are few arrays and many columns, for
-    compiled functions hand each array over in seven parts and more.
-
-    Attributes
-    ----------
-    of, row
-        Arcs of each obstacle: of[row[o]] … of[row[o + 1] - 1].
-    disk, span
-        (nodes, 5) and (nodes, 4) columns CX … and STARTS ….
-    table
-        (slots, 2) hash table of departures by `source * nodes + target`, -1 where empty.
-    real, whole
-        (e, 5) and (e, 6) columns LENGTH … and FIRST … of the departures.
-    letters
-        Of segments and arcs.
-    solid
-        (n, 13) columns XMIN ….
-    edges
-        (k, 4) of polygons.
-    points
-        How many nodes are directed arcs; points follow.
-    """
-
-    of: Ints
-    row: Ints
-    disk: Floats
-    span: Ints
-    table: Ints
-    real: Floats
-    whole: Ints
-    letters: Ints
-    solid: Floats
-    edges: Floats
-    points: int
 
 
 class Path(NamedTuple):
@@ -123,7 +99,7 @@ class Path(NamedTuple):
     real, whole
         (k, 8) and (k, 2) columns ARRIVING … and NODE ….
     word
-        (w,) letters written, reduced as they come; their number first.
+        (w,) letters written, reduced as they come, from the second place on.
     """
 
     real: Floats
@@ -138,94 +114,6 @@ def path_for(longest: int) -> Path:
         np.empty((MOST_NODES, 8)), np.empty((MOST_NODES, 2), dtype=np.int64),
         np.empty(2 * longest + 64, dtype=np.int64),
     )  # fmt: skip
-
-
-def arcs_of(problem: Problem, outline: Outline, graph: TangentGraph, slits: Slits) -> Arcs:
-    """What paths are pulled over."""
-    arcs, nodes = len(graph.arcs), len(graph.start) - 1
-    disk = np.zeros((nodes, 5))
-    disk[: 2 * arcs] = np.repeat(graph.arcs, 2, axis=0)
-    disk[2 * arcs :, :2] = graph.points
-    disk[: 2 * arcs, END][np.repeat(graph.full, 2)] = np.inf
-    owner = np.full(nodes, -1, dtype=np.int64)
-    of, row = [np.zeros(0, dtype=np.int64)], [0]
-    at: dict[tuple[float, ...], list[int]] = {}
-    for k, (x, y, r) in enumerate(graph.arcs[:, :3].tolist()):
-        at.setdefault((x, y, r), []).append(k)
-    for o, obstacle in enumerate(problem.obstacles):
-        if isinstance(obstacle, Circle):
-            corners, radius = np.array([obstacle.center]), outline.blockers.circles[o, 2]
-        else:
-            corners, radius = np.array(obstacle.polygon), outline.blockers.grow[o]
-        disks = dict.fromkeys((x, y, float(radius)) for x, y in (corners - outline.origin).tolist())
-        own = np.array([k for disk in disks for k in at.get(disk, [])], dtype=np.int64)
-        owner[2 * own] = owner[2 * own + 1] = o
-        of.append(own)
-        row.append(row[-1] + len(own))
-    source = np.repeat(np.arange(nodes), np.diff(graph.start))
-    gap_letters, gaps, begin = _gap_letters(graph)
-    real = np.column_stack([graph.length, graph.angle, graph.turn, _along(graph)])
-    table = np.full((1 << max(4, (3 * len(source)).bit_length()), 2), -1, dtype=np.int64)
-    _fill(source * nodes + graph.target, table)
-    whole = np.column_stack([graph.first, graph.segment_row, graph.arrival_row, gaps])
-    blockers = outline.blockers
-    solid = np.column_stack([
-        blockers.box, blockers.circles[:, 2], graph.rays, slits.rank, blockers.edge_start[:-1],
-        blockers.edge_start[1:], blockers.grow - blockers.eps, blockers.circles[:, :2],
-    ])  # fmt: skip
-    return Arcs(
-        np.concatenate(of), np.array(row), disk, np.column_stack([begin, owner]), table, real,
-        whole, np.concatenate([graph.letters.astype(np.int64), gap_letters]), solid,
-        blockers.edges, 2 * arcs,
-    )  # fmt: skip
-
-
-def _along(graph: TangentGraph) -> Floats:
-    """(e,) angle from the first departure of an arc to each."""
-    step = np.maximum(graph.gap, 0.0)
-    before = np.concatenate([[0.0], np.cumsum(step)])
-    first = np.repeat(graph.start[:-1], np.diff(graph.start))
-    return np.asarray(before[:-1] - before[first])
-
-
-def _gap_letters(graph: TangentGraph) -> tuple[Ints, Ints, Ints]:
-    """The letters of whole arcs, each in one row, to come after those of the graph; (e,) where in
-    them each departure is; and (nodes, 3) columns STARTS … of the nodes."""
-    count = graph.gap_row[:, 1] - graph.gap_row[:, 0]
-    base = len(graph.letters)
-    begin = base + np.concatenate([[0], np.cumsum(count)]).astype(np.int64)
-    letters = [graph.letters[a:b] for a, b in graph.gap_row[count > 0].tolist()]
-    span = np.column_stack([graph.start[:-1], begin[graph.start[:-1]], begin[graph.start[1:]]])
-    together = np.concatenate([*letters, np.zeros(0)]).astype(np.int64)
-    return together, begin[:-1], span.astype(np.int64)
-
-
-@kernel
-def _slot(code: int, slots: int) -> int:
-    """Where to look first: Knuth's multiplicative hashing."""
-    return int(((code * 0x9E3779B1) >> 7) & (slots - 1))
-
-
-@kernel
-def _fill(code: Ints, table: Ints) -> None:
-    slots = len(table)
-    for e in range(len(code)):
-        slot = _slot(code[e], slots)
-        while table[slot, 0] >= 0:
-            slot = (slot + 1) & (slots - 1)
-        table[slot, 0], table[slot, 1] = code[e], e
-
-
-@kernel
-def _tangent(code: int, table: Ints) -> int:
-    """The departure of a code; -1 if there is none."""
-    slots = len(table)
-    slot = _slot(code, slots)
-    while table[slot, 0] >= 0:
-        if table[slot, 0] == code:
-            return int(table[slot, 1])
-        slot = (slot + 1) & (slots - 1)
-    return -1
 
 
 @kernel
@@ -317,7 +205,7 @@ def _tightened(
             _close_up(i + 1, count, at, on)
             count -= 1
             continue
-        e = _tangent(a * nodes + b, table)
+        e = tangent(a * nodes + b, table)
         if e < 0:
             new, angle = _between(a, b, i, of, row, disk, span, solid, edges, at)
             if new < 0 or new in (a, b):
