@@ -35,7 +35,7 @@ GOALS = (10, 20, 40, 80, 160, 320)
 TETHERS = (200, 250, 300, 350, 400, 450, 500, 550)
 OBSTACLES = (10, 20, 40, 80, 160)
 ROUNDS = 2000
-LEAST_S, LEAST_MIB = 0.002, 10.0
+LEAST_S, LEAST_MIB = 0.002, 20.0
 """Less is rounding: of the clock, and of what the process has anyway."""
 
 WHAT = {
