@@ -1,6 +1,7 @@
 """The mip solver proves what brute force finds, and is honest when it cannot."""
 
 import gc
+import itertools
 import sys
 import time
 import weakref
@@ -19,6 +20,7 @@ from netsp.mip.bound import exact_bound
 from netsp.mip.cbc_program import CbcRelaxation
 from netsp.mip.cuts import Cut
 from netsp.mip.highs import HighsRelaxation
+from netsp.mip.overgoals import best_tree
 from netsp.mip.prices import Prices
 from netsp.mip.solve import Params
 from netsp.mip.subtours import components, fractional_cuts
@@ -396,6 +398,39 @@ def test_the_matrices_of_a_proof_go_when_it_ends(monkeypatch):
     assert found.status is Status.OPTIMAL
     assert made
     assert not left
+
+
+@given(
+    st.lists(st.integers(0, 9) | st.floats(0.0, 9.0), min_size=36, max_size=36),
+    st.integers(3, 6), st.booleans(),
+)  # fmt: skip
+def test_a_one_tree_is_no_longer_than_any_tour(numbers, n, hurried):
+    half = np.triu(np.array(numbers).reshape(6, 6)[:n, :n], 1)
+    lengths = half + half.T
+    best = min(
+        sum(lengths[a, b] for a, b in itertools.pairwise((0, *order, 0)))
+        for order in itertools.permutations(range(1, n))
+    )
+    assert 0.0 <= best_tree(lengths, lambda: hurried) <= best * (1 + 1e-9) + 1e-9
+
+
+def test_one_trees_come_near_the_tour_of_many_places():
+    place = np.random.default_rng(0).random((60, 2))
+    lengths = np.hypot(*(place[:, None] - place[None]).transpose(2, 0, 1))
+    apart = lengths + np.diag(np.full(60, np.inf))
+    tour = solve(TravelGraph.from_costs(apart, range(60)))
+    assert tour.status is Status.OPTIMAL
+    assert best_tree(lengths, lambda: False) >= 0.97 * tour.length
+
+
+def test_between_goals_straight_lines_bound_legs_when_there_is_no_time():
+    graph = travel_graph(far_world(0, goals=6, tether_length=300.0))
+    hurried, whole = graph.between_goals(lambda: True), graph.between_goals()
+    assert (hurried[~np.eye(7, dtype=bool)] > 0.0).all()
+    assert (hurried <= whole * (1 + 1e-9)).all()
+    legs = np.isfinite(graph.costs)
+    among = whole[graph.cluster[:, None], graph.cluster[None, :]]
+    assert (among[legs] <= graph.costs[legs] * (1 + 1e-9)).all()
 
 
 def test_what_is_done_with_thousands_of_classes_only_proves_the_same_with_hundreds(monkeypatch):

@@ -95,7 +95,7 @@ class ContactGraph:
 
     def between(self, height: Floats, up: Callable[[], bool]) -> Floats:
         """(points, points) no more than the 3D length of any path between two points, in any class;
-        0 for those that were not looked at when the time was up.
+        straight lines for those that were not looked at when the time was up.
 
         Parameters
         ----------
@@ -109,6 +109,9 @@ class ContactGraph:
             rows = range(first, min(first + AT_ONCE, self.points))
             planar[rows] = self.lengths(rows)
         planar[~np.isfinite(planar)] = 0.0
+        x, y = self.outline.points.T
+        straight = np.hypot(np.subtract.outer(x, x), np.subtract.outer(y, y))
+        planar = np.maximum(planar, straight * (1.0 - 1e-12))
         return np.hypot(np.maximum(planar, planar.T), np.subtract.outer(height, height))
 
     def rest(self, goal: int) -> Rest:

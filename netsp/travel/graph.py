@@ -358,8 +358,7 @@ class TravelGraph(Drawn):
         Returns
         -------
         ndarray, shape (n + 1, n + 1)
-            No more than any leg between two goals, or base and goal; 0 where nothing is known, or
-            the time was up.
+            No more than any leg between two goals, or base and goal; 0 where nothing is known.
         """
         if self._between is not None:
             return self._between(up)
