@@ -111,8 +111,8 @@ class ContactGraph:
         planar[~np.isfinite(planar)] = 0.0
         x, y = self.outline.points.T
         straight = np.hypot(np.subtract.outer(x, x), np.subtract.outer(y, y))
-        planar = np.maximum(planar, straight * (1.0 - 1e-12))
-        return np.hypot(np.maximum(planar, planar.T), np.subtract.outer(height, height))
+        planar = np.maximum(np.maximum(planar, planar.T), straight * (1.0 - 1e-12))
+        return np.asarray(np.hypot(planar, np.subtract.outer(height, height)))
 
     def rest(self, goal: int) -> Rest:
         """What is left to a point from the base and from the end of every tangent."""
