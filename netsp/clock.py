@@ -53,6 +53,7 @@ class Clock:
         self.start = time.monotonic()
         self.deadline = math.inf if limit is None else self.start + limit
         self._stop = _Stop(should_stop) if should_stop is not None else None
+        self._family: _Family = _Family() if within is None else within._family
         if within is not None:
             self.deadline = min(self.deadline, within.deadline)
             self._stop = self._stop or within._stop
@@ -86,13 +87,20 @@ class Clock:
 
     @property
     def stopped(self) -> bool:
-        """Whether `should_stop` has said so."""
-        return self._stop is not None and self._stop.now
+        """Whether `should_stop` has said so, or `end` was called."""
+        return self._family.ended or (self._stop is not None and self._stop.now)
 
     @property
     def stoppable(self) -> bool:
         """Whether the time may be up before the deadline."""
         return self._stop is not None
+
+    def end(self) -> None:
+        """The time is up for this clock and all that have a clock in common with it: who was
+        interrupted in a part of some work does not want the next part."""
+        self._family.ended = True
+        if self._flag is not None:
+            self._flag[0] = 1
 
     def close(self) -> None:
         """Ask `should_stop` no more; what it raised is raised here."""
@@ -148,6 +156,12 @@ class Clock:
         if failure:
             raise failure[0]
         return outcome[0]
+
+
+class _Family:
+    """What clocks within one another share."""
+
+    ended = False
 
 
 TimeLimit = float | Clock | None

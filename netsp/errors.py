@@ -148,7 +148,7 @@ def interrupted(error: BaseException) -> bool:
     """Whether an error is Ctrl-C.
 
     Python says SystemError ("returned a result with an exception set") where the signal comes just
-    as a compiled function returns.
+    as a compiled function returns, and once more for each function that this one was called by.
 
     Parameters
     ----------
@@ -160,5 +160,7 @@ def interrupted(error: BaseException) -> bool:
     bool
         Whether it is, or comes of, a KeyboardInterrupt.
     """
-    cause = error.__cause__ if isinstance(error, SystemError) else error
+    cause: BaseException | None = error
+    while isinstance(cause, SystemError):
+        cause = cause.__cause__
     return isinstance(cause, KeyboardInterrupt)

@@ -370,7 +370,7 @@ def test_with_many_classes_of_few_goals_a_bound_comes_before_all_legs_are_bounde
 
     module = sys.modules["netsp.mip.solve"]  # the function of that name hides it
     monkeypatch.setattr(module, "LegCosts", OfSome)
-    monkeypatch.setattr(module, "MANY", 10)
+    monkeypatch.setattr(module, "CORE_FIRST", 10)
     monkeypatch.setattr(searching, "LARGER", 2)
     assert len(graph) > MEASURE_AT_ONCE
     found = solve_graph(graph, "auto")
@@ -431,6 +431,48 @@ def test_between_goals_straight_lines_bound_legs_when_there_is_no_time():
     legs = np.isfinite(graph.costs)
     among = whole[graph.cluster[:, None], graph.cluster[None, :]]
     assert (among[legs] <= graph.costs[legs] * (1 + 1e-9)).all()
+
+
+def from_kernel():
+    """Ctrl-C as it comes out of a compiled function that was called by another."""
+    try:
+        try:
+            raise KeyboardInterrupt
+        except KeyboardInterrupt as pressed:
+            raise SystemError("returned a result with an exception set") from pressed
+    except SystemError as inner:
+        raise SystemError("returned a result with an exception set") from inner
+
+
+def plainly():
+    raise KeyboardInterrupt
+
+
+@pytest.mark.parametrize("press", [plainly, from_kernel])
+def test_ctrl_c_in_a_proof_over_goals_ends_the_proof_over_classes_too(monkeypatch, press):
+    graph, calls = travel_graph(far_world(0, goals=8, tether_length=500.0)), []
+
+    def cuts(*_):
+        calls.append(1)
+        press()
+
+    monkeypatch.setattr(root, "fractional_cuts", cuts)
+    monkeypatch.setattr(sys.modules["netsp.mip.solve"], "CORE_FIRST", 10)
+    monkeypatch.setattr(searching, "LARGER", 2)
+    found = solve(graph)
+    assert len(calls) == 1
+    assert found.status is Status.FEASIBLE
+    assert graph.is_tour(found.tour)
+    assert found.length == pytest.approx(graph.tour_length(found.tour))
+
+
+def test_what_comes_of_something_else_than_ctrl_c_is_no_interrupt(monkeypatch):
+    def cuts(*_):
+        raise SystemError("of another kind")
+
+    monkeypatch.setattr(root, "fractional_cuts", cuts)
+    with pytest.raises(SystemError, match="another kind"):
+        solve(travel_graph(far_world(0, goals=8, tether_length=300.0)))
 
 
 def test_what_is_done_with_thousands_of_classes_only_proves_the_same_with_hundreds(monkeypatch):

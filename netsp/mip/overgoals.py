@@ -27,6 +27,9 @@ MOST_TREES, FIRST_STEP, SHORTER, PATIENCE = 60, 1.0, 0.7, 4
 """1-trees at most; the first step, as a share of Polyak's; and by how much steps get shorter when
 so many trees have raised nothing."""
 
+MOST_PROGRAMS = 300
+"""Of the proof over goals: with hundreds of them it would take the time of that over classes."""
+
 ABOVE = 1.1
 """The tour is taken to be so many times as long as the first bound, until one knows better."""
 
@@ -45,7 +48,8 @@ def bound_over_goals(graph: TravelGraph, prove: Prove, limits: Limits) -> float:
     least = graph.between_goals(lambda: clock.up)
     over = TravelGraph.from_costs(least, range(graph.goal_count + 1))
     trees = best_tree(least, lambda: clock.up)
-    bound = prove(over, replace(limits, time=clock)).lower_bound or 0.0
+    most = MOST_PROGRAMS if limits.iterations is None else min(limits.iterations, MOST_PROGRAMS)
+    bound = prove(over, replace(limits, time=clock, iterations=most)).lower_bound or 0.0
     bound = max(bound, trees) * (1.0 - ROUNDING)
     graph.bound_in_any_class = max(graph.bound_in_any_class, bound)
     return bound

@@ -18,7 +18,7 @@ from netsp.mip.cuts import Cut
 from netsp.mip.prices import Prices
 from netsp.mip.program import Point, Relaxation
 from netsp.mip.subtours import branches, fractional_cuts
-from netsp.solving.legcosts import LegCosts, squeezed
+from netsp.solving.legcosts import ROWS, LegCosts, squeezed
 from netsp.solving.run import Stop
 from netsp.solving.searching import SearchingRun
 
@@ -31,9 +31,6 @@ PRICED_PER_VERTEX, MOST_PRICED = 3, 3000
 PRICE_EVERY, PRICE_SELDOM = 4, 32
 """Rounds of cuts between two looks at the prices of all legs, unless no cut is found; every look
 that brings hardly a leg and raises the bound by little doubles the first, up to the second."""
-
-ROWS = 512
-"""Of a matrix whose places are sorted at a time."""
 
 MIX = 0.6
 """Cuts are first sought between the LP's point and the incumbent: those found there go deeper

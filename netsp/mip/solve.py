@@ -50,7 +50,7 @@ SEARCH_AGAIN = 0.5
 FEW_LEGS = 600
 """So few legs are left to cuts, where walks that remember ever more take long over them."""
 
-MANY = 3000
+CORE_FIRST = 3000
 """With more vertices a first bound, and a proof over a core of them, come before all are bounded,
 also where goals are few."""
 
@@ -134,7 +134,7 @@ class MipRun(SearchingRun):
             if not self.trivial():
                 self.begin()
                 warm: Warm | None = None
-                if not walks or len(self.graph) > MANY:
+                if not walks or len(self.graph) > CORE_FIRST:
                     with self.core() as core:
                         if core is not None:
                             self.bound_by_goals(backend)

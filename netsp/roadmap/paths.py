@@ -90,18 +90,18 @@ class TautPaths:
             A word without a path within the longest that this was made for.
         """
         from_, to = np.asarray(a, dtype=np.int64), np.asarray(b, dtype=np.int64)
-        known = len(self.outline.rays)
+        ends_of = list(zip(from_.tolist(), to.tolist(), words, strict=True))
+        for p, q, word in ends_of:
+            if not self._knows(word):
+                self.planar_length(p, q, word)
         points = np.concatenate([from_, to])
-        letters, row = flattened([
-            *[()] * len(from_), *(w if max(map(abs, w), default=0) <= known else () for w in words)
-        ])  # fmt: skip
+        letters, row = flattened([*[()] * len(from_), *words])
         places = self.outline.places[points]
         ends = Ends(places, self.slits.cells(places[:, 0]), letters, row)
         out, pairs = np.empty(len(from_)), np.arange(len(from_))
         pull_each(pairs, pairs + len(pairs), ends, points, self.slits, self.arcs, out)
-        for k, (p, q, word) in enumerate(zip(from_.tolist(), to.tolist(), words, strict=True)):
-            if out[k] < 0.0 or max(map(abs, word), default=0) > known:
-                out[k] = self.planar_length(p, q, word)
+        for k in np.flatnonzero(out < 0.0).tolist():
+            out[k] = self.planar_length(*ends_of[k])
         return np.asarray(np.hypot(out, self._z[to] - self._z[from_]))
 
     def planar_length(self, a: int, b: int, word: Word, longest: float | None = None) -> float:
@@ -197,7 +197,7 @@ class TautPaths:
         self, a: int, b: int, word: Word, longest: float | None
     ) -> tuple[float, list[tuple[int, float]]] | None:
         """Length and pieces; None if there is no path so short."""
-        if any(abs(letter) > len(self.outline.rays) for letter in word):
+        if not self._knows(word):
             return None
         length, edges, slid = self._pulled(a, b, word)
         if length >= 0.0:
@@ -223,6 +223,10 @@ class TautPaths:
                 return None
             step = min(step**2, DEEPEST)
             limit = min(max(step * limit, LEAST * most), most)
+
+    def _knows(self, word: Word) -> bool:
+        """Whether there is an obstacle for every letter."""
+        return all(abs(letter) <= len(self.outline.rays) for letter in word)
 
     def _pulled(self, a: int, b: int, word: Word) -> tuple[float, Ints, Floats]:
         """As of `netsp.roadmap.pulled.pull_one`."""

@@ -424,11 +424,13 @@ def _proven(
         if i > 0:
             arrived, node = on[i - 1, EDGE], on[i, NODE]
             f = whole[arrived, FIRST]
+            if f < 0:
+                return NOT_PULLED
             by = real[arrived, TURN] + real[e, ALONG] - real[f, ALONG]
             turns = round((at[i, SLID] - by) / TWO_PI)
             by += turns * TWO_PI
             whole_circle = disk[node, END] == np.inf
-            if f < 0 or turns < 0 or by < -ANGLE_TOLERANCE:
+            if turns < 0 or by < -ANGLE_TOLERANCE:
                 return NOT_PULLED
             if (turns and not whole_circle) or (turns == 0 and e < f):
                 return NOT_PULLED

@@ -30,7 +30,7 @@ BYTES_PER_LEG, BYTES_ROUNDED = 24.0, 8.0
 """Of memory that a proof takes: the values, what is known of them, and what is in between."""
 
 ROWS = 512
-"""Of the matrix that are bounded or measured at a time."""
+"""Of a matrix that are worked on at a time, so that what is in between stays small."""
 
 
 class LegCosts:

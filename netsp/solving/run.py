@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from netsp.clock import Clock
-from netsp.errors import InputError, LimitReachedError, MemoryLimitError
+from netsp.errors import InputError, LimitReachedError, MemoryLimitError, interrupted
 from netsp.solution import Status
 from netsp.solving.limits import Limits
 from netsp.travel.baseless import BaselessGraph
@@ -96,7 +96,11 @@ class SolverRun:
             yield
         except MemoryLimitError:
             raise
-        except (Stop, LimitReachedError, KeyboardInterrupt):
+        except (Stop, LimitReachedError, KeyboardInterrupt, SystemError) as error:
+            if interrupted(error):
+                self.clock.end()  # for the run that this one is a part of, too
+            elif isinstance(error, SystemError):
+                raise
             self.stopped = True
             if not blind:
                 self.start()
