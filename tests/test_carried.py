@@ -9,7 +9,7 @@ import pytest
 
 from netsp import Circle, Problem, Solution, solve, travel_graph, verify
 from netsp.clock import Clock
-from netsp.roadmap import legs
+from netsp.roadmap import sought
 from netsp.roadmap.taut import TautRoadmap
 from netsp.solvers import carried
 from netsp.solvers import solve as by_name
@@ -96,10 +96,10 @@ def test_legs_sought_within_the_slits_first_are_the_same_legs(monkeypatch, seed)
     found = TautRoadmap(problem, max_classes=60)
     some = np.arange(len(found.cluster))
     quick = found.legs.lengths(some)
-    monkeypatch.setattr(legs, "WORTH", -1.0)  # at once as long as the tethers allow
+    monkeypatch.setattr(sought, "WORTH", -1.0)  # at once as long as the tethers allow
     assert (found.legs.lengths(some) == quick).all()
-    monkeypatch.setattr(legs, "WORTH", np.inf)
-    monkeypatch.setattr(legs, "EXCESS", 1e-9)  # hardly any leg is found at first
+    monkeypatch.setattr(sought, "WORTH", np.inf)
+    monkeypatch.setattr(sought, "EXCESS", 1e-9)  # hardly any leg is found at first
     assert (found.legs.lengths(some) == quick).all()
 
 
