@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from netsp.arrays import Ints
+from netsp.clock import Clock
 from netsp.lns.layers import Instance
 from netsp.lns.search import Search
 from netsp.solving.limits import Limits
@@ -34,7 +35,7 @@ class Params:
     """
 
     classes: int = 0
-    restarts: int = 3
+    restarts: int = 5
 
     def __post_init__(self) -> None:
         if self.classes < 0:
@@ -65,18 +66,17 @@ def _search(run: SolverRun, rng: np.random.Generator, chosen: Params) -> None:
     if not by_clock and run.iteration_limit == np.inf:
         run.iteration_limit = ROUNDS_PER_GOAL * graph.goal_count
     total = 0 if by_clock else int(run.iteration_limit)
-    begin = run.clock.elapsed
     for k in range(chosen.restarts):
         start = None if run.tour is None else graph.cluster[list(run.tour)]
         run.check()
-        search = Search(instance, rng, start, run.clock)
+        clock = run.clock.part(1.0 / (chosen.restarts - k))
+        search = Search(instance, rng, start, clock)
         search.settle()
         _take(run, search)
         run.report("settled", current=search.length)
 
-        def progress(k: int = k) -> float:
-            share = (run.clock.elapsed - begin) / max((run.clock.limit or 1.0) - begin, 1e-9)
-            return share * chosen.restarts - k
+        def progress(clock: Clock = clock) -> float:
+            return clock.elapsed / (clock.limit or 1.0)
 
         def tell(count: int, search: Search = search) -> None:
             run.iterations += count
@@ -85,7 +85,7 @@ def _search(run: SolverRun, rng: np.random.Generator, chosen: Params) -> None:
             run.report("search", current=search.length)
 
         rounds = total * (k + 1) // chosen.restarts - total * k // chosen.restarts
-        search.run(np.inf if by_clock else rounds, run.clock, progress if by_clock else None, tell)
+        search.run(np.inf if by_clock else rounds, clock, progress if by_clock else None, tell)
 
 
 def core_of(run: SolverRun, classes: int = 0, vertices: int = MOST_VERTICES) -> Ints:

@@ -59,9 +59,10 @@ def exact_bound(costs: Floats, cluster: Ints, cuts: list[Cut], duals: Duals) -> 
         for v in range(n):
             if u != v and np.isfinite(costs[u, v]):
                 r = Fraction(float(costs[u, v])) - degree[u] - degree[v]
-                pair = tuple(sorted((int(cluster[u]), int(cluster[v]))))
+                pair = {int(cluster[u]), int(cluster[v])}
                 r -= sum(mu for c, mu in active if c.inside[u] and c.inside[v])
-                legs[u].append(r - sum(mu for c, mu in active if pair in c.teeth))
+                bitten = sum(mu for c, mu in active if any(pair <= set(t) for t in c.teeth))
+                legs[u].append(r - bitten)
     vertex = []
     for v in range(n):
         r = 2 * degree[v] - cluster_dual[cluster[v]]

@@ -141,7 +141,8 @@ class CbcInteger:
                 for v, x in self._x.items()
                 if cut.inside[v] and self.cluster[v] != cut.cluster
             ]
-            terms += [(self._y[k], 1.0) for k in cut.within(self.cluster, self.legs)]
+            rows, times = cut.within(self.cluster, self.legs)
+            terms += [(self._y[k], float(t)) for k, t in zip(rows, times, strict=True)]
             if terms:
                 name = f"cut_{len(self.cuts)}"
                 _row(self.problem, terms, pulp.LpConstraintLE, cut.room, name)

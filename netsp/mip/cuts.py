@@ -12,40 +12,50 @@ from netsp.arrays import Bools, Floats, Ints
 
 @dataclass(frozen=True)
 class Cut:
-    """The cut y(E(S)) + y(F) <= x(S \\ C) + `room`: `inside` marks S, `cluster` is C, `teeth` are
-    the pairs of clusters F.
+    """The cut y(E(S)) + Σ y(E(T)) <= x(S \\ C) + `room`: `inside` marks S, `cluster` is C, `teeth`
+    are the sets of clusters T.
 
-    A subtour cut has no teeth. A 2-matching inequality (`netsp.mip.blossoms`) has an odd number of
-    them, each with one end in S, a union of clusters, and no C (-1).
+    A subtour cut has no teeth. A comb (`netsp.mip.blossoms`, `netsp.mip.combs`) has an odd number of
+    them, each partly in S, a union of clusters, and no C (-1). Teeth of more than two clusters
+    share none.
     """
 
     inside: Bools
     cluster: int
-    teeth: tuple[tuple[int, int], ...] = ()
+    teeth: tuple[tuple[int, ...], ...] = ()
 
     @property
     def room(self) -> float:
-        """(|F| - 1) / 2 with teeth, else 0."""
-        return 0.5 * (len(self.teeth) - 1) if self.teeth else 0.0
+        """Σ (|T| - 1) - (k + 1) / 2 with k teeth, else 0; (k - 1) / 2 if each is a pair."""
+        k = len(self.teeth)
+        return sum(len(t) - 1 for t in self.teeth) - 0.5 * (k + 1) if k else 0.0
 
-    def bites(self, cluster: Ints, legs: Ints) -> Bools:
-        """(k,) legs (k, 2) between the two clusters of a tooth."""
-        out = np.zeros(len(legs), dtype=bool)
-        if self.teeth:
-            m = int(cluster.max()) + 1
-            ends = np.sort(cluster[legs], axis=1)
-            out = np.isin(ends[:, 0] * m + ends[:, 1], [g * m + h for g, h in self.teeth])
+    def bitten(self, clusters: int) -> Bools:
+        """(m + 1, m + 1) pairs of different clusters within a tooth."""
+        out = np.zeros((clusters, clusters), dtype=bool)
+        for tooth in self.teeth:
+            out[np.ix_(tooth, tooth)] = True
         return out
 
-    def within(self, cluster: Ints, legs: Ints) -> Ints:
-        """Rows of the legs on the left side."""
+    def bites(self, cluster: Ints, legs: Ints) -> Bools:
+        """(k,) legs (k, 2) between clusters of a tooth."""
+        if not self.teeth:
+            return np.zeros(len(legs), dtype=bool)
+        ends = cluster[legs]
+        return np.asarray(self.bitten(int(cluster.max()) + 1)[ends[:, 0], ends[:, 1]])
+
+    def within(self, cluster: Ints, legs: Ints) -> tuple[Ints, Floats]:
+        """Rows of the legs on the left side, and how often they stand there: a leg may be within
+        the handle and within a tooth."""
         both = self.inside[legs[:, 0]] & self.inside[legs[:, 1]]
-        return np.flatnonzero(both | self.bites(cluster, legs))
+        times = both.astype(np.float64) + self.bites(cluster, legs)
+        rows = np.flatnonzero(times)
+        return rows, times[rows]
 
 
 def cut_coefficients(cuts: Sequence[Cut], cluster: Ints, legs: Ints) -> Floats:
-    """(cuts, legs) coefficients of y(δ(S)) - y at S ∩ C - 2 y(F) >= -2 room: 1 for a leg out of
-    S \\ C, -1 for one between S ∩ C and S \\ C or in a tooth, else 0."""
+    """(cuts, legs) coefficients of y(δ(S)) - y at S ∩ C - 2 Σ y(E(T)) >= -2 room: 1 for a leg out of
+    S \\ C, -1 for one between S ∩ C and S \\ C, and 2 less in a tooth, else 0."""
     out = np.zeros((len(cuts), len(legs)))
     for k, cut in enumerate(cuts):
         u, v = cut.inside[legs[:, 0]], cut.inside[legs[:, 1]]

@@ -132,6 +132,28 @@ class HighsRelaxation:
         n = len(costs)
         self._highs.changeColsCost(n, np.arange(n, dtype=np.int32), costs * self._scale)
 
+    def set_alive(self, alive: Bools) -> None:
+        """Let only the legs marked be used."""
+        n = len(alive)
+        self._highs.changeColsBounds(
+            n, np.arange(n, dtype=np.int32), np.zeros(n), alive.astype(np.float64)
+        )
+
+    def probe(self, costs: Floats, alive: Bools, steps: int) -> float:
+        """The objective after so many simplex steps with other costs and legs; inf where these
+        show that there is no solution. The basis is put back; costs and legs are not."""
+        h = self._highs
+        basis = h.getBasis()
+        self.set_costs(costs)
+        self.set_alive(alive)
+        h.setOptionValue("simplex_iteration_limit", steps)
+        h.run()
+        h.setOptionValue("simplex_iteration_limit", highspy.kHighsIInf)
+        infeasible = h.getModelStatus() == highspy.HighsModelStatus.kInfeasible
+        value = math.inf if infeasible else float(h.getInfo().objective_function_value)
+        h.setBasis(basis)
+        return value / self._scale
+
     def add_cuts(self, cuts: list[Cut]) -> None:
         """Bring cuts into the program."""
         if not cuts:
@@ -227,10 +249,10 @@ class HighsInteger:
         for cut in cuts:
             at = self.vertices
             outside_c = at[cut.inside[at] & (self.cluster[at] != cut.cluster)]
-            within = cut.within(self.cluster, self.legs)
+            within, times = cut.within(self.cluster, self.legs)
             starts.append(count)
             index += [self._position[outside_c], len(self.vertices) + within]
-            value += [np.full(len(outside_c), -1.0), np.ones(len(within))]
+            value += [np.full(len(outside_c), -1.0), times]
             count += len(outside_c) + len(within)
         n = len(cuts)
         self._highs.addRows(

@@ -35,7 +35,7 @@ class Terms(NamedTuple):
     """What a reduced cost is made of, c - π_u - π_v + shared - bitten, for the kernels.
 
     `group` is that of each vertex, of vertices that the same cuts hold; `shared` (groups, groups)
-    what the cuts that hold both ends cost; `bitten` (m + 1, m + 1) what teeth between two clusters
+    what the cuts that hold both ends cost; `bitten` (m + 1, m + 1) what teeth that hold two clusters
     do; `vertex` r_v; `least` and `second` are r_uv of the two cheapest legs of each vertex.
     """
 
@@ -90,9 +90,8 @@ class Prices:
         m = int(cluster.max(initial=0)) + 1
         bitten = np.zeros((m, m))
         for k in active:
-            for g, h in cuts[k].teeth:
-                bitten[g, h] += duals.cut[k]
-                bitten[h, g] += duals.cut[k]
+            if cuts[k].teeth:
+                bitten[cuts[k].bitten(m)] += duals.cut[k]
         vertex = 2.0 * duals.degree - duals.cluster[cluster]
         for k in active:
             vertex[cuts[k].inside & (cluster != cuts[k].cluster)] += duals.cut[k]

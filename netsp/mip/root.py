@@ -13,7 +13,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from netsp.arrays import Bools, Floats, Ints
-from netsp.mip.blossoms import blossom_cuts
+from netsp.mip.blossoms import blossom_cuts, shrunk
+from netsp.mip.combs import comb_cuts, tight_sets
 from netsp.mip.cuts import Cut
 from netsp.mip.prices import Prices
 from netsp.mip.program import Point, Relaxation
@@ -197,9 +198,9 @@ class Root:
             point = self._relaxed()
             if not (settling or pace.look_is_due):
                 pace.rounds += 1
-                cuts = self._separate(point)
+                cuts = self.separate(point)
                 if cuts:
-                    self._purge(point, risen=False)
+                    self.purge(point, risen=False)
                     self.lp.add_cuts(cuts)
                     continue
             priced, risen = self._look(point, pace, lean=not settling)
@@ -213,12 +214,12 @@ class Root:
             settling = priced and self._promises(point, SETTLED if settling else SETTLE)
             if settling:
                 continue
-            cuts = self._separate(point)
+            cuts = self.separate(point)
             patience = PATIENCE if self.costs.exact is not None else MEASURED_PATIENCE
             stalled = pace.stalled(run.length - (run.bound or 0.0), patience)
             if not priced and (stalled or not cuts):
                 return
-            self._purge(point, risen=risen)
+            self.purge(point, risen=risen)
             self.lp.add_cuts(cuts)
 
     def _relaxed(self) -> Point:
@@ -403,7 +404,8 @@ class Root:
         self.branch = np.unique(self.branch[self.branch.sum(axis=1) > 1], axis=0)
         self.point = None
 
-    def _separate(self, point: Point) -> list[Cut]:
+    def separate(self, point: Point) -> list[Cut]:
+        """Violated cuts, of the LP's point or of one between it and the incumbent."""
         cluster = self.costs.cluster
         tour = tour_legs(self.tour())
         # visited by the point or by the incumbent
@@ -419,9 +421,14 @@ class Root:
             if cuts:
                 return cuts
         cuts = fractional_cuts(point.x, point.legs, point.y, cluster, self.branch, near)
-        return cuts or blossom_cuts(point.legs, point.y, cluster)
+        if cuts:
+            return cuts
+        cuts = blossom_cuts(point.legs, point.y, cluster)
+        between = shrunk(point.legs, point.y, cluster)
+        tight = tight_sets(self.lp.cuts, point, between, cluster)
+        return cuts + comb_cuts(between, tight, cluster)
 
-    def _purge(self, point: Point, *, risen: bool) -> None:
+    def purge(self, point: Point, *, risen: bool) -> None:
         """Count how long cuts have done nothing, and take the idle ones out of the LP, but only
         when the bound has risen: on a plateau they would only come back."""
         assert point.slack is not None

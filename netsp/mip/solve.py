@@ -16,6 +16,7 @@ import numpy as np
 from netsp.clock import Clock
 from netsp.dp.solve import bound_by_walks
 from netsp.lns import Search
+from netsp.mip.branching import Tree
 from netsp.mip.cuts import Cut
 from netsp.mip.overgoals import bound_over_goals
 from netsp.mip.program import IntegerProgram, Point
@@ -217,7 +218,10 @@ class MipRun(SearchingRun):
                 root.solve()
         legs = root.size()["legs"]
         if not self.done and legs <= min(MOST_LEGS, self.clock.left / SECONDS_PER_LEG):
-            self.integer(root, integer)
+            if backend == "highs":
+                Tree(root).solve()
+            else:
+                self.integer(root, integer)
 
     # incumbents
 

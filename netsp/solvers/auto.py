@@ -42,8 +42,9 @@ MOST_KEPT = 3_000
 FEW_GOALS = 24
 """Most goals for which walks come first: with more, remembering them costs more than cuts do."""
 
-ROUNDS_PER_GOAL = 40
-"""Rounds of ruin and recreate before and after the root, times the number of goals."""
+LEAST_ROUNDS, ROUNDS_PER_GOAL, ROUNDS_PER_PAIR = 500, 40, 1.0
+"""Rounds of ruin and recreate before and after the root: for each goal so many, or for each two
+goals if that is more."""
 
 FEW_CLASSES = 3
 """Of a goal, where the roadmap had to leave classes out: a tour over them comes first."""
@@ -96,8 +97,7 @@ def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | Non
         if graph.goal_count > FEW_GOALS and limits.warm_start is None:
             limits = _from_few(graph, limits, chosen.backend)
     if len(graph) <= PROVABLE:
-        rounds = max(500, ROUNDS_PER_GOAL * graph.goal_count)
-        run = MipRun(graph, limits, search_rounds=rounds)
+        run = MipRun(graph, limits, search_rounds=_rounds(graph))
         return run.solve(chosen.backend, limits.warm_start, walks=graph.goal_count <= FEW_GOALS)
     if graph.goal_count <= FEW_GOALS and graph.roadmapped:
         return _over_shortest(graph, limits, chosen.backend)
@@ -124,13 +124,19 @@ def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | Non
     return replace(found, lower_bound=bound, status=status, trace=tuple(rows))
 
 
+def _rounds(graph: TravelGraph) -> int:
+    """Of one search."""
+    n = graph.goal_count
+    return max(LEAST_ROUNDS, ROUNDS_PER_GOAL * n, int(ROUNDS_PER_PAIR * n * (n - 1) / 2))
+
+
 def _in_part_ordered(graph: TravelGraph, limits: Limits, backend: str) -> Result:
     """With precedences: walks, which remember them, prove where goals are few; with many, a search.
     The bound of the tours in any order holds, too, and is quickly had."""
     clock = Clock.of(limits.time)
     limits = replace(limits, time=clock)
     few = walks_fit(graph) and graph.goal_count <= FEW_GOALS
-    rounds = ROUNDS_PER_GOAL * graph.goal_count
+    rounds = _rounds(graph)
     bound = 0.0
     if len(graph) <= PROVABLE:
         share = Clock((1.0 - SHARE) * clock.left, within=clock) if clock.limit else clock
@@ -167,7 +173,7 @@ def _from_few(graph: TravelGraph, limits: Limits, backend: str) -> Limits:
     found = MipRun(
         graph.subgraph(core),
         replace(limits, time=share, on_progress=of_part(limits.on_progress, core)),
-        search_rounds=max(500, ROUNDS_PER_GOAL * graph.goal_count),
+        search_rounds=_rounds(graph),
     ).solve(backend, None)  # fmt: skip
     if found.tour is None:
         return limits
@@ -188,7 +194,7 @@ def _over_shortest(graph: TravelGraph, limits: Limits, backend: str) -> Result:
     run = MipRun(
         graph.subgraph(core),
         replace(limits, on_progress=of_part(limits.on_progress, core)),
-        search_rounds=max(500, ROUNDS_PER_GOAL * graph.goal_count),
+        search_rounds=_rounds(graph),
     )
     found = run.solve(backend, warm, walks=True)
     if found.tour is None:
