@@ -14,8 +14,8 @@ from netsp.lns.layers import Instance, best_classes
 from netsp.lns.ruin import Tables, descend, ruin_and_recreate, two_opt
 
 HOT, COLD = 1.0, 2e-2
-"""First and last temperature of ruin and recreate, in mean legs of the tour. A tenth of the first ends
-in the same poor tour from most starts, with few rounds and with many."""
+"""First and last temperature of ruin and recreate, in mean legs of the tour. A tenth of the first
+ends in the same poor tour from most starts, with few rounds and with many."""
 
 STEPS = 100
 """Temperatures from first to last, when the rounds are limited."""

@@ -17,7 +17,7 @@ import heapq
 import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 
@@ -25,11 +25,15 @@ from netsp.arrays import Bools, Floats, Ints
 from netsp.mip.blossoms import shrunk
 from netsp.mip.cuts import Cut
 from netsp.mip.legprices import LegPrices
-from netsp.mip.program import Point
+from netsp.mip.program import Point, WarmRelaxation
 from netsp.mip.root import Root, tour_legs
+from netsp.solving.run import Stop
 
 FRACTIONAL = 0.02
 """Farther than this from whole numbers is worth branching on."""
+
+WHOLE = 1e-6
+"""Nearer than this to whole numbers is whole."""
 
 PAIRS, CLASSES = 8, 6
 """So many pairs of clusters, and so many vertices, are tried for branching."""
@@ -82,11 +86,13 @@ class Tree:
     Parameters
     ----------
     root : Root
-        Solved; all legs that it has not ruled out are measured, and come into its relaxation.
+        Solved, over a `WarmRelaxation`; all legs that it has not ruled out are measured, and come
+        into its program.
     """
 
     def __init__(self, root: Root) -> None:
-        self.root, self.run, self.lp = root, root.run, root.lp
+        self.root, self.run = root, root.run
+        self.lp = cast(WarmRelaxation, root.lp)
         self.cluster = root.costs.cluster
         legs = np.argwhere(np.triu(~root.dead, 1))
         legs = np.unique(np.vstack([legs, tour_legs(root.tour())]), axis=0)
@@ -161,7 +167,9 @@ class Tree:
             alive = alive.copy()
             alive[np.flatnonzero(alive)[prices.above(run.cutoff - own)]] = False
             lp.set_alive(alive)
-            whole = np.abs(point.y - np.rint(point.y)).max(initial=0.0) < 1e-6
+            # x as well: a point may come to a cluster at one vertex and leave it at another
+            values = np.concatenate([point.x, point.y])
+            whole = bool(np.abs(values - np.rint(values)).max() < WHOLE)
             if whole or (k == 0 and self._nodes % SETTLE_EVERY == 0):
                 self.root.round_point(self.root, point)
             cuts = self.root.separate(point)
@@ -228,6 +236,8 @@ class Tree:
         used = np.unique(self.legs[alive])
         largest = int(np.argmax(np.bincount(self.cluster[used])))
         members = used[self.cluster[used] == largest]
+        if len(members) < 2:
+            raise Stop  # the LP has failed where there is nothing left to choose
         first, second = members[: len(members) // 2], members[len(members) // 2 :]
         without, within = (alive & ~np.isin(self.legs, m).any(axis=1) for m in (first, second))
         return Choice((without, together), (within, together), [])

@@ -37,9 +37,7 @@ WEAK = 0.3
 """Sets joined by less are no tooth."""
 
 
-def tight_sets(
-    cuts: Sequence[Cut], point: Point, between: Floats, cluster: Ints
-) -> list[Bools]:
+def tight_sets(cuts: Sequence[Cut], point: Point, between: Floats, cluster: Ints) -> list[Bools]:
     """(m + 1,) flags of sets of clusters that a point enters and leaves once: of its cuts those
     whose sets hold, of what it visits, clusters as a whole."""
     out: dict[bytes, Bools] = {}

@@ -15,8 +15,8 @@ class Cut:
     """The cut y(E(S)) + Σ y(E(T)) <= x(S \\ C) + `room`: `inside` marks S, `cluster` is C, `teeth`
     are the sets of clusters T.
 
-    A subtour cut has no teeth. A comb (`netsp.mip.blossoms`, `netsp.mip.combs`) has an odd number of
-    them, each partly in S, a union of clusters, and no C (-1). Teeth of more than two clusters
+    A subtour cut has no teeth. A comb (`netsp.mip.blossoms`, `netsp.mip.combs`) has an odd number
+    of them, each partly in S, a union of clusters, and no C (-1). Teeth of more than two clusters
     share none.
     """
 
@@ -54,8 +54,8 @@ class Cut:
 
 
 def cut_coefficients(cuts: Sequence[Cut], cluster: Ints, legs: Ints) -> Floats:
-    """(cuts, legs) coefficients of y(δ(S)) - y at S ∩ C - 2 Σ y(E(T)) >= -2 room: 1 for a leg out of
-    S \\ C, -1 for one between S ∩ C and S \\ C, and 2 less in a tooth, else 0."""
+    """(cuts, legs) coefficients of y(δ(S)) - y at S ∩ C - 2 Σ y(E(T)) >= -2 room: 1 for a leg
+    out of S \\ C, -1 for one between S ∩ C and S \\ C, else 0, and 2 less in a tooth."""
     out = np.zeros((len(cuts), len(legs)))
     for k, cut in enumerate(cuts):
         u, v = cut.inside[legs[:, 0]], cut.inside[legs[:, 1]]

@@ -35,8 +35,9 @@ class Terms(NamedTuple):
     """What a reduced cost is made of, c - π_u - π_v + shared - bitten, for the kernels.
 
     `group` is that of each vertex, of vertices that the same cuts hold; `shared` (groups, groups)
-    what the cuts that hold both ends cost; `bitten` (m + 1, m + 1) what teeth that hold two clusters
-    do; `vertex` r_v; `least` and `second` are r_uv of the two cheapest legs of each vertex.
+    what the cuts that hold both ends cost; `bitten` (m + 1, m + 1) what teeth that hold both
+    clusters do; `vertex` r_v; `least` and `second` are r_uv of the two cheapest legs of each
+    vertex.
     """
 
     costs: Floats

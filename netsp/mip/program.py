@@ -152,6 +152,16 @@ class Relaxation(Protocol):
         """The optimum with duals; None if there is none or the time ran out."""
 
 
+class WarmRelaxation(Relaxation, Protocol):
+    """A relaxation that starts from its last basis, so that a tree can be searched with it."""
+
+    def set_alive(self, alive: Bools) -> None:
+        """Let only the legs marked be used."""
+
+    def probe(self, costs: Floats, alive: Bools, steps: int) -> float:
+        """The objective after so many simplex steps with other costs and legs."""
+
+
 class IntegerProgram(Protocol):
     """The integer program over fixed legs and a growing set of cuts."""
 

@@ -137,7 +137,9 @@ class MipRun(SearchingRun):
                 warm: Warm | None = None
                 if not walks or len(self.graph) > CORE_FIRST:
                     with self.core() as core:
-                        if core is not None or (self.graph.roadmapped and self.graph.goal_count >= 100):
+                        if core is not None or (
+                            self.graph.roadmapped and self.graph.goal_count >= 100
+                        ):
                             self.bound_by_goals(backend)
                         if core is not None:
                             core.prove(backend, walks=walks)

@@ -1,0 +1,199 @@
+"""Branch and cut: nothing is lost on the way, and every bound holds."""
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from netsp.mip.branching import Tree
+from netsp.mip.combs import comb_cuts
+from netsp.mip.cuts import Cut, cut_coefficients
+from netsp.mip.highs import HighsRelaxation
+from netsp.mip.legprices import LegPrices
+from netsp.mip.prices import Prices
+from netsp.mip.program import duals_of_relaxation
+from netsp.mip.root import Root
+from netsp.mip.solve import MipRun
+from netsp.mip.subtours import component_cuts
+from netsp.solving.legcosts import LegCosts
+from netsp.solving.limits import Limits
+from netsp.travel.graph import TravelGraph
+from tests.brute import brute_tour
+from tests.test_blossoms import all_legs, some_cut
+from tests.test_contract import random_graph
+
+
+def root_of(graph, *, tour=None, rows=None):
+    """A root that has done nothing but hold all legs, with a poor tour or none."""
+    run = MipRun(graph, Limits(on_progress=None if rows is None else rows.append))
+    run.update_incumbent(tour)
+    return Root(run, LegCosts(graph), HighsRelaxation, run.round)
+
+
+def only_what_a_whole_point_needs(root, point):
+    whole = np.abs(point.y - np.rint(point.y)).max() < 1e-6
+    return component_cuts(point.x, point.legs, point.y, root.costs.cluster) if whole else []
+
+
+@pytest.mark.parametrize("cuts", [True, False])
+@pytest.mark.parametrize("start", [True, False])
+@pytest.mark.parametrize("seed", range(12))
+def test_branching_alone_finds_the_shortest_tour_and_proves_it(seed, start, cuts, monkeypatch):
+    if not cuts:
+        monkeypatch.setattr(Root, "separate", only_what_a_whole_point_needs)
+    monkeypatch.setattr(MipRun, "tour_at", _as_it_is)
+    graph, rows = random_graph(seed, 6, most=3), []
+    some = [0, *(graph.members(g)[0] for g in range(1, 7))]
+    root = root_of(graph, tour=some if start else None, rows=rows)
+    Tree(root).solve()
+    best = brute_tour(graph)
+    assert root.run.done
+    assert root.run.length == pytest.approx(best)
+    assert all(r.bound <= best * (1 + 1e-9) for r in rows)
+
+
+def _as_it_is(run, costs, point, *, whole):
+    """Take a point that is a tour for one, without a search that would find better."""
+    from netsp.mip.subtours import tour_from
+
+    cycles = tour_from(point.x, point.legs, point.y)
+    if whole and len(cycles) == 1:
+        run.update_incumbent(costs.vertices[cycles[0]].tolist())
+
+
+def test_a_graph_without_a_tour_is_told():
+    cluster = np.array([0, 1, 2, 3])
+    costs = np.full((4, 4), np.inf)
+    for u, v in ((0, 1), (1, 2), (0, 2), (2, 3)):
+        costs[u, v] = costs[v, u] = 1.0
+    root = root_of(TravelGraph.from_costs(costs, cluster))
+    Tree(root).solve()
+    assert root.run.infeasible
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(0, 10**6), st.randoms(use_true_random=False), st.floats(0.0, 1.0))
+def test_prices_of_a_list_of_legs_are_those_of_a_matrix(seed, chance, scale):
+    graph = random_graph(seed, 6, most=3)
+    rng = np.random.default_rng(seed)
+    legs, _ = all_legs(graph)
+    legs = legs[rng.random(len(legs)) < 0.9]
+    dead = np.ones(graph.costs.shape, dtype=bool)
+    dead[legs[:, 0], legs[:, 1]] = dead[legs[:, 1], legs[:, 0]] = False
+    cuts = [some_cut(chance, graph) for _ in range(5)]
+    duals = duals_of_relaxation(
+        scale * rng.normal(size=7), scale * np.abs(rng.normal(size=5)), cuts, graph.cluster
+    )
+    of_matrix = Prices(graph.costs, dead, graph.cluster, cuts, duals)
+    costs = graph.costs[legs[:, 0], legs[:, 1]]
+    of_list = LegPrices(legs, costs, graph.cluster, cuts, duals)
+    assert of_list.bound == pytest.approx(of_matrix.bound, abs=1e-9)
+    if np.isfinite(of_list.bound):
+        of_matrix.rule_out(of_matrix.bound + 0.3)
+        gone = of_list.above(of_matrix.bound + 0.3 - of_list.bound)
+        by_matrix = dead[legs[:, 0], legs[:, 1]]
+        # a matrix also forgets vertices, whose legs a list keeps
+        assert not (gone & ~by_matrix).any()
+
+
+def test_a_trial_leaves_the_program_as_it_was():
+    graph = random_graph(3, 8)
+    legs, costs = all_legs(graph)
+    lp = HighsRelaxation(graph.cluster, legs, costs)
+    before = lp.solve(60.0)
+    used = int(np.argmax(before.y))
+    alive = np.ones(len(legs), dtype=bool)
+    alive[used] = False
+    assert lp.probe(costs, alive, 1000) > before.objective
+    lp.set_costs(costs)
+    lp.set_alive(~np.zeros(len(legs), dtype=bool))
+    assert lp.solve(60.0).objective == pytest.approx(before.objective)
+
+
+def some_comb(chance, graph):
+    """A handle, and an odd number of disjoint teeth partly in it."""
+    m = graph.goal_count + 1
+    clusters = chance.sample(range(m), m)
+    teeth = []
+    while len(clusters) > 1:
+        k = chance.randint(2, min(3, len(clusters)))
+        teeth.append(clusters[:k])
+        clusters = clusters[k:]
+    teeth = teeth[: len(teeth) - (len(teeth) + 1) % 2]
+    handle = np.zeros(m, dtype=bool)
+    for tooth in teeth:
+        handle[chance.sample(tooth, chance.randint(1, len(tooth) - 1))] = True
+    return Cut(handle[graph.cluster], -1, tuple(tuple(sorted(t)) for t in teeth))
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 10**6), st.randoms(use_true_random=False))
+def test_no_tour_violates_a_comb(seed, chance):
+    graph = random_graph(seed, 8, most=2)
+    legs, _ = all_legs(graph)
+    place = {tuple(e): k for k, e in enumerate(legs.tolist())}
+    combs = [some_comb(chance, graph) for _ in range(8)]
+    rows = cut_coefficients(combs, graph.cluster, legs)
+    for _ in range(30):
+        order = chance.sample(range(1, 9), 8)
+        tour = [0, *(chance.choice(graph.members(g).tolist()) for g in order)]
+        y = np.zeros(len(legs))
+        for u, v in zip(tour, [*tour[1:], 0], strict=True):
+            y[place[min(u, v), max(u, v)]] = 1.0
+        assert (rows @ y >= [-2.0 * c.room - 1e-9 for c in combs]).all()
+        for comb in combs:
+            within, times = comb.within(graph.cluster, legs)
+            visited = sum(comb.inside[v] for v in tour)
+            assert times @ y[within] <= visited + comb.room + 1e-9
+
+
+def test_a_comb_is_found_where_no_pair_of_clusters_is_a_tooth():
+    """A prism of halves, each corner on one side two clusters that are left as one."""
+    corners = {3: (3, 6), 4: (4, 7), 5: (5, 8)}
+    between = np.zeros((9, 9))
+    for u, v in ((0, 1), (1, 2), (0, 2)):
+        between[u, v] = 0.5
+    for k, (a, b) in corners.items():
+        between[k - 3, a] = between[k - 3, b] = 0.5
+        between[a, b] = 1.0
+    for (_, b), (c, _) in (
+        (corners[3], corners[4]),
+        (corners[4], corners[5]),
+        (corners[5], corners[3]),
+    ):
+        between[b, c] = 0.5
+    between += between.T
+    assert (between.sum(axis=1) == 2.0).all()
+    tight = [np.isin(np.arange(9), pair) for pair in corners.values()]
+    cluster = np.arange(9)
+    cuts = comb_cuts(between, tight, cluster)
+    assert cuts
+    legs = np.argwhere(np.triu(between, 1))
+    y = between[legs[:, 0], legs[:, 1]]
+    for cut in cuts:
+        assert max(len(t) for t in cut.teeth) == 3
+        assert (cut_coefficients([cut], cluster, legs) @ y)[0] < -2.0 * cut.room - 0.5
+    assert not comb_cuts(between, [], cluster)
+
+
+def test_every_two_children_share_the_tours_of_their_parent():
+    graph = random_graph(5, 5, most=3)
+    root = root_of(graph)
+    tree = Tree(root)
+    point = tree.lp.solve(60.0)
+    place = {tuple(e): k for k, e in enumerate(tree.legs.tolist())}
+    alive = np.ones(len(tree.legs), dtype=bool)
+    choices = [*tree._choices(point, alive, ()), tree._halves(alive, ())]
+    assert len(choices) > 1
+    for order in itertools.permutations(range(1, 6)):
+        for chosen in itertools.product(*(graph.members(g).tolist() for g in order)):
+            tour = [0, *chosen]
+            used = [place[min(e), max(e)] for e in zip(tour, [*chosen, 0], strict=True)]
+            for choice in choices:
+                costs = []
+                for legs, pairs in (choice.without, choice.within):
+                    if legs[used].all():
+                        costs.append(tree._costs(pairs)[used].sum() + tree.charge * len(pairs))
+                assert min(costs) == pytest.approx(graph.tour_length(tour))
