@@ -1,7 +1,8 @@
-"""`mip`: heuristic, cutting planes at fractional points, then lazy rounds at integer ones.
+"""`mip`: heuristic, cutting planes at fractional points, then branching or lazy rounds.
 
-The root (`netsp.mip.root`) bounds every tour and rules out most legs and vertices. The small
-integer program that is left is solved, cut at its subtours, and solved again.
+The root (`netsp.mip.root`) bounds every tour and rules out most legs and vertices. What is left is
+branched on (`netsp.mip.branching`), or, by the paper, an integer program that is solved, cut at its
+subtours, and solved again.
 """
 
 from __future__ import annotations
@@ -30,17 +31,23 @@ from netsp.travel.graph import TravelGraph
 from netsp.travel.result import Result
 
 BACKENDS = {
-    "highs": ("netsp.mip.highs:HighsRelaxation", "netsp.mip.highs:HighsInteger"),
-    "cbc": ("netsp.mip.cbc_program:CbcRelaxation", "netsp.mip.cbc_program:CbcInteger"),
+    "highs": "netsp.mip.highs:HighsRelaxation",
+    "cbc": "netsp.mip.cbc_program:CbcRelaxation",
 }
-"""Who solves the programs. `highs` re-solves the LP in process and is the faster; `cbc` is the
-paper's shape."""
+"""Who solves the programs. `highs` re-solves the LP in process, fast enough to branch on it; `cbc`
+is the paper's shape, lazy rounds of an integer program."""
+
+LAZY = {"cbc": "netsp.mip.cbc_program:CbcInteger"}
+"""Who is not branched on."""
 
 DEFAULT_BACKEND = "highs"
 
 SECONDS_PER_LEG = 3e-4
 """With less time than this left for every leg the integer program is not begun: its presolve alone
 would take that long, and cannot be stopped."""
+
+MANY_GOALS = 100
+"""With so many the bound of the goals comes first, and its cuts are those of the first LP."""
 
 GOALS_SHARE = 0.1
 """Part of the time that is left which the bound from the goals alone may take."""
@@ -56,8 +63,8 @@ CORE_FIRST = 3000
 also where goals are few."""
 
 MOST_LEGS, TRIES = 30_000, 6
-"""With more legs left the integer program would end nowhere; so many more searches may find a tour
-that rules legs out, else the run ends."""
+"""With more legs left neither branching nor an integer program would end; so many more searches may
+find a tour that rules legs out, else the run ends."""
 
 
 @dataclass(frozen=True)
@@ -129,7 +136,7 @@ class MipRun(SearchingRun):
     def solve(
         self, backend: str, warm_start: Sequence[int] | None, *, walks: bool = False
     ) -> Result:
-        """Heuristic, walks if wanted, root, integer rounds."""
+        """Heuristic, walks if wanted, root, branching."""
         with self.until_stopped():
             self.update_incumbent(warm_start)
             if not self.trivial():
@@ -193,13 +200,14 @@ class MipRun(SearchingRun):
         return Warm(core, core[self.root.lp.legs], list(self.root.lp.cuts), self.outer[1])
 
     def cut(self, costs: LegCosts, backend: str, warm: Warm | None) -> None:
-        """Root and integer rounds over what is left of the vertices."""
+        """Root and branching over what is left of the vertices."""
         self._gap_searched = self.length
         if warm is not None:
             # a core is proven over lengths; over their bounds its cuts would prove less
             costs.measure(np.searchsorted(costs.vertices, warm.measured))
-        relaxation, integer = (_load(path) for path in BACKENDS[backend])
-        self.root = root = Root(self, costs, relaxation, self.round, warm, self._over_goals)
+        self.root = root = Root(
+            self, costs, _load(BACKENDS[backend]), self.round, warm, self._over_goals
+        )
         root.solve()
         if not self.done and root.point is not None:
             used = np.flatnonzero(root.point.x > 1e-6)
@@ -220,11 +228,12 @@ class MipRun(SearchingRun):
             if self.length < before:
                 root.solve()
         legs = root.size()["legs"]
-        if not self.done and legs <= min(MOST_LEGS, self.clock.left / SECONDS_PER_LEG):
-            if backend == "highs":
-                Tree(root).solve()
-            else:
-                self.integer(root, integer)
+        if self.done or legs > MOST_LEGS:
+            return
+        if backend not in LAZY:
+            Tree(root).solve()
+        elif legs <= self.clock.left / SECONDS_PER_LEG:
+            self.integer(root, _load(LAZY[backend]))
 
     # incumbents
 
