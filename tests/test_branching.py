@@ -1,5 +1,6 @@
 """Branch and cut: nothing is lost on the way, and every bound holds."""
 
+import contextlib
 import itertools
 
 import numpy as np
@@ -19,6 +20,7 @@ from netsp.mip.solve import MipRun
 from netsp.mip.subtours import component_cuts
 from netsp.solving.legcosts import LegCosts
 from netsp.solving.limits import Limits
+from netsp.solving.run import Stop
 from netsp.travel.graph import TravelGraph
 from tests.brute import brute_tour
 from tests.test_blossoms import all_legs, some_cut
@@ -63,14 +65,40 @@ def _as_it_is(run, costs, point, *, whole):
         run.update_incumbent(costs.vertices[cycles[0]].tolist())
 
 
-def test_a_graph_without_a_tour_is_told():
-    cluster = np.array([0, 1, 2, 3])
-    costs = np.full((4, 4), np.inf)
-    for u, v in ((0, 1), (1, 2), (0, 2), (2, 3)):
+DEAD_END = ((0, 1), (1, 2), (0, 2), (2, 3))
+BRIDGE = ((0, 1), (1, 2), (0, 2), (2, 3), (3, 4), (4, 5), (3, 5))
+
+
+@pytest.mark.parametrize("legs", [DEAD_END, BRIDGE])
+@pytest.mark.parametrize("with_ray", [True, False])
+def test_that_there_is_no_tour_is_said_only_where_it_is_proven(legs, with_ray, monkeypatch):
+    if not with_ray:
+        monkeypatch.setattr(HighsRelaxation, "rays", lambda lp: [])
+    cluster = np.arange(max(max(leg) for leg in legs) + 1)
+    costs = np.full((len(cluster), len(cluster)), np.inf)
+    for u, v in legs:
         costs[u, v] = costs[v, u] = 1.0
     root = root_of(TravelGraph.from_costs(costs, cluster))
-    Tree(root).solve()
-    assert root.run.infeasible
+    with contextlib.nullcontext() if with_ray else pytest.raises(Stop):
+        Tree(root).solve()
+    assert root.run.infeasible == with_ray
+
+
+def test_a_tree_that_is_stopped_claims_no_more_than_its_open_nodes(monkeypatch):
+    monkeypatch.setattr(Root, "separate", only_what_a_whole_point_needs)
+    graph = random_graph(7, 8, most=3)
+    best = brute_tour(graph)
+    some = [0, *(graph.members(g)[0] for g in range(1, 9))]
+    bounds = []
+    for programs in (1, 2, 3, 5, 8, 13):
+        root = root_of(graph, tour=some)
+        root.run.iteration_limit = programs
+        with root.run.until_stopped():
+            Tree(root).solve()
+        bounds.append(root.run.bound)
+        assert root.run.bound <= best * (1 + 1e-9)
+    assert bounds == sorted(bounds)
+    assert bounds[-1] > bounds[0]
 
 
 @settings(max_examples=40, deadline=None)

@@ -116,11 +116,13 @@ class Tree:
         whole = np.ones(len(self.legs), dtype=bool)
         open_nodes = [Node(run.bound or 0.0, next(self._rank), whole, ())]
         settled = np.inf
-        while open_nodes and not run.done:
+        while open_nodes:
             node = heapq.heappop(open_nodes)
             run.raise_bound(min(node.bound, settled, run.cutoff))
-            if node.bound >= run.cutoff or run.done:
-                break
+            if run.done:
+                return
+            if node.bound >= run.cutoff:
+                break  # and so are those of all others
             bound, choice = self._process(node)
             if choice is None:
                 settled = min(settled, bound)
@@ -132,11 +134,9 @@ class Tree:
                 "branches", cuts=len(self.lp.cuts), legs=int(node.alive.sum()),
                 vertices=len(np.unique(self.legs[node.alive])),
             )  # fmt: skip
-        else:
-            if run.tour is None:
-                run.infeasible = True
-            else:
-                run.raise_bound(min(settled, run.cutoff))
+        run.infeasible = run.tour is None and settled == np.inf
+        if not run.infeasible:
+            run.raise_bound(min(settled, run.cutoff))
 
     # one node
 
@@ -153,10 +153,10 @@ class Tree:
             point = lp.solve(run.clock)
             run.iterations += 1
             if point is None:
-                if not lp.infeasible:
-                    run.check()
-                    return bound, self._halves(alive, node.together)
-                return np.inf, None
+                if lp.infeasible and self._is_proven_empty(alive):
+                    return np.inf, None
+                run.check()
+                return bound, self._halves(alive, node.together)
             assert point.duals is not None
             before = bound
             prices = LegPrices(self.legs[alive], costs[alive], self.cluster, lp.cuts, point.duals)
@@ -182,6 +182,16 @@ class Tree:
             self.root.purge(point, risen=gain > 0.0)
             lp.add_cuts(cuts)
         raise AssertionError
+
+    def _is_proven_empty(self, alive: Bools) -> bool:
+        """Whether the ray of an infeasible LP shows, by the formula of the bound, that a tour of
+        these legs would be longer than nothing even if legs cost nothing. The solver's word alone
+        would make a proof rest on its tolerances."""
+        legs, free = self.legs[alive], np.zeros(int(alive.sum()))
+        return any(
+            LegPrices(legs, free, self.cluster, self.lp.cuts, ray).bound > 0.0
+            for ray in self.lp.rays()
+        )
 
     def _costs(self, together: tuple[tuple[int, int], ...]) -> Floats:
         """Of all legs, where such pairs follow each other."""

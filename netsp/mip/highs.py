@@ -13,7 +13,14 @@ from netsp.arrays import Bools, Floats, Ints
 from netsp.clock import Clock, TimeLimit
 from netsp.mip.cutpool import CutPool
 from netsp.mip.cuts import Cut, cut_coefficients
-from netsp.mip.program import IntegerOutcome, Point, duals_of_relaxation, restricted, scale_of
+from netsp.mip.program import (
+    Duals,
+    IntegerOutcome,
+    Point,
+    duals_of_relaxation,
+    restricted,
+    scale_of,
+)
 
 _SETTLED = (
     highspy.HighsModelStatus.kOptimal,
@@ -138,6 +145,19 @@ class HighsRelaxation:
         self._highs.changeColsBounds(
             n, np.arange(n, dtype=np.int32), np.zeros(n), alive.astype(np.float64)
         )
+
+    def rays(self) -> list[Duals]:
+        """Dual values that say why the last solve found no solution, in either sign; none where
+        HiGHS has none."""
+        _, known, ray = self._highs.getDualRay()
+        if not known:
+            return []
+        values = np.asarray(ray, dtype=np.float64)
+        return [
+            duals_of_relaxation(
+                v[: self.clusters], v[self.clusters :], self.cuts, self.cluster
+            ) for v in (values, -values)
+        ]  # fmt: skip
 
     def probe(self, costs: Floats, alive: Bools, steps: int) -> float:
         """The objective after so many simplex steps with other costs and legs; inf where these

@@ -158,6 +158,9 @@ class WarmRelaxation(Relaxation, Protocol):
     def set_alive(self, alive: Bools) -> None:
         """Let only the legs marked be used."""
 
+    def rays(self) -> list[Duals]:
+        """Dual values that say why the last solve found no solution; all that there may be."""
+
     def probe(self, costs: Floats, alive: Bools, steps: int) -> float:
         """The objective after so many simplex steps with other costs and legs."""
 
