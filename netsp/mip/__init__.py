@@ -1,4 +1,4 @@
-"""The paper's mixed-integer program, solved by cutting planes and lazy rounds."""
+"""The paper's mixed-integer program, solved by cutting planes, branching and lazy rounds."""
 
 from netsp.mip.solve import solve
 

@@ -22,7 +22,7 @@ from netsp.travel.baseless import BaselessGraph
 from netsp.travel.graph import TravelGraph
 from netsp.travel.result import OnProgress, Progress, Result, of_part, proven
 
-ROUNDS_PER_CLUSTER = 400
+ROUNDS_PER_CLUSTER = 2000
 """Of a first search, shared among the vertices: it says where to begin, and what is found ahead of
 a proof spares it most of the work."""
 
