@@ -2,6 +2,7 @@
 
 import contextlib
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -211,15 +212,22 @@ def test_every_two_children_share_the_tours_of_their_parent():
     root = root_of(graph)
     tree = Tree(root)
     point = tree.lp.solve(60.0)
+    # something of every leg, so that pairs of clusters and vertices are open
+    point = replace(point, y=np.full(len(tree.legs), 0.05), x=np.full(len(graph), 0.3))
     place = {tuple(e): k for k, e in enumerate(tree.legs.tolist())}
     alive = np.ones(len(tree.legs), dtype=bool)
     choices = [*tree._choices(point, alive, ()), tree._halves(alive, ())]
     assert len(choices) > 1
+    # a pair once is a pair, though the point has it in part
+    (pair,) = choices[0].within[1]
+    again = list(tree._choices(point, alive, (pair,)))
+    assert all(len(set(p)) == len(p) for c in again for _, p in (c.without, c.within))
+    has_pair = tree.pair == pair[0] * tree.clusters + pair[1]
     for order in itertools.permutations(range(1, 6)):
         for chosen in itertools.product(*(graph.members(g).tolist() for g in order)):
             tour = [0, *chosen]
             used = [place[min(e), max(e)] for e in zip(tour, [*chosen, 0], strict=True)]
-            for choice in choices:
+            for choice in choices + (again if has_pair[used].any() else []):
                 costs = []
                 for legs, pairs in (choice.without, choice.within):
                     if legs[used].all():

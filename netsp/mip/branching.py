@@ -228,6 +228,8 @@ class Tree:
     ) -> Iterator[Choice]:
         """Pairs of clusters that follow each other or do not, vertices that are visited or not."""
         between = np.triu(shrunk(point.legs, point.y, self.cluster), 1)
+        for g, h in together:
+            between[g, h] = 0.0  # a pair is charged once
         for g, h in _most_open(between, PAIRS):
             legs = self.pair == g * self.clusters + h
             inside = np.isin(self.cluster, (g, h))
