@@ -24,7 +24,7 @@ from netsp.solving.limits import Limits
 from netsp.solving.run import Stop
 from netsp.travel.graph import TravelGraph
 from tests.brute import brute_tour
-from tests.test_blossoms import all_legs, some_cut
+from tests.test_blossoms import all_legs, some_cut, tours_as_points
 from tests.test_contract import random_graph
 
 
@@ -162,15 +162,9 @@ def some_comb(chance, graph):
 def test_no_tour_violates_a_comb(seed, chance):
     graph = random_graph(seed, 8, most=2)
     legs, _ = all_legs(graph)
-    place = {tuple(e): k for k, e in enumerate(legs.tolist())}
     combs = [some_comb(chance, graph) for _ in range(8)]
     rows = cut_coefficients(combs, graph.cluster, legs)
-    for _ in range(30):
-        order = chance.sample(range(1, 9), 8)
-        tour = [0, *(chance.choice(graph.members(g).tolist()) for g in order)]
-        y = np.zeros(len(legs))
-        for u, v in zip(tour, [*tour[1:], 0], strict=True):
-            y[place[min(u, v), max(u, v)]] = 1.0
+    for tour, y in tours_as_points(chance, graph, legs):
         assert (rows @ y >= [-2.0 * c.room - 1e-9 for c in combs]).all()
         for comb in combs:
             within, times = comb.within(graph.cluster, legs)
@@ -233,3 +227,14 @@ def test_every_two_children_share_the_tours_of_their_parent():
                     if legs[used].all():
                         costs.append(tree._costs(pairs)[used].sum() + tree.charge * len(pairs))
                 assert min(costs) == pytest.approx(graph.tour_length(tour))
+
+
+def test_nothing_shorter_than_a_known_tour_is_not_that_there_is_none():
+    graph = random_graph(2, 6, most=3)
+    best = brute_tour(graph)
+    root = root_of(graph)
+    root.run.known = 0.9 * best
+    Tree(root).solve()
+    assert root.run.tour is None
+    assert not root.run.infeasible
+    assert 0.9 * best * (1 - 1e-6) <= root.run.bound <= best

@@ -379,6 +379,18 @@ def test_with_many_classes_of_few_goals_a_bound_comes_before_all_legs_are_bounde
     assert found.lower_bound > 0.5 * found.length
 
 
+def test_with_many_goals_their_bound_comes_first_and_the_proof_is_the_same(monkeypatch):
+    graph = travel_graph(far_world(1, goals=12, tether_length=200.0))
+    plain = solve(graph)
+    assert "goals" not in {row.stage for row in plain.trace}
+    monkeypatch.setattr(sys.modules["netsp.mip.solve"], "MANY_GOALS", 12)
+    first = solve(graph)
+    begun = [row for row in first.trace if row.stage == "goals"]
+    assert 0.0 < begun[0].bound <= plain.length * (1 + 1e-9)
+    assert first.status is plain.status is Status.OPTIMAL
+    assert first.length == pytest.approx(plain.length)
+
+
 def test_the_matrices_of_a_proof_go_when_it_ends(monkeypatch):
     made = []
     module = sys.modules["netsp.mip.solve"]  # the function of that name hides it

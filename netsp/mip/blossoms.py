@@ -34,21 +34,27 @@ def shrunk(legs: Ints, y: Floats, cluster: Ints) -> Floats:
     return np.asarray(out + out.T)
 
 
-def blossom_cuts(legs: Ints, y: Floats, cluster: Ints) -> list[Cut]:
-    """Violated 2-matching inequalities, the most violated first."""
-    between = shrunk(legs, y, cluster)
-    found: dict[tuple[bytes, tuple[tuple[int, int], ...]], tuple[float, Cut]] = {}
+def handles(between: Floats, least: int) -> list[Bools]:
+    """Components of what is fractional between so many clusters or more, at several levels."""
+    out: dict[bytes, Bools] = {}
     for level in LEVELS:
         part = coo_array((between > level) & (between < 1.0 - level))
         count, label = connected_components(part, directed=False)
         for k in range(count):
             handle = label == k
-            if 3 <= handle.sum() < len(handle):
-                violation, teeth = best_teeth(between, handle)
-                if violation > VIOLATION and len(teeth) >= 3:
-                    cut = Cut(handle[cluster], -1, teeth)
-                    found[handle.tobytes(), teeth] = (violation, cut)
-    return [cut for _, cut in sorted(found.values(), key=lambda f: -f[0])]
+            if least <= handle.sum() < len(handle):
+                out[handle.tobytes()] = handle
+    return list(out.values())
+
+
+def blossom_cuts(between: Floats, cluster: Ints) -> list[Cut]:
+    """Violated 2-matching inequalities, the most violated first; `between` as of `shrunk`."""
+    found = []
+    for handle in handles(between, 3):
+        violation, teeth = best_teeth(between, handle)
+        if violation > VIOLATION and len(teeth) >= 3:
+            found.append((violation, Cut(handle[cluster], -1, teeth)))
+    return [cut for _, cut in sorted(found, key=lambda f: -f[0])]
 
 
 def best_teeth(between: Floats, handle: Bools) -> tuple[float, tuple[tuple[int, int], ...]]:

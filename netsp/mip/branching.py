@@ -122,7 +122,8 @@ class Tree:
             if run.done:
                 return
             if node.bound >= run.cutoff:
-                break  # and so are those of all others
+                settled = min(settled, node.bound)
+                break  # those of all others are no lower
             bound, choice = self._process(node)
             if choice is None:
                 settled = min(settled, bound)

@@ -16,11 +16,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from netsp.arrays import Bools, Floats, Ints
-from netsp.mip.blossoms import LEVELS, VIOLATION
+from netsp.mip.blossoms import VIOLATION, handles
 from netsp.mip.cuts import Cut
 from netsp.mip.program import Point
 
@@ -80,7 +78,7 @@ def comb_cuts(between: Floats, tight: Sequence[Bools], cluster: Ints) -> list[Cu
         to[label, np.arange(len(between))] = 1.0
         flow = to @ between @ to.T
         np.fill_diagonal(flow, 0.0)
-        for handle in _handles(flow):
+        for handle in handles(flow, 2):
             violation, pairs = _teeth(flow, handle)
             if violation <= VIOLATION:
                 continue
@@ -103,19 +101,6 @@ def _shrunk_to(sets: Sequence[Bools], size: int) -> Ints:
             label[s] = int(np.argmax(s))
             taken |= s
     return np.unique(label, return_inverse=True)[1]
-
-
-def _handles(flow: Floats) -> list[Bools]:
-    """Components of what is fractional, at several levels."""
-    out: dict[bytes, Bools] = {}
-    for level in LEVELS:
-        part = coo_array((flow > level) & (flow < 1.0 - level))
-        count, label = connected_components(part, directed=False)
-        for k in range(count):
-            handle = label == k
-            if 2 <= handle.sum() < len(handle):
-                out[handle.tobytes()] = handle
-    return list(out.values())
 
 
 def _teeth(flow: Floats, handle: Bools) -> tuple[float, list[tuple[int, int]]]:

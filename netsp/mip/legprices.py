@@ -60,12 +60,11 @@ class LegPrices:
     def above(self, missing: float) -> Bools:
         """(k,) legs that no tour less than so much longer than the bound uses (see
         `netsp.mip.prices`)."""
-        r, out = self._reduced, -missing
-        total = out + self._reduced
+        r = total = self._reduced
         for end in self._legs.T:
             other = np.where(r <= self._least[end], self._second[end], self._least[end])
             total = total + self._above[end] + 0.5 * other
-        return np.asarray(total > 0.0)
+        return np.asarray(total > missing)
 
 
 def _two_least(legs: Ints, values: Floats, size: int) -> tuple[Floats, Floats]:

@@ -423,10 +423,9 @@ class Root:
         cuts = fractional_cuts(point.x, point.legs, point.y, cluster, self.branch, near)
         if cuts:
             return cuts
-        cuts = blossom_cuts(point.legs, point.y, cluster)
         between = shrunk(point.legs, point.y, cluster)
         tight = tight_sets(self.lp.cuts, point, between, cluster)
-        return cuts + comb_cuts(between, tight, cluster)
+        return blossom_cuts(between, cluster) + comb_cuts(between, tight, cluster)
 
     def purge(self, point: Point, *, risen: bool) -> None:
         """Count how long cuts have done nothing, and take the idle ones out of the LP, but only

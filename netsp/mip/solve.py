@@ -144,9 +144,8 @@ class MipRun(SearchingRun):
                 warm: Warm | None = None
                 if not walks or len(self.graph) > CORE_FIRST:
                     with self.core() as core:
-                        if core is not None or (
-                            self.graph.roadmapped and self.graph.goal_count >= 100
-                        ):
+                        many = self.graph.roadmapped and self.graph.goal_count >= MANY_GOALS
+                        if core is not None or many:
                             self.bound_by_goals(backend)
                         if core is not None:
                             core.prove(backend, walks=walks)
