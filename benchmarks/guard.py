@@ -1,14 +1,15 @@
 """A guard beside robots that are driven, with noise: what it misses, how early it warns, how often
 it is wrong, and how long an update takes; and a counter of turns on the same tracks.
 
-    python benchmarks/guard.py [--only plane|space|hour] [--tracks 100] [--loops 10]
-                               [--jobs 2] [--keep]
+    python benchmarks/guard.py [--only plane|space|hour] [--tracks 100] [--loops 15]
+                               [--jobs 2] [--outcomes FILE] [--keep]
 
 Tracks are tours of the shipped problems and of random worlds, flown by our vehicles, the recorded
 flights in `tests/data/ardusub`, and random pilots' drives, none of which closes a loop. Into each,
 loops are put at random moments: from there the robot drives round some obstacle in sight until its
 own tether has closed a loop. Positions get white noise (0.3 m) and a drift (0.5 m, forgotten in
-100 s).
+100 s). That takes hours: with `--outcomes` each track's are kept in a file as soon as they are
+known, and tracks that are in it are not driven again.
 """
 
 from __future__ import annotations
@@ -22,8 +23,9 @@ import math
 import resource
 import time
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, field
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
 
 import numpy as np
 from sites import SITES, mission_of, shipped
@@ -194,11 +196,11 @@ class TurnCounter:
         return abs(self.turned) >= 2.0 * math.pi
 
 
-def loop_path(problem: Problem, here: np.ndarray, rng: np.random.Generator) -> np.ndarray | None:
-    """Straight to some obstacle in sight and around it, once and a bit."""
-    strands = Strands(PlaneSite(problem))
-    order = rng.permutation(len(problem.obstacles))
-    for i in order:
+def loop_paths(
+    problem: Problem, here: np.ndarray, strands: Strands, rng: np.random.Generator
+) -> Iterator[np.ndarray]:
+    """Straight to obstacles in sight, one after the other, and around each, once and a bit."""
+    for i in rng.permutation(len(problem.obstacles)):
         o = problem.obstacles[int(i)]
         if not isinstance(o, Circle) or math.dist(o.center, here[:2]) > 25.0:
             continue
@@ -221,14 +223,13 @@ def loop_path(problem: Problem, here: np.ndarray, rng: np.random.Generator) -> n
             continue
         steps = int(math.dist(here, ring[0]) / (SPEED * DT)) + 1
         line = here + np.linspace(0.0, 1.0, steps + 1)[1:, None] * (ring[0] - here)
-        return np.vstack([line, ring])
-    return None
+        yield np.vstack([line, ring])
 
 
 def closes(problem: Problem, tether: object, path: np.ndarray, strands: Strands) -> int | None:
-    """At which point of a path the true tether has a loop."""
+    """At which point of a path the true tether has a loop, if it is soon enough."""
     at = tether
-    for k, place in enumerate(path):
+    for k, place in enumerate(path[: int(MOST_S / DT)]):
         at = strands.site.model.update(at, place)
         if loops_in(problem, at.nodes[:, :2]):
             return k
@@ -284,11 +285,12 @@ def put_in(
     """A loop that begins here, with copies of the guards."""
     if not clear.strands.all or clear.report is None or clear.report.loops:
         return
-    path = loop_path(problem, clear.strands.all[0].tether.robot, rng)
-    if path is None:
-        return
-    end = closes(problem, clear.strands.all[0].tether, path, clear.strands)
-    if end is None or end * DT > MOST_S:
+    tether = clear.strands.all[0].tether
+    for path in loop_paths(problem, tether.robot, clear.strands, rng):
+        end = closes(problem, tether, path, clear.strands)
+        if end is not None:
+            break
+    else:
         return
     path = path[: end + int(5.0 / DT)]
     watching, seeing, turns = copy.deepcopy(guard), copy.deepcopy(clear), copy.deepcopy(counter)
@@ -323,8 +325,9 @@ def put_in(
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--tracks", type=int, default=100)
-    parser.add_argument("--loops", type=int, default=10)
+    parser.add_argument("--loops", type=int, default=15)
     parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--outcomes", type=Path, help="JSON lines, one a track")
     parser.add_argument("--only", choices=("plane", "space", "hour"))
     args = parser.parse_args()
     heading("A guard beside robots that are driven")
@@ -339,12 +342,26 @@ def main() -> None:
          "false as possible an hour",
          "turn counter's an hour", "update ms, median / p99", name="guard")  # fmt: skip
     jobs = [(kind, seed, args.loops) for kind, seed in tracks(args.tracks)]
-    with ProcessPoolExecutor(args.jobs) as pool:
-        outcomes = list(pool.map(one, jobs))
+    outcomes = measured(jobs, args.jobs, args.outcomes)
     for kind in (*dict.fromkeys(o.kind for o in outcomes), None):
         some = [o for o in outcomes if kind in (None, o.kind)]
         told(kind or "all", some)
     print()
+
+
+def measured(jobs: list[tuple[str, int, int]], workers: int, kept: Path | None) -> list[Outcome]:
+    """Outcomes of all tracks; those in the file are taken from it, and new ones are added."""
+    lines = kept.read_text().splitlines() if kept is not None and kept.exists() else []
+    known = {tuple(row["job"]): Outcome(**row["outcome"]) for row in map(json.loads, lines)}
+    with ProcessPoolExecutor(workers) as pool:
+        running = {pool.submit(one, job): job for job in jobs if job not in known}
+        for done in as_completed(running):
+            job = running[done]
+            known[job] = done.result()
+            if kept is not None:
+                with kept.open("a") as file:
+                    file.write(json.dumps({"job": job, "outcome": asdict(known[job])}) + "\n")
+    return [known[job] for job in jobs]
 
 
 def beside_flight(
