@@ -3,6 +3,7 @@
     python benchmarks/frontier.py                     every cell, 10 worlds, 300 s each: many hours
     python benchmarks/frontier.py --worlds 3 --limit 60
     python benchmarks/frontier.py --cells 60:300,60:350
+    python benchmarks/frontier.py --outcomes FILE     each world is kept as it comes
     python benchmarks/frontier.py --rules             all classes, and the non-looping ones
     python benchmarks/frontier.py --heuristic         `lns` against the best known
     python benchmarks/frontier.py --peers             other people's solvers on the same graphs
@@ -19,9 +20,11 @@ import statistics
 import sys
 import time
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from peers import EXACT, HEURISTIC
+from resumed import outcomes
 from table import head, heading, row
 
 from netsp import Problem, Status, solve, solve_graph, travel_graph, verify
@@ -49,51 +52,70 @@ def world(seed: int, goals: int, tether: float, many: bool) -> Problem:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Of one world: seconds, classes, gap in per cent, why it failed."""
+    """Of one world: seconds, classes, gap in per cent, GiB, why it failed."""
 
     seconds: float
     classes: int = 0
     gap: float = 100.0
     proven: bool = False
     verified: bool = False
+    peak: float = 0.0
     failed: str = ""
 
+    @property
+    def shown(self) -> str:
+        """Seconds if it was proven, else the gap."""
+        if self.failed:
+            return "failed"
+        return f"{self.seconds:.0f} s" if self.proven else f"{self.gap:.2g} %"
 
-def proof(problem: Problem, limit: float, classes: str = "all") -> Outcome:
+
+def warmed() -> None:
+    """Compile before it counts."""
+    solve(world(0, 5, 200.0, many=False))
+    solve_graph(travel_graph(world(0, 5, 200.0, many=False)), "lns", iteration_limit=10)
+
+
+def proof(job: tuple[int, float, bool, str, float, int]) -> Outcome:
     """From problem to proof, and the tour judged."""
+    goals, tether, many, classes, limit, seed = job
+    warmed()
+    problem = world(seed, goals, tether, many)
     begin = time.perf_counter()
     try:
         solution = solve(problem, time_limit=limit, roadmap_options={"classes": classes})
     except NetspError as error:
         return Outcome(time.perf_counter() - begin, failed=f" ({str(error)[:40]}…)")
     seconds = time.perf_counter() - begin
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
     return Outcome(
         seconds, len(travel_graph(problem, classes=classes)),
         100.0 * (solution.gap if solution.gap is not None else 1.0),
-        solution.status is Status.OPTIMAL, bool(verify(problem, solution)),
+        solution.status is Status.OPTIMAL, bool(verify(problem, solution)), peak,
     )  # fmt: skip
 
 
 def proofs(
     cells: list[tuple[int, float]], worlds: int, limit: float, many: bool, rules: list[str],
-    table: str,
+    table: str, workers: int, kept: Path | None,
 ) -> None:  # fmt: skip
     """One row a cell and rule of classes. table : its name among those that are kept."""
     head("goals", "tether", "rule", "classes", "proven", "median s", "worst s", "mean gap %",
-         "worst gap %", "verified", "peak GiB",
+         "worst gap %", "verified", "peak GiB", "each world: proven after, or gap",
          name=table)  # fmt: skip
     for goals, tether in cells:
         for rule in rules:
-            found = [proof(world(s, goals, tether, many), limit, rule) for s in range(worlds)]
+            jobs = [(goals, tether, many, rule, limit, s) for s in range(worlds)]
+            found = outcomes(jobs, proof, Outcome, workers=workers, file=kept)
             times, gaps = [f.seconds for f in found], [f.gap for f in found]
             sizes = [f.classes for f in found if f.classes] or [0]
             failed = next((f.failed for f in found if f.failed), "")
-            peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
             row(
                 goals, f"{tether:g}", rule, f"{min(sizes)} to {max(sizes)}",
                 f"{sum(f.proven for f in found)}/{worlds}{failed}",
                 f"{statistics.median(times):.2f}", f"{max(times):.2f}", f"{np.mean(gaps):.3f}",
-                f"{max(gaps):.3f}", f"{sum(f.verified for f in found)}/{worlds}", f"{peak:.2f}",
+                f"{max(gaps):.3f}", f"{sum(f.verified for f in found)}/{worlds}",
+                f"{max(f.peak for f in found):.2f}", ", ".join(f.shown for f in found),
             )  # fmt: skip
 
 
@@ -180,10 +202,11 @@ def main() -> None:
     parser.add_argument("--peers", action="store_true")
     parser.add_argument("--table", help="name of the table among those kept")
     parser.add_argument("--plot", help="of --peers, a performance profile")
+    parser.add_argument("--jobs", type=int, default=1, help="worlds at a time")
+    parser.add_argument("--outcomes", type=Path, help="JSON lines, one a world")
     args = parser.parse_args()
     heading(f"Frontier ({args.worlds} worlds a cell, limit {args.limit:g} s)")
-    solve(world(0, 5, 200.0, many=False))  # compiled before it counts
-    solve_graph(travel_graph(world(0, 5, 200.0, many=False)), "lns", iteration_limit=10)
+    warmed()
     if args.heuristic:
         heuristic(args.worlds)
     elif args.peers:
@@ -194,7 +217,10 @@ def main() -> None:
             cells = [(int(c.split(":")[0]), float(c.split(":")[1])) for c in args.cells.split(",")]
         rules = ["non-looping", "all"] if args.rules else ["all"]
         table = args.table or ("frontier-rules" if args.rules else "frontier")
-        proofs([(n, float(t)) for n, t in cells], args.worlds, args.limit, args.many, rules, table)
+        proofs(
+            [(n, float(t)) for n, t in cells], args.worlds, args.limit, args.many, rules, table,
+            args.jobs, args.outcomes,
+        )  # fmt: skip
 
 
 if __name__ == "__main__":

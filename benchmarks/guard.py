@@ -23,11 +23,11 @@ import math
 import resource
 import time
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from resumed import outcomes
 from sites import SITES, mission_of, shipped
 from space import reachable_world
 from table import ROOT, head, heading, row
@@ -342,26 +342,11 @@ def main() -> None:
          "false as possible an hour",
          "turn counter's an hour", "update ms, median / p99", name="guard")  # fmt: skip
     jobs = [(kind, seed, args.loops) for kind, seed in tracks(args.tracks)]
-    outcomes = measured(jobs, args.jobs, args.outcomes)
-    for kind in (*dict.fromkeys(o.kind for o in outcomes), None):
-        some = [o for o in outcomes if kind in (None, o.kind)]
+    found = outcomes(jobs, one, Outcome, workers=args.jobs, file=args.outcomes)
+    for kind in (*dict.fromkeys(o.kind for o in found), None):
+        some = [o for o in found if kind in (None, o.kind)]
         told(kind or "all", some)
     print()
-
-
-def measured(jobs: list[tuple[str, int, int]], workers: int, kept: Path | None) -> list[Outcome]:
-    """Outcomes of all tracks; those in the file are taken from it, and new ones are added."""
-    lines = kept.read_text().splitlines() if kept is not None and kept.exists() else []
-    known = {tuple(row["job"]): Outcome(**row["outcome"]) for row in map(json.loads, lines)}
-    with ProcessPoolExecutor(workers) as pool:
-        running = {pool.submit(one, job): job for job in jobs if job not in known}
-        for done in as_completed(running):
-            job = running[done]
-            known[job] = done.result()
-            if kept is not None:
-                with kept.open("a") as file:
-                    file.write(json.dumps({"job": job, "outcome": asdict(known[job])}) + "\n")
-    return [known[job] for job in jobs]
 
 
 def beside_flight(
