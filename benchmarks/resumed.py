@@ -15,7 +15,7 @@ Outcome = TypeVar("Outcome")
 
 
 def outcomes(
-    jobs: Sequence[tuple[Any, ...]], run: Callable[[Any], O], kind: type[Outcome],
+    jobs: Sequence[tuple[Any, ...]], run: Callable[[Any], Outcome], kind: type[Outcome],
     *, workers: int, file: Path | None,
 ) -> list[Outcome]:  # fmt: skip
     """Of all jobs, in their order. Each is run in a process of its own: memory is its own, too.
