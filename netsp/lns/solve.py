@@ -10,6 +10,7 @@ from netsp.arrays import Ints
 from netsp.clock import Clock
 from netsp.lns.layers import Instance
 from netsp.lns.search import Search
+from netsp.solving.beside import LEAST_SHARE, beside_tour
 from netsp.solving.limits import Limits
 from netsp.solving.run import SolverRun
 from netsp.travel.graph import TravelGraph, least_tethers
@@ -29,7 +30,8 @@ class Params:
     Attributes
     ----------
     classes
-        Most classes per goal, those of least tether; 0 for as many as make `MOST_VERTICES` in all.
+        Most classes per goal, at first those of least tether, then those beside the best tour; 0
+        for as many as make `MOST_VERTICES` in all.
     restarts
         Searches that share the iterations or the time, each from the best so far.
     """
@@ -61,7 +63,7 @@ def _search(run: SolverRun, rng: np.random.Generator, chosen: Params) -> None:
     graph = run.graph
     run.check()
     core = core_of(run, chosen.classes)
-    instance = Instance(graph.cluster[core], graph.costs_among(core), core, graph.before)
+    instance = Instance.among(graph, core)
     by_clock = run.clock.limit is not None and run.iteration_limit == np.inf
     if not by_clock and run.iteration_limit == np.inf:
         run.iteration_limit = ROUNDS_PER_GOAL * graph.goal_count
@@ -69,6 +71,9 @@ def _search(run: SolverRun, rng: np.random.Generator, chosen: Params) -> None:
     for k in range(chosen.restarts):
         start = None if run.tour is None else graph.cluster[list(run.tour)]
         run.check()
+        if k and len(core) < len(graph) and run.tour is not None:
+            core = core_beside(run, chosen.classes)
+            instance = Instance.among(graph, core)
         clock = run.clock.part(1.0 / (chosen.restarts - k))
         search = Search(instance, rng, start, clock)
         search.settle()
@@ -95,6 +100,16 @@ def core_of(run: SolverRun, classes: int = 0, vertices: int = MOST_VERTICES) -> 
     some = classes or most_classes(graph, vertices)
     core = least_tethers(graph.costs_to_base, graph.cluster, some)
     return np.union1d(core, run.tour) if run.tour is not None else core
+
+
+def core_beside(run: SolverRun, classes: int = 0) -> Ints:
+    """The classes that a search looks at once there is a tour: some of least tether, and those
+    beside it."""
+    graph, tour = run.graph, run.tour or (0,)
+    some = classes or most_classes(graph, MOST_VERTICES)
+    least = least_tethers(graph.costs_to_base, graph.cluster, max(1, some // LEAST_SHARE))
+    beside = beside_tour(graph.lower_bounds(rows=tour), tour, graph.cluster, some)
+    return np.unique(np.concatenate([least, beside, tour]))
 
 
 def _take(run: SolverRun, search: Search) -> None:

@@ -1,7 +1,8 @@
 """A run of a solver that proves, with local search for its incumbents.
 
-While legs are only bounded the search sees a core of classes whose legs it has measured; in the end
-it sees all that are left.
+While legs are only bounded the search sees a core of classes whose legs it has measured, those of
+least tether and those beside the best tour (`netsp.solving.beside`); in the end it sees all that
+are left.
 
 With very many classes the proof is made over the core first (`SearchingRun.core`): its tour is
 often the best of all, and the program over all classes begins with its legs and cuts.
@@ -15,11 +16,12 @@ from typing import Any, Self
 
 import numpy as np
 
-from netsp.arrays import Ints
+from netsp.arrays import Floats, Ints
 from netsp.clock import Clock
 from netsp.errors import LimitReachedError
 from netsp.lns.layers import Instance
 from netsp.lns.search import Search
+from netsp.solving.beside import LEAST_SHARE, beside_tour
 from netsp.solving.legcosts import MEASURE_AT_ONCE, LegCosts
 from netsp.solving.limits import Limits
 from netsp.solving.run import SLIVER, SolverRun, Stop
@@ -38,6 +40,10 @@ MOST_CLASSES = 12
 
 CORE_SHARE = 0.4
 """Part of the time that is left which the core may take."""
+
+TURNS, IN_VAIN, TURNS_SHARE = 8, 2, 0.1
+"""So many times at most, until so many in a row were in vain, and in that part of the time, a tour
+is sought beside the best one."""
 
 LARGER = 6
 """The core comes first where there are more than so many times as many vertices in all: below that
@@ -81,9 +87,36 @@ class SearchingRun(SolverRun):
         self.take(search)
         self.report("begun", vertices=len(graph))
 
+    def search_beside(self) -> Ints:
+        """Search among the classes of least tether, then among those beside the best tour, as long
+        as that is improved; the classes of the last search."""
+        graph, clock = self.graph, self.clock.part(TURNS_SHARE)
+        core = least_tethers(graph.costs_to_base, graph.cluster, self.classes_per_goal)
+        vain = 0
+        for _ in range(TURNS):
+            before = self.length
+            core = np.union1d(core, np.array(self.tour or (0,), dtype=np.int64))
+            self._search(Instance.among(graph, core), clock)
+            self.report("begun", vertices=len(graph))
+            vain = 0 if self.length < before else vain + 1
+            if clock.up or self.tour is None or vain == IN_VAIN:
+                break
+            core = self._classes(
+                graph.costs_to_base, graph.cluster, graph.lower_bounds(rows=self.tour), self.tour
+            )
+        return core
+
+    def _classes(
+        self, tethers: Floats, cluster: Ints, bounds: Floats, tour: Sequence[int] | Ints
+    ) -> Ints:
+        """Of least tether, and beside a tour with so many bounds from its vertices."""
+        few = max(1, self.classes_per_goal // LEAST_SHARE)
+        least = least_tethers(tethers, cluster, few)
+        return np.union1d(least, beside_tour(bounds, tour, cluster, self.classes_per_goal))
+
     @contextmanager
     def core(self) -> Iterator[Self | None]:
-        """A run like this one over the classes of least tether, those of the incumbent among them;
+        """A run like this one over the classes of least tether and those beside the best tour;
         None where they are too few to be worth it. When its own share of the time is over, the body
         is left early."""
         graph = self.graph
@@ -92,7 +125,7 @@ class SearchingRun(SolverRun):
         if few or not graph.roadmapped or self.outer is not None:
             yield None
             return
-        core = np.union1d(core, np.array(self.tour or (0,), dtype=np.int64))
+        core = np.union1d(self.search_beside(), np.array(self.tour or (0,), dtype=np.int64))
         limit = CORE_SHARE * self.clock.left if self.clock.limit is not None else None
         inner = type(self)(
             graph.subgraph(core), Limits(Clock(limit, within=self.clock), rng=self.rng),
@@ -136,16 +169,19 @@ class SearchingRun(SolverRun):
 
     def instance(self, costs: LegCosts, more: Ints) -> Instance:
         """What the heuristic searches: everything if it is measured, else the classes of least
-        tether, the incumbent's, and more."""
+        tether, those beside the incumbent, its own, and more."""
         if costs.exact is None:
             if self._core is None or self._core[0] != len(costs):
                 values = np.asarray(costs.values, dtype=np.float64)
                 whole = Instance(costs.cluster, values, costs.vertices, self.graph.before)
                 self._core = len(costs), whole
             return self._core[1]
-        least = least_tethers(costs.values[0], costs.cluster, self.classes_per_goal)
-        own = np.searchsorted(costs.vertices, np.array(self.tour or (0,)))
-        core = np.unique(np.concatenate([least, own, more]))
+        tethers, own = costs.values[0], np.searchsorted(costs.vertices, np.array(self.tour or (0,)))
+        if self.tour is None:
+            some = least_tethers(tethers, costs.cluster, self.classes_per_goal)
+        else:
+            some = self._classes(tethers, costs.cluster, costs.values[own], own)
+        core = np.unique(np.concatenate([some, own, more]))
         costs.measure(core)
         return Instance(
             costs.cluster[core], costs.values[np.ix_(core, core)].astype(np.float64),
@@ -153,13 +189,24 @@ class SearchingRun(SolverRun):
         )  # fmt: skip
 
     def search(self, costs: LegCosts, more: Ints | None = None) -> None:
-        """Local search, then ruin and recreate, from the incumbent if there is one."""
-        instance = self.instance(costs, np.zeros(0, dtype=np.int64) if more is None else more)
+        """Local search, then ruin and recreate, from the incumbent if there is one; again beside a
+        better tour, where not all classes are looked at."""
+        more = np.zeros(0, dtype=np.int64) if more is None else more
+        clock = self.clock.part(TURNS_SHARE)
+        vain = 0
+        for _ in range(TURNS):
+            before = self.length
+            self._search(self.instance(costs, more), clock, rounded=costs.rounded)
+            vain = 0 if self.length < before else vain + 1
+            if costs.exact is None or clock.up or vain == IN_VAIN:
+                break
+
+    def _search(self, instance: Instance, clock: Clock, *, rounded: bool = False) -> None:
         start = None if self.tour is None else self.graph.cluster[list(self.tour)]
-        search = Search(instance, self.rng, start, self.clock)
+        search = Search(instance, self.rng, start, clock)
         search.settle()
-        search.run(self.search_rounds, self.clock)
-        self.take(search, rounded=costs.rounded)
+        search.run(self.search_rounds, clock)
+        self.take(search, rounded=rounded)
 
     def take(self, search: Search, *, rounded: bool = False) -> None:
         """Offer what a search found; its legs are measured, so its length is known unless they were

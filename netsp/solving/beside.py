@@ -1,0 +1,51 @@
+"""Which classes of a goal are worth a look, given a tour: those that lengthen it least.
+
+Where tethers are long, the best tours take classes far from those of least tether: with 60 goals at
+a tether of 500, a search among the twelve of least tether of each goal ends 2 % above the best
+one, however long it takes. Beside the tour that it finds are those of a better one.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from netsp.arrays import Floats, Ints
+
+LEAST_SHARE = 3
+"""Besides those beside a tour, of least tether there are one in so many as of them."""
+
+
+def beside_tour(bounds: Floats, tour: npt.ArrayLike, cluster: Ints, classes: int) -> Ints:
+    """The classes of each goal that lengthen a tour least, by bounds on their legs.
+
+    Parameters
+    ----------
+    bounds : ndarray, shape (m, V)
+        Of the legs from the tour's vertices to all, inf within a cluster.
+    tour : array_like of int, shape (m,)
+        The vertices, base first.
+    cluster : ndarray of int, shape (V,)
+        Of all vertices.
+    classes : int
+        So many of each goal.
+
+    Returns
+    -------
+    ndarray of int
+        The vertices, in order; the base is among them.
+    """
+    t = np.asarray(tour, dtype=np.int64)
+    after = np.roll(np.arange(len(t)), -1)
+    legs = bounds[np.arange(len(t)), t[after]]
+    longer = np.full(len(cluster), np.inf)
+    for k in range(len(t)):
+        np.minimum(longer, bounds[k] + bounds[after[k]] - legs[k], out=longer)
+    # in place of the tour's own class of a goal
+    for k in range(1, len(t)):
+        own = np.flatnonzero(cluster == cluster[t[k]])
+        instead = bounds[k - 1, own] + bounds[after[k], own] - legs[k - 1] - legs[k]
+        longer[own] = np.minimum(longer[own], instead)
+    order = np.lexsort((longer, cluster))
+    first = np.searchsorted(cluster[order], cluster[order])
+    return np.sort(order[np.arange(len(order)) - first < classes])
