@@ -1,0 +1,72 @@
+"""Classes beside a tour: those that lengthen it least, whatever their tether."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from netsp import solve, travel_graph
+from netsp.mip.solve import MipRun
+from netsp.solving import searching
+from netsp.solving.beside import beside_tour
+from netsp.solving.limits import Limits
+from netsp.travel.graph import least_tethers
+from netsp.worlds import random_world
+from tests.test_contract import random_graph
+
+
+def lengthens(graph, tour, v):
+    """What vertex v adds to a tour, put in anywhere or in place of its goal's own vertex."""
+    at = [graph.cluster[u] for u in tour].index(graph.cluster[v])
+    ring = [*tour, tour[0]]
+    put_in = [graph.costs[a, v] + graph.costs[v, b] - graph.costs[a, b] for a, b in pairwise(ring)]
+    a, b = ring[at - 1], ring[at + 1]
+    own = graph.costs[a, tour[at]] + graph.costs[tour[at], b]
+    return min(*put_in, graph.costs[a, v] + graph.costs[v, b] - own)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_of_each_goal_those_are_chosen_that_lengthen_the_tour_least(seed):
+    graph = random_graph(seed, goals=6)
+    rng = np.random.default_rng(seed)
+    order = rng.permutation(np.arange(1, graph.goal_count + 1))
+    tour = [0, *(int(rng.choice(graph.members(c))) for c in order)]
+    chosen = beside_tour(graph.lower_bounds(rows=tour), tour, graph.cluster, 2)
+    assert 0 in chosen
+    for goal in order:
+        members = graph.members(goal)
+        costs = sorted(lengthens(graph, tour, v) for v in members)
+        found = sorted(lengthens(graph, tour, v) for v in members if v in chosen)
+        assert found == pytest.approx(costs[:2])
+    every = beside_tour(graph.lower_bounds(rows=tour), tour, graph.cluster, len(graph))
+    assert every.tolist() == list(range(len(graph)))
+
+
+@pytest.mark.parametrize("seed", [0, 3, 4, 5])
+def test_a_search_of_two_classes_a_goal_finds_more_than_those_of_least_tether_hold(seed):
+    problem = random_world(seed, goals=20, tether_length=350.0)
+    graph = travel_graph(problem)
+    least = least_tethers(graph.costs_to_base, graph.cluster, 2)
+    shortest_of_these = solve_all(graph.subgraph(least))
+    found = solve(problem, solver="lns", params={"classes": 2}, iteration_limit=3000)
+    assert found.length < 0.95 * shortest_of_these
+
+
+def solve_all(graph):
+    run = MipRun(graph, Limits(time=60.0))
+    result = run.solve("highs", None)
+    assert result.status == "optimal"
+    return result.length
+
+
+def test_a_proof_begins_with_a_tour_beside_which_there_is_none_better(monkeypatch):
+    monkeypatch.setattr(searching, "CORE", 40)  # three classes of each goal
+    graph = travel_graph(random_world(0, goals=20, tether_length=350.0))
+    run = MipRun(graph, Limits(iterations=10_000), search_rounds=300)
+    run.begin()
+    first = solve_all(
+        graph.subgraph(least_tethers(graph.costs_to_base, graph.cluster, run.classes_per_goal))
+    )
+    core = run.search_beside()
+    assert run.length < first - 1.0
+    assert np.isin(run.tour, core).all()
