@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from netsp import Circle, InfeasibleError, InputError, Problem, Status, solve, travel_graph, verify
 from netsp.command.main import main
 from netsp.roadmap.paths import TautPaths
-from netsp.roadmap.within_reach import shortest_tethers
+from netsp.roadmap.reach import shortest_tethers
 from netsp.sizing import best_base, margins, tether_curve
 from netsp.sizing.margins import _complaint
 

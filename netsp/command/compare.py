@@ -8,6 +8,7 @@ import time
 from typing import TYPE_CHECKING, Any, TextIO
 
 from netsp.command import messages, told
+from netsp.command.patience import span
 from netsp.command.types import (
     length,
     natural,
@@ -164,7 +165,7 @@ class Bar:
         fresh = tally.done - tally.begun
         left = (now - self.begin) / fresh * (tally.total - tally.done)
         text = (
-            f"{tally.done}/{tally.total} trials, {tally.failed} failed, {_span(left)} left, "
+            f"{tally.done}/{tally.total} trials, {tally.failed} failed, {span(left)} left, "
             f"last {describe_row(row)}"
         )
         self._clear()
@@ -187,9 +188,3 @@ def describe_row(row: TrialRow) -> str:
         f"{row['solver']['label']} on {world['family']}-{world['seed']}, {world['goals']} goals, "
         f"tether {world['tether_length']:g}"
     )
-
-
-def _span(seconds: float) -> str:
-    minutes, rest = divmod(round(seconds), 60)
-    hours, minutes = divmod(minutes, 60)
-    return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"

@@ -93,7 +93,7 @@ def run(args: argparse.Namespace) -> int:
     from netsp.online.scene.scene import Scene
 
     scene = Scene.load(args.scene)
-    stages = None if args.quiet else Stages(sys.stderr)
+    stages = None if args.quiet else Stages(sys.stderr, args.time_limit)
     compiling = contextlib.nullcontext() if args.quiet else compile_messages(sys.stderr)
     with stages or contextlib.nullcontext(), compiling:
         found = cover(

@@ -8,6 +8,7 @@ import sys
 from typing import TYPE_CHECKING
 
 from netsp.command import messages
+from netsp.command.patience import Patience
 from netsp.command.types import check_writable, length, option, positive
 from netsp.errors import InputError
 
@@ -102,11 +103,13 @@ def run(args: argparse.Namespace) -> int:
     check_writable(args.output, inputs=(args.site, args.goals))
     from netsp.files import write_text
 
-    problem = _of_image(args) if _is_image(args) else _of_map(args)
+    with Patience(sys.stderr, f"reading {args.site}"):
+        problem = _of_image(args) if _is_image(args) else _of_map(args)
     if args.skip_unreachable:
         from netsp.roadmap.within_reach import within_reach
 
-        problem, why = within_reach(problem)
+        with Patience(sys.stderr, "looking for the goals in reach"):
+            problem, why = within_reach(problem)
         for line in why:
             messages.note(f"{line}: left out")
     print(

@@ -9,6 +9,7 @@ import time
 from typing import TYPE_CHECKING
 
 from netsp.command import told
+from netsp.command.patience import span
 from netsp.command.types import check_writable, natural, seconds
 from netsp.errors import EXIT_NOT_VERIFIED, InputError
 
@@ -171,7 +172,7 @@ def _rank(args: argparse.Namespace, library: Library) -> int:
                         what += f", {100 * (row.length / record.length - 1):.3f} % above the best"
                 print(
                     f"[{k}/{len(names)}] {row.problem}: {what}, {row.seconds:.1f} s; "
-                    f"{left / 60:.1f} min left", file=sys.stderr, flush=True,
+                    f"{span(left)} left", file=sys.stderr, flush=True,
                 )  # fmt: skip
     entries = rank.ranking(library, rows)
     if args.json:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from typing import TYPE_CHECKING
 
+from netsp.command.patience import Patience
 from netsp.command.solve_mission import is_mission
 from netsp.command.types import (
     check_writable,
@@ -54,6 +56,11 @@ def arguments(p: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Draw, and return the exit code."""
     check_writable(args.output, inputs=(args.problem, args.solution))
+    with Patience(sys.stderr, f"drawing {args.output}"):
+        return _drawn(args)
+
+
+def _drawn(args: argparse.Namespace) -> int:
     if is_mission(args.problem):
         return _mission(args)
     if is_scene(args.problem):

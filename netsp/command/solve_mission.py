@@ -75,7 +75,7 @@ def solve(
     from netsp.command.stages import Stages
     from netsp.space.solve import solve_mission
 
-    stages = None if quiet else Stages(sys.stderr)
+    stages = None if quiet else Stages(sys.stderr, time_limit or TIME_LIMIT)
     begin = time.monotonic()
     compiling = contextlib.nullcontext() if quiet else compile_messages(sys.stderr)
     with stages or contextlib.nullcontext(), compiling:

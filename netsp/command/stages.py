@@ -5,16 +5,18 @@ from __future__ import annotations
 import time
 from typing import TextIO
 
+from netsp.command.patience import span
+
 EVERY = 5.0
 """Seconds between two lines of one stage where nobody watches a terminal."""
 
 
 class Stages:
     """Shows what is being done: in one line that is written again where somebody watches, else in a
-    line for each stage, and for a long one now and then."""
+    line for each stage, and for a long one now and then. With a limit, the seconds left of it."""
 
-    def __init__(self, stream: TextIO) -> None:
-        self._stream, self._begin = stream, time.monotonic()
+    def __init__(self, stream: TextIO, limit: float | None = None) -> None:
+        self._stream, self._begin, self._limit = stream, time.monotonic(), limit
         self._watched = stream.isatty()
         self._stage, self._shown = "", -EVERY
 
@@ -26,7 +28,9 @@ class Stages:
             return
         if stage != self._stage and not self._watched:
             text = stage  # how far it is will be told of those that take long
-        line = f"{now - self._begin:7.1f}s  {text} …"
+        seconds = now - self._begin
+        left = "" if self._limit is None else f", {span(max(self._limit - seconds, 0.0))} left"
+        line = f"{seconds:7.1f}s  {text} …{left}"
         if self._watched:
             end = "\n" if stage != self._stage and self._stage else ""
             print(f"{end}\r{line:<78}", end="", file=self._stream, flush=True)

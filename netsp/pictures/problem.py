@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from netsp import steps
 from netsp.pictures import style
 from netsp.problem import Circle, Problem
 from netsp.roadmap.paths import TautPaths
@@ -328,7 +329,7 @@ def draw_obstacles(
 
     xmin, ymin, xmax, ymax = view(problem, None)
     small = SMALL * max(xmax - xmin, ymax - ymin)
-    for i, o in enumerate(problem.obstacles):
+    for i, o in enumerate(steps.each(problem.obstacles)):
         look: dict[str, Any] = {"fc": style.OBSTACLE, "ec": style.EDGE, "lw": 0.6, "zorder": 1}
         if i in wrapped:
             look["fc"] = style.WRAPPED

@@ -9,10 +9,13 @@ from __future__ import annotations
 import io
 import re
 import warnings
-from functools import cache
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import cache, wraps
 from pathlib import Path
 from typing import Any
 
+from netsp import steps
 from netsp.errors import InputError
 
 BASE = "#000000"
@@ -101,7 +104,34 @@ def _write(figure: Any, target: Any, **more: Any) -> None:
     the first show as boxes, the second are cut."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message=r"Glyph \d+|constrained_layout not applied")
-        literal(figure).savefig(target, **more)
+        with _steps_told(figure):
+            literal(figure).savefig(target, **more)
+
+
+@contextmanager
+def _steps_told(figure: Any) -> Iterator[None]:
+    """While the body draws a figure, what it consists of is counted."""
+    parts = [part for axes in figure.axes for part in axes.get_children()]
+    done = 0
+
+    def counting(draw: Callable[..., Any]) -> Callable[..., Any]:
+        @wraps(draw)
+        def drawn(*args: Any, **more: Any) -> Any:
+            nonlocal done
+            done = min(done + 1, len(parts))
+            out = draw(*args, **more)
+            steps.tell(done, len(parts))
+            return out
+
+        return drawn
+
+    for part in parts:
+        part.draw = counting(part.draw)
+    try:
+        yield
+    finally:
+        for part in parts:
+            del part.draw
 
 
 def literal(figure: Any) -> Any:

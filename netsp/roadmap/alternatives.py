@@ -8,7 +8,8 @@ import numpy as np
 
 from netsp.errors import InfeasibleError, InputError
 from netsp.problem import Problem
-from netsp.roadmap.within_reach import HAIR, shortest_tethers
+from netsp.roadmap.reach import shortest_tethers
+from netsp.roadmap.within_reach import HAIR
 from netsp.travel.choices import with_choices
 from netsp.travel.graph import TravelGraph
 

@@ -1,4 +1,5 @@
-"""Why a goal is out of reach: the shortest tether that would do, or what encloses it."""
+"""How long a tether each goal needs, and why one is out of reach: the shortest tether that would
+do, or what encloses it."""
 
 from __future__ import annotations
 
@@ -7,13 +8,56 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from netsp.arrays import Floats
 from netsp.errors import InfeasibleError, counted
 from netsp.problem import Circle, Problem
-from netsp.roadmap.outline import Outline
+from netsp.roadmap.outline import Outline, build_outline
 from netsp.roadmap.shortest import ContactGraph
 
 if TYPE_CHECKING:
     import shapely
+
+
+MANY_OBSTACLES = 100
+"""With more, those that no path can touch are left out."""
+
+FARTHER = 1.2
+"""Times the distance, as which the ways to goals are long, at first."""
+
+
+def shortest_tethers(problem: Problem, outline: Outline | None = None) -> Floats:
+    """The shortest tether that reaches each goal, in any class.
+
+    Parameters
+    ----------
+    problem : Problem
+        Its tether length does not matter.
+    outline : Outline, optional
+        Of the problem, if it is at hand.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Lengths in 3D; inf where a goal cannot be reached.
+    """
+    points = problem.points
+    far = np.hypot(*(points[1:, :2] - points[0, :2]).T)
+    away = np.array([o.signed_distance(points[0, :2]) for o in problem.obstacles])
+    within = FARTHER * float(far.max(initial=0.0)) + problem.clearance
+    while True:
+        near = away <= within + problem.clearance
+        if len(away) <= MANY_OBSTACLES or near.all():
+            planar = ContactGraph(outline or build_outline(problem)).lengths([0])[0, 1:]
+            break
+        some = tuple(o for o, there in zip(problem.obstacles, near, strict=True) if there)
+        local = build_outline(problem.model_copy(update={"obstacles": some}))
+        planar = ContactGraph(local).lengths([0])[0, 1:]
+        # a path no longer than that does not get to the others
+        longest = float(planar[np.isfinite(planar)].max(initial=0.0))
+        if longest <= within:
+            break
+        within = longest
+    return np.asarray(np.hypot(planar, points[1:, 2] - points[0, 2]))
 
 
 def explain_unreached(problem: Problem, outline: Outline, missing: list[int]) -> str:
@@ -23,16 +67,18 @@ def explain_unreached(problem: Problem, outline: Outline, missing: list[int]) ->
 
 def unreached(problem: Problem, outline: Outline, missing: list[int]) -> InfeasibleError:
     """The error about goals (as point numbers, base 0) that no admissible tether reaches."""
-    planar = ContactGraph(outline).lengths([0])[0]
-    dz = problem.points[:, 2] - problem.points[0, 2]
-    needed = np.hypot(planar, dz)
+    return why_unreached(problem, shortest_tethers(problem, outline), [g - 1 for g in missing])
+
+
+def why_unreached(problem: Problem, needed: Floats, missing: list[int]) -> InfeasibleError:
+    """The error about goals that no admissible tether reaches, given the shortest for each goal."""
     parts: list[str] = []
     enclosing: tuple[int, ...] = ()
     missing = sorted(missing, key=lambda g: -needed[g])  # the largest need first
     for g in missing[:3]:
-        label = problem.goal_label(g - 1)
+        label = problem.goal_label(g)
         if math.isinf(needed[g]):
-            why, around = _enclosure(problem, g)
+            why, around = _enclosure(problem, g + 1)
             if g == missing[0]:
                 enclosing = around
             parts.append(f"{label} cannot be reached with a tether of any length: {why}")
@@ -47,7 +93,7 @@ def unreached(problem: Problem, outline: Outline, missing: list[int]) -> Infeasi
         parts.append(f"{counted(more, 'more goal')} {'is' if more == 1 else 'are'} out of reach")
     first = missing[0]
     return InfeasibleError(
-        "; ".join(parts), goal=first - 1, needed=float(needed[first]), enclosing=enclosing
+        "; ".join(parts), goal=first, needed=float(needed[first]), enclosing=enclosing
     )
 
 

@@ -28,6 +28,12 @@ class ShortestPaths(Protocol):
         """(k, 2) polyline of the path from the source to a target along a tree."""
 
 
+def _by_number(numbers: Ints, count: int) -> list[Ints]:
+    """Where each of the first so many numbers stands, in order."""
+    order = np.argsort(numbers, kind="stable")
+    return np.split(order, np.searchsorted(numbers[order], np.arange(1, count + 1)))[:count]
+
+
 class Rest(NamedTuple):
     """Shortest lengths to a point.
 
@@ -64,9 +70,9 @@ class ContactGraph:
         rows, cols, cost = [leave], [arrive], [t.length]
         self.arc = np.full(points + 2 * edges, -1, dtype=np.int64)
         self.angle = np.zeros(points + 2 * edges)
+        outward, inward = _by_number(tail // 2, arcs), _by_number(t.target // 2, arcs)
         for a in range(arcs):
-            out_e = np.flatnonzero(tail // 2 == a)
-            in_e = np.flatnonzero(t.target // 2 == a)
+            out_e, in_e = outward[a], inward[a]
             contact = np.concatenate([leave[out_e], arrive[in_e]])
             theta = np.concatenate([t.angle[out_e, 0], t.angle[in_e, 1]])
             key = np.mod(theta - t.arcs[a, 3] + 1e-6, 2.0 * np.pi)

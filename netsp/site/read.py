@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pydantic import ValidationError
 
+from netsp import steps
 from netsp.errors import InputError, SeveralErrors, counted
 from netsp.fields import checked_number
 from netsp.models import explain, shown
@@ -320,7 +321,7 @@ class _Site:
                 name = f"{name} {number}"
             out.append({"name": name, **more, "where": feature.where, "feature": feature})
 
-        for feature in features:
+        for feature in steps.each(features):
             if "Point" in feature.shape.geom_type:
                 radius = self._radius(feature)
                 points = getattr(feature.shape, "geoms", [feature.shape])

@@ -32,7 +32,7 @@ from netsp.errors import InputError, LimitReachedError
 from netsp.fields import checked_argument
 from netsp.files import write_text
 from netsp.problem import Problem
-from netsp.roadmap.within_reach import shortest_tethers
+from netsp.roadmap.reach import shortest_tethers
 from netsp.solution import Status
 from netsp.solvers.solve import solve_graph, travel_graph
 from netsp.travel.graph import TravelGraph

@@ -1,0 +1,69 @@
+"""What takes so long, and how long it will take: told where nothing else is for some seconds."""
+
+from __future__ import annotations
+
+import threading
+import time
+from contextlib import ExitStack
+from typing import TextIO
+
+from netsp.steps import heard_by
+
+QUIET_S, EVERY_S = 3.0, 5.0
+"""Seconds until it is told at first, and then between two lines."""
+
+
+class Patience:
+    """While the body of a `with` runs, a line now and then of how far it is: by its steps, where
+    these are counted (`netsp.steps`), with about the time that is left.
+
+    Parameters
+    ----------
+    stream : file
+        Where to.
+    doing : str
+        What is being done.
+    """
+
+    def __init__(self, stream: TextIO, doing: str) -> None:
+        self._stream, self._doing = stream, doing
+        self._done, self._total = 0, 0
+        self._begin = self._since = time.monotonic()
+        self._over = threading.Event()
+        self._open = ExitStack()
+
+    def __enter__(self) -> Patience:
+        self._open.enter_context(heard_by(self._step))
+        threading.Thread(target=self._watch, daemon=True).start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._over.set()
+        self._open.close()
+
+    def _step(self, done: int, total: int) -> None:
+        if done < self._done or total != self._total:
+            self._since = time.monotonic()  # other steps than before
+        self._done, self._total = done, total
+
+    def _watch(self) -> None:
+        wait = QUIET_S
+        while not self._over.wait(wait):
+            wait = EVERY_S
+            print(self.line, file=self._stream, flush=True)
+
+    @property
+    def line(self) -> str:
+        """How far it is."""
+        now, done, total = time.monotonic(), self._done, self._total
+        if not 0 < done < total:
+            return f"{self._doing}: {span(now - self._begin)} so far"
+        left = (now - self._since) / done * (total - done)
+        return f"{self._doing}: {done} of {total}, about {span(left)} left"
+
+
+def span(seconds: float) -> str:
+    """Minutes and seconds, or hours as well."""
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"

@@ -1,0 +1,107 @@
+"""Pictures look as they did when they were last looked at, one by one.
+
+After a change that is meant, look at what `NETSP_REDRAW=1 pytest tests/test_pictures_alike.py`
+writes to `tests/data/pictures`, and commit it.
+"""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from netsp.pictures import style
+from netsp.pictures.problem import save_classes, save_roadmap
+from netsp.report import figures
+from tests.test_style import WHARF, mission, of, run, tour
+
+__all__ = ["mission", "run", "tour"]  # fixtures
+
+KEPT = Path(__file__).parent / "data" / "pictures"
+WIDTH, BLOCK = 480, 12
+"""Pixels: pictures are compared at this width, in blocks of this size."""
+
+ALIKE, MOST = 10.0, 0.01
+"""Of 255: blocks whose colours differ by less on average are alike; and the share of blocks that
+need not be: fonts are drawn a little differently from one release of Matplotlib to the next."""
+
+
+def rows():
+    """Trials of two solvers whose times are known."""
+    return {
+        name: [
+            {"problem_sha256": f"{k}", "seed": 0, "total_s": scale * 1.4**k, "status": status}
+            for k, status in enumerate(["optimal"] * last + ["feasible"] * (12 - last))
+        ]
+        for name, scale, last in (("auto", 0.05, 12), ("mip", 0.2, 9), ("dp", 0.02, 6))
+    }
+
+
+def draw(what, file, request, monkeypatch):
+    """Write a picture as the commands do."""
+    if what == "classes":
+        save_classes(WHARF, 2, file)
+    elif what == "roadmap":
+        save_roadmap(WHARF, "taut", {}, file)
+    elif what == "profile":
+        style.save(figures.performance(rows()), file)
+    else:
+        figure = of(what, request, monkeypatch)
+        monkeypatch.undo()  # the kind that keeps its figure has replaced what saves it
+        style.save(figure, file, dpi=120)
+
+
+def small(file):
+    """(h, w, 3) a picture on white, at the width of comparison."""
+    picture = Image.open(file).convert("RGBA")
+    white = Image.new("RGBA", picture.size, "white")
+    picture = Image.alpha_composite(white, picture).convert("RGB")
+    height = round(picture.height * WIDTH / picture.width)
+    return picture.resize((WIDTH, height), Image.Resampling.LANCZOS)
+
+
+def unlike(one, other):
+    """Share of the blocks of two pictures that are not alike; 1 if they have not the same shape."""
+    if abs(one.height - other.height) > 2:
+        return 1.0
+    height = min(one.height, other.height) // BLOCK * BLOCK
+    a, b = (np.asarray(p, dtype=float)[:height, : WIDTH // BLOCK * BLOCK] for p in (one, other))
+    blocks = (height // BLOCK, BLOCK, WIDTH // BLOCK, BLOCK, 3)
+    means = [p.reshape(blocks).mean(axis=(1, 3)) for p in (a, b)]
+    return float((np.abs(means[0] - means[1]).max(axis=2) > ALIKE).mean())
+
+
+KINDS = (
+    "problem", "tour", "classes", "roadmap", "execution map", "execution tether",
+    "scene", "mission", "profile",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("what", KINDS)
+def test_a_picture_is_as_it_was_when_it_was_looked_at(what, request, monkeypatch, tmp_path):
+    draw(what, tmp_path / "now.png", request, monkeypatch)
+    now, kept = small(tmp_path / "now.png"), KEPT / f"{what.replace(' ', '-')}.png"
+    if os.environ.get("NETSP_REDRAW"):
+        KEPT.mkdir(exist_ok=True)
+        now.quantize(128).save(kept, optimize=True)
+    before = Image.open(kept).convert("RGB")
+    assert unlike(now, before) <= MOST
+
+
+def test_a_change_that_an_eye_would_see_is_seen(monkeypatch, tmp_path):
+    """The check itself: another colour of the tether, a legend elsewhere, an obstacle less."""
+    style.save(figures.performance(rows()), tmp_path / "one.png")
+    figure = figures.performance(rows())
+    for legend in figure.legends or [ax.get_legend() for ax in figure.axes]:
+        legend.remove()
+    style.save(figure, tmp_path / "other.png")
+    assert unlike(small(tmp_path / "one.png"), small(tmp_path / "other.png")) > MOST
+    save_classes(WHARF, 2, tmp_path / "one.png")
+    monkeypatch.setattr(style, "TETHER", "#009e73")
+    save_classes(WHARF, 2, tmp_path / "green.png")
+    fewer = WHARF.model_copy(update={"obstacles": WHARF.obstacles[1:]})
+    assert unlike(small(tmp_path / "one.png"), small(tmp_path / "green.png")) > MOST
+    monkeypatch.undo()
+    save_classes(fewer, 2, tmp_path / "fewer.png")
+    assert unlike(small(tmp_path / "one.png"), small(tmp_path / "fewer.png")) > MOST
