@@ -96,14 +96,14 @@ def proof(job: tuple[int, float, bool, str, float, int]) -> Outcome:
 
 
 def proofs(
-    cells: list[tuple[int, float]], worlds: int, limit: float, many: bool, rules: list[str],
+    cells: list[tuple[int, float, int]], limit: float, many: bool, rules: list[str],
     table: str, workers: int, kept: Path | None,
 ) -> None:  # fmt: skip
     """One row a cell and rule of classes. table : its name among those that are kept."""
     head("goals", "tether", "rule", "classes", "proven", "median s", "worst s", "mean gap %",
          "worst gap %", "verified", "peak GiB", "each world: proven after, or gap",
          name=table)  # fmt: skip
-    for goals, tether in cells:
+    for goals, tether, worlds in cells:
         for rule in rules:
             jobs = [(goals, tether, many, rule, limit, s) for s in range(worlds)]
             found = outcomes(jobs, proof, Outcome, workers=workers, file=kept)
@@ -193,7 +193,7 @@ def peers(worlds: int, limit: float, plot: str | None) -> None:
 def main() -> None:
     """Run what was asked for."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--cells", help="goals:tether,… instead of all")
+    parser.add_argument("--cells", help="goals:tether[:worlds],… instead of all")
     parser.add_argument("--worlds", type=int, default=10)
     parser.add_argument("--limit", type=float, default=300.0, help="seconds a world")
     parser.add_argument("--many", action="store_true", help="50 circles of radius 10 to 20")
@@ -212,15 +212,16 @@ def main() -> None:
     elif args.peers:
         peers(args.worlds, args.limit, args.plot)
     else:
-        cells = CELLS
+        cells = [(n, float(t), args.worlds) for n, t in CELLS]
         if args.cells:
-            cells = [(int(c.split(":")[0]), float(c.split(":")[1])) for c in args.cells.split(",")]
+            asked = [c.split(":") for c in args.cells.split(",")]
+            cells = [
+                (int(n), float(t), int(worlds[0]) if worlds else args.worlds)
+                for n, t, *worlds in asked
+            ]
         rules = ["non-looping", "all"] if args.rules else ["all"]
         table = args.table or ("frontier-rules" if args.rules else "frontier")
-        proofs(
-            [(n, float(t)) for n, t in cells], args.worlds, args.limit, args.many, rules, table,
-            args.jobs, args.outcomes,
-        )  # fmt: skip
+        proofs(cells, args.limit, args.many, rules, table, args.jobs, args.outcomes)
 
 
 if __name__ == "__main__":
