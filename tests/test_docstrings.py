@@ -1,10 +1,12 @@
 """Public names are documented in numpydoc's form: every parameter, what is returned and raised."""
 
 import dataclasses
+import doctest
 import enum
 import importlib
 import inspect
 import pkgutil
+from pathlib import Path
 
 import pytest
 from numpydoc.validate import validate
@@ -105,3 +107,23 @@ def test_what_a_docstring_says_is_raised_is_an_error_that_exists(name):
 
     raised = [row.type for row in FunctionDoc(PUBLIC[name])["Raises"]]
     assert all(hasattr(netsp.errors, r) or hasattr(netsp.worlds, r) for r in raised), raised
+
+
+def _with_examples():
+    """Modules that show examples."""
+    names = [m.name for m in pkgutil.walk_packages(netsp.__path__, "netsp.")]
+    files = {n: Path(netsp.__file__).parent.joinpath(*n.split(".")[1:]) for n in names}
+    return [
+        n for n, file in files.items()
+        if any(">>>" in line and "+SKIP" not in line
+               for f in (file.with_suffix(".py"), file / "__init__.py") if f.exists()
+               for line in f.read_text().splitlines())
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("name", _with_examples())
+def test_examples_give_what_they_say(name, monkeypatch):
+    monkeypatch.chdir(Path(__file__).parent.parent)  # they read files of the repository
+    found = doctest.testmod(importlib.import_module(name))
+    assert found.attempted
+    assert not found.failed

@@ -41,6 +41,9 @@ def arguments(p: argparse.ArgumentParser) -> None:
 
 MOST_SIDE_BY_SIDE, PAGE = 3, ".html"
 
+MOST_SECONDS, MOST_FPS = 600, 60
+"""Of a film."""
+
 
 def run(args: argparse.Namespace) -> int:
     """Draw, and return the exit code."""
@@ -50,6 +53,11 @@ def run(args: argparse.Namespace) -> int:
     kinds = (*FORMATS, PAGE)
     if Path(args.output).suffix.lower() not in kinds:
         raise InputError(f"{args.output}: expected a name ending in {', '.join(kinds)}")
+    for name, value, most in (
+        ("--seconds", args.seconds, MOST_SECONDS), ("--fps", args.fps, MOST_FPS)
+    ):  # fmt: skip
+        if value > most:
+            raise InputError(f"{name}: expected at most {most}, got {value}")
     if len(args.source) > MOST_SIDE_BY_SIDE:
         raise InputError(
             f"SOURCE: {len(args.source)} of them; expected {MOST_SIDE_BY_SIDE} or fewer"

@@ -87,7 +87,7 @@ class Guard:
     >>> for t in range(21):
     ...     report = guard.take(Fix(float(t), (0.3 * t, 0.1 * t, 0.0), estimate=True))
     >>> report.classes[0].word, round(report.classes[0].slack, 2), report.loops
-    ((1,), 2.67, ())
+    ((1,), 2.68, ())
     """
 
     def __init__(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import subprocess
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -102,6 +103,8 @@ def save_animation(
     write = _write_gif if suffix == ".gif" else _write_mp4
     count = max(2, round(seconds * fps))
     target = Path(file).resolve()
+    if target.exists() and not target.is_file():
+        raise InputError(f"{file}: cannot be written: expected a file, not a device or a folder")
     try:
         # renamed into place when it is whole: Ctrl-C leaves what was there before
         with tempfile.TemporaryDirectory(dir=target.parent, prefix=".netsp-") as folder:
@@ -241,6 +244,18 @@ def _write_gif(file: Path, pictures: Iterator[Any], fps: int) -> None:
     frames[0].save(file, save_all=True, append_images=frames[1:], duration=durations, loop=0)
 
 
+def _check_ffmpeg(imageio_ffmpeg: Any) -> None:
+    """InputError unless there is an ffmpeg that runs: a broken one would be blamed on the film."""
+    try:
+        program = imageio_ffmpeg.get_ffmpeg_exe()
+        said = subprocess.run([program, "-version"], capture_output=True, timeout=30).stdout
+        why = "" if b"ffmpeg version" in said else f"{program} is none"
+    except (RuntimeError, OSError, subprocess.SubprocessError) as error:
+        why = str(error)
+    if why:
+        raise InputError(f"films in .mp4 need an ffmpeg that runs: {why}; a .gif does not")
+
+
 def _write_mp4(file: Path, pictures: Iterator[Any], fps: int) -> None:
     try:
         import imageio_ffmpeg
@@ -248,6 +263,7 @@ def _write_mp4(file: Path, pictures: Iterator[Any], fps: int) -> None:
         raise InputError(
             "films in .mp4 need imageio-ffmpeg: pip install 'netsp[video]'; a .gif does not"
         ) from None
+    _check_ffmpeg(imageio_ffmpeg)
     logging.getLogger("imageio_ffmpeg").setLevel(logging.ERROR)  # what Ctrl-C cuts off is not kept
     first = next(pictures)
     height, width = (n - n % 2 for n in first.shape[:2])

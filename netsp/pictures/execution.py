@@ -64,6 +64,7 @@ def draw_map(done: Execution, *, ax: Any = None) -> Any:
         if places:
             ax.plot(*np.array(places)[:, :2].T, mark, color=colour, ms=7, mew=1.8, label=name)
     ax.plot(*problem.base[:2], "*", color=style.BASE, mec="white", ms=14, ls="none", label="base")
+    ax.margins(0.05, 0.1)  # names stand above the goals, within the frame
     ax.set(aspect="equal", xlabel=f"x ({problem.units})", ylabel=f"y ({problem.units})")
     if len(problem.goals) <= 40:
         for k, goal in enumerate(problem.goals):

@@ -39,6 +39,10 @@ FRAMES, FILM_MS = 120, 12_000
 """Of a page: moments that its slider knows, and milliseconds in which they go by."""
 
 
+DASHES = ("-", "-.")
+"""Of two runs side by side, so that they can be told apart in grey."""
+
+
 def path_of(run: Run) -> Floats:
     """(n, 3) where the robot was."""
     return np.array([[r.x, r.y, r.z] for r in run.log])
@@ -77,7 +81,7 @@ def save_runs(runs: Sequence[Run], scene: Scene, file: str | Path) -> None:
     from matplotlib.figure import Figure
 
     seen = runs[0].summary["coverage"] is not None
-    figure = Figure(figsize=(13, 5.5 + 2.5 * (len(runs) - 1)), layout="constrained")
+    figure = Figure(figsize=(13, 5.5 + 4.5 * (len(runs) - 1)), layout="constrained")
     left, right = figure.subfigures(1, 2, width_ratios=[1.0, 1.1])  # type: ignore[misc]
     charts = np.atleast_1d(left.subplots(2 if seen else 1, 1, sharex=True))
     draw_tether(runs, ax=charts[0], units=scene.units)
@@ -105,7 +109,7 @@ def draw_tether(runs: Sequence[Run], *, ax: Any = None, units: str = "m") -> Any
     if ax is None:
         ax = Figure(figsize=(8, 4), layout="constrained").subplots()
     colours = style.RUNS if len(runs) > 1 else (style.TETHER,)
-    for run, colour in zip(runs, colours, strict=False):
+    for run, colour, dashes in zip(runs, colours, DASHES, strict=False):
         t = np.array([r.time for r in run.log])
         recovering = [r.mode == "recovery" for r in run.log]
         if len(runs) == 1 and any(recovering):
@@ -113,7 +117,7 @@ def draw_tether(runs: Sequence[Run], *, ax: Any = None, units: str = "m") -> Any
                 t, 0, 1, where=recovering, color=style.RECOVERY,
                 transform=ax.get_xaxis_transform(), label="tether recovery",
             )  # fmt: skip
-        ax.plot(t, [r.payout for r in run.log], color=colour, lw=1.3, label=run.planner)
+        ax.plot(t, [r.payout for r in run.log], color=colour, lw=1.3, ls=dashes, label=run.planner)
     longest = max(runs, key=lambda run: len(run.log))
     ax.plot(
         [r.time for r in longest.log], [r.limit for r in longest.log], color=style.LIMIT, lw=1.0,
@@ -137,9 +141,9 @@ def draw_coverage(runs: Sequence[Run], *, ax: Any = None) -> Any:
 
     if ax is None:
         ax = Figure(figsize=(8, 4), layout="constrained").subplots()
-    for run, colour in zip(runs, style.RUNS, strict=False):
+    for run, colour, dashes in zip(runs, style.RUNS, DASHES, strict=False):
         t = np.array([r.time for r in run.log])
-        ax.plot(t, [100 * r.coverage for r in run.log], color=colour, lw=1.3)
+        ax.plot(t, [100 * r.coverage for r in run.log], color=colour, lw=1.3, ls=dashes)
         ax.plot(t, [100 * r.coverage_through for r in run.log], color=colour, lw=0.9, ls=":")
     ax.set(xlabel="time (s)", ylabel="seen (%)", ylim=(0, 100))
     if any(r.coverage != r.coverage_through for run in runs for r in run.log):

@@ -181,7 +181,7 @@ def draw_space(
     if stops is not None:
         draw_stops(ax, stops, (0, 1, 2))
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-    ax.set_box_aspect(high - low, zoom=0.85)  # room for the labels
+    ax.set_box_aspect(high - low, zoom=0.8)  # room for the labels
     # beyond the numbers of the ticks, along the longer sides farther
     widest = float((high - low).max())
     for name, size in zip("xyz", high - low, strict=True):

@@ -71,6 +71,8 @@ def save(figure: Any, path: str | Path, dpi: int = 150) -> None:
         Another ending, a file that cannot be written.
     """
     check_format(path)
+    if Path(path).exists() and not Path(path).is_file():
+        raise InputError(f"{path}: cannot be written: expected a file, not a device or a folder")
     try:
         metadata = {"Date": None} if Path(path).suffix.lower() == ".svg" else None
         _write(figure, path, dpi=dpi, metadata=metadata)

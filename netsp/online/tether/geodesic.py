@@ -61,7 +61,7 @@ class GeodesicTether:
     >>> tether = model.start(anchor=(-2, 0.6, 0), robot=(2, 0.6, 0))
     >>> tether = model.update(tether, (2, -1, 0))
     >>> len(tether.contacts), round(tether.length, 2)
-    (1, 4.37)
+    (1, 4.53)
     """
 
     field: DistanceField
