@@ -122,8 +122,8 @@ class SearchingRun(SolverRun):
     @contextmanager
     def core(self) -> Iterator[Self | None]:
         """A run like this one over the classes of least tether, and those beside the best tour if
-        there is room for enough of them; None where they are too few to be worth it. When its own share of the time is over, the body
-        is left early."""
+        there is room for enough of them; None where they are too few to be worth it. When its own
+        share of the time is over, the body is left early."""
         graph = self.graph
         core = least_tethers(graph.costs_to_base, graph.cluster, self.classes_per_goal)
         few = len(graph) <= max(MEASURE_AT_ONCE, LARGER * len(core))
