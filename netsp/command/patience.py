@@ -31,14 +31,16 @@ class Patience:
         self._begin = self._since = time.monotonic()
         self._over = threading.Event()
         self._open = ExitStack()
+        self._thread = threading.Thread(target=self._watch, daemon=True)
 
     def __enter__(self) -> Patience:
         self._open.enter_context(heard_by(self._step))
-        threading.Thread(target=self._watch, daemon=True).start()
+        self._thread.start()
         return self
 
     def __exit__(self, *_: object) -> None:
         self._over.set()
+        self._thread.join()  # no line comes after the work is done
         self._open.close()
 
     def _step(self, done: int, total: int) -> None:
