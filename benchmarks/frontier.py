@@ -76,11 +76,15 @@ def warmed() -> None:
     solve_graph(travel_graph(world(0, 5, 200.0, many=False)), "lns", iteration_limit=10)
 
 
-def proof(job: tuple[int, float, bool, str, float, int]) -> Outcome:
-    """From problem to proof, and the tour judged."""
+def of_job(job: tuple[int, float, bool, str, float, int]) -> Outcome:
+    """What `proof` gives in a process of its own."""
     goals, tether, many, classes, limit, seed = job
     warmed()
-    problem = world(seed, goals, tether, many)
+    return proof(world(seed, goals, tether, many), limit, classes)
+
+
+def proof(problem: Problem, limit: float, classes: str = "all") -> Outcome:
+    """From problem to proof, and the tour judged."""
     begin = time.perf_counter()
     try:
         solution = solve(problem, time_limit=limit, roadmap_options={"classes": classes})
@@ -106,7 +110,7 @@ def proofs(
     for goals, tether, worlds in cells:
         for rule in rules:
             jobs = [(goals, tether, many, rule, limit, s) for s in range(worlds)]
-            found = outcomes(jobs, proof, Outcome, workers=workers, file=kept)
+            found = outcomes(jobs, of_job, Outcome, workers=workers, file=kept)
             times, gaps = [f.seconds for f in found], [f.gap for f in found]
             sizes = [f.classes for f in found if f.classes] or [0]
             failed = next((f.failed for f in found if f.failed), "")
