@@ -145,11 +145,13 @@ def driven(problem: Problem, seed: int, seconds: float = 240.0) -> np.ndarray:
 
 
 def tracks(count: int) -> Iterator[tuple[str, int]]:
-    """Names of tracks."""
+    """Kinds and seeds of tracks, no two alike."""
     kinds = ["recorded", "kinematic", "bluerov2", "pilot", "pilot"]
+    seeds = dict.fromkeys(kinds, 0)
     for k in range(count):
         kind = kinds[k % len(kinds)]
-        yield kind, k // len(kinds)
+        yield kind, seeds[kind]
+        seeds[kind] += 1
 
 
 def track_of(kind: str, seed: int) -> tuple[Problem, np.ndarray]:
