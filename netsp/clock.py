@@ -184,23 +184,20 @@ def until_interrupt(limit: TimeLimit) -> Iterator[Clock]:
     Clock
         The clock.
     """
-    before = signal.getsignal(signal.SIGINT)
-    if (
-        threading.current_thread() is not threading.main_thread()
-        or before is not signal.default_int_handler
-        or (isinstance(limit, Clock) and limit.stoppable)
-    ):
+    if not _interruptible() or (isinstance(limit, Clock) and limit.stoppable):
         yield Clock.of(limit)
         return
-    pressed = False
+    before = signal.getsignal(signal.SIGINT)
+    pressed = threading.Event()
+    within, seconds = (limit, None) if isinstance(limit, Clock) else (None, limit)
+    clock = Clock(seconds, within=within, should_stop=pressed.is_set)
 
     def press(*_: Any) -> None:
-        nonlocal pressed
-        pressed = True
+        pressed.set()
+        if clock._stop is not None:
+            clock._stop.now = True  # also where the work ends before the thread asks again
         signal.signal(signal.SIGINT, before)
 
-    within, seconds = (limit, None) if isinstance(limit, Clock) else (None, limit)
-    clock = Clock(seconds, within=within, should_stop=lambda: pressed)
     signal.signal(signal.SIGINT, press)
     try:
         yield clock
@@ -213,10 +210,31 @@ def until_interrupt(limit: TimeLimit) -> Iterator[Clock]:
 def whole_or_interrupted() -> Iterator[None]:
     """Work that is not broken off in the middle: Ctrl-C interrupts at its end. Compiled code that
     hands over tuples calls Python for it, and an interrupt just then is more than it can take."""
-    with until_interrupt(None) as clock:
+    if not _interruptible():
         yield
-        if clock.stopped:
-            raise KeyboardInterrupt
+        return
+    before = signal.getsignal(signal.SIGINT)
+    pressed = False
+
+    def press(*_: Any) -> None:
+        nonlocal pressed
+        pressed = True
+
+    signal.signal(signal.SIGINT, press)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+    if pressed:
+        raise KeyboardInterrupt
+
+
+def _interruptible() -> bool:
+    """Whether Ctrl-C raises KeyboardInterrupt here."""
+    return (
+        threading.current_thread() is threading.main_thread()
+        and signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    )
 
 
 class _Stop:

@@ -174,6 +174,56 @@ def test_ctrl_c_leaves_a_verified_solution(tmp_path):
     assert main(["verify", str(problem), str(out), "--quiet"]) == 0
 
 
+LOST_IN = {
+    "a finalizer": """
+class Dying:
+    def __del__(self):
+        signal.raise_signal(signal.SIGINT)
+
+def run(args):
+    Dying()
+    time.sleep(20.0)
+    return 0
+
+import netsp.command.plot
+netsp.command.plot.run = run
+argv = ["plot", "problems/known/square.json", "-o", OUT]
+""",
+    "a fork": """
+import os
+os.register_at_fork(before=lambda: signal.raise_signal(signal.SIGINT))
+argv = ["solve", PROBLEM, "--solver", "mip", "--mip-backend", "cbc", "-o", OUT, "--quiet"]
+""",
+}
+"""Where Python forgets what is raised, and a command to which that happens."""
+
+
+@pytest.mark.parametrize("where", LOST_IN)
+def test_an_interrupt_that_python_forgets_is_heard(where, tmp_path):
+    """Ctrl-C came while CBC was being started, and the proof went on to its end."""
+    from tests.worlds import random_world
+
+    problem, out = tmp_path / "p.json", tmp_path / "s.json"
+    problem.write_text(random_world(2, goals=12, tether=300.0).to_json())
+    code = (
+        "import signal, sys, time\n"
+        "from netsp.command.main import main\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        f"PROBLEM, OUT = {str(problem)!r}, {str(out)!r}\n"
+        f"{LOST_IN[where]}\n"
+        "sys.exit(main(argv))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, timeout=60
+    )
+    assert "Traceback" not in done.stderr
+    if where == "a fork":
+        assert done.returncode == 0
+        assert json.loads(out.read_text())["status"] == "feasible"
+    else:
+        assert done.returncode == 130, done.stderr
+
+
 def test_help_imports_nothing_heavy():
     code = (
         "import sys, netsp.command.main as c\n"

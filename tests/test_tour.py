@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from netsp.clock import Clock, until_interrupt
+from netsp.clock import Clock, until_interrupt, whole_or_interrupted
 from netsp.command.main import main
 from netsp.geometry import polylines
 from netsp.online.mission import Mission
@@ -371,6 +371,29 @@ def pressed_twice() -> None:
             threading.Event().wait(0.01)
         assert clock.up
         signal.raise_signal(signal.SIGINT)
+
+
+@pytest.mark.usefixtures("ctrl_c")
+def test_work_that_ends_at_once_after_ctrl_c_says_so():
+    """A thread asks every 20 ms whether it was pressed: short work lost it."""
+    with until_interrupt(None) as clock:
+        signal.raise_signal(signal.SIGINT)
+    assert clock.stopped
+
+
+@pytest.mark.usefixtures("ctrl_c")
+def test_whole_work_ends_and_then_interrupts():
+    done: list[int] = []
+
+    def work() -> None:
+        with whole_or_interrupted():
+            signal.raise_signal(signal.SIGINT)
+            done.append(1)
+
+    with pytest.raises(KeyboardInterrupt):
+        work()
+    assert done == [1]
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
 @pytest.mark.usefixtures("ctrl_c")

@@ -18,6 +18,7 @@ from collections.abc import Container, Sequence
 from typing import Any, NoReturn
 
 from netsp.command import messages
+from netsp.command.interrupts import interrupts_are_heard
 from netsp.errors import (
     EXIT_BAD_INPUT,
     EXIT_INTERRUPTED,
@@ -41,7 +42,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         except SystemExit:  # after --help or --version
             sys.stdout.flush()
             raise
-        code = int(args.run(args))
+        with interrupts_are_heard():
+            code = int(args.run(args))
         sys.stdout.flush()
         return code
     except SeveralErrors as error:

@@ -21,7 +21,7 @@ from pathlib import Path
 
 import pulp
 
-from netsp.clock import Clock, TimeLimit
+from netsp.clock import Clock, TimeLimit, whole_or_interrupted
 from netsp.errors import NetspError
 
 GRACE = 1.0
@@ -101,25 +101,29 @@ def _die_with_parent() -> Callable[[], None] | None:
 def _run(command: list[str], log: Path, clock: Clock) -> None:
     """Run to the end, or until the clock is up: at a deadline CBC has a while to end by itself. The
     process group is gone when this returns."""
+    process = None
     with log.open("wb") as stream:
-        process = subprocess.Popen(
-            command,
-            stdin=subprocess.DEVNULL,
-            stdout=stream,
-            stderr=subprocess.STDOUT,
-            start_new_session=True,
-            preexec_fn=_die_with_parent(),
-        )
         try:
+            # Python calls hooks when it forks, and what is raised in those is lost
+            with whole_or_interrupted():
+                process = subprocess.Popen(
+                    command,
+                    stdin=subprocess.DEVNULL,
+                    stdout=stream,
+                    stderr=subprocess.STDOUT,
+                    start_new_session=True,
+                    preexec_fn=_die_with_parent(),
+                )
             end = time.monotonic() + clock.left + GRACE
             while time.monotonic() < end and not clock.stopped:
                 with contextlib.suppress(subprocess.TimeoutExpired):
                     process.wait(WAIT)
                     break
         finally:
-            with contextlib.suppress(ProcessLookupError, PermissionError):
-                os.killpg(process.pid, signal.SIGKILL)
-            process.wait()
+            if process is not None:
+                with contextlib.suppress(ProcessLookupError, PermissionError):
+                    os.killpg(process.pid, signal.SIGKILL)
+                process.wait()
 
 
 def _read(
