@@ -192,7 +192,7 @@ def faults(done: Execution) -> list[str]:
         depth = problem.clearance - float(np.min(o.signed_distance(xy), initial=np.inf))
         if depth > allowed:
             out.append(f"in obstacle {i} by {depth:.3g}")
-    named = {a.goal for a in done.arrivals} | set(done.left_out) | done.cancelled | {-1}
+    named = {a.goal for a in done.arrivals} | set(done.left_out) | set(done.cancelled) | {-1}
     if len(named) != len(problem.goals) + 1:
         out.append("a goal forgotten")
     if done.left_out:

@@ -56,15 +56,18 @@ class Model(BaseModel):
 M = TypeVar("M", bound=BaseModel)
 
 
-def read_model(model: type[M], text: str | bytes, source: str) -> M:
-    """A model of format version 1 from JSON, or `InputError` in one line."""
+def read_model(
+    model: type[M], text: str | bytes, source: str, context: Mapping[str, Any] | None = None
+) -> M:
+    """A model of format version 1 from JSON, or `InputError` in one line; its validators get the
+    context."""
     data = parse_json_object(text, source)
     _check_kind(model, data, source)
     version = data.get("schema_version", None)
     if version != SCHEMA_VERSION or isinstance(version, bool):
         raise InputError(f"{source}: schema_version: expected {SCHEMA_VERSION}, got {version!r}")
     try:
-        return model.model_validate(data)
+        return model.model_validate(data, context=context)
     except ValidationError as error:
         raise InputError(f"{source}: {explain(error)}") from None
 

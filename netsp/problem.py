@@ -22,6 +22,7 @@ from pydantic import (
     Field,
     Tag,
     ValidationError,
+    ValidationInfo,
     WithJsonSchema,
     field_validator,
     model_validator,
@@ -45,7 +46,7 @@ from netsp.fields import (
 )
 from netsp.files import FileModel, write_text
 from netsp.geometry.polygons import check_polygon, polygon_interior_point, polygon_signed_distance
-from netsp.models import Model, explain, shown
+from netsp.models import Model, explain, read_model, shown
 from netsp.shorthand import Inspection, written_out
 
 if TYPE_CHECKING:
@@ -269,6 +270,10 @@ def _width(o: Circle | Polygon) -> float:
     return float(np.ptp(np.array(o.polygon), axis=0).max())
 
 
+OF_A_RUN = {"of": "a run"}
+"""Context of validation: goals may lie in obstacles, which came later."""
+
+
 class Problem(Drawn, FileModel):
     """An instance of the Non-Entangling Travelling Salesperson Problem.
 
@@ -401,11 +406,11 @@ class Problem(Drawn, FileModel):
         return box
 
     @model_validator(mode="after")
-    def _consistent(self) -> Self:
+    def _consistent(self, info: ValidationInfo) -> Self:
         self._check_distinct_goals()
         if complaint := complaint_of(self.goals) or self.size_complaint():
             raise ValueError(complaint)
-        self._check_free()
+        self._check_free(goals=info.context != OF_A_RUN)
         self._check_state()
         return self
 
@@ -467,9 +472,10 @@ class Problem(Drawn, FileModel):
                 )
         return None
 
-    def _check_free(self) -> None:
-        """Base and goals lie within the bounds and outside of every grown obstacle."""
-        xy, tolerance = self.points[:, :2], self.tolerance
+    def _check_free(self, *, goals: bool) -> None:
+        """The base, and goals if they are to, lie within the bounds and outside of every grown
+        obstacle."""
+        xy, tolerance = self.points[: None if goals else 1, :2], self.tolerance
         outside: npt.NDArray[np.bool_] = np.zeros(len(xy), dtype=bool)
         if self.bounds is not None:
             low, high = np.array(self.bounds[:2]), np.array(self.bounds[2:])
@@ -643,6 +649,29 @@ class Problem(Drawn, FileModel):
             raise InputError(f"margin {more:g}: {explain(error)}") from None
 
     # JSON in and out
+
+    @classmethod
+    def from_run(cls, text: str | bytes, source: str) -> Self:
+        """The site as it was during a run: obstacles may have come onto goals.
+
+        Parameters
+        ----------
+        text : str or bytes
+            JSON, as of a problem file.
+        source : str
+            Where it is from, for what is wrong with it.
+
+        Returns
+        -------
+        Problem
+            The site. Goals in obstacles, which no problem file may have, are those that were lost.
+
+        Raises
+        ------
+        InputError
+            The text is not valid, in one line.
+        """
+        return read_model(cls, text, source, OF_A_RUN)
 
     @property
     def summary(self) -> str:

@@ -1,7 +1,9 @@
 """Moving pictures of tours and runs."""
 
 import json
+import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +12,7 @@ from PIL import Image
 
 from netsp import Circle, Problem, solve
 from netsp.command.main import main
+from netsp.errors import InputError
 from netsp.execute.events import Event, Surprises
 from netsp.execute.log import ExecutionOptions
 from netsp.execute.run import execute
@@ -18,8 +21,11 @@ from netsp.online.log import read_run, write_run
 from netsp.online.mission import Mission
 from netsp.online.simulate import simulate
 from netsp.pictures import style
-from netsp.pictures.animation import Film, save_animation
+from netsp.pictures.animation import save_animation
+from netsp.pictures.film import film_of_mission, film_of_plan, steps_of
 from netsp.pictures.moments import moments_of_flight, moments_of_plan
+from netsp.report.opened import opened
+from netsp.space.solve import solve_mission
 from tests.pages import unpacked
 
 ROOT = Path(__file__).parent.parent
@@ -95,7 +101,7 @@ def test_what_ctrl_c_cuts_off_leaves_the_file_that_was_there(files, suffix, monk
             raise KeyboardInterrupt
 
     site, tour = Problem.load(files / "p.json"), solve(SITE)
-    film = Film("a tour", moments_of_plan(site, tour, 20), tour.length)
+    film = film_of_plan(site, tour, 20)
     out = files / f"kept.{suffix}"
     out.write_text("before")
     with pytest.raises(KeyboardInterrupt):
@@ -145,6 +151,77 @@ def test_an_obstacle_that_appears_is_in_the_film_from_then_on_and_not_before(fil
 
 
 @pytest.fixture(scope="module")
+def lost(files):
+    """A run in which an obstacle comes to stand on a goal, and the other goal is visited."""
+    boat = Circle(center=(6.4, -2.2), radius=0.7, name="boat")
+    run = execute(SITE, solve(SITE), surprises=Surprises(events=(Event(time=3, appear=boat),)))
+    assert set(run.left_out) == {1}
+    write_execution(run, files / "lost")
+    return files / "lost"
+
+
+def test_a_goal_under_an_obstacle_is_shown_as_left_out_from_then_on(lost):
+    film = opened(lost, None).film(60)
+    for moment in film.moments:
+        time = float(moment.text.split(" s;")[0])
+        assert moment.fates["left out"] == ((1,) if time >= 3.0 else ())
+    assert film.moments[0].fates["visited"] == ()
+    assert film.moments[-1].fates["visited"] == (0,)
+
+
+@pytest.mark.parametrize("command", ["animate", "report"])
+def test_such_a_run_is_a_page_though_its_map_is_no_problem_that_can_be_solved(
+    lost, tmp_path, command
+):
+    page = tmp_path / "lost.html"
+    assert main([command, str(lost), "-o", str(page)]) == 0
+    text = page.read_text()
+    assert "boat, from 3 s" in text
+    with pytest.raises(InputError, match="lies inside obstacles"):
+        Problem.load(lost / "problem.json")
+
+
+def test_goals_of_a_plan_are_visited_in_their_order_as_the_robot_comes_by(files):
+    tour = solve(SITE)
+    moments = moments_of_plan(SITE, tour, 50)
+    order = [visit.goal for visit in tour.tour]
+    counts = []
+    for moment in moments:
+        visited = moment.fates["visited"]
+        assert list(visited) == order[: len(visited)]
+        counts.append(len(visited))
+        for goal in visited[-1:]:
+            gone = np.linalg.norm(moment.path - np.array(SITE.goals[goal].position), axis=1)
+            assert gone.min() < 1e-6
+    assert counts == sorted(counts)
+    assert (counts[0], counts[-1]) == (0, len(SITE.goals))
+
+
+def test_a_run_and_a_plan_take_as_long_and_two_plans_go_as_fast(files):
+    tour, run = solve(SITE), opened(files / "run", None).film(20)
+    plan = film_of_plan(SITE, tour, 20)
+    what, steps = steps_of([plan, run], 11)
+    assert what == "done (%)"
+    assert steps[-1].moments == (len(plan.moments) - 1, len(run.moments) - 1)
+    longer = replace(plan, length=2.0 * plan.length)
+    what, steps = steps_of([plan, longer], 11)
+    assert what == "way (m)"
+    assert steps[5].moments == (len(plan.moments) - 1, (len(plan.moments) - 1) // 2)
+
+
+def test_two_tours_are_a_page_with_two_maps_that_one_slider_moves(files, tmp_path):
+    page = tmp_path / "two.html"
+    two = [str(files / "run"), str(files / "g.json")]
+    assert main(["animate", *two, "--problem", str(files / "p.json"), "-o", str(page)]) == 0
+    text = page.read_text()
+    assert text.count('<svg class="map"') == 2
+    assert text.count('id="slider"') == 1
+    data = json.loads(re.search(r'id="frames">(.*?)</script>', text).group(1))
+    assert [max(film["at"]) for film in data] == [len(film["moments"]) - 1 for film in data]
+    assert len({len(film["at"]) for film in data}) == 1
+
+
+@pytest.fixture(scope="module")
 def flight(tmp_path_factory):
     folder = tmp_path_factory.mktemp("flight")
     mission = Mission.load(ROOT / "missions" / "basin.json")
@@ -186,6 +263,35 @@ def test_a_flight_is_shown_in_space_as_a_gif_and_as_a_page(flight):
         assert seen(film, style.ROBOT) > 20
     assert main(["animate", str(folder / "run"), "-o", str(page)]) == 0
     assert len(unpacked(page)["frames"]) == 120
+
+
+def test_a_planned_mission_is_a_film_and_a_page(flight, tmp_path, capsys):
+    folder, run, _ = flight
+    planned = tmp_path / "planned.json"
+    mission = run.mission.model_copy(update={"scene": str(ROOT / "scenes" / "basin.json")})
+    (tmp_path / "m.json").write_text(mission.model_dump_json(exclude_none=True))
+    assert main(["animate", str(tmp_path / "m.json"), "-o", str(tmp_path / "x.gif")]) == 2
+    assert "tour: the mission has none" in capsys.readouterr().err
+    found = solve_mission(mission, time_limit=10.0).mission
+    planned.write_text(found.model_dump_json(exclude_none=True))
+    film = film_of_mission(Mission.load(planned), run.mission.load_scene(), 40)
+    visited = [len(m.fates["visited"]) for m in film.moments]
+    assert visited == sorted(visited)
+    assert (visited[0], visited[-1]) == (0, 6)
+    for suffix in ("gif", "html"):
+        out = str(tmp_path / f"x.{suffix}")
+        assert main(["animate", str(planned), "-o", out, "--seconds", "1", "--quiet"]) == 0
+    both = [str(planned), str(folder / "run")]
+    assert main(["animate", *both, "-o", str(tmp_path / "both.html"), "--quiet"]) == 0
+    names = [t.get("name") for t in unpacked(tmp_path / "both.html")["data"]]
+    assert names.count("robot") == 2
+
+
+def test_the_plane_and_space_are_no_page_together(files, flight, tmp_path, capsys):
+    folder, _, _ = flight
+    two = [str(files / "run"), str(folder / "run")]
+    assert main(["animate", *two, "-o", str(tmp_path / "x.html")]) == 2
+    assert "is in space and" in capsys.readouterr().err
 
 
 def test_a_page_of_a_tour_has_a_button_that_plays(files):

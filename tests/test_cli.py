@@ -182,7 +182,7 @@ class Dying:
 
 def run(args):
     Dying()
-    time.sleep(20.0)
+    time.sleep(300.0)
     return 0
 
 import netsp.command.plot

@@ -5,6 +5,7 @@ writes to `tests/data/pictures`, and commit it.
 """
 
 import os
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -14,13 +15,18 @@ from PIL import Image
 
 from netsp.online.simulate import simulate
 from netsp.pictures import style
+from netsp.pictures.animation import save_animation
+from netsp.pictures.film import film_of_flight, film_of_run
 from netsp.pictures.mission import save_runs
 from netsp.pictures.problem import draw as draw_tour
 from netsp.pictures.problem import save_classes, save_roadmap
+from netsp.pictures.sizing import draw_tether_curve
 from netsp.report import figures
-from tests.test_style import WHARF, mission, of, run, tour
+from netsp.report.stats import best_lengths, cells, methods
+from netsp.sizing.tether import tether_curve
+from tests.test_style import WHARF, mission, of, rows, run, tour
 
-__all__ = ["mission", "run", "tour"]  # fixtures
+__all__ = ["mission", "rows", "run", "tour"]  # fixtures
 
 KEPT = Path(__file__).parent / "data" / "pictures"
 WIDTH, BLOCK = 480, 12
@@ -31,7 +37,7 @@ ALIKE, MOST = 5.0, 0.003
 need not be: fonts are drawn a little differently from one release of Matplotlib to the next."""
 
 
-def rows():
+def trials():
     """Trials of two solvers whose times are known."""
     return {
         name: [
@@ -52,12 +58,35 @@ def draw(what, file, request, monkeypatch):
         found, scene = request.getfixturevalue("mission")
         save_runs([simulate(found, scene=scene, planner=p) for p in ("predictive", "none")],
                   scene, file)  # fmt: skip
+    elif what.startswith("film"):
+        save_animation([film_of(what, request)], file.with_suffix(".gif"), seconds=0.3, fps=10)
+        with Image.open(file.with_suffix(".gif")) as film:
+            film.seek(1)  # in the middle
+            film.convert("RGB").save(file)
+    elif what == "tether curve":
+        style.save(draw_tether_curve(tether_curve(WHARF, 30.0)).figure, file)
+    elif what == "lengths":
+        all_rows = request.getfixturevalue("rows")
+        style.save(figures.lengths(cells(methods(all_rows)), best_lengths(all_rows)), file)
     elif what == "profile":
-        style.save(figures.performance(rows()), file)
+        style.save(figures.performance(trials()), file)
     else:
         figure = of(what, request, monkeypatch)
         monkeypatch.undo()  # the kind that keeps its figure has replaced what saves it
         style.save(figure, file, dpi=120)
+
+
+def film_of(what, request):
+    """Of a run in the plane, or of a flight."""
+    if what == "film":
+        done = request.getfixturevalue("run")
+        frames = [{"time": time, "nodes": nodes} for time, nodes in done.tethers]
+        rows = [{k: str(v) for k, v in asdict(row).items()} for row in done.rows]
+        since = {"visited": {a.goal: a.time for a in done.arrivals if a.goal >= 0},
+                 "left out": {}, "cancelled": done.cancelled}  # fmt: skip
+        return film_of_run(done.maps, rows, frames, since, 40)
+    found, scene = request.getfixturevalue("mission")
+    return film_of_flight(simulate(found, scene=scene), scene, 40)
 
 
 def small(file):
@@ -82,7 +111,7 @@ def unlike(one, other):
 
 KINDS = (
     "problem", "tour", "classes", "roadmap", "execution map", "execution tether",
-    "scene", "mission", "two runs", "profile",
+    "scene", "mission", "two runs", "profile", "film", "film in space", "tether curve", "lengths",
 )  # fmt: skip
 
 
@@ -114,8 +143,8 @@ def test_names_or_a_tether_that_are_missing_are_seen(tour, tmp_path):
 
 def test_a_change_that_an_eye_would_see_is_seen(monkeypatch, tmp_path):
     """Another colour of the tether, a legend elsewhere, an obstacle less."""
-    style.save(figures.performance(rows()), tmp_path / "one.png")
-    figure = figures.performance(rows())
+    style.save(figures.performance(trials()), tmp_path / "one.png")
+    figure = figures.performance(trials())
     for legend in figure.legends or [ax.get_legend() for ax in figure.axes]:
         legend.remove()
     style.save(figure, tmp_path / "other.png")

@@ -21,8 +21,10 @@ from netsp.online.mission import Mission
 from netsp.online.simulate import simulate
 from netsp.pictures import style
 from netsp.pictures.execution import draw_map, draw_tether
+from netsp.pictures.film import film_of_flight
+from netsp.pictures.film_page import FRAMES, save_page
 from netsp.pictures.interactive import seen
-from netsp.pictures.mission import save_page, save_runs
+from netsp.pictures.mission import save_runs
 from netsp.pictures.problem import draw
 from netsp.pictures.scene import Stops, figure_of
 from netsp.report import figures
@@ -224,7 +226,7 @@ def test_an_overlap_a_missing_name_and_a_covered_curve_are_seen():
 def test_an_obstacle_that_comes_and_goes_is_drawn_with_its_times(run):
     assert [len(p.obstacles) for _, p in run.maps] == [8, 9, 9, 8]
     told = [t.get_text() for t in draw_map(run).texts]
-    assert "barge\n25 to 70 s" in told
+    assert "barge, 25 to 70 s" in told
 
 
 def test_a_waypoint_that_was_not_visited_is_not_drawn_as_visited(mission, monkeypatch):
@@ -249,14 +251,16 @@ def test_a_page_of_a_hundred_waypoints_is_small_and_plays(tmp_path):
     assert len(mission.waypoints) >= 97
     scene = mission.load_scene()
     run = simulate(mission, scene=scene)
-    save_page([run], scene, tmp_path / "run.html")
+    films = [film_of_flight(run, scene, FRAMES)]
+    save_page(films, "helix", tmp_path / "run.html")
     text = (tmp_path / "run.html").read_text()
     assert len(text) < 3_000_000
     figure = unpacked(tmp_path / "run.html")
     names = {trace.get("name") for trace in figure["data"] if trace.get("showlegend", True)}
-    assert names == {"path", "tether", "robot", "anchor", "waypoint visited"}
+    marks = {"waypoint", "waypoint visited", "waypoint left out"}
+    assert names == {"path", "taut tether", "robot", "anchor", *marks}
     assert all(figure["layout"]["scene"][f"{a}axis"]["title"]["text"] == f"{a} (m)" for a in "xyz")
-    save_page([run], scene, tmp_path / "again.html")
+    save_page(films, "helix", tmp_path / "again.html")
     assert (tmp_path / "again.html").read_text() == text
 
 

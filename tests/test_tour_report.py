@@ -25,14 +25,14 @@ console.error = (message) => { faults.push(String(message)); };
 
 ASK = """
 <script>
-const before = document.getElementById("tether").getAttribute("points");
+const before = document.querySelector(".map .tether").getAttribute("points");
 slider.value = slider.max;
 slider.dispatchEvent(new Event("input"));
-const after = document.getElementById("tether").getAttribute("points");
+const after = document.querySelector(".map .tether").getAttribute("points");
 slider.value = Math.floor(slider.max / 2);
 slider.dispatchEvent(new Event("input"));
-const robot = document.getElementById("robot").getBoundingClientRect();
-const map = document.getElementById("map").getBoundingClientRect();
+const robot = document.querySelector(".map .robot").getBoundingClientRect();
+const map = document.querySelector(".map").getBoundingClientRect();
 const inside = robot.left >= map.left && robot.right <= map.right;
 document.title = [before !== after, inside && map.width > 300, faults.length].join(";");
 </script>

@@ -447,10 +447,11 @@ def _download(session: Session, name: str) -> Any:
         elif name == "solution.json":
             text, kind = session.solution, "application/json"
         elif name == "report.html":
+            from netsp.report.opened import Opened
             from netsp.report.tour import page
 
             solution = Solution.from_json(session.solution)
-            text, kind = page(problem, solution, [], None, None), "text/html"
+            text, kind = page(Opened(problem, solution)), "text/html"
         elif name in EXPORTS:
             name, text = exported(problem, Solution.from_json(session.solution), name)
             kind = "application/octet-stream"

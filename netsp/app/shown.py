@@ -104,7 +104,8 @@ def read_shown(source: str | Path, problem_file: str | Path | None = None) -> Sh
             raise InputError(f"{source}: does not hold its problem; expected --problem FILE")
         return _of_plan(Problem.load(problem_file), Solution.load(place), str(source))
     if (place / "solution.json").exists():
-        problem = Problem.load(place / "problem.json")
+        file = place / "problem.json"
+        problem = Problem.from_run(read_text(file), str(file))
         return _of_execution(place, problem, Solution.load(place / "solution.json"))
     if (place / "mission.json").exists():
         return _of_mission(place)

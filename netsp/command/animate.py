@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import argparse
 import sys
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from netsp.command.solve_mission import is_mission
 from netsp.command.types import check_writable, positive
 from netsp.errors import InputError
 
 if TYPE_CHECKING:
-    from netsp.pictures.animation import Film
+    from netsp.pictures.film import Film
 
 EXAMPLE = "netsp animate tour.json --problem problems/wharf.json -o tour.gif"
 
@@ -21,8 +21,8 @@ def arguments(p: argparse.ArgumentParser) -> None:
     """Of the command line."""
     p.add_argument(
         "source", metavar="SOURCE", nargs="+",
-        help="a solution, or the folder of a run of `netsp execute` or `netsp simulate`; several "
-        "stand side by side",
+        help="a solution, a planned mission, or the folder of a run of `netsp execute` or "
+        "`netsp simulate`; several stand side by side",
     )  # fmt: skip
     p.add_argument("--problem", metavar="FILE", help="the problem of solution files")
     p.add_argument(
@@ -30,7 +30,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
         "--output",
         required=True,
         metavar="FILE",
-        help="gif, mp4 (extra video), or a page (html) with a slider, of one",
+        help="gif, mp4 (extra video), or a page (html) with a slider",
     )
     p.add_argument(
         "--seconds", type=positive, default=12, metavar="N", help="how long it is; default 12"
@@ -81,71 +81,58 @@ def _told(args: argparse.Namespace) -> int:
     return 0
 
 
-def _is_flight(source: str) -> bool:
-    """Whether it is the folder of a flight in space."""
+def _in_space(source: str) -> bool:
+    """Whether it is the folder of a flight in space, or a mission."""
     place = Path(source)
-    return (place / "mission.json").exists() and not (place / "solution.json").exists()
+    if place.is_dir():
+        return (place / "mission.json").exists() and not (place / "solution.json").exists()
+    return is_mission(source)
 
 
 def _page(args: argparse.Namespace) -> int:
     """A page that plays."""
-    flights = [_is_flight(source) for source in args.source]
-    if all(flights):
-        from netsp.online.log import read_run
-        from netsp.pictures.mission import save_page
+    in_space = [_in_space(source) for source in args.source]
+    if all(in_space):
+        from netsp.pictures.film_page import FRAMES, save_page
 
-        runs = [read_run(source) for source in args.source]
-        try:
-            save_page(runs, runs[0].mission.load_scene(), args.output)
-        except (KeyError, TypeError, ValueError) as error:
-            raise InputError(
-                f"{', '.join(args.source)}: a summary of the run is damaged: "
-                f"{type(error).__name__}: {error}"
-            ) from None
-        return _told(args)
-    if len(args.source) > 1:
-        raise InputError(f"{args.output}: a page shows one tour, or flights in space; expected one")
-    from netsp.report.tour import report_tour
+        films = [_film(source, args.problem, FRAMES) for source in args.source]
+        names = dict.fromkeys(film.title.split("\n")[0] for film in films)
+        save_page(films, " and ".join(names), args.output)
+    elif any(in_space):
+        raise InputError(
+            f"SOURCE: {args.source[in_space.index(True)]} is in space and "
+            f"{args.source[in_space.index(False)]} is not; expected a page of one kind"
+        )
+    elif len(args.source) > 1:
+        from netsp.report.beside import save_beside
+        from netsp.report.opened import opened
 
-    report_tour(args.source[0], args.problem, args.output)
+        save_beside([opened(source, args.problem) for source in args.source], args.output)
+    else:
+        from netsp.report.tour import report_tour
+
+        report_tour(args.source[0], args.problem, args.output)
     return _told(args)
 
 
-def _flight(source: str, count: int) -> Film:
+def _film(source: str, problem_file: str | None, count: int) -> Film:
+    if not _in_space(source):
+        from netsp.report.opened import opened
+
+        return opened(source, problem_file).film(count)
+    if not Path(source).is_dir():
+        from netsp.online.mission import Mission
+        from netsp.pictures.film import film_of_mission
+
+        mission = Mission.load(source)
+        return film_of_mission(mission, mission.load_scene(), count)
     from netsp.online.log import read_run
-    from netsp.pictures.animation import Film, Space
-    from netsp.pictures.mission import stops_of
-    from netsp.pictures.moments import moments_of_flight
+    from netsp.pictures.film import film_of_flight
 
     run = read_run(source)
-    scene = run.mission.load_scene()
-    title = f"{run.mission.name}, by {run.planner}"
-    stops = replace(stops_of(run), anchor=run.mission.anchor)
-    moments = moments_of_flight(run, scene, count)
-    return Film(title, moments, run.log[-1].time, Space(scene, stops))
-
-
-def _film(source: str, problem_file: str | None, count: int) -> Film:
-    if _is_flight(source):
-        return _flight(source, count)
-    import numpy as np
-
-    from netsp.geometry import polylines
-    from netsp.pictures.animation import Film
-    from netsp.pictures.moments import moments_of_plan, moments_of_run
-    from netsp.report.opened import opened
-
-    what = opened(source, problem_file)
-    problem, solution = what.problem, what.solution
-    if what.tethers:
-        try:
-            moments = moments_of_run(what.maps, what.rows, what.tethers, count)
-            seconds = float(what.rows[-1]["time"])
-        except (KeyError, ValueError, TypeError, OverflowError) as error:
-            raise InputError(
-                f"{source}: a file of the run is damaged: {type(error).__name__}: {error}"
-            ) from None
-        return Film(f"{problem.name}, carried out", moments, seconds)
-    title = f"{problem.name}: {solution.solver}, {solution.length:.4g} {problem.units}"
-    moments = moments_of_plan(problem, solution, count)
-    return Film(title, moments, float(polylines.length(np.array(solution.path))))
+    try:
+        return film_of_flight(run, run.mission.load_scene(), count)
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(
+            f"{source}: a summary of the run is damaged: {type(error).__name__}: {error}"
+        ) from None

@@ -116,7 +116,11 @@ def draw_runs(runs: list[Run], scene: Scene, folder: Path) -> None:
         import plotly  # noqa: F401
     except ImportError:
         return
-    flights.save_page(runs, scene, folder / "run.html")
+    from netsp.pictures.film import film_of_flight
+    from netsp.pictures.film_page import FRAMES, save_page
+
+    films = [film_of_flight(run, scene, FRAMES) for run in runs]
+    save_page(films, runs[0].mission.name, folder / "run.html")
 
 
 def until_stopped(

@@ -7,6 +7,7 @@ Python reports and forgets, KeyboardInterrupt too: the work would go on as if no
 from __future__ import annotations
 
 import _thread
+import signal
 import sys
 import threading
 from collections.abc import Iterator
@@ -28,7 +29,7 @@ def interrupts_are_heard() -> Iterator[None]:
         if unraisable.exc_value is None or not interrupted(unraisable.exc_value):
             before(unraisable)
             return
-        again = threading.Timer(AGAIN, _thread.interrupt_main)
+        again = threading.Timer(AGAIN, _interrupt)
         again.daemon = True
         again.start()
 
@@ -37,3 +38,12 @@ def interrupts_are_heard() -> Iterator[None]:
         yield
     finally:
         sys.unraisablehook = before
+
+
+def _interrupt() -> None:
+    """Ctrl-C for the main thread, which also wakes it up where there are real signals."""
+    main = threading.main_thread().ident
+    if hasattr(signal, "pthread_kill") and main is not None:
+        signal.pthread_kill(main, signal.SIGINT)
+    else:
+        _thread.interrupt_main()

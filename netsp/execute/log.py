@@ -173,8 +173,8 @@ class Execution(Drawn):
         What happened, and what was done about it.
     left_out : dict
         Goals left out, with the reason.
-    cancelled : set of int
-        Goals that were cancelled.
+    cancelled : dict
+        Goals that were cancelled, with the time, seconds since the start.
     tethers : list of (float, ndarray)
         Time and nodes of the tether now and then, for pictures.
     free : bool
@@ -200,7 +200,7 @@ class Execution(Drawn):
     arrivals: list[Arrival] = field(default_factory=list)
     entries: list[Entry] = field(default_factory=list)
     left_out: dict[int, str] = field(default_factory=dict)
-    cancelled: set[int] = field(default_factory=set)
+    cancelled: dict[int, float] = field(default_factory=dict)
     tethers: list[tuple[float, Floats]] = field(default_factory=list)
     free: bool = False
     walked: float = 0.0
@@ -237,6 +237,7 @@ class Execution(Drawn):
             "arrivals_as_planned": sum(a.as_planned for a in self.arrivals),
             "left_out": [{"goal": g, "reason": why} for g, why in sorted(self.left_out.items())],
             "cancelled": sorted(self.cancelled),
+            "cancelled_s": [round(self.cancelled[g], 6) for g in sorted(self.cancelled)],
             "longest_tether": max((r.tether for r in self.rows), default=0.0),
             "tether_length": self.problem.tether_length,
             "exceedance_s": float(np.array(steps)[over].sum()) if self.rows else 0.0,

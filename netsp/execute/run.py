@@ -210,7 +210,7 @@ class _Run:
                     must = f"{before.goal_label(gone)} was cancelled"
                 if self.options.repair and (gone in self.left or gone in self.out.left_out):
                     self.out.left_out.pop(gone, None)
-                    self.out.cancelled.add(gone)
+                    self.out.cancelled[gone] = self.now
         if event.tether_length is not None and self.tether.length > event.tether_length:
             self.shorten = True
         back = self._in_reach_again() if self.options.repair else []

@@ -5,17 +5,17 @@ from __future__ import annotations
 import logging
 import subprocess
 import tempfile
+import textwrap
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from netsp.errors import InputError
-from netsp.online.scene.scene import Scene
 from netsp.pictures import style
-from netsp.pictures.moments import Moment
+from netsp.pictures.film import Film, steps_of
+from netsp.pictures.moments import CANCELLED, LEFT_OUT, VISITED
 from netsp.pictures.problem import draw_map, view
 from netsp.pictures.scene import Stops, draw_space
 from netsp.problem import Problem
@@ -31,46 +31,23 @@ WIDTH, DPI = 6.4, 100
 HIGH = 5.6
 """Inches of a panel in space."""
 
+LEGEND, COLUMNS = 0.25, 5
+"""Inches of each line of what the marks mean, below the panels, and marks of a line and panel."""
+
+ROBOT = {"marker": "o", "ms": 9, "color": style.ROBOT, "mec": style.BASE, "mew": 0.8}
+
+MARKS: tuple[tuple[str, dict[str, Any]], ...] = (
+    (VISITED, {"marker": "o", "color": style.VISITED, "ms": 7}),
+    (LEFT_OUT, {"marker": "x", "color": style.LEFT_OUT, "ms": 8, "mew": 2.2}),
+    (CANCELLED, {"marker": "+", "color": style.CANCELLED, "ms": 9, "mew": 2.2}),
+)
+"""What has become of goals and waypoints."""
+
+LETTERS = 62
+"""Of a line of a panel's title."""
+
 HOLD_S = 1.5
 """Seconds that the last picture stays."""
-
-
-@dataclass(frozen=True)
-class Space:
-    """A scene in space.
-
-    Parameters
-    ----------
-    scene : Scene
-        The scene.
-    stops : Stops
-        Waypoints.
-    """
-
-    scene: Scene
-    stops: Stops
-
-
-@dataclass(frozen=True)
-class Film:
-    """What one panel shows.
-
-    Parameters
-    ----------
-    title : str
-        Above it.
-    moments : sequence of Moment
-        At even steps.
-    length : float
-        Of it all: seconds of a run, or metres of a tour. Beside a longer one, it ends earlier.
-    space : Space, optional
-        What stands still in a picture in space; by default, the map of each moment.
-    """
-
-    title: str
-    moments: Sequence[Moment]
-    length: float
-    space: Space | None = None
 
 
 def save_animation(
@@ -130,34 +107,23 @@ def _pictures(films: Sequence[Film], count: int) -> Iterator[Any]:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    height = max(map(_height, films))
+    handles, columns = _legend(films), COLUMNS * len(films)
+    height = max(map(_height, films)) + LEGEND * -(-len(handles) // columns)
     figure = Figure(figsize=(WIDTH * len(films), height), dpi=DPI, layout="constrained")
     canvas = FigureCanvasAgg(figure)
     panels: list[Any] = [
-        figure.add_subplot(1, len(films), k, projection="3d" if film.space else None)
+        figure.add_subplot(1, len(films), k, projection="3d" if film.scene else None)
         for k, film in enumerate(films, 1)
     ]
-    moving: list[tuple[Any, ...]] = []
-    for ax, film in zip(panels, films, strict=True):
-        none: tuple[list[float], ...] = ([], [], []) if film.space else ([], [])
-        (path,) = ax.plot(*none, color=style.PATH, lw=1.6, zorder=8, animated=True)
-        (tether,) = ax.plot(*none, color=style.TETHER, lw=2.4, zorder=9, animated=True)
-        look = {"marker": "o", "ms": 9, "color": style.ROBOT, "mec": style.BASE, "mew": 0.8}
-        (robot,) = ax.plot(*none, **look, zorder=10, animated=True)
-        write = ax.text2D if film.space else ax.text
-        text = write(
-            0.0, 1.02, "", transform=ax.transAxes, fontsize=8, color=style.EDGE, animated=True
-        )
-        moving.append((path, tether, robot, text))
+    moving = [_moving(ax, film) for ax, film in zip(panels, films, strict=True)]
+    figure.legend(
+        handles=handles, loc="outside lower center", ncols=columns, fontsize=8, frameon=False,
+    )  # fmt: skip
     style.literal(figure)
-    longest = max(film.length for film in films)
     shown: list[Problem | None] | None = None
     still = None
-    for k in range(count):
-        shares = [min(k / max(count - 1, 1) * longest / film.length, 1.0) for film in films]
-        now = [
-            f.moments[round(s * (len(f.moments) - 1))] for f, s in zip(films, shares, strict=True)
-        ]
+    for step in steps_of(films, count)[1]:
+        now = [film.moments[n] for film, n in zip(films, step.moments, strict=True)]
         if [moment.problem for moment in now] != shown:
             shown = [moment.problem for moment in now]
             _draw_maps(panels, films, shown)
@@ -165,36 +131,82 @@ def _pictures(films: Sequence[Film], count: int) -> Iterator[Any]:
             canvas.draw()
             still = canvas.copy_from_bbox(figure.bbox)
         canvas.restore_region(still)
-        for moment, (path, tether, robot, text) in zip(now, moving, strict=True):
-            for line, points in (
-                (path, moment.path), (tether, moment.nodes), (robot, moment.nodes[-1:]),
-            ):  # fmt: skip
-                if line.axes.name == "3d":
+        for film, moment, artists in zip(films, now, moving, strict=True):
+            marks = [film.places[list(moment.fates.get(fate, ()))] for fate, _ in MARKS]
+            lines = [*marks, moment.path, moment.nodes, moment.nodes[-1:]]
+            for line, points in zip(artists, lines, strict=False):
+                if film.scene is not None:
                     line.set_data_3d(*points.T)
                 else:
                     line.set_data(*points.T[:2])
-            text.set_text(moment.text)
-            for artist in (path, tether, robot, text):
+            artists[-1].set_text(moment.text)
+            for artist in artists:
                 figure.draw_artist(artist)
         yield np.asarray(canvas.buffer_rgba())[:, :, :3].copy()
 
 
-def _draw_space(ax: Any, film: Film, space: Space) -> None:
+def _moving(ax: Any, film: Film) -> tuple[Any, ...]:
+    """What is drawn again at every moment: marks, path, tether, robot, and the words above."""
+    none: tuple[list[float], ...] = ([], [], []) if film.scene else ([], [])
+    size = 0.6 if film.scene else 1.0
+    marks = []
+    for _, look in MARKS:
+        smaller = {**look, "ms": size * float(look["ms"])}
+        marks += ax.plot(*none, **smaller, ls="none", zorder=7, animated=True)
+    (path,) = ax.plot(*none, color=style.PATH, lw=1.6, zorder=8, animated=True)
+    (tether,) = ax.plot(*none, color=style.TETHER, lw=2.4, zorder=9, animated=True)
+    (robot,) = ax.plot(*none, **ROBOT, zorder=10, animated=True)
+    write = ax.text2D if film.scene else ax.text
+    text = write(0.0, 1.02, "", transform=ax.transAxes, fontsize=8, color=style.EDGE, animated=True)
+    return (*marks, path, tether, robot, text)
+
+
+def _legend(films: Sequence[Film]) -> list[Any]:
+    """What the lines and marks mean."""
+    from matplotlib.lines import Line2D
+
+    what = "waypoint" if any(film.scene for film in films) else "goal"
+    base = "anchor" if any(film.scene for film in films) else "base"
+    star = {"marker": "*", "color": style.BASE, "ms": 9}
+    to_visit = {"marker": "o", "color": style.GOAL, "mec": style.PATH, "mew": 1.4, "ms": 7}
+    found = set().union(*(film.every_fate for film in films))
+    return [
+        Line2D([], [], color=style.PATH, lw=1.6, label="path"),
+        Line2D([], [], color=style.TETHER, lw=2.4, label="taut tether"),
+        *(
+            Line2D([], [], ls="none", label=label, **look)
+            for label, look in (
+                ("robot", ROBOT), (base, star), (what, to_visit),
+                *((f"{what} {fate}", look) for fate, look in MARKS if fate in found),
+            )
+        ),
+    ]  # fmt: skip
+
+
+def _draw_space(ax: Any, film: Film) -> None:
     """A scene, seen as far as the robot goes."""
+    assert film.scene is not None
     every = np.vstack([m.nodes for m in film.moments] + [film.moments[-1].path])
-    draw_space(space.scene, every, np.zeros((0, 3)), ax=ax, stops=space.stops)
+    stops = Stops(film.places, anchor=film.anchor)
+    draw_space(film.scene, every, np.zeros((0, 3)), ax=ax, stops=stops)
     for line in ax.lines:
         if line.get_label() == "path" and not line.get_animated():
             line.remove()
-    ax.set_title(f"{film.title}\n", fontsize=10, loc="left")
+    ax.set_title(_title(film), fontsize=10, loc="left")
+
+
+def _title(film: Film) -> str:
+    """In lines that fit, with room below for what is said of the moment."""
+    lines = [part for line in film.title.split("\n") for part in textwrap.wrap(line, LETTERS)]
+    return "\n".join([*lines, ""])
 
 
 def _draw_maps(panels: Any, films: Sequence[Film], shown: Sequence[Problem | None]) -> None:
     """All that stands still, in place of what stood there before."""
     for ax, film, problem in zip(panels, films, shown, strict=True):
-        if film.space is not None:
+        if film.scene is not None:
             if not ax.collections:
-                _draw_space(ax, film, film.space)
+                _draw_space(ax, film)
             continue
         assert problem is not None
         for artist in [*ax.patches, *ax.lines, *ax.texts, *ax.collections]:
@@ -203,7 +215,7 @@ def _draw_maps(panels: Any, films: Sequence[Film], shown: Sequence[Problem | Non
         draw_map(problem, ax=ax)
         xmin, ymin, xmax, ymax = _view(film)
         ax.set(xlim=(xmin, xmax), ylim=(ymin, ymax))
-        ax.set_title(f"{film.title}\n", fontsize=10, loc="left")
+        ax.set_title(_title(film), fontsize=10, loc="left")
 
 
 def _view(film: Film) -> tuple[float, float, float, float]:
@@ -216,7 +228,7 @@ def _view(film: Film) -> tuple[float, float, float, float]:
 
 def _height(film: Film) -> float:
     """Inches, so that the map fills its panel."""
-    if film.space is not None:
+    if film.scene is not None:
         return HIGH
     xmin, ymin, xmax, ymax = _view(film)
     return float(np.clip(WIDTH * (ymax - ymin) / (xmax - xmin) + 0.8, 2.5, 2.0 * WIDTH))
@@ -226,7 +238,10 @@ def _palette(picture: Any) -> Any:
     """The colours of a picture, and those of the roles, however small they are in it."""
     from PIL import Image
 
-    roles = (style.ROBOT, style.TETHER, style.PATH, style.BASE, style.OBSTACLE, style.EDGE)
+    roles = (
+        style.ROBOT, style.TETHER, style.PATH, style.BASE, style.OBSTACLE, style.EDGE,
+        style.VISITED, style.LEFT_OUT, style.CANCELLED,
+    )  # fmt: skip
     out = Image.new("RGB", (picture.width, picture.height + 20 * len(roles)))
     out.paste(picture)
     for k, colour in enumerate(roles):

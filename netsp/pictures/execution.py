@@ -7,9 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from netsp.arrays import Floats
 from netsp.errors import counted
 from netsp.execute.log import Execution
 from netsp.execute.passing import Maps, lasting, passing
+from netsp.geometry import polylines
 from netsp.pictures import style
 from netsp.pictures.problem import draw_obstacles
 
@@ -48,9 +50,11 @@ def draw_map(done: Execution, *, ax: Any = None) -> Any:
     maps = done.maps or [(0.0, problem)]
     at_first = lasting(maps)
     draw_obstacles(ax, at_first, label=at_first.obstacle_name if few else None)
-    _draw_passing(ax, maps)
     plan = np.array(done.solution.path).reshape(-1, 3)
-    path = np.array([[r.x, r.y] for r in done.rows])
+    path = np.array([[r.x, r.y] for r in done.rows]).reshape(-1, 2)
+    standing = [o.representative_point for o in at_first.obstacles]
+    busy = [problem.points[:, :2], polylines.dense(plan[:, :2], 0.2 * problem.scale / 20.0), path]
+    _draw_passing(ax, maps, np.vstack([*busy, np.array(standing).reshape(-1, 2)]))
     ax.plot(plan[:, 0], plan[:, 1], color=style.PLAN, lw=1.0, ls="--", label="plan")
     if len(path):
         ax.plot(path[:, 0], path[:, 1], color=style.PATH, lw=1.3, label="path")
@@ -58,7 +62,7 @@ def draw_map(done: Execution, *, ax: Any = None) -> Any:
     for mark, colour, name, wanted in (
         ("o", style.VISITED, "goal visited", visited),
         ("x", style.LEFT_OUT, "goal left out", set(done.left_out)),
-        ("+", style.CANCELLED, "goal cancelled", done.cancelled),
+        ("+", style.CANCELLED, "goal cancelled", set(done.cancelled)),
     ):
         places = [g.position for k, g in enumerate(problem.goals) if k in wanted]
         if places:
@@ -74,13 +78,31 @@ def draw_map(done: Execution, *, ax: Any = None) -> Any:
     return ax
 
 
-def _draw_passing(ax: Any, maps: Maps) -> None:
-    """Obstacles that stood there for a time only, by their outline and their times."""
+def _draw_passing(ax: Any, maps: Maps, busy: Floats) -> None:
+    """Obstacles that stood there for a time only, by their outline and their times; these stand
+    beside it, where there is least else (n, 2), for a goal that was lost lies within."""
+    size = float(np.ptp(busy, axis=0).max())
     for p in passing(maps):
         rim = np.asarray(p.obstacle.shape(0.0).exterior.coords)[:, :2]
         ax.fill(*rim.T, fc=style.OBSTACLE, ec=style.EDGE, ls="--", lw=0.9, alpha=0.6, zorder=1)
+        (x0, y0), (x1, y1) = rim.min(0), rim.max(0)
+        x, y = (x0 + x1) / 2, (y0 + y1) / 2
+        half = 0.008 * size * len(text := f"{p.name}, {p.when}")
+        sides = (
+            ((x, y1), (0, 3), "center", "bottom", (x, y1 + 0.02 * size)),
+            ((x, y0), (0, -3), "center", "top", (x, y0 - 0.02 * size)),
+            ((x1, y), (3, 0), "left", "center", (x1 + half, y)),
+            ((x0, y), (-3, 0), "right", "center", (x0 - half, y)),
+        )
+
+        def room(side: Any, half: float = half) -> float:
+            """To what is nearest to the middle of the words, which are wide and low."""
+            away = np.abs(busy - np.array(side[-1])) / np.array([half, 0.02 * size])
+            return float(away.max(axis=1).min())
+
+        place, offset, across, up, _ = max(sides, key=room)
         ax.annotate(
-            f"{p.name}\n{p.when}", rim[:-1].mean(0), ha="center", va="center", fontsize=6.5,
+            text, place, xytext=offset, textcoords="offset points", ha=across, va=up, fontsize=6.5,
             path_effects=style.halo(), zorder=5,
         )  # fmt: skip
 

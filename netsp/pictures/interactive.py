@@ -144,8 +144,10 @@ def stop_traces(stops: Stops) -> list[Any]:
     """Waypoints on an interactive page: those that were visited, and those that were not."""
     out = []
     left = np.isin(np.arange(len(stops.places)), stops.left_out)
+    visited = {"size": 3, "color": style.VISITED}
+    to_visit = {"size": 4, "color": style.PATH, "symbol": "circle-open"}
     for chosen, name, marker in (
-        (~left, stops.name, {"size": 3, "color": style.VISITED}),
+        (~left, stops.name, visited if stops.visited else to_visit),
         (left, "not visited", {"size": 4, "color": style.LEFT_OUT, "symbol": "x"}),
     ):
         if chosen.any():

@@ -14,30 +14,11 @@ from netsp.arrays import Floats
 from netsp.online.laid import present_tether
 from netsp.online.log import Run
 from netsp.online.scene.scene import Scene
-from netsp.online.scene.surfaces import extent
 from netsp.online.simulate import grid_of
 from netsp.online.tether import GeodesicTether, Tether
 from netsp.online.track import Track
 from netsp.pictures import style
-from netsp.pictures.interactive import (
-    layout,
-    line_trace,
-    mesh_trace,
-    plotly_objects,
-    point_trace,
-    seen,
-    stop_traces,
-    write_figure,
-)
-from netsp.pictures.scene import (
-    Stops,
-    draw_space,
-    parts_of,
-)
-
-FRAMES, FILM_MS = 120, 12_000
-"""Of a page: moments that its slider knows, and milliseconds in which they go by."""
-
+from netsp.pictures.scene import Stops, draw_space
 
 DASHES = ("-", "-.")
 """Of two runs side by side, so that they can be told apart in grey."""
@@ -67,7 +48,7 @@ def stops_of(run: Run) -> Stops:
     """Its waypoints, and which of them were not visited."""
     visited = {int(stop["waypoint"]) for stop in run.summary["stops"]}
     left = tuple(sorted(set(range(len(run.mission.waypoints))) - visited))
-    return Stops(run.mission.places, left, name="waypoint visited")
+    return Stops(run.mission.places, left, visited=True)
 
 
 def save_runs(runs: Sequence[Run], scene: Scene, file: str | Path) -> None:
@@ -172,85 +153,3 @@ def tethers_along(run: Run, scene: Scene, moments: npt.NDArray[np.int64]) -> lis
         out.append(state)
         at = int(row) + 1
     return out
-
-
-def save_page(runs: Sequence[Run], scene: Scene, file: str | Path) -> None:
-    """A page that needs nothing else: each run in space with a slider for the time.
-
-    Raises
-    ------
-    InputError
-        Plotly is not installed, the file cannot be written.
-    """
-    go = plotly_objects()
-    from plotly.subplots import make_subplots
-
-    figure = make_subplots(
-        rows=1, cols=len(runs), specs=[[{"type": "scene"}] * len(runs)],
-        subplot_titles=[title_of(r) for r in runs], horizontal_spacing=0.01,
-    )  # fmt: skip
-    longest = max(r.log[-1].time for r in runs)
-    times = np.linspace(0.0, longest, FRAMES)
-    changing: list[list[Any]] = [[] for _ in times]
-    numbers: list[int] = []
-    for k, run in enumerate(runs):
-        path = path_of(run)
-        low, high = extent(scene, path, run.tether.nodes)
-        for name, (vertices, faces) in parts_of(scene, low, high):
-            trace = mesh_trace(name, vertices, faces)
-            trace.showlegend = False
-            figure.add_trace(trace, row=1, col=k + 1)
-        for trace in stop_traces(stops_of(run)):
-            trace.showlegend = k == 0
-            figure.add_trace(trace, row=1, col=k + 1)
-        told = seen(path)
-        stamps = np.array([r.time for r in run.log])
-        rows = np.minimum(np.searchsorted(stamps, times), len(stamps) - 1)
-        tethers = tethers_along(run, scene, rows)
-        for f, (row, tether) in enumerate(zip(rows, tethers, strict=True)):
-            moving = [
-                line_trace("path", path[[*told[told < row], row]], style.PATH, 3),
-                line_trace("tether", tether.nodes, style.TETHER, 6),
-                point_trace("robot", path[row], style.ROBOT),
-                point_trace("anchor", tether.anchor, style.BASE),
-            ]
-            if f == 0:
-                for trace in moving:
-                    trace.showlegend = k == 0
-                    numbers.append(len(figure.data))
-                    figure.add_trace(trace, row=1, col=k + 1)
-            changing[f] += moving
-    figure.frames = [
-        go.Frame(data=traces, traces=numbers, name=f"{t:.0f}")
-        for t, traces in zip(times, changing, strict=True)
-    ]
-    now = {"frame": {"duration": 0, "redraw": True}, "mode": "immediate"}
-    steps = [{"args": [[f"{t:.0f}"], now], "label": f"{t:.0f}", "method": "animate"} for t in times]
-    base = layout(runs[0].mission.name, scene.units)
-    scenes = {f"scene{k + 1 if k else ''}": base["scene"] for k in range(len(runs))}
-    figure.update_layout(
-        title=base["title"], margin={"l": 0, "r": 0, "t": 70, "b": 115}, legend=base["legend"],
-        sliders=[{
-            "steps": steps, "currentvalue": {"prefix": "time (s) "}, "pad": {"t": 20}, "x": 0.17,
-            "len": 0.81,
-        }],
-        updatemenus=[_play()], **scenes,
-    )  # fmt: skip
-    write_figure(figure, runs[0].mission.name, file)
-
-
-def _play() -> dict[str, Any]:
-    """Buttons that have the frames go by."""
-    on = {
-        "frame": {"duration": FILM_MS // FRAMES, "redraw": True}, "fromcurrent": True,
-        "transition": {"duration": 0},
-    }  # fmt: skip
-    stop = {"frame": {"duration": 0, "redraw": False}, "mode": "immediate"}
-    buttons = [
-        {"label": "▶ play", "method": "animate", "args": [None, on]},
-        {"label": "❚❚ pause", "method": "animate", "args": [[None], stop]},
-    ]
-    return {
-        "type": "buttons", "direction": "left", "buttons": buttons, "showactive": False,
-        "x": 0.0, "xanchor": "left", "y": 0.0, "yanchor": "top", "pad": {"t": 40, "l": 8},
-    }  # fmt: skip

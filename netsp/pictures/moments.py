@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from netsp.arrays import Floats
+from netsp.errors import InputError
 from netsp.execute.plan import HOME
 from netsp.geometry import polylines
+from netsp.online.laid import present_tether
 from netsp.online.log import Run
+from netsp.online.mission import Mission
 from netsp.online.scene.scene import Scene, scene_of
+from netsp.online.simulate import grid_of
 from netsp.online.tether import GeodesicTether
 from netsp.online.tether.resolution import suggested_delta
 from netsp.pictures.mission import path_of, tethers_along
@@ -21,6 +25,12 @@ from netsp.solution import Solution
 
 THIN = 400
 """Points of what a run has gone so far, about."""
+
+VISITED, LEFT_OUT, CANCELLED = "visited", "left out", "cancelled"
+"""What may have become of a goal or waypoint."""
+
+Fates = Mapping[str, tuple[int, ...]]
+"""Numbers of goals or waypoints, by what has become of them so far."""
 
 
 @dataclass(frozen=True)
@@ -37,12 +47,15 @@ class Moment:
         How far it is.
     problem : Problem or None
         The site, as it is then; None in space.
+    fates : mapping
+        Of goals or waypoints, by then.
     """
 
     nodes: Floats
     path: Floats
     text: str
     problem: Problem | None = None
+    fates: Fates = field(default_factory=dict)
 
 
 def moments_of_plan(problem: Problem, solution: Solution, count: int) -> list[Moment]:
@@ -65,6 +78,7 @@ def moments_of_plan(problem: Problem, solution: Solution, count: int) -> list[Mo
     model = GeodesicTether(scene_of(problem).field(), suggested_delta(problem))
     path = np.array(solution.path)
     s = polylines.along(path)
+    reached = _reached(path, problem, solution)
     if problem.state is None:
         state = model.start(problem.base, problem.base)
     else:
@@ -79,13 +93,25 @@ def moments_of_plan(problem: Problem, solution: Solution, count: int) -> list[Mo
             f"{u:.4g} of {s[-1]:.4g} {problem.units}; tether {state.length:.4g} of "
             f"{problem.tether_length:g} {problem.units}"
         )
-        out.append(Moment(state.nodes, np.vstack([path[:passed], here]), text, problem))
+        gone = np.vstack([path[:passed], here])
+        visited = tuple(g for g, n in reached if s[n] <= u * (1.0 + 1e-12))
+        out.append(Moment(state.nodes, gone, text, problem, {VISITED: visited}))
+    return out
+
+
+def _reached(path: Floats, problem: Problem, solution: Solution) -> list[tuple[int, int]]:
+    """Each goal of the tour, and the vertex of the path at which it is visited."""
+    out, at = [], 0
+    for visit in solution.tour:
+        apart = np.linalg.norm(path[at:] - np.array(problem.goals[visit.goal].position), axis=1)
+        at += int(np.argmax(apart <= apart.min() + problem.tolerance))
+        out.append((visit.goal, at))
     return out
 
 
 def moments_of_run(
     maps: Sequence[tuple[float, Problem]], rows: Sequence[dict[str, str]],
-    tethers: Sequence[dict[str, Any]], count: int,
+    tethers: Sequence[dict[str, Any]], count: int, since: Mapping[str, Mapping[int, float]],
 ) -> list[Moment]:  # fmt: skip
     """Moments of a run that were recorded.
 
@@ -99,6 +125,8 @@ def moments_of_run(
         Of tethers.json.
     count : int
         How many, about.
+    since : mapping of str to mapping of int to float
+        For each fate, seconds since when goals have it.
 
     Returns
     -------
@@ -130,7 +158,12 @@ def moments_of_run(
             f"{problem.units}; {where}"
         )
         gone = np.vstack([path[: k : max(1, k // THIN)], nodes[-1:]])
-        out.append(Moment(nodes, gone, text, problem))
+        now = frame["time"] if k < len(rows) - 1 else np.inf
+        fates = {
+            fate: tuple(g for g, when in begins.items() if when <= now)
+            for fate, begins in since.items()
+        }
+        out.append(Moment(nodes, gone, text, problem, fates))
     return out
 
 
@@ -152,18 +185,76 @@ def moments_of_flight(run: Run, scene: Scene, count: int) -> list[Moment]:
         The last one among them.
     """
     path = path_of(run)
+    visited = {int(stop["waypoint"]) for stop in run.summary["stops"]}
     stamps = np.array([r.time for r in run.log])
     rows = np.searchsorted(stamps, np.linspace(0.0, stamps[-1], count))
     rows = np.minimum(rows, len(stamps) - 1)
     units, out = scene.units, []
     for row, tether in zip(rows, tethers_along(run, scene, rows), strict=True):
         r = run.log[row]
+        end = row == len(stamps) - 1
+        passed = range(len(run.mission.waypoints) if end else r.waypoint)
+        fates = {
+            VISITED: tuple(k for k in passed if k in visited),
+            LEFT_OUT: tuple(k for k in passed if k not in visited),
+        }
         text = (
             f"{r.time:.4g} s; tether {r.tether:.4g} of {r.limit:g} {units}; "
-            f"{min(r.waypoint, len(run.mission.waypoints))} of {len(run.mission.waypoints)} visited"
+            f"{len(fates[VISITED])} of {len(run.mission.waypoints)} visited"
         )
         gone = np.vstack([path[: row : max(1, row // THIN)], path[row]])
-        out.append(Moment(np.vstack([tether.nodes[:-1], path[row]]), gone, text))
+        nodes = np.vstack([tether.nodes[:-1], path[row]])
+        out.append(Moment(nodes, gone, text, fates=fates))
+    return out
+
+
+def moments_of_mission(mission: Mission, scene: Scene, count: int) -> list[Moment]:
+    """Moments of a planned mission, at even steps along its tour.
+
+    Parameters
+    ----------
+    mission : Mission
+        Planned.
+    scene : Scene
+        Its scene.
+    count : int
+        How many steps.
+
+    Returns
+    -------
+    list of Moment
+        One more than steps.
+
+    Raises
+    ------
+    InputError
+        The mission has no tour.
+    """
+    if mission.tour is None:
+        raise InputError(
+            f"{mission.name}: tour: the mission has none; expected one that netsp solve has planned"
+        )
+    field_of = scene.field()
+    model = GeodesicTether(field_of, mission.delta)
+    state = present_tether(mission, field_of, model, grid_of(mission, scene, field_of))
+    legs = [mission.tour.leg(k) for k in range(len(mission.tour.stops))]
+    ends = np.cumsum([polylines.length(leg) for leg in legs if leg is not None])
+    path = mission.tour.line
+    s = polylines.along(path)
+    units, all_of, out, at = scene.units, len(mission.waypoints), [], 0
+    for u in np.linspace(0.0, s[-1], count + 1):
+        here = np.array([np.interp(u, s, path[:, k]) for k in range(3)])
+        passed = int(np.searchsorted(s, u))
+        state = model.drive(state, np.vstack([path[at:passed], here]))[0]
+        at = max(at, passed)
+        visited = tuple(range(int((ends <= u + 1e-9 * s[-1]).sum())))
+        left = tuple(range(len(ends), all_of)) if u == s[-1] else ()
+        text = (
+            f"{u:.4g} of {s[-1]:.4g} {units}; tether {state.length:.4g} of "
+            f"{mission.tether_length:g} {units}; {len(visited)} of {all_of} visited"
+        )
+        gone = np.vstack([path[:passed], here])
+        out.append(Moment(state.nodes, gone, text, fates={VISITED: visited, LEFT_OUT: left}))
     return out
 
 

@@ -36,14 +36,19 @@ class Stops:
         Which of them are left out.
     anchor : (x, y, z) or None
         Drawn as well where no tether is.
-    name : str
-        What the legend calls those that are not left out.
+    visited : bool
+        Whether the others have been visited, or are to be.
     """
 
     places: Floats
     left_out: tuple[int, ...] = ()
     anchor: tuple[float, float, float] | None = None
-    name: str = "waypoint"
+    visited: bool = False
+
+    @property
+    def name(self) -> str:
+        """What the legend calls those that are not left out."""
+        return "waypoint visited" if self.visited else "waypoint"
 
     @property
     def every_place(self) -> Floats:
@@ -198,8 +203,10 @@ def draw_stops(ax: Any, stops: Stops, axes: tuple[int, ...]) -> None:
     the tour where these are few enough to be read."""
     columns = list(axes)
     some = np.isin(np.arange(len(stops.places)), stops.left_out)
+    to_visit = {"marker": "o", "ms": 4, "color": style.GOAL, "mec": style.PATH, "mew": 1.0}
+    visited = {"marker": "o", "ms": 4, "color": style.VISITED}
     for chosen, look, label in (
-        (~some, {"marker": "o", "ms": 4, "color": style.VISITED}, stops.name),
+        (~some, visited if stops.visited else to_visit, stops.name),
         (some, {"marker": "x", "ms": 6, "mew": 1.8, "color": style.LEFT_OUT}, "not visited"),
     ):
         there = stops.places[chosen][:, columns]

@@ -12,12 +12,16 @@ import numpy.typing as npt
 from netsp.arrays import Floats
 from netsp.execute.passing import Maps, lasting, passing
 from netsp.pictures import style
+from netsp.pictures.film import Film
 from netsp.problem import Circle, Problem
 from netsp.solution import Solution
 
 WIDTH = 900.0
 LEFT, HEAD, FOOT = 52.0, 44.0, 46.0
 """Room for the numbers of the y axis, for scale bar and north, and for the x axis."""
+
+FATE = 6
+"""Letters beside a name, where a goal was left out or cancelled, less those in the margin."""
 
 MANY = 40
 """With more goals or obstacles, names would cover each other."""
@@ -27,6 +31,8 @@ LEGEND = (
     (f'<circle cx="8" cy="8" r="6" fill="{style.GOAL}" stroke="{style.PATH}" stroke-width="1.5"/>'
      '<text x="8" y="11" font-size="8" text-anchor="middle">1</text>',
      "goal, with the number of its visit"),
+    (f'<circle cx="8" cy="8" r="6" fill="{style.VISITED}" stroke="{style.PATH}" '
+     'stroke-width="1.5"/>', "visited by then"),
     (f'<rect x="2" y="3" width="12" height="10" fill="{style.OBSTACLE}" stroke="{style.EDGE}"/>',
      "obstacle"),
     (f'<rect x="1" y="2" width="14" height="12" fill="none" stroke="{style.EDGE}" '
@@ -58,6 +64,9 @@ class View:
         low, high = every.min(axis=0), every.max(axis=0)
         room = 0.04 * float((high - low).max()) + 1e-9
         self.low, self.high = low - room, high + room
+        if len(problem.goals) <= MANY:  # names stand to the right of goals
+            letters = max((len(goal.name or "") for goal in problem.goals), default=0) + FATE
+            self.high[0] += min(0.007 * letters, 0.2) * float((high - low).max())
         lack = 0.25 * float((self.high - self.low).max()) - (self.high - self.low)
         self.low, self.high = (
             self.low - np.maximum(lack, 0.0) / 2,
@@ -66,6 +75,24 @@ class View:
         self.scale = (WIDTH - LEFT - 8.0) / float(self.high[0] - self.low[0])
         self.bottom = HEAD + float(self.high[1] - self.low[1]) * self.scale
         self.height = self.bottom + FOOT
+
+    @classmethod
+    def of(cls, problem: Problem, film: Film) -> View:
+        """Of a problem, and of all that a film shows.
+
+        Parameters
+        ----------
+        problem : Problem
+            What is shown.
+        film : Film
+            Of the plane.
+
+        Returns
+        -------
+        View
+            Of both.
+        """
+        return cls(problem, np.vstack([m.nodes for m in film.moments]))
 
     def point(self, p: npt.ArrayLike) -> list[float]:
         """Where a place is in the picture."""
@@ -106,17 +133,17 @@ def draw(
     shapes = [
         *_frame(problem, view), *_obstacles(lasting(maps) if maps else problem, view),
         *_passing(maps, view), *_tour(solution, view),
-        f'<polyline id="done" fill="none" stroke="{style.PLAN}" stroke-width="3"/>',
-        f'<polyline id="tether" fill="none" stroke="{style.TETHER}" stroke-width="3"/>',
+        f'<polyline class="done" fill="none" stroke="{style.PLAN}" stroke-width="3"/>',
+        f'<polyline class="tether" fill="none" stroke="{style.TETHER}" stroke-width="3"/>',
         *_goals(problem, solution, view, fates),
     ]  # fmt: skip
     x, y = view.point(problem.base)
     shapes.append(
         f'<polygon points="{_star(x, y)}" fill="{style.BASE}"><title>base</title></polygon>'
     )
-    shapes.append(f'<circle id="robot" r="6" fill="{style.ROBOT}" stroke="{style.BASE}"/>')
+    shapes.append(f'<circle class="robot" r="6" fill="{style.ROBOT}" stroke="{style.BASE}"/>')
     return (
-        f'<svg id="map" viewBox="0 0 {WIDTH:g} {view.height:.1f}" role="img" '
+        f'<svg class="map" viewBox="0 0 {WIDTH:g} {view.height:.1f}" role="img" '
         f'aria-label="map">{"".join(shapes)}</svg>'
     )
 
@@ -228,11 +255,12 @@ def _passing(maps: Maps, view: View) -> list[str]:
     )
     for p in passing(maps) if maps else ():
         rim = np.asarray(p.obstacle.shape(0.0).exterior.coords)[:, :2]
-        x, y = view.point(p.obstacle.representative_point)
+        # above it: a goal that was lost lies within
+        x, y = view.point([rim[:, 0].mean(), rim[:, 1].max()])
         name = html.escape(f"{p.name}, {p.when}")
         out.append(
             f'<polygon points="{view.points(rim)}" {look}/>'
-            f'<text x="{x}" y="{y + 4}" class="name" text-anchor="middle">{name}</text>'
+            f'<text x="{x}" y="{y - 4}" class="name" text-anchor="middle">{name}</text>'
         )
     return out
 
@@ -266,7 +294,8 @@ def _goals(
             fate, style.PATH if k in visit else style.EDGE
         )
         note = html.escape(f"{problem.goal_label(k)} {fate}".strip())
-        out.append(f'<circle cx="{x}" cy="{y}" r="9" fill="{style.GOAL}" stroke="{edge}" '
+        out.append(f'<circle class="goal" data-goal="{k}" cx="{x}" cy="{y}" r="9" '
+                   f'fill="{style.GOAL}" stroke="{edge}" '
                    f'stroke-width="1.6"><title>{note}</title></circle>'
                    f'<text x="{x}" y="{y + 4}" class="visit" text-anchor="middle">'
                    f"{visit.get(k, '–')}</text>")  # fmt: skip

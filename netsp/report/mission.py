@@ -87,9 +87,7 @@ def page(mission: Mission, scene: Scene, run: Path | None) -> str:
     line = _line(mission, rows)
     left = tuple(int(w["waypoint"]) for w in summary.get("left_out", ()))
     left = left or tuple(range(_stops(mission), len(mission.waypoints))) * (run is None)
-    stops = Stops(
-        mission.places, left, mission.anchor, "waypoint" if run is None else "waypoint visited"
-    )
+    stops = Stops(mission.places, left, mission.anchor, visited=run is not None)
     parts += ["<h2>Pictures</h2>", _picture(scene, line, mission.name, stops)]
     if run is not None and (run / "run.html").exists():
         parts.append(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -12,9 +13,12 @@ from typing import Any
 import numpy as np
 
 from netsp.errors import InputError
+from netsp.execute.plan import HOME
 from netsp.files import read_text
 from netsp.geometry import polylines
 from netsp.online.log import check_log
+from netsp.pictures.film import Film, film_of_plan, film_of_run
+from netsp.pictures.moments import CANCELLED, LEFT_OUT, VISITED
 from netsp.problem import Problem
 from netsp.report import log
 from netsp.solution import Solution
@@ -42,10 +46,79 @@ class Opened:
 
     problem: Problem
     solution: Solution
-    rows: list[dict[str, str]]
-    tethers: list[dict[str, Any]] | None
-    run: Path | None
-    maps: Sequence[tuple[float, Problem]]
+    rows: Sequence[dict[str, str]] = ()
+    tethers: list[dict[str, Any]] | None = None
+    run: Path | None = None
+    maps: Sequence[tuple[float, Problem]] = ()
+
+    @property
+    def fates(self) -> dict[int, str]:
+        """Goals that a run did not visit, and why not in two words; InputError if its summary is
+        damaged."""
+        if self.run is None:
+            return {}
+        s = json_of(self.run / "summary.json")
+        try:
+            left_out = {int(x["goal"]): LEFT_OUT for x in s["left_out"]}
+            return left_out | {int(g): CANCELLED for g in s["cancelled"]}
+        except (KeyError, ValueError, TypeError) as error:
+            raise InputError(
+                f"{self.run / 'summary.json'}: is damaged: {type(error).__name__}: {error}"
+            ) from None
+
+    def film(self, count: int) -> Film:
+        """The tour, or the run, as a moving picture.
+
+        Parameters
+        ----------
+        count : int
+            Moments, about.
+
+        Returns
+        -------
+        Film
+            Of it.
+
+        Raises
+        ------
+        InputError
+            A file of the run is damaged.
+        """
+        if not self.tethers:
+            return film_of_plan(self.problem, self.solution, count)
+        try:
+            return film_of_run(self.maps, self.rows, self.tethers, self._since(), count)
+        except (KeyError, IndexError, ValueError, TypeError, OverflowError) as error:
+            raise InputError(
+                f"{self.run}: a file of the run is damaged: {type(error).__name__}: {error}"
+            ) from None
+
+    def _since(self) -> dict[str, dict[int, float]]:
+        """For what has become of goals in a run, seconds since when it has."""
+        assert self.run is not None
+        visits = log.rows_of(self.run / "visits.csv")
+        summary = json_of(self.run / "summary.json")
+        left = {int(x["goal"]): self._covered(int(x["goal"])) for x in summary["left_out"]}
+        cancelled = [int(g) for g in summary["cancelled"]]
+        times = summary.get("cancelled_s", [math.inf] * len(cancelled))  # runs of before have none
+        visited = {int(v["goal"]): float(v["time"]) for v in visits if int(v["goal"]) != HOME}
+        return {
+            VISITED: visited,
+            LEFT_OUT: left,
+            CANCELLED: dict(zip(cancelled, map(float, times), strict=True)),
+        }
+
+    def _covered(self, goal: int) -> float:
+        """Since when an obstacle stands on a goal; inf where it was left out for another reason."""
+        for time, problem in self.maps:
+            if goal < len(problem.goals):
+                place, least = problem.goals[goal].position[:2], problem.clearance
+                if any(
+                    float(o.signed_distance(place)) < least - problem.tolerance
+                    for o in problem.obstacles
+                ):
+                    return time
+        return math.inf
 
 
 def opened(source: str | Path, problem_file: str | Path | None) -> Opened:
@@ -73,14 +146,17 @@ def opened(source: str | Path, problem_file: str | Path | None) -> Opened:
     if run is not None:
         if (run / "mission.json").exists() and not (run / "solution.json").exists():
             raise InputError(f"{source}: is of a mission; expected a run of a problem")
-        problem_file = problem_file or run / "problem.json"
+        problem_file = run / "problem.json"
         place = run / "solution.json"
         if not place.exists():
             raise InputError(f"{source}: is not the folder of a run; expected solution.json in it")
     solution = Solution.load(place)
     if problem_file is None:
         raise InputError(f"{source}: does not hold its problem; expected --problem FILE")
-    problem = Problem.load(problem_file)
+    problem = (
+        Problem.load(problem_file) if run is None
+        else Problem.from_run(read_text(problem_file), str(problem_file))
+    )  # fmt: skip
     if run is None and problem.sha256 != solution.problem.sha256:
         raise InputError(f"{source}: solves another problem than {problem_file} (sha256 differs)")
     if solution.length is None:
@@ -113,8 +189,7 @@ def _maps_of(file: Path) -> list[tuple[float, Problem]]:
     found = json_of(file)
     try:
         maps = [
-            (float(m["time"]), Problem.from_json(json.dumps(m["problem"]), source=str(file)))
-            for m in found
+            (float(m["time"]), Problem.from_run(json.dumps(m["problem"]), str(file))) for m in found
         ]
     except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise InputError(f"{file}: expected times and problems: {error}") from None

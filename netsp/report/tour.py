@@ -5,82 +5,35 @@ the checks, measures of entanglement, a run's log."""
 from __future__ import annotations
 
 import html
-import json
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from netsp.errors import InputError, counted
-from netsp.execute.passing import Maps
 from netsp.files import write_text
 from netsp.hsignature.measures import measure
 from netsp.judge import verify
-from netsp.pictures.moments import moments_of_plan, moments_of_run
 from netsp.problem import Problem
-from netsp.report import briefing, chart, log
-from netsp.report.opened import json_of, opened
+from netsp.report import briefing, chart, log, moving
+from netsp.report.opened import Opened, json_of, opened
 from netsp.report.page import STYLE
 from netsp.solution import Solution, Status, above_shortest
 
-FRAMES = 240
-
 TOUR_STYLE = """
-#map { background: #fff; width: 100%; max-width: 900px } #map text { font-size: 12px }
-#map .name { font-size: 11px; fill: #1b2631; paint-order: stroke; stroke: #fff; stroke-width: 3px }
-#map .visit { font-size: 10.5px } #map .grid { stroke: #e8edf1; fill: none }
-#slider { width: 100%; max-width: 900px } .chart { max-width: 900px; width: 100% }
-.legend { list-style: none; padding: 0; display: flex; flex-wrap: wrap; gap: .2em 1.2em;
-  font-size: 13px } .legend svg { vertical-align: -3px }
+.chart { max-width: 900px; width: 100% }
 @media (max-width: 600px) {
-  body { margin: .6em auto; padding: 0 .6em } #map text, .chart text { font-size: 20px }
-  #map .visit { font-size: 14px } #map .name { font-size: 18px } th, td { padding: .2em .45em }
+  body { margin: .6em auto; padding: 0 .6em } .chart text { font-size: 20px }
+  th, td { padding: .2em .45em }
   td.words { min-width: 11em } td:nth-child(2) { min-width: 0 }
 }
 @page { size: A4; margin: 12mm }
 @media print {
   body { margin: 0; padding: 0; max-width: none; font-size: 11px }
-  .noprint, #robot, #tether, #done { display: none } .wide { overflow: visible }
+  .wide { overflow: visible }
   table { font-size: 9px; width: 100% } th, td { padding: .15em .35em } h1 { font-size: 16px }
   h2 { font-size: 12px; margin: .9em 0 .3em; break-after: avoid } tr, svg { break-inside: avoid }
-  #map { max-height: 130mm }
 }
-"""
-
-SCRIPT = """
-const data = JSON.parse(document.getElementById("frames").textContent);
-const slider = document.getElementById("slider");
-function show(k) {
-  const f = data[k];
-  document.getElementById("tether").setAttribute("points", f.t);
-  document.getElementById("robot").setAttribute("cx", f.r[0]);
-  document.getElementById("robot").setAttribute("cy", f.r[1]);
-  document.getElementById("done").setAttribute("points", f.p);
-  document.getElementById("state").textContent = f.s;
-}
-slider.max = data.length - 1;
-let fresh = true;
-slider.addEventListener("input", () => { fresh = false; stop(); show(Number(slider.value)); });
-slider.value = Math.floor(data.length / 3);
-show(Number(slider.value));
-const button = document.getElementById("play");
-let timer = null;
-function stop() {
-  clearInterval(timer);
-  timer = null;
-  button.textContent = "▶ play";
-}
-button.addEventListener("click", () => {
-  if (timer !== null) return stop();
-  if (fresh || Number(slider.value) >= data.length - 1) slider.value = 0;
-  fresh = false;
-  button.textContent = "❚❚ pause";
-  timer = setInterval(() => {
-    slider.value = Number(slider.value) + 1;
-    show(Number(slider.value));
-    if (Number(slider.value) >= data.length - 1) stop();
-  }, 60);
-});
 """
 
 
@@ -95,7 +48,7 @@ def report_tour(source: str | Path, problem_file: str | Path | None, output: str
     """
     what = opened(source, problem_file)
     try:
-        text = page(what.problem, what.solution, what.rows, what.tethers, what.run, what.maps)
+        text = page(what)
     except (KeyError, IndexError, ValueError, TypeError, OverflowError) as error:
         raise InputError(
             f"{source}: a file of the run is damaged: {type(error).__name__}: {error}"
@@ -103,37 +56,35 @@ def report_tour(source: str | Path, problem_file: str | Path | None, output: str
     write_text(output, text)
 
 
-def page(
-    problem: Problem, solution: Solution, rows: list[dict[str, str]],
-    tethers: list[dict[str, Any]] | None, run: Path | None, maps: Maps = (),
-) -> str:  # fmt: skip
+def page(what: Opened) -> str:
     """The page as HTML.
 
     Parameters
     ----------
-    rows, tethers
-        Of a run, else empty.
-    maps : sequence of (float, Problem)
-        The site as it was from some seconds on; by default, as it is.
+    what : Opened
+        A solution or a run.
+
+    Returns
+    -------
+    str
+        The page.
+
+    Raises
+    ------
+    InputError, KeyError, IndexError, ValueError, TypeError, OverflowError
+        A file of the run is damaged.
     """
-    moments = (
-        moments_of_run(maps or [(0.0, problem)], rows, tethers, FRAMES) if tethers
-        else moments_of_plan(problem, solution, FRAMES)
-    )  # fmt: skip
-    view = chart.View(problem, np.vstack([m.nodes for m in moments]))
+    problem, solution, run = what.problem, what.solution, what.run
+    film, fates = what.film(moving.FRAMES), what.fates
+    view = chart.View.of(problem, film)
     title = f"{problem.name}: {'a run' if run else 'a tour'}"
-    fates = _fates(run)
     own = problem.sha256 == solution.problem.sha256
     found = briefing.of_tour(problem, solution) if run is None else None
     parts = [
         f"<h1>{html.escape(title)}</h1>",
         _summary(problem, solution, run),
-        "<h2>Map</h2>", chart.draw(problem, solution, view, fates, maps), chart.legend(),
-        '<div class="noprint"><button id="play" type="button">▶ play</button>'
-        '<input id="slider" type="range" min="0" value="0" '
-        'aria-label="position along the tour"><p class="note">Move the slider: the thick line is '
-        "the tether, pulled taut round the obstacles as it is when the robot is there.</p>"
-        '<p id="state" class="note"></p></div>',
+        "<h2>Map</h2>", chart.draw(problem, solution, view, fates, what.maps), chart.legend(),
+        moving.CONTROLS, moving.STATE,
         "<h2>Goals in their order</h2>",
         briefing.stops(problem, solution, found) if run is None
         else _reached(problem, solution, run, fates),
@@ -146,25 +97,16 @@ def page(
         parts += ["<h2>Checks</h2>", briefing.checks(verify(problem, solution))]
     if problem.state is None and own:
         parts += ["<h2>Measures of entanglement</h2>", _measures(problem, solution)]
-    if rows:
-        parts += ["<h2>Log</h2>", _over_time(rows, problem.units), _events(run)]
-    shown = [
-        {
-            "t": view.points(m.nodes), "r": view.point(m.nodes[-1]),
-            "p": view.points(m.path), "s": m.text,
-        }
-        for m in moments
-    ]  # fmt: skip
-    data = json.dumps(shown, allow_nan=False).replace("<", "\\u003c")
+    if what.rows:
+        parts += ["<h2>Log</h2>", _over_time(what.rows, problem.units), _events(run)]
     return (
         '<!doctype html><html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
         f"<title>{html.escape(title)}"
-        f'</title><link rel="icon" href="data:,"><style>{STYLE}{briefing.STYLE}{TOUR_STYLE}'
-        "</style></head><body>"
+        f'</title><link rel="icon" href="data:,"><style>{STYLE}{briefing.STYLE}'
+        f"{moving.STYLE}{TOUR_STYLE}</style></head><body>"
         + "\n".join(parts)
-        + f'<script type="application/json" id="frames">{data}</script>'
-        + f"<script>{SCRIPT}</script></body></html>\n"
+        + f"{moving.script([film], [view])}</body></html>\n"
     )
 
 
@@ -191,15 +133,6 @@ def _summary(problem: Problem, solution: Solution, run: Path | None) -> str:
             f"{'recovered free' if s['tether_free'] else 'not recovered free'} at the end."
         )
     return "".join(f"<p>{line}</p>" for line in lines)
-
-
-def _fates(run: Path | None) -> dict[int, str]:
-    """Goals that were not visited, and why not in two words."""
-    if run is None:
-        return {}
-    s = json_of(run / "summary.json")
-    left_out = {int(x["goal"]): "left out" for x in s["left_out"]}
-    return left_out | {int(g): "cancelled" for g in s["cancelled"]}
 
 
 def _reached(problem: Problem, solution: Solution, run: Path, fates: dict[int, str]) -> str:
@@ -245,7 +178,7 @@ def _measures(problem: Problem, solution: Solution) -> str:
     return f"<table>{body}</table>"
 
 
-def _over_time(rows: list[dict[str, str]], units: str) -> str:
+def _over_time(rows: Sequence[dict[str, str]], units: str) -> str:
     times, lengths, limits = (
         np.array([float(r[k]) for r in rows]) for k in ("time", "tether", "limit")
     )
