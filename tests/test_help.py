@@ -58,6 +58,9 @@ def test_help_to_a_full_disk_fails_in_one_line():
 @pytest.mark.parametrize(
     ("words", "offered"),
     [(("netsp", "so"), "solve"), (("netsp", "solve", "--ti"), "--time-limit"),
+     (("netsp", "solve", "--solver", "reduced"), "reduced-mip"),
+     (("netsp", "export", "--format", "geo"), "geojson"),
+     (("netsp", "simulate", "--planner", "pred"), "predictive"),
      (("netsp", "schema", "sce"), "scene-surprises"), (("netsp", "plot", "prob"), "problems")],
 )  # fmt: skip
 def test_bash_completes_commands_options_choices_and_files(words, offered, tmp_path, capsys):

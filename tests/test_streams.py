@@ -114,3 +114,35 @@ def test_what_has_no_tour_is_a_summary_too_with_the_tether_that_it_takes(tmp_pat
     data["tether_length"] = told["needed"] + 1e-3
     (tmp_path / "enough.json").write_text(json.dumps(data))
     assert run("solve", tmp_path / "enough.json", "--quiet", "-o", "-").returncode == 0
+
+
+def test_import_export_and_combine_say_as_json_what_they_did(tmp_path, tour):
+    done = run("import", ROOT / "examples" / "site.geojson", "-o", tmp_path / "p.json", "--json")
+    summary = json.loads(done.stdout)
+    problem = Problem.load(tmp_path / "p.json")
+    assert summary["goals"] == len(problem.goals)
+    assert summary["tether_length"] == problem.tether_length
+    done = run("import", ROOT / "examples" / "site.geojson", "--json")
+    assert done.returncode == 2
+    assert "--json" in done.stderr
+    plan = tmp_path / "w.csv"
+    done = run("export", tour, "--problem", WHARF, "-o", plan, "--json")
+    summary = json.loads(done.stdout)
+    assert summary["stops"] == 8
+    assert summary["waypoints"] == len(plan.read_text().splitlines()) - 1
+    rows = tmp_path / "rows.jsonl"
+    rows.write_text("")
+    study = ["--goals", "3", "--tethers", "150", "--solvers", "greedy", "--worlds", "2"]
+    assert run("compare", *study, "-o", rows, "--quiet").returncode == 0
+    done = run("combine", rows, "-o", tmp_path / "all.jsonl", "--json")
+    assert json.loads(done.stdout)["trials"] == 2
+
+
+def test_reports_and_films_read_a_solution_from_standard_input(tmp_path, tour):
+    text = Path(tour).read_text()
+    page = run("report", "-", "--problem", WHARF, "-o", "-", stdin=text).stdout
+    assert page.startswith("<!doctype html>")
+    file = tmp_path / "x.gif"
+    more = ["-o", file, "--seconds", "1", "--quiet"]
+    assert run("animate", "-", "--problem", WHARF, *more, stdin=text).returncode == 0
+    assert file.read_bytes().startswith(b"GIF8")

@@ -7,6 +7,28 @@ from typing import Any
 
 EXAMPLE = """netsp completion bash > ~/.local/share/bash-completion/completions/netsp"""
 
+
+def _names(command: str) -> dict[str, list[str]]:
+    """Names that options of a command take; those of other packages are among them."""
+    from netsp.export.write import FORMATS
+    from netsp.online.planner import PLANNERS
+    from netsp.online.tether import TETHERS
+    from netsp.online.vehicle import VEHICLES
+    from netsp.solvers.table import ROADMAPS, SOLVERS
+    from netsp.worlds import FAMILIES
+
+    planners = list(PLANNERS) if command == "simulate" else ["repair", "none"]
+    return {
+        "--solver": list(SOLVERS), "--solvers": list(SOLVERS), "--roadmap": list(ROADMAPS),
+        "--roadmaps": list(ROADMAPS), "--format": list(FORMATS), "--planner": planners,
+        "--compare": list(PLANNERS), "--vehicle": list(VEHICLES), "--tether-model": list(TETHERS),
+        "--family": list(FAMILIES), "--classes": ["taut", "non-looping"],
+        "--mip-backend": ["highs", "cbc"], "--frame": ["local", "global"],
+        "--paths": ["tree", "bitstar", "rrtstar", "prmstar"],
+        "--refine": ["none", "paper", "gradient"],
+    }  # fmt: skip
+
+
 SHELLS = ("bash", "zsh", "tcsh")
 
 
@@ -24,8 +46,14 @@ def run(args: argparse.Namespace) -> int:
     parser = parser_of_all()
     for choice in _of_commands(parser):
         choice.help = None  # what has no help in the usage is not completed
-    for command in (c for choice in _of_commands(parser) for c in choice.choices.values()):
+    for name, command in (
+        pair for choice in _of_commands(parser) for pair in choice.choices.items()
+    ):
+        names = _names(name)
         for action in command._actions:
+            for option in action.option_strings:
+                if action.choices is None and option in names:
+                    action.choices = names[option]
             takes_one = action.nargs != 0 and action.choices is None and action.type is None
             if takes_one and not hasattr(action, "complete"):
                 action.complete = shtab.FILE  # type: ignore[attr-defined]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 
-from netsp.command import messages
+from netsp.command import messages, told
 from netsp.command.types import (
     check_writable,
     length,
@@ -67,12 +67,14 @@ def arguments(p: argparse.ArgumentParser) -> None:
         help="of a mission: z of the water's surface (m); default 0",
     )  # fmt: skip
     p.add_argument("-o", "--output", required=True, metavar="FILE")
+    told.json_flag(p)
 
 
 def run(args: argparse.Namespace) -> int:
     """Write the file, warn of what is tight, and return the exit code."""
     from netsp.command.solve_mission import is_mission
 
+    told.check_stdout(args)
     if is_mission(args.solution):
         return _mission(args)
     if args.problem is None:
@@ -119,6 +121,11 @@ def run(args: argparse.Namespace) -> int:
         f"about {seconds:.0f} s at {settings.speed:g} {problem.units}/s, stops included",
         file=sys.stderr,
     )
+    if args.json:
+        told.tell({
+            "file": args.output, "format": kind, "waypoints": len(points), "stops": goals,
+            "seconds": seconds, "speed": settings.speed,
+        })  # fmt: skip
     for line in warnings(problem, solution, points, slack, clearance):
         messages.warning(line)
     if kind in ("plan", "wpl"):
@@ -180,6 +187,12 @@ def _mission(args: argparse.Namespace) -> int:
         f"stops included; longest tether {done.longest:.2f} of {mission.tether_length:g} m",
         file=sys.stderr,
     )
+    if args.json:
+        told.tell({
+            "file": args.output, "format": kind, "waypoints": len(done.points), "stops": stops,
+            "seconds": predicted_s(done.points, settings), "speed": settings.speed,
+            "longest_tether": done.longest, "tether_length": mission.tether_length,
+        })  # fmt: skip
     if mission.tether_length - done.longest < slack:
         messages.warning(
             f"only {mission.tether_length - done.longest:.2f} m of tether are left, less than the "

@@ -7,7 +7,7 @@ import math
 import sys
 from typing import TYPE_CHECKING
 
-from netsp.command import messages
+from netsp.command import messages, told
 from netsp.command.patience import Patience
 from netsp.command.types import check_writable, length, option, positive
 from netsp.errors import InputError
@@ -96,15 +96,18 @@ def arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument(
         "-o", "--output", metavar="FILE", help="write the problem to this file (default: stdout)"
     )
+    told.json_flag(p)
 
 
 def run(args: argparse.Namespace) -> int:
     """Write the problem, and return the exit code."""
+    told.check_stdout(args)
     check_writable(args.output, inputs=(args.site, args.goals))
     from netsp.files import write_text
 
     with Patience(sys.stderr, f"reading {args.site}"):
         problem = _of_image(args) if _is_image(args) else _of_map(args)
+    why: list[str] = []
     if args.skip_unreachable:
         from netsp.roadmap.within_reach import within_reach
 
@@ -120,6 +123,12 @@ def run(args: argparse.Namespace) -> int:
         sys.stdout.write(problem.to_json())
     else:
         write_text(args.output, problem.to_json())
+    if args.json:
+        told.tell({
+            "problem": problem.name, "units": problem.units, "goals": len(problem.goals),
+            "obstacles": len(problem.obstacles), "tether_length": problem.tether_length,
+            "clearance": problem.clearance, "left_out": list(why), "file": args.output,
+        })  # fmt: skip
     return 0
 
 

@@ -11,6 +11,8 @@ from netsp.arrays import Floats
 from netsp.command import messages
 from netsp.errors import InputError
 from netsp.files import read_path
+from netsp.geometry import polylines
+from netsp.online.limits import MOST_NODES
 from netsp.online.scene.field import DistanceField
 from netsp.online.scene.scene import Scene
 from netsp.online.tether import GeodesicTether, Tether, make_tether
@@ -31,6 +33,11 @@ def plot_scene(args: argparse.Namespace) -> int:
             messages.note(f"{scene.name}: {note}")
         check_overlap(scene, field, path, args.solution)
         delta = args.delta or delta_for_path(field, path)
+        if (nodes := polylines.length(path) / delta) > MOST_NODES:
+            raise InputError(
+                f"--delta: {delta:g} makes {nodes:.2g} nodes of a tether; expected at most "
+                f"{MOST_NODES:g}"
+            )
         tether = lay(field, path, args.tether_model, delta)
         print(
             f"{scene.name}: taut tether {tether.length:.6g} {scene.units} "

@@ -20,11 +20,10 @@ if TYPE_CHECKING:
 
 
 def json_flag(p: argparse.ArgumentParser) -> None:
-    """The flag."""
-    p.add_argument(
-        "--json", action="store_true",
-        help="print the summary as JSON on stdout (data then needs -o FILE)",
-    )  # fmt: skip
+    """The flag, of a command whose other arguments are known."""
+    data = any("--output" in action.option_strings for action in p._actions)
+    more = " (data then needs -o FILE)" if data else ""
+    p.add_argument("--json", action="store_true", help=f"print the summary as JSON on stdout{more}")
 
 
 def check_stdout(args: argparse.Namespace) -> None:

@@ -45,7 +45,7 @@ def report_mission(source: str | Path, output: str | Path) -> None:
     """
     place = Path(source)
     run = place if place.is_dir() else None
-    mission = Mission.load(place if run is None else run / "mission.json")
+    mission = Mission.load(source if run is None else run / "mission.json")
     if run is None and mission.tour is None:
         raise InputError(
             f"{source}: tour: the mission has none; expected one that `netsp solve` has planned, "

@@ -141,16 +141,16 @@ def opened(source: str | Path, problem_file: str | Path | None) -> Opened:
     InputError
         Files that cannot be read, or do not belong together.
     """
-    place = Path(source)
-    run = place if place.is_dir() else None
+    file: str | Path = source
+    run = Path(source) if Path(source).is_dir() else None
     if run is not None:
         if (run / "mission.json").exists() and not (run / "solution.json").exists():
             raise InputError(f"{source}: is of a mission; expected a run of a problem")
         problem_file = run / "problem.json"
-        place = run / "solution.json"
-        if not place.exists():
+        file = run / "solution.json"
+        if not file.exists():
             raise InputError(f"{source}: is not the folder of a run; expected solution.json in it")
-    solution = Solution.load(place)
+    solution = Solution.load(file)
     if problem_file is None:
         raise InputError(f"{source}: does not hold its problem; expected --problem FILE")
     problem = (

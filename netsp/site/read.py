@@ -212,14 +212,17 @@ class _Site:
         own = bases[0] if bases else None
         if not self.map.geographic:
             if own is None:
-                self._complain("has no base; expected a Point of kind base")
+                if not self.complaints:  # a feature that is damaged may be it
+                    self._complain("has no base; expected a Point of kind base")
                 return None
             return self._place(own.shape, own), own
         if self.projection is None:
             if own is None:
-                self._complain(
-                    "has no base; expected a Point of kind base, or lat,lon given besides (--base)"
-                )
+                if not self.complaints:
+                    self._complain(
+                        "has no base; expected a Point of kind base, or lat,lon given besides "
+                        "(--base)"
+                    )
                 return None
             heading = self._number(own, "heading") or 0.0
             try:
