@@ -111,7 +111,8 @@ def unlike(one, other):
 
 KINDS = (
     "problem", "tour", "classes", "roadmap", "execution map", "execution tether",
-    "scene", "mission", "two runs", "profile", "film", "film in space", "tether curve", "lengths",
+    "scene", "tall scene", "mission", "two runs", "profile", "film", "film in space",
+    "tether curve", "lengths",
 )  # fmt: skip
 
 

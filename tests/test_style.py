@@ -18,6 +18,7 @@ from netsp.compare.study import Study
 from netsp.execute.events import Event, Surprises
 from netsp.execute.run import execute
 from netsp.online.mission import Mission
+from netsp.online.scene.scene import Scene
 from netsp.online.simulate import simulate
 from netsp.pictures import style
 from netsp.pictures.execution import draw_map, draw_tether
@@ -26,7 +27,7 @@ from netsp.pictures.film_page import FRAMES, save_page
 from netsp.pictures.interactive import seen
 from netsp.pictures.mission import save_runs
 from netsp.pictures.problem import draw
-from netsp.pictures.scene import Stops, figure_of
+from netsp.pictures.scene import Stops, figure_of, save
 from netsp.report import figures
 from netsp.report.stats import best_lengths, cells, methods
 from tests.pages import unpacked
@@ -87,6 +88,11 @@ def of(what, request, monkeypatch):
         found, scene = request.getfixturevalue("mission")
         path = np.array([[-3.0, 0, -2], [3, 1, -2]])
         return figure_of(scene, path, "a scene", Stops(found.places))
+    if what == "tall scene":
+        kept = []
+        monkeypatch.setattr(style, "save", lambda figure, *_, **__: kept.append(figure))
+        save(Scene.load(ROOT / "scenes" / "oc4-jacket.json"), "x.png")
+        return kept[0]
     if what == "mission":
         found, scene = request.getfixturevalue("mission")
         kept = []
@@ -103,8 +109,8 @@ def of(what, request, monkeypatch):
 
 
 KINDS = (
-    "problem", "tour", "execution map", "execution tether", "scene", "mission", "profile",
-    "anytime", "times",
+    "problem", "tour", "execution map", "execution tether", "scene", "tall scene", "mission",
+    "profile", "anytime", "times",
 )  # fmt: skip
 
 

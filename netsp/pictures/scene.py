@@ -20,6 +20,10 @@ from netsp.pictures import style
 
 INTERACTIVE = ".html"
 
+TALL, TICK = 1.5, 0.45
+"""Height over width of a scene whose side views stand beside one another, and inches of the number
+of a tick."""
+
 MOST_NUMBERED = 30
 """Waypoints whose numbers are drawn."""
 
@@ -133,6 +137,7 @@ def _figure(
     """A view in space, and the plans from above and from two sides."""
     from matplotlib.collections import PolyCollection
     from matplotlib.figure import Figure
+    from matplotlib.ticker import MaxNLocator
 
     low, high = box
     figure = Figure(figsize=(13, 7.5), layout="constrained")
@@ -144,7 +149,13 @@ def _figure(
     unit = scene.units
     names = ("x", "y", "z")
     views = ((0, 1, "from above"), (0, 2, "from the south"), (1, 2, "from the east"))
-    for panel, (a, b, name) in zip(right.subplots(3, 1), views, strict=True):
+    size = high - low
+    if size[2] > TALL * max(size[0], size[1]):
+        wide = {"width_ratios": [size[a] for a, _, _ in views]}
+        panels, room = right.subplots(1, 3, **wide), (1.3, 5.5)
+    else:
+        panels, room = right.subplots(3, 1), (4.7, 1.7)
+    for panel, (a, b, name) in zip(panels, views, strict=True):
         for _, (vertices, faces) in parts:
             flat: Any = vertices[faces][:, :, [a, b]]
             panel.add_collection(PolyCollection(flat, facecolors=style.OBSTACLE, linewidths=0))
@@ -154,6 +165,10 @@ def _figure(
         if stops is not None:
             draw_stops(panel, stops, (a, b))
         panel.set(xlim=(low[a], high[a]), ylim=(low[b], high[b]), aspect="equal")
+        scale = min(room[0] / size[a], room[1] / size[b])  # inches
+        for axis, along in ((panel.xaxis, a), (panel.yaxis, b)):
+            count = int(np.clip(scale * size[along] / TICK, 2, 5))
+            axis.set_major_locator(MaxNLocator(count))
         panel.set_title(name, fontsize=9)
         panel.set(xlabel=f"{names[a]} ({unit})", ylabel=f"{names[b]} ({unit})")
     figure.suptitle(title)
@@ -191,7 +206,8 @@ def draw_space(
     widest = float((high - low).max())
     for name, size in zip("xyz", high - low, strict=True):
         label = getattr(ax, f"set_{name}label")
-        label(f"{name} ({scene.units})", labelpad=2.0 + 12.0 * float(size) / widest)
+        more = 20.0 if name == "z" else 12.0  # whose numbers are written along
+        label(f"{name} ({scene.units})", labelpad=2.0 + more * float(size) / widest)
     ax.tick_params(labelsize=7)
     for axis, size in zip((ax.xaxis, ax.yaxis, ax.zaxis), high - low, strict=True):
         axis.set_major_locator(MaxNLocator(5 if size > 0.5 * widest else 3))

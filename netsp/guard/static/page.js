@@ -39,12 +39,70 @@ const [wide, high] = [
 map.setAttribute("viewBox", `${left} ${top} ${wide} ${high}`);
 const unit = size / 120; // what a thing that is drawn without a size measures
 
+/** A round length that divides a span into at most so many parts. @param {number} span @param {number} parts */
+const roundStep = (span, parts) => {
+  const power = 10 ** Math.floor(Math.log10(span / parts));
+  return [1, 2, 5, 10].map((k) => k * power).find((v) => v >= (span / parts) * (1 - 1e-9)) ?? span;
+};
+
+/** Grid and numbers along the lower and the left edge, with the names of the axes. */
+function drawGrid() {
+  const step = roundStep(size, 8);
+  const letters = 2.4 * unit;
+  const write = (/** @type {number} */ x, /** @type {number} */ y, /** @type {string} */ text, anchor = "middle") => {
+    const made = add(map, "text", { x, y, "text-anchor": anchor, class: "axis" });
+    /** @type {SVGElement} */ (made).style.fontSize = `${letters}px`;
+    made.textContent = text;
+  };
+  const [right, bottom] = [left + wide, top + high];
+  for (let k = Math.ceil(left / step); k * step <= right; k += 1) {
+    add(map, "path", { d: `M${k * step} ${top}V${bottom}`, class: "grid", ...thin });
+    if (k * step > left + 5 * letters && k * step < right - 3 * letters)
+      write(k * step, bottom - 0.4 * letters, `${+(k * step).toPrecision(6)}`);
+  }
+  for (let k = Math.ceil(-bottom / step); k * step <= -top; k += 1) {
+    add(map, "path", { d: `M${left} ${-k * step}H${right}`, class: "grid", ...thin });
+    if (-k * step < bottom - 2.5 * letters && -k * step > top + 2.5 * letters)
+      write(left + 0.3 * letters, -k * step - 0.2 * letters, `${+(k * step).toPrecision(6)}`, "start");
+  }
+  write(right - 0.3 * letters, bottom - 0.4 * letters, `x (${site.units})`, "end");
+  write(left + 0.3 * letters, top + 1.2 * letters, `y (${site.units})`, "start");
+}
+
+/** What the lines and marks mean. */
+function drawLegend() {
+  const line = (/** @type {string} */ kind) => [["path", { d: "M0 7H18", class: kind }]];
+  const star = "M9 1l1.8 4 4.2.3-3.3 2.8 1 4.3L9 10l-3.7 2.4 1-4.3L3 5.3 7.2 5z";
+  /** @type {[string, any[][]][]} */
+  const marks = [
+    ["base", [["path", { d: star, class: "base" }]]],
+    ["robot", [["circle", { cx: 9, cy: 7, r: 5, class: "robot" }]]],
+    ["tether, taut, in its likeliest class", line("tether")],
+    ["in another class that it may be in", line("other")],
+    ["gone so far", line("track")],
+    ["goal", [["circle", { cx: 9, cy: 7, r: 5, class: "goal" }]]],
+    ["obstacle", [["rect", { x: 2, y: 2, width: 14, height: 10, class: "rim" }]]],
+    ["clearance", [["rect", { x: 1, y: 1, width: 16, height: 12, class: "grown" }]]],
+  ];
+  for (const [text, parts] of marks) {
+    const item = document.createElement("li");
+    const icon = document.createElementNS(SVG, "svg");
+    icon.setAttribute("viewBox", "0 0 18 14");
+    icon.setAttribute("aria-hidden", "true");
+    for (const [kind, values] of parts) add(icon, kind, values);
+    item.append(icon, ` ${text}`);
+    byId("legend").append(item);
+  }
+}
+
 /** @param {number[][]} line */
 const points = (line) => line.map((p) => `${p[0]},${-p[1]}`).join(" ");
 const thin = { "vector-effect": "non-scaling-stroke" };
+drawGrid();
+drawLegend();
 for (const o of site.obstacles) {
   add(map, "polygon", { points: points(o.grown), class: "grown", ...thin });
-  add(map, "polygon", { points: points(o.rim), class: "rim" });
+  add(map, "polygon", { points: points(o.rim), class: "rim", ...thin });
   const below = Math.max(...o.rim.map((/** @type {number[]} */ p) => o.middle[1] - p[1])) + 3.5 * unit;
   const text = add(map, "text", { x: o.middle[0], y: -o.middle[1] + below, "text-anchor": "middle" });
   /** @type {SVGElement} */ (text).style.fontSize = `${2.6 * unit}px`;
@@ -53,13 +111,15 @@ for (const o of site.obstacles) {
 for (const g of site.goals) {
   add(map, "circle", { cx: g.position[0], cy: -g.position[1], r: unit, class: "goal", ...thin });
 }
-add(map, "rect", {
-  x: site.base[0] - unit, y: -site.base[1] - unit, width: 2 * unit, height: 2 * unit, class: "base", ...thin,
+const star = Array.from({ length: 10 }, (_, k) => {
+  const [angle, r] = [Math.PI * (k / 5 - 0.5), (k % 2 ? 0.8 : 2) * unit];
+  return `${site.base[0] + r * Math.cos(angle)},${-site.base[1] + r * Math.sin(angle)}`;
 });
+add(map, "polygon", { points: star.join(" "), class: "base" });
 const track = add(map, "polyline", { points: "", class: "track", ...thin });
 const others = add(map, "g", {});
 const tether = add(map, "polyline", { points: "", class: "tether", ...thin });
-const robot = add(map, "circle", { r: 1.4 * unit, cx: site.base[0], cy: -site.base[1], class: "robot" });
+const robot = add(map, "circle", { r: 1.4 * unit, cx: site.base[0], cy: -site.base[1], class: "robot", ...thin });
 for (const side of site.sides) {
   const option = document.createElement("option");
   option.textContent = side;
