@@ -1,0 +1,259 @@
+"""The figures of docs/theory.md, each drawn from what the code computes.
+
+    python benchmarks/theory.py [--folder docs]
+
+Words and lengths in them are those of the paths that are drawn; a string among slits is as long as
+`netsp.roadmap.slits` says it is, or no figure is written.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from netsp import Circle, Problem, solve
+from netsp.geometry import polylines
+from netsp.hsignature.rays import crossings, signature
+from netsp.pictures import style
+from netsp.pictures.moments import moments_of_plan
+from netsp.pictures.problem import draw_obstacles
+from netsp.roadmap.paths import TautPaths
+from netsp.roadmap.taut import TautRoadmap
+
+RISE = 0.35
+"""Of a letter above its crossing."""
+
+
+def panels(count: int, width: float, height: float) -> tuple[Any, Any]:
+    """A figure of maps side by side."""
+    figure = Figure(figsize=(width, height), layout="constrained")
+    return figure, np.atleast_1d(figure.subplots(1, count))
+
+
+def finish(ax: Any, title: str, box: Sequence[float]) -> None:
+    """Names, units and what is seen."""
+    ax.set(xlim=box[:2], ylim=box[2:], aspect="equal", xlabel="x (m)", ylabel="y (m)")
+    ax.set_title(title, fontsize=9, loc="left")
+    ax.tick_params(labelsize=7)
+
+
+def draw_rays(ax: Any, problem: Problem, top: float) -> None:
+    """From each representative point up."""
+    for i, (x, y) in enumerate(problem.representative_points):
+        ax.plot([x, x], [y, top], ":", color=style.EDGE, lw=1.0, zorder=2)
+        ax.plot(x, y, ".", color=style.EDGE, ms=5, zorder=3)
+        ax.annotate(str(i + 1), (x, y), xytext=(4, -9), textcoords="offset points", fontsize=8,
+                    path_effects=style.halo())  # fmt: skip
+
+
+def draw_letters(ax: Any, path: Any, points: Any) -> None:
+    """The letter of each crossing, in its place."""
+    for p, q in pairwise(np.asarray(path)[:, :2]):
+        letters = crossings([p, q], points)
+        for letter in letters:
+            x = points[abs(letter) - 1][0]
+            y = p[1] + (x - p[0]) / (q[0] - p[0]) * (q[1] - p[1])
+            ax.plot(x, y, "o", ms=3.5, color=style.TETHER, zorder=6)
+            ax.annotate(f"{letter:+d}".replace("-", "−"), (x, y), xytext=(4, 4), fontsize=8,
+                        textcoords="offset points", color=style.TETHER, zorder=7,
+                        path_effects=style.halo())  # fmt: skip
+
+
+def told(word: Sequence[int]) -> str:
+    """A word as it is written."""
+    return "(" + ", ".join(str(a).replace("-", "−") for a in word) + ")" if word else "()"
+
+
+def words() -> Any:
+    """Three classes of one goal."""
+    problem = Problem(
+        base=(0, 0), goals=[(9, 1)], tether_length=13,
+        obstacles=[Circle(center=(3, 0.6), radius=0.7), Circle(center=(6, 0.2), radius=0.9)],
+    )  # fmt: skip
+    roadmap = TautRoadmap(problem)
+    order = np.argsort(roadmap.tethers[1:], kind="stable")[:4] + 1
+    figure, axes = panels(len(order), 13.0, 2.5)
+    for ax, v in zip(axes, order, strict=True):
+        draw_obstacles(ax, problem)
+        draw_rays(ax, problem, 3.4)
+        tether = roadmap.paths.tether(0, roadmap.signatures[v])
+        ax.plot(*tether.T[:2], color=style.TETHER, lw=1.6, zorder=5)
+        draw_letters(ax, tether, problem.representative_points)
+        ax.plot(*problem.base[:2], "*", color=style.BASE, ms=11, zorder=6)
+        ax.plot(*problem.goals[0].position[:2], "o", color=style.GOAL, mec=style.PATH, zorder=6)
+        word = signature(tether, problem.representative_points)
+        assert word == tuple(roadmap.signatures[v])
+        finish(ax, f"{told(word)}: {roadmap.tethers[v]:.4g} m", (-0.8, 9.8, -2.2, 3.4))
+    return figure
+
+
+def limit() -> Any:
+    """How long the tether is along the legs of a tour."""
+    problem = Problem.load(Path(__file__).parent.parent / "problems" / "wharf.json")
+    tour = solve(problem)
+    moments = moments_of_plan(problem, tour, 600)
+    gone = np.linspace(0.0, float(tour.length or 0.0), len(moments))
+    lengths = [polylines.length(m.nodes) for m in moments]
+    counts = np.array([len(m.fates["visited"]) for m in moments])
+    arrivals = [int(np.argmax(counts >= k + 1)) for k in range(len(tour.tour))]
+    ends, step = [0, *arrivals, len(moments) - 1], float(gone[1])
+    for a, b in pairwise(ends):
+        assert max(lengths[a : b + 1]) <= max(lengths[a], lengths[b]) + step
+    figure = Figure(figsize=(9.0, 3.2), layout="constrained")
+    ax = figure.subplots()
+    ax.plot(gone, lengths, color=style.TETHER, lw=1.6, label="taut tether")
+    for a, b in pairwise(ends):
+        most = max(lengths[a], lengths[b])
+        ax.plot([gone[a], gone[b]], [most, most], color=style.PLAN, lw=1.2, ls="--",
+                label="the longer of a leg's ends" if a == 0 else None)  # fmt: skip
+    ax.plot(gone[arrivals], np.array(lengths)[arrivals], "o", ms=5, color=style.VISITED,
+            label="goal visited")  # fmt: skip
+    ax.axhline(problem.tether_length, color=style.LIMIT, ls="--", lw=1.0, label="limit")
+    ax.set(xlabel="way along the tour (m)", ylabel="length (m)", ylim=(0.0, 22.0))
+    figure.legend(loc="outside lower center", ncols=4, fontsize=8, frameon=False)
+    return figure
+
+
+def pending() -> Any:
+    """A letter that a path writes and takes back, and one that it keeps."""
+    problem = Problem(
+        base=(-3.5, 1.2), goals=[(-3.5, 5.2), (3.5, 2.0)], tether_length=14,
+        obstacles=[Circle(center=(0, 0), radius=0.4), Circle(center=(-0.6, 3.2), radius=1.3)],
+    )  # fmt: skip
+    paths = TautPaths(problem)
+    figure, axes = panels(2, 9.0, 4.2)
+    for ax, (goal, word, title) in zip(
+        axes,
+        ((0, (-2,), "+1 is pending until −1 takes it back"), (1, (1,), "+1 is final")),
+        strict=True,
+    ):
+        draw_obstacles(ax, problem)
+        draw_rays(ax, problem, 6.6)
+        path = paths.tether(goal, word)
+        letters = crossings(path, problem.representative_points)
+        assert 1 in letters
+        assert (-1 in letters) == (goal == 0)
+        ax.plot(*path.T[:2], color=style.TETHER, lw=1.6, zorder=5)
+        draw_letters(ax, path, problem.representative_points)
+        ax.plot(*problem.base[:2], "*", color=style.BASE, ms=11, zorder=6)
+        ax.plot(*problem.goals[goal].position[:2], "o", color=style.GOAL, mec=style.PATH, zorder=6)
+        finish(ax, f"letters {told(letters)}, word {told(word)}: {title}", (-4.2, 4.2, -1.2, 6.6))
+    return figure
+
+
+def slits() -> Any:
+    """A leg, the string among slits below it, and the same unfolded."""
+    problem = Problem(
+        base=(0, 0), goals=[(2.2, 3.6)], tether_length=30,
+        obstacles=[
+            Circle(center=(2.0, 0.9), radius=0.8), Circle(center=(4.6, 1.2), radius=1.0),
+            Circle(center=(7.2, 1.6), radius=0.9),
+        ],
+    )  # fmt: skip
+    word = (-3, -2)  # below all, and back above the third and the second
+    paths = TautPaths(problem)
+    leg = paths.tether(0, word)
+    reach = np.array([[o.center[1] - o.radius, o.center[1] + o.radius] for o in problem.obstacles])
+    x = np.array([o.center[0] for o in problem.obstacles])
+    start, goal = np.zeros(2), np.array(problem.goals[0].position[:2])
+    # to the right of the last chord below all, and back above those that lie right of the goal
+    gates = [(x[k], -np.inf, reach[k, 0]) for k in range(3)]
+    gates += [(x[k], reach[k, 1], np.inf) for k in (2, 1) if x[k] > goal[0]]
+    string, unfolded = shortest_through(start, goal, gates)
+    assert abs(polylines.length(string) - paths.slit_length(0, 1, word)) < 1e-6
+    figure = Figure(figsize=(12.0, 4.0), layout="constrained")
+    left, right = figure.subplots(1, 2, width_ratios=[1.0, 1.25])
+    draw_obstacles(left, problem)
+    for k in range(3):
+        left.plot([x[k], x[k]], reach[k], color=style.EDGE, lw=2.6, zorder=4)
+        left.plot([x[k], x[k]], [-9, 9], ":", color=style.EDGE, lw=0.7, zorder=1)
+    left.plot(*leg.T[:2], color=style.PATH, lw=1.6, label=f"leg, {polylines.length(leg):.4g} m")
+    left.plot(*string.T, color=style.PLAN, lw=1.6, ls="--",
+              label=f"string among slits, {polylines.length(string):.4g} m")  # fmt: skip
+    left.plot(*start, "*", color=style.BASE, ms=11, zorder=6)
+    left.plot(*goal, "o", color=style.GOAL, mec=style.PATH, zorder=6)
+    finish(left, f"word {told(word)}", (-0.8, 9.0, -1.4, 4.8))
+    left.legend(loc="lower right", fontsize=7, frameon=False)
+    along = unfolded[:, 0]
+    for s, low, high in gates_unfolded(start, gates):
+        right.plot([s, s], [max(low, -9), min(high, 9)], color=style.VISITED, lw=1.0, zorder=1)
+        bar = [high, 9.0] if np.isfinite(high) else [-9.0, low]
+        right.plot([s, s], bar, color=style.EDGE, lw=2.6, zorder=2)
+    right.plot(*unfolded.T, color=style.PLAN, lw=1.6, ls="--")
+    right.plot(*unfolded[0], "*", color=style.BASE, ms=11, zorder=6)
+    right.plot(*unfolded[-1], "o", color=style.GOAL, mec=style.PATH, zorder=6)
+    finish(right, "unfolded: a string through half-lines", (-0.8, along[-1] + 0.8, -1.4, 4.8))
+    right.set(xlabel="way in x (m)")
+    return figure
+
+
+def gates_unfolded(start: Any, gates: Any) -> list[tuple[float, float, float]]:
+    """The gates over the way in x."""
+    out, s, at = [], 0.0, float(start[0])
+    for x, low, high in gates:
+        s += abs(x - at)
+        at = x
+        out.append((s, low, high))
+    return out
+
+
+def shortest_through(start: Any, goal: Any, gates: Any) -> tuple[Any, Any]:
+    """The shortest string through half-lines in their order: by a search over their ends."""
+    over = gates_unfolded(start, gates)
+    end = over[-1][0] + abs(float(goal[0]) - gates[-1][0])
+    corners = [(0.0, float(start[1])), *((s, low if np.isfinite(low) else high)
+               for s, low, high in over), (end, float(goal[1]))]  # fmt: skip
+
+    def free(a: int, b: int) -> bool:
+        (s, y), (t, z) = corners[a], corners[b]
+        for k in range(a + 1, b):
+            at, low, high = over[k - 1]
+            height = y + (at - s) / (t - s) * (z - y) if t > s else y
+            if not low - 1e-12 <= height <= high + 1e-12:
+                return False
+        return True
+
+    best = {0: (0.0, [0])}
+    for b in range(1, len(corners)):
+        best[b] = min(
+            (best[a][0] + float(np.hypot(*np.subtract(corners[b], corners[a]))), [*best[a][1], b])
+            for a in range(b)
+            if free(a, b)
+        )
+    chosen = best[len(corners) - 1][1]
+    places = [start, *((g[0], 0.0) for g in gates), goal]
+    unfolded = np.array([corners[k] for k in chosen])
+    string = np.array([[places[k][0], corners[k][1]] for k in chosen])
+    turn = int(np.argmax([g[0] for g in gates])) + 1
+    if turn not in chosen:  # where it turns back it meets the line of the gate
+        s = over[turn - 1][0]
+        y = float(np.interp(s, unfolded[:, 0], unfolded[:, 1]))
+        place = int(np.searchsorted(unfolded[:, 0], s))
+        string = np.insert(string, place, [gates[turn - 1][0], y], axis=0)
+    return string, unfolded
+
+
+FIGURES: dict[str, Callable[[], Any]] = {
+    "words": words, "limit": limit, "pending": pending, "slits": slits
+}  # fmt: skip
+
+
+def main() -> None:
+    """Write them."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
+    parser.add_argument("--folder", type=Path, default=Path(__file__).parent.parent / "docs")
+    args = parser.parse_args()
+    for name, draw in FIGURES.items():
+        file = args.folder / f"theory-{name}.png"
+        style.save(draw(), file, dpi=90)
+        print(file)
+
+
+if __name__ == "__main__":
+    main()
