@@ -68,6 +68,50 @@ def test_every_field_of_a_file_says_what_it_is(name):
     assert not [(kind, field) for kind, field, what in fields if not what.get("description")]
 
 
+UNIT = re.compile(
+    r"\b(m|s|kg|N|m/s|rad|degrees|seconds|metres|units?|share|GiB|%)\b|kg/m³|/s\b|\(length - "
+)
+"""What says the unit of a number, or that it is a share."""
+
+WITHOUT = {
+    "drag_coefficient", "friction", "max_tension_ratio",  # ratios
+    "normal", "axis", "start",  # directions
+    "goals", "add_goal",  # whose own fields say it
+}  # fmt: skip
+
+
+def is_of_numbers(field):
+    """Whether a field of a schema is a number, or made of numbers."""
+    parts = [field.get("items"), *field.get("prefixItems", ())]
+    parts += [part for kind in ("anyOf", "oneOf", "allOf") for part in field.get(kind, ())]
+    return field.get("type") == "number" or any(
+        is_of_numbers(part) for part in parts if isinstance(part, dict)
+    )
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_every_number_of_a_file_says_its_unit(name):
+    module, model = FORMATS[name].split(":")
+    schema = getattr(importlib.import_module(module), model).model_json_schema()
+    fields = [
+        (field, what["description"])
+        for of in (schema, *schema.get("$defs", {}).values())
+        for field, what in of.get("properties", {}).items()
+        if is_of_numbers(what)
+    ]
+    assert not [(f, d) for f, d in fields if f not in WITHOUT and not UNIT.search(d)]
+
+
+def test_the_version_is_the_same_wherever_it_is_said():
+    said = re.search(r'^version = "(.*)"$', (ROOT / "pyproject.toml").read_text(), re.M).group(1)
+    cited = (ROOT / "CITATION.cff").read_text()
+    assert netsp.__version__ == said
+    assert f"\nversion: {said}\n" in cited
+    released = re.search(r"^date-released: (\S+)$", cited, re.M).group(1)
+    newest = re.search(r"^## (\d\S*), (\S+)$", (ROOT / "CHANGELOG.md").read_text(), re.M)
+    assert newest.groups() == (said, released)
+
+
 def test_the_site_has_every_page_every_public_name_and_every_field():
     """What is named is found when the site is built (`make docs`): there a warning is an error."""
     site = (ROOT / "mkdocs.yml").read_text()

@@ -40,7 +40,8 @@ class Worlds(Model):
     ] = None
     side: Annotated[Positive, Field(description="of the square, in units of length")] = 500.0
     radii: Annotated[
-        tuple[Positive, Positive], Field(description="minimum and maximum radius of obstacles")
+        tuple[Positive, Positive],
+        Field(description="least and greatest radius of obstacles, in units of length"),
     ] = (10.0, 30.0)
 
     @model_validator(mode="after")
