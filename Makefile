@@ -4,7 +4,7 @@ PYTHON ?= python3
 BIN     = $(VENV)/bin
 DEMO   ?= demo
 
-.PHONY: demo test accept docs wheel tables lint bench js clean
+.PHONY: demo test accept docs wheel wheel-installed pythons tables lint bench js clean
 .DELETE_ON_ERROR:
 
 $(VENV)/.installed: pyproject.toml
@@ -39,14 +39,32 @@ docs: $(VENV)/.installed
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 
 # the wheel that a release would have, alone in a new environment, does the main job
-wheel: $(VENV)/.installed
+wheel: wheel-installed
+	cd build/wheel && env/bin/netsp --version
+	cd build/wheel && env/bin/netsp solve ../../problems/pool.json -o tour.json --plot tour.png --quiet
+	cd build/wheel && env/bin/netsp verify ../../problems/pool.json tour.json --quiet
+
+wheel-installed: $(VENV)/.installed
 	rm -rf build/wheel && mkdir -p build/wheel
 	$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps -w build/wheel .
 	$(PYTHON) -m venv build/wheel/env
 	build/wheel/env/bin/pip install --quiet --disable-pip-version-check build/wheel/netsp-*.whl
-	cd build/wheel && env/bin/netsp --version
-	cd build/wheel && env/bin/netsp solve ../../problems/pool.json -o tour.json --plot tour.png --quiet
-	cd build/wheel && env/bin/netsp verify ../../problems/pool.json tour.json --quiet
+
+# the same under every other Python that we declare, that is here, and for which numba and the others are to be had
+PYTHONS ?= 3.11 3.12 3.13
+pythons:
+	@own=$$($(PYTHON) -c 'import sys; print("%d.%d" % sys.version_info[:2])'); \
+	for version in $(PYTHONS); do \
+		[ $$version = $$own ] && continue; \
+		for python in python$$version $$HOME/.pyenv/versions/$$version.*/bin/python; do \
+			$$python --version > /dev/null 2>&1 || continue; \
+			echo "== $$($$python --version)"; \
+			$(MAKE) --no-print-directory wheel-installed PYTHON=$$python 2> /dev/null || \
+				{ echo "cannot be installed there: skipped"; break; }; \
+			$(MAKE) --no-print-directory -o wheel-installed wheel PYTHON=$$python || exit 1; \
+			break; \
+		done; \
+	done
 
 # the tables of the docs, written from the rows that the benchmarks keep
 tables: $(VENV)/.installed
