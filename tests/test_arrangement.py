@@ -60,7 +60,7 @@ def brute(graph: TravelGraph) -> float:
     return best
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(
     seed=st.integers(0, 10**6),
     goals=st.integers(1, 6),

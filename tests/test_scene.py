@@ -220,9 +220,10 @@ def test_clouds_and_meshes_are_read_from_files(tmp_path):
     ball.export(tmp_path / "ball.stl")
     np.savez(tmp_path / "cloud.npz", points=ball.vertices)
     np.savetxt(tmp_path / "cloud.csv", ball.vertices, delimiter=",", header="x,y,z", comments="")
-    expected = of_cloud(ball.vertices).values
+    expected = of_cloud(ball.vertices, voxel=0.1).values
     for name in ("cloud.npz", "cloud.csv"):
-        assert np.allclose(of_cloud_file(tmp_path / name).values, expected, atol=1e-4)
+        found = of_cloud_file(tmp_path / name, voxel=0.1).values
+        assert np.allclose(found, expected, atol=1e-4)
     scene = {"schema_version": 1, "mesh": {"file": "ball.stl", "scale": 2.0, "voxel": 0.1}}
     (tmp_path / "scene.json").write_text(json.dumps(scene))
     assert Scene.load(tmp_path / "scene.json").field().distance([0, 0, 3]) == pytest.approx(1, 0.05)
