@@ -10,7 +10,7 @@ from netsp.arrays import Ints
 from netsp.clock import Clock
 from netsp.lns.layers import Instance
 from netsp.lns.search import Search
-from netsp.solving.beside import LEAST_SHARE, beside_tour
+from netsp.solving.beside import classes_beside
 from netsp.solving.limits import Limits
 from netsp.solving.run import SolverRun
 from netsp.travel.graph import TravelGraph, least_tethers
@@ -107,9 +107,8 @@ def core_beside(run: SolverRun, classes: int = 0) -> Ints:
     beside it."""
     graph, tour = run.graph, run.tour or (0,)
     some = classes or most_classes(graph, MOST_VERTICES)
-    least = least_tethers(graph.costs_to_base, graph.cluster, max(1, some // LEAST_SHARE))
-    beside = beside_tour(graph.lower_bounds(rows=tour), tour, graph.cluster, some)
-    return np.unique(np.concatenate([least, beside, tour]))
+    bounds = graph.lower_bounds(rows=tour)
+    return classes_beside(graph.costs_to_base, graph.cluster, bounds, tour, some)
 
 
 def _take(run: SolverRun, search: Search) -> None:

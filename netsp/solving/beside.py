@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.arrays import Floats, Ints
+from netsp.travel.graph import least_tethers
 
 LEAST_SHARE = 3
 """Besides those beside a tour, of least tether there are one in so many as of them."""
@@ -49,3 +50,29 @@ def beside_tour(bounds: Floats, tour: npt.ArrayLike, cluster: Ints, classes: int
     order = np.lexsort((longer, cluster))
     first = np.searchsorted(cluster[order], cluster[order])
     return np.sort(order[np.arange(len(order)) - first < classes])
+
+
+def classes_beside(
+    tethers: Floats, cluster: Ints, bounds: Floats, tour: npt.ArrayLike, classes: int
+) -> Ints:
+    """What a search looks at once there is a tour.
+
+    Parameters
+    ----------
+    tethers : ndarray, shape (V,)
+        Of all vertices.
+    cluster : ndarray of int, shape (V,)
+        Of all vertices.
+    bounds, tour
+        As of `beside_tour`.
+    classes : int
+        So many of each goal beside the tour, and one in `LEAST_SHARE` as many of least tether.
+
+    Returns
+    -------
+    ndarray of int
+        The vertices, in order; the tour's are among them.
+    """
+    least = least_tethers(tethers, cluster, max(1, classes // LEAST_SHARE))
+    beside = beside_tour(bounds, tour, cluster, classes)
+    return np.unique(np.concatenate([least, beside, np.asarray(tour, dtype=np.int64)]))

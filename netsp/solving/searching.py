@@ -16,12 +16,12 @@ from typing import Any, Self
 
 import numpy as np
 
-from netsp.arrays import Floats, Ints
+from netsp.arrays import Ints
 from netsp.clock import Clock
 from netsp.errors import LimitReachedError
 from netsp.lns.layers import Instance
 from netsp.lns.search import Search
-from netsp.solving.beside import LEAST_SHARE, beside_tour
+from netsp.solving.beside import classes_beside
 from netsp.solving.legcosts import MEASURE_AT_ONCE, LegCosts
 from netsp.solving.limits import Limits
 from netsp.solving.run import SLIVER, SolverRun, Stop
@@ -106,18 +106,11 @@ class SearchingRun(SolverRun):
             vain = 0 if self.length < before else vain + 1
             if clock.up or self.tour is None or vain == IN_VAIN:
                 break
-            core = self._classes(
-                graph.costs_to_base, graph.cluster, graph.lower_bounds(rows=self.tour), self.tour
-            )
+            core = classes_beside(
+                graph.costs_to_base, graph.cluster, graph.lower_bounds(rows=self.tour), self.tour,
+                self.classes_per_goal,
+            )  # fmt: skip
         return core
-
-    def _classes(
-        self, tethers: Floats, cluster: Ints, bounds: Floats, tour: Sequence[int] | Ints
-    ) -> Ints:
-        """Of least tether, and beside a tour with so many bounds from its vertices."""
-        few = max(1, self.classes_per_goal // LEAST_SHARE)
-        least = least_tethers(tethers, cluster, few)
-        return np.union1d(least, beside_tour(bounds, tour, cluster, self.classes_per_goal))
 
     @contextmanager
     def core(self) -> Iterator[Self | None]:
@@ -188,7 +181,9 @@ class SearchingRun(SolverRun):
         if self.tour is None:
             some = least_tethers(tethers, costs.cluster, self.classes_per_goal)
         else:
-            some = self._classes(tethers, costs.cluster, costs.values[own], own)
+            some = classes_beside(
+                tethers, costs.cluster, costs.values[own], own, self.classes_per_goal
+            )
         core = np.unique(np.concatenate([some, own, more]))
         costs.measure(core)
         return Instance(
