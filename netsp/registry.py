@@ -5,12 +5,17 @@ ours do, in study files and on the command line too:
 
     [project.entry-points."netsp.solvers"]
     my-solver = "my_package:solve"
+
+Without a package, ``module:attribute`` itself is a name.
 """
 
 from __future__ import annotations
 
 import importlib
 import importlib.metadata
+import os
+import re
+import sys
 from collections.abc import Callable, Iterator, MutableMapping
 from contextlib import contextmanager
 from functools import cached_property
@@ -19,6 +24,10 @@ from typing import Any, Generic, TypeVar
 from netsp.errors import InputError, NetspError, PluginError
 
 R = TypeVar("R")
+
+
+_WHERE = re.compile(r"[\w.]+:[\w.]+")
+"""``module:attribute``."""
 
 
 class Registry(MutableMapping[str, R], Generic[R]):
@@ -82,9 +91,27 @@ class Registry(MutableMapping[str, R], Generic[R]):
         InputError
             No record has that name; tells the choices.
         """
+        if isinstance(name, str) and name not in self and _WHERE.fullmatch(name):
+            self._check_there(name)
+            return self._record(name, name)
         if not isinstance(name, str) or name not in self:
-            raise InputError(f"{self.kind}: unknown {name!r}; expected one of {', '.join(self)}")
+            raise InputError(
+                f"{self.kind}: unknown {name!r}; expected one of {', '.join(self)}, or "
+                "module:attribute of yours"
+            )
         return self[name]
+
+    def _check_there(self, where: str) -> None:
+        """InputError unless ``module:attribute`` can be imported, also from the folder one is in,
+        where an installed command does not look for modules."""
+        module, _, attribute = where.partition(":")
+        if (here := os.getcwd()) not in sys.path and "" not in sys.path:
+            sys.path.append(here)
+        with foreign(f"{self.kind}: {where}: cannot be loaded"):
+            try:
+                _found(module, attribute)
+            except (ImportError, AttributeError) as error:
+                raise InputError(f"{self.kind}: {where}: cannot be loaded: {error}") from None
 
 
 def later(name: str, where: str) -> Callable[..., Any]:

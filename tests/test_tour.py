@@ -13,9 +13,11 @@ from hypothesis import strategies as st
 from netsp.clock import Clock, until_interrupt, whole_or_interrupted
 from netsp.command.main import main
 from netsp.geometry import polylines
+from netsp.online.laid import present_tether
 from netsp.online.mission import Mission
 from netsp.online.planner.predictive import PredictivePlanner
-from netsp.online.simulate import simulate
+from netsp.online.simulate import grid_of, simulate
+from netsp.online.tether import GeodesicTether
 from netsp.online.tour import in_file
 from netsp.solution import Status
 from netsp.space.bound import bound_of_all
@@ -432,3 +434,58 @@ def test_a_simplified_path_is_the_same_path(points):
             for a, b in ends
         ]  # fmt: skip
         assert min(near) < 1e-6
+
+
+RING_AND_BOX = {
+    "schema_version": 1, "bounds": [-4, -4, -3, 4, 4, 3],
+    "solids": [
+        {"torus": {"center": [0, 0, 0], "axis": [1, 0, 0], "major_radius": 1.2,
+                   "minor_radius": 0.15}},
+        {"box": {"center": [2, 1.5, 0], "size": [1, 1, 2]}},
+    ],
+}  # fmt: skip
+
+
+def beside_a_box(folder, tether):
+    """A leg straight over the box, on which the tether is longer than at both of its ends."""
+    (folder / "ring.json").write_text(json.dumps(RING_AND_BOX))
+    waypoints = [[2.9, 0, 0.5], [0, 2.2, 0], [3.2, 2.8, 0], [0, 0, 2]]
+    return Mission.model_validate({
+        "schema_version": 1, "scene": str(folder / "ring.json"), "anchor": [-3, 0, 0],
+        "start": [-2.8, 0, 0], "waypoints": waypoints, "clearance": 0.2, "tether_length": tether,
+    })  # fmt: skip
+
+
+def longest_by_steps(mission, step):
+    """Of the tether along a tour, by the model alone, metres."""
+    scene = mission.load_scene()
+    field = scene.field()
+    model = GeodesicTether(field, mission.delta)
+    tether = present_tether(mission, field, model, grid_of(mission, scene, field))
+    _, lengths = model.drive(tether, polylines.dense(mission.tour.line, step))
+    return float(lengths.max())
+
+
+@pytest.fixture(scope="module")
+def over_the_box(tmp_path_factory):
+    return solve_mission(beside_a_box(tmp_path_factory.mktemp("box"), 9.0), time_limit=20.0).mission
+
+
+def test_a_tether_is_as_long_as_stated_between_the_ends_of_legs_too(over_the_box):
+    """Lengths were asked for at corners alone: 0.4 m too little on a straight leg."""
+    tour = over_the_box.tour
+    at_ends = max(stop.tether_length for stop in tour.stops)
+    longest = longest_by_steps(over_the_box, 0.02)
+    assert longest > at_ends + 0.2
+    assert tour.longest_tether == pytest.approx(longest, abs=over_the_box.delta)
+
+
+def test_where_it_would_be_too_long_on_the_way_another_tour_is_taken(over_the_box, tmp_path):
+    longest = longest_by_steps(over_the_box, 0.02)
+    shorter = solve_mission(beside_a_box(tmp_path, longest - 0.2), time_limit=20.0).mission
+    assert verify_mission(shorter)
+    assert longest_by_steps(shorter, 0.02) <= shorter.tether_length
+    assert shorter.tour.length > over_the_box.tour.length + 0.05
+    false = over_the_box.model_copy(update={"tether_length": shorter.tether_length})
+    failed = [c.name for c in verify_mission(false).checks if not c.passed]
+    assert "within the tether's length" in failed

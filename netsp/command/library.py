@@ -8,10 +8,10 @@ import sys
 import time
 from typing import TYPE_CHECKING
 
-from netsp.command import told
+from netsp.command import messages, told
 from netsp.command.patience import span
 from netsp.command.types import check_writable, natural, seconds
-from netsp.errors import EXIT_NOT_VERIFIED, InputError
+from netsp.errors import EXIT_NOT_VERIFIED, InputError, counted
 
 if TYPE_CHECKING:
     from netsp.library import Library
@@ -157,6 +157,12 @@ def _rank(args: argparse.Namespace, library: Library) -> int:
         names = [
             n for n in _chosen(args, library) if (label, args.time_limit, n) not in there
         ]  # fmt: skip
+        skipped = len(_chosen(args, library)) - len(names)
+        if skipped and not args.quiet:
+            messages.note(
+                f"{counted(skipped, 'problem')} of {label!r} with this limit are in {output} and "
+                "are not run again; another --label, or another file, runs them"
+            )
         begin = time.monotonic()
         for k, row in enumerate(rank.run(library, names, label, solve, args.time_limit), 1):
             rows.append(row)
@@ -175,6 +181,8 @@ def _rank(args: argparse.Namespace, library: Library) -> int:
                     f"{span(left)} left", file=sys.stderr, flush=True,
                 )  # fmt: skip
     entries = rank.ranking(library, rows)
+    if len({e["problems"] for e in entries}) > 1 and not args.quiet:
+        messages.note("not all ran over the same problems: their means are not of the same")
     if args.json:
         told.tell({"ranking": entries})
         return 0

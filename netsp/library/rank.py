@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import functools
 import importlib
 import json
 import os
@@ -26,7 +27,12 @@ from netsp.judge import verify
 from netsp.library.records import SAME, Library
 from netsp.models import Model, read_model
 from netsp.problem import Problem
+from netsp.registry import foreign
 from netsp.solution import Solution
+
+LATE, LATE_S = 1.1, 5.0
+"""What takes longer than so many times its limit, and so many seconds (of loading what it needs),
+does not count."""
 
 GRACE = 10.0
 """Seconds beyond twice its limit after which a command is killed."""
@@ -70,10 +76,23 @@ def by_name(name: str, seed: int) -> Solve:
             raise InputError(f"--solver: {name}: cannot be imported: {error}") from None
         finally:
             sys.path.remove(os.getcwd())
+        if callable(solver):
+            solver = _guarded(solver, name)
     check_solver(solver, None)
     return lambda problem, _, limit, should_stop: solve(
         problem, solver, time_limit=limit, seed=seed, should_stop=should_stop
     )
+
+
+def _guarded(function: Callable[..., Any], name: str) -> Callable[..., Any]:
+    """The same, whose errors cost a row and no more; it is asked for the same arguments."""
+
+    @functools.wraps(function)
+    def call(*args: Any, **more: Any) -> Any:
+        with foreign(f"{name} failed"):
+            return function(*args, **more)
+
+    return call
 
 
 def by_command(command: str) -> Solve:
@@ -164,7 +183,9 @@ def _run(
     try:
         solution = solve(problem, library.paths[name], limit, lambda: clock.stopped)
         row["seconds"] = round(time.perf_counter() - begin, 3)
-        if solution.length is None:
+        if row["seconds"] > LATE * limit + LATE_S:
+            row["message"] = f"late: answered after {row['seconds']:.1f} s of {limit:g}"
+        elif solution.length is None:
             row["message"] = solution.status.value
         elif solution.problem.sha256 != problem.sha256:
             row["message"] = "a solution of another problem"

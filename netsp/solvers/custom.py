@@ -20,7 +20,7 @@ from netsp.solving.limits import Limits
 from netsp.solving.params import read_params
 from netsp.solving.run import SolverRun
 from netsp.travel.graph import TravelGraph
-from netsp.travel.result import Result
+from netsp.travel.result import OPTIMALITY_TOLERANCE, Result
 
 OFFERED = ("params", "limits", "time", "iterations", "rng", "warm_start")
 """What a solver may ask for by name: its options, the limits, and each field of them."""
@@ -92,12 +92,12 @@ def call(
 
     It returns a `Result`, or a tour as vertices from 0 on (then no bound is claimed), or None if it
     found none. A tour is checked against the graph, and its length is measured here. A bound cannot
-    be checked: it is taken at its word, but never above the tour's length, and only beside a tour.
+    be checked, unless its own tour refutes it: it is taken at its word, and only beside a tour.
 
     Raises
     ------
     InputError
-        As `read_options`; something returned that is neither.
+        As `read_options`; something returned that is neither; a bound above the tour's length.
     """
     fields = {"params": read_options(solver, name, params), "limits": limits}
     fields |= {k: getattr(limits, k) for k in OFFERED[2:]}
@@ -109,14 +109,20 @@ def call(
     if tour is not None:
         vertices = whole_numbers(tour)
         if not vertices or not run.update_incumbent(vertices):
+            why = graph.why_no_tour(vertices) if vertices else "no sequence of whole numbers"
             raise InputError(
-                f"solver {name!r}: returned {shown(tour)}; expected vertices from 0 on, one of "
-                "every cluster, or a Result"
+                f"solver {name!r}: returned {shown(tour)}: {why}; expected vertices from 0 on, one "
+                "of every cluster, or a Result"
             )
     if claimed is not None and claimed.lower_bound is not None and tour is not None:
         bound = claimed.lower_bound
         if isinstance(bound, bool) or not isinstance(bound, int | float | np.number):
             raise InputError(f"solver {name!r}: lower_bound: expected a number, got {shown(bound)}")
+        if bound > run.length * (1.0 + OPTIMALITY_TOLERANCE):
+            raise InputError(
+                f"solver {name!r}: lower_bound: {bound:.9g} is more than its own tour's length, "
+                f"{run.length:.9g}"
+            )
         run.raise_bound(float(bound))
     if claimed is not None and claimed.status is Status.INFEASIBLE:
         run.start()

@@ -160,7 +160,7 @@ def waypoint_graph(
             if not straight(field, points[n], points[m], mission.clearance):
                 continue
             path = np.array([points[n], points[m]])
-            there, lengths = model.drive(found.tether[v], path[1:])
+            there, lengths = model.drive(found.tether[v], polylines.dense(path, mission.delta))
             if lengths.max() > limit:
                 continue
             w = found.find(int(m), there, mission.delta)

@@ -245,7 +245,8 @@ class RepairPlanner(PredictivePlanner):
         """The tether at the end of a leg; None, and why, where the robot cannot go along it."""
         if leg is None or not self.keeps_off(leg):
             return None, f"{name} is blocked"
-        there, lengths = self._model.drive(tether, leg[1:])
+        step = self.mission.delta
+        there, lengths = self._model.drive(tether, polylines.dense(leg, step))
         most = float(lengths.max(initial=0.0))
         if most > self.limit:
             return None, (

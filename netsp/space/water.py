@@ -258,9 +258,11 @@ class Water:
         tether : Tether
             At the end.
         longest : float
-            Metres of it on the way.
+            Metres of it on the way. It may be longer there than at both ends of a straight piece:
+            about solids in space it is not convex along it, as it is in the plane
+            (docs/theory.md, fact 2).
         """
-        after, lengths = self.model.drive(tether, path[1:])
+        after, lengths = self.model.drive(tether, polylines.dense(path, self.mission.delta))
         return after, float(lengths.max(initial=tether.length))
 
     def number(self, path: Floats) -> int | None:

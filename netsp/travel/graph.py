@@ -531,13 +531,39 @@ class TravelGraph(Drawn):
         bool
             True for a tour.
         """
+        return self.why_no_tour(tour) is None
+
+    def why_no_tour(self, tour: Sequence[int]) -> str | None:
+        """Why vertices are no tour.
+
+        Parameters
+        ----------
+        tour : sequence of int
+            As of `is_tour`.
+
+        Returns
+        -------
+        str or None
+            What is wrong with them first; None for a tour.
+        """
         t = [int(v) for v in tour]
-        return (
-            bool(t)
-            and t[0] == 0
-            and self.takes_one_of_each(t)
-            and keeps(self.cluster[t].tolist(), self.before)
-        )
+        if not t or t[0] != 0:
+            return "it does not begin at vertex 0"
+        if wrong := [v for v in t if not 0 <= v < len(self)]:
+            return f"{wrong[0]} is no vertex (0 to {len(self) - 1})"
+        if len(t) > 1 and t[-1] == 0:
+            return "vertex 0 is repeated at its end"
+        own = self.cluster[t].tolist()
+        of: dict[int, int] = {}
+        for v, cluster in zip(t, own, strict=True):
+            if cluster in of:
+                return f"cluster {cluster} is visited twice (vertices {of[cluster]} and {v})"
+            of[cluster] = v
+        if missing := set(range(self.goal_count + 1)) - of.keys():
+            return f"no vertex of cluster {min(missing)}"
+        if not keeps(own, self.before):
+            return "it breaks a precedence"
+        return None
 
     def takes_one_of_each(self, vertices: Sequence[int]) -> bool:
         """Whether vertices are exactly one of every cluster, in any order.

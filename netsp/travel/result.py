@@ -155,7 +155,7 @@ class Result:
         """In a line."""
         length = "no tour" if self.length is None else f"length {self.length:.6g}"
         bound = "" if self.lower_bound is None else f", bound {self.lower_bound:.6g}"
-        visits = "" if self.tour is None else f", {len(self.tour) - 1} visits"
+        visits = "" if self.tour is None else f", tour of {len(self.tour)} vertices"
         return f"<Result: {self.status.value}, {length}{bound}{visits}>"
 
 
