@@ -38,7 +38,7 @@ from netsp.online.simulate import grid_of, simulate
 from netsp.solvers.solve import solve_graph
 from netsp.space.bound import bound_of_all
 from netsp.space.order import order_by_going_on
-from netsp.space.plan import SHARE, plan
+from netsp.space.plan import plan
 from netsp.space.signature import SpaceSignature
 from netsp.space.solve import (
     AS_GIVEN,
@@ -47,7 +47,7 @@ from netsp.space.solve import (
     seconds_until_home,
     solve_mission,
 )
-from netsp.space.water import Water, along, straight
+from netsp.space.water import SHARE, Water, along, straight
 from netsp.travel.graph import TravelGraph
 from netsp.worlds import reachable_world
 

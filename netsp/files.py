@@ -300,3 +300,29 @@ class FileModel(Model):
         if not isinstance(path, str | os.PathLike):
             raise InputError(f"path: expected the name of a file, got {shown(path)}")
         return cls.from_json(read_text(path), source=str(path))
+
+    def to_json(self) -> str:
+        """The model as JSON of format version 1, without what is not given.
+
+        Returns
+        -------
+        str
+            Text of a file.
+        """
+        data = self.model_dump(mode="json", exclude_none=True)
+        return json.dumps(data, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
+
+    def save(self, path: str | Path) -> None:
+        """Write the file, whole or not at all.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file; one that is there is replaced. Files that it names are named as they are.
+
+        Raises
+        ------
+        InputError
+            The file cannot be written.
+        """
+        write_text(path, self.to_json())

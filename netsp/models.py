@@ -63,6 +63,10 @@ def read_model(
     context."""
     data = parse_json_object(text, source)
     _check_kind(model, data, source)
+    if data.get("type") in ("FeatureCollection", "Feature"):
+        raise InputError(
+            f"{source}: this is a map (GeoJSON); expected what `netsp import` makes of it"
+        )
     version = data.get("schema_version", None)
     if version != SCHEMA_VERSION or isinstance(version, bool):
         raise InputError(f"{source}: schema_version: expected {SCHEMA_VERSION}, got {version!r}")
@@ -99,8 +103,10 @@ def parse_json_object(text: str | bytes, source: str) -> dict[str, Any]:
     try:
         data = json.loads(text, object_pairs_hook=unique)
     except json.JSONDecodeError as error:
+        known = "NODE_COORD_SECTION" in str(text) or "GTSP_SET_SECTION" in str(text)
+        hint = "; `netsp gtsp` reads this format" if known else ""
         raise InputError(
-            f"{source}: not JSON: {error.msg} at line {error.lineno}, column {error.colno}"
+            f"{source}: not JSON: {error.msg} at line {error.lineno}, column {error.colno}{hint}"
         ) from None
     except UnicodeDecodeError:
         raise InputError(f"{source}: not text in UTF-8") from None

@@ -10,7 +10,6 @@ import hashlib
 import json
 from collections.abc import Sequence
 from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
@@ -44,7 +43,7 @@ from netsp.fields import (
     checked_argument,
     checked_number,
 )
-from netsp.files import FileModel, write_text
+from netsp.files import FileModel
 from netsp.geometry.polygons import check_polygon, polygon_interior_point, polygon_signed_distance
 from netsp.models import Model, explain, read_model, shown
 from netsp.shorthand import Inspection, written_out
@@ -171,7 +170,9 @@ def _obstacle_kind(value: Any) -> str | None:
     if isinstance(value, Polygon):
         return "polygon"
     if isinstance(value, dict):
-        return "polygon" if "polygon" in value else "circle"
+        if "polygon" in value:
+            return "polygon"
+        return "circle" if {"center", "radius"} & value.keys() else None
     return None
 
 
@@ -705,21 +706,6 @@ class Problem(Drawn, FileModel):
             if not goal["after"]:
                 del goal["after"]
         return json.dumps(data, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
-
-    def save(self, path: str | Path) -> None:
-        """Write the problem file, whole or not at all.
-
-        Parameters
-        ----------
-        path : str or Path
-            The file; one that is there is replaced.
-
-        Raises
-        ------
-        InputError
-            The file cannot be written.
-        """
-        write_text(path, self.to_json())
 
     @property
     def sha256(self) -> str:

@@ -5,14 +5,13 @@ from __future__ import annotations
 import json
 import math
 from enum import StrEnum
-from pathlib import Path
 from typing import Annotated, ClassVar, Literal
 
 from pydantic import ConfigDict, Field
 
 from netsp.drawn import Drawn
 from netsp.fields import Name, NonNegative, Number, PathPoint, Total
-from netsp.files import FileModel, write_text
+from netsp.files import FileModel
 from netsp.models import Model
 
 
@@ -259,18 +258,3 @@ class Solution(Drawn, FileModel):
         text = json.dumps(data, indent=1, allow_nan=False, ensure_ascii=False)
         rows = ",\n".join("  " + json.dumps(p, allow_nan=False) for p in path)
         return f'{text[:-2]},\n "path": [\n{rows}\n ]\n}}\n'
-
-    def save(self, path: str | Path) -> None:
-        """Write the solution file, whole or not at all.
-
-        Parameters
-        ----------
-        path : str or Path
-            The file; one that is there is replaced.
-
-        Raises
-        ------
-        InputError
-            The file cannot be written.
-        """
-        write_text(path, self.to_json())

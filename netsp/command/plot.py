@@ -16,7 +16,7 @@ from netsp.command.types import (
     positive,
     roadmap_options,
 )
-from netsp.errors import InputError, counted
+from netsp.errors import InputError
 
 if TYPE_CHECKING:
     from netsp.problem import Problem
@@ -106,21 +106,13 @@ def _mission(args: argparse.Namespace) -> int:
         if getattr(args, name) is not None:
             raise InputError(f"{flag}: {args.problem} is a mission; expected nothing beside it")
     from netsp.online.mission import Mission
-    from netsp.pictures import scene as pictures
     from netsp.pictures import style
+    from netsp.pictures.mission import save_mission
+    from netsp.pictures.scene import INTERACTIVE
 
-    style.check_format(args.output, pictures.INTERACTIVE)
+    style.check_format(args.output, INTERACTIVE)
     mission = Mission.load(args.problem)
-    tour, count = mission.tour, len(mission.waypoints)
-    left = () if tour is None else tuple(range(len(tour.stops), count))
-    scene = mission.load_scene()
-    title = f"{mission.name}: {counted(count, 'waypoint')}"
-    if tour is not None:
-        title += f", tour {tour.length:.5g} {scene.units}"
-    pictures.save(
-        scene, args.output, path=None if tour is None else tour.line, title=title,
-        stops=pictures.Stops(mission.places, left, mission.anchor),
-    )  # fmt: skip
+    save_mission(mission, mission.load_scene(), args.output)
     return 0
 
 

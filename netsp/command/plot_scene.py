@@ -65,11 +65,6 @@ def lay(field: DistanceField, path: Floats, model: str, delta: float) -> Tether:
     chosen = make_tether(model, field, delta)
     if isinstance(chosen, GeodesicTether):
         warn_of_scene(chosen, delta, "take a smaller --delta")
-    for k in range(len(path) - 1):
-        if not field.line_of_sight(path[k], path[k + 1], depth=0.25 * delta):
-            raise InputError(
-                f"path[{k}] to path[{k + 1}]: passes through a solid; expected a free path"
-            )
     tether: Tether = chosen.lay(path)
     return tether
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 
+from netsp.command.compiling import compile_messages
 from netsp.command.solve_mission import is_mission
 from netsp.command.types import check_writable
 from netsp.errors import InputError
@@ -29,6 +31,22 @@ def arguments(p: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write the page, and return the exit code."""
+    if not args.output.lower().endswith(PAGES) and args.output != "-":
+        raise InputError(
+            f"{args.output}: a page is HTML; expected a name ending in .html (a browser prints it "
+            "to PDF)"
+        )
+    with compile_messages(sys.stderr):
+        _written(args)
+    if args.output != "-":
+        print(f"page {args.output}", file=sys.stderr)
+    return 0
+
+
+PAGES = (".html", ".htm")
+
+
+def _written(args: argparse.Namespace) -> None:
     if not args.results.endswith((".jsonl", ".jsonl.gz")):
         check_writable(args.output, inputs=(args.results, args.problem))
         if args.figures is not None:
@@ -39,16 +57,15 @@ def run(args: argparse.Namespace) -> int:
             if args.problem is not None:
                 raise InputError(f"--problem: {args.results} is of a mission; expected none")
             report_mission(args.results, args.output)
-            return 0
+            return
         from netsp.report.tour import report_tour
 
         report_tour(args.results, args.problem, args.output)
-        return 0
+        return
     from netsp.report.page import write_report
 
     check_writable(args.output, inputs=(args.results,))
     write_report(args.results, args.output, args.figures)
-    return 0
 
 
 def _of_mission(source: str) -> bool:

@@ -124,9 +124,9 @@ def draw(found: SolvedMission, scene: Scene, file: str) -> None:
 
         save_runs([found.run], scene, file)
     else:
-        from netsp.pictures.scene import save
+        from netsp.pictures.mission import save_mission
 
-        save(scene, file, path=found.tour.line, title=found.mission.name)
+        save_mission(found.mission, scene, file)
 
 
 MOST_NAMED = 16

@@ -91,10 +91,12 @@ class StudySolver(Model):
 
     @model_validator(mode="after")
     def _known(self) -> Self:
-        if self.name not in SOLVERS:
+        try:
+            SOLVERS.named(self.name)
+        except InputError as error:
             raise ValueError(
-                f"name: unknown solver {self.name!r}; expected one of {_list(SOLVERS)}"
-            )
+                f"name: {str(error).replace('solver: unknown', 'unknown solver')}"
+            ) from None
         try:
             check_solver(self.name, self.options)
         except InputError as error:

@@ -295,7 +295,7 @@ def _class_of(arrivals: list[Arrival]) -> str:
     """In how many of the arrivals, home among them, the tether was as planned."""
     others = sum(not a.as_planned for a in arrivals)
     if not others:
-        return ", the tether always in the planned class"
+        return ", the tether always in the class of the plan in force"
     return f", the tether in another class than planned at {others} of {len(arrivals)} arrivals"
 
 

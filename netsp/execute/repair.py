@@ -177,7 +177,10 @@ def repair(
         else:
             reason += ", a new order would not save enough"
     elif hurried:
-        reason += ", as far as planning came within its time limit; no new order was tried"
+        reason += (
+            ", as far as planning came within its time limit; no new order was tried, and a longer "
+            "limit (--planning-limit) may find a shorter way"
+        )
     else:
         reason += f", a new order could save at most {max(saving, 0.0):.1f} s"
     solution = to_solution(rest, graph, chosen, "auto", seed)

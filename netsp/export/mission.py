@@ -213,7 +213,7 @@ def _checked(water: Water, points: list[Waypoint], line: Floats, exact: bool) ->
                 raise InputError(
                     f"mission: at waypoint #{p.goal} the lines are not of the planned class"
                 )
-    _, longest = water.driven(tether, line)
+    _, longest = water.driven(tether, line, fine=True)
     limit = water.mission.tether_length
     if longest > limit:
         raise InputError(

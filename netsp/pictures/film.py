@@ -36,7 +36,7 @@ class Film:
     moments : sequence of Moment
         At even steps.
     length : float
-        Of it all: seconds of a run, or metres of a tour.
+        Of it all: seconds of a run, or the length of a tour.
     places : ndarray, shape (n, 3)
         Goals or waypoints, also those that are added on the way.
     anchor : (x, y, z)
@@ -62,7 +62,7 @@ class Film:
             return "time (s)"
         problem = self.moments[0].problem
         units = self.scene.units if self.scene else problem.units if problem else ""
-        return f"way ({units})"
+        return f"distance ({units})"
 
     @property
     def every_fate(self) -> set[str]:
@@ -87,8 +87,8 @@ class Step:
 
 
 def steps_of(films: Sequence[Film], count: int) -> tuple[str, list[Step]]:
-    """Films that run together: all by time or by way, the shorter ones wait at their ends; where
-    some are of seconds and some of metres, all take as long.
+    """Films that run together, all by time or all by distance; the shorter ones wait at their ends.
+    Where some are of seconds and some of metres, all take as long.
 
     Parameters
     ----------
@@ -132,7 +132,7 @@ def film_of_plan(problem: Problem, solution: Solution, count: int) -> Film:
     Film
         With the length of the tour.
     """
-    title = f"{problem.name}: {solution.solver}, {solution.length:.4g} {problem.units}"
+    title = f"{problem.name}: tour of {solution.length:.4g} {problem.units} by {solution.solver}"
     moments = moments_of_plan(problem, solution, count)
     length = float(polylines.length(np.array(solution.path)))
     places = np.array([g.position for g in problem.goals]).reshape(-1, 3)

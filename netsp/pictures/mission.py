@@ -11,14 +11,16 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.arrays import Floats
+from netsp.errors import counted
 from netsp.online.laid import present_tether
 from netsp.online.log import Run
+from netsp.online.mission import Mission
 from netsp.online.scene.scene import Scene
 from netsp.online.simulate import grid_of
 from netsp.online.tether import GeodesicTether, Tether
 from netsp.online.track import Track
 from netsp.pictures import style
-from netsp.pictures.scene import Stops, draw_space
+from netsp.pictures.scene import Stops, draw_space, save
 
 DASHES = ("-", "-.")
 """Of two runs side by side, so that they can be told apart in grey."""
@@ -49,6 +51,25 @@ def stops_of(run: Run) -> Stops:
     visited = {int(stop["waypoint"]) for stop in run.summary["stops"]}
     left = tuple(sorted(set(range(len(run.mission.waypoints))) - visited))
     return Stops(run.mission.places, left, visited=True)
+
+
+def save_mission(mission: Mission, scene: Scene, file: str | Path) -> None:
+    """Waypoints in their order, and the tour if there is one.
+
+    Raises
+    ------
+    InputError
+        As of `netsp.pictures.scene.save`.
+    """
+    tour, count = mission.tour, len(mission.waypoints)
+    left = () if tour is None else tuple(range(len(tour.stops), count))
+    title = f"{mission.name}: {counted(count, 'waypoint')}"
+    if tour is not None:
+        title += f", tour {tour.length:.5g} {scene.units}"
+    save(
+        scene, file, path=None if tour is None else tour.line, title=title,
+        stops=Stops(mission.places, left, mission.anchor),
+    )  # fmt: skip
 
 
 def save_runs(runs: Sequence[Run], scene: Scene, file: str | Path) -> None:

@@ -363,7 +363,7 @@ class Board:
         delta = water.mission.delta
         for state in [*tour, -1]:
             path = self.path(before, state)
-            tether, longest = water.driven(tether, path)
+            tether, longest = water.driven(tether, path, fine=True)
             total += along(path)
             meant = water.laid if state < 0 else states.all[state].tether
             pair = (min(before, state), max(before, state))

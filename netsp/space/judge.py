@@ -37,7 +37,7 @@ LENGTH_TOLERANCE = 0.01
 resolution may differ: three times the worst drives against finer ones (docs/tether.md)."""
 
 REACH = 0.99
-"""Of the tether that a plan may need at a waypoint (`netsp.space.plan.SHARE`)."""
+"""Of the tether that a plan may need at a waypoint (`netsp.space.water.SHARE`)."""
 
 ROUNDING = 1e-6
 """Metres, and share of a length, that stated figures may be off."""
@@ -245,7 +245,7 @@ class _Judge:
         model, laid = self.water.model, self.water.laid
         tether, longest, where, off = self.water.present, 0.0, 0, []
         for k, leg in enumerate(self.legs):
-            tether, most = self.water.driven(tether, leg)
+            tether, most = self.water.driven(tether, leg, fine=True)
             if most > longest:
                 longest, where = most, k
             if k < len(self.tour.stops):

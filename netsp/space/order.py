@@ -24,9 +24,8 @@ from netsp.online.paths.tree import Grid, ShortestTree, taut
 from netsp.online.scene.field import DistanceField
 from netsp.online.tether import GeodesicTether, Tether
 from netsp.solvers.solve import solve_graph
-from netsp.space.plan import SHARE
 from netsp.space.states import alike
-from netsp.space.water import straight
+from netsp.space.water import SHARE, straight, stride
 from netsp.travel.graph import TravelGraph
 
 NEIGHBOURS = 12
@@ -160,7 +159,7 @@ def waypoint_graph(
             if not straight(field, points[n], points[m], mission.clearance):
                 continue
             path = np.array([points[n], points[m]])
-            there, lengths = model.drive(found.tether[v], polylines.dense(path, mission.delta))
+            there, lengths = model.drive(found.tether[v], polylines.dense(path, stride(mission)))
             if lengths.max() > limit:
                 continue
             w = found.find(int(m), there, mission.delta)

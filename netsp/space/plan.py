@@ -40,12 +40,9 @@ from netsp.space.legs import Growth, Ways
 from netsp.space.places import Places
 from netsp.space.states import Effort, first_states, states_with_room
 from netsp.space.trees import states_of_trees
-from netsp.space.water import Water
+from netsp.space.water import SHARE, Water
 from netsp.travel.graph import TravelGraph
 from netsp.travel.result import Result, relative_gap
-
-SHARE = 0.99
-"""Of the tether that states and legs may need: the rest is for how the robot is steered."""
 
 ROUNDING = 1e-9
 """Share of a length."""

@@ -28,7 +28,7 @@ from netsp.online.scene.field import DistanceField, pushed_out
 from netsp.online.tether import Tether
 from netsp.online.tour import PlannedStop, PlannedTour, in_file
 from netsp.space.plan import SpacePlan, plan
-from netsp.space.water import DIP
+from netsp.space.water import DIP, stride
 
 KEPT, LOCAL, REPLANNED, BY_LEGS = "kept", "local", "replan", "legs"
 """What became of the rest of a tour: kept; kept but for legs round what blocks it; planned anew; or
@@ -245,7 +245,7 @@ class RepairPlanner(PredictivePlanner):
         """The tether at the end of a leg; None, and why, where the robot cannot go along it."""
         if leg is None or not self.keeps_off(leg):
             return None, f"{name} is blocked"
-        step = self.mission.delta
+        step = stride(self.mission)
         there, lengths = self._model.drive(tether, polylines.dense(leg, step))
         most = float(lengths.max(initial=0.0))
         if most > self.limit:

@@ -23,6 +23,10 @@ from netsp.space.cells import FREE, OPEN
 from netsp.space.search import NONE, Found, shortest_words, way_back
 from netsp.space.signature import SpaceSignature
 
+SHARE = 0.99
+"""Of the tether that states and legs may need: the rest is for how the robot is steered, and for
+what is not seen between two steps along a leg."""
+
 LONGER = 1.35
 """Of paths along cells beside those pulled taut: 26 directions make 1.09, and round bodies more."""
 
@@ -243,8 +247,12 @@ class Water:
             return line
         return lifted(self.field, line, min(mission.clearance, room_at_ends(self.field, path)))
 
-    def driven(self, tether: Tether, path: Floats) -> tuple[Tether, float]:
+    def driven(self, tether: Tether, path: Floats, *, fine: bool = False) -> tuple[Tether, float]:
         """A tether, once the robot has gone a path.
+
+        About solids in space its length is not convex along a straight leg, as it is in the plane
+        (docs/theory.md, fact 2): it may be longer there than at both ends. So it is asked for in
+        steps (`stride`).
 
         Parameters
         ----------
@@ -252,17 +260,19 @@ class Water:
             Before.
         path : ndarray, shape (k, 3)
             From the robot on, metres.
+        fine : bool
+            In steps of delta.
 
         Returns
         -------
         tether : Tether
             At the end.
         longest : float
-            Metres of it on the way. It may be longer there than at both ends of a straight piece:
-            about solids in space it is not convex along it, as it is in the plane
-            (docs/theory.md, fact 2).
+            Metres of it on the way, as far as the steps tell: between two of them it is longer by
+            half a step at most, because it gets longer by no more than the robot goes.
         """
-        after, lengths = self.model.drive(tether, polylines.dense(path, self.mission.delta))
+        step = self.mission.delta if fine else stride(self.mission)
+        after, lengths = self.model.drive(tether, polylines.dense(path, step))
         return after, float(lengths.max(initial=tether.length))
 
     def number(self, path: Floats) -> int | None:
@@ -389,6 +399,23 @@ def least_room(field: DistanceField, path: Floats) -> float:
     """
     step = max(2.0 * ROOM_STEP, along(path) / 1e6)
     return float(field.distance(np.vstack([path[:1], polylines.dense(path, step)])).min())
+
+
+def stride(mission: Mission) -> float:
+    """Metres after which the tether's length is asked for on a leg: so many that it can be longer
+    in between by no more than what is spared of the tether.
+
+    Parameters
+    ----------
+    mission : Mission
+        Whose tether counts.
+
+    Returns
+    -------
+    float
+        At least its delta.
+    """
+    return max(mission.delta, 2.0 * (1.0 - SHARE) * mission.tether_length)
 
 
 def straight(field: DistanceField, a: Floats, b: Floats, clearance: float) -> bool:

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -133,13 +134,18 @@ class GeodesicTether:
         Raises
         ------
         InputError
-            A point inside a solid or not finite, fewer than two points.
+            A point or a piece inside a solid, or not finite; fewer than two points.
         """
-        points = np.asarray(path, dtype=float).reshape(-1, 3)
+        points = _points(path)
         if len(points) < 2:
             raise InputError(f"path: expected at least two points, got {len(points)}")
         for k, point in enumerate(points):
             self.field.free_point(point, f"path[{k}]")
+        for k, (a, b) in enumerate(pairwise(points)):
+            if not self.field.line_of_sight(a, b, depth=0.25 * self.delta):
+                raise InputError(
+                    f"path[{k}] to path[{k + 1}]: passes through a solid; expected a free path"
+                )
         tether = self._taut(strand_of(np.array([points[0], points[0]])))
         return self.refine(self.drive(tether, points[1:])[0])
 
@@ -232,8 +238,8 @@ class GeodesicTether:
     ) -> tuple[Tether, Floats]:
         """The tether after the robot has followed a path: look-ahead in one call.
 
-        Points inside solids are the caller's to avoid: the tether follows to them as well as it
-        can.
+        That the robot's own path is free is the caller's to see to, as by `field.line_of_sight`:
+        through a solid the tether follows as well as it can, and its length means nothing.
 
         Parameters
         ----------
@@ -253,9 +259,7 @@ class GeodesicTether:
         lengths : ndarray, shape (k,)
             Length at each point, metres.
         """
-        points = np.ascontiguousarray(path, dtype=float).reshape(-1, 3)
-        if not np.isfinite(points).all():
-            raise InputError("path: expected finite coordinates")
+        points = _points(path)
         strand, count, residual, lengths = drive(
             self.field.arrays, tether.strand.copy(), len(tether.strand), points, self._settings,
             floor,
@@ -327,3 +331,20 @@ class GeodesicTether:
 
 def _show(point: Floats) -> str:
     return "(" + ", ".join(f"{v:g}" for v in point) + ")"
+
+
+def _points(path: npt.ArrayLike) -> Floats:
+    """(k, 3) a path; InputError if it has another shape or is not finite."""
+    try:
+        points = np.ascontiguousarray(path, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError("path: expected points of three coordinates each") from None
+    if points.shape == (3,):
+        points = points[None]
+    if points.size == 0:
+        return points.reshape(0, 3)
+    if points.ndim != 2 or points.shape[1] != 3:
+        raise InputError(f"path: expected shape (k, 3), got {points.shape}")
+    if not np.isfinite(points).all():
+        raise InputError("path: expected finite coordinates")
+    return points
