@@ -205,7 +205,7 @@ def test_a_run_and_a_plan_take_as_long_and_two_plans_go_as_fast(files):
     assert steps[-1].moments == (len(plan.moments) - 1, len(run.moments) - 1)
     longer = replace(plan, length=2.0 * plan.length)
     what, steps = steps_of([plan, longer], 11)
-    assert what == "way (m)"
+    assert what == "distance (m)"
     assert steps[5].moments == (len(plan.moments) - 1, (len(plan.moments) - 1) // 2)
 
 

@@ -12,7 +12,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from netsp import InputError, Problem, TravelGraph, solve, solve_graph, verify
+from netsp import InputError, Problem, Solution, Status, TravelGraph, solve, solve_graph, verify
+from netsp.command.main import main
+from netsp.compare.rows import read_rows
+from netsp.compare.run import compare
+from netsp.compare.study import Study
 from netsp.online import GeodesicTether, Scene
 from netsp.online.mission import Mission
 from netsp.online.planner import Planner
@@ -104,15 +108,50 @@ def test_a_plain_function_solves(tmp_path):
 
 def test_a_function_may_claim_a_bound_but_not_more_than_its_tour():
     graph = TravelGraph.from_costs([[0, 1, 5], [1, 0, 2], [5, 2, 0]], clusters=[0, 1, 2])
-    from netsp import Status
 
     def boaster(graph, limits, rng):
         assert limits.rng is rng
         return Result((0, 1, 2), 1.0, 99.0, Status.OPTIMAL, ())
 
-    found = solve_graph(graph, boaster)
-    assert found.length == 8.0
-    assert found.lower_bound == 8.0
+    with pytest.raises(InputError, match="99 is more than its own tour's length, 8"):
+        solve_graph(graph, boaster)
+    modest = solve_graph(graph, lambda g: Result((0, 1, 2), 1.0, 7.0, Status.OPTIMAL, ()))
+    assert (modest.length, modest.lower_bound) == (8.0, 7.0)
+
+
+@pytest.mark.parametrize(
+    ("tour", "why"),
+    [([0, 1, 2, 0], "vertex 0 is repeated at its end"), ([0, 1], "no vertex of cluster 2"),
+     ([1, 2, 0], "does not begin at vertex 0"), ([0, 1, 1, 2], "cluster 1 is visited twice"),
+     ([0, 1, 7], "7 is no vertex"), ([0, 1.5, 2], "no sequence of whole numbers")],
+)  # fmt: skip
+def test_what_is_wrong_with_a_tour_is_said(tour, why):
+    graph = TravelGraph.from_costs([[0, 1, 5], [1, 0, 2], [5, 2, 0]], clusters=[0, 1, 2])
+    with pytest.raises(InputError, match=why):
+        solve_graph(graph, lambda g: tour)
+
+
+def test_a_function_is_named_by_its_module_wherever_a_solver_is(tmp_path, monkeypatch):
+    """From the folder one is in, without a package."""
+    (tmp_path / "mine_here.py").write_text(
+        "def first(graph):\n"
+        "    return [0, *(int(graph.members(c)[0]) for c in range(1, graph.goal_count + 1))]\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [p for p in sys.path if p])
+    out = tmp_path / "s.json"
+    assert (
+        main(["solve", str(WHARF), "--solver", "mine_here:first", "-o", str(out), "--quiet"]) == 0
+    )
+    assert Solution.load(out).solver == "mine_here:first"
+    solvers = [{"name": "mine_here:first"}, {"name": "greedy"}]
+    study = {"name": "own", "goals": [3], "tether_lengths": [200], "time_limit": 5,
+             "worlds": {"count": 1}, "solvers": solvers}  # fmt: skip
+    compare(Study.checked(study, "test"), tmp_path / "rows.jsonl")
+    rows = read_rows(tmp_path / "rows.jsonl")
+    assert {r["status"] for r in rows} == {"feasible"}
+    for name in ("mine_here:second", "no_such_module:f"):
+        assert main(["solve", str(WHARF), "--solver", name, "-o", str(out)]) == 2
 
 
 @pytest.mark.parametrize("wrong", [[0], [1, 2], "abc", 7, [0, 1, 1], [0, 99, 2]])

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from netsp.command import messages, told
 from netsp.command.patience import Patience
 from netsp.command.types import check_writable, length, option, positive
-from netsp.errors import InputError
+from netsp.errors import InputError, counted
 
 if TYPE_CHECKING:
     from netsp.problem import Problem
@@ -115,10 +115,13 @@ def run(args: argparse.Namespace) -> int:
             problem, why = within_reach(problem)
         for line in why:
             messages.note(f"{line}: left out")
-    print(
-        f"{problem.name}: {problem.summary}",
-        file=sys.stderr,
-    )
+    print(f"{problem.name}: {problem.summary}{_where(problem)}", file=sys.stderr)
+    above = [problem.goal_name(k) for k, g in enumerate(problem.goals) if g.position[2] > 0.0]
+    if above:
+        messages.warning(
+            f"{counted(len(above), 'goal')} above the water ({', '.join(above[:3])}"
+            f"{', …' if len(above) > 3 else ''}): depths count downwards, heights z upwards"
+        )
     if args.output is None:
         sys.stdout.write(problem.to_json())
     else:
@@ -130,6 +133,21 @@ def run(args: argparse.Namespace) -> int:
             "clearance": problem.clearance, "left_out": list(why), "file": args.output,
         })  # fmt: skip
     return 0
+
+
+def _where(problem: Problem) -> str:
+    """Clearance, extent and place on the earth: what a slip in the map shows in."""
+    import numpy as np
+
+    places = np.vstack([problem.points[:, :2], problem.representative_points.reshape(-1, 2)])
+    wide, high = np.ptp(places, axis=0)
+    said = f", clearance {problem.clearance:g} {problem.units}"
+    said += f"; {wide:.3g} x {high:.3g} {problem.units}"
+    if problem.origin is not None:
+        lat, lon = problem.origin.latitude, problem.origin.longitude
+        north, east = "N" if lat >= 0.0 else "S", "E" if lon >= 0.0 else "W"
+        said += f", base at {abs(lat):.6g} {north}, {abs(lon):.6g} {east}"
+    return said
 
 
 def _is_image(args: argparse.Namespace) -> bool:

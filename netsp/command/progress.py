@@ -95,8 +95,8 @@ class ProgressTable:
             self._print(_HEADER)
             self._header = True
         tour = "-" if row.incumbent is None else f"{row.incumbent:.6g}"
-        bound = "-" if row.bound is None else f"{row.bound:.6g}"
-        gap = "-" if row.gap is None else f"{100 * row.gap:.3f}%"
+        bound = f"{row.bound:.6g}" if row.bound else "-"  # no tour is shorter than 0 anyway
+        gap = "-" if row.gap is None or not row.bound else f"{100 * row.gap:.3f}%"
         self._print(
             f"{seconds:>6.1f}s  {row.stage:<10} {tour:>12} {bound:>12} {gap:>8} "
             f"{row.cuts or '-':>6} {row.vertices or '-':>8} {row.legs or '-':>9} "

@@ -30,6 +30,11 @@ Which = Annotated[Annotated[int, Field(ge=0)] | str, BeforeValidator(_which)]
 """An obstacle or goal: its index, or its name; where it has none, `#index` as messages say."""
 
 
+SPECK = 1e-4
+"""Of the tether: what appears and is smaller, on a site that has its place on the earth, was meant
+in degrees."""
+
+
 class Move(Model):
     """An obstacle is somewhere else from now on."""
 
@@ -165,6 +170,13 @@ def changed(problem: Problem, event: Event) -> Problem:
     out = problem.model_copy(update=update)
     if complaint := out.size_complaint():
         raise InputError(f"{event.kind}: {complaint}")
+    if event.appear is not None and problem.origin is not None:
+        box = event.appear.shape(0.0).bounds
+        if max(box[2] - box[0], box[3] - box[1]) < SPECK * problem.tether_length:
+            raise InputError(
+                f"appear: is {max(box[2] - box[0], box[3] - box[1]):.1g} {problem.units} across; "
+                "expected coordinates of the problem, from its base on, not degrees"
+            )
     if event.add_goal is not None:
         away = float(np.abs(np.array(event.add_goal.position) - np.array(problem.base)).max())
         most = WIDEST * max(problem.tether_length, problem.scale)

@@ -38,7 +38,8 @@ def save_beside(opened: Sequence[Opened], output: str | Path) -> None:
     title = f"{' and '.join(names)}: {len(opened)} side by side"
     sections = "".join(
         f"<section><h2>{html.escape(film.title)}</h2>"
-        f"{chart.draw(one.problem, one.solution, view, one.fates, one.maps)}{moving.STATE}"
+        f"{chart.draw(one.problem, one.solution, view, one.fates, one.maps, one.driven, one.order)}"
+        f"{moving.STATE}"
         "</section>"
         for one, film, view in zip(opened, films, views, strict=True)
     )
@@ -48,6 +49,6 @@ def save_beside(opened: Sequence[Opened], output: str | Path) -> None:
         f'<title>{html.escape(title)}</title><link rel="icon" href="data:,">'
         f"<style>{STYLE}{moving.STYLE}{BESIDE}</style></head><body>"
         f"<h1>{html.escape(title)}</h1>{moving.CONTROLS}"
-        f'<div class="beside">{sections}</div>{chart.legend()}'
+        f'<div class="beside">{sections}</div>{chart.legend(run=any(one.run for one in opened))}'
         f"{moving.script(films, views)}</body></html>\n"
     ))  # fmt: skip

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import math
+from collections.abc import Mapping
 from itertools import pairwise
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy.typing as npt
 
 from netsp.arrays import Floats
 from netsp.execute.passing import Maps, lasting, passing
+from netsp.geometry import polylines
 from netsp.pictures import style
 from netsp.pictures.film import Film
 from netsp.problem import Circle, Problem
@@ -41,6 +43,14 @@ LEGEND = (
     (f'<path d="M0 8H16" stroke="{style.PLAN}" stroke-width="3"/>', "gone so far"),
     (f'<path d="M0 8H16" stroke="{style.TETHER}" stroke-width="3"/>', "tether"),
 )  # fmt: skip
+
+
+MOVING = ("visited by then", "gone so far", "tether")
+"""What moves with the slider, and is not on paper."""
+
+MOVES = ' class="noprint"'
+
+_PLANNED = f'<path d="M0 8H16" stroke="{style.PLAN}" stroke-width="2" stroke-dasharray="4 3"/>'
 
 
 class View:
@@ -108,7 +118,13 @@ class View:
 
 
 def draw(
-    problem: Problem, solution: Solution, view: View, fates: dict[int, str], maps: Maps = ()
+    problem: Problem,
+    solution: Solution,
+    view: View,
+    fates: dict[int, str],
+    maps: Maps = (),
+    driven: Floats | None = None,
+    order: Mapping[int, int] | None = None,
 ) -> str:
     """The map as SVG, with the elements that the page's script moves.
 
@@ -124,18 +140,26 @@ def draw(
         Of goals that were not visited.
     maps : sequence of (float, Problem)
         The problem as it was from some seconds on, where it changed.
+    driven : ndarray, shape (k, 3), optional
+        Of a run, where the robot went; the tour is then drawn as what was planned.
+    order : mapping of int to int, optional
+        Of goals, the numbers of their visits; by default as in the tour.
 
     Returns
     -------
     str
         An element.
     """
+    if order is None:
+        order = {v.goal: n for n, v in enumerate(solution.tour, 1)}
     shapes = [
         *_frame(problem, view), *_obstacles(lasting(maps) if maps else problem, view),
-        *_passing(maps, view), *_tour(solution, view),
+        *_passing(maps, view),
+        *(_tour(np.array(solution.path), view) if driven is None
+          else [*_planned(np.array(solution.path), view), *_tour(driven, view)]),
         f'<polyline class="done" fill="none" stroke="{style.PLAN}" stroke-width="3"/>',
         f'<polyline class="tether" fill="none" stroke="{style.TETHER}" stroke-width="3"/>',
-        *_goals(problem, solution, view, fates),
+        *_goals(problem, order, view, fates),
     ]  # fmt: skip
     x, y = view.point(problem.base)
     shapes.append(
@@ -148,12 +172,27 @@ def draw(
     )
 
 
-def legend() -> str:
-    """What the marks of the map mean, as a list."""
+def legend(*, run: bool = False) -> str:
+    """What the marks of the map mean, as a list.
+
+    Parameters
+    ----------
+    run : bool
+        Of a run, whose plan is drawn besides.
+
+    Returns
+    -------
+    str
+        An element.
+    """
+    marks = [(mark, "path" if run and text == "tour" else text) for mark, text in LEGEND]
+    if run:
+        marks.append((_PLANNED, "plan at the start"))
     items = "".join(
-        f'<li><svg viewBox="0 0 16 16" width="16" height="16" aria-hidden="true">{mark}</svg> '
+        f"<li{MOVES if text in MOVING else ''}>"
+        f'<svg viewBox="0 0 16 16" width="16" height="16" aria-hidden="true">{mark}</svg> '
         f"{text}</li>"
-        for mark, text in LEGEND
+        for mark, text in marks
     )
     return f'<ul class="legend">{items}</ul>'
 
@@ -265,9 +304,17 @@ def _passing(maps: Maps, view: View) -> list[str]:
     return out
 
 
-def _tour(solution: Solution, view: View) -> list[str]:
-    """The path, with an arrowhead in the middle of every long piece."""
-    path = np.array(solution.path)
+def _planned(path: Floats, view: View) -> list[str]:
+    """What was to be gone at first."""
+    return [
+        f'<polyline points="{view.points(path)}" fill="none" stroke="{style.PLAN}" '
+        'stroke-width="1.5" stroke-dasharray="6 4"/>'
+    ]
+
+
+def _tour(path: Floats, view: View) -> list[str]:
+    """A path, with an arrowhead in the middle of every long piece."""
+    path = path[polylines.telling(path, 1e-3 / view.scale)]
     out = [f'<polyline points="{view.points(path)}" fill="none" stroke="{style.PATH}" '
            'stroke-width="1.5"/>']  # fmt: skip
     places = np.array([view.point(p) for p in path])
@@ -282,9 +329,8 @@ def _tour(solution: Solution, view: View) -> list[str]:
 
 
 def _goals(
-    problem: Problem, solution: Solution, view: View, fates: dict[int, str]
+    problem: Problem, visit: Mapping[int, int], view: View, fates: dict[int, str]
 ) -> list[str]:  # fmt: skip
-    visit = {v.goal: n + 1 for n, v in enumerate(solution.tour)}
     named = len(problem.goals) <= MANY
     out = []
     for k, goal in enumerate(problem.goals):

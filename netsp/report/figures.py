@@ -11,6 +11,9 @@ from netsp.compare.rows import TrialRow
 from netsp.pictures import style
 from netsp.report.stats import Cell, Summary, gap_over_time, over_best, profile, summary
 
+LEVEL = 1.0
+"""Least height of a linear axis: less of a per cent, or of an obstacle, is no difference to see."""
+
 LINES, MARKERS = ("-", "--", "-.", ":"), "os^Dv<>"
 
 
@@ -44,6 +47,9 @@ def by_goals(
     tethers = sorted({c.tether for c in cells})
     names = list(dict.fromkeys(c.method for c in cells))
     figure, axes = _figure(len(tethers))
+    goals = sorted({c.goals for c in cells})
+    span = max(goals) - min(goals)
+    dodge = 0.012 * span if span else 0.01 * max(goals)
     for panel, tether in zip(axes[0], tethers, strict=True):
         for k, name in enumerate(names):
             points: list[tuple[int, Summary]] = []
@@ -52,18 +58,22 @@ def by_goals(
                 if cell.tether == tether and (s := summary(found)) is not None:
                     points.append((cell.goals, s))
             if points:
-                at = [g + 0.06 * (k - len(names) / 2) for g, _ in points]
+                at = [g + dodge * (k - (len(names) - 1) / 2) for g, _ in points]
                 mid = np.array([s.median for _, s in points])
                 spread = [mid - [s.low for _, s in points], [s.high for _, s in points] - mid]
                 panel.errorbar(at, mid, spread, label=name, capsize=2, lw=1.2, **_style(k))
         panel.set(
             title=f"tether {tether:g}",
             xlabel="number of goals",
-            xticks=sorted({c.goals for c in cells}),
+            xticks=goals,
         )
+        if not span:  # all beside the one number, which stands in the middle
+            panel.set_xlim(0.9 * goals[0], 1.1 * goals[0])
         panel.grid(alpha=0.3)
         if log:
             panel.set_yscale("log")
+        elif panel.get_ylim()[1] < LEVEL:
+            panel.set_ylim(-0.05 * LEVEL, LEVEL)
     axes[0][0].set_ylabel(label)
     if axes[0][-1].get_legend_handles_labels()[0]:
         _legend(axes[0][-1])
@@ -93,7 +103,7 @@ def entanglements(cells: dict[Cell, list[TrialRow]]) -> Any | None:
 def performance(by_method: dict[str, list[TrialRow]]) -> Any | None:
     """Share of problems proven within a multiple of the fastest time; None if nothing is
     fewer than two methods prove any."""
-    from matplotlib.ticker import NullFormatter, StrMethodFormatter
+    from matplotlib.ticker import FixedLocator, NullFormatter, StrMethodFormatter
 
     ratios = profile(by_method)
     if sum(bool(np.isfinite(r).any()) for r in ratios.values()) < 2:
@@ -112,6 +122,8 @@ def performance(by_method: dict[str, list[TrialRow]]) -> Any | None:
               xlabel="times the seconds of the fastest")  # fmt: skip
     panel.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
     panel.xaxis.set_minor_formatter(NullFormatter())
+    if most < 30.0:  # less than two numbers would stand at powers of ten
+        panel.xaxis.set_major_locator(FixedLocator([1.0, 1.5, 2.0, 3.0, 5.0, 10.0, 20.0]))
     panel.grid(alpha=0.3)
     if panel.get_legend_handles_labels()[0]:
         _legend(panel)
@@ -139,7 +151,7 @@ def anytime(by_method: dict[str, list[TrialRow]], best: dict[str, float]) -> Any
     panel.yaxis.set_major_locator(FixedLocator([0.0, *(10.0**k for k in range(-1, 7))]))
     panel.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
     panel.yaxis.set_minor_locator(NullLocator())
-    panel.set_ylim(bottom=-0.02)
+    panel.set_ylim(bottom=-0.02, top=max(panel.get_ylim()[1], LEVEL))
     panel.grid(alpha=0.3)
     if panel.get_legend_handles_labels()[0]:
         _legend(panel)

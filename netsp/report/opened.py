@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.execute.plan import HOME
 from netsp.files import read_text
@@ -50,6 +51,27 @@ class Opened:
     tethers: list[dict[str, Any]] | None = None
     run: Path | None = None
     maps: Sequence[tuple[float, Problem]] = ()
+
+    @property
+    def driven(self) -> Floats | None:
+        """(k, 3) where the robot of a run went; None of a solution."""
+        if not self.rows:
+            return None
+        return np.array([[float(r[k]) for k in "xyz"] for r in self.rows])
+
+    @property
+    def order(self) -> dict[int, int] | None:
+        """Of the goals that a run has visited, the numbers of their visits; None of a solution.
+
+        Raises
+        ------
+        KeyError, ValueError
+            The list of visits is damaged.
+        """
+        if self.run is None:
+            return None
+        goals = [int(r["goal"]) for r in log.rows_of(self.run / "visits.csv")]
+        return {goal: n for n, goal in enumerate((g for g in goals if g != HOME), 1)}
 
     @property
     def fates(self) -> dict[int, str]:

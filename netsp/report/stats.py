@@ -12,6 +12,9 @@ from scipy.stats import binom
 from netsp.arrays import Floats
 from netsp.compare.rows import FAILED, TrialRow
 
+ROUNDING = 1e-6
+"""Per cent over the best that are taken for none: the same tour, summed in another order."""
+
 CONFIDENCE = 0.95
 """Of the intervals about medians."""
 
@@ -72,7 +75,8 @@ def over_best(row: TrialRow, best: dict[str, float]) -> float | None:
     key = row.get("problem_sha256")
     if row.get("length") is None or key not in best:
         return None
-    return float(100.0 * (row["length"] / best[key] - 1.0))
+    over = float(100.0 * (row["length"] / best[key] - 1.0))
+    return over if over > ROUNDING else 0.0
 
 
 def summary(values: Sequence[float]) -> Summary | None:

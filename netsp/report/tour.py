@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from netsp.errors import InputError, counted
+from netsp.execute.plan import HOME
 from netsp.files import write_text
 from netsp.hsignature.measures import measure
 from netsp.judge import verify
@@ -83,7 +84,9 @@ def page(what: Opened) -> str:
     parts = [
         f"<h1>{html.escape(title)}</h1>",
         _summary(problem, solution, run),
-        "<h2>Map</h2>", chart.draw(problem, solution, view, fates, what.maps), chart.legend(),
+        "<h2>Map</h2>",
+        chart.draw(problem, solution, view, fates, what.maps, what.driven, what.order),
+        chart.legend(run=run is not None),
         moving.CONTROLS, moving.STATE,
         "<h2>Goals in their order</h2>",
         briefing.stops(problem, solution, found) if run is None
@@ -96,7 +99,12 @@ def page(what: Opened) -> str:
     if run is None or own:
         parts += ["<h2>Checks</h2>", briefing.checks(verify(problem, solution))]
     if problem.state is None and own:
-        parts += ["<h2>Measures of entanglement</h2>", _measures(problem, solution)]
+        parts += [
+            "<h2>Measures of entanglement</h2>",
+            '<p class="note">Stricter notions from the literature, for comparison: the tour is '
+            "none the worse for failing them.</p>",
+            _measures(problem, solution),
+        ]
     if what.rows:
         parts += ["<h2>Log</h2>", _over_time(what.rows, problem.units), _events(run)]
     return (
@@ -136,21 +144,32 @@ def _summary(problem: Problem, solution: Solution, run: Path | None) -> str:
 
 
 def _reached(problem: Problem, solution: Solution, run: Path, fates: dict[int, str]) -> str:
-    """The visits of a plan that was carried out."""
-    arrived = {int(r["goal"]): r for r in log.rows_of(run / "visits.csv")}
-    u = problem.units
-    head = ["visit", "goal", f"tether ({u})", f"slack ({u})", "reached at (s)",
-            f"tether when reached ({u})", "word"]  # fmt: skip
-    rows = []
-    for n, v in enumerate(solution.tour):
-        row = arrived.get(v.goal)
+    """The visits that were made, in their order, and the goals that were not reached."""
+    u, planned = problem.units, {v.goal: v for v in solution.tour}
+    head = ["visit", "goal", "reached at (s)", f"tether out ({u})", f"slack ({u})", "word",
+            f"planned at the start ({u})", "word then"]  # fmt: skip
+    rows: list[list[str]] = []
+    missed = list(planned)
+
+    def told(goal: int) -> list[str]:
+        v = planned.get(goal)
+        return ["–", "–"] if v is None else [f"{v.tether_length:.5g}", str(list(v.signature))]
+
+    for row in log.rows_of(run / "visits.csv"):
+        goal = int(row["goal"])
+        if goal == HOME:
+            continue
+        missed = [g for g in missed if g != goal]
+        out = float(row["tether"])
         rows.append([
-            str(n + 1), problem.goal_name(v.goal), f"{v.tether_length:.5g}",
-            f"{problem.tether_length - v.tether_length:.5g}",
-            f"{float(row['time']):.1f}" if row else fates.get(v.goal, "–"),
-            f"{float(row['tether']):.5g}" if row else "–", str(list(v.signature)),
+            str(len(rows) + 1), problem.goal_name(goal), f"{float(row['time']):.1f}", f"{out:.5g}",
+            f"{problem.tether_length - out:.5g}", str([int(a) for a in row["word"].split()]),
+            *told(goal),
         ])  # fmt: skip
-    return briefing.table(head, rows, (1, 6))
+    for goal in missed:
+        fate = fates.get(goal, "not reached")
+        rows.append(["–", problem.goal_name(goal), fate, "–", "–", "–", *told(goal)])
+    return briefing.table(head, rows, (1, 5, 7))
 
 
 def _measures(problem: Problem, solution: Solution) -> str:

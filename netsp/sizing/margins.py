@@ -183,7 +183,8 @@ def _obstacles(problem: Problem, solution: Solution) -> tuple[float, str]:
     low, high = 0.0, max(float(gaps.min()), 0.0)
     i, k = np.unravel_index(int(np.argmin(gaps)), gaps.shape)
     place = "the base" if k == 0 else problem.goal_label(int(k) - 1)
-    reason = f"{place} is as near to {problem.obstacle_label(int(i))}"
+    nearer = "would be nearer than the clearance to" if problem.clearance else "would lie in"
+    reason = f"{place} {nearer} {problem.obstacle_label(int(i))}"
     high *= 1.0 - 1e-9
     if high <= 0.0:
         return 0.0, reason

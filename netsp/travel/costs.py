@@ -84,7 +84,8 @@ def checked_costs(
     if base and (cluster[0] != 0 or (cluster == 0).sum() != 1):
         raise InputError(
             "clusters: vertex 0, where the tour starts, must be alone in cluster 0; cluster 0 is "
-            f"{np.flatnonzero(cluster == 0).tolist()}; expected that, or base=None"
+            f"{np.flatnonzero(cluster == 0).tolist()}; expected that (numbers "
+            "begin at 0), or base=None"
         )
     missing = sorted(set(range(int(cluster.max()) + 1)) - set(cluster.tolist()))
     if missing:
