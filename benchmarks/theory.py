@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from netsp import Circle, Problem, solve
 from netsp.geometry import polylines
@@ -115,7 +116,7 @@ def limit() -> Any:
     ax.plot(gone[arrivals], np.array(lengths)[arrivals], "o", ms=5, color=style.VISITED,
             label="goal visited")  # fmt: skip
     ax.axhline(problem.tether_length, color=style.LIMIT, ls="--", lw=1.0, label="limit")
-    ax.set(xlabel="way along the tour (m)", ylabel="length (m)", ylim=(0.0, 22.0))
+    ax.set(xlabel="distance along the tour (m)", ylabel="length (m)", ylim=(0.0, 22.0))
     figure.legend(loc="outside lower center", ncols=4, fontsize=8, frameon=False)
     return figure
 
@@ -127,7 +128,7 @@ def pending() -> Any:
         obstacles=[Circle(center=(0, 0), radius=0.4), Circle(center=(-0.6, 3.2), radius=1.3)],
     )  # fmt: skip
     paths = TautPaths(problem)
-    figure, axes = panels(2, 9.0, 4.2)
+    figure, axes = panels(2, 9.0, 5.0)
     for ax, (goal, word, title) in zip(
         axes,
         ((0, (-2,), "+1 is pending until −1 takes it back"), (1, (1,), "+1 is final")),
@@ -143,7 +144,7 @@ def pending() -> Any:
         draw_letters(ax, path, problem.representative_points)
         ax.plot(*problem.base[:2], "*", color=style.BASE, ms=11, zorder=6)
         ax.plot(*problem.goals[goal].position[:2], "o", color=style.GOAL, mec=style.PATH, zorder=6)
-        finish(ax, f"letters {told(letters)}, word {told(word)}: {title}", (-4.2, 4.2, -1.2, 6.6))
+        finish(ax, f"letters {told(letters)}, word {told(word)}:\n{title}", (-4.2, 4.2, -1.2, 6.6))
     return figure
 
 
@@ -189,7 +190,12 @@ def slits() -> Any:
     right.plot(*unfolded[0], "*", color=style.BASE, ms=11, zorder=6)
     right.plot(*unfolded[-1], "o", color=style.GOAL, mec=style.PATH, zorder=6)
     finish(right, "unfolded: a string through half-lines", (-0.8, along[-1] + 0.8, -1.4, 4.8))
-    right.set(xlabel="way in x (m)")
+    right.set(xlabel="distance travelled in x (m)")
+    handles = [
+        Line2D([], [], color=style.EDGE, lw=2.6, label="closed half of a line"),
+        Line2D([], [], color=style.VISITED, lw=1.0, label="gate"),
+    ]
+    right.legend(handles=handles, loc="lower right", fontsize=7, frameon=False)
     return figure
 
 

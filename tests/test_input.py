@@ -640,3 +640,51 @@ def test_the_parts_of_a_named_multipolygon_are_numbered(tmp_path):
         "quay 1",
         "quay 2",
     ]
+
+
+def test_files_of_another_kind_are_told_what_reads_them(tmp_path, capsys):
+    site = Path(__file__).parent.parent / "examples" / "site.geojson"
+    assert main(["solve", str(site)]) == 2
+    assert "netsp import" in one_line(capsys)
+    ring = Path(__file__).parent.parent / "examples" / "7ring28.gtsp"
+    assert main(["solve", str(ring)]) == 2
+    assert "netsp gtsp" in one_line(capsys)
+    path = tmp_path / "path.csv"
+    path.write_text("x,y\n0,0\n1,1\n")
+    wharf = Path(__file__).parent.parent / "problems" / "wharf.json"
+    assert main(["plot", str(wharf), str(path), "-o", str(tmp_path / "x.png")]) == 2
+    assert "--measures" in one_line(capsys)
+
+
+def test_an_obstacle_of_neither_form_is_told_both(tmp_path, capsys):
+    file = tmp_path / "p.json"
+    data = {"schema_version": 1, "base": [0, 0], "goals": [[3, 0]], "tether_length": 9}
+    file.write_text(json.dumps({**data, "obstacles": [{"vertices": [[1, 1], [2, 1], [2, 2]]}]}))
+    assert main(["solve", str(file)]) == 2
+    told = one_line(capsys)
+    assert "obstacles[0]" in told
+    assert '"polygon"' in told
+    assert '"center"' in told
+
+
+def test_an_obstacle_that_appears_in_degrees_is_refused(tmp_path, capsys):
+    from netsp.execute.events import Surprises
+
+    origin = {"latitude": 57.7, "longitude": 11.95}
+    problem = Problem(base=(0, 0), goals=[(9, 0)], tether_length=60, origin=origin)
+    corners = [[11.9505, 57.7001], [11.9506, 57.7001], [11.9506, 57.7002]]
+    events = Surprises.model_validate(
+        {"schema_version": 1, "events": [{"time": 1, "appear": {"polygon": corners}}]}
+    )
+    with pytest.raises(InputError, match="not degrees"):
+        events.check(problem)
+
+
+def test_a_path_through_an_obstacle_is_told_when_it_is_measured(tmp_path, capsys):
+    wharf = Path(__file__).parent.parent / "problems" / "wharf.json"
+    path = tmp_path / "path.csv"
+    path.write_text("x,y\n0,2.5\n9,2.5\n")
+    assert main(["verify", str(wharf), str(path), "--measures"]) == 0
+    told = capsys.readouterr()
+    assert "passes through obstacle A1" in told.err
+    assert "word" in told.out

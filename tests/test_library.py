@@ -5,6 +5,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ import pytest
 from netsp import Problem, Solution, solve, verify
 from netsp.command.main import main
 from netsp.errors import InputError, VerificationError
-from netsp.library import Library, Record
+from netsp.library import Library, Record, rank
 from netsp.library.rank import Row, append_row, ranking, read_rows
 
 FOLDER = Path(__file__).parent.parent / "problems" / "library"
@@ -253,3 +254,33 @@ def test_ctrl_c_ends_a_ranking_and_what_it_cut_short_has_no_row(small, tour, tmp
     assert run.returncode == 0
     assert len(read_rows(rows)) == 1
     assert "lns" in out
+
+
+def fails(graph):
+    raise KeyError("on purpose")
+
+
+def test_a_function_that_fails_costs_its_rows_only(small, tour, tmp_path, capsys):
+    with_records(small, tour)
+    rows = tmp_path / "rows.jsonl"
+    words = ["library", "rank", "--folder", str(small), "-o", str(rows), "--time-limit", "1"]
+    assert main([*words, "--solver", "tests.test_library:fails", "--label", "bad"]) == 0
+    assert "KeyError: 'on purpose'" in capsys.readouterr().err
+    assert len(read_rows(rows)) == 2
+    assert main([*words, "--solver", "greedy", "--label", "bad", "--quiet"]) == 0
+    assert len(read_rows(rows)) == 2
+    assert main([*words, "--solver", "greedy", "--label", "bad"]) == 0
+    assert "are not run again" in capsys.readouterr().err
+
+
+def test_what_answers_late_does_not_count(small, tour, monkeypatch):
+    with_records(small, tour)
+    monkeypatch.setattr(rank, "LATE_S", 0.0)
+
+    def slow(problem, path, limit, should_stop):
+        time.sleep(0.3)
+        return tour
+
+    (row,) = rank.run(Library(small), [SMALL], "slow", slow, 0.1)
+    assert not row.verified
+    assert row.message.startswith("late: answered after")

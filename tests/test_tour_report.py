@@ -1,5 +1,6 @@
 """The page about a solution or a run explains itself, in a real browser too."""
 
+import csv
 import re
 import shutil
 import subprocess
@@ -180,3 +181,22 @@ def test_what_does_not_belong_together_is_refused(pages, tmp_path, capsys):
     assert "solves another problem" in capsys.readouterr().err
     assert main(["report", str(tmp_path), "-o", out]) == 2
     assert "is not the folder of a run" in capsys.readouterr().err
+
+
+def test_the_page_of_a_run_shows_what_was_driven_and_what_was_out(pages):
+    run = pages[1].parent / "run"
+    text = pages[1].read_text()
+    assert "plan at the start" in text
+    with open(run / "visits.csv") as stream:
+        visits = [row for row in csv.DictReader(stream) if row["goal"] != "-1"]
+    for row in visits:
+        assert f"<td>{float(row['time']):.1f}</td>" in text
+        assert f"<td>{float(row['tether']):.5g}</td>" in text
+    assert "plan at the start" not in pages[0].read_text()
+
+
+def test_a_page_is_html_and_nothing_else(pages, tmp_path, capsys):
+    run = pages[1].parent / "run"
+    assert main(["report", str(run), "-o", str(tmp_path / "x.pdf")]) == 2
+    assert "a page is HTML" in capsys.readouterr().err
+    assert not (tmp_path / "x.pdf").exists()

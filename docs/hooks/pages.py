@@ -89,7 +89,9 @@ def table(name: str, schema: dict[str, Any]) -> list[str]:
     required = set(schema.get("required", ()))
     out = ["| field | type | meaning | default |", "|---|---|---|---|"]
     for field, what in schema["properties"].items():
-        default = "required" if field in required else f"`{what.get('default', 'none')}`"
+        # a model in Python has it by itself, a file must say it
+        in_file = field in required or field == "schema_version"
+        default = "required" if in_file else f"`{what.get('default', 'none')}`"
         if what.get("default", "") is None:
             default = ""
         meaning = what.get("description", "").replace("\n", " ").replace("|", "\\|")

@@ -74,3 +74,31 @@ def _verdict(problem: Problem, broken: tuple[int, ...]) -> str:
     if not broken:
         return "holds"
     return f"fails at {', '.join(problem.obstacle_name(k) for k in broken)}"
+
+
+def entered(problem: Problem, path: npt.ArrayLike) -> list[str]:
+    """The obstacles that a path passes through.
+
+    Parameters
+    ----------
+    problem : Problem
+        With the obstacles, not grown.
+    path : array_like, shape (k, 2) or (k, 3)
+        The path.
+
+    Returns
+    -------
+    list of str
+        What messages call them.
+    """
+    import shapely
+
+    xy = np.asarray(path, dtype=float)[:, :2]
+    if len(xy) < 2:
+        return []
+    line = shapely.LineString(xy)
+    return [
+        problem.obstacle_label(i)
+        for i, o in enumerate(problem.obstacles)
+        if line.intersection(o.shape(0.0)).length > 1e-6 * problem.scale
+    ]

@@ -87,6 +87,11 @@ def _drawn(args: argparse.Namespace) -> int:
             options["seed"] = args.seed
         plotting.save_roadmap(Problem.load(args.problem), args.roadmap, options, args.output)
     elif args.solution:
+        if args.solution.lower().endswith(".csv"):
+            raise InputError(
+                f"{args.solution}: a path is drawn over a scene; of a problem, netsp verify "
+                f"{args.problem} {args.solution} --measures tells its word"
+            )
         problem, solution = load_pair(args.problem, args.solution)
         if solution.problem.sha256 != problem.sha256:
             raise InputError(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from netsp.command import told
+from netsp.command import messages, told
 from netsp.command.types import load_pair
 from netsp.errors import EXIT_NOT_VERIFIED, InputError
 
@@ -57,13 +57,17 @@ def run(args: argparse.Namespace) -> int:
         read_text(args.problem)  # a file that is not there is told as ever
         raise InputError(f"SOLUTION: {args.problem} is no mission; expected a solution beside it")
     if args.measures:
-        from netsp.command.measures import describe_path
+        from netsp.command.measures import describe_path, entered
         from netsp.files import read_path
         from netsp.problem import Problem
 
         path = read_path(args.solution)
         if path is not None:
-            text = describe_path(Problem.load(args.problem), path)
+            problem = Problem.load(args.problem)
+            text = describe_path(problem, path)
+            for name in entered(problem, path):
+                messages.warning(f"{args.solution}: the path passes through {name}; its word there "
+                                 "depends on where the ray stands")  # fmt: skip
             if not args.quiet:
                 print(text)
             return 0

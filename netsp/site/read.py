@@ -189,11 +189,16 @@ class _Site:
         parts: dict[str, list[Feature]] = {
             k: [] for k in ("base", "goal", "obstacle", "bounds", "path", "ignore")
         }
+        wrong: dict[str, list[str]] = {}
         for feature in self.map.features:
             try:
                 parts[kind_of(feature, self.kinds, chart=chart)].append(feature)
             except InputError as error:
-                self._complain(str(error))
+                what = str(error).removeprefix(feature.where)
+                wrong.setdefault(what, []).append(feature.where)
+        for what, places in wrong.items():  # as like as not the same slip in all of them
+            more = f" and {len(places) - 1} more" if len(places) > 1 else ""
+            self._complain(f"{places[0]}{more}{what}")
         if parts["ignore"]:
             self.notes.append(f"{counted(len(parts['ignore']), 'feature')} left out")
         for layer, size in self.map.layers.items():
