@@ -193,7 +193,7 @@ def test_solvers_that_crash_hang_or_eat_cost_one_row_each(tmp_path, monkeypatch)
     (tmp_path / "sitecustomize.py").write_text(textwrap.dedent(patch))
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     monkeypatch.syspath_prepend(str(tmp_path))
-    monkeypatch.setattr(pool, "GRACE_S", 15.0)
+    monkeypatch.setattr(pool, "GRACE_S", 10.0)
     for name in names:
         monkeypatch.setitem(SOLVERS, name, Solver(name, f"badsolvers:{name}"))
     study = Study.checked(

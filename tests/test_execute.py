@@ -180,6 +180,7 @@ def test_what_is_whole_is_not_called_broken(world):
 
 def test_a_dynamic_vehicle_in_a_current_carries_it_out_too():
     problem = Problem.load(PROBLEMS / "pool.json")
+    problem = problem.model_copy(update={"goals": problem.goals[:3]})
     run = execute(
         problem, solve(problem),
         ExecutionOptions(vehicle="bluerov2", speed=0.4, current=(0.05, 0.03, 0.0), gusts=0.02),
