@@ -31,6 +31,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write the page, and return the exit code."""
+    check_writable(args.output, inputs=(args.results, args.problem))
     if not args.output.lower().endswith(PAGES) and args.output != "-":
         raise InputError(
             f"{args.output}: a page is HTML; expected a name ending in .html (a browser prints it "
@@ -48,7 +49,6 @@ PAGES = (".html", ".htm")
 
 def _written(args: argparse.Namespace) -> None:
     if not args.results.endswith((".jsonl", ".jsonl.gz")):
-        check_writable(args.output, inputs=(args.results, args.problem))
         if args.figures is not None:
             raise InputError(f"--figures: is for comparisons, and {args.results} is none")
         if _of_mission(args.results):
@@ -64,7 +64,6 @@ def _written(args: argparse.Namespace) -> None:
         return
     from netsp.report.page import write_report
 
-    check_writable(args.output, inputs=(args.results,))
     write_report(args.results, args.output, args.figures)
 
 

@@ -76,7 +76,7 @@ def over_best(row: TrialRow, best: dict[str, float]) -> float | None:
     if row.get("length") is None or key not in best:
         return None
     over = float(100.0 * (row["length"] / best[key] - 1.0))
-    return over if over > ROUNDING else 0.0
+    return over if abs(over) > ROUNDING else 0.0
 
 
 def summary(values: Sequence[float]) -> Summary | None:
