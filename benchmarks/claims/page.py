@@ -43,12 +43,14 @@ def small() -> tuple[str, bool]:
     from sites import shipped
 
     from netsp.online.simulate import simulate
-    from netsp.pictures.mission import save_page
+    from netsp.pictures.film import film_of_flight
+    from netsp.pictures.film_page import FRAMES, save_page
 
     mission, scene = shipped("basin")
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "run.html"
-        save_page([simulate(mission, scene=scene)], scene, file)
+        film = film_of_flight(simulate(mission, scene=scene), scene, FRAMES)
+        save_page([film], mission.name, file)
         size = file.stat().st_size / 1e6
     return f"{size:.2f} MB for {len(mission.waypoints)} waypoints", size <= 3.0
 
