@@ -1,5 +1,6 @@
 """The map in the browser: versions, the solver beside it, who is let in, and the page itself."""
 
+import asyncio
 import dataclasses
 import itertools
 import json
@@ -17,7 +18,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from netsp import InfeasibleError, InputError, Problem, Solution, Tethers, solve, verify
+from netsp import Circle, InfeasibleError, InputError, Problem, Solution, Tethers, solve, verify
 from netsp.app.facts import facts, plain, shortest_sufficient
 from netsp.app.files import EXPORTS, bare_name
 from netsp.app.frame import Frame
@@ -25,6 +26,7 @@ from netsp.app.shown import read_shown
 from netsp.app.solving import Worker
 from netsp.app.state import Document
 from netsp.app.tethers import Cursor
+from netsp.execute.events import Event, Surprises
 from netsp.execute.run import execute
 from netsp.execute.write import write_execution
 from netsp.export.write import export
@@ -606,3 +608,21 @@ def test_the_page_in_a_browser(tmp_path):
             browser.close()
         finally:
             server.terminate()
+
+
+def test_a_run_in_which_an_obstacle_came_onto_a_goal_is_shown(tmp_path):
+    """Its site is no problem that could be solved."""
+    site = Problem(base=(0, 0), goals=[(6, 2), (6, -2)], tether_length=12)
+    boat = Circle(center=(6.0, -2.2), radius=0.7, name="boat")
+    events = Surprises(events=(Event(time=1.0, appear=boat),))
+    run = execute(site, solve(site), surprises=events)
+    assert set(run.left_out) == {1}
+    write_execution(run, tmp_path / "run")
+    seen = read_shown(tmp_path / "run")
+    session = Session(Document(None, seen.data), shown=seen)
+
+    async def told():
+        session.begin()
+        return session.everything()
+
+    assert asyncio.run(told())

@@ -26,7 +26,6 @@ from netsp.app.tethers import Cursor
 from netsp.errors import InputError, NetspError
 from netsp.fields import checked_argument
 from netsp.models import shown
-from netsp.problem import Problem
 from netsp.solution import Solution
 
 STATIC = Path(__file__).parent / "static"
@@ -76,7 +75,7 @@ class Session:
             return
         self.answer = self.shown.answer
         if self.shown.solution is not None:
-            problem = Problem.model_validate(self.shown.data)
+            problem = self.shown.problem()
             self.solution = self.shown.solution.to_json()
             self._cursor = Cursor(problem, self.shown.solution.path)
             if not self.shown.frames:
@@ -438,7 +437,7 @@ def _download(session: Session, name: str) -> Any:
             return PlainTextResponse("netsp: a run has no such file", status_code=404)
         problem = (
             session.document.problem() if session.shown is None
-            else Problem.model_validate(session.shown.data)
+            else session.shown.problem()
         )  # fmt: skip
         if name == "problem.json":
             text, kind = problem.to_json(), "application/json"

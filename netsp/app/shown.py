@@ -61,6 +61,16 @@ class Shown:
         rows = [[k / last, f["length"], f["z"]] for k, f in enumerate(self.frames)]
         return {"sufficient": None, "margins": None, "profile": rows, "visits": []}
 
+    def problem(self) -> Problem:
+        """The site; goals that a run has lost lie in obstacles.
+
+        Returns
+        -------
+        Problem
+            As it is at the end.
+        """
+        return Problem.from_run(json.dumps(self.data), "the run")
+
     def along(self, share: float) -> dict[str, Any]:
         """The tether at a share of the run's time.
 
