@@ -13,7 +13,7 @@ import numpy as np
 from netsp.arrays import Bools, Floats, Ints
 from netsp.mip.cuts import Cut
 
-IDLE, SLACK = 16, 2
+IDLE, SLACK = 8, 2
 """A cut leaves the LP after so many rounds in a row without a price, rounds in which it was slack
 counting twice (a cut between vertices that the LP leaves alone is tight and means nothing).
 Separation finds it again if need be."""

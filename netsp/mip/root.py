@@ -48,7 +48,7 @@ MANY, LEAN_EVERY, DEAR = 2000, 4, 0.01
 is more than the last share of the incumbent: there the first prices bring in far more than stays of
 use, and LPs take all the time."""
 
-SETTLE, SETTLED = 0.5, 0.1
+SETTLE, SETTLED = 0.3, 0.1
 """Where the LP is so far above the bound, as a share of the gap, cuts wait until the prices of all
 legs leave it no farther than the second share."""
 
