@@ -53,8 +53,11 @@ from netsp.space.solve import solve_mission
 NOISE, DRIFT, DRIFT_S, SPEED, DT = 0.3, 0.5, 100.0, 0.5, 0.1
 RECORDED = ROOT / "tests" / "data" / "ardusub"
 SHIPPED = ("wharf", "pool", "oc4-jacket")
-LEAD = 10.0
+LEAD, LONGER = 10.0, 12.0
 MOST_S = 90.0
+AT_ONCE = 20
+"""Updates before and after which a guard that knows the position may see what is warned of: it
+tells a turn from noise sooner, and later where the noise happens to turn, too."""
 
 
 @dataclass
@@ -72,8 +75,9 @@ class Outcome:
     possible: int = 0
     missed_by_turns: int = 0
     leads: list[float] = field(default_factory=list)
-    allowed: list[tuple[float, float]] = field(default_factory=list)
-    """Of loops that can be foreseen in time: leads of the warning, and of the first word."""
+    allowed: list[tuple[float, float, float]] = field(default_factory=list)
+    """Of loops that can be foreseen in time: leads of the warning, of the first word, and of a
+    guard that knows the position."""
     updates_ms: list[float] = field(default_factory=list)
     home_ms: list[float] = field(default_factory=list)
 
@@ -255,19 +259,17 @@ def one(job: tuple[str, int, int]) -> Outcome:
     clear = Guard(problem, GuardOptions(0.01, 0.01, SPEED))
     counter = TurnCounter()
     moments = sorted(rng.integers(30, len(true) - 10, loops).tolist())
-    was = spoke = turned = False
+    turned = False
+    near: list[bool] = []
+    said: dict[Level, list[bool]] = {Level.WARNING: [], Level.CAUTION: []}
     for k in range(len(true)):
         begin = time.perf_counter()
         report = guard.take(Fix(k * DT, tuple(told[k]), estimate=True))
         out.updates_ms.append(1e3 * (time.perf_counter() - begin))
         exact = clear.take(Fix(k * DT, tuple(true[k]), estimate=True))
-        now, speaks = warned(report, Level.WARNING), warned(report, Level.CAUTION)
-        near = exact.loop_s is not None or bool(exact.loops)
-        if now and not was:
-            out.warned += 1
-            out.wrong += not near
-        out.cautioned += speaks and not spoke and not near
-        was, spoke = now, speaks
+        near.append(exact.loop_s is not None or bool(exact.loops))
+        for level, on in said.items():
+            on.append(warned(report, level))
         if k and counter.take(true[k] - true[k - 1]) and not turned:
             turned = True
             out.turned += 1
@@ -276,8 +278,18 @@ def one(job: tuple[str, int, int]) -> Outcome:
         while moments and moments[0] == k:
             moments.pop(0)
             put_in(out, problem, guard, clear, counter, true[k], k * DT, drift, rng)
+    out.warned = len(raised(said[Level.WARNING]))
+    out.wrong, out.cautioned = (
+        sum(not any(near[max(0, k - AT_ONCE) : k + AT_ONCE + 1]) for k in raised(on))
+        for on in said.values()
+    )
     out.seconds = len(true) * DT
     return out
+
+
+def raised(on: list[bool]) -> list[int]:
+    """Updates at which something is said that was not just before."""
+    return [k for k, now in enumerate(on) if now and not (k and on[k - 1])]
 
 
 def put_in(
@@ -321,7 +333,7 @@ def put_in(
     out.leads.append(lead)
     # where even a guard that knows the position saw it coming ten seconds before
     if foreseen is not None and (end - foreseen) * DT >= LEAD:
-        out.allowed.append((lead, word))
+        out.allowed.append((lead, word, (end - foreseen) * DT))
 
 
 def main() -> None:
@@ -340,7 +352,8 @@ def main() -> None:
         return
     head("tracks", "hours", "loops put in", "nothing said", "only as possible",
          "missed by turns", "lead of the warning s, p5 / median",
-         "warned / told 10 s before where foreseeable %", "warnings an hour", "false an hour",
+         "warned / told 10 s before where foreseeable %", "where foreseeable 12 s before %",
+         "warnings an hour", "false an hour",
          "false as possible an hour",
          "turn counter's an hour", "update ms, median / p99", name="guard")  # fmt: skip
     jobs = [(kind, seed, args.loops) for kind, seed in tracks(args.tracks)]
@@ -439,10 +452,18 @@ def hour() -> None:
     print()
 
 
+def in_time(leads: np.ndarray) -> str:
+    """Per cent of loops warned of, and told of, ten seconds before."""
+    if not len(leads):
+        return ""
+    share = " / ".join(f"{100.0 * v:.1f}" for v in (leads[:, :2] >= LEAD).mean(axis=0))
+    return f"{share} of {len(leads)}"
+
+
 def told(name: str, some: list[Outcome]) -> None:
     hours = sum(o.seconds for o in some) / 3600.0
     leads = [v for o in some for v in o.leads]
-    allowed = [v for o in some for v in o.allowed]
+    allowed = np.array([v for o in some for v in o.allowed]).reshape(-1, 3)
     ms = [v for o in some for v in o.updates_ms]
     if not leads or not hours:
         return
@@ -450,8 +471,7 @@ def told(name: str, some: list[Outcome]) -> None:
         str(sum(o.possible for o in some)),
         str(sum(o.missed_by_turns for o in some)),
         f"{np.percentile(leads, 5, method='lower'):.1f} / {np.median(leads):.1f}",
-        " / ".join(f"{100.0 * v:.1f}" for v in (np.array(allowed) >= LEAD).mean(axis=0))
-        + f" of {len(allowed)}" if allowed else "",
+        in_time(allowed), in_time(allowed[allowed[:, 2] >= LONGER]),
         f"{sum(o.warned for o in some) / hours:.1f}", f"{sum(o.wrong for o in some) / hours:.1f}",
         f"{sum(o.cautioned for o in some) / hours:.1f}",
         f"{sum(o.turned for o in some) / hours:.1f}",

@@ -32,9 +32,10 @@ from netsp.problem import Problem
 LEFT_OF_NOISE = 0.4
 """Share of an estimate's noise that is left when it is smoothed, about."""
 
-LOOK_S, LOOK_STEPS = 0.3, 24
+LOOK_S, LOOK_STEPS = 0.3, 60
 """Seconds between the beginnings of two looks ahead, at least, and steps of them in an update: an
-update is to take 50 ms at most."""
+update is to take 50 ms at most, and with several classes a look of fewer steps at a time tells of
+what was ahead a second ago."""
 
 MOST_TETHERS = 8
 """Of the classes believed, the likeliest get a tether."""

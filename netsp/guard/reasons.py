@@ -20,7 +20,7 @@ drives towards it all the time."""
 SLACK = {Level.CAUTION: 0.1, Level.WARNING: 0.03, Level.ALARM: 0.0}
 """Shares of the tether that are left."""
 
-LIKELY, LOOPED, POSSIBLE = 0.7, 0.5, 0.1
+LIKELY, LOOPED, POSSIBLE = 0.8, 0.5, 0.05
 """Shares of the classes in which a loop will close, or has closed: above the first, or second, it
 is spoken of as such, above the third as a possibility, and below not at all."""
 
@@ -28,9 +28,10 @@ LATER = 1.3
 """For each metre of a position's noise, the share by which a loop is seen to close later than it
 does: a course with noise goes round in a wider circle."""
 
-CLEAR = 0.6
+CLEAR, ALL = 0.6, 0.95
 """Share that the likeliest class must have for a warning of what is ahead: where it is anybody's
-guess how the tether runs, so is what closes a loop."""
+guess how the tether runs, so is what closes a loop; unless one closes in all of them, but for the
+rest of the second share."""
 
 DOUBT = 0.05
 """Share that a second class must have to be worth a word."""
@@ -114,7 +115,7 @@ def soon_looped(
     level = _level({v: most * (1.0 + LATER * noise) for v, most in limits.items()}, ahead.loop_s)
     if level is None:
         return []
-    if share < LIKELY or clear < CLEAR or on_plan:
+    if share < LIKELY or (clear < CLEAR and share < ALL) or on_plan:
         level = Level.CAUTION
     near = site.nearest(ahead.loop.around, robot)
     keep = site.side_of(near, robot)
