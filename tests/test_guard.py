@@ -9,6 +9,7 @@ import math
 import subprocess
 import sys
 import threading
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,7 @@ from hypothesis import strategies as st
 from netsp import Circle, Polygon, Problem
 from netsp.command.main import main
 from netsp.errors import InputError
-from netsp.guard.ahead import Look
+from netsp.guard.ahead import Ahead, Look
 from netsp.guard.alarms import Alarm, Alarms, Level
 from netsp.guard.belief import Belief
 from netsp.guard.fix import Fix
@@ -31,7 +32,9 @@ from netsp.guard.loops import closed_by, loops_in
 from netsp.guard.memory import restore, save
 from netsp.guard.page import Page
 from netsp.guard.plane import PlaneSite, RayLetters
+from netsp.guard.reasons import soon_looped
 from netsp.guard.replay import read_fixes
+from netsp.guard.site import Loop
 from netsp.guard.stream import replayed
 from netsp.guard.tethers import Strands
 from netsp.guard.track import Motion, Track
@@ -608,6 +611,45 @@ def test_an_alarm_flickers_neither_on_nor_off():
     assert "loop-ahead" in alarms.on
     alarms.take(20.0, [])
     assert not alarms.on
+
+
+@pytest.mark.parametrize(
+    ("share", "clear", "on_plan", "level"),
+    [
+        (1.0, 1.0, False, Level.WARNING),
+        (1.0, 0.4, False, Level.WARNING),  # whichever class it is
+        (0.85, 0.85, False, Level.WARNING),
+        (0.85, 0.4, False, Level.CAUTION),  # anybody's guess
+        (0.6, 0.7, False, Level.CAUTION),
+        (1.0, 1.0, True, Level.CAUTION),
+        (0.06, 0.9, False, Level.CAUTION),
+        (0.04, 0.9, False, None),
+    ],
+)  # fmt: skip
+def test_a_loop_ahead_is_warned_of_where_it_closes_in_nearly_every_class(
+    share, clear, on_plan, level
+):
+    line = np.array([[4.0, 0.0], [5.0, 1.0], [6.0, 0.0], [5.0, -1.0], [4.0, 0.0]])
+    ahead = Ahead(loop_s=8.0, loop=Loop((0,), line))
+    told = soon_looped(PlaneSite(SITE), ahead, np.array([4.0, -1.0, 0.0]), share, on_plan, clear)
+    assert [a.level for a in told] == ([] if level is None else [level])
+
+
+def test_what_is_ahead_in_two_classes_is_half_a_second_old_at_most():
+    """A look that took many updates would tell of a robot that turns what it did before."""
+    guard = Guard(SITE, EXACT)
+    for fix in along((0, 0, 0), (3, 2.5, 0)):
+        guard.take(fix)
+    (strand,) = guard.strands.all
+    half = replace(strand, likely=0.5)
+    motion = replace(guard._motion, velocity=np.array([0.35, 0.35, 0.0]), turn=0.1)
+    guard._looks, guard._looked = [], -math.inf
+    updates = 1
+    guard._look([half, half], motion)
+    while guard._looks:
+        guard._look([half, half], motion)
+        updates += 1
+    assert updates <= 5
 
 
 @pytest.mark.parametrize("exact", [True, False])
