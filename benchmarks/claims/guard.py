@@ -105,9 +105,20 @@ def in_space() -> tuple[str, bool]:
     return f"{counts[0]} of {sum(counts)} stops, {longest:.2f} of {flown:.2f} m", good
 
 
+def loops() -> tuple[str, bool]:
+    """Loops put into two drives, in noise: those of which nothing is said, and false warnings."""
+    from guard import one
+
+    found = [one(("pilot", 5, 4)), one(("bluerov2", 1, 4))]
+    count, silent = sum(o.loops for o in found), sum(o.silent for o in found)
+    wrong = sum(o.wrong for o in found)
+    return f"{silent} of {count} silent, {wrong} false", count > 0 and not silent + wrong
+
+
 def claims() -> Iterator[Claim]:
     """All of this file."""
     yield Claim("guard: words at the goals of five recorded flights", "34 of 34", recordings)
     yield Claim("guard: true class below 5 % at the end, in noise", "0 of 2", believed)
+    yield Claim("guard: loops of which nothing is said, in noise", "none, none false", loops)
     yield Claim("guard: stops of the flown basin mission as planned", "97 of 97", in_space)
     yield Claim("fly: the pool on a fake autopilot", "all, as planned, free", flown)
