@@ -20,9 +20,11 @@ import csv
 import gzip
 import json
 import math
+import multiprocessing
 import resource
 import time
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -345,9 +347,10 @@ def main() -> None:
     parser.add_argument("--only", choices=("plane", "space", "hour"))
     args = parser.parse_args()
     heading("A guard beside robots that are driven")
-    for name, measure in (("space", missions), ("hour", hour)):
-        if args.only in (None, name):
-            measure()
+    if args.only in (None, "space"):
+        missions()
+    if args.only in (None, "hour"):
+        hour(args.jobs)
     if args.only in ("space", "hour"):
         return
     head("tracks", "hours", "loops put in", "nothing said", "only as possible",
@@ -425,31 +428,39 @@ def resident() -> float:
         return int(file.read().split()[1]) * resource.getpagesize() / 2**20
 
 
-def hour() -> None:
+def hour(jobs: int) -> None:
     """A recorded flight over and over for an hour at ten a second, with noise and drift, each
-    update told as a line of JSON."""
+    update told as a line of JSON; every flight in a process of its own."""
     head("flight", "updates", "update ms, median / p99 / worst", "path home with it, ms",
          "MiB after 6 min", "after 60 min", name="guard-hour")  # fmt: skip
-    for name in SHIPPED:
-        problem, true = recorded(name)
-        guard, rng = Guard(problem, GuardOptions(NOISE, DRIFT, SPEED)), np.random.default_rng(0)
-        begin, updates, home, early, count = np.zeros(2), [], [], 0.0, 0
-        while count < 36_000:
-            for place in drifted(true, rng, begin):
-                began = time.perf_counter()
-                report = guard.take(Fix(count * DT, tuple(place), estimate=True))
-                updates.append(1e3 * (time.perf_counter() - began))
-                began = time.perf_counter()
-                json.dumps(report.as_row())
-                home.append(1e3 * (time.perf_counter() - began))
-                count += 1
-                if count == 3_600:
-                    early = resident()
-        ms = np.array(updates)
-        row(name, str(count),
-            f"{np.median(ms):.1f} / {np.percentile(ms, 99):.1f} / {ms.max():.0f}",
-            f"{np.percentile(home, 99):.2f}", f"{early:.0f}", f"{resident():.0f}")  # fmt: skip
+    spawn = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(jobs, max_tasks_per_child=1, mp_context=spawn) as pool:
+        for cells in pool.map(hour_of, SHIPPED):
+            row(*cells)
     print()
+
+
+def hour_of(name: str) -> list[str]:
+    """The cells of one flight."""
+    problem, true = recorded(name)
+    guard, rng = Guard(problem, GuardOptions(NOISE, DRIFT, SPEED)), np.random.default_rng(0)
+    begin, updates, home, early, count = np.zeros(2), [], [], 0.0, 0
+    while count < 36_000:
+        for place in drifted(true, rng, begin):
+            began = time.perf_counter()
+            report = guard.take(Fix(count * DT, tuple(place), estimate=True))
+            updates.append(1e3 * (time.perf_counter() - began))
+            began = time.perf_counter()
+            json.dumps(report.as_row())
+            home.append(1e3 * (time.perf_counter() - began))
+            count += 1
+            if count == 3_600:
+                early = resident()
+    ms = np.array(updates)
+    return [
+        name, str(count), f"{np.median(ms):.1f} / {np.percentile(ms, 99):.1f} / {ms.max():.0f}",
+        f"{np.percentile(home, 99):.2f}", f"{early:.0f}", f"{resident():.0f}",
+    ]  # fmt: skip
 
 
 def in_time(leads: np.ndarray) -> str:
