@@ -32,10 +32,8 @@ from netsp.problem import Problem
 LEFT_OF_NOISE = 0.4
 """Share of an estimate's noise that is left when it is smoothed, about."""
 
-LOOK_S, LOOK_STEPS = 0.3, 60
-"""Seconds between the beginnings of two looks ahead, at least, and steps of them in an update: an
-update is to take 50 ms at most, and with several classes a look of fewer steps at a time tells of
-what was ahead a second ago."""
+LOOK_S = 0.3
+"""Seconds between the beginnings of two looks ahead, at least."""
 
 MOST_TETHERS = 8
 """Of the classes believed, the likeliest get a tether."""
@@ -390,7 +388,7 @@ class Guard:
                 (s.likely, Look(self.site, s.tether, motion, self.options.speed))
                 for k, s in enumerate(strands) if k == 0 or s.likely >= reasons.DOUBT
             ]  # fmt: skip
-        steps = LOOK_STEPS
+        steps = self.site.look_steps
         for _, look in self._looks:
             steps = look.go_on(steps)
         if not all(look.done for _, look in self._looks):

@@ -81,6 +81,7 @@ class PlaneSite:
     """
 
     sides: tuple[str, ...] = tuple(SIDES)
+    look_steps = 60
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem

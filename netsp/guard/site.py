@@ -98,6 +98,9 @@ class Site(Protocol):
     """Of obstacles, as operators may name them."""
     centres: Floats
     """(n, 2) of what robots circle, in the plan, metres."""
+    look_steps: int
+    """Of looks ahead, in one update, which is to take 50 ms at most: with fewer, a look in several
+    classes tells of what was ahead a second ago."""
 
     def start_word(self) -> Word:
         """The word of the tether when it begins at the start."""

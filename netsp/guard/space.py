@@ -94,6 +94,7 @@ class SpaceSite:
     """
 
     sides: tuple[str, ...] = ("north", "east", "south", "west", "above", "below")
+    look_steps = 24
 
     def __init__(self, mission: Mission, scene: Scene | None = None) -> None:
         if mission.track:
