@@ -17,17 +17,16 @@ def min_cuts(
     tail: Ints,
     head: Ints,
     capacity: Floats,
-    x: Floats,
     cluster: Ints,
     sink: int,
     wanted: Ints,
     enough: float,
 ) -> tuple[Bools, Ints, Floats]:
-    r"""For every wanted cluster C the vertex set S of least ``capacity(δ(S)) + 2 x(C \ S)`` without
-    the sink, if that is below `enough`.
+    """For every wanted cluster C the vertex set S of least ``capacity(δ(S))`` with all of C and
+    without the sink, if that is below `enough`.
 
     Returns (k, n) flags of the sets found, the cluster and the value of each. A source joined to
-    each v of C by capacity 2 x_v makes it one maximum flow; it ends as soon as the flow is enough.
+    each vertex of C without limit makes it one maximum flow; it ends as soon as the flow is enough.
 
     Parameters
     ----------
@@ -35,8 +34,6 @@ def min_cuts(
         Vertices.
     tail, head, capacity
         Undirected edges.
-    x
-        (n,) visits.
     """
     edges = len(tail)
     arcs = 2 * edges + 2 * n
@@ -71,7 +68,7 @@ def min_cuts(
             rest[2 * e] = rest[2 * e + 1] = capacity[e]
         for v in range(n):
             a = 2 * edges + 2 * v
-            rest[a] = 2.0 * x[v] if cluster[v] == c else 0.0
+            rest[a] = np.inf if cluster[v] == c else 0.0
             rest[a + 1] = 0.0
         flow = 0.0
         while flow < enough:

@@ -4,9 +4,9 @@ The bound is that of `netsp.mip.bound`. A tour through a given vertex, or along 
 what these cost above the cheapest of their clusters.
 
 Reduced costs are never held. With thousands of classes a matrix of them, and those that are in
-between, would take more memory than the costs themselves, and more time to write than to compute:
-classes that lie in the same sets of all cuts pay the same for these, so that part is computed once
-for each two groups of such classes.
+between, would take more memory than the costs themselves, and more time to write than to compute.
+What cuts add to the legs of one vertex is summed up cut by cut, over the sets that it lies in: most
+sets hold few of all vertices, so that takes far less than a product of matrices.
 """
 
 from __future__ import annotations
@@ -34,18 +34,22 @@ CHEAPEST = 8
 class Terms(NamedTuple):
     """What a reduced cost is made of, c - π_u - π_v + shared - bitten, for the kernels.
 
-    `group` is that of each vertex, of vertices that the same cuts hold; `shared` (groups, groups)
-    what the cuts that hold both ends cost; `bitten` (m + 1, m + 1) what teeth that hold both
-    clusters do; `vertex` r_v; `least` and `second` are r_uv of the two cheapest legs of each
-    vertex.
+    `shared` is what the cuts that hold both ends cost: those of vertex v are
+    `cut_at[first_at[v] : first_at[v + 1]]`, cut k holds
+    `member[first_member[k] : first_member[k + 1]]`, both ascending, and costs `weight[k]`.
+    `bitten` (m + 1, m + 1) is what teeth that hold both clusters do; `vertex` r_v; `least` and
+    `second` are r_uv of the two cheapest legs of each vertex.
     """
 
     costs: Floats
     dead: Bools
     cluster: Ints
     degree: Floats
-    group: Ints
-    shared: Floats
+    first_at: Ints
+    cut_at: Ints
+    first_member: Ints
+    member: Ints
+    weight: Floats
     bitten: Floats
     vertex: Floats
     least: Floats
@@ -84,10 +88,10 @@ class Prices:
         self._size = len(cluster)
         active = np.flatnonzero(duals.cut < 0.0).tolist()
         inside = np.array([cuts[k].inside for k in active], dtype=bool).reshape(-1, self._size)
-        first, group = _alike(inside)
-        mu = duals.cut[active]
-        # the product of a matrix with its own transpose takes BLAS half the work
-        root = inside[:, first] * np.sqrt(-mu)[:, None]
+        of_cut, member = np.nonzero(inside)
+        first_member = np.searchsorted(of_cut, np.arange(len(active) + 1))
+        by_vertex = np.argsort(member, kind="stable")
+        first_at = np.searchsorted(member[by_vertex], np.arange(self._size + 1))
         m = int(cluster.max(initial=0)) + 1
         bitten = np.zeros((m, m))
         for k in active:
@@ -98,9 +102,11 @@ class Prices:
             vertex[cuts[k].inside & (cluster != cuts[k].cluster)] += duals.cut[k]
         least, second, longest = np.empty((3, self._size))
         terms = self._terms = Terms(
-            costs, dead, cluster, duals.degree, group, root.T @ root, bitten, vertex, least, second
-        )
-        self._by_rows(lambda a, b: _scan(a, b, terms, longest))
+            costs, dead, cluster, duals.degree, first_at, of_cut[by_vertex], first_member, member,
+            -duals.cut[active], bitten, vertex, least, second,
+        )  # fmt: skip
+        self._by_rows(lambda a, b: _scan(a, b, terms, longest), self._size)
+        self._more = least < 0.0
         self._cost = vertex + 0.5 * (least + second)
         self._cheapest = least_of_clusters(self._cost, cluster)
         fixed = float((duals.cluster + self._cheapest).sum()) + duals.constant
@@ -113,7 +119,7 @@ class Prices:
             return
         terms = self._terms
         above = terms.vertex - self._cheapest[terms.cluster]
-        self._by_rows(lambda a, b: _rule_out(a, b, terms, above, missing))
+        self._by_rows(lambda a, b: _rule_out(a, b, terms, above, missing), self._size)
         gone = self._cost - self._cheapest[terms.cluster] > missing
         gone[0] = False
         terms.dead[gone] = True
@@ -121,10 +127,14 @@ class Prices:
 
     def cheapest(self, tolerance: float) -> tuple[Ints, Floats]:
         """(k, 2) legs u < v of reduced costs below minus the tolerance, and these: of each vertex
-        the `CHEAPEST` at most."""
+        the `CHEAPEST` at most. Costs may have risen since it was last called: then those of
+        vertices of which all such legs had been given are not looked for again."""
+        rows = np.flatnonzero(self._more)
         other = np.full((self._size, CHEAPEST), -1, dtype=np.int64)
         price = np.zeros((self._size, CHEAPEST))
-        self._by_rows(lambda a, b: _cheapest(a, b, self._terms, tolerance, other, price))
+        terms = self._terms
+        self._by_rows(lambda a, b: _cheapest(rows[a:b], terms, tolerance, other, price), len(rows))
+        self._more = other[:, -1] >= 0
         u, k = np.nonzero(other >= 0)
         pairs = np.sort(np.column_stack([u, other[u, k]]), axis=1)
         legs, where = np.unique(pairs.reshape(-1, 2), axis=0, return_index=True)
@@ -134,10 +144,10 @@ class Prices:
         """(k,) the reduced costs of legs (k, 2)."""
         return _of(legs, self._terms)
 
-    def _by_rows(self, work: Callable[[int, int], None]) -> None:
-        blocks = [(k, min(k + ROWS, self._size)) for k in range(0, self._size, ROWS)]
+    def _by_rows(self, work: Callable[[int, int], None], count: int) -> None:
+        blocks = [(k, min(k + ROWS, count)) for k in range(0, count, ROWS)]
         if len(blocks) < 4:
-            work(0, self._size)
+            work(0, count)
             return
 
         def checked(block: tuple[int, int]) -> None:
@@ -148,37 +158,70 @@ class Prices:
             list(pool.map(checked, blocks))
 
 
-def _alike(inside: Bools) -> tuple[Ints, Ints]:
-    """The first of every group of columns that are the same, and the group of each column."""
-    if not len(inside):
-        return np.zeros(1, dtype=np.int64), np.zeros(inside.shape[1], dtype=np.int64)
-    packed = np.ascontiguousarray(np.packbits(inside, axis=0).T)
-    rows = packed.view(np.dtype((np.void, packed.shape[1]))).ravel()
-    _, first, group = np.unique(rows, return_index=True, return_inverse=True)
-    return first, group
+@kernel
+def _row(u: int, terms: Terms, other: Ints, price: Floats, room: Floats) -> int:
+    """How many legs at u are not dead, and the first so many of `other` and `price`: their other
+    ends, ascending, and reduced costs. `room` has one place for each vertex or cut and is zero
+    before and after.
+
+    What cuts add is summed over the sets of u, or, where few legs are left, over those of their
+    other ends; the order of the sums is the same, and makes r_uv the same as r_vu.
+    """
+    count, work = 0, 0
+    for v in range(len(terms.cluster)):
+        if not terms.dead[u, v]:
+            other[count] = v
+            count += 1
+            work += terms.first_at[v + 1] - terms.first_at[v]
+    cuts = terms.cut_at[terms.first_at[u] : terms.first_at[u + 1]]
+    for k in cuts:
+        work -= terms.first_member[k + 1] - terms.first_member[k]
+    bitten = terms.bitten[terms.cluster[u]]
+    if work > 0:
+        for k in cuts:
+            for v in terms.member[terms.first_member[k] : terms.first_member[k + 1]]:
+                room[v] += terms.weight[k]
+    else:
+        for k in cuts:
+            room[k] = terms.weight[k]
+    for i in range(count):
+        v = other[i]
+        shared = 0.0
+        if work > 0:
+            shared = room[v]
+        else:
+            for k in terms.cut_at[terms.first_at[v] : terms.first_at[v + 1]]:
+                shared += room[k]
+        price[i] = (
+            terms.costs[u, v] - (terms.degree[u] + terms.degree[v])
+            + shared - bitten[terms.cluster[v]]
+        )  # fmt: skip
+    if work > 0:
+        for k in cuts:
+            for v in terms.member[terms.first_member[k] : terms.first_member[k + 1]]:
+                room[v] = 0.0
+    else:
+        for k in cuts:
+            room[k] = 0.0
+    return count
 
 
 @kernel
-def _reduced(u: int, v: int, terms: Terms) -> float:
-    """r_uv; its terms in an order that makes it the same as r_vu."""
-    return float(
-        terms.costs[u, v] - (terms.degree[u] + terms.degree[v])
-        + terms.shared[terms.group[u], terms.group[v]]
-        - terms.bitten[terms.cluster[u], terms.cluster[v]]
-    )  # fmt: skip
+def _rooms(terms: Terms) -> tuple[Ints, Floats, Floats]:
+    """`other`, `price` and `room` of `_row`."""
+    n = len(terms.cluster)
+    return np.empty(n, np.int64), np.empty(n), np.zeros(max(n, len(terms.weight)))
 
 
 @kernel
 def _scan(first: int, last: int, terms: Terms, longest: Floats) -> None:
     """Per row the two least reduced costs, and the largest size of any."""
-    n = len(terms.cluster)
+    other, price, room = _rooms(terms)
     for u in range(first, last):
         least = second = np.inf
         size = 0.0
-        for v in range(n):
-            if terms.dead[u, v]:
-                continue
-            r = _reduced(u, v, terms)
+        for i in range(_row(u, terms, other, price, room)):
+            r = price[i]
             size = max(size, abs(r))
             if r < least:
                 least, second = r, least
@@ -191,12 +234,10 @@ def _scan(first: int, last: int, terms: Terms, longest: Floats) -> None:
 def _rule_out(first: int, last: int, terms: Terms, above: Floats, missing: float) -> None:
     """Mark the legs whose ends cost more than what is missing if they are used: an end pays for
     half of the leg, and half of its cheapest other one."""
-    n = len(terms.cluster)
+    other, price, room = _rooms(terms)
     for u in range(first, last):
-        for v in range(n):
-            if terms.dead[u, v]:
-                continue
-            r = _reduced(u, v, terms)
+        for i in range(_row(u, terms, other, price, room)):
+            v, r = other[i], price[i]
             on = terms.second[u] if r <= terms.least[u] else terms.least[u]
             back = terms.second[v] if r <= terms.least[v] else terms.least[v]
             if above[u] + above[v] + r + 0.5 * (on + back) > missing:
@@ -205,34 +246,45 @@ def _rule_out(first: int, last: int, terms: Terms, above: Floats, missing: float
 
 @kernel
 def _cheapest(
-    first: int, last: int, terms: Terms, tolerance: float, other: Ints, price: Floats
+    rows: Ints, terms: Terms, tolerance: float, held_at: Ints, held_price: Floats
 ) -> None:  # fmt: skip
     """Per row the legs of least reduced cost, if it is negative, in no order."""
-    n, most = len(terms.cluster), other.shape[1]
-    for u in range(first, last):
+    most = held_at.shape[1]
+    other, price, room = _rooms(terms)
+    for u in rows:
         held, worst = 0, 0
-        for v in range(n):
-            if terms.dead[u, v]:
-                continue
-            r = _reduced(u, v, terms)
-            if r >= -tolerance or (held == most and r >= price[u, worst]):
+        for i in range(_row(u, terms, other, price, room)):
+            r = price[i]
+            if r >= -tolerance or (held == most and r >= held_price[u, worst]):
                 continue
             at = worst
             if held < most:
                 at = held
                 held += 1
-            other[u, at], price[u, at] = v, r
+            held_at[u, at], held_price[u, at] = other[i], r
             if held == most:
                 worst = 0
                 for k in range(most):
-                    if price[u, k] > price[u, worst]:
+                    if held_price[u, k] > held_price[u, worst]:
                         worst = k
 
 
 @kernel
 def _of(legs: Ints, terms: Terms) -> Floats:
-    """The reduced cost of each leg."""
+    """The reduced cost of each leg, as `_row` has it."""
     out = np.empty(len(legs))
     for k in range(len(legs)):
-        out[k] = _reduced(legs[k, 0], legs[k, 1], terms)
+        u, v = legs[k]
+        shared = 0.0
+        i, j = terms.first_at[u], terms.first_at[v]
+        while i < terms.first_at[u + 1] and j < terms.first_at[v + 1]:
+            a, b = terms.cut_at[i], terms.cut_at[j]
+            if a == b:
+                shared += terms.weight[a]
+            i += a <= b
+            j += b <= a
+        out[k] = (
+            terms.costs[u, v] - (terms.degree[u] + terms.degree[v])
+            + shared - terms.bitten[terms.cluster[u], terms.cluster[v]]
+        )  # fmt: skip
     return out

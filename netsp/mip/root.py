@@ -55,6 +55,10 @@ legs leave it no farther than the second share."""
 PRICINGS = 4
 """Times that legs are sought whose measured length has a negative price, before cuts are."""
 
+FAR = 1.5
+"""What a look with a bound that is so many times farther from the incumbent than the best one would
+rule out is not worth its time."""
+
 USED = 0.05
 """Legs that a point uses that much are measured."""
 
@@ -132,7 +136,10 @@ class Warm:
         one_of = np.zeros(int(costs.cluster.max()) + 1, dtype=np.int64)
         one_of[costs.cluster[place]] = np.arange(len(place))
         whole = one_of[costs.cluster]
-        return [replace(c, inside=c.inside[whole if c.teeth else near]) for c in self.cuts]
+        return [
+            replace(c, inside=c.inside[whole if c.teeth else near] | (costs.cluster == c.cluster))
+            for c in self.cuts
+        ]
 
     def legs_over(self, costs: LegCosts) -> Ints:
         """(k, 2) rows of its legs."""
@@ -321,7 +328,9 @@ class Root:
         run.raise_bound(min(prices.bound, run.cutoff))
         if run.done:
             return False
-        prices.rule_out(run.cutoff)
+        missing = run.cutoff - (run.bound or 0.0)
+        if run.cutoff - prices.bound < FAR * missing:
+            prices.rule_out(run.cutoff)
         scale = run.length if run.tour is not None else float(self.costs.values[0, 1:].max())
         new, longer = self._most_negative(prices, TINY * scale)
         if len(new):
