@@ -21,9 +21,10 @@ from netsp.mip.cbc_program import CbcRelaxation
 from netsp.mip.cuts import Cut
 from netsp.mip.highs import HighsRelaxation
 from netsp.mip.overgoals import best_tree
-from netsp.mip.prices import Prices
+from netsp.mip.prices import Prices, _row
+from netsp.mip.program import duals_of_relaxation
 from netsp.mip.solve import Params
-from netsp.mip.subtours import components, fractional_cuts
+from netsp.mip.subtours import components, fractional_cuts, strongest_cut
 from netsp.roadmap.taut import TautRoadmap
 from netsp.solution import Status
 from netsp.solving import legcosts, searching
@@ -158,6 +159,84 @@ def test_no_tour_violates_a_cut_and_the_cuts_found_are_violated(seed):
             pairs = zip(tour, [*tour[1:], 0], strict=True)
             used = [place[tuple(sorted((int(a), int(b))))] for a, b in pairs]
             assert inside[used].sum() <= other[tour].sum()
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_cut_with_all_of_its_cluster_is_violated_most_and_no_less_than_with_a_part_of_it(seed):
+    graph = random_graph(seed, goals=6, most=4)
+    rng = np.random.default_rng(seed)
+    legs, costs = first_legs(graph)
+    point = HighsRelaxation(graph.cluster, legs, costs).solve(60.0)
+
+    def crossing(inside):
+        return point.y[inside[legs[:, 0]] ^ inside[legs[:, 1]]].sum()
+
+    for _ in range(50):
+        inside = rng.random(len(graph)) < 0.4
+        inside[0] = False
+        violation, cut = strongest_cut(inside, point.x, legs, point.y, graph.cluster)
+        whole = {}
+        for c in range(1, graph.goal_count + 1):
+            of_c = graph.cluster == c
+            whole[c] = 2.0 - crossing(inside | of_c)
+            part = 2.0 * point.x[inside & of_c].sum() - crossing(inside)
+            assert part <= whole[c] + 1e-7
+        assert violation == pytest.approx(max(whole.values()), abs=1e-7)
+        assert whole[cut.cluster] == pytest.approx(violation, abs=1e-7)
+        assert (cut.inside == inside | (graph.cluster == cut.cluster)).all()
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_prices_are_the_same_to_the_bit_however_they_are_summed_and_from_either_end(seed):
+    graph = random_graph(seed, goals=6, most=4)
+    rng = np.random.default_rng(seed)
+    n = len(graph)
+    cuts = [Cut(rng.random(n) < 0.5, 1 + k % 6) for k in range(12)]
+    duals = duals_of_relaxation(rng.normal(size=7), rng.random(12), cuts, graph.cluster)
+    none = ~np.isfinite(graph.costs)
+    all_of_them = row_prices(Prices(graph.costs, none.copy(), graph.cluster, cuts, duals))
+    assert (all_of_them == all_of_them.T).all()
+    for u, v in np.argwhere(np.triu(~none, 1))[::7].tolist():
+        dead = np.ones_like(none)
+        dead[u, v] = dead[v, u] = False
+        alone = Prices(graph.costs, dead, graph.cluster, cuts, duals)
+        assert row_prices(alone)[u, v] == row_prices(alone)[v, u] == all_of_them[u, v]
+        assert alone.of(np.array([[u, v]])) == all_of_them[u, v]
+        shared = sum(duals.cut[k] for k, c in enumerate(cuts) if c.inside[u] and c.inside[v])
+        expected = graph.costs[u, v] - duals.degree[u] - duals.degree[v] - shared
+        assert all_of_them[u, v] == pytest.approx(expected)
+
+
+def row_prices(prices):
+    """(V, V) reduced costs row by row; inf where a leg is dead."""
+    terms = prices._terms
+    n = len(terms.cluster)
+    out = np.full((n, n), np.inf)
+    other, price, room = np.empty(n, np.int64), np.empty(n), np.zeros(max(n, len(terms.weight)))
+    for u in range(n):
+        count = _row(u, terms, other, price, room)
+        out[u, other[:count]] = price[:count]
+        assert not room.any()
+    return out
+
+
+def test_legs_that_got_longer_since_are_looked_for_again_where_there_may_be_more(monkeypatch):
+    """All legs of negative price are given in the end, whatever few are given at a time."""
+    monkeypatch.setattr("netsp.mip.prices.CHEAPEST", 2)
+    graph = random_graph(3, goals=6, most=4)
+    costs = graph.costs.copy()
+    duals = duals_of_relaxation(np.full(7, 0.4), np.zeros(0), [], graph.cluster)
+    prices = Prices(costs, ~np.isfinite(costs), graph.cluster, [], duals)
+    legs, cost = first_legs(graph)
+    negative = {tuple(leg) for leg in legs[cost < 0.8 - 1e-9].tolist()}
+    seen = set()
+    while len(found := prices.cheapest(1e-9)[0]):
+        assert not seen & {tuple(leg) for leg in found.tolist()}
+        seen |= {tuple(leg) for leg in found.tolist()}
+        u, v = found.T
+        costs[u, v] = costs[v, u] = 1e4
+    assert len(seen) > 20
+    assert seen == negative
 
 
 def test_components_are_told_apart():

@@ -63,9 +63,9 @@ class CbcRelaxation:
         """Set the costs of all legs in the program."""
         self.costs = np.array(costs)
 
-    def add_cuts(self, cuts: list[Cut]) -> None:
+    def add_cuts(self, cuts: list[Cut], *, for_good: bool = False) -> None:
         """Bring cuts into the program."""
-        self.pool.add(cuts)
+        self.pool.add(cuts, for_good=for_good)
 
     def keep_cuts(self, keep: Bools) -> None:
         """Take all cuts out of the program but those marked."""

@@ -29,18 +29,22 @@ class CutPool:
     ----------
     idle
         (k,) rounds that each has done nothing.
+    for_good
+        (k,) which of them are never idle.
     """
 
     def __init__(self) -> None:
         self.cuts: list[Cut] = []
         self.idle: Ints = np.zeros(0, dtype=np.int64)
+        self.for_good: Bools = np.zeros(0, dtype=bool)
 
     def __len__(self) -> int:
         return len(self.cuts)
 
-    def add(self, cuts: Sequence[Cut]) -> None:
+    def add(self, cuts: Sequence[Cut], *, for_good: bool = False) -> None:
         """Take new cuts, which have not been idle yet."""
         self.cuts += cuts
+        self.for_good = np.concatenate([self.for_good, np.full(len(cuts), for_good)])
         self.idle = np.concatenate([self.idle, np.zeros(len(cuts), dtype=np.int64)])
 
     def replace(self, cuts: Sequence[Cut]) -> None:
@@ -52,7 +56,7 @@ class CutPool:
     def keep(self, kept: Bools) -> None:
         """Drop all cuts but those marked."""
         self.cuts = [c for c, k in zip(self.cuts, kept, strict=True) if k]
-        self.idle = self.idle[kept]
+        self.idle, self.for_good = self.idle[kept], self.for_good[kept]
 
     def count(self, prices: Floats, slack: Floats) -> None:
         """Count a round: prices and slacks of all cuts at its optimum."""
@@ -61,5 +65,5 @@ class CutPool:
 
     def active(self) -> Bools | None:
         """(k,) which cuts are not idle; None if too few are for it to be worth the while."""
-        kept = self.idle < IDLE
+        kept = (self.idle < IDLE) | self.for_good
         return None if kept.sum() >= MOST_KEPT * len(kept) else kept

@@ -174,7 +174,7 @@ class HighsRelaxation:
         h.setBasis(basis)
         return value / self._scale
 
-    def add_cuts(self, cuts: list[Cut]) -> None:
+    def add_cuts(self, cuts: list[Cut], *, for_good: bool = False) -> None:
         """Bring cuts into the program."""
         if not cuts:
             return
@@ -183,7 +183,7 @@ class HighsRelaxation:
         no_limit = np.full(n, highspy.kHighsInf)
         least = np.array([-2.0 * c.room for c in cuts])
         self._highs.addRows(n, least, no_limit, *_compressed(block))
-        self.pool.add(cuts)
+        self.pool.add(cuts, for_good=for_good)
 
     def keep_cuts(self, keep: Bools) -> None:
         """Take all cuts out of the program but those marked."""

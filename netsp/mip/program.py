@@ -12,6 +12,7 @@ says the same and also ties the class of the incoming leg to that of the outgoin
 a printer's subtour cut (its left side lacks the restriction to S); ours is the generalised subtour
 elimination constraint y(δ(S)) >= 2 x(S ∩ C), rewritten with (3): if the vertex that serves C lies
 in S, the tour must enter and leave S. (Fischetti, Salazar & Toth 1995, here aggregated over S ∩ C.)
+It is strongest where S holds all of C: then x(S \\ C) is the same, and no y(E(S)) is smaller.
 
 The relaxation does without x: by (3) x_v is half the legs at v, so (2) reads y over the legs at a
 cluster = 2, and (4), times -2, y(δ(S)) - y(δ(S ∩ C)) >= 0 with legs counted at the vertices of
@@ -142,8 +143,8 @@ class Relaxation(Protocol):
     def set_costs(self, costs: Floats) -> None:
         """Set the costs of all legs in the program."""
 
-    def add_cuts(self, cuts: list[Cut]) -> None:
-        """Bring cuts into the program."""
+    def add_cuts(self, cuts: list[Cut], *, for_good: bool = False) -> None:
+        """Bring cuts into the program; those that are there for good are never idle."""
 
     def keep_cuts(self, keep: Bools) -> None:
         """Take all cuts out of the program but those marked."""

@@ -183,7 +183,9 @@ class Root:
         self.lp = relaxation(costs.cluster, legs, costs.of(legs))
         if warm is not None:
             self.lp.add_cuts(warm.cuts_over(costs))
-        self.lp.add_cuts([replace(c, inside=c.inside[costs.cluster]) for c in over_goals])
+        # whatever the classes, the LP is no lower with these than the goals' own
+        goals = [replace(c, inside=c.inside[costs.cluster]) for c in over_goals]
+        self.lp.add_cuts(goals, for_good=True)
         self.point: Point | None = None
         self._objective = 0.0
 

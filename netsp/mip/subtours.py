@@ -1,9 +1,9 @@
 """Finding violated subtour cuts.
 
 At integer points by sight: the components of the support. At fractional points by components, too,
-by the branches of the cover (for every prefix of a word, the vertices whose word begins with it:
-sets that belong together in space and need no search) and by minimum cuts, one for every cluster,
-which find a violated cut if there is one.
+by minimum cuts among the clusters, by the branches of the cover (for every prefix of a word, the
+vertices whose word begins with it: sets that belong together in space and need no search) and by
+minimum cuts among the vertices, one for every cluster, which find a violated cut if there is one.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from scipy.sparse.csgraph import connected_components
 
 from netsp.arrays import Bools, Floats, Ints
 from netsp.hsignature import Word
+from netsp.mip.blossoms import shrunk
 from netsp.mip.cuts import Cut
 from netsp.mip.flows import min_cuts
 
@@ -90,6 +91,20 @@ def strongest_cut(
     return violation, Cut(inside | (cluster == c), c)
 
 
+def goal_cuts(legs: Ints, y: Floats, cluster: Ints) -> list[Cut]:
+    """Violated cuts of sets of whole clusters: those of least crossing, one for each cluster. They
+    say nothing of classes, so that no other class of a goal gets round them."""
+    between = shrunk(legs, y, cluster)
+    tail, head = np.nonzero(np.triu(between))
+    goals = np.arange(1, len(between))
+    sets, which, _ = min_cuts(
+        len(between), tail, head, between[tail, head], np.arange(len(between)), 0, goals,
+        2.0 - VIOLATION,
+    )  # fmt: skip
+    distinct = {s.tobytes(): (s, int(c)) for s, c in zip(sets, which, strict=True)}
+    return [Cut(s[cluster], c) for s, c in distinct.values()]
+
+
 def branches(signatures: Sequence[Word]) -> Bools:
     """(k, V) vertices of every branch of the cover with more than one vertex and not all."""
     rows: dict[Word, list[int]] = {}
@@ -114,7 +129,7 @@ def fractional_cuts(
     """Cuts violated by a fractional point: of components, and the most violated of others; `near`
     as of `component_cuts`. An LP costs far more than looking for cuts, so that all are taken at
     once: with thousands of classes it takes a quarter of the rounds."""
-    cuts = component_cuts(x, legs, y, cluster, near)
+    cuts = component_cuts(x, legs, y, cluster, near) + goal_cuts(legs, y, cluster)
     known = {np.packbits(c.inside).tobytes() for c in cuts}
     support = np.flatnonzero(x > 1e-9)
     on = y > 1e-9

@@ -29,7 +29,7 @@ ROUNDED_FROM = 5000
 BYTES_PER_LEG, BYTES_ROUNDED = 24.0, 8.0
 """Of memory that a proof takes: the values, what is known of them, and what is in between."""
 
-ROWS = 512
+ROWS, LEGS = 512, 200_000
 """Of a matrix that are worked on at a time, so that what is in between stays small."""
 
 
@@ -148,9 +148,10 @@ class LegCosts:
             u, v = np.nonzero(new)
             u += first
             u, v = u[u < v], v[u < v]
-            if len(u):
-                lengths = self._held(self.graph.costs_of(self.vertices[u], self.vertices[v]))
-                self.values[u, v] = self.values[v, u] = lengths
+            for k in range(0, len(u), LEGS):
+                a, b = u[k : k + LEGS], v[k : k + LEGS]
+                lengths = self._held(self.graph.costs_of(self.vertices[a], self.vertices[b]))
+                self.values[a, b] = self.values[b, a] = lengths
 
     def restrict(self, keep: Bools) -> None:
         """Forget all vertices but those marked."""
