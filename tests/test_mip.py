@@ -24,7 +24,13 @@ from netsp.mip.overgoals import best_tree
 from netsp.mip.prices import Prices, _row
 from netsp.mip.program import duals_of_relaxation
 from netsp.mip.solve import Params
-from netsp.mip.subtours import components, fractional_cuts, strongest_cut
+from netsp.mip.subtours import (
+    VIOLATION,
+    components,
+    fractional_cuts,
+    goal_cuts,
+    strongest_cut,
+)
 from netsp.roadmap.taut import TautRoadmap
 from netsp.solution import Status
 from netsp.solving import legcosts, searching
@@ -184,6 +190,34 @@ def test_a_cut_with_all_of_its_cluster_is_violated_most_and_no_less_than_with_a_
         assert violation == pytest.approx(max(whole.values()), abs=1e-7)
         assert whole[cut.cluster] == pytest.approx(violation, abs=1e-7)
         assert (cut.inside == inside | (graph.cluster == cut.cluster)).all()
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_where_no_cut_of_whole_clusters_is_found_none_is_violated(seed):
+    """Against all sets of goals; and those that are found are violated, and of whole clusters."""
+    graph = random_graph(seed, goals=6, most=3)
+    legs, costs = first_legs(graph)
+    program = HighsRelaxation(graph.cluster, legs, costs)
+
+    def crossing(goals):
+        inside = np.isin(graph.cluster, goals)[legs]
+        return point.y[inside[:, 0] ^ inside[:, 1]].sum()
+
+    subsets = [s for k in range(1, 7) for s in itertools.combinations(range(1, 7), k)]
+    for _ in range(20):
+        point = program.solve(60.0)
+        cuts = goal_cuts(point.legs, point.y, graph.cluster)
+        least = min(crossing(s) for s in subsets)
+        assert bool(cuts) == (least < 2.0 - VIOLATION)
+        for cut in cuts:
+            goals = np.unique(graph.cluster[cut.inside])
+            assert (cut.inside == np.isin(graph.cluster, goals)).all()
+            assert cut.cluster in goals
+            assert crossing(goals) < 2.0 - VIOLATION
+        if not cuts:
+            return
+        program.add_cuts(cuts)
+    raise AssertionError("no end of cuts")
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -380,6 +414,7 @@ def test_rounded_costs_prove_the_same(monkeypatch, rounded_from):
     plain = solve(travel_graph(problem))
     monkeypatch.setattr(legcosts, "ROUNDED_FROM", rounded_from)
     monkeypatch.setattr(legcosts, "ROWS", 100)
+    monkeypatch.setattr(legcosts, "LEGS", 70)
     monkeypatch.setattr(legcosts, "MEASURE_AT_ONCE", 5)
     monkeypatch.setattr(searching, "MEASURE_AT_ONCE", 5)
     graph = travel_graph(problem)
@@ -397,6 +432,7 @@ def test_rounded_costs_prove_the_same(monkeypatch, rounded_from):
 def test_what_is_measured_of_rounded_costs_is_as_long_as_it_is(monkeypatch):
     monkeypatch.setattr(legcosts, "ROUNDED_FROM", 10)
     monkeypatch.setattr(legcosts, "ROWS", 50)
+    monkeypatch.setattr(legcosts, "LEGS", 30)
     monkeypatch.setattr(legcosts, "MEASURE_AT_ONCE", 5)
     graph = travel_graph(far_world(0, goals=5, tether_length=400.0))
     costs, rng = LegCosts(graph), np.random.default_rng(0)
@@ -582,6 +618,23 @@ def test_what_is_done_with_thousands_of_classes_only_proves_the_same_with_hundre
     assert left
     assert plain.status is lean.status is Status.OPTIMAL
     assert lean.length == pytest.approx(plain.length, rel=2e-6)
+
+
+def test_cuts_of_the_proof_over_goals_stay_in_the_program(monkeypatch):
+    monkeypatch.setattr(sys.modules["netsp.mip.solve"], "MANY_GOALS", 5)
+    monkeypatch.setattr("netsp.mip.cutpool.IDLE", 1)
+    ends = []
+    proven = root.Root.solve
+
+    def prove(self):
+        began = self.lp.pool.for_good.sum()
+        proven(self)
+        ends.append((began, self.lp.pool.for_good.sum(), len(self.lp.pool)))
+
+    monkeypatch.setattr(root.Root, "solve", prove)
+    solve(travel_graph(far_world(1, goals=25, tether_length=300.0)))
+    began, left, cuts = ends[-1]
+    assert 0 < began == left < cuts
 
 
 def test_looking_at_prices_can_be_stopped_half_way():
