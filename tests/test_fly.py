@@ -10,6 +10,7 @@ import sys
 import numpy as np
 import pytest
 
+import netsp.fly.vehicle as linked
 from netsp import Circle, Problem, solve
 from netsp.command.main import main
 from netsp.errors import InputError
@@ -40,11 +41,19 @@ def tour():
     return solve(SITE)
 
 
+@pytest.fixture(autouse=True)
+def patience(monkeypatch):
+    """At `PACE` two seconds of the vehicle are a quarter of one of ours, for which a busy machine
+    holds either end up: only what is about lost links takes that for one."""
+    monkeypatch.setattr(linked, "SILENT_S", 60.0)
+    monkeypatch.setattr(linked, "UNPLACED_S", 60.0)
+
+
 class Flown:
     """An autopilot, and our session with it."""
 
     def __init__(self, arm=True, **how):
-        how = {"pace": PACE, "params": {"FS_GCS_TIMEOUT": 12}, **how}
+        how = {"pace": PACE, "params": {"FS_GCS_TIMEOUT": 60}, **how}
         self.autopilot = Autopilot(**how)
         self.arm, self.pace = arm, how["pace"]
 
@@ -85,7 +94,7 @@ def test_a_vehicle_visits_every_goal_in_the_class_of_the_plan_and_comes_home_fre
     with Flown(noise=0.02, drift=0.03, smooth=1.0) as flown:
         done = flown.fly(tour)
         s = done.summary
-        assert (s["status"], s["visited"], s["home"]) == ("done", 2, True)
+        assert (s["status"], s["visited"], s["home"]) == ("done", 2, True), done.stopped
         assert s["arrivals_as_planned"] == 3
         assert s["tether_free"]
         assert s["exceedance_s"] == 0.0
@@ -151,8 +160,11 @@ def test_a_link_with_nobody_at_the_other_end_is_told(tour):
         ({"do": "silence", "seconds": 60}, "the link is lost"),
     ],
 )
-def test_a_flight_stops_when_the_vehicle_is_not_ours_any_more_and_says_why(tour, what, why):
-    # slow enough that a busy machine does not hold the link up for two of the vehicle's seconds
+def test_a_flight_stops_when_the_vehicle_is_not_ours_any_more_and_says_why(
+    tour, what, why, monkeypatch
+):
+    if what["do"] == "silence":
+        monkeypatch.undo()
     with Flown(pace=3.0) as flown:
         done = flown.fly(tour, on_step=after(6.0, lambda: flown.autopilot.tell(**what)))
         assert done.summary["status"] == "stopped"
@@ -185,7 +197,7 @@ def test_what_appears_in_the_way_is_gone_round(tour):
     with Flown() as flown:
         done = flown.fly(tour, surprises=Surprises.model_validate(told))
         s = done.summary
-        assert (s["status"], s["visited"], s["tether_free"]) == ("done", 1, True)
+        assert (s["status"], s["visited"], s["tether_free"]) == ("done", 1, True), done.stopped
         boat = Circle(center=(3.0, 1.6), radius=0.4)
         late = flown.autopilot.truth()
         assert min(float(boat.signed_distance(p[1:3])) for p in late) > 0.0
@@ -334,7 +346,7 @@ def test_ctrl_c_at_the_command_stops_the_vehicle_offers_the_way_home_and_keeps_t
 def test_a_vehicle_that_is_not_where_it_was_sent_is_stopped(tour, what):
     with Flown() as flown:
         done = flown.fly(tour, on_step=after(8.0, lambda: flown.autopilot.tell(**what)))
-        assert "off its path" in done.stopped
+        assert "off its path" in str(done.stopped)
 
 
 def test_disarming_that_nobody_looked_at_in_time_is_not_forgotten(tour):
@@ -346,10 +358,12 @@ def test_disarming_that_nobody_looked_at_in_time_is_not_forgotten(tour):
 
     with Flown(params={"FS_GCS_ENABLE": 0}) as flown:
         done = flown.fly(tour, on_step=after(6.0, rearm))
-        assert "disarmed" in done.stopped
+        assert "disarmed" in str(done.stopped)
 
 
-def test_a_vehicle_that_tells_no_positions_any_more_is_stopped(tour):
+def test_a_vehicle_that_tells_no_positions_any_more_is_stopped(tour, monkeypatch):
+    monkeypatch.setattr(linked, "UNPLACED_S", 2.0)
+
     def deaf():
         flown.session._listener._local_position_ned = lambda message: None
 
