@@ -14,7 +14,7 @@ import argparse
 from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
-from guard import DRIFT, DT, NOISE, SPEED, drifted, track_of
+from guard_tracks import DRIFT, DT, NOISE, SPEED, drifted, track_of
 from table import head, heading, row
 
 from netsp.guard.fix import Fix

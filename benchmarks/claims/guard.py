@@ -14,7 +14,7 @@ sys.path.insert(0, str(ROOT))
 
 def recordings() -> tuple[str, bool]:
     """Words at the goals of the recorded flights, and no loop told of."""
-    import guard as bench
+    import guard_tracks as bench
     import numpy as np
 
     from netsp.guard.fix import Fix
@@ -90,7 +90,7 @@ def flown() -> tuple[str, bool]:
 
 def in_space() -> tuple[str, bool]:
     """A planned mission, flown, with a guard beside."""
-    from guard import beside_flight
+    from guard_space import beside_flight
     from sites import shipped
 
     from netsp.online.simulate import simulate
@@ -109,7 +109,7 @@ def loops() -> tuple[str, bool]:
     """Loops put into two drives, in noise: those of which nothing is said, and false warnings."""
     from guard import one
 
-    found = [one(("pilot", 5, 4)), one(("bluerov2", 1, 4))]
+    found = [one(("pilot", 5, 4, True)), one(("bluerov2", 1, 4, True))]
     count, silent = sum(o.loops for o in found), sum(o.silent for o in found)
     wrong = sum(o.wrong for o in found)
     return f"{silent} of {count} silent, {wrong} false", count > 0 and not silent + wrong

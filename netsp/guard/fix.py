@@ -27,6 +27,8 @@ class Fix:
         Whether it vouches for the position.
     paid_out : float, optional
         Length of tether that the winch has let out.
+    velocity : (x, y, z), optional
+        As estimated with the position, m/s.
     """
 
     time: float
@@ -36,3 +38,4 @@ class Fix:
     mode: str | None = None
     estimate: bool | None = None
     paid_out: float | None = None
+    velocity: Point3 | None = None

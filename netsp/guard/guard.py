@@ -365,7 +365,8 @@ class Guard:
             *reasons.little_left(site, classes[0]),
             *reasons.soon_short(site, ahead),
             *([] if again else reasons.soon_looped(
-                site, ahead, robot, self._sure, on_plan, classes[0].likely, self.options.noise
+                site, ahead, robot, self._sure, on_plan, classes[0].likely, self.options.noise,
+                reasons.OF_VELOCITIES if self.track.velocities.believed else reasons.OF_PLACES,
             )),
             *reasons.looped(site, loops, robot, share, on_plan),
         ]  # fmt: skip

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from netsp.arrays import Floats
 from netsp.geometry import polylines
@@ -24,14 +25,34 @@ LIKELY, LOOPED, POSSIBLE = 0.8, 0.5, 0.05
 """Shares of the classes in which a loop will close, or has closed: above the first, or second, it
 is spoken of as such, above the third as a possibility, and below not at all."""
 
-LATER = 1.3
-"""For each metre of a position's noise, the share by which a loop is seen to close later than it
-does: a course with noise goes round in a wider circle."""
+ALL = 0.95
+"""Share of the classes that is all of them, but for a rest."""
 
-CLEAR, ALL = 0.6, 0.95
-"""Share that the likeliest class must have for a warning of what is ahead: where it is anybody's
-guess how the tether runs, so is what closes a loop; unless one closes in all of them, but for the
-rest of the second share."""
+
+@dataclass(frozen=True)
+class Course:
+    """How well it is known where the robot is heading.
+
+    Parameters
+    ----------
+    later : float
+        For each metre of a position's noise, the share by which a loop is seen to close later than
+        it does: a course with noise goes round in a wider circle.
+    likely : float
+        Share of the classes in which a loop will close for a warning.
+    clear : float
+        Share that the likeliest class must have for a warning: where it is anybody's guess how the
+        tether runs, so is what closes a loop; unless one closes in `ALL` of them.
+    """
+
+    later: float
+    likely: float
+    clear: float
+
+
+OF_PLACES, OF_VELOCITIES = Course(1.3, LIKELY, 0.6), Course(0.6, 0.7, 0.0)
+"""From where the robot has been alone, and where it tells its velocity, too
+(benchmarks/guard.py)."""
 
 DOUBT = 0.05
 """Share that a second class must have to be worth a word."""
@@ -104,7 +125,7 @@ def soon_short(site: Site, ahead: Ahead) -> list[Alarm]:
 
 def soon_looped(
     site: Site, ahead: Ahead, robot: Floats, share: float = 1.0, on_plan: bool = False,
-    clear: float = 1.0, noise: float = 0.0,
+    clear: float = 1.0, noise: float = 0.0, course: Course = OF_PLACES,
 ) -> list[Alarm]:  # fmt: skip
     """Going on closes a loop, in that share of the classes, the likeliest of which is so clear.
     Where the tether was as planned at the last stop of a tour, the way on is more likely that of
@@ -112,10 +133,11 @@ def soon_looped(
     if ahead.loop_s is None or ahead.loop is None or share < POSSIBLE:
         return []
     limits = TURN_S if ahead.turning else LOOP_S
-    level = _level({v: most * (1.0 + LATER * noise) for v, most in limits.items()}, ahead.loop_s)
+    longer = 1.0 + course.later * noise
+    level = _level({v: most * longer for v, most in limits.items()}, ahead.loop_s)
     if level is None:
         return []
-    if share < LIKELY or (clear < CLEAR and share < ALL) or on_plan:
+    if share < course.likely or (clear < course.clear and share < ALL) or on_plan:
         level = Level.CAUTION
     near = site.nearest(ahead.loop.around, robot)
     keep = site.side_of(near, robot)

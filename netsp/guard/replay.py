@@ -44,8 +44,9 @@ def read_fixes(file: str | Path, frame: Frame, system: int | None = None) -> Ite
     Parameters
     ----------
     file : str or Path
-        A table (columns t or time, x, y, z, or north, east, down; heading, armed, mode, estimate,
-        paid_out where it has them), a ground station's .tlog, or a .bin of ArduPilot.
+        A table (columns t or time, x, y, z, or north, east, down; vx, vy, vz of the same frame,
+        heading, armed, mode, estimate, paid_out where it has them), a ground station's .tlog, or
+        a .bin of ArduPilot.
     frame : Frame
         Of the site.
     system : int, optional
@@ -131,9 +132,13 @@ def _row(row: dict[str, str], frame: Frame, named: bool, where: str) -> Fix:
     if None not in parts:
         a, b, c = (float(v) for v in parts if v is not None)
         place = (a, b, c) if named else frame.from_local(a, b, c)
+    speeds, velocity = [number(c) for c in ("vx", "vy", "vz")], None
+    if None not in speeds:
+        a, b, c = (float(v) for v in speeds if v is not None)
+        velocity = (a, b, c) if named else frame.velocity(a, b, c)
     return Fix(
         time, place, number("heading"), yes("armed"), row.get("mode") or None, yes("estimate"),
-        number("paid_out"),
+        number("paid_out"), velocity,
     )  # fmt: skip
 
 
@@ -210,8 +215,12 @@ def _of_log(log: Any, frame: Frame) -> Iterator[Fix]:
             continue
         if kind == "XKF1":
             north, east, down, yaw = (float(v) for v in (m.PN, m.PE, m.PD, m.Yaw))
-            if all(abs(v) < MOST for v in (north, east, down, yaw, time)):
-                yield Fix(time, position=frame.from_local(north, east, down), heading=yaw % 360.0)
+            speeds = [float(v) for v in (m.VN, m.VE, m.VD)]
+            if all(abs(v) < MOST for v in (north, east, down, yaw, time, *speeds)):
+                yield Fix(
+                    time, position=frame.from_local(north, east, down), heading=yaw % 360.0,
+                    velocity=frame.velocity(*speeds),
+                )  # fmt: skip
         elif kind == "XKF4":
             flags = int(m.SS)
             good = bool(flags & HORIZONTAL) and not flags & (CONSTANT | UNINITIALIZED)

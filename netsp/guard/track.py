@@ -15,6 +15,7 @@ import numpy as np
 
 from netsp.arrays import Floats
 from netsp.guard.fix import Fix
+from netsp.guard.velocities import Velocities
 
 ACCELERATION = 0.15
 """m/s²: standard deviation of what a work-class or smaller vehicle does between two estimates."""
@@ -31,8 +32,13 @@ MOVING = 0.1
 RESTART_S = 10.0
 """Seconds that a vehicle takes to start anew, at least."""
 
-TURN_SPAN = 3.0
-"""Seconds: courses over two spans in a row tell how fast the robot turns."""
+VELOCITY_NOISE = 0.1
+"""m/s: standard deviation of one estimate of a velocity, at ten a second; that of a Doppler log is
+a tenth of it, but a filter without one knows no better."""
+
+TURN_SPAN, SHORT_SPAN = 3.0, 2.0
+"""Seconds: courses over two spans in a row tell how fast the robot turns; the second where its
+velocity is known, too."""
 
 
 @dataclass(frozen=True)
@@ -79,6 +85,7 @@ class Track:
 
     def __init__(self, noise: float, speed: float) -> None:
         self.noise, self.speed = max(noise, 1e-3), speed
+        self.velocities = Velocities(self.noise, speed)
         self.time: float | None = None
         self.frozen = False
         self._state = np.zeros((2, 3))
@@ -112,6 +119,7 @@ class Track:
         self._state = np.array([position, np.zeros(3)])
         self._spread = np.diag([self.noise**2, self.speed**2])
         self._past = deque([(time, position.copy())])
+        self.velocities.begin()
         self.frozen, self._doubt_since = False, None
 
     def shift(self, seconds: float) -> None:
@@ -197,34 +205,46 @@ class Track:
         if lost_s:
             self.begin(fix.time, position)
             return Motion(fix.time, before, position, np.zeros(3), 0.0, lost_s, reason)
-        self._filter(position, dt)
+        self._predict(dt)
+        self._learn(0, position, self.noise)
+        if fix.velocity is not None:
+            velocity = np.array(fix.velocity, dtype=float)
+            self.velocities.take(fix.time, position, velocity)
+            if self.velocities.believed:
+                self._learn(1, velocity, VELOCITY_NOISE)
         self.time = fix.time
         self._past.append((fix.time, self.here))
         while len(self._past) > 2 and fix.time - self._past[1][0] >= 2.0 * TURN_SPAN:
             self._past.popleft()
         return Motion(fix.time, before, self.here, self.velocity, self._turn())
 
-    def _filter(self, position: Floats, dt: float) -> None:
+    def _predict(self, dt: float) -> None:
         step = np.array([[1.0, dt], [0.0, 1.0]])
         shake = ACCELERATION**2 * np.array([[dt**4 / 4.0, dt**3 / 2.0], [dt**3 / 2.0, dt**2]])
         self._state = step @ self._state
         self._spread = step @ self._spread @ step.T + shake * (1.0 / max(dt, 0.1))
-        gain = self._spread[:, 0] / (self._spread[0, 0] + self.noise**2)
-        self._state = self._state + np.outer(gain, position - self._state[0])
-        self._spread = self._spread - np.outer(gain, self._spread[0])
+
+    def _learn(self, k: int, told: Floats, noise: float) -> None:
+        """Of the place (0) or the velocity (1)."""
+        gain = self._spread[:, k] / (self._spread[k, k] + noise**2)
+        self._state = self._state + np.outer(gain, told - self._state[k])
+        self._spread = self._spread - np.outer(gain, self._spread[k])
 
     def _turn(self) -> float:
         """How fast the course changes, over twice the span; 0 where the robot went too little to
         have one."""
+        span = SHORT_SPAN if self.velocities.believed else TURN_SPAN
         now, here = self._past[-1]
         times = np.array([t for t, _ in self._past])
-        if now - times[0] < 1.8 * TURN_SPAN:
+        begin = int(np.searchsorted(times, now - 2.0 * span, side="right")) - 1
+        start = self._past[max(begin, 0)]
+        if now - start[0] < 1.8 * span:
             return 0.0
-        k = int(np.searchsorted(times, now - TURN_SPAN))
+        k = int(np.searchsorted(times, now - span))
         middle = self._past[k][1]
-        first, second = (middle - self._past[0][1])[:2], (here - middle)[:2]
-        least = max(0.3, 2.0 * self.noise) * MOVING * 10.0 * self.speed * TURN_SPAN
-        if min(np.hypot(*first), np.hypot(*second)) < min(least, 0.5 * self.speed * TURN_SPAN):
+        first, second = (middle - start[1])[:2], (here - middle)[:2]
+        least = max(0.3, 2.0 * self.noise) * MOVING * 10.0 * self.speed * span
+        if min(np.hypot(*first), np.hypot(*second)) < min(least, 0.5 * self.speed * span):
             return 0.0
         cross = float(first[0] * second[1] - first[1] * second[0])
-        return math.atan2(cross, float(first @ second)) / TURN_SPAN
+        return math.atan2(cross, float(first @ second)) / span

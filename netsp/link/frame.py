@@ -64,6 +64,11 @@ class Frame:
             -down,
         )
 
+    def velocity(self, north: float, east: float, down: float) -> Point3:
+        """A velocity in the site, of one to the north, east and down."""
+        c, s = self._cos, self._sin
+        return c * east - s * north, s * east + c * north, -down
+
     def to_local(self, place: Point3) -> tuple[float, float, float]:
         """Metres north, east and down of a place in the site."""
         c, s = self._cos, self._sin

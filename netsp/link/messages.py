@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from netsp.fields import Point3
 from netsp.guard.fix import Fix
 from netsp.link.frame import Frame
 from netsp.link.modes import mode_name
@@ -21,6 +22,9 @@ none was yet."""
 
 FARTHEST = 1e7
 """Metres from the base; a place beyond is none."""
+
+FASTEST = 1e3
+"""m/s; a velocity beyond is none."""
 
 
 class Listener:
@@ -83,13 +87,16 @@ class Listener:
     def _local_position_ned(self, m: Any) -> Fix | None:
         if self.frame.is_global:
             return None
-        return self._at(m.x, m.y, m.z)
-
-    def _at(self, north: float, east: float, down: float) -> Fix | None:
         assert self.time is not None
-        if not all(math.isfinite(v) and abs(v) < FARTHEST for v in (north, east, down)):
+        if not all(math.isfinite(v) and abs(v) < FARTHEST for v in (m.x, m.y, m.z)):
             return None
-        return Fix(self.time, position=self.frame.from_local(north, east, down))
+        place = self.frame.from_local(m.x, m.y, m.z)
+        return Fix(self.time, position=place, velocity=self._velocity(m.vx, m.vy, m.vz))
+
+    def _velocity(self, north: float, east: float, down: float) -> Point3 | None:
+        if not all(math.isfinite(v) and abs(v) < FASTEST for v in (north, east, down)):
+            return None
+        return self.frame.velocity(north, east, down)
 
     def _global_position_int(self, m: Any) -> Fix | None:
         assert self.time is not None
@@ -98,7 +105,10 @@ class Listener:
         if abs(m.lat) > 900_000_000 or abs(m.lon) > 1_800_000_000:
             return None
         place = self.frame.from_global(m.lat, m.lon, m.relative_alt / 1000.0)
-        return Fix(self.time, position=place) if all(map(math.isfinite, place)) else None
+        if not all(map(math.isfinite, place)):
+            return None
+        velocity = self._velocity(m.vx / 100.0, m.vy / 100.0, m.vz / 100.0)
+        return Fix(self.time, position=place, velocity=velocity)
 
     def _ekf_status_report(self, m: Any) -> Fix:
         assert self.time is not None
