@@ -32,7 +32,7 @@ from netsp.guard.loops import closed_by, loops_in
 from netsp.guard.memory import restore, save
 from netsp.guard.page import Page
 from netsp.guard.plane import PlaneSite, RayLetters
-from netsp.guard.reasons import soon_looped
+from netsp.guard.reasons import OF_VELOCITIES, soon_looped
 from netsp.guard.replay import read_fixes
 from netsp.guard.site import Loop
 from netsp.guard.stream import replayed
@@ -629,10 +629,23 @@ def test_an_alarm_flickers_neither_on_nor_off():
 def test_a_loop_ahead_is_warned_of_where_it_closes_in_nearly_every_class(
     share, clear, on_plan, level
 ):
+    assert levels_ahead(8.0, share, on_plan, clear) == ([] if level is None else [level])
+
+
+def levels_ahead(seconds, *how, **more):
     line = np.array([[4.0, 0.0], [5.0, 1.0], [6.0, 0.0], [5.0, -1.0], [4.0, 0.0]])
-    ahead = Ahead(loop_s=8.0, loop=Loop((0,), line))
-    told = soon_looped(PlaneSite(SITE), ahead, np.array([4.0, -1.0, 0.0]), share, on_plan, clear)
-    assert [a.level for a in told] == ([] if level is None else [level])
+    ahead = Ahead(loop_s=seconds, loop=Loop((0,), line))
+    told = soon_looped(PlaneSite(SITE), ahead, np.array([4.0, -1.0, 0.0]), *how, **more)
+    return [a.level for a in told]
+
+
+def test_with_velocities_fewer_classes_are_asked_for_and_less_is_added_for_noise():
+    how = {"noise": 0.3, "course": OF_VELOCITIES}
+    assert levels_ahead(8.0, 0.75, False, 0.5, **how) == [Level.WARNING]
+    assert levels_ahead(8.0, 0.65, False, 0.5, **how) == [Level.CAUTION]
+    assert levels_ahead(8.0, 0.75, False, 0.5, noise=0.3) == [Level.CAUTION]
+    assert levels_ahead(25.0, noise=0.3) == [Level.WARNING]  # 20 s × 1.39
+    assert levels_ahead(25.0, **how) == [Level.CAUTION]  # 20 s × 1.18
 
 
 def test_what_is_ahead_in_two_classes_is_half_a_second_old_at_most():

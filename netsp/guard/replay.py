@@ -19,7 +19,7 @@ from netsp.files import MOST_BYTES, check_file, read_bytes
 from netsp.guard.fix import Fix
 from netsp.link.dialect import dialect, parser
 from netsp.link.frame import Frame
-from netsp.link.messages import CONSTANT, HORIZONTAL, UNINITIALIZED, Listener
+from netsp.link.messages import CONSTANT, HORIZONTAL, Listener
 from netsp.link.modes import mode_name
 from netsp.models import shown
 
@@ -186,8 +186,8 @@ def _silence() -> Iterator[None]:
 
 
 def _dataflash(file: Path, frame: Frame) -> Iterator[Fix]:
-    """A log of the vehicle itself: estimates of its first filter (XKF1), its status (XKF4), arming
-    and modes."""
+    """A log of the vehicle itself: estimates of the filter that it goes by, its status, arming,
+    modes and the winch. Filters are those of EKF3 (XKF1, XKF4), or of EKF2 in older vehicles."""
     try:
         from pymavlink.DFReader import DFReader_binary
     except ImportError:
@@ -197,23 +197,30 @@ def _dataflash(file: Path, frame: Frame) -> Iterator[Fix]:
     broken = (OSError, ValueError, TypeError, AttributeError, struct.error, IndexError, KeyError)
     try:
         with _silence():
-            log = DFReader_binary(str(file))
-            found = list(_of_log(log, frame))
+            with contextlib.closing(DFReader_binary(str(file))) as log:
+                found = list(_of_log(log, frame, "XKF"))
+                if all(fix.position is None for fix in found):
+                    log.rewind()
+                    found = list(_of_log(log, frame, "NKF"))
     except broken as error:
         raise InputError(f"--replay: {file}: no log of ArduPilot: {error}") from None
     yield from found
 
 
-def _of_log(log: Any, frame: Frame) -> Iterator[Fix]:
+def _of_log(log: Any, frame: Frame, filters: str) -> Iterator[Fix]:
+    places, status = f"{filters}1", f"{filters}4"
+    primary = 0  # of several that run beside each other
     while True:
-        m = log.recv_match(type=["XKF1", "XKF4", "ARM", "MODE"])
+        m = log.recv_match(type=[places, status, "ARM", "MODE", "WINC"])
         if m is None:
             return
         time = float(m.TimeUS) * 1e-6
         kind = m.get_type()
-        if kind in ("XKF1", "XKF4") and getattr(m, "C", 0) != 0:
+        if kind == status:
+            primary = max(0, int(getattr(m, "PI", 0)))
+        if kind in (places, status) and getattr(m, "C", 0) != primary:
             continue
-        if kind == "XKF1":
+        if kind == places:
             north, east, down, yaw = (float(v) for v in (m.PN, m.PE, m.PD, m.Yaw))
             speeds = [float(v) for v in (m.VN, m.VE, m.VD)]
             if all(abs(v) < MOST for v in (north, east, down, yaw, time, *speeds)):
@@ -221,10 +228,14 @@ def _of_log(log: Any, frame: Frame) -> Iterator[Fix]:
                     time, position=frame.from_local(north, east, down), heading=yaw % 360.0,
                     velocity=frame.velocity(*speeds),
                 )  # fmt: skip
-        elif kind == "XKF4":
+        elif kind == status:
+            # nav_filter_status: the first bits are those of EKF_STATUS_REPORT, but the one that
+            # says there that nothing is known yet is here set for good once the vehicle has turned
             flags = int(m.SS)
-            good = bool(flags & HORIZONTAL) and not flags & (CONSTANT | UNINITIALIZED)
-            yield Fix(time, estimate=good)
+            yield Fix(time, estimate=bool(flags & HORIZONTAL) and not flags & CONSTANT)
+        elif kind == "WINC":
+            if 0.0 <= float(m.Len) < MOST:
+                yield Fix(time, paid_out=float(m.Len))
         elif kind == "ARM":
             yield Fix(time, armed=bool(m.ArmState))
         else:
