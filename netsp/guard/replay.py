@@ -196,12 +196,11 @@ def _dataflash(file: Path, frame: Frame) -> Iterator[Fix]:
         ) from None
     broken = (OSError, ValueError, TypeError, AttributeError, struct.error, IndexError, KeyError)
     try:
-        with _silence():
-            with contextlib.closing(DFReader_binary(str(file))) as log:
-                found = list(_of_log(log, frame, "XKF"))
-                if all(fix.position is None for fix in found):
-                    log.rewind()
-                    found = list(_of_log(log, frame, "NKF"))
+        with _silence(), contextlib.closing(DFReader_binary(str(file))) as log:
+            found = list(_of_log(log, frame, "XKF"))
+            if all(fix.position is None for fix in found):
+                log.rewind()
+                found = list(_of_log(log, frame, "NKF"))
     except broken as error:
         raise InputError(f"--replay: {file}: no log of ArduPilot: {error}") from None
     yield from found
