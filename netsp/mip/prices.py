@@ -159,6 +159,13 @@ class Prices:
 
 
 @kernel
+def _reduced(u: int, v: int, shared: float, terms: Terms) -> float:
+    """r_uv, the same as r_vu."""
+    bitten = terms.bitten[terms.cluster[u], terms.cluster[v]]
+    return float(terms.costs[u, v] - (terms.degree[u] + terms.degree[v]) + shared - bitten)
+
+
+@kernel
 def _row(u: int, terms: Terms, other: Ints, price: Floats, room: Floats) -> int:
     """How many legs at u are not dead, and the first so many of `other` and `price`: their other
     ends, ascending, and reduced costs. `room` has one place for each vertex or cut and is zero
@@ -176,7 +183,6 @@ def _row(u: int, terms: Terms, other: Ints, price: Floats, room: Floats) -> int:
     cuts = terms.cut_at[terms.first_at[u] : terms.first_at[u + 1]]
     for k in cuts:
         work -= terms.first_member[k + 1] - terms.first_member[k]
-    bitten = terms.bitten[terms.cluster[u]]
     if work > 0:
         for k in cuts:
             for v in terms.member[terms.first_member[k] : terms.first_member[k + 1]]:
@@ -192,10 +198,7 @@ def _row(u: int, terms: Terms, other: Ints, price: Floats, room: Floats) -> int:
         else:
             for k in terms.cut_at[terms.first_at[v] : terms.first_at[v + 1]]:
                 shared += room[k]
-        price[i] = (
-            terms.costs[u, v] - (terms.degree[u] + terms.degree[v])
-            + shared - bitten[terms.cluster[v]]
-        )  # fmt: skip
+        price[i] = _reduced(u, v, shared, terms)
     if work > 0:
         for k in cuts:
             for v in terms.member[terms.first_member[k] : terms.first_member[k + 1]]:
@@ -283,8 +286,5 @@ def _of(legs: Ints, terms: Terms) -> Floats:
                 shared += terms.weight[a]
             i += a <= b
             j += b <= a
-        out[k] = (
-            terms.costs[u, v] - (terms.degree[u] + terms.degree[v])
-            + shared - terms.bitten[terms.cluster[u], terms.cluster[v]]
-        )  # fmt: skip
+        out[k] = _reduced(u, v, shared, terms)
     return out

@@ -183,7 +183,8 @@ class Root:
         self.lp = relaxation(costs.cluster, legs, costs.of(legs))
         if warm is not None:
             self.lp.add_cuts(warm.cuts_over(costs))
-        # whatever the classes, the LP is no lower with these than the goals' own
+        # with these, and those of pairs that `goal_cuts` finds, the LP does not fall below the
+        # goals' own, whatever the classes
         goals = [replace(c, inside=c.inside[costs.cluster]) for c in over_goals]
         self.lp.add_cuts(goals, for_good=True)
         self.point: Point | None = None
