@@ -124,6 +124,38 @@ def test_older_vehicles_log_their_older_filter(tmp_path):
     assert fixes[1].position == pytest.approx((2.0, 1.0, -3.0))
 
 
+@pytest.mark.parametrize("core", [-1, 5])
+def test_a_filter_that_is_not_logged_leaves_the_first(tmp_path, core):
+    fixes = read(tmp_path, status(1.0, GOOD, primary=core), place(2.0, 1.0, 0.0, 0.0))
+    assert [f.estimate for f in fixes] == [True, None]
+    assert fixes[1].position == pytest.approx((0.0, 1.0, 0.0))
+
+
+def test_where_the_newer_filter_knows_nothing_the_older_counts(tmp_path):
+    fixes = read(
+        tmp_path, place(1.0, np.nan, 0.0, 0.0), place(2.0, 1.0, 0.0, 0.0, name="NKF1"),
+    )  # fmt: skip
+    assert [f.time for f in fixes if f.position is not None] == [2.0]
+
+
+def test_a_place_is_kept_when_its_velocity_is_none(tmp_path):
+    for v in ((np.nan, 0.0, 0.0), (0.0, np.inf, 0.0), (0.0, 0.0, np.nan)):
+        (fix,) = read(tmp_path, place(1.0, 1.0, 2.0, 3.0, velocity=v))
+        assert fix.position == pytest.approx((2.0, 1.0, -3.0))
+        assert fix.velocity is None
+
+
+def test_formats_that_are_damaged_and_columns_that_are_missing_are_told(tmp_path):
+    file = tmp_path / "log.bin"
+    rows = place(1.0, 1.0, 2.0, 3.0)
+    file.write_bytes(header().replace(b"QBccCfffffffccce", b"QBccCfff!fffccce", 1) + rows)
+    with pytest.raises(InputError, match="no log of ArduPilot"):
+        list(read_fixes(file, Frame(SITE)))
+    file.write_bytes(header().replace(b"dPD,PN,PE", b"dPD,QN,PE", 1) + rows)
+    with pytest.raises(InputError, match=r"without its column.*PN"):
+        list(read_fixes(file, Frame(SITE)))
+
+
 def test_a_log_without_places_and_one_cut_short_are_told(tmp_path):
     with pytest.raises(InputError, match="no positions"):
         read(tmp_path, packed("ARM", 10**6, 1, 0, 0, 0))

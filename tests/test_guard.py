@@ -37,7 +37,7 @@ from netsp.guard.replay import read_fixes
 from netsp.guard.site import Loop
 from netsp.guard.stream import replayed
 from netsp.guard.tethers import Strands
-from netsp.guard.track import Motion, Track
+from netsp.guard.track import RESTART_S, Motion, Track
 from netsp.hsignature import concatenate, crossings, signature
 from netsp.link.frame import Frame
 from netsp.link.modes import GUIDED
@@ -630,6 +630,21 @@ def test_a_loop_ahead_is_warned_of_where_it_closes_in_nearly_every_class(
     share, clear, on_plan, level
 ):
     assert levels_ahead(8.0, share, on_plan, clear) == ([] if level is None else [level])
+
+
+@pytest.mark.parametrize("vouched", [True, False])
+def test_after_a_restart_the_robot_may_have_gone_for_ten_seconds_at_least(vouched):
+    guard = Guard(SITE, EXACT)
+    for fix in along((0, 0, 0), (3, 0.9, 0), begin=100.0):
+        guard.take(fix)
+    if not vouched:
+        guard.take(Fix(guard.report.time, estimate=False))
+    before = guard.report.time
+    guard.restarted(Fix(0.5))
+    assert guard.track.silence(0.5) >= RESTART_S
+    motion = guard.track.take(Fix(2.5, (3.0, 0.9, 0.0)))
+    assert before > 100.0
+    assert 12.0 <= motion.lost_s < 13.0
 
 
 def levels_ahead(seconds, *how, **more):

@@ -47,7 +47,7 @@ def test_true_velocities_are_believed_after_some_metres_and_stay_so(seed, wide, 
     turn = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
     velocities, since = Velocities(0.3, 0.5), None
     for t, place, speed in zip(times, places @ turn, speeds @ turn, strict=True):
-        velocities.take(t, place, speed)
+        velocities.take(t, place[:2], speed[:2])
         if velocities.believed and since is None:
             since = t
         assert since is None or velocities.believed
@@ -64,7 +64,7 @@ def test_velocities_by_which_the_vehicle_did_not_go_are_not_believed(wrong):
         times, _, _, places, speeds = drive(40.0, seed=seed)
         velocities = Velocities(0.3, 0.5)
         for t, place, speed in zip(times, places, wrong(speeds), strict=True):
-            velocities.take(t, place, speed)
+            velocities.take(t, place[:2], speed[:2])
             assert not velocities.believed
 
 
@@ -72,7 +72,7 @@ def test_belief_is_lost_when_the_vehicle_goes_otherwise_and_comes_back():
     times, _, _, places, speeds = drive(60.0)
     velocities, believed = Velocities(0.3, 0.5), {}
     for t, place, speed in zip(times, places, speeds, strict=True):
-        velocities.take(t, place, np.zeros(3) if 20.0 <= t < 35.0 else speed)
+        velocities.take(t, place[:2], np.zeros(2) if 20.0 <= t < 35.0 else speed[:2])
         believed[round(t)] = velocities.believed
     assert believed[19]
     assert not believed[26]
@@ -87,6 +87,76 @@ def test_a_vehicle_that_says_zero_whatever_it_does_is_one_that_says_nothing():
         one = silent.take(Fix(t, tuple(place), estimate=True))
         other = zero.take(Fix(t, tuple(place), estimate=True, velocity=(0.0, 0.0, 0.0)))
         assert one.as_row() == other.as_row()
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.3, 1.0, 3.0])
+@pytest.mark.parametrize("speed", [0.05, 0.3, 0.5, 2.0])
+def test_zero_is_never_believed_whatever_the_noise_and_the_speed(noise, speed):
+    for seed in range(5):
+        times, _, _, places, _ = drive(60.0, noise=noise, seed=seed)
+        velocities = Velocities(noise, speed)
+        for t, place in zip(times, places, strict=True):
+            velocities.take(t, place[:2], np.zeros(2))
+            assert not velocities.believed
+
+
+def test_one_that_freezes_at_zero_is_found_out_before_the_place_is_off_by_a_metre():
+    for seed in range(10):
+        times, true, _, places, speeds = drive(30.0, seed=seed)
+        track = Track(0.3, 0.5)
+        for t, place, speed, real in zip(times, places, speeds, true, strict=True):
+            said = np.zeros(3) if t > 20.0 else speed
+            motion = track.take(Fix(t, tuple(place), velocity=tuple(said)))
+            if 19.0 < t < 20.0:
+                assert track.velocities.believed
+            if t > 20.0:
+                assert np.linalg.norm((motion.after - real)[:2]) < 1.0
+        assert not track.velocities.believed
+
+
+@given(
+    seed=st.integers(0, 1000), wrong=st.tuples(st.floats(-100, 100), st.floats(-100, 100)),
+    at=st.floats(8.0, 28.0),
+)  # fmt: skip
+@settings(max_examples=40, deadline=None)
+def test_a_single_wrong_velocity_moves_a_robot_by_centimetres_at_most(seed, wrong, at):
+    times, _, _, places, speeds = drive(30.0, seed=seed)
+    good, bad = Track(0.3, 0.5), Track(0.3, 0.5)
+    k = int(np.searchsorted(times, at))
+    for i, (t, place, speed) in enumerate(zip(times, places, speeds, strict=True)):
+        one = good.take(Fix(t, tuple(place), velocity=tuple(speed)))
+        said = (*wrong, 0.0) if i == k else tuple(speed)
+        other = bad.take(Fix(t, tuple(place), velocity=said))
+        assert np.linalg.norm(one.after - other.after) < 0.1
+        assert np.linalg.norm(one.velocity - other.velocity) < 0.35
+
+
+def test_what_is_said_of_going_up_or_down_has_no_effect():
+    times, _, _, places, speeds = drive(30.0)
+    one, other = Track(0.3, 0.5), Track(0.3, 0.5)
+    for t, place, speed in zip(times, places, speeds, strict=True):
+        a = one.take(Fix(t, tuple(place), velocity=tuple(speed)))
+        b = other.take(Fix(t, tuple(place), velocity=(*speed[:2], 9.0)))
+        assert (a.after == b.after).all()
+        assert (a.velocity == b.velocity).all()
+
+
+@pytest.mark.parametrize("pause", ["gap", "silence", "restart"])
+def test_after_a_pause_velocities_have_to_prove_themselves_again(pause):
+    times, _, _, places, speeds = drive(60.0)
+    track = Track(0.3, 0.5)
+    for t, place, speed in zip(times, places, speeds, strict=True):
+        if 20.0 <= t < 25.0 and pause == "gap":
+            continue
+        if pause == "restart" and abs(t - 20.0) < 0.05:
+            track.lose(t)
+        said = None if 20.0 <= t < 25.0 and pause == "silence" else tuple(speed)
+        track.take(Fix(t, tuple(place), velocity=said))
+        if 19.0 < t < 19.5:
+            assert track.velocities.believed
+        if 23.0 < t < 24.0 or (25.0 <= t < 26.0 and pause != "restart"):
+            assert not track.velocities.believed
+    assert track.velocities.believed
 
 
 def test_with_velocities_a_course_and_its_turning_are_known_better_and_sooner():
@@ -148,7 +218,7 @@ def test_messages_tell_velocities_with_places_and_nonsense_is_none():
 def test_tables_tell_velocities_in_the_frame_of_their_places(tmp_path):
     for columns, expected in (
         ("t,x,y,z,vx,vy,vz", (1.0, 2.0, 3.0)), ("t,north,east,down,vx,vy,vz", (2.0, 1.0, -3.0)),
-        ("t,x,y,z,vx,vy", None),
+        ("t,x,y,z,vx,vy", (1.0, 2.0, 0.0)), ("t,x,y,z,vx", None),
     ):  # fmt: skip
         file = tmp_path / "a.csv"
         row = ["0", "0", "0", "0", "1", "2", "3"][: columns.count(",") + 1]

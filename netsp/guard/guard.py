@@ -239,7 +239,7 @@ class Guard:
             self._previous = replace(self._previous, time=self._previous.time - shift)
         self.alarms = Alarms()
         self._seen = self._looked = -np.inf
-        self.track.lose(fix.time)
+        self.track.lose(fix.time if self.track.time is None else self.track.time)
         self._vouched = None
         return self.take(fix)
 

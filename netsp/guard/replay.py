@@ -10,7 +10,7 @@ import math
 import os
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -132,10 +132,11 @@ def _row(row: dict[str, str], frame: Frame, named: bool, where: str) -> Fix:
     if None not in parts:
         a, b, c = (float(v) for v in parts if v is not None)
         place = (a, b, c) if named else frame.from_local(a, b, c)
-    speeds, velocity = [number(c) for c in ("vx", "vy", "vz")], None
-    if None not in speeds:
-        a, b, c = (float(v) for v in speeds if v is not None)
-        velocity = (a, b, c) if named else frame.velocity(a, b, c)
+    first, second, third = (number(column) for column in ("vx", "vy", "vz"))
+    velocity = None
+    if first is not None and second is not None:
+        there = (first, second, third or 0.0)
+        velocity = there if named else frame.velocity(*there)
     return Fix(
         time, place, number("heading"), yes("armed"), row.get("mode") or None, yes("estimate"),
         number("paid_out"), velocity,
@@ -194,48 +195,73 @@ def _dataflash(file: Path, frame: Frame) -> Iterator[Fix]:
         raise InputError(
             "--replay: a .bin needs pymavlink; install it with: pip install 'netsp[mavlink]'"
         ) from None
-    broken = (OSError, ValueError, TypeError, AttributeError, struct.error, IndexError, KeyError)
+    kinds = ["XKF1", "XKF4", "NKF1", "NKF4", "ARM", "MODE", "WINC"]
+    log = DFReader_binary.__new__(DFReader_binary)  # which leaves its file open when it fails
     try:
-        with _silence(), contextlib.closing(DFReader_binary(str(file))) as log:
-            found = list(_of_log(log, frame, "XKF"))
-            if all(fix.position is None for fix in found):
-                log.rewind()
-                found = list(_of_log(log, frame, "NKF"))
-    except broken as error:
+        with _silence():
+            DFReader_binary.__init__(log, str(file))
+            messages = list(iter(lambda: log.recv_match(type=kinds), None))
+    except Exception as error:  # it raises just that where a format is damaged
+        raise InputError(f"--replay: {file}: no log of ArduPilot: {error}") from None
+    finally:
+        for part in ("data_map", "filehandle"):
+            with contextlib.suppress(AttributeError, BufferError):
+                getattr(log, part).close()
+    try:
+        found = _of_log(messages, frame, "XKF")
+        if all(fix.position is None for fix in found):
+            found = _of_log(messages, frame, "NKF")
+    except AttributeError as error:
+        raise InputError(
+            f"--replay: {file}: a message without its column {shown(str(error))}"
+        ) from None
+    except (ValueError, TypeError, OverflowError) as error:
         raise InputError(f"--replay: {file}: no log of ArduPilot: {error}") from None
     yield from found
 
 
-def _of_log(log: Any, frame: Frame, filters: str) -> Iterator[Fix]:
+def _of_log(messages: Sequence[Any], frame: Frame, filters: str) -> list[Fix]:
+    """Of several filters that run beside each other the one that the vehicle goes by counts, if it
+    is logged. Older vehicles log the first one only under these names, and do not number it."""
     places, status = f"{filters}1", f"{filters}4"
-    primary = 0  # of several that run beside each other
-    while True:
-        m = log.recv_match(type=[places, status, "ARM", "MODE", "WINC"])
-        if m is None:
-            return
-        time = float(m.TimeUS) * 1e-6
-        kind = m.get_type()
-        if kind == status:
-            primary = max(0, int(getattr(m, "PI", 0)))
-        if kind in (places, status) and getattr(m, "C", 0) != primary:
+    logged = {int(getattr(m, "C", 0)) for m in messages if m.get_type() == places}
+    primary, found = 0, []
+    for m in messages:
+        kind, time = m.get_type(), float(m.TimeUS) * 1e-6
+        if not abs(time) < MOST:
             continue
-        if kind == places:
-            north, east, down, yaw = (float(v) for v in (m.PN, m.PE, m.PD, m.Yaw))
-            speeds = [float(v) for v in (m.VN, m.VE, m.VD)]
-            if all(abs(v) < MOST for v in (north, east, down, yaw, time, *speeds)):
-                yield Fix(
-                    time, position=frame.from_local(north, east, down), heading=yaw % 360.0,
-                    velocity=frame.velocity(*speeds),
-                )  # fmt: skip
-        elif kind == status:
-            # nav_filter_status: the first bits are those of EKF_STATUS_REPORT, but the one that
-            # says there that nothing is known yet is here set for good once the vehicle has turned
-            flags = int(m.SS)
-            yield Fix(time, estimate=bool(flags & HORIZONTAL) and not flags & CONSTANT)
-        elif kind == "WINC":
-            if 0.0 <= float(m.Len) < MOST:
-                yield Fix(time, paid_out=float(m.Len))
-        elif kind == "ARM":
-            yield Fix(time, armed=bool(m.ArmState))
-        else:
-            yield Fix(time, mode=mode_name(int(m.ModeNum)))
+        if kind == status and int(getattr(m, "PI", 0)) in logged:
+            primary = int(getattr(m, "PI", 0))
+        if kind in (places, status) and getattr(m, "C", primary) != primary:
+            continue
+        fix = _of_message(m, kind, time, frame, places, status)
+        if fix is not None:
+            found.append(fix)
+    return found
+
+
+def _of_message(
+    m: Any, kind: str, time: float, frame: Frame, places: str, status: str
+) -> Fix | None:  # fmt: skip
+    if kind == places:
+        at, speeds = ([float(v) for v in some] for some in ((m.PN, m.PE, m.PD), (m.VN, m.VE, m.VD)))
+        if not all(abs(v) < MOST for v in at):
+            return None
+        right = all(abs(v) < MOST for v in speeds)
+        return Fix(
+            time, position=frame.from_local(*at),
+            heading=float(m.Yaw) % 360.0 if abs(float(m.Yaw)) < MOST else None,
+            velocity=frame.velocity(*speeds) if right else None,
+        )  # fmt: skip
+    if kind == status:
+        # nav_filter_status: the first bits are those of EKF_STATUS_REPORT, but the one that says
+        # there that nothing is known yet is here set for good once the vehicle has turned
+        flags = int(m.SS)
+        return Fix(time, estimate=bool(flags & HORIZONTAL) and not flags & CONSTANT)
+    if kind == "WINC":
+        return Fix(time, paid_out=float(m.Len)) if 0.0 <= float(m.Len) < MOST else None
+    if kind == "ARM":
+        return Fix(time, armed=bool(m.ArmState))
+    if kind == "MODE":
+        return Fix(time, mode=mode_name(int(m.ModeNum)))
+    return None  # of the other family of filters

@@ -15,7 +15,7 @@ import numpy as np
 
 from netsp.arrays import Floats
 from netsp.guard.fix import Fix
-from netsp.guard.velocities import Velocities
+from netsp.guard.velocities import NOISE, Velocities
 
 ACCELERATION = 0.15
 """m/s²: standard deviation of what a work-class or smaller vehicle does between two estimates."""
@@ -32,9 +32,12 @@ MOVING = 0.1
 RESTART_S = 10.0
 """Seconds that a vehicle takes to start anew, at least."""
 
-VELOCITY_NOISE = 0.1
-"""m/s: standard deviation of one estimate of a velocity, at ten a second; that of a Doppler log is
-a tenth of it, but a filter without one knows no better."""
+PLAN, DEPTH = range(2)
+AXES = (slice(0, 2), slice(2, 3))
+"""What is filtered alike: velocities are learned of in the plan alone."""
+
+ODD = 4.0
+"""Deviations from what is expected beyond which a velocity is not learned of."""
 
 TURN_SPAN, SHORT_SPAN = 3.0, 2.0
 """Seconds: courses over two spans in a row tell how fast the robot turns; the second where its
@@ -89,7 +92,7 @@ class Track:
         self.time: float | None = None
         self.frozen = False
         self._state = np.zeros((2, 3))
-        self._spread = np.zeros((2, 2))
+        self._spread = np.zeros((2, 2, 2))
         self._last: Floats | None = None
         self._same_since, self._was_moving = 0.0, False
         self._doubt_since: float | None = None
@@ -117,7 +120,7 @@ class Track:
         """
         self.time, self._last, self._same_since = time, position, time
         self._state = np.array([position, np.zeros(3)])
-        self._spread = np.diag([self.noise**2, self.speed**2])
+        self._spread = np.array([np.diag([self.noise**2, self.speed**2])] * 2)
         self._past = deque([(time, position.copy())])
         self.velocities.begin()
         self.frozen, self._doubt_since = False, None
@@ -132,6 +135,8 @@ class Track:
         """
         if self.time is not None:
             self.time += seconds - RESTART_S
+        if self._doubt_since is not None:
+            self._doubt_since += seconds - RESTART_S
 
     def lose(self, time: float) -> None:
         """The vehicle does not vouch for its estimates any more.
@@ -206,12 +211,12 @@ class Track:
             self.begin(fix.time, position)
             return Motion(fix.time, before, position, np.zeros(3), 0.0, lost_s, reason)
         self._predict(dt)
-        self._learn(0, position, self.noise)
-        if fix.velocity is not None:
-            velocity = np.array(fix.velocity, dtype=float)
-            self.velocities.take(fix.time, position, velocity)
-            if self.velocities.believed:
-                self._learn(1, velocity, VELOCITY_NOISE)
+        for part in (PLAN, DEPTH):
+            self._learn(part, 0, position[AXES[part]], self.noise)
+        if fix.velocity is None:
+            self.velocities.note_none(fix.time)
+        else:
+            self._learn_velocity(fix.time, position[:2], np.array(fix.velocity[:2], dtype=float))
         self.time = fix.time
         self._past.append((fix.time, self.here))
         while len(self._past) > 2 and fix.time - self._past[1][0] >= 2.0 * TURN_SPAN:
@@ -224,11 +229,25 @@ class Track:
         self._state = step @ self._state
         self._spread = step @ self._spread @ step.T + shake * (1.0 / max(dt, 0.1))
 
-    def _learn(self, k: int, told: Floats, noise: float) -> None:
-        """Of the place (0) or the velocity (1)."""
-        gain = self._spread[:, k] / (self._spread[k, k] + noise**2)
-        self._state = self._state + np.outer(gain, told - self._state[k])
-        self._spread = self._spread - np.outer(gain, self._spread[k])
+    def _learn(self, part: int, k: int, told: Floats, noise: float) -> None:
+        """Of the place (k = 0) or the velocity (1), in the plan or in depth."""
+        spread, axes = self._spread[part], AXES[part]
+        gain = spread[:, k] / (spread[k, k] + noise**2)
+        self._state[:, axes] += np.outer(gain, told - self._state[k, axes])
+        self._spread[part] = spread - np.outer(gain, spread[k])
+
+    def _learn_velocity(self, time: float, place: Floats, velocity: Floats) -> None:
+        """Of one that the robot can have, if such ones are believed; a single one that is far from
+        what is expected is as likely an error of the link."""
+        velocities = self.velocities
+        if not velocities.possible(velocity):
+            velocities.note_none(time)
+            return
+        velocities.take(time, place, velocity)
+        off = float(np.abs(velocity - self._state[1, :2]).max())
+        odd = off > ODD * math.hypot(math.sqrt(self._spread[PLAN, 1, 1]), NOISE)
+        if velocities.believed and not odd:
+            self._learn(PLAN, 1, velocity, NOISE)
 
     def _turn(self) -> float:
         """How fast the course changes, over twice the span; 0 where the robot went too little to
