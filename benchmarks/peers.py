@@ -51,7 +51,7 @@ def raw(backend: str) -> Callable[[TravelGraph, float], Outcome]:
 
     def run(graph: TravelGraph, limit: float) -> Outcome:
         from netsp.mip.cbc_program import CbcInteger
-        from netsp.mip.highs import HighsInteger
+        from netsp.mip.highs_integer import HighsInteger
         from netsp.mip.subtours import component_cuts
 
         legs = np.argwhere(np.triu(np.isfinite(graph.costs), 1))

@@ -119,8 +119,12 @@ class Prices:
             return
         terms = self._terms
         above = terms.vertex - self._cheapest[terms.cluster]
-        self._by_rows(lambda a, b: _rule_out(a, b, terms, above, missing), self._size)
-        gone = self._cost - self._cheapest[terms.cluster] > missing
+        excess = self._cost - self._cheapest[terms.cluster]
+        way, other_way, before = _ways(terms, excess, missing)
+        self._by_rows(
+            lambda a, b: _rule_out(a, b, terms, above, way, other_way, before, missing), self._size
+        )
+        gone = (excess > missing) | (way + other_way > missing + excess)
         gone[0] = False
         terms.dead[gone] = True
         terms.dead[:, gone] = True
@@ -234,13 +238,59 @@ def _scan(first: int, last: int, terms: Terms, longest: Floats) -> None:
 
 
 @kernel
-def _rule_out(first: int, last: int, terms: Terms, above: Floats, missing: float) -> None:
+def _beyond(u: int, v: int, price: float, terms: Terms) -> float:
+    """What a leg costs its ends more than the second cheapest of theirs."""
+    return 0.5 * (max(price - terms.second[u], 0.0) + max(price - terms.second[v], 0.0))
+
+
+@kernel
+def _ways(terms: Terms, excess: Floats, missing: float) -> tuple[Floats, Floats, Ints]:
+    """(V,) the least that a way from the base to a vertex costs above the bound, that of a way whose
+    last leg is another, and the vertex before it on the first; inf where that is more than what is
+    missing. Dijkstra's algorithm: nothing on a way is negative."""
+    n = len(terms.cluster)
+    way, other_way = np.full(n, np.inf), np.full(n, np.inf)
+    before = np.full(n, -1, np.int64)
+    done = np.zeros(n, np.bool_)
+    other, price, room = _rooms(terms)
+    way[0] = other_way[0] = 0.0
+    while True:
+        u, least = -1, np.inf
+        for v in range(n):
+            if not done[v] and way[v] < least:
+                u, least = v, way[v]
+        if u < 0 or least > missing:
+            break
+        done[u] = True
+        for i in range(_row(u, terms, other, price, room)):
+            v = other[i]
+            if v == 0:
+                continue
+            new = least + _beyond(u, v, price[i], terms) + excess[v]
+            if new < way[v]:
+                way[v], other_way[v], before[v] = new, way[v], u
+            elif new < other_way[v]:
+                other_way[v] = new
+    return way, other_way, before
+
+
+@kernel
+def _rule_out(
+    first: int, last: int, terms: Terms, above: Floats, way: Floats, other_way: Floats,
+    before: Ints, missing: float,
+) -> None:  # fmt: skip
     """Mark the legs whose ends cost more than what is missing if they are used: an end pays for
-    half of the leg, and half of its cheapest other one."""
+    half of the leg, and half of its cheapest other one; or to which and from which the ways cost as
+    much."""
     other, price, room = _rooms(terms)
     for u in range(first, last):
         for i in range(_row(u, terms, other, price, room)):
             v, r = other[i], price[i]
+            there = other_way[u] if before[u] == v else way[u]
+            home = other_way[v] if before[v] == u else way[v]
+            if there + _beyond(u, v, r, terms) + home > missing:
+                terms.dead[u, v] = True
+                continue
             on = terms.second[u] if r <= terms.least[u] else terms.least[u]
             back = terms.second[v] if r <= terms.least[v] else terms.least[v]
             if above[u] + above[v] + r + 0.5 * (on + back) > missing:

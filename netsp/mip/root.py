@@ -59,6 +59,10 @@ FAR = 1.5
 """What a look with a bound that is so many times farther from the incumbent than the best one would
 rule out is not worth its time."""
 
+MEASURED_AT = 3_000_000
+"""So few legs are left to be measured that it takes some seconds: what bounds of them miss, the
+bound of all tours misses."""
+
 USED = 0.05
 """Legs that a point uses that much are measured."""
 
@@ -127,19 +131,25 @@ class Warm:
     measured: Ints
 
     def cuts_over(self, costs: LegCosts) -> list[Cut]:
-        """The cuts over all vertices left: a vertex that is not in the program goes with the one
-        there that is nearest, or with its cluster where the set must be a union of clusters. A cut
-        of (4) holds for any set without the base: all that a poor choice loses is strength."""
+        """The cuts over all vertices left, each in up to two ways: a vertex that is not in the
+        program goes with the one there that is nearest, or with the nearest of its cluster; where
+        the set must be a union of clusters, with its cluster. A cut of (4) holds for any set
+        without the base: all that a poor choice loses is strength."""
         place = np.searchsorted(costs.vertices, self.vertices)
+        cluster, held = costs.cluster, costs.cluster[place]
         near = np.argmin(costs.values[:, place], axis=1)
-        near[place] = np.arange(len(place))
-        one_of = np.zeros(int(costs.cluster.max()) + 1, dtype=np.int64)
-        one_of[costs.cluster[place]] = np.arange(len(place))
-        whole = one_of[costs.cluster]
-        return [
-            replace(c, inside=c.inside[whole if c.teeth else near] | (costs.cluster == c.cluster))
-            for c in self.cuts
-        ]
+        akin = np.empty_like(near)
+        for c in range(int(cluster.max()) + 1):
+            own, there = np.flatnonzero(cluster == c), np.flatnonzero(held == c)
+            # legs within a cluster are inf: the vertex of it nearest to the base, then
+            akin[own] = there[np.argmin(costs.values[0, place[there]])]
+        near[place] = akin[place] = np.arange(len(place))
+        out: dict[tuple[bytes, object], Cut] = {}
+        for goes_with in (near, akin):
+            for c in self.cuts:
+                inside = c.inside[akin if c.teeth else goes_with] | (cluster == c.cluster)
+                out.setdefault((inside.tobytes(), c.teeth), replace(c, inside=inside))
+        return list(out.values())
 
     def legs_over(self, costs: LegCosts) -> Ints:
         """(k, 2) rows of its legs."""
@@ -332,17 +342,32 @@ class Root:
         if run.done:
             return False
         missing = run.cutoff - (run.bound or 0.0)
+        longer = False
         if run.cutoff - prices.bound < FAR * missing:
             prices.rule_out(run.cutoff)
+            longer = self._measure_left()
         scale = run.length if run.tour is not None else float(self.costs.values[0, 1:].max())
-        new, longer = self._most_negative(prices, TINY * scale)
+        new, found_longer = self._most_negative(prices, TINY * scale)
         if len(new):
             self.lp.add_legs(new, self.costs.of(new))
-        longer |= self._measure_used(point)
+        longer |= found_longer | self._measure_used(point)
         if lean and len(self.costs) > MANY:
             self._drop_dear(prices.of(self.lp.legs), point)
         self._forget()
         return len(new) > 0 or longer
+
+    def _measure_left(self) -> bool:
+        """Measure all legs that are left, once they are few; whether there were any."""
+        exact = self.costs.exact
+        if exact is None or not self.costs.graph.quick_legs:
+            return False
+        left = ~(self.dead | exact)
+        if np.count_nonzero(left) > 2 * MEASURED_AT:
+            return False
+        if not self.costs.measure_legs(np.argwhere(np.triu(left, 1))):
+            return False
+        self.lp.set_costs(self.costs.of(self.lp.legs))
+        return True
 
     def _measure_used(self, point: Point) -> bool:
         """Measure the legs that the point uses and that are only bounded; whether there were any.
