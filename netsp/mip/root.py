@@ -59,8 +59,8 @@ FAR = 1.5
 """What a look with a bound that is so many times farther from the incumbent than the best one would
 rule out is not worth its time."""
 
-MEASURED_AT = 3_000_000
-"""So few legs are left to be measured that it takes some seconds: what bounds of them miss, the
+MEASURED_AT = 1_000_000
+"""So few legs are left to be measured that it takes a second or two: what bounds of them miss, the
 bound of all tours misses."""
 
 USED = 0.05

@@ -50,7 +50,7 @@ ENOUGH_BESIDE = 10
 worth more for all classes than those beside the tour: with 100 goals at tether 500, 2 % of a gap
 are left where 5 % are; with 60 goals it is the other way round."""
 
-LARGER = 6
+LARGER = 3
 """The core comes first where there are more than so many times as many vertices in all: below that
 it costs more than it saves, and shows no bound meanwhile."""
 
