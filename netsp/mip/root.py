@@ -29,7 +29,7 @@ NEAREST = 4
 PRICED_PER_VERTEX, MOST_PRICED = 3, 3000
 """Most legs per vertex, and in all, that one pricing round brings in."""
 
-PRICE_EVERY, PRICE_SELDOM = 4, 32
+PRICE_EVERY, PRICE_SELDOM = 2, 32
 """Rounds of cuts between two looks at the prices of all legs, unless no cut is found; every look
 that brings hardly a leg and raises the bound by little doubles the first, up to the second."""
 
