@@ -131,6 +131,35 @@ def test_minimum_cuts_are_those_of_networkx(seed):
         assert capacity[inside[tail] ^ inside[head]].sum() == pytest.approx(expected)
 
 
+@pytest.mark.parametrize("seed", range(30))
+def test_the_clusters_with_a_cut_below_enough_are_those_of_networkx(seed):
+    """Whatever was found to have none counts as the sink for those after it."""
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(6, 14))
+    pairs = [e for e in itertools.combinations(range(n), 2) if rng.random() < 0.4]
+    tail, head = (np.array([e[k] for e in pairs], dtype=np.int64) for k in range(2))
+    capacity = rng.uniform(0.1, 1.0, len(pairs))
+    cluster = np.concatenate([[0], rng.integers(1, n, n - 1)])  # most of one vertex, some of more
+    wanted = rng.permutation(np.unique(cluster[1:]))
+    flows = {}
+    for c in wanted.tolist():
+        g = nx.Graph()
+        g.add_nodes_from([*range(n), "s"])
+        for (u, v), w in zip(pairs, capacity, strict=True):
+            g.add_edge(u, v, capacity=w)
+        for v in np.flatnonzero(cluster == c):
+            g.add_edge("s", int(v))
+        flows[c] = nx.maximum_flow_value(g, "s", 0)
+    enough = float(np.median(list(flows.values()))) + 1e-6
+    sets, which, values = min_cuts(n, tail, head, capacity, cluster, 0, wanted, enough)
+    assert set(which.tolist()) == {c for c, flow in flows.items() if flow < enough}
+    for inside, c, value in zip(sets, which.tolist(), values, strict=True):
+        assert value == pytest.approx(flows[c])
+        assert capacity[inside[tail] ^ inside[head]].sum() == pytest.approx(value)
+        assert inside[cluster == c].all()
+        assert not inside[0]
+
+
 def test_branches_are_the_prefixes_of_words():
     words = [(), (1,), (1, 2), (1, 2, 3), (-1,), (-1, 2)]
     found = {tuple(np.flatnonzero(row).tolist()) for row in branches(words)}

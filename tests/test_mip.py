@@ -21,8 +21,9 @@ from netsp.mip.cbc_program import CbcRelaxation
 from netsp.mip.cuts import Cut
 from netsp.mip.highs import HighsRelaxation
 from netsp.mip.overgoals import best_tree
-from netsp.mip.prices import Prices, _row
+from netsp.mip.prices import Prices
 from netsp.mip.program import duals_of_relaxation
+from netsp.mip.reducedcosts import reduced_row
 from netsp.mip.solve import Params
 from netsp.mip.subtours import (
     VIOLATION,
@@ -248,7 +249,7 @@ def row_prices(prices):
     out = np.full((n, n), np.inf)
     other, price, room = np.empty(n, np.int64), np.empty(n), np.zeros(max(n, len(terms.weight)))
     for u in range(n):
-        count = _row(u, terms, other, price, room)
+        count = reduced_row(u, terms, other, price, room)
         out[u, other[:count]] = price[:count]
         assert not room.any()
     return out

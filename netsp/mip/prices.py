@@ -2,11 +2,6 @@
 
 The bound is that of `netsp.mip.bound`. A tour through a given vertex, or along a given leg, pays
 what these cost above the cheapest of their clusters.
-
-Reduced costs are never held. With thousands of classes a matrix of them, and those that are in
-between, would take more memory than the costs themselves, and more time to write than to compute.
-What cuts add to the legs of one vertex is summed up cut by cut, over the sets that it lies in: most
-sets hold few of all vertices, so that takes far less than a product of matrices.
 """
 
 from __future__ import annotations
@@ -14,7 +9,6 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import NamedTuple
 
 import numpy as np
 
@@ -23,37 +17,14 @@ from netsp.compiled.kernel import kernel
 from netsp.mip.bound import least_of_clusters, rounding
 from netsp.mip.cuts import Cut
 from netsp.mip.program import Duals
+from netsp.mip.reducedcosts import Terms, reduced_costs, reduced_row, rooms
+from netsp.mip.ways import beyond, ways_from_base
 
 ROWS = 256
 """Rows of a matrix that a thread works on at a time."""
 
 CHEAPEST = 8
 """Legs of negative reduced cost that are kept for each vertex."""
-
-
-class Terms(NamedTuple):
-    """What a reduced cost is made of, c - π_u - π_v + shared - bitten, for the kernels.
-
-    `shared` is what the cuts that hold both ends cost: those of vertex v are
-    `cut_at[first_at[v] : first_at[v + 1]]`, cut k holds
-    `member[first_member[k] : first_member[k + 1]]`, both ascending, and costs `weight[k]`.
-    `bitten` (m + 1, m + 1) is what teeth that hold both clusters do; `vertex` r_v; `least` and
-    `second` are r_uv of the two cheapest legs of each vertex.
-    """
-
-    costs: Floats
-    dead: Bools
-    cluster: Ints
-    degree: Floats
-    first_at: Ints
-    cut_at: Ints
-    first_member: Ints
-    member: Ints
-    weight: Floats
-    bitten: Floats
-    vertex: Floats
-    least: Floats
-    second: Floats
 
 
 class Prices:
@@ -120,7 +91,7 @@ class Prices:
         terms = self._terms
         above = terms.vertex - self._cheapest[terms.cluster]
         excess = self._cost - self._cheapest[terms.cluster]
-        way, other_way, before = _ways(terms, excess, missing)
+        way, other_way, before = ways_from_base(terms, excess, missing)
         self._by_rows(
             lambda a, b: _rule_out(a, b, terms, above, way, other_way, before, missing), self._size
         )
@@ -146,7 +117,7 @@ class Prices:
 
     def of(self, legs: Ints) -> Floats:
         """(k,) the reduced costs of legs (k, 2)."""
-        return _of(legs, self._terms)
+        return reduced_costs(legs, self._terms)
 
     def _by_rows(self, work: Callable[[int, int], None], count: int) -> None:
         blocks = [(k, min(k + ROWS, count)) for k in range(0, count, ROWS)]
@@ -163,71 +134,13 @@ class Prices:
 
 
 @kernel
-def _reduced(u: int, v: int, shared: float, terms: Terms) -> float:
-    """r_uv, the same as r_vu."""
-    bitten = terms.bitten[terms.cluster[u], terms.cluster[v]]
-    return float(terms.costs[u, v] - (terms.degree[u] + terms.degree[v]) + shared - bitten)
-
-
-@kernel
-def _row(u: int, terms: Terms, other: Ints, price: Floats, room: Floats) -> int:
-    """How many legs at u are not dead, and the first so many of `other` and `price`: their other
-    ends, ascending, and reduced costs. `room` has one place for each vertex or cut and is zero
-    before and after.
-
-    What cuts add is summed over the sets of u, or, where few legs are left, over those of their
-    other ends; the order of the sums is the same, and makes r_uv the same as r_vu.
-    """
-    count, work = 0, 0
-    for v in range(len(terms.cluster)):
-        if not terms.dead[u, v]:
-            other[count] = v
-            count += 1
-            work += terms.first_at[v + 1] - terms.first_at[v]
-    cuts = terms.cut_at[terms.first_at[u] : terms.first_at[u + 1]]
-    for k in cuts:
-        work -= terms.first_member[k + 1] - terms.first_member[k]
-    if work > 0:
-        for k in cuts:
-            for v in terms.member[terms.first_member[k] : terms.first_member[k + 1]]:
-                room[v] += terms.weight[k]
-    else:
-        for k in cuts:
-            room[k] = terms.weight[k]
-    for i in range(count):
-        v = other[i]
-        shared = 0.0
-        if work > 0:
-            shared = room[v]
-        else:
-            for k in terms.cut_at[terms.first_at[v] : terms.first_at[v + 1]]:
-                shared += room[k]
-        price[i] = _reduced(u, v, shared, terms)
-    if work > 0:
-        for k in cuts:
-            for v in terms.member[terms.first_member[k] : terms.first_member[k + 1]]:
-                room[v] = 0.0
-    else:
-        for k in cuts:
-            room[k] = 0.0
-    return count
-
-
-@kernel
-def _rooms(terms: Terms) -> tuple[Ints, Floats, Floats]:
-    """`other`, `price` and `room` of `_row`."""
-    n = len(terms.cluster)
-    return np.empty(n, np.int64), np.empty(n), np.zeros(max(n, len(terms.weight)))
-
-
-@kernel
 def _scan(first: int, last: int, terms: Terms, longest: Floats) -> None:
     """Per row the two least reduced costs, and the largest size of any."""
-    other, price, room = _rooms(terms)
+    other, price, room = rooms(terms)
     for u in range(first, last):
         least = second = np.inf
         size = 0.0
-        for i in range(_row(u, terms, other, price, room)):
+        for i in range(reduced_row(u, terms, other, price, room)):
             r = price[i]
             size = max(size, abs(r))
             if r < least:
@@ -238,43 +151,6 @@ def _scan(first: int, last: int, terms: Terms, longest: Floats) -> None:
 
 
 @kernel
-def _beyond(u: int, v: int, price: float, terms: Terms) -> float:
-    """What a leg costs its ends more than the second cheapest of theirs."""
-    return 0.5 * (max(price - terms.second[u], 0.0) + max(price - terms.second[v], 0.0))
-
-
-@kernel
-def _ways(terms: Terms, excess: Floats, missing: float) -> tuple[Floats, Floats, Ints]:
-    """(V,) the least that a way from the base to a vertex costs above the bound, that of a way whose
-    last leg is another, and the vertex before it on the first; inf where that is more than what is
-    missing. Dijkstra's algorithm: nothing on a way is negative."""
-    n = len(terms.cluster)
-    way, other_way = np.full(n, np.inf), np.full(n, np.inf)
-    before = np.full(n, -1, np.int64)
-    done = np.zeros(n, np.bool_)
-    other, price, room = _rooms(terms)
-    way[0] = other_way[0] = 0.0
-    while True:
-        u, least = -1, np.inf
-        for v in range(n):
-            if not done[v] and way[v] < least:
-                u, least = v, way[v]
-        if u < 0 or least > missing:
-            break
-        done[u] = True
-        for i in range(_row(u, terms, other, price, room)):
-            v = other[i]
-            if v == 0:
-                continue
-            new = least + _beyond(u, v, price[i], terms) + excess[v]
-            if new < way[v]:
-                way[v], other_way[v], before[v] = new, way[v], u
-            elif new < other_way[v]:
-                other_way[v] = new
-    return way, other_way, before
-
-
-@kernel
 def _rule_out(
     first: int, last: int, terms: Terms, above: Floats, way: Floats, other_way: Floats,
     before: Ints, missing: float,
@@ -282,13 +158,13 @@ def _rule_out(
     """Mark the legs whose ends cost more than what is missing if they are used: an end pays for
     half of the leg, and half of its cheapest other one; or to which and from which the ways cost as
     much."""
-    other, price, room = _rooms(terms)
+    other, price, room = rooms(terms)
     for u in range(first, last):
-        for i in range(_row(u, terms, other, price, room)):
+        for i in range(reduced_row(u, terms, other, price, room)):
             v, r = other[i], price[i]
             there = other_way[u] if before[u] == v else way[u]
             home = other_way[v] if before[v] == u else way[v]
-            if there + _beyond(u, v, r, terms) + home > missing:
+            if there + beyond(u, v, r, terms) + home > missing:
                 terms.dead[u, v] = True
                 continue
             on = terms.second[u] if r <= terms.least[u] else terms.least[u]
@@ -303,10 +179,10 @@ def _cheapest(
 ) -> None:  # fmt: skip
     """Per row the legs of least reduced cost, if it is negative, in no order."""
     most = held_at.shape[1]
-    other, price, room = _rooms(terms)
+    other, price, room = rooms(terms)
     for u in rows:
         held, worst = 0, 0
-        for i in range(_row(u, terms, other, price, room)):
+        for i in range(reduced_row(u, terms, other, price, room)):
             r = price[i]
             if r >= -tolerance or (held == most and r >= held_price[u, worst]):
                 continue
@@ -320,21 +196,3 @@ def _cheapest(
                 for k in range(most):
                     if held_price[u, k] > held_price[u, worst]:
                         worst = k
-
-
-@kernel
-def _of(legs: Ints, terms: Terms) -> Floats:
-    """The reduced cost of each leg, as `_row` has it."""
-    out = np.empty(len(legs))
-    for k in range(len(legs)):
-        u, v = legs[k]
-        shared = 0.0
-        i, j = terms.first_at[u], terms.first_at[v]
-        while i < terms.first_at[u + 1] and j < terms.first_at[v + 1]:
-            a, b = terms.cut_at[i], terms.cut_at[j]
-            if a == b:
-                shared += terms.weight[a]
-            i += a <= b
-            j += b <= a
-        out[k] = _reduced(u, v, shared, terms)
-    return out

@@ -18,6 +18,7 @@ class Quiet(highspy.Highs):  # type: ignore[misc]
     soon as callbacks are enabled, which its constructor does."""
 
     def enableCallbacks(self) -> None:
+        """With nothing printed."""
         self.setOptionValue("output_flag", False)
         super().enableCallbacks()
 

@@ -8,7 +8,7 @@ What is ruled out is forgotten, so the rounds get cheaper as the proof gets clos
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,9 +16,11 @@ from netsp.arrays import Bools, Floats, Ints
 from netsp.mip.blossoms import blossom_cuts, shrunk
 from netsp.mip.combs import comb_cuts, tight_sets
 from netsp.mip.cuts import Cut
+from netsp.mip.pace import WORTH, Pace
 from netsp.mip.prices import Prices
 from netsp.mip.program import Point, Relaxation
 from netsp.mip.subtours import branches, fractional_cuts
+from netsp.mip.warm import Warm
 from netsp.solving.legcosts import ROWS, LegCosts, squeezed
 from netsp.solving.run import Stop
 from netsp.solving.searching import SearchingRun
@@ -28,10 +30,6 @@ NEAREST = 4
 
 PRICED_PER_VERTEX, MOST_PRICED = 3, 3000
 """Most legs per vertex, and in all, that one pricing round brings in."""
-
-PRICE_EVERY, PRICE_SELDOM = 2, 32
-"""Rounds of cuts between two looks at the prices of all legs, unless no cut is found; every look
-that brings hardly a leg and raises the bound by little doubles the first, up to the second."""
 
 MIX = 0.6
 """Cuts are first sought between the LP's point and the incumbent: those found there go deeper
@@ -66,8 +64,8 @@ bound of all tours misses."""
 USED = 0.05
 """Legs that a point uses that much are measured."""
 
-PATIENCE, MEASURED_PATIENCE, WORTH = 15, 60, 0.02
-"""On bounds of legs, the root ends when so many looks at the prices closed less than this share of
+PATIENCE, MEASURED_PATIENCE = 15, 60
+"""On bounds of legs, the root ends when so many looks at the prices closed hardly anything of
 the gap; on measured legs it has more patience, for nothing but branching comes after it."""
 
 HARDLY, RISEN = 0.002, 1e-6
@@ -76,84 +74,6 @@ bound has risen if by more than the second share."""
 
 TINY = 1e-9
 """Relative: reduced costs and visits smaller than this are rounding."""
-
-
-@dataclass
-class Pace:
-    """When to look at the prices of all legs, and when to give up.
-
-    Attributes
-    ----------
-    rounds
-        Of the LP since the last look.
-    every
-        So many make the next one due.
-    looks
-        So far.
-    gaps
-        After every look.
-    """
-
-    rounds: int = 0
-    every: int = PRICE_EVERY
-    looks: int = 0
-    gaps: list[float] = field(default_factory=list)
-
-    @property
-    def look_is_due(self) -> bool:
-        """At first, and whenever enough rounds have passed."""
-        return self.rounds % self.every == 0
-
-    def note_look(self, *, idle: bool) -> None:
-        """Looks that bring nothing become seldom."""
-        self.rounds = 1
-        self.looks += 1
-        self.every = min(2 * self.every, PRICE_SELDOM) if idle else PRICE_EVERY
-
-    def stalled(self, gap: float, patience: int) -> bool:
-        """Whether the last so many looks closed hardly anything of the gap."""
-        self.gaps.append(gap)
-        if len(self.gaps) <= patience:
-            return False
-        before = self.gaps[-1 - patience]
-        return before - gap < WORTH * before
-
-
-@dataclass(frozen=True)
-class Warm:
-    """A program over some of the vertices: their numbers in the graph, legs (k, 2) by these
-    numbers, and cuts over the vertices in their order; `measured` are vertices all of whose legs to
-    one another have been measured."""
-
-    vertices: Ints
-    legs: Ints
-    cuts: list[Cut]
-    measured: Ints
-
-    def cuts_over(self, costs: LegCosts) -> list[Cut]:
-        """The cuts over all vertices left, each in up to two ways: a vertex that is not in the
-        program goes with the one there that is nearest, or with the nearest of its cluster; where
-        the set must be a union of clusters, with its cluster. A cut of (4) holds for any set
-        without the base: all that a poor choice loses is strength."""
-        place = np.searchsorted(costs.vertices, self.vertices)
-        cluster, held = costs.cluster, costs.cluster[place]
-        near = np.argmin(costs.values[:, place], axis=1)
-        akin = np.empty_like(near)
-        for c in range(int(cluster.max()) + 1):
-            own, there = np.flatnonzero(cluster == c), np.flatnonzero(held == c)
-            # legs within a cluster are inf: the vertex of it nearest to the base, then
-            akin[own] = there[np.argmin(costs.values[0, place[there]])]
-        near[place] = akin[place] = np.arange(len(place))
-        out: dict[tuple[bytes, object], Cut] = {}
-        for goes_with in (near, akin):
-            for c in self.cuts:
-                inside = c.inside[akin if c.teeth else goes_with] | (cluster == c.cluster)
-                out.setdefault((inside.tobytes(), c.teeth), replace(c, inside=inside))
-        return list(out.values())
-
-    def legs_over(self, costs: LegCosts) -> Ints:
-        """(k, 2) rows of its legs."""
-        return np.searchsorted(costs.vertices, self.legs)
 
 
 class Root:

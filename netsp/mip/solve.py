@@ -21,8 +21,9 @@ from netsp.mip.branching import Tree
 from netsp.mip.cuts import Cut
 from netsp.mip.overgoals import bound_over_goals
 from netsp.mip.program import IntegerProgram, Point
-from netsp.mip.root import Root, Warm, tour_legs
+from netsp.mip.root import Root, tour_legs
 from netsp.mip.subtours import component_cuts, heaviest_walk, tour_from
+from netsp.mip.warm import Warm
 from netsp.solving.legcosts import LegCosts
 from netsp.solving.limits import Limits
 from netsp.solving.run import Stop

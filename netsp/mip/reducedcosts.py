@@ -1,0 +1,117 @@
+"""One leg's reduced cost, and those of all legs at a vertex: kernels over a matrix of costs.
+
+Reduced costs are never held. With thousands of classes a matrix of them, and those that are in
+between, would take more memory than the costs themselves, and more time to write than to compute.
+What cuts add to the legs of one vertex is summed up cut by cut, over the sets that it lies in: most
+sets hold few of all vertices, so that takes far less than a product of matrices.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from netsp.arrays import Bools, Floats, Ints
+from netsp.compiled.kernel import kernel
+
+
+class Terms(NamedTuple):
+    """What a reduced cost is made of, c - π_u - π_v + shared - bitten, for the kernels.
+
+    `shared` is what the cuts that hold both ends cost: those of vertex v are
+    `cut_at[first_at[v] : first_at[v + 1]]`, cut k holds
+    `member[first_member[k] : first_member[k + 1]]`, both ascending, and costs `weight[k]`.
+    `bitten` (m + 1, m + 1) is what teeth that hold both clusters do; `vertex` r_v; `least` and
+    `second` are r_uv of the two cheapest legs of each vertex.
+    """
+
+    costs: Floats
+    dead: Bools
+    cluster: Ints
+    degree: Floats
+    first_at: Ints
+    cut_at: Ints
+    first_member: Ints
+    member: Ints
+    weight: Floats
+    bitten: Floats
+    vertex: Floats
+    least: Floats
+    second: Floats
+
+
+@kernel
+def reduced(u: int, v: int, shared: float, terms: Terms) -> float:
+    """r_uv, the same as r_vu."""
+    bitten = terms.bitten[terms.cluster[u], terms.cluster[v]]
+    return float(terms.costs[u, v] - (terms.degree[u] + terms.degree[v]) + shared - bitten)
+
+
+@kernel
+def reduced_row(u: int, terms: Terms, other: Ints, price: Floats, room: Floats) -> int:
+    """How many legs at u are not dead, and the first so many of `other` and `price`: their other
+    ends, ascending, and reduced costs. `room` has one place for each vertex or cut and is zero
+    before and after.
+
+    What cuts add is summed over the sets of u, or, where few legs are left, over those of their
+    other ends; the order of the sums is the same, and makes r_uv the same as r_vu.
+    """
+    count, work = 0, 0
+    for v in range(len(terms.cluster)):
+        if not terms.dead[u, v]:
+            other[count] = v
+            count += 1
+            work += terms.first_at[v + 1] - terms.first_at[v]
+    cuts = terms.cut_at[terms.first_at[u] : terms.first_at[u + 1]]
+    for k in cuts:
+        work -= terms.first_member[k + 1] - terms.first_member[k]
+    if work > 0:
+        for k in cuts:
+            for v in terms.member[terms.first_member[k] : terms.first_member[k + 1]]:
+                room[v] += terms.weight[k]
+    else:
+        for k in cuts:
+            room[k] = terms.weight[k]
+    for i in range(count):
+        v = other[i]
+        shared = 0.0
+        if work > 0:
+            shared = room[v]
+        else:
+            for k in terms.cut_at[terms.first_at[v] : terms.first_at[v + 1]]:
+                shared += room[k]
+        price[i] = reduced(u, v, shared, terms)
+    if work > 0:
+        for k in cuts:
+            for v in terms.member[terms.first_member[k] : terms.first_member[k + 1]]:
+                room[v] = 0.0
+    else:
+        for k in cuts:
+            room[k] = 0.0
+    return count
+
+
+@kernel
+def rooms(terms: Terms) -> tuple[Ints, Floats, Floats]:
+    """`other`, `price` and `room` of `reduced_row`."""
+    n = len(terms.cluster)
+    return np.empty(n, np.int64), np.empty(n), np.zeros(max(n, len(terms.weight)))
+
+
+@kernel
+def reduced_costs(legs: Ints, terms: Terms) -> Floats:
+    """The reduced cost of each leg, as `reduced_row` has it."""
+    out = np.empty(len(legs))
+    for k in range(len(legs)):
+        u, v = legs[k]
+        shared = 0.0
+        i, j = terms.first_at[u], terms.first_at[v]
+        while i < terms.first_at[u + 1] and j < terms.first_at[v + 1]:
+            a, b = terms.cut_at[i], terms.cut_at[j]
+            if a == b:
+                shared += terms.weight[a]
+            i += a <= b
+            j += b <= a
+        out[k] = reduced(u, v, shared, terms)
+    return out

@@ -1,0 +1,61 @@
+"""What it costs above a bound to get to a vertex from the base.
+
+The bound of `netsp.mip.bound` takes of every vertex two legs of least reduced cost, wherever they
+lead. So it does not see what a tour pays that goes far: on the cover the classes of one sheet lie
+close together, and are left for nothing in the bound of each. But a tour gets there from the base,
+and home again. With r_v + half of the two least r_uv at v, less the least of its cluster, as the
+excess of v, and with s_u the second least r at u,
+
+    length >= bound + Σ over its vertices of their excess
+              + Σ over its legs of half of max(r_uv - s_u, 0) + max(r_uv - s_v, 0):
+
+the two legs at u have r_a + r_b >= l_u + s_u, and more by what each has above s_u. No term is
+negative, so a tour through v pays for a way to v and for another, from v, which takes another leg
+at v; what lies on both is v. That rules out whole sheets long before the LP has the cuts for it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from netsp.arrays import Floats, Ints
+from netsp.compiled.kernel import kernel
+from netsp.mip.reducedcosts import Terms, reduced_row, rooms
+
+
+@kernel
+def beyond(u: int, v: int, price: float, terms: Terms) -> float:
+    """What a leg costs its ends more than the second cheapest of theirs."""
+    above = max(price - terms.second[u], 0.0) + max(price - terms.second[v], 0.0)
+    return float(0.5 * above)
+
+
+@kernel
+def ways_from_base(terms: Terms, excess: Floats, missing: float) -> tuple[Floats, Floats, Ints]:
+    """(V,) the least that a way from the base to a vertex costs above the bound, the least with
+    another last leg, and the vertex before it on the first; inf where that is more than what is
+    missing. Dijkstra's algorithm: nothing on a way is negative."""
+    n = len(terms.cluster)
+    way, other_way = np.full(n, np.inf), np.full(n, np.inf)
+    before = np.full(n, -1, np.int64)
+    done = np.zeros(n, np.bool_)
+    other, price, room = rooms(terms)
+    way[0] = other_way[0] = 0.0
+    while True:
+        u, least = -1, np.inf
+        for v in range(n):
+            if not done[v] and way[v] < least:
+                u, least = v, way[v]
+        if u < 0 or least > missing:
+            break
+        done[u] = True
+        for i in range(reduced_row(u, terms, other, price, room)):
+            v = other[i]
+            if v == 0:
+                continue
+            new = least + beyond(u, v, price[i], terms) + excess[v]
+            if new < way[v]:
+                way[v], other_way[v], before[v] = new, way[v], u
+            elif new < other_way[v]:
+                other_way[v] = new
+    return way, other_way, before
