@@ -277,17 +277,15 @@ class Root:
         return len(new) > 0 or longer
 
     def _measure_left(self) -> bool:
-        """Measure all legs that are left, once they are few; whether there were any."""
+        """Measure all legs that are left, once they are few; whether there were any. Those in the
+        LP are measured already."""
         exact = self.costs.exact
         if exact is None or not self.costs.graph.quick_legs:
             return False
         left = ~(self.dead | exact)
         if np.count_nonzero(left) > 2 * MEASURED_AT:
             return False
-        if not self.costs.measure_legs(np.argwhere(np.triu(left, 1))):
-            return False
-        self.lp.set_costs(self.costs.of(self.lp.legs))
-        return True
+        return self.costs.measure_legs(np.argwhere(np.triu(left, 1)))
 
     def _measure_used(self, point: Point) -> bool:
         """Measure the legs that the point uses and that are only bounded; whether there were any.
