@@ -21,6 +21,7 @@ from netsp.mip.ways import beyond, ways_from_base
 from netsp.solution import Status
 from netsp.solving.legcosts import LegCosts
 from netsp.solving.limits import Limits
+from netsp.solving.run import Stop
 from netsp.worlds import random_world
 from tests.test_blossoms import some_cut
 from tests.test_contract import random_graph
@@ -86,6 +87,22 @@ def test_a_sheet_far_away_is_ruled_out_though_its_legs_cost_nothing(apart, gone)
     assert dead[5:].all() == gone
     assert not dead[0, 1]
     assert not dead[1, 2]
+
+
+def test_the_search_for_ways_can_be_stopped(monkeypatch):
+    costs, cluster = two_sheets(0.4)
+    duals = Duals(np.zeros(5), np.zeros(9), np.zeros(0))
+    asked = []
+
+    def stop():
+        asked.append(1)
+        if len(asked) == 3:
+            raise Stop
+
+    prices = Prices(costs, np.isinf(costs), cluster, [], duals, stop)
+    monkeypatch.setattr("netsp.mip.ways.AT_ONCE", 1)
+    with pytest.raises(Stop):
+        prices.rule_out(prices.bound + 100.0)
 
 
 @pytest.mark.parametrize("seed", range(4))

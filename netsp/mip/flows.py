@@ -26,7 +26,7 @@ def min_cuts(
     without the sink, if that is below `enough`.
 
     Where it is not, and C is a single vertex, that vertex lies in no set below `enough` without the
-    sink, and counts as the sink from then on (Padberg & Rinaldi 1990): most flows have a short way.
+    sink, and counts as the sink from then on (as in Padberg & Rinaldi 1990): flows become short.
 
     Returns (k, n) flags of the sets found, the cluster and the value of each. A source joined to
     each vertex of C without limit makes it one maximum flow; it ends as soon as the flow is enough.
@@ -137,13 +137,13 @@ def min_cuts(
                     depth -= 1
                     v = to[path[depth] ^ 1]
         if flow >= enough:
-            only, others = -1, 0
+            last, count = -1, 0
             for v in range(n):
                 if cluster[v] == c:
-                    only = v
-                    others += 1
-            if others == 1:
-                is_sink[only] = True
+                    last = v
+                    count += 1
+            if count == 1:
+                is_sink[last] = True
             continue
         # level marks what the source still reaches
         some = False

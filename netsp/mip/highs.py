@@ -153,7 +153,7 @@ class HighsRelaxation:
         self.pool.add(cuts, for_good=for_good)
 
     def keep_cuts(self, keep: Bools) -> None:
-        """Take all cuts out of the program but those marked."""
+        """Take the cuts out of the program but those marked, and those that its basis rests on."""
         h = self._highs
         basis = h.getBasis()
         if basis.valid:

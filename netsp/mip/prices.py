@@ -91,7 +91,7 @@ class Prices:
         terms = self._terms
         above = terms.vertex - self._cheapest[terms.cluster]
         excess = self._cost - self._cheapest[terms.cluster]
-        way, other_way, before = ways_from_base(terms, excess, missing)
+        way, other_way, before = ways_from_base(terms, excess, missing, self._check)
         self._by_rows(
             lambda a, b: _rule_out(a, b, terms, above, way, other_way, before, missing), self._size
         )
@@ -164,7 +164,7 @@ def _rule_out(
             v, r = other[i], price[i]
             there = other_way[u] if before[u] == v else way[u]
             home = other_way[v] if before[v] == u else way[v]
-            if there + beyond(u, v, r, terms) + home > missing:
+            if there + home + beyond(u, v, r, terms) > missing:
                 terms.dead[u, v] = True
                 continue
             on = terms.second[u] if r <= terms.least[u] else terms.least[u]

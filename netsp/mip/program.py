@@ -147,7 +147,7 @@ class Relaxation(Protocol):
         """Bring cuts into the program; those that are there for good are never idle."""
 
     def keep_cuts(self, keep: Bools) -> None:
-        """Take all cuts out of the program but those marked."""
+        """Take the cuts out of the program but those marked, and those that its basis rests on."""
 
     def solve(self, limit: TimeLimit) -> Point | None:
         """The optimum with duals; None if there is none or the time ran out."""

@@ -21,7 +21,7 @@ from netsp.mip.prices import Prices
 from netsp.mip.program import Point, Relaxation
 from netsp.mip.subtours import branches, fractional_cuts
 from netsp.mip.warm import Warm
-from netsp.solving.legcosts import ROWS, LegCosts, squeezed
+from netsp.solving.legcosts import LEGS, ROWS, LegCosts, squeezed
 from netsp.solving.run import Stop
 from netsp.solving.searching import SearchingRun
 
@@ -278,14 +278,19 @@ class Root:
 
     def _measure_left(self) -> bool:
         """Measure all legs that are left, once they are few; whether there were any. Those in the
-        LP are measured already."""
+        LP have been measured before."""
         exact = self.costs.exact
         if exact is None or not self.costs.graph.quick_legs:
             return False
         left = ~(self.dead | exact)
         if np.count_nonzero(left) > 2 * MEASURED_AT:
             return False
-        return self.costs.measure_legs(np.argwhere(np.triu(left, 1)))
+        u, v = np.nonzero(left)
+        legs = np.column_stack([u[u < v], v[u < v]])
+        for first in range(0, len(legs), LEGS):
+            self.run.check()
+            self.costs.measure_legs(legs[first : first + LEGS])
+        return len(legs) > 0
 
     def _measure_used(self, point: Point) -> bool:
         """Measure the legs that the point uses and that are only bounded; whether there were any.

@@ -16,11 +16,16 @@ at v; what lies on both is v. That rules out whole sheets long before the LP has
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
-from netsp.arrays import Floats, Ints
+from netsp.arrays import Bools, Floats, Ints
 from netsp.compiled.kernel import kernel
 from netsp.mip.reducedcosts import Terms, reduced_row, rooms
+
+AT_ONCE = 500
+"""Vertices between two looks at the clock."""
 
 
 @kernel
@@ -30,24 +35,41 @@ def beyond(u: int, v: int, price: float, terms: Terms) -> float:
     return float(0.5 * above)
 
 
-@kernel
-def ways_from_base(terms: Terms, excess: Floats, missing: float) -> tuple[Floats, Floats, Ints]:
+def ways_from_base(
+    terms: Terms, excess: Floats, missing: float, check: Callable[[], None] = lambda: None
+) -> tuple[Floats, Floats, Ints]:
     """(V,) the least that a way from the base to a vertex costs above the bound, the least with
-    another last leg, and the vertex before it on the first; inf where that is more than what is
-    missing. Dijkstra's algorithm: nothing on a way is negative."""
+    another last leg, and the vertex before it on the first; something above what is missing where
+    they are more. Dijkstra's algorithm: nothing on a way is negative.
+
+    Parameters
+    ----------
+    check
+        Called every so many vertices; may raise to stop.
+    """
     n = len(terms.cluster)
     way, other_way = np.full(n, np.inf), np.full(n, np.inf)
-    before = np.full(n, -1, np.int64)
-    done = np.zeros(n, np.bool_)
-    other, price, room = rooms(terms)
+    before, done = np.full(n, -1, dtype=np.int64), np.zeros(n, dtype=bool)
     way[0] = other_way[0] = 0.0
-    while True:
+    while _settle(AT_ONCE, terms, excess, missing, way, other_way, before, done):
+        check()
+    return way, other_way, before
+
+
+@kernel
+def _settle(
+    most: int, terms: Terms, excess: Floats, missing: float, way: Floats, other_way: Floats,
+    before: Ints, done: Bools,
+) -> bool:  # fmt: skip
+    """Go on from so many vertices more; whether there may be others."""
+    other, price, room = rooms(terms)
+    for _ in range(most):
         u, least = -1, np.inf
-        for v in range(n):
+        for v in range(len(way)):
             if not done[v] and way[v] < least:
                 u, least = v, way[v]
         if u < 0 or least > missing:
-            break
+            return False
         done[u] = True
         for i in range(reduced_row(u, terms, other, price, room)):
             v = other[i]
@@ -58,4 +80,4 @@ def ways_from_base(terms: Terms, excess: Floats, missing: float) -> tuple[Floats
                 way[v], other_way[v], before[v] = new, way[v], u
             elif new < other_way[v]:
                 other_way[v] = new
-    return way, other_way, before
+    return True
