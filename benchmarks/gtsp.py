@@ -37,7 +37,7 @@ def instance(clusters: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
 
 def clustered(costs: np.ndarray, clusters: int) -> np.ndarray:
     """Cluster of each vertex, by GTSPLIB's rule."""
-    centres = [int(np.argmax(costs)) // len(costs)]
+    centres = [int(np.argmax(costs[0]))]
     while len(centres) < clusters:
         centres.append(int(np.argmax(costs[centres].min(axis=0))))
     of = np.argmin(costs[centres], axis=0)

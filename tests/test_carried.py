@@ -9,7 +9,6 @@ import pytest
 
 from netsp import Circle, Problem, Solution, solve, travel_graph, verify
 from netsp.clock import Clock
-from netsp.roadmap import sought
 from netsp.roadmap.taut import TautRoadmap
 from netsp.solvers import carried
 from netsp.solvers import solve as by_name
@@ -88,19 +87,6 @@ def test_the_same_seed_carries_to_the_same_classes():
 def test_a_whole_graph_is_given_back_as_it_is():
     graph = travel_graph(windfarm(2, 1.1))
     assert with_carried(graph, Clock(), np.random.default_rng(0)).graph is graph
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_legs_sought_within_the_slits_first_are_the_same_legs(monkeypatch, seed):
-    problem = windfarm(3, 1.3, seed)
-    found = TautRoadmap(problem, max_classes=60)
-    some = np.arange(len(found.cluster))
-    quick = found.legs.lengths(some)
-    monkeypatch.setattr(sought, "WORTH", -1.0)  # at once as long as the tethers allow
-    assert (found.legs.lengths(some) == quick).all()
-    monkeypatch.setattr(sought, "WORTH", np.inf)
-    monkeypatch.setattr(sought, "EXCESS", 1e-9)  # hardly any leg is found at first
-    assert (found.legs.lengths(some) == quick).all()
 
 
 def test_ctrl_c_while_classes_are_carried_keeps_the_best_tour(tmp_path):

@@ -52,18 +52,6 @@ def test_hardly_any_path_of_a_random_world_cannot_be_pulled(family):
     assert (lengths < 0.0).mean() < 0.02
 
 
-def test_legs_that_cannot_be_pulled_are_searched_for(monkeypatch):
-    problem = random_world(3, goals=6, obstacles=8, tether_length=330.0)
-    whole = TautRoadmap(problem).to_travel_graph().costs
-
-    def none(here, there, asked, *rest):
-        return int(asked[np.ix_(here, there)].sum())
-
-    monkeypatch.setattr("netsp.roadmap.legs._pulled", none)
-    searched = TautRoadmap(problem).to_travel_graph().costs
-    assert np.allclose(whole, searched, rtol=1e-12, atol=1e-9)
-
-
 def test_few_legs_are_those_of_all():
     roadmap = TautRoadmap(random_world(4, goals=6, obstacles=8, tether_length=330.0))
     vertices = np.arange(len(roadmap.cluster))

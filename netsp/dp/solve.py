@@ -123,6 +123,7 @@ def bound_by_walks(run: SearchingRun, costs: LegCosts, *, few_legs: int = 0) -> 
     direction: Floats = np.zeros(walks.n + 1)
     best, kept, step, vain = -np.inf, prices, STEP, 0
     history: list[tuple[float, int]] = []
+    searched = run.searches_all(costs)
     while not run.done:
         run.check()
         cutoff = run.cutoff
@@ -144,6 +145,9 @@ def bound_by_walks(run: SearchingRun, costs: LegCosts, *, few_legs: int = 0) -> 
             run.update_incumbent([0, *costs.vertices[walk.rows].tolist()])
             walks.set_values(costs.values)
         _forget(run, walks, costs)
+        if not searched and run.searches_all(costs):
+            run.search(costs)
+            searched = True
         run.report("walks", vertices=len(costs), legs=len(costs) * (len(costs) - 1) // 2)
         if whole:
             if measured and not run.done:

@@ -210,9 +210,11 @@ class MipRun(SearchingRun):
         )
         root.solve()
         if not self.done and root.point is not None:
-            used = np.flatnonzero(root.point.x > 1e-6)
+            before, used = self.length, np.flatnonzero(root.point.x > 1e-6)
             self.search(costs, used)
             self.report("heuristic", **root.size())
+            if costs.exact is None and self.length < before:
+                root.solve()
         if not self.done and costs.exact is not None:
             self.check()
             root.measure()
@@ -238,9 +240,9 @@ class MipRun(SearchingRun):
     # incumbents
 
     def round(self, root: Root, point: Point) -> None:
-        """Turn a point of the root into a tour, if all legs are measured; else search among the
-        classes it visits whenever the gap has shrunk to `SEARCH_AGAIN` of what it was."""
-        if root.costs.exact is None:
+        """Turn a point of the root into a tour, if all that is left is searched; else search the
+        classes that it visits whenever the gap has shrunk to `SEARCH_AGAIN` of what it was."""
+        if self.searches_all(root.costs):
             whole = np.abs(point.y - np.rint(point.y)).max(initial=0.0) < 1e-6
             self.tour_at(root.costs, point, whole=whole)
             return

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -37,65 +36,11 @@ SHARE = 0.3
 
 
 @dataclass(frozen=True)
-class TetherTree:
-    """Tethers as paths in a tree of bends, rooted at the base.
-
-    Attributes
-    ----------
-    last
-        (V,) last bend of each vertex's tether.
-    parent, length
-        (bends,) the bend before (-1 at the root), and the length of tether up to the bend.
-    """
-
-    last: Ints
-    parent: Ints
-    length: Floats
-
-    @cached_property
-    def depth(self) -> Ints:
-        """(bends,) bends before each; a bend comes after its parent in the arrays."""
-        depth = np.zeros(len(self.parent), dtype=np.int64)
-        for k in range(1, len(depth)):
-            depth[k] = depth[self.parent[k]] + 1
-        return depth
-
-
-Bends = tuple[tuple[int, float], ...]
-"""A tether as the tangents that it takes, each with the length of tether at its end, but for the
-last, which ends at the goal."""
-
-
-class _GrowingTree:
-    """A tree of bends from tethers one by one."""
-
-    def __init__(self) -> None:
-        self.parent, self.length = [-1], [0.0]
-        # the length, too: a tether that has gone once more around before it takes a tangent has
-        # another bend there
-        self._child: dict[tuple[int, int, float], int] = {}
-
-    def last(self, bends: Bends) -> int:
-        """The last bend of a tether, whose bends are in the tree from now on."""
-        at = 0
-        for tangent, length in bends:
-            found = self._child.get((at, tangent, length))
-            if found is None:
-                found = self._child[at, tangent, length] = len(self.parent)
-                self.parent.append(at)
-                self.length.append(length)
-            at = found
-        return at
-
-
-@dataclass(frozen=True)
 class Classes:
     """Augmented goals, base first: cluster (V,), word and planar tether length of each.
 
     Attributes
     ----------
-    tree
-        Where the tethers part.
     least_left_out
         No class that is not here has a shorter tether (in space); inf if all are here.
     """
@@ -103,7 +48,6 @@ class Classes:
     cluster: Ints
     signatures: list[Word]
     planar: Floats
-    tree: TetherTree
     least_left_out: float = math.inf
 
     @property
@@ -149,7 +93,7 @@ class _Search:
         found = self.clock.interruptible(
             lambda: run_explore(
                 self.paths.tangents, 0, trie, margin=self.paths.outline.margin, rule=self.rule,
-                keep=True, cap=max(1_000_000, STATES_PER_CLASS * self.most),
+                cap=max(1_000_000, STATES_PER_CLASS * self.most),
                 within=self.within, most=4 * self.most + 1000, stop=self.clock.flag,
             )
         )  # fmt: skip
@@ -159,11 +103,8 @@ class _Search:
         missing = sorted(set(range(1, self.goals + 1)) - {g for g, _ in best})
         if missing:
             raise unreached(self.problem, self.paths.outline, missing)
-        order = sorted(best, key=lambda k: (k[0], best[k][0], trie.word(k[1])))
-        last = np.array([0, *(best[k][1] for k in order)], dtype=np.int64)
-        tree = TetherTree(last, found.tree[:, 3], found.tree_length)
-        rows = [(g, best[g, w][0], trie.word(w)) for g, w in order]
-        return _together(rows, tree, math.inf)
+        rows = sorted((g, length, trie.word(w)) for (g, w), length in best.items())
+        return _together(rows, math.inf)
 
     def shortest(self) -> Classes:
         """The shortest classes of every goal, about as many of each; at least one, whatever the
@@ -176,31 +117,24 @@ class _Search:
             raise unreached(self.problem, self.paths.outline, missing)
         rays = self.problem.representative_points - self.paths.outline.origin
         rows: list[tuple[int, float, Word]] = []
-        tree = _GrowingTree()
-        last = [0]
         left_out = math.inf
         for g in range(1, self.goals + 1):
             word = signature(contacts.draw(0, g, before), rays)
-            nearest = (float(planar[g]), word, contacts.bends(0, g, before, planar))
+            nearest = (float(planar[g]), word)
             own, beyond = [nearest], nearest[0]
             if not (self.clock.up or (self.rule == NON_LOOPING and is_looping(nearest[1]))):
                 own, beyond = self._of_goal(g, share)
                 own = own or [nearest]
-            rows += [(g, length, word) for length, word, _ in own]
-            last += [tree.last(bends) for _, _, bends in own]
+            rows += [(g, length, word) for length, word in own]
             left_out = min(left_out, math.hypot(beyond, self.dz[g]))
-        together = TetherTree(
-            np.array(last, dtype=np.int64), np.array(tree.parent, dtype=np.int64),
-            np.array(tree.length),
-        )  # fmt: skip
-        return _together(rows, together, left_out)
+        return _together(rows, left_out)
 
-    def _of_goal(self, g: int, share: int) -> tuple[list[tuple[float, Word, Bends]], float]:
+    def _of_goal(self, g: int, share: int) -> tuple[list[tuple[float, Word]], float]:
         """The shortest classes of one goal, in order, and the planar length up to which they are
         all (inf if there are no more within the tether)."""
         rest = self.paths.contacts.rest(g)
         least, most = float(rest.source), float(self.within[g])
-        known: list[tuple[float, Word, Bends]] = []
+        known: list[tuple[float, Word]] = []
         known_to = least
         low, high = 0.0, math.inf  # excesses known to give too few, too many
         excess = FIRST_EXCESS * max(most - least, 0.0)
@@ -230,7 +164,7 @@ class _Search:
 
     def _within(
         self, g: int, rest: Floats, reach: float, share: int
-    ) -> tuple[Found | None, list[tuple[float, Word, Bends]]]:
+    ) -> tuple[Found | None, list[tuple[float, Word]]]:
         """The classes of a goal up to a planar length; None if there are too many to look at."""
         trie = Trie.root(reach)
         within = np.full(self.goals + 1, -1.0)
@@ -238,43 +172,34 @@ class _Search:
         found = self.clock.interruptible(
             lambda: run_explore(
                 self.paths.tangents, 0, trie, margin=self.paths.outline.margin, rule=self.rule,
-                keep=True, cap=max(20_000, STATES_PER_CLASS * share), toward=(g, rest),
-                within=within, most=8 * share + 64, stop=self.clock.flag,
+                cap=max(20_000, STATES_PER_CLASS * share), toward=(g, rest), within=within,
+                most=8 * share + 64, stop=self.clock.flag,
             )
         )  # fmt: skip
         if found.capped:
             return None, []
-        nearest = sorted((length, w, s) for (_, w), (length, s) in self._best(found).items())
+        nearest = sorted((length, w) for (_, w), length in self._best(found).items())
         # one more than can be kept tells how long the shortest is that is not
-        rows = [(length, trie.word(w), _bends(found, s)) for length, w, s in nearest[: share + 1]]
+        rows = [(length, trie.word(w)) for length, w in nearest[: share + 1]]
         return found, sorted(rows)
 
-    def _best(self, found: Found) -> dict[tuple[int, int], tuple[float, int]]:
-        """Shortest (length, last bend) by (goal, word) among the hits within the tether."""
+    def _best(self, found: Found) -> dict[tuple[int, int], float]:
+        """Shortest length by (goal, word) among the hits within the tether."""
         reach = np.hypot(found.length, self.dz[found.goal])
         rows = np.flatnonzero((found.goal > 0) & (reach <= self.limit))
-        best: dict[tuple[int, int], tuple[float, int]] = {}
-        for goal, word, length, state in zip(
+        best: dict[tuple[int, int], float] = {}
+        for goal, word, length in zip(
             found.goal[rows].tolist(), found.word[rows].tolist(), found.length[rows].tolist(),
-            found.state[rows].tolist(), strict=True,
+            strict=True,
         ):  # fmt: skip
-            best[goal, word] = min(best.get((goal, word), (math.inf, 0)), (length, state))
+            best[goal, word] = min(best.get((goal, word), math.inf), length)
         return best
 
 
-def _bends(found: Found, state: int) -> Bends:
-    out: list[tuple[int, float]] = []
-    while found.tree[state, 3] >= 0:
-        out.append((int(found.tree[state, 4]), float(found.tree_length[state])))
-        state = int(found.tree[state, 3])
-    return tuple(reversed(out))
-
-
-def _together(rows: list[tuple[int, float, Word]], tree: TetherTree, left_out: float) -> Classes:
+def _together(rows: list[tuple[int, float, Word]], left_out: float) -> Classes:
     return Classes(
         np.array([0, *(g for g, _, _ in rows)], dtype=np.int64),
         [(), *(word for _, _, word in rows)],
         np.array([0.0, *(length for _, length, _ in rows)]),
-        tree,
         left_out,
     )

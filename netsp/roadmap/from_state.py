@@ -25,7 +25,7 @@ from netsp.roadmap.legs import TautLegs
 from netsp.roadmap.paths import TautPaths
 from netsp.roadmap.taut import MAX_CLASSES, TautRoadmap
 from netsp.solution import Status
-from netsp.travel.graph import TravelGraph
+from netsp.travel.graph import TravelGraph, rounded_down
 from netsp.travel.kept import within_kept
 from netsp.travel.result import OPTIMALITY_TOLERANCE, OnProgress, Progress, Result
 
@@ -140,6 +140,18 @@ class _OpenedLegs:
     ) -> Floats:
         with self.within.on_clock(clock or self.within.clock):
             return self._charged(self.within.costs_among(vertices, asked), vertices, vertices)
+
+    @property
+    def at_once(self) -> bool:
+        return self.within.legs_at_once
+
+    def rounded(self, vertices: Ints, clock: Clock | None = None) -> Floats:
+        with self.within.on_clock(clock or self.within.clock):
+            out = self.within.costs_rounded(vertices)
+        for k in np.flatnonzero(np.isin(vertices, (0, self.start))).tolist():
+            own = self._charged(out[k : k + 1].astype(np.float64), vertices[k : k + 1], vertices)
+            out[k] = out[:, k] = rounded_down(own)[0]
+        return out
 
     def to_base(self) -> Floats:
         out = self.within.costs_to_base + self.surcharge

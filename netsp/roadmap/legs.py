@@ -1,4 +1,4 @@
-"""Exact legs between augmented goals: pulled along their words, or else searched for."""
+"""Exact legs between augmented goals: branch by branch, or pulled along their words."""
 
 from __future__ import annotations
 
@@ -10,24 +10,26 @@ from functools import cached_property
 import numpy as np
 
 from netsp.arrays import Bools, Floats, Ints
-from netsp.clock import NEVER, Clock, Flag
-from netsp.compiled.kernel import kernel
+from netsp.clock import NEVER, Clock
 from netsp.errors import LimitReachedError
 from netsp.hsignature import Word, concatenate, invert
 from netsp.memory import ask
-from netsp.roadmap.arcs import Arcs
-from netsp.roadmap.classes import TetherTree
+from netsp.roadmap.branches import OPEN, Lengths, branches_of, fill, open_legs, spread
 from netsp.roadmap.paths import TautPaths
-from netsp.roadmap.pulled import path_for, pull, pull_each
-from netsp.roadmap.slits import Ends, Slits, flattened, room_for, slit_lengths
-from netsp.roadmap.sought import Tethers, longest_word, sought
+from netsp.roadmap.pulled import Path, path_along, pull_each
+from netsp.roadmap.slits import Ends, flattened, slit_lengths
+from netsp.roadmap.tethertree import GrowingTree, TetherTree
 from netsp.travel.graph import UNTIMED
+
+ROUNDED_DOWN = 1.0 - 2.0**-23
+"""Of a length, what single precision rounds to no more than the length."""
 
 BLOCK = 256
 """Rows of a matrix that are worked on at a time, so that what is in between stays small."""
 
 FEW = 20_000
-"""So many entries of a matrix are pulled one by one, hundredths of a second; more by both cores."""
+"""So many legs asked for in a matrix are pulled one by one, hundredths of a second; as many at a
+time where there are more."""
 
 
 class TautLegs:
@@ -36,90 +38,88 @@ class TautLegs:
     Parameters
     ----------
     cluster, signatures, planar
-        Goal (0 is the base), word and planar taut tether length of each vertex.
-    tree
-        Where their tethers part, if known.
+        Goal (0 is the base), word and planar taut tether length of each vertex; the first is the
+        base.
     """
 
     def __init__(
-        self,
-        paths: TautPaths,
-        cluster: Ints,
-        signatures: Sequence[Word],
-        planar: Floats,
-        tree: TetherTree | None = None,
+        self, paths: TautPaths, cluster: Ints, signatures: Sequence[Word], planar: Floats
     ) -> None:
         self.paths, self.cluster, self.planar = paths, cluster, planar
         self.signatures = list(signatures)
         self._z = paths.problem.points[:, 2]
-        nothing = np.zeros(1, dtype=np.int64)
-        self._tree = tree or TetherTree(np.zeros_like(cluster), nothing - 1, np.zeros(1))
+
+    at_once = True
 
     def lengths(
         self, vertices: Ints, asked: Bools | None = None, clock: Clock | None = None
     ) -> Floats:
         """(k, k) 3D leg lengths among the given vertices; inf within a cluster, and where `asked`
-        is given and false. LimitReachedError when the clock is up before all of many are measured.
-        """
+        is given and false, anything. LimitReachedError when the clock is up before all of many are
+        found."""
         vertices = np.asarray(vertices, dtype=np.int64)
-        cluster = self.cluster[vertices]
         if asked is not None and asked.sum() <= max(FEW, 2 * len(vertices)):
             return self._few(vertices, asked)
+        return self._all(vertices, np.float64, 1.0, clock)
+
+    def rounded(self, vertices: Ints, clock: Clock | None = None) -> Floats:
+        """(k, k) 3D leg lengths among the given vertices in single precision, rounded down; inf
+        within a cluster. LimitReachedError as of `lengths`."""
+        return self._all(np.asarray(vertices, dtype=np.int64), np.float32, ROUNDED_DOWN, clock)
+
+    def _all(
+        self, vertices: Ints, kind: type[np.floating], share: float, clock: Clock | None
+    ) -> Floats:
+        """All legs among vertices, branch by branch (`netsp.roadmap.branches`)."""
+        n = len(vertices)
         ask(
-            2.0 * 8.0 * len(vertices) ** 2,
-            f"legs between {len(vertices)} homotopy classes",
+            float(np.dtype(kind).itemsize) * n**2,
+            f"legs between {n} homotopy classes",
             "lower tether_length or max_classes",
         )
         # what takes a fraction of a second is measured all the same, or there would be no tour
-        count = len(vertices) ** 2 if asked is None else int(asked.sum())
-        stop = clock.flag if clock is not None and count > UNTIMED**2 else NEVER
-        out = np.full((len(vertices), len(vertices)), np.inf)
+        stop = clock.flag if clock is not None and n > UNTIMED else NEVER
+        out = np.full((n, n), OPEN, dtype=kind)
+        paths, (places, points) = self.paths, self._ends
         letters, row = flattened([self.signatures[v] for v in vertices])
-        tethers = Tethers(
-            letters, row, cluster, self.planar[vertices], self._tree.last[vertices],
-            self._tree.parent, self._tree.depth, self._tree.length,
-        )  # fmt: skip
-        if asked is None:
-            asked = np.ones(out.shape, dtype=bool)
-        goals = np.unique(cluster)
-
-        def measure(g: int) -> None:
-            here = np.flatnonzero(cluster == g)
-            there = np.flatnonzero(cluster > g)
-            if len(there) == 0 or stop[0]:
-                return
-            if g == 0:
-                block = np.broadcast_to(tethers.planar[there], (len(here), len(there)))
-            else:
-                block = self._legs_from(g, here, there, asked, tethers, stop)
-            block = np.hypot(block, (self._z[g] - self._z[cluster[there]])[None, :])
-            out[np.ix_(here, there)] = block
-            out[np.ix_(there, here)] = block.T
-
-        with ThreadPoolExecutor(os.cpu_count()) as pool:
-            list(pool.map(measure, goals.tolist()))
+        ends = Ends(places.place[vertices], places.cell[vertices], letters, row)
+        point = points[vertices]
+        branches = branches_of(self._tree, vertices)
+        lengths = Lengths(self.planar[vertices], self._z[point], share, out)
+        left = fill(branches, lengths, point, ends, paths.slits, paths.arcs, stop)
+        for u, v in open_legs(point, out).tolist() if left and not stop[0] else ():
+            if out[u, v] == OPEN and not stop[0]:
+                length, path = self._searched(int(vertices[u]), int(vertices[v]))
+                spread(u, v, length, len(path.whole) - 1, path.whole, path.real, branches, lengths)
         if stop[0]:
             raise LimitReachedError(
-                f"time limit reached while measuring the legs between {len(vertices)} homotopy "
-                "classes; lower tether_length or raise the limit"
+                f"time limit reached while measuring the legs between {n} homotopy classes; lower "
+                "tether_length or raise the limit"
             )
-        return out
+        for base in np.flatnonzero(point == 0).tolist():
+            out[base] = out[:, base] = share * self.to_base()[vertices]
+        for g in np.unique(point).tolist():
+            own = np.flatnonzero(point == g)
+            out[np.ix_(own, own)] = np.inf
+        return out  # type: ignore[return-value]
 
-    def _legs_from(
-        self, g: int, here: Ints, there: Ints, asked: Bools, tethers: Tethers, stop: Flag
-    ) -> Floats:
-        """(len(here), len(there)) planar lengths of all legs from the classes of goal g."""
-        paths = self.paths
-        places, cluster = paths.outline.places, tethers.cluster
-        cells = paths.slits.cells(places[:, 0])
-        ends = Ends(places[cluster], cells[cluster], tethers.letters, tethers.row)
-        out = np.full((len(here), len(there)), np.inf)
-        left = _pulled(here, there, asked, cluster, ends, paths.slits, paths.arcs, out, stop)
-        if left and not stop[0]:
-            asked = asked[np.ix_(here, there)] & np.isinf(out)
-            found = sought(paths, g, here, there, asked, tethers, ends, stop)
-            np.minimum(out, found, out=out)
-        return out
+    def _searched(self, u: int, v: int) -> tuple[float, Path]:
+        """Planar length and path of a leg that could not be pulled."""
+        a, b = int(self.cluster[u]), int(self.cluster[v])
+        word = self.relative_word(u, v)
+        # a tether is searched for when there is no tree yet, and none is needed
+        longest = self._longest(u, v) if u > 0 and v > 0 else float(self.planar[u] + self.planar[v])
+        length, pieces = self.paths.pieces(a, b, word, longest)
+        return length, path_along(a, pieces, self.paths.tangents.target, self.paths.arcs)
+
+    @cached_property
+    def _tree(self) -> TetherTree:
+        """Where the tethers part."""
+        paths, (ends, point) = self.paths, self._ends
+        growing = GrowingTree(len(point))
+        for v in growing.pull(ends, point, paths.slits, paths.arcs).tolist():
+            growing.add(v, self._searched(0, v)[1], paths.arcs)
+        return growing.tree()
 
     def to_base(self) -> Floats:
         """(V,) 3D lengths of the legs from the base, which are the tethers."""
@@ -177,13 +177,7 @@ class TautLegs:
 
     def _longest(self, u: int, v: int) -> float:
         """More than the planar length of a leg: back along one tether to where the other parts."""
-        s, t, tree = int(self._tree.last[u]), int(self._tree.last[v]), self._tree
-        while s != t:
-            if tree.depth[s] >= tree.depth[t]:
-                s = int(tree.parent[s])
-            else:
-                t = int(tree.parent[t])
-        return float(self.planar[u] + self.planar[v] - 2.0 * tree.length[s])
+        return float(self.planar[u] + self.planar[v] - 2.0 * self._tree.part(u, v))
 
     def _few(self, vertices: Ints, asked: Bools) -> Floats:
         """As `lengths`, for a few legs; those that cannot be pulled are searches of their own."""
@@ -229,27 +223,3 @@ class TautLegs:
         letters, row = flattened(self.signatures)
         return Ends(places[point], self.paths.slits.cells(places[:, 0])[point], letters, row), point
 
-
-@kernel
-def _pulled(
-    here: Ints, there: Ints, asked: Bools, cluster: Ints, ends: Ends, slits: Slits, arcs: Arcs,
-    out: Floats, stop: Ints,
-) -> int:  # fmt: skip
-    """The planar lengths of legs between two lists of vertices, into (len(here), len(there)) `out`;
-    how many of those asked for could not be pulled."""
-    longest = longest_word(here, there, ends.row)
-    room, path = room_for(longest, slits), path_for(longest)
-    left = 0
-    for a in range(len(here)):
-        if stop[0] != 0:
-            break
-        u = here[a]
-        for b in range(len(there)):
-            v = there[b]
-            if asked[u, v]:
-                length, _, _ = pull(u, v, ends, cluster, slits, arcs, room, path)
-                if length >= 0.0:
-                    out[a, b] = length
-                else:
-                    left += 1
-    return left

@@ -112,7 +112,7 @@ class TautPaths:
         longest
             That it is known not to exceed.
         """
-        return self._pieces(a, b, word, longest)[0]
+        return self.pieces(a, b, word, longest)[0]
 
     def planar_length_within(self, a: int, b: int, word: Word, longest: float) -> float | None:
         """Length in the plan of the taut path of a word from point a to point b; None if it is
@@ -135,7 +135,7 @@ class TautPaths:
     def turning(self, a: int, b: int, word: Word) -> float:
         """Sum of the angles (radians) by which the taut path of a word from point a to point b
         turns in the plan."""
-        _, pieces = self._pieces(a, b, word)
+        _, pieces = self.pieces(a, b, word)
         return float(sum(slid for _, slid in pieces[1:]))
 
     def path(self, a: int, b: int, word: Word, longest: float | None = None) -> Floats:
@@ -146,7 +146,7 @@ class TautPaths:
         longest
             A planar length that it is known not to exceed.
         """
-        _, pieces = self._pieces(a, b, word, longest)
+        _, pieces = self.pieces(a, b, word, longest)
         return self._raised(a, b, self._polyline(a, b, pieces))
 
     def _raised(self, a: int, b: int, xy: Floats) -> Floats:
@@ -174,10 +174,17 @@ class TautPaths:
             f"solution: tour: no taut tether to goal #{goal} has the word {list(word)}"
         )
 
-    def _pieces(
+    def pieces(
         self, a: int, b: int, word: Word, longest: float | None = None
     ) -> tuple[float, list[tuple[int, float]]]:
-        """Length, and (departure, angle slid before it) along the taut path of a word."""
+        """Length in the plan, and (departure, angle slid before it) along the taut path of a word
+        from point a to point b.
+
+        Parameters
+        ----------
+        longest
+            That it is known not to exceed.
+        """
         key = (a, b, tuple(word))
         if key not in self._known:
             if len(self._known) >= MOST_KNOWN:

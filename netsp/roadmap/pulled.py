@@ -18,6 +18,7 @@ search (`netsp.roadmap.explore`).
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -61,7 +62,7 @@ from netsp.roadmap.arcs import (
     Arcs,
     tangent,
 )
-from netsp.roadmap.slits import HIGH, LINE, LOW, Ends, Room, Slits, room_for, string
+from netsp.roadmap.slits import HIGH, LINE, LOW, Ends, Room, Slits, longest_word, room_for, string
 from netsp.roadmap.tangents import ANGLE_TOLERANCE
 
 MOST_NODES = 256
@@ -116,6 +117,25 @@ def path_for(longest: int) -> Path:
     )  # fmt: skip
 
 
+def path_along(a: int, pieces: Sequence[tuple[int, float]], target: Ints, arcs: Arcs) -> Path:
+    """A path from point a that was found otherwise.
+
+    Parameters
+    ----------
+    pieces
+        Departures, and the angle slid before each.
+    target
+        (e,) node at which each departure ends.
+    """
+    path = Path(np.zeros((len(pieces) + 1, 8)), np.zeros((len(pieces) + 1, 2), dtype=np.int64),
+                np.zeros(0, dtype=np.int64))  # fmt: skip
+    path.whole[0, NODE] = arcs.points + a
+    for k, (e, slid) in enumerate(pieces):
+        path.whole[k, EDGE], path.real[k, SLID] = e, slid
+        path.whole[k + 1, NODE] = target[e]
+    return path
+
+
 @kernel
 def pull(
     u: int, v: int, ends: Ends, point: Ints, slits: Slits, arcs: Arcs, room: Room, path: Path
@@ -155,9 +175,7 @@ def pull_each(
     us: Ints, vs: Ints, ends: Ends, point: Ints, slits: Slits, arcs: Arcs, out: Floats
 ) -> None:
     """The lengths of (k,) taut paths as of `pull`, into `out`."""
-    longest = int(np.int64(0))  # no literal: callees are compiled once
-    for v in range(len(ends.cell)):
-        longest = max(longest, ends.row[v + 1] - ends.row[v])
+    longest = longest_word(ends.row)
     room, path = room_for(longest, slits), path_for(longest)
     for k in range(len(us)):
         out[k], _, _ = pull(us[k], vs[k], ends, point, slits, arcs, room, path)
@@ -167,7 +185,7 @@ def pull_each(
 def pull_one(ends: Ends, point: Ints, slits: Slits, arcs: Arcs) -> tuple[float, Ints, Floats]:
     """The taut path between two ends: its length as of `pull`, departures and angles slid before
     them."""
-    longest = max(ends.row[1] - ends.row[0], ends.row[2] - ends.row[1])
+    longest = longest_word(ends.row)
     path = path_for(longest)
     length, _, count = pull(0, 1, ends, point, slits, arcs, room_for(longest, slits), path)
     return length, path.whole[:count, EDGE].copy(), path.real[:count, SLID].copy()

@@ -149,17 +149,6 @@ class ContactGraph:
         xy[0], xy[-1] = self.outline.places[source], self.outline.places[target]
         return xy
 
-    def bends(
-        self, source: int, target: int, before: Ints, length: Floats
-    ) -> tuple[tuple[int, float], ...]:
-        """The tangents along a path of a tree that end at an arc, each with the length there."""
-        nodes = _walk_back(source, target, before)
-        return tuple(
-            (int(self._edge_of[node]), float(length[node]))
-            for node in nodes[1:-1]
-            if (node - self.points) % 2 == 1
-        )
-
     def _polyline(self, nodes: list[int], step: float) -> Floats:
         t = self.tangents
         out: list[tuple[float, float]] = []

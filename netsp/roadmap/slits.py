@@ -168,10 +168,7 @@ def _rows(
 ) -> None:
     """Fill rows first … last - 1, which are those of the vertices `asked`; of the whole matrix only
     what is beyond the diagonal, and the columns with the same numbers."""
-    longest = 0
-    for v in range(len(cluster)):
-        longest = max(longest, ends.row[v + 1] - ends.row[v])
-    room = room_for(longest, slits)
+    room = room_for(longest_word(ends.row), slits)
     for k in range(first, last):
         if stop[0] != 0:
             return
@@ -182,6 +179,15 @@ def _rows(
             out[k, v], _ = string(u, v, ends, slits, room)
             if whole:
                 out[v, k] = out[k, v]
+
+
+@kernel
+def longest_word(row: Ints) -> int:
+    """Most letters of a word, given where each begins and the last ends."""
+    longest = int(np.int64(0))  # no literal: callees are compiled once
+    for k in range(len(row) - 1):
+        longest = max(longest, row[k + 1] - row[k])
+    return longest
 
 
 @kernel

@@ -19,7 +19,7 @@ from netsp.clock import Clock, TimeLimit
 from netsp.errors import InputError
 from netsp.hsignature import Word, is_looping, signature
 from netsp.problem import Problem
-from netsp.roadmap.classes import TetherTree, find_classes
+from netsp.roadmap.classes import find_classes
 from netsp.roadmap.detours import taut_detours
 from netsp.roadmap.explore import ALL, NON_LOOPING
 from netsp.roadmap.legs import TautLegs
@@ -82,8 +82,7 @@ class TautRoadmap:
         self.cluster, self.signatures, self.planar = found.cluster, found.signatures, found.planar
         self.complete, self.least_left_out = found.complete, found.least_left_out
         self.tethers: Floats = np.hypot(self.planar, self._z[self.cluster] - self._z[0])
-        self._tree = found.tree
-        self.legs = TautLegs(self.paths, self.cluster, self.signatures, self.planar, self._tree)
+        self.legs = TautLegs(self.paths, self.cluster, self.signatures, self.planar)
 
     def to_travel_graph(self) -> TravelGraph:
         """The travel graph over this roadmap; legs are computed when first asked for."""
@@ -129,14 +128,10 @@ class TautRoadmap:
         order = np.argsort(cluster, kind="stable")
         signatures = [*self.signatures, *(w for _, w, _ in more)]
         planar = np.array([*self.planar, *(length for _, _, length in more)])
-        tree = self._tree
-        # nothing is known of where these tethers part from others but at the base
-        last = np.r_[tree.last, np.zeros(len(more), dtype=np.int64)]
-        self._tree = TetherTree(last[order], tree.parent, tree.length)
         self.cluster, self.planar = cluster[order], planar[order]
         self.signatures = [signatures[k] for k in order.tolist()]
         self.tethers = np.asarray(np.hypot(self.planar, self._z[self.cluster] - self._z[0]))
-        self.legs = TautLegs(self.paths, self.cluster, self.signatures, self.planar, self._tree)
+        self.legs = TautLegs(self.paths, self.cluster, self.signatures, self.planar)
         return self.to_travel_graph()
 
     def _tether(self, goal: int, word: Word) -> float | None:

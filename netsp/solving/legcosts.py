@@ -1,6 +1,7 @@
-"""Leg costs that are measured only when they matter.
+"""Leg costs, measured only when they matter where they cannot be had all at once.
 
-A bound costs a fraction of a leg, and there are many. As long as a leg is only bounded from below,
+Over the taut roadmap they can (`netsp.roadmap.branches`). Elsewhere a bound costs a fraction of a
+leg, and there are many. As long as a leg is only bounded from below,
 everything that is proven with the bound holds: the relaxation is one of a cheaper world. So the
 relaxation runs on bounds first, and what it cannot rule out is measured.
 
@@ -17,7 +18,7 @@ import numpy.typing as npt
 
 from netsp.arrays import Bools, Floats, Ints
 from netsp.memory import ask
-from netsp.travel.graph import TravelGraph
+from netsp.travel.graph import TravelGraph, rounded_down
 
 MEASURE_AT_ONCE = 400
 """So many vertices or fewer are measured altogether: that takes a second at most."""
@@ -54,10 +55,14 @@ class LegCosts:
         self.cluster: Ints = graph.cluster
         self.values: Floats
         self.exact: Bools | None = None
+        many = len(graph) > ROUNDED_FROM
         if graph.measured or len(graph) <= MEASURE_AT_ONCE:
             self.values = np.array(graph.costs)
             return
-        many = len(graph) > ROUNDED_FROM
+        if graph.legs_at_once:
+            costs = graph.costs_rounded if many else graph.costs_among
+            self.values = costs(self.vertices)
+            return
         ask(
             (BYTES_ROUNDED if many else BYTES_PER_LEG) * len(graph) ** 2,
             f"bounding every tour over {len(graph)} homotopy classes",
@@ -175,13 +180,6 @@ class LegCosts:
             )  # fmt: skip
         else:
             self._none_measured()
-
-
-def rounded_down(values: Floats) -> Floats:
-    """In single precision, and no larger."""
-    out = values.astype(np.float32)
-    np.nextafter(out, np.float32(-np.inf), out=out, where=out > values)
-    return out  # type: ignore[return-value]
 
 
 def squeezed(matrix: npt.NDArray[Any], keep: Bools) -> npt.NDArray[Any]:

@@ -32,6 +32,9 @@ CORE = 800
 """About so many vertices, those of least tether, are measured for the heuristic while the other
 legs are only bounded."""
 
+SEARCHED_WHOLE = 1200
+"""So many vertices whose legs are measured are searched altogether."""
+
 FEW_CLASSES = 3
 """Classes per goal of the first tour of all."""
 
@@ -168,10 +171,15 @@ class SearchingRun(SolverRun):
         else:
             self.outer[0].report("core", **more)
 
+    def searches_all(self, costs: LegCosts) -> bool:
+        """Whether the heuristic searches all vertices that are left."""
+        few = len(costs) <= SEARCHED_WHOLE or not self.graph.roadmapped
+        return costs.exact is None and few
+
     def instance(self, costs: LegCosts, more: Ints) -> Instance:
-        """What the heuristic searches: everything if it is measured, else the classes of least
+        """What the heuristic searches: everything if it is not too much, else the classes of least
         tether, those beside the incumbent, its own, and more."""
-        if costs.exact is None:
+        if self.searches_all(costs):
             if self._core is None or self._core[0] != len(costs):
                 values = np.asarray(costs.values, dtype=np.float64)
                 whole = Instance(costs.cluster, values, costs.vertices, self.graph.before)
@@ -201,7 +209,7 @@ class SearchingRun(SolverRun):
             before = self.length
             self._search(self.instance(costs, more), clock, rounded=costs.rounded)
             vain = 0 if self.length < before else vain + 1
-            if costs.exact is None or clock.up or vain == IN_VAIN:
+            if self.searches_all(costs) or clock.up or vain == IN_VAIN:
                 break
 
     def _search(self, instance: Instance, clock: Clock, *, rounded: bool = False) -> None:

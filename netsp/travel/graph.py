@@ -240,6 +240,34 @@ class TravelGraph(Drawn):
             return np.asarray(self._costs[np.ix_(chosen, chosen)])
         return self._measured(chosen, asked)
 
+    def costs_rounded(self, vertices: npt.ArrayLike) -> Floats:
+        """Leg costs among some vertices in single precision, for solvers that need very many.
+
+        Parameters
+        ----------
+        vertices : array_like of int, shape (k,)
+            The vertices.
+
+        Returns
+        -------
+        ndarray of float32, shape (k, k)
+            No cost is larger than that of the leg; inf within a cluster.
+
+        Raises
+        ------
+        LimitReachedError
+            The clock was up before they were found.
+        """
+        chosen = np.asarray(vertices, dtype=np.int64)
+        rounded = getattr(self._legs, "rounded", None)
+        if rounded is None or self._costs is not None:
+            return rounded_down(self.costs_among(chosen))
+        begin = time.monotonic()
+        try:
+            return np.asarray(rounded(chosen, self.clock))
+        finally:
+            self.legs_s += time.monotonic() - begin
+
     def costs_of(self, us: Ints, vs: Ints) -> Floats:
         """Costs of single legs.
 
@@ -312,6 +340,11 @@ class TravelGraph(Drawn):
     def quick_legs(self) -> bool:
         """Whether a leg by itself is quickly measured."""
         return bool(getattr(self._legs, "quick", True))
+
+    @property
+    def legs_at_once(self) -> bool:
+        """Whether all legs together are found about as quickly as bounds on them."""
+        return bool(getattr(self._legs, "at_once", False))
 
     @property
     def geometric(self) -> bool:
@@ -647,6 +680,13 @@ class TravelGraph(Drawn):
         return listener
 
 
+def rounded_down(values: Floats) -> Floats:
+    """In single precision, and no larger."""
+    out = values.astype(np.float32)
+    np.nextafter(out, np.float32(-np.inf), out=out, where=out > values)
+    return out  # type: ignore[return-value]
+
+
 def least_tethers(tethers: Floats, cluster: Ints, classes: int) -> Ints:
     """Vertices of the shortest tethers of every cluster, at most so many of each, in order."""
     order = np.lexsort((tethers, cluster))
@@ -666,6 +706,14 @@ class _PartOfLegs:
     ) -> Floats:
         with self.graph.on_clock(clock or self.graph.clock):
             return self.graph.costs_among(self.chosen[vertices], asked)
+
+    @property
+    def at_once(self) -> bool:
+        return self.graph.legs_at_once
+
+    def rounded(self, vertices: Ints, clock: Clock | None = None) -> Floats:
+        with self.graph.on_clock(clock or self.graph.clock):
+            return self.graph.costs_rounded(self.chosen[vertices])
 
     def pairs(self, us: Ints, vs: Ints) -> Floats:
         return self.graph.costs_of(self.chosen[us], self.chosen[vs])

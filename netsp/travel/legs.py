@@ -29,3 +29,12 @@ class Legs(Protocol):
 
     def path(self, u: int, v: int) -> Floats:
         """(n, 3) polyline of the leg from vertex u to vertex v."""
+
+
+class LegsAtOnce(Legs, Protocol):
+    """Legs that are quickly found all together; `at_once` says so."""
+
+    at_once: bool
+
+    def rounded(self, vertices: Ints, clock: Clock | None = None) -> Floats:
+        """As `lengths`, in single precision and no larger."""

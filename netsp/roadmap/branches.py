@@ -1,0 +1,284 @@
+"""All legs at once: one taut leg tells those between two whole branches of the tree of tethers.
+
+A leg leaves the tether of its start at some bend p, crosses over, and joins that of its end at some
+bend q. From any other class beyond p, back along its own tether, over the same crossing and on
+along another tether beyond q leads a path of tangents as well. It slides forwards on every arc, but
+perhaps at p and q, where it is known how far; if it does there, too, it is taut, and a class of
+paths holds one taut path (docs/theory.md). So, with T the lengths of tethers,
+
+    leg(u, v) = T(u) + T(v) - c(p, q)
+
+for all u and v beyond p and q that leave their arcs late enough. (c is twice the Gromov product of
+u and v.) Millions of legs have some ten thousand crossings: of each one leg is pulled
+(`netsp.roadmap.pulled`), the others are sums.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from netsp.arrays import Floats, Ints
+from netsp.compiled.kernel import kernel
+from netsp.roadmap.arcs import Arcs
+from netsp.roadmap.pulled import NODE, SAME_ANGLE, SLID, path_for, pull
+from netsp.roadmap.slits import Ends, Slits, longest_word, room_for
+from netsp.roadmap.tethertree import TetherTree
+
+BACK = 1e-9
+"""Radians that a path may slide backwards: it is then longer than the taut one by their square."""
+
+OPEN = -1.0
+"""Instead of a length that is not known yet."""
+
+
+class Branches(NamedTuple):
+    """Some vertices in the order of the tree of their tethers: those beyond a bend follow one
+    another, and among them those that leave its arc from some angle on.
+
+    Attributes
+    ----------
+    node, parent, turned
+        As of `TetherTree`.
+    last, slid
+        (k,) the same of these vertices.
+    order, rank
+        (k,) vertices in order, and the place of each.
+    end
+        (bends,) the place after those beyond a bend.
+    row, angle, begin
+        What leaves a bend, bends and vertices, by the angle slid there: rows row[b] to row[b + 1]
+        of angles, and of the places that each begins at.
+    """
+
+    node: Ints
+    parent: Ints
+    turned: Floats
+    last: Ints
+    slid: Floats
+    order: Ints
+    rank: Ints
+    end: Ints
+    row: Ints
+    angle: Floats
+    begin: Ints
+
+
+class Lengths(NamedTuple):
+    """Legs between some vertices, being found.
+
+    Attributes
+    ----------
+    planar, height
+        (k,) planar lengths of their tethers, and heights.
+    share
+        Of each length that is held: a little less than 1 where lengths are rounded down.
+    out
+        (k, k) the lengths in space, `OPEN` where not known yet.
+    """
+
+    planar: Floats
+    height: Floats
+    share: float
+    out: Floats
+
+
+def branches_of(tree: TetherTree, vertices: Ints) -> Branches:
+    """The branches of some vertices of a tree."""
+    last, slid = tree.last[vertices], tree.slid[vertices]
+    size = _sizes(tree.parent, last)
+    # what leaves a bend: bends with vertices beyond them, as negative numbers (the root leaves
+    # none), and vertices
+    bends = np.flatnonzero(size[1:]) + 1
+    owner = np.concatenate([tree.parent[bends], last])
+    angle = np.concatenate([tree.turned[bends], slid])
+    what = np.concatenate([-bends, np.arange(len(last))])
+    by_angle = np.lexsort((angle, owner))
+    row = np.searchsorted(owner[by_angle], np.arange(len(size) + 1)).astype(np.int64)
+    order, begin, end = _laid_out(what[by_angle], row, size, len(last))
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(order))
+    return Branches(
+        tree.node, tree.parent, tree.turned, last, slid, order, rank, end, row, angle[by_angle],
+        begin,
+    )  # fmt: skip
+
+
+@kernel
+def _sizes(parent: Ints, last: Ints) -> Ints:
+    """How many vertices are beyond each bend."""
+    size = np.zeros(len(parent), dtype=np.int64)
+    for v in range(len(last)):
+        size[last[v]] += 1
+    for b in range(len(parent) - 1, 0, -1):
+        size[parent[b]] += size[b]
+    return size
+
+
+@kernel
+def _laid_out(what: Ints, row: Ints, size: Ints, count: int) -> tuple[Ints, Ints, Ints]:
+    """`Branches.order`, `begin` and `end`."""
+    order = np.empty(count, dtype=np.int64)
+    begin = np.empty(len(what), dtype=np.int64)
+    start, end = np.zeros_like(size), np.zeros_like(size)
+    for b in range(len(size)):
+        at = start[b]
+        end[b] = at + size[b]
+        for k in range(row[b], row[b + 1]):
+            begin[k] = at
+            if what[k] < 0:
+                start[-what[k]] = at
+                at += size[-what[k]]
+            else:
+                order[at] = what[k]
+                at += 1
+    return order, begin, end
+
+
+@kernel
+def fill(
+    branches: Branches, lengths: Lengths, point: Ints, ends: Ends, slits: Slits, arcs: Arcs,
+    stop: Ints,
+) -> int:  # fmt: skip
+    """Find the legs between vertices of different goals; how many could not be pulled, and stay
+    open. What is within a goal may be anything, and so may legs of the base (point 0).
+
+    Parameters
+    ----------
+    point
+        (k,) that each vertex is at.
+    """
+    order, out = branches.order, lengths.out
+    longest = longest_word(ends.row)
+    room, path = room_for(longest, slits), path_for(longest)
+    left = 0
+    for i in range(len(order)):
+        u = order[i]
+        if stop[0] != 0:
+            break
+        if point[u] == 0:
+            continue
+        for j in range(i + 1, len(order)):
+            v = order[j]
+            if out[u, v] != OPEN or point[u] == point[v] or point[v] == 0:
+                continue
+            length, _, count = pull(u, v, ends, point, slits, arcs, room, path)
+            if length < 0.0:
+                left += 1
+            else:
+                spread(u, v, length, count, path.whole, path.real, branches, lengths)
+    return left
+
+
+@kernel
+def open_legs(point: Ints, out: Floats) -> Ints:
+    """(k, 2) legs u < v that are open, but for those of the base."""
+    count = 0
+    for u in range(len(point)):
+        for v in range(u):
+            if out[u, v] == OPEN and point[u] != point[v] and point[u] != 0 and point[v] != 0:
+                count += 1
+    legs = np.empty((count, 2), dtype=np.int64)
+    count = 0
+    for u in range(len(point)):
+        for v in range(u):
+            if out[u, v] == OPEN and point[u] != point[v] and point[u] != 0 and point[v] != 0:
+                legs[count, 0], legs[count, 1] = v, u
+                count += 1
+    return legs
+
+
+@kernel
+def spread(
+    u: int, v: int, length: float, count: int, on: Ints, at: Floats, branches: Branches,
+    lengths: Lengths,
+) -> None:  # fmt: skip
+    """Note all legs that cross over as that from u to v does, whose planar length is given, and its
+    number of tangents (`Path.whole` and `Path.real`)."""
+    i0, i1, j0, j1 = _alike(u, v, count, on, at, branches)
+    order, planar = branches.order, lengths.planar
+    saved = planar[u] + planar[v] - length
+    # row by row, for memory's sake
+    for x in range(i0, i1):
+        _note(order[x], j0, j1, saved, order, lengths)
+    for y in range(j0, j1):
+        _note(order[y], i0, i1, saved, order, lengths)
+
+
+@kernel
+def _note(
+    a: int, begin: int, end: int, saved: float, order: Ints, lengths: Lengths
+) -> None:  # fmt: skip
+    """The legs from one vertex to those of places in the order, so much shorter than both
+    tethers."""
+    planar, height, share, out = lengths.planar, lengths.height, lengths.share, lengths.out
+    for y in range(begin, end):
+        b = order[y]
+        rise = height[b] - height[a]
+        length = planar[a] + planar[b] - saved
+        if rise != 0.0:
+            length = np.sqrt(length * length + rise * rise)
+        out[a, b] = share * length
+
+
+@kernel
+def _alike(
+    u: int, v: int, count: int, on: Ints, at: Floats, branches: Branches
+) -> tuple[int, int, int, int]:
+    """From and to which places the vertices are whose legs cross over as that of u and v does:
+    those on the side of u, and those on the side of v."""
+    p, p_least, p_place = _fork(u, 1, 1, 1, count, on, at, branches)
+    q, q_least, q_place = _fork(v, count - 1, -1, 0, count, on, at, branches)
+    i0, j0 = branches.rank[u], branches.rank[v]
+    i1, j1 = i0 + 1, j0 + 1
+    if p >= 0 and q >= 0 and p_place >= q_place:
+        # around one arc from tether to tether: how far it slides is up to both ends
+        if p_place == q_place:
+            i0, i1 = _together_with(i0, p, branches)
+            j0, j1 = _from_angle(q, q_least, branches), branches.end[q]
+    else:
+        if p >= 0:
+            i0, i1 = _from_angle(p, p_least, branches), branches.end[p]
+        if q >= 0:
+            j0, j1 = _from_angle(q, q_least, branches), branches.end[q]
+    return i0, i1, j0, j1
+
+
+@kernel
+def _fork(
+    v: int, first: int, step: int, flip: int, count: int, on: Ints, at: Floats, branches: Branches
+) -> tuple[int, float, int]:
+    """The bend at which a leg leaves the tether of its end v, -1 if it is nowhere along it; the
+    angle from which on what leaves that bend has the same crossing; and which node of the leg it
+    is. The nodes are gone through from the given one on. From its start a leg goes along a tether
+    backwards, and around arcs the other way (flip 1)."""
+    bend, slid = branches.last[v], branches.slid[v]
+    found, least, place = -1, 0.0, -1
+    k = first
+    while 0 < k < count and bend > 0 and (on[k, NODE] ^ flip) == branches.node[bend]:
+        found, least, place = bend, slid - at[k, SLID], k
+        if abs(least) > SAME_ANGLE:
+            break
+        k += step
+        slid, bend = branches.turned[bend], branches.parent[bend]
+    return found, least, place
+
+
+@kernel
+def _from_angle(bend: int, least: float, branches: Branches) -> int:
+    """The place at which what leaves a bend from an angle on begins."""
+    k, after = branches.row[bend], branches.row[bend + 1]
+    while k < after and branches.angle[k] < least - BACK:
+        k += 1
+    return int(branches.begin[k]) if k < after else int(branches.end[bend])
+
+
+@kernel
+def _together_with(place: int, bend: int, branches: Branches) -> tuple[int, int]:
+    """From and to which places that is which leaves a bend with the vertex of a place."""
+    k, after = branches.row[bend], branches.row[bend + 1]
+    while k + 1 < after and branches.begin[k + 1] <= place:
+        k += 1
+    end = branches.begin[k + 1] if k + 1 < after else branches.end[bend]
+    return int(branches.begin[k]), int(end)

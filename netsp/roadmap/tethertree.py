@@ -1,0 +1,145 @@
+"""Tethers as paths in a tree of bends.
+
+All tethers begin at the base, and on the cover two that have parted never meet again. So a bend of
+the tree stands for all tethers that come to it the same way.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from netsp.arrays import Floats, Ints
+from netsp.compiled.growing import more_int_rows, more_rows
+from netsp.compiled.kernel import kernel
+from netsp.roadmap.arcs import LENGTH, RADIUS, Arcs
+from netsp.roadmap.pulled import EDGE, NODE, SAME_ANGLE, SLID, Path, path_for, pull
+from netsp.roadmap.slits import Ends, Slits, longest_word, room_for
+
+AT, PARENT, CHILD, SIBLING = range(4)
+"""Columns of a bend: its directed arc, the bend before (-1 at the root), the last bend found after
+it, and the one of the same parent that was found before it (-1 for none)."""
+
+TURNED, REACHED = range(2)
+"""And the angle slid on the arc before on the way to it, and the length of tether up to it."""
+
+
+class TetherTree(NamedTuple):
+    """Some tethers as paths in a tree of bends, the first of which is the base.
+
+    Attributes
+    ----------
+    node, parent
+        (bends,) directed arc, and the bend before, which is earlier in the arrays; -1 at the base.
+    turned, length
+        (bends,) angle slid on the arc before on the way to a bend, and length of tether up to it.
+    last, slid
+        (V,) last bend of each tether, and the angle slid there.
+    """
+
+    node: Ints
+    parent: Ints
+    turned: Floats
+    length: Floats
+    last: Ints
+    slid: Floats
+
+    def part(self, u: int, v: int) -> float:
+        """The length that two tethers have in common."""
+        s, t = int(self.last[u]), int(self.last[v])
+        while s != t:  # a bend comes after its parent
+            if s > t:
+                s = int(self.parent[s])
+            else:
+                t = int(self.parent[t])
+        return float(self.length[s])
+
+
+class GrowingTree:
+    """A tree of bends to which tethers are added.
+
+    Parameters
+    ----------
+    vertices
+        How many tethers there will be. Where nothing is known of one, it bends at the base alone.
+    """
+
+    def __init__(self, vertices: int) -> None:
+        self._whole = np.full((256, 4), -1, dtype=np.int64)
+        self._real = np.zeros((256, 2))
+        self._size = 1
+        self._last = np.zeros(vertices, dtype=np.int64)
+        self._slid = np.zeros(vertices)
+
+    def pull(self, ends: Ends, point: Ints, slits: Slits, arcs: Arcs) -> Ints:
+        """Add the tethers of all vertices, from vertex 0, the base, to each; those that could not
+        be pulled."""
+        self._whole, self._real, self._size = _grown(
+            ends, point, slits, arcs, self._whole, self._real, self._size, self._last, self._slid
+        )
+        missing = np.flatnonzero(self._last < 0)
+        self._last[missing] = 0
+        return missing
+
+    def add(self, vertex: int, path: Path, arcs: Arcs) -> None:
+        """Add the tether of a vertex, a path of nodes and departures and the angles slid there."""
+        self._whole, self._real, self._size = _grafted(
+            vertex, len(path.whole) - 1, path.whole, path.real, arcs, self._whole, self._real,
+            self._size, self._last, self._slid,
+        )  # fmt: skip
+
+    def tree(self) -> TetherTree:
+        """What has grown."""
+        whole, real = self._whole[: self._size], self._real[: self._size]
+        return TetherTree(
+            whole[:, AT].copy(), whole[:, PARENT].copy(), real[:, TURNED].copy(),
+            real[:, REACHED].copy(), self._last, self._slid,
+        )  # fmt: skip
+
+
+@kernel
+def _grown(
+    ends: Ends, point: Ints, slits: Slits, arcs: Arcs, whole: Ints, real: Floats, size: int,
+    last: Ints, slid: Floats,
+) -> tuple[Ints, Floats, int]:  # fmt: skip
+    longest = longest_word(ends.row)
+    room, path = room_for(longest, slits), path_for(longest)
+    for v in range(1, len(point)):
+        length, _, count = pull(0, v, ends, point, slits, arcs, room, path)
+        if length < 0.0:
+            last[v] = -1
+            continue
+        whole, real, size = _grafted(
+            v, count, path.whole, path.real, arcs, whole, real, size, last, slid
+        )
+    return whole, real, size
+
+
+@kernel
+def _grafted(
+    v: int, count: int, on: Ints, at: Floats, arcs: Arcs, whole: Ints, real: Floats, size: int,
+    last: Ints, slid: Floats,
+) -> tuple[Ints, Floats, int]:  # fmt: skip
+    """The tree with the tether of vertex v, which takes so many tangents: `Path.whole` and
+    `Path.real`."""
+    bend, by, reached = 0, 0.0, 0.0
+    for k in range(1, count):
+        reached += by * arcs.disk[on[k - 1, NODE], RADIUS] + arcs.real[on[k - 1, EDGE], LENGTH]
+        child = whole[bend, CHILD]
+        while child >= 0 and not (
+            whole[child, AT] == on[k, NODE] and abs(real[child, TURNED] - by) <= SAME_ANGLE
+        ):
+            child = whole[child, SIBLING]
+        if child < 0:
+            if size == len(whole):
+                whole, real = more_int_rows(whole), more_rows(real)
+            child = size
+            size += 1
+            whole[child, AT], whole[child, PARENT] = on[k, NODE], bend
+            whole[child, CHILD], whole[child, SIBLING] = -1, whole[bend, CHILD]
+            whole[bend, CHILD] = child
+            real[child, TURNED], real[child, REACHED] = by, reached
+        bend, by = child, at[k, SLID]
+    last[v], slid[v] = bend, by
+    return whole, real, size

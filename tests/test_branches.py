@@ -1,0 +1,158 @@
+"""Legs found branch by branch are those that are pulled, or searched for, one by one."""
+
+import json
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from netsp import Circle, Polygon, Problem
+from netsp.roadmap import legs as legs_of
+from netsp.roadmap.legs import TautLegs
+from netsp.roadmap.taut import TautRoadmap
+from netsp.roadmap.tethertree import GrowingTree
+from netsp.worlds import FAMILIES, random_world
+
+BAY = Polygon(polygon=[(2, -3), (8, -3), (8, 3), (2, 3), (2, 2), (7, 2), (7, -2), (2, -2)])
+
+TURNS = Problem(
+    base=(0, 0), goals=[(6, 0.2), (3.0, 1.4), (-1, -3), (4.5, -3.5)], tether_length=38,
+    obstacles=[
+        Circle(center=(3, 0), radius=1), Polygon(polygon=[(3, -4), (4, -4), (4, -3), (3, -3)]),
+    ],
+)  # fmt: skip
+"""Whole turns around a circle and around bare corners."""
+
+INLETS = Problem(
+    base=(0, 0), goals=[(5, 0), (6.5, 1.5), (9, 0.5), (5, 4)], tether_length=40, clearance=0.2,
+    obstacles=[BAY, Circle(center=(5, 6), radius=1), Circle(center=(10, 3), radius=0.5)],
+)  # fmt: skip
+
+TOUCHING = Problem(
+    base=(0, 0), goals=[(6, 0.5), (3, 5), (7, -4), (-2, 2)], tether_length=24,
+    obstacles=[
+        Circle(center=(3, 0), radius=1), Circle(center=(3, 2), radius=1),
+        Polygon(polygon=[(3, -3), (5, -3), (5, -1), (3, -1)]),
+        Polygon(polygon=[(5, -3), (6, -3), (6, -2), (5, -2)]),
+    ],
+)  # fmt: skip
+"""Obstacles that touch, whose outlines give one path several spellings."""
+
+
+def one_by_one(roadmap, legs=None):
+    """(V, V) lengths of legs, each pulled or searched for by itself; inf within a goal."""
+    legs = legs or roadmap.legs
+    u, v = np.nonzero(roadmap.cluster[:, None] < roadmap.cluster[None])
+    out = np.full((len(roadmap.cluster), len(roadmap.cluster)), np.inf)
+    out[u, v] = out[v, u] = legs.pairs(u, v)
+    return out
+
+
+def sunk(problem, seed):
+    """The same goals at heights of their own."""
+    data = json.loads(problem.to_json())
+    rng = np.random.default_rng(seed)
+    for goal in data["goals"]:
+        goal["position"][2] = float(rng.uniform(-20.0, 0.0))
+    return Problem.model_validate(data)
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    st.integers(0, 10_000), st.sampled_from(sorted(FAMILIES)), st.integers(1, 14), st.booleans()
+)
+def test_legs_of_whole_branches_are_those_pulled_one_by_one(seed, family, obstacles, deep):
+    problem = random_world(
+        seed, family=family, goals=5, obstacles=obstacles, tether_length=340.0
+    )  # fmt: skip
+    roadmap = TautRoadmap(sunk(problem, seed) if deep else problem, max_classes=300)
+    found = roadmap.legs.lengths(np.arange(len(roadmap.cluster)))
+    assert np.allclose(found, one_by_one(roadmap), rtol=1e-10, atol=1e-7)
+    assert (found == found.T).all()
+
+
+@pytest.mark.parametrize("problem", [TURNS, INLETS, TOUCHING], ids=["turns", "inlets", "touching"])
+def test_so_are_those_around_bare_corners_in_bays_and_after_whole_turns(problem):
+    roadmap = TautRoadmap(problem, max_classes=800)
+    assert len(roadmap.cluster) > 10
+    found = roadmap.legs.lengths(np.arange(len(roadmap.cluster)))
+    assert np.allclose(found, one_by_one(roadmap), rtol=1e-10, atol=1e-9)
+
+
+def test_some_of_the_vertices_have_the_legs_that_they_have_among_all():
+    roadmap = TautRoadmap(random_world(7, goals=8, obstacles=12, tether_length=400.0))
+    whole = roadmap.legs.lengths(np.arange(len(roadmap.cluster)))
+    some = np.random.default_rng(0).permutation(len(whole))[: len(whole) // 3]
+    assert np.allclose(roadmap.legs.lengths(some), whole[np.ix_(some, some)], rtol=1e-12)
+
+
+def test_rounded_legs_are_hardly_shorter_and_never_longer():
+    roadmap = TautRoadmap(sunk(random_world(7, goals=8, obstacles=12, tether_length=400.0), 0))
+    vertices = np.arange(len(roadmap.cluster))
+    exact, rounded = roadmap.legs.lengths(vertices), roadmap.legs.rounded(vertices)
+    assert rounded.dtype == np.float32
+    finite = np.isfinite(exact)
+    assert (np.isinf(rounded) == ~finite).all()
+    assert (rounded[finite] <= exact[finite]).all()
+    assert np.allclose(rounded[finite], exact[finite], rtol=3e-7)
+
+
+@pytest.fixture
+def searches(monkeypatch):
+    """How often a leg was searched for by itself."""
+    seen = []
+    search = TautLegs._searched
+
+    def note(self, u, v):
+        seen.append((u, v))
+        return search(self, u, v)
+
+    monkeypatch.setattr(TautLegs, "_searched", note)
+    return seen
+
+
+def test_few_legs_tell_all(monkeypatch, searches):
+    roadmap = TautRoadmap(random_world(0, goals=10, tether_length=450.0))
+    vertices = np.arange(len(roadmap.cluster))
+    pulled = roadmap.legs.lengths(vertices)
+    assert len(vertices) > 300
+    searches.clear()
+    monkeypatch.setattr(legs_of, "fill", lambda *_: 1)
+    searched = roadmap.legs.lengths(vertices)
+    assert np.allclose(pulled, searched, rtol=1e-10)
+    assert len(searches) < 0.05 * len(vertices) ** 2 / 2
+
+
+def test_tethers_that_cannot_be_pulled_are_searched_for_and_grow_the_same_tree(
+    monkeypatch, searches
+):
+    problem = random_world(3, goals=6, obstacles=8, tether_length=330.0)
+    one, other = TautRoadmap(problem), TautRoadmap(problem)
+    tree = one.legs._tree
+    searches.clear()
+    monkeypatch.setattr(
+        GrowingTree, "pull", lambda self, ends, point, *_: np.arange(1, len(point))
+    )
+    same = other.legs._tree
+    assert len(searches) == len(one.cluster) - 1
+    assert (same.node == tree.node).all()
+    assert (same.parent == tree.parent).all()
+    assert np.allclose(same.length, tree.length)
+    assert np.allclose(same.turned, tree.turned, atol=1e-9)
+    assert np.allclose(same.slid, tree.slid, atol=1e-9)
+
+
+def test_the_tree_ends_where_the_tethers_do():
+    roadmap = TautRoadmap(random_world(5, goals=8, obstacles=12, tether_length=380.0))
+    tree, places = roadmap.legs._tree, roadmap.outline.places
+    for v in range(1, len(roadmap.cluster)):
+        bend = tree.last[v]
+        assert tree.length[bend] <= roadmap.planar[v]
+        if bend == 0:
+            assert roadmap.planar[v] == pytest.approx(np.hypot(*places[roadmap.cluster[v]]))
+        while bend > 0:
+            before = tree.parent[bend]
+            assert before < bend
+            assert tree.length[before] < tree.length[bend]
+            bend = before
