@@ -59,9 +59,7 @@ def sunk(problem, seed):
 
 
 @settings(max_examples=40, deadline=None)
-@given(
-    st.integers(0, 10_000), st.sampled_from(sorted(FAMILIES)), st.integers(1, 14), st.booleans()
-)
+@given(st.integers(0, 10_000), st.sampled_from(sorted(FAMILIES)), st.integers(1, 14), st.booleans())
 def test_legs_of_whole_branches_are_those_pulled_one_by_one(seed, family, obstacles, deep):
     problem = random_world(
         seed, family=family, goals=5, obstacles=obstacles, tether_length=340.0
@@ -131,9 +129,7 @@ def test_tethers_that_cannot_be_pulled_are_searched_for_and_grow_the_same_tree(
     one, other = TautRoadmap(problem), TautRoadmap(problem)
     tree = one.legs._tree
     searches.clear()
-    monkeypatch.setattr(
-        GrowingTree, "pull", lambda self, ends, point, *_: np.arange(1, len(point))
-    )
+    monkeypatch.setattr(GrowingTree, "pull", lambda self, ends, point, *_: np.arange(1, len(point)))
     same = other.legs._tree
     assert len(searches) == len(one.cluster) - 1
     assert (same.node == tree.node).all()

@@ -9,7 +9,6 @@ import pytest
 
 from netsp import Circle, Problem, Solution, solve, travel_graph, verify
 from netsp.clock import Clock
-from netsp.roadmap.taut import TautRoadmap
 from netsp.solvers import carried
 from netsp.solvers import solve as by_name
 from netsp.solvers.carried import Carried, with_carried

@@ -141,12 +141,16 @@ def test_labels_do_not_depend_on_how_many_share_the_work(monkeypatch):
     assert found[0] == found[1] == found[2]
 
 
+@pytest.mark.parametrize("at_once", [True, False])
 @pytest.mark.parametrize("seed", range(6))
-def test_dp_proves_the_same_optimum_as_mip_whether_legs_are_measured_or_bounded(seed, monkeypatch):
+def test_dp_proves_the_same_optimum_as_mip_whether_legs_are_measured_or_bounded(
+    seed, at_once, monkeypatch
+):
     problem = random_world(seed, circles=12, goals=7, tether=330.0)
     expected = solve_graph(travel_graph(problem), "mip").length
     monkeypatch.setattr("netsp.solving.legcosts.MEASURE_AT_ONCE", 20)
     monkeypatch.setattr(SOLVE, "MEASURE_AT_ONCE", 20)
+    monkeypatch.setattr(TravelGraph, "legs_at_once", at_once)
     result = solve_graph(travel_graph(problem), "dp", params={"search_rounds": 0})
     assert result.status is Status.OPTIMAL
     assert result.length == pytest.approx(expected, rel=2e-6)

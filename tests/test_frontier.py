@@ -9,7 +9,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from netsp import NetspError, Polygon, Problem, Status, solve, solve_graph, travel_graph, verify
+from netsp import (
+    NetspError,
+    Polygon,
+    Problem,
+    Status,
+    TravelGraph,
+    solve,
+    solve_graph,
+    travel_graph,
+    verify,
+)
 from netsp.clock import Clock
 from netsp.lns import Instance, Search
 from netsp.mip.flows import min_cuts
@@ -310,10 +320,12 @@ def core_first(monkeypatch, problem, share=0.4, **limits):
     return run
 
 
+@pytest.mark.parametrize("at_once", [True, False])
 @pytest.mark.parametrize("seed", range(4))
-def test_a_proof_over_the_core_first_ends_at_the_same_optimum(monkeypatch, seed):
+def test_a_proof_over_the_core_first_ends_at_the_same_optimum(monkeypatch, seed, at_once):
     problem = random_world(seed, goals=7, tether=300.0)
     best = solve(problem, "mip", seed=0).length
+    monkeypatch.setattr(TravelGraph, "legs_at_once", at_once)
     run = core_first(monkeypatch, problem)
     assert any(row.stage == "core" for row in run.trace)
     goals = next(row for row in run.trace if row.stage == "goals")

@@ -38,7 +38,7 @@ from netsp.solving import legcosts, searching
 from netsp.solving.legcosts import MEASURE_AT_ONCE, LegCosts
 from netsp.solving.limits import Limits
 from netsp.solving.run import Stop
-from netsp.travel.graph import TravelGraph
+from netsp.travel.graph import TravelGraph, rounded_down
 from netsp.worlds import random_world as far_world
 from tests.brute import brute_tour as brute
 from tests.test_contract import random_graph
@@ -358,8 +358,9 @@ def test_the_certificate_in_exact_rationals_is_no_lower_than_the_bound_claimed(s
         assert exact <= best * (1 + 1e-12)
 
 
-def test_a_long_tether_is_solved_without_measuring_most_legs():
+def test_a_long_tether_is_solved_without_measuring_most_legs_where_that_takes_long(monkeypatch):
     problem = far_world(0, goals=5, tether_length=500.0)
+    monkeypatch.setattr(TravelGraph, "legs_at_once", False)
     lazy, whole = travel_graph(problem), travel_graph(problem)
     whole.costs  # noqa: B018
     assert len(whole) > MEASURE_AT_ONCE
@@ -378,7 +379,8 @@ def test_a_long_tether_is_solved_without_measuring_most_legs():
     assert sum(asked) < 0.2 * len(whole) ** 2 / 2
 
 
-def test_legs_that_an_lp_uses_are_measured_and_no_others():
+def test_legs_that_an_lp_uses_are_measured_and_no_others(monkeypatch):
+    monkeypatch.setattr(TravelGraph, "legs_at_once", False)
     graph = travel_graph(far_world(0, goals=5, tether_length=500.0))
     costs = LegCosts(graph)
     bounds = costs.values.copy()
@@ -404,15 +406,18 @@ def test_no_leg_comes_into_an_lp_that_is_only_bounded(monkeypatch):
         return few(self, legs, price)
 
     monkeypatch.setattr(root.Root, "_a_few", note)
+    monkeypatch.setattr(TravelGraph, "legs_at_once", False)
     assert solve(travel_graph(far_world(0, goals=5, tether_length=500.0))).status is Status.OPTIMAL
     assert seen
     assert all(seen)
 
 
+@pytest.mark.parametrize("at_once", [True, False])
 @pytest.mark.parametrize("rounded_from", [10, 300])
-def test_rounded_costs_prove_the_same(monkeypatch, rounded_from):
+def test_rounded_costs_prove_the_same(monkeypatch, rounded_from, at_once):
     problem = far_world(0, goals=7, tether_length=450.0)
     plain = solve(travel_graph(problem))
+    monkeypatch.setattr(TravelGraph, "legs_at_once", at_once)
     monkeypatch.setattr(legcosts, "ROUNDED_FROM", rounded_from)
     monkeypatch.setattr(legcosts, "ROWS", 100)
     monkeypatch.setattr(legcosts, "LEGS", 70)
@@ -422,7 +427,9 @@ def test_rounded_costs_prove_the_same(monkeypatch, rounded_from):
     costs = LegCosts(graph)
     assert costs.rounded
     assert costs.values.dtype == np.float32
-    assert (costs.values[1:, 1:] <= graph.lower_bounds()[1:, 1:]).all()
+    most = travel_graph(problem).costs if at_once else graph.lower_bounds()
+    assert (costs.values[1:, 1:] <= most[1:, 1:]).all()
+    assert (costs.exact is None) == at_once
     found = solve(graph)
     assert found.status is plain.status is Status.OPTIMAL
     assert found.length == pytest.approx(plain.length, rel=2e-6)
@@ -435,6 +442,7 @@ def test_what_is_measured_of_rounded_costs_is_as_long_as_it_is(monkeypatch):
     monkeypatch.setattr(legcosts, "ROWS", 50)
     monkeypatch.setattr(legcosts, "LEGS", 30)
     monkeypatch.setattr(legcosts, "MEASURE_AT_ONCE", 5)
+    monkeypatch.setattr(TravelGraph, "legs_at_once", False)
     graph = travel_graph(far_world(0, goals=5, tether_length=400.0))
     costs, rng = LegCosts(graph), np.random.default_rng(0)
     asked = rng.random(costs.values.shape) < 0.5
@@ -464,7 +472,7 @@ def test_what_is_measured_of_rounded_costs_is_as_long_as_it_is(monkeypatch):
 )
 def test_rounding_is_down_and_squeezing_keeps_what_is_kept(numbers, keep):
     matrix = np.array(numbers).reshape(3, 3)
-    rounded = legcosts.rounded_down(matrix)
+    rounded = rounded_down(matrix)
     assert (rounded <= matrix).all()
     assert (rounded >= matrix * (1 - 2e-7) - 1e-40).all()
     kept = np.array(keep)

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from netsp import travel_graph
+from netsp import TravelGraph, travel_graph
 from netsp.mip import root
 from netsp.mip.cuts import Cut
 from netsp.mip.prices import Prices
@@ -127,6 +127,7 @@ def test_once_few_legs_are_left_all_of_them_are_measured(seed, monkeypatch):
 
     monkeypatch.setattr(root.Root, "_measure_left", note)
     monkeypatch.setattr("netsp.solving.legcosts.MEASURE_AT_ONCE", 20)
+    monkeypatch.setattr(TravelGraph, "legs_at_once", False)
     found = MipRun(travel_graph(problem), Limits()).solve("highs", None)
     assert after
     assert all(after)

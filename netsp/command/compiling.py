@@ -69,7 +69,6 @@ def steps() -> Iterator[tuple[str, Callable[[], object]]]:
     from netsp.problem import Problem
     from netsp.solvers.solve import solve, travel_graph
     from netsp.solvers.table import SOLVERS
-    from netsp.solving.legcosts import rounded_down
     from netsp.space.solve import solve_mission
     from netsp.worlds import random_world
 
@@ -91,7 +90,7 @@ def steps() -> Iterator[tuple[str, Callable[[], object]]]:
 
     def rounded() -> None:
         graph = travel_graph(fewer)
-        costs, clusters = rounded_down(graph.costs), int(graph.cluster.max()) + 1
+        costs, clusters = graph.costs_rounded(np.arange(len(graph))), graph.goal_count + 1
         duals = Duals(np.zeros(clusters), np.zeros(len(costs)), np.zeros(0))
         prices = Prices(costs, np.isinf(costs), graph.cluster, [], duals)
         prices.rule_out(1.0)

@@ -233,9 +233,10 @@ def _alike(
     i0, j0 = branches.rank[u], branches.rank[v]
     i1, j1 = i0 + 1, j0 + 1
     if p >= 0 and q >= 0 and p_place >= q_place:
-        # around one arc from tether to tether: how far it slides is up to both ends
+        # around one arc from tether to tether: how far it slides is up to both ends, so those on
+        # the side of u are to leave no earlier than u does
         if p_place == q_place:
-            i0, i1 = _together_with(i0, p, branches)
+            i0, i1 = _from_angle(p, p_least + at[p_place, SLID], branches), branches.end[p]
             j0, j1 = _from_angle(q, q_least, branches), branches.end[q]
     else:
         if p >= 0:
@@ -272,13 +273,3 @@ def _from_angle(bend: int, least: float, branches: Branches) -> int:
     while k < after and branches.angle[k] < least - BACK:
         k += 1
     return int(branches.begin[k]) if k < after else int(branches.end[bend])
-
-
-@kernel
-def _together_with(place: int, bend: int, branches: Branches) -> tuple[int, int]:
-    """From and to which places that is which leaves a bend with the vertex of a place."""
-    k, after = branches.row[bend], branches.row[bend + 1]
-    while k + 1 < after and branches.begin[k + 1] <= place:
-        k += 1
-    end = branches.begin[k + 1] if k + 1 < after else branches.end[bend]
-    return int(branches.begin[k]), int(end)

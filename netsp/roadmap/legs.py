@@ -222,4 +222,3 @@ class TautLegs:
         places, point = self.paths.outline.places, np.asarray(self.cluster, dtype=np.int64)
         letters, row = flattened(self.signatures)
         return Ends(places[point], self.paths.slits.cells(places[:, 0])[point], letters, row), point
-
