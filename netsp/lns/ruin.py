@@ -28,6 +28,9 @@ LONGEST_STRING = 10
 REMOVED = 10
 """Average number of clusters removed together."""
 
+EVEN = 1e-12
+"""Share of a length up to which two differences are the same."""
+
 BLINK = 0.01
 """Chance that a place is overlooked (same paper, section 3.3)."""
 
@@ -61,9 +64,12 @@ def forward(order: Ints, n: int, first: int, start: Ints, costs: Floats, ahead: 
 
 
 @kernel
-def backward(order: Ints, n: int, last: int, start: Ints, costs: Floats, behind: Floats) -> None:
-    """Fill ``behind`` from position `last` down to 1; behind[n] is the path from the base home."""
-    for k in range(last, 0, -1):
+def backward(
+    order: Ints, n: int, last: int, first: int, start: Ints, costs: Floats, behind: Floats
+) -> None:
+    """Fill ``behind`` from position `last` down to `first`; behind[n] is the path from the base
+    home."""
+    for k in range(last, first - 1, -1):
         c = order[k]
         q = order[k + 1] if k + 1 < n else 0
         for j in range(start[c], start[c + 1]):
@@ -73,6 +79,60 @@ def backward(order: Ints, n: int, last: int, start: Ints, costs: Floats, behind:
                 if d < best:
                     best = d
             behind[k, j - start[c]] = best
+
+
+@kernel
+def forward_again(
+    order: Ints, n: int, first: int, start: Ints, costs: Floats, ahead: Floats
+) -> None:
+    """Fill ``ahead`` from position `first` on, where it holds what was true before a change further
+    back. Where all paths to a cluster have become longer by the same, those to all after it have,
+    too: what lies so far back has no say in which classes are best."""
+    for k in range(first, n):
+        c, p = order[k], order[k - 1]
+        longer, even = 0.0, True
+        for j in range(start[c], start[c + 1]):
+            best = np.inf
+            for i in range(start[p], start[p + 1]):
+                d = ahead[k - 1, i - start[p]] + costs[i, j]
+                if d < best:
+                    best = d
+            by = best - ahead[k, j - start[c]]
+            if j == start[c]:
+                longer = by
+            elif abs(by - longer) > EVEN * best:
+                even = False
+            ahead[k, j - start[c]] = best
+        if even:
+            for q in range(k + 1, n):
+                for j in range(start[order[q] + 1] - start[order[q]]):
+                    ahead[q, j] += longer
+            return
+
+
+@kernel
+def backward_again(order: Ints, last: int, start: Ints, costs: Floats, behind: Floats) -> None:
+    """Fill ``behind`` from position `last` down to 1, as `forward_again`."""
+    for k in range(last, 0, -1):
+        c, q = order[k], order[k + 1]
+        longer, even = 0.0, True
+        for j in range(start[c], start[c + 1]):
+            best = np.inf
+            for i in range(start[q], start[q + 1]):
+                d = behind[k + 1, i - start[q]] + costs[j, i]
+                if d < best:
+                    best = d
+            by = best - behind[k, j - start[c]]
+            if j == start[c]:
+                longer = by
+            elif abs(by - longer) > EVEN * best:
+                even = False
+            behind[k, j - start[c]] = best
+        if even:
+            for p in range(k - 1, 0, -1):
+                for j in range(start[order[p] + 1] - start[order[p]]):
+                    behind[p, j] += longer
+            return
 
 
 @kernel
@@ -149,12 +209,15 @@ def insert_best(
         order[k] = order[k - 1]
         for i in range(behind.shape[1]):
             behind[k + 1, i] = behind[k, i]
+            ahead[k, i] = ahead[k - 1, i]
     for i in range(behind.shape[1]):
         behind[at + 2, i] = behind[at + 1, i]
     order[at + 1] = c
     n += 1
-    forward(order, n, at + 1, start, costs, ahead)
-    backward(order, n, at + 1, start, costs, behind)
+    forward(order, at + 2, at + 1, start, costs, ahead)
+    forward_again(order, n, at + 2, start, costs, ahead)
+    backward(order, n, at + 1, at + 1, start, costs, behind)
+    backward_again(order, at, start, costs, behind)
     return n, best
 
 
@@ -186,7 +249,7 @@ def descend(
                     size += 1
             forward(work, size, 1, start, costs, ahead)
             behind[size, 0] = 0.0
-            backward(work, size, size - 1, start, costs, behind)
+            backward(work, size, size - 1, 1, start, costs, behind)
             size, d = insert_best(
                 c, work, size, start, costs, near, before, ahead, behind, 0.0, chance
             )
@@ -352,7 +415,7 @@ def ruin_and_recreate(
         ahead[0, 0] = 0.0
         forward(work, size, 1, start, costs, ahead)
         behind[size, 0] = 0.0
-        backward(work, size, size - 1, start, costs, behind)
+        backward(work, size, size - 1, 1, start, costs, behind)
         d = 0.0
         for r in range(removed):
             size, d = insert_best(

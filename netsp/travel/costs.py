@@ -15,6 +15,8 @@ from netsp.errors import InputError
 class CostTable:
     """Legs given as a matrix."""
 
+    at_once = True
+
     def __init__(self, costs: Floats, cluster: Ints) -> None:
         self.costs, self.cluster = costs, cluster
 
