@@ -2,6 +2,7 @@
 
 import itertools
 import json
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,9 @@ from netsp.gtsplib import load
 from netsp.lns.solve import solve as lns
 from netsp.pictures.gtsp import draw_gtsp
 from netsp.solution import Status
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
+from gtsp import OPTIMA, clustered
 
 RING = Path(__file__).parent.parent / "examples" / "7ring28.gtsp"
 
@@ -268,3 +272,23 @@ def test_distances_without_places_have_no_picture(tmp_path, capsys):
     )  # fmt: skip
     assert main(["gtsp", str(path), "--plot", str(tmp_path / "a.png"), "--quiet"]) == 2
     assert "nothing to draw" in capsys.readouterr().err
+
+
+EIL51 = np.array([
+    (37, 52), (49, 49), (52, 64), (20, 26), (40, 30), (21, 47), (17, 63), (31, 62), (52, 33),
+    (51, 21), (42, 41), (31, 32), (5, 25), (12, 42), (36, 16), (52, 41), (27, 23), (17, 33),
+    (13, 13), (57, 58), (62, 42), (42, 57), (16, 57), (8, 52), (7, 38), (27, 68), (30, 48),
+    (43, 67), (58, 48), (58, 27), (37, 69), (38, 46), (46, 10), (61, 33), (62, 63), (63, 69),
+    (32, 22), (45, 35), (59, 15), (5, 6), (10, 17), (21, 10), (5, 64), (30, 15), (39, 10),
+    (32, 39), (25, 32), (25, 55), (48, 28), (56, 37), (30, 40),
+])  # fmt: skip
+"""Places of TSPLIB's eil51 (Christofides & Eilon 1969)."""
+
+
+def test_clusters_are_made_as_those_of_gtsplib_whose_optimum_is_known():
+    """Of 11eil51 Fischetti, Salazar & Toth (1997) proved that it is 174."""
+    costs = np.floor(np.hypot(*(EIL51[:, None] - EIL51[None]).T) + 0.5)
+    graph = TravelGraph.from_costs(costs, clustered(costs, 11), base=None)
+    found = solve_graph(graph)
+    assert found.status is Status.OPTIMAL
+    assert found.length == found.lower_bound == OPTIMA["eil51"] == 174

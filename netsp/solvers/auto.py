@@ -33,7 +33,7 @@ from netsp.travel.graph import TravelGraph, least_tethers
 from netsp.travel.kept import within_kept
 from netsp.travel.result import Progress, Result, of_part, proven
 
-PROVABLE = 20_000
+PROVABLE = 22_000
 """Most vertices of a travel graph that `mip` is asked to bound: about 3 GiB of matrices."""
 
 MOST_KEPT = 3_000
