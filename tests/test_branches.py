@@ -58,7 +58,7 @@ def sunk(problem, seed):
     return Problem.model_validate(data)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(st.integers(0, 10_000), st.sampled_from(sorted(FAMILIES)), st.integers(1, 14), st.booleans())
 def test_legs_of_whole_branches_are_those_pulled_one_by_one(seed, family, obstacles, deep):
     problem = random_world(
