@@ -8,7 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp import Circle, Polygon, Problem
+from netsp.clock import NEVER, Clock
+from netsp.errors import LimitReachedError
 from netsp.roadmap import legs as legs_of
+from netsp.roadmap.branches import OPEN
 from netsp.roadmap.legs import TautLegs
 from netsp.roadmap.taut import TautRoadmap
 from netsp.roadmap.tethertree import GrowingTree
@@ -110,13 +113,25 @@ def searches(monkeypatch):
     return seen
 
 
+def nothing_pulled(branches, lengths, point, *rest):
+    """The next open leg."""
+    order, (i, j) = branches.order, rest[-2:]
+    for a in range(i, len(order)):
+        if point[order[a]] > 0:
+            for b in range(j if a == i else a + 1, len(order)):
+                u, v = order[a], order[b]
+                if lengths.out[u, v] == OPEN and point[u] != point[v] and point[v] > 0:
+                    return a, b
+    return len(order), 0
+
+
 def test_few_legs_tell_all(monkeypatch, searches):
     roadmap = TautRoadmap(random_world(0, goals=10, tether_length=450.0))
     vertices = np.arange(len(roadmap.cluster))
     pulled = roadmap.legs.lengths(vertices)
     assert len(vertices) > 300
     searches.clear()
-    monkeypatch.setattr(legs_of, "fill", lambda *_: 1)
+    monkeypatch.setattr(legs_of, "fill", nothing_pulled)
     searched = roadmap.legs.lengths(vertices)
     assert np.allclose(pulled, searched, rtol=1e-10)
     assert len(searches) < 0.05 * len(vertices) ** 2 / 2
@@ -127,10 +142,10 @@ def test_tethers_that_cannot_be_pulled_are_searched_for_and_grow_the_same_tree(
 ):
     problem = random_world(3, goals=6, obstacles=8, tether_length=330.0)
     one, other = TautRoadmap(problem), TautRoadmap(problem)
-    tree = one.legs._tree
+    tree = one.legs._grown(NEVER)
     searches.clear()
     monkeypatch.setattr(GrowingTree, "pull", lambda self, ends, point, *_: np.arange(1, len(point)))
-    same = other.legs._tree
+    same = other.legs._grown(NEVER)
     assert len(searches) == len(one.cluster) - 1
     assert (same.node == tree.node).all()
     assert (same.parent == tree.parent).all()
@@ -141,7 +156,7 @@ def test_tethers_that_cannot_be_pulled_are_searched_for_and_grow_the_same_tree(
 
 def test_the_tree_ends_where_the_tethers_do():
     roadmap = TautRoadmap(random_world(5, goals=8, obstacles=12, tether_length=380.0))
-    tree, places = roadmap.legs._tree, roadmap.outline.places
+    tree, places = roadmap.legs._grown(NEVER), roadmap.outline.places
     for v in range(1, len(roadmap.cluster)):
         bend = tree.last[v]
         assert tree.length[bend] <= roadmap.planar[v]
@@ -152,3 +167,13 @@ def test_the_tree_ends_where_the_tethers_do():
             assert before < bend
             assert tree.length[before] < tree.length[bend]
             bend = before
+
+
+def test_a_clock_that_is_up_ends_it_and_leaves_nothing_half_done():
+    roadmap = TautRoadmap(random_world(0, goals=10, tether_length=450.0))
+    vertices = np.arange(len(roadmap.cluster))
+    for measure in (roadmap.legs.lengths, roadmap.legs.rounded):
+        with pytest.raises(LimitReachedError, match="homotopy classes"):
+            measure(vertices, clock=Clock(0.0))
+    found = roadmap.legs.lengths(vertices, clock=Clock(60.0))
+    assert np.allclose(found, one_by_one(roadmap), rtol=1e-10)

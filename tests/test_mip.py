@@ -38,7 +38,8 @@ from netsp.solving import legcosts, searching
 from netsp.solving.legcosts import MEASURE_AT_ONCE, LegCosts
 from netsp.solving.limits import Limits
 from netsp.solving.run import Stop
-from netsp.travel.graph import TravelGraph, rounded_down
+from netsp.travel.costs import rounded_down
+from netsp.travel.graph import TravelGraph
 from netsp.worlds import random_world as far_world
 from tests.brute import brute_tour as brute
 from tests.test_contract import random_graph
@@ -668,3 +669,16 @@ def first_legs(graph):
     """All legs and their costs."""
     legs = np.argwhere(np.triu(np.isfinite(graph.costs), 1))
     return legs, graph.costs[legs[:, 0], legs[:, 1]]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_tour_that_the_relaxation_finds_is_kept_where_too_much_is_left_to_be_searched(
+    seed, monkeypatch
+):
+    problem = far_world(seed, goals=7, tether_length=400.0)
+    plain = solve(travel_graph(problem))
+    monkeypatch.setattr(searching, "SEARCHED_WHOLE", 1)
+    monkeypatch.setattr(searching.SearchingRun, "search", lambda *_: None)
+    found = solve(travel_graph(problem))
+    assert found.status is plain.status is Status.OPTIMAL
+    assert found.length == pytest.approx(plain.length, rel=2e-6)

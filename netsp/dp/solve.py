@@ -2,8 +2,8 @@
 
 Where there are few goals and very many classes this is by far the fastest proof: the states are
 (visit, vertex, remembered goals), the legs of a class cost nothing to keep apart, and what a bound
-rules out shrinks the next pass. It starts on lower bounds of the legs; in most worlds nine classes
-in ten are dead before a leg is measured.
+rules out shrinks the next pass. Where legs take long it starts on lower bounds of them; in most
+worlds nine classes in ten are dead before a leg is measured.
 
 Prices follow the walk (deflected subgradient): goals it misses become dearer to miss, goals it
 repeats cheaper. Memory follows it too: where it repeats a goal, that is remembered from now on.
@@ -164,6 +164,7 @@ def bound_by_walks(run: SearchingRun, costs: LegCosts, *, few_legs: int = 0) -> 
         stalls = _stalls(history, run.length)
         if costs.exact is not None and (stalls or len(costs) <= MEASURE_AT_ONCE):
             _measure(run, walks, costs)
+            searched = run.searches_all(costs)
             best, step = -np.inf, STEP
             history.clear()
         elif stalls:

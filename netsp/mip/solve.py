@@ -60,7 +60,7 @@ FEW_LEGS = 600
 """So few legs are left to cuts, where walks that remember ever more take long over them."""
 
 CORE_FIRST = 3000
-"""With more vertices a first bound, and a proof over a core of them, come before all are bounded,
+"""With more vertices a first bound, and a proof over a core of them, come before that over all,
 also where goals are few."""
 
 MOST_LEGS, TRIES = 30_000, 6
@@ -242,8 +242,8 @@ class MipRun(SearchingRun):
     def round(self, root: Root, point: Point) -> None:
         """Turn a point of the root into a tour, if all that is left is searched; else search the
         classes that it visits whenever the gap has shrunk to `SEARCH_AGAIN` of what it was."""
-        if self.searches_all(root.costs):
-            whole = np.abs(point.y - np.rint(point.y)).max(initial=0.0) < 1e-6
+        whole = np.abs(point.y - np.rint(point.y)).max(initial=0.0) < 1e-6
+        if self.searches_all(root.costs) or (whole and root.costs.exact is None):
             self.tour_at(root.costs, point, whole=whole)
             return
         gap = self.length - (self.bound or 0.0)

@@ -139,10 +139,12 @@ def _laid_out(what: Ints, row: Ints, size: Ints, count: int) -> tuple[Ints, Ints
 @kernel
 def fill(
     branches: Branches, lengths: Lengths, point: Ints, ends: Ends, slits: Slits, arcs: Arcs,
-    stop: Ints,
-) -> int:  # fmt: skip
-    """Find the legs between vertices of different goals; how many could not be pulled, and stay
-    open. What is within a goal may be anything, and so may legs of the base (point 0).
+    stop: Ints, i: int, j: int,
+) -> tuple[int, int]:  # fmt: skip
+    """Find the legs between vertices of different goals, those of the vertices at places i and j
+    in the order first, and then what is open after these; the next pair of places whose leg cannot
+    be pulled, or more places than there are. What is within a goal may be anything, and so may
+    legs of the base (point 0).
 
     Parameters
     ----------
@@ -152,41 +154,19 @@ def fill(
     order, out = branches.order, lengths.out
     longest = longest_word(ends.row)
     room, path = room_for(longest, slits), path_for(longest)
-    left = 0
-    for i in range(len(order)):
+    while i < len(order) and stop[0] == 0:
         u = order[i]
-        if stop[0] != 0:
-            break
-        if point[u] == 0:
-            continue
-        for j in range(i + 1, len(order)):
+        while j < len(order) and point[u] != 0:
             v = order[j]
-            if out[u, v] != OPEN or point[u] == point[v] or point[v] == 0:
-                continue
-            length, _, count = pull(u, v, ends, point, slits, arcs, room, path)
-            if length < 0.0:
-                left += 1
-            else:
+            if out[u, v] == OPEN and point[u] != point[v] and point[v] != 0:
+                length, _, count = pull(u, v, ends, point, slits, arcs, room, path)
+                if length < 0.0:
+                    return i, j
                 spread(u, v, length, count, path.whole, path.real, branches, lengths)
-    return left
-
-
-@kernel
-def open_legs(point: Ints, out: Floats) -> Ints:
-    """(k, 2) legs u < v that are open, but for those of the base."""
-    count = 0
-    for u in range(len(point)):
-        for v in range(u):
-            if out[u, v] == OPEN and point[u] != point[v] and point[u] != 0 and point[v] != 0:
-                count += 1
-    legs = np.empty((count, 2), dtype=np.int64)
-    count = 0
-    for u in range(len(point)):
-        for v in range(u):
-            if out[u, v] == OPEN and point[u] != point[v] and point[u] != 0 and point[v] != 0:
-                legs[count, 0], legs[count, 1] = v, u
-                count += 1
-    return legs
+            j += 1
+        i += 1
+        j = i + 1
+    return i, j
 
 
 @kernel

@@ -25,7 +25,8 @@ from netsp.roadmap.legs import TautLegs
 from netsp.roadmap.paths import TautPaths
 from netsp.roadmap.taut import MAX_CLASSES, TautRoadmap
 from netsp.solution import Status
-from netsp.travel.graph import TravelGraph, rounded_down
+from netsp.travel.costs import rounded_down
+from netsp.travel.graph import TravelGraph
 from netsp.travel.kept import within_kept
 from netsp.travel.result import OPTIMALITY_TOLERANCE, OnProgress, Progress, Result
 

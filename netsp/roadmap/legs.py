@@ -10,11 +10,11 @@ from functools import cached_property
 import numpy as np
 
 from netsp.arrays import Bools, Floats, Ints
-from netsp.clock import NEVER, Clock
+from netsp.clock import NEVER, Clock, Flag
 from netsp.errors import LimitReachedError
 from netsp.hsignature import Word, concatenate, invert
 from netsp.memory import ask
-from netsp.roadmap.branches import OPEN, Lengths, branches_of, fill, open_legs, spread
+from netsp.roadmap.branches import OPEN, Lengths, branches_of, fill, spread
 from netsp.roadmap.paths import TautPaths
 from netsp.roadmap.pulled import Path, path_along, pull_each
 from netsp.roadmap.slits import Ends, flattened, slit_lengths
@@ -48,6 +48,7 @@ class TautLegs:
         self.paths, self.cluster, self.planar = paths, cluster, planar
         self.signatures = list(signatures)
         self._z = paths.problem.points[:, 2]
+        self._tree: TetherTree | None = None
 
     at_once = True
 
@@ -77,49 +78,65 @@ class TautLegs:
             f"legs between {n} homotopy classes",
             "lower tether_length or max_classes",
         )
+        out: Floats = np.full((n, n), OPEN, dtype=kind)  # type: ignore[assignment]
         # what takes a fraction of a second is measured all the same, or there would be no tour
-        stop = clock.flag if clock is not None and n > UNTIMED else NEVER
-        out = np.full((n, n), OPEN, dtype=kind)
-        paths, (places, points) = self.paths, self._ends
-        letters, row = flattened([self.signatures[v] for v in vertices])
-        ends = Ends(places.place[vertices], places.cell[vertices], letters, row)
-        point = points[vertices]
-        branches = branches_of(self._tree, vertices)
-        lengths = Lengths(self.planar[vertices], self._z[point], share, out)
-        left = fill(branches, lengths, point, ends, paths.slits, paths.arcs, stop)
-        for u, v in open_legs(point, out).tolist() if left and not stop[0] else ():
-            if out[u, v] == OPEN and not stop[0]:
-                length, path = self._searched(int(vertices[u]), int(vertices[v]))
-                spread(u, v, length, len(path.whole) - 1, path.whole, path.real, branches, lengths)
-        if stop[0]:
-            raise LimitReachedError(
-                f"time limit reached while measuring the legs between {n} homotopy classes; lower "
-                "tether_length or raise the limit"
-            )
+        if n <= UNTIMED:
+            self._fill(vertices, share, out, NEVER)
+        else:
+            clock = clock or Clock()
+            clock.interruptible(lambda: self._fill(vertices, share, out, clock.flag))
+            if clock.flag[0]:
+                raise LimitReachedError(
+                    f"time limit reached while measuring the legs between {n} homotopy classes; "
+                    "lower tether_length or raise the limit"
+                )
+        point = self.cluster[vertices]
         for base in np.flatnonzero(point == 0).tolist():
             out[base] = out[:, base] = share * self.to_base()[vertices]
         for g in np.unique(point).tolist():
             own = np.flatnonzero(point == g)
             out[np.ix_(own, own)] = np.inf
-        return out  # type: ignore[return-value]
+        return out
+
+    def _fill(self, vertices: Ints, share: float, out: Floats, stop: Flag) -> None:
+        """The legs between goals, into (k, k) `out`; unfinished when the flag is set."""
+        tree = self._grown(stop)
+        if stop[0]:
+            return
+        paths, (every, points) = self.paths, self._ends
+        letters, row = flattened([self.signatures[v] for v in vertices])
+        ends = Ends(every.place[vertices], every.cell[vertices], letters, row)
+        point, branches = points[vertices], branches_of(tree, vertices)
+        lengths = Lengths(self.planar[vertices], self._z[point], share, out)
+        i, j = 0, 1
+        while True:
+            i, j = fill(branches, lengths, point, ends, paths.slits, paths.arcs, stop, i, j)
+            if i >= len(vertices) or stop[0]:
+                return
+            u, v = int(branches.order[i]), int(branches.order[j])
+            length, path = self._searched(int(vertices[u]), int(vertices[v]))
+            spread(u, v, length, len(path.whole) - 1, path.whole, path.real, branches, lengths)
 
     def _searched(self, u: int, v: int) -> tuple[float, Path]:
         """Planar length and path of a leg that could not be pulled."""
         a, b = int(self.cluster[u]), int(self.cluster[v])
-        word = self.relative_word(u, v)
-        # a tether is searched for when there is no tree yet, and none is needed
-        longest = self._longest(u, v) if u > 0 and v > 0 else float(self.planar[u] + self.planar[v])
-        length, pieces = self.paths.pieces(a, b, word, longest)
+        length, pieces = self.paths.pieces(a, b, self.relative_word(u, v), self._longest(u, v))
         return length, path_along(a, pieces, self.paths.tangents.target, self.paths.arcs)
 
-    @cached_property
-    def _tree(self) -> TetherTree:
-        """Where the tethers part."""
+    def _grown(self, stop: Flag) -> TetherTree:
+        """Where the tethers part, found out once; unfinished when the flag is set."""
+        if self._tree is not None:
+            return self._tree
         paths, (ends, point) = self.paths, self._ends
         growing = GrowingTree(len(point))
-        for v in growing.pull(ends, point, paths.slits, paths.arcs).tolist():
+        for v in growing.pull(ends, point, paths.slits, paths.arcs, stop).tolist():
+            if stop[0]:
+                break
             growing.add(v, self._searched(0, v)[1], paths.arcs)
-        return growing.tree()
+        tree = growing.tree()
+        if not stop[0]:
+            self._tree = tree
+        return tree
 
     def to_base(self) -> Floats:
         """(V,) 3D lengths of the legs from the base, which are the tethers."""
@@ -176,8 +193,10 @@ class TautLegs:
         return self.paths.path(int(self.cluster[u]), int(self.cluster[v]), word, longest)
 
     def _longest(self, u: int, v: int) -> float:
-        """More than the planar length of a leg: back along one tether to where the other parts."""
-        return float(self.planar[u] + self.planar[v] - 2.0 * self._tree.part(u, v))
+        """More than the planar length of a leg: back along one tether to where the other parts, as
+        far as that is known."""
+        part = 0.0 if self._tree is None else self._tree.part(u, v)
+        return float(self.planar[u] + self.planar[v] - 2.0 * part)
 
     def _few(self, vertices: Ints, asked: Bools) -> Floats:
         """As `lengths`, for a few legs; those that cannot be pulled are searches of their own."""

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from netsp.arrays import Floats, Ints
+from netsp.clock import Flag
 from netsp.compiled.growing import more_int_rows, more_rows
 from netsp.compiled.kernel import kernel
 from netsp.roadmap.arcs import LENGTH, RADIUS, Arcs
@@ -72,12 +73,13 @@ class GrowingTree:
         self._last = np.zeros(vertices, dtype=np.int64)
         self._slid = np.zeros(vertices)
 
-    def pull(self, ends: Ends, point: Ints, slits: Slits, arcs: Arcs) -> Ints:
+    def pull(self, ends: Ends, point: Ints, slits: Slits, arcs: Arcs, stop: Flag) -> Ints:
         """Add the tethers of all vertices, from vertex 0, the base, to each; those that could not
-        be pulled."""
+        be pulled. Unfinished when the flag is set."""
         self._whole, self._real, self._size = _grown(
-            ends, point, slits, arcs, self._whole, self._real, self._size, self._last, self._slid
-        )
+            ends, point, slits, arcs, self._whole, self._real, self._size, self._last, self._slid,
+            stop,
+        )  # fmt: skip
         missing = np.flatnonzero(self._last < 0)
         self._last[missing] = 0
         return missing
@@ -101,11 +103,13 @@ class GrowingTree:
 @kernel
 def _grown(
     ends: Ends, point: Ints, slits: Slits, arcs: Arcs, whole: Ints, real: Floats, size: int,
-    last: Ints, slid: Floats,
+    last: Ints, slid: Floats, stop: Ints,
 ) -> tuple[Ints, Floats, int]:  # fmt: skip
     longest = longest_word(ends.row)
     room, path = room_for(longest, slits), path_for(longest)
     for v in range(1, len(point)):
+        if stop[0] != 0:
+            break
         length, _, count = pull(0, v, ends, point, slits, arcs, room, path)
         if length < 0.0:
             last[v] = -1

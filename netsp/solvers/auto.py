@@ -34,7 +34,7 @@ from netsp.travel.kept import within_kept
 from netsp.travel.result import Progress, Result, of_part, proven
 
 PROVABLE = 22_000
-"""Most vertices of a travel graph that `mip` is asked to bound: about 3 GiB of matrices."""
+"""Most vertices of a travel graph that `mip` is asked to bound: some 3 GiB of matrices."""
 
 MOST_KEPT = 3_000
 """With more vertices and few goals, about so many, those of least tether, are proven over."""

@@ -1,12 +1,12 @@
 """Leg costs, measured only when they matter where they cannot be had all at once.
 
 Over the taut roadmap they can (`netsp.roadmap.branches`). Elsewhere a bound costs a fraction of a
-leg, and there are many. As long as a leg is only bounded from below,
-everything that is proven with the bound holds: the relaxation is one of a cheaper world. So the
-relaxation runs on bounds first, and what it cannot rule out is measured.
+leg, and there are many. As long as a leg is only bounded from below, everything that is proven with
+the bound holds: the relaxation is one of a cheaper world. So the relaxation runs on bounds first,
+and what it cannot rule out is measured.
 
 With thousands of classes the matrix is what limits a proof. Then it is in single precision, rounded
-down: bounds stay bounds, and a proof loses 6e-8 of the length at most, of the 5e-7 that it may.
+down: bounds stay bounds, and a proof loses 3e-7 of the length at most, of the 5e-7 that it may.
 """
 
 from __future__ import annotations
@@ -18,7 +18,8 @@ import numpy.typing as npt
 
 from netsp.arrays import Bools, Floats, Ints
 from netsp.memory import ask
-from netsp.travel.graph import TravelGraph, rounded_down
+from netsp.travel.costs import rounded_down
+from netsp.travel.graph import TravelGraph
 
 MEASURE_AT_ONCE = 400
 """So many vertices or fewer are measured altogether: that takes a second at most."""
@@ -59,15 +60,15 @@ class LegCosts:
         if graph.measured or len(graph) <= MEASURE_AT_ONCE:
             self.values = np.array(graph.costs)
             return
-        if graph.legs_at_once:
-            costs = graph.costs_rounded if many else graph.costs_among
-            self.values = costs(self.vertices)
-            return
         ask(
             (BYTES_ROUNDED if many else BYTES_PER_LEG) * len(graph) ** 2,
             f"bounding every tour over {len(graph)} homotopy classes",
             "lower tether_length or max_classes, or use solver 'lns'",
         )
+        if graph.legs_at_once:
+            costs = graph.costs_rounded if many else graph.costs_among
+            self.values = costs(self.vertices)
+            return
         self.values = self._bounded() if many else graph.lower_bounds()
         self._none_measured()
 

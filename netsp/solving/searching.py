@@ -1,6 +1,6 @@
 """A run of a solver that proves, with local search for its incumbents.
 
-While legs are only bounded the search sees a core of classes whose legs it has measured, those of
+While legs are only bounded, or many vertices are left, the search sees a core of classes, those of
 least tether and those beside the best tour (`netsp.solving.beside`); in the end it sees all that
 are left.
 
@@ -29,8 +29,7 @@ from netsp.travel.graph import TravelGraph, least_tethers
 from netsp.travel.result import OPTIMALITY_TOLERANCE
 
 CORE = 800
-"""About so many vertices, those of least tether, are measured for the heuristic while the other
-legs are only bounded."""
+"""About so many vertices, those of least tether, are searched while there are too many for all."""
 
 SEARCHED_WHOLE = 1200
 """So many vertices whose legs are measured are searched altogether."""

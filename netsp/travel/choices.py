@@ -56,6 +56,23 @@ class _LegsOfChoices:
         out[own[:, None] == own[None, :]] = np.inf
         return out
 
+    @property
+    def at_once(self) -> bool:
+        """As beneath."""
+        return self.graph.legs_at_once
+
+    def rounded(self, vertices: Ints, clock: Clock | None = None) -> Floats:
+        with self.graph.on_clock(clock or self.graph.clock):
+            out = self.graph.costs_rounded(vertices)
+        own = self.cluster[vertices]
+        for c in np.unique(own).tolist():
+            alike = np.flatnonzero(own == c)
+            out[np.ix_(alike, alike)] = np.inf
+        return out
+
+    def pairs(self, us: Ints, vs: Ints) -> Floats:
+        return self.graph.costs_of(us, vs)
+
     def to_base(self) -> Floats:
         out = self.graph.costs_to_base
         out[0] = 0.0

@@ -11,6 +11,16 @@ from netsp.arrays import Bools, Floats, Ints
 from netsp.clock import Clock
 from netsp.errors import InputError
 
+ROWS = 512
+"""Of a matrix that are worked on at a time, so that what is in between stays small."""
+
+
+def rounded_down(values: Floats) -> Floats:
+    """In single precision, and no larger."""
+    out = values.astype(np.float32)
+    np.nextafter(out, np.float32(-np.inf), out=out, where=out > values)
+    return out  # type: ignore[return-value]
+
 
 class CostTable:
     """Legs given as a matrix."""
@@ -24,7 +34,14 @@ class CostTable:
         self, vertices: Ints, asked: Bools | None = None, clock: Clock | None = None
     ) -> Floats:
         """As `netsp.travel.graph.Legs.lengths`; nothing has to be measured."""
-        return self.costs[np.ix_(vertices, vertices)].copy()
+        return self.costs[np.ix_(vertices, vertices)]
+
+    def rounded(self, vertices: Ints, clock: Clock | None = None) -> Floats:
+        """As `netsp.travel.legs.LegsAtOnce.rounded`."""
+        out = np.empty((len(vertices), len(vertices)), dtype=np.float32)
+        for k in range(0, len(vertices), ROWS):
+            out[k : k + ROWS] = rounded_down(self.costs[np.ix_(vertices[k : k + ROWS], vertices)])
+        return out  # type: ignore[return-value]
 
     def to_base(self) -> Floats:
         """(V,) costs from the base."""

@@ -25,7 +25,7 @@ from netsp.clock import NEVER, Clock, Flag
 from netsp.drawn import Drawn
 from netsp.errors import InputError, counted
 from netsp.hsignature import Word
-from netsp.travel.costs import CostTable, checked_costs, grain_of
+from netsp.travel.costs import CostTable, checked_costs, grain_of, rounded_down
 from netsp.travel.detours import Detours
 from netsp.travel.kept import with_bound, within_kept
 from netsp.travel.legs import Legs
@@ -678,13 +678,6 @@ class TravelGraph(Drawn):
             What the solver is to call.
         """
         return listener
-
-
-def rounded_down(values: Floats) -> Floats:
-    """In single precision, and no larger."""
-    out = values.astype(np.float32)
-    np.nextafter(out, np.float32(-np.inf), out=out, where=out > values)
-    return out  # type: ignore[return-value]
 
 
 def least_tethers(tethers: Floats, cluster: Ints, classes: int) -> Ints:
