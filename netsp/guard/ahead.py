@@ -2,7 +2,8 @@
 
 The robot goes on as it goes: straight, and where its course has been turning, in that circle, along
 obstacles that it would run into. The tether is driven along (0.1 ms a step), so that what comes off
-a corner on the way has come off.
+a corner on the way has come off; but for stretches of open water, of which is known at once that
+nothing happens there.
 """
 
 from __future__ import annotations
@@ -146,8 +147,14 @@ class _Way:
         self._steps = math.ceil(horizon / STEP_S)
         self._dt = horizon / self._steps
         c, s = math.cos(turn * self._dt), math.sin(turn * self._dt)
-        self._turn = np.array([[c, -s], [s, c]])
-        self._course, self._least = velocity.copy(), 0.1 * self._dt * np.linalg.norm(velocity)
+        rotation = np.array([[c, -s], [s, c]])
+        self._least = 0.1 * self._dt * np.linalg.norm(velocity)
+        courses = np.empty((self._steps + 1, 3))
+        courses[:] = velocity
+        for k in range(self._steps):
+            courses[k + 1, :2] = rotation @ courses[k, :2]
+        # where each step leads, from where the robot is
+        self._offsets = self._dt * (np.cumsum(courses, axis=0) - velocity)
         self._tether, self._k = tether, 0
         self.loop_s: float | None = None
         self.loop: Loop | None = None
@@ -155,10 +162,17 @@ class _Way:
         self.done = False
 
     def step(self, site: Site) -> None:
+        place, k = self._tether.robot, self._k
+        places = place + self._offsets[k + 1 :] - self._offsets[k]
+        leap = site.leap(self._tether, places)
+        if leap == len(places):
+            self.done = True
+            return
+        if leap > 1:
+            self._tether, self._k = site.ahead.update(self._tether, places[leap - 1]), k + leap
+            return
         self._k += 1
-        place = self._tether.robot
-        self._course[:2] = self._turn @ self._course[:2]
-        there = pushed_out(site.field, (place + self._dt * self._course)[None], 1e-3)[0]
+        there = pushed_out(site.field, places[:1], 1e-3)[0]
         self.loop = site.closed_by(self._tether.nodes, there)
         if self.loop is not None:
             self.loop_s, self.done = self._k * self._dt, True
@@ -168,7 +182,7 @@ class _Way:
         if stopped or not site.field.line_of_sight(place, there, depth=0.2 * site.model.delta):
             self.done = True
             return
-        self._tether = site.model.update(self._tether, there)
+        self._tether = site.ahead.update(self._tether, there)
         if self.short_s is None and self._tether.length > site.tether_length:
             self.short_s = self._k * self._dt
         self.done = self._k == self._steps

@@ -11,15 +11,20 @@ from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.guard.correct import SIDES, corrected
 from netsp.guard.gaps import ways_between
+from netsp.guard.leaps import leap
 from netsp.guard.loops import closed_by, loops_in
 from netsp.guard.site import LONGER, ROUNDS, Letters, Loop
 from netsp.hsignature import Word, concatenate, crossings, reduce, signature
 from netsp.online.scene.scene import scene_of
 from netsp.online.tether import GeodesicTether, Tether
-from netsp.online.tether.resolution import suggested_delta
+from netsp.online.tether.resolution import coarsest_delta, suggested_delta
 from netsp.problem import Problem
 from netsp.report.wording import listed, passages, side
 from netsp.roadmap.tethers import Tethers
+
+COARSER = 2.0
+"""Times the resolution of the tether, for looks ahead: steps of half a metre take half as long, and
+three in a thousand looks see something else, most of them at their horizon."""
 
 
 class RayLetters:
@@ -94,7 +99,9 @@ class PlaneSite:
         self.rays = self.centres = problem.representative_points
         self.letters: Letters = RayLetters(problem)
         self.field = scene_of(problem).field()
-        self.model = GeodesicTether(self.field, suggested_delta(problem))
+        delta = suggested_delta(problem)
+        self.model = GeodesicTether(self.field, delta)
+        self.ahead = GeodesicTether(self.field, min(COARSER * delta, coarsest_delta(problem) / 1.1))
         longer = problem.model_copy(
             update={"tether_length": LONGER * problem.tether_length, "bounds": None}
         )
@@ -129,6 +136,10 @@ class PlaneSite:
     def closed_by(self, nodes: Floats, there: Floats) -> Loop | None:
         """As of `netsp.guard.loops.closed_by`."""
         return closed_by(self.problem, nodes[:, :2], np.array([nodes[-1, :2], there[:2]]))
+
+    def leap(self, tether: Tether, places: Floats) -> int:
+        """As of `netsp.guard.leaps.leap`."""
+        return leap(self.field, tether, places, self.tether_length)
 
     def corrected(
         self, words: dict[Word, float], robot: Floats, side: str, obstacle: int | str

@@ -50,7 +50,7 @@ class Course:
     clear: float
 
 
-OF_PLACES, OF_VELOCITIES = Course(1.3, LIKELY, 0.6), Course(0.6, 0.7, 0.0)
+OF_PLACES, OF_VELOCITIES = Course(1.3, LIKELY, 0.6), Course(0.6, 0.75, 0.0)
 """From where the robot has been alone, and where it tells its velocity, too
 (benchmarks/guard.py)."""
 

@@ -93,6 +93,8 @@ class Site(Protocol):
     """Tells it from others, in state files."""
     field: DistanceField
     model: GeodesicTether
+    ahead: GeodesicTether
+    """As the model, and as coarse as does for looks ahead."""
     letters: Letters
     sides: tuple[str, ...]
     """Of obstacles, as operators may name them."""
@@ -151,6 +153,10 @@ class Site(Protocol):
 
     def closed_by(self, nodes: Floats, there: Floats) -> Loop | None:
         """The loop that a robot closes by going straight to a place; None where it closes none."""
+
+    def leap(self, tether: Tether, places: Floats) -> int:
+        """Over how many places (k, 3) on its way, one after the other, the robot can go of which is
+        known without its tether there that it closes no loop and has tether enough."""
 
     def corrected(
         self, words: dict[Word, float], robot: Floats, side: str, obstacle: int | str

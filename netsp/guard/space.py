@@ -106,6 +106,7 @@ class SpaceSite:
         self.field = scene.field()
         self.water = Water.of(mission, scene, self.field)
         self.model = self.water.model
+        self.ahead = self.model
         self.anchor = np.asarray(mission.anchor, dtype=float)
         self._first = self.water.present
         self.start = self._first.robot
@@ -199,6 +200,10 @@ class SpaceSite:
     def closed_by(self, nodes: Floats, there: Floats) -> Loop | None:
         """As of `netsp.guard.winding.closing`."""
         return closing(self.field, self.model, nodes, there)
+
+    def leap(self, tether: Tether, places: Floats) -> int:
+        """None: in space a tether comes off its contacts in ways that its ends do not tell."""
+        return 0
 
     def corrected(
         self, words: dict[Word, float], robot: Floats, side: str, obstacle: int | str
