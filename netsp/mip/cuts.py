@@ -17,7 +17,8 @@ class Cut:
 
     A subtour cut has no teeth. A comb (`netsp.mip.blossoms`, `netsp.mip.combs`) has an odd number
     of them, each partly in S, a union of clusters, and no C (-1). Teeth of more than two clusters
-    share none.
+    share none. Where S is no union of clusters (`netsp.mip.parities`), all teeth are pairs. Of a
+    pair only legs with one end in S count.
     """
 
     inside: Bools
@@ -38,11 +39,34 @@ class Cut:
         return out
 
     def bites(self, cluster: Ints, legs: Ints) -> Bools:
-        """(k,) legs (k, 2) between clusters of a tooth."""
+        """(k,) legs (k, 2) that are in a tooth."""
         if not self.teeth:
             return np.zeros(len(legs), dtype=bool)
         ends = cluster[legs]
-        return np.asarray(self.bitten(int(cluster.max()) + 1)[ends[:, 0], ends[:, 1]])
+        out = self.bitten(int(cluster.max()) + 1)[ends[:, 0], ends[:, 1]]
+        if all(len(t) == 2 for t in self.teeth):
+            out &= self.inside[legs[:, 0]] ^ self.inside[legs[:, 1]]
+        return np.asarray(out)
+
+    def splits(self, cluster: Ints) -> bool:
+        """Whether there are teeth of which S holds some vertices of a cluster and not others."""
+        if not self.teeth:
+            return False
+        size = np.bincount(cluster)
+        held = np.bincount(cluster[self.inside], minlength=len(size))
+        return bool(((held > 0) & (held < size)).any())
+
+    def sets_of_teeth(self, cluster: Ints) -> list[Bools]:
+        """For teeth that are pairs of clusters the sets of vertices, two for each, whose legs to
+        one another are in the tooth."""
+        out = []
+        for a, b in self.teeth:
+            there = np.where(cluster == a, self.inside, ~self.inside) & (
+                (cluster == a) | (cluster == b)
+            )
+            other = ((cluster == a) | (cluster == b)) & ~there
+            out += [part for part in (there, other) if part.any()]
+        return out
 
     def within(self, cluster: Ints, legs: Ints) -> tuple[Ints, Floats]:
         """Rows of the legs on the left side, and how often they stand there: a leg may be within

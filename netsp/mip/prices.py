@@ -58,15 +58,21 @@ class Prices:
         self._check = check
         self._size = len(cluster)
         active = np.flatnonzero(duals.cut < 0.0).tolist()
-        inside = np.array([cuts[k].inside for k in active], dtype=bool).reshape(-1, self._size)
+        sets, weight = [cuts[k].inside for k in active], [-duals.cut[k] for k in active]
+        split = {k for k in active if cuts[k].splits(cluster)}
+        for k in sorted(split):
+            of_teeth = cuts[k].sets_of_teeth(cluster)
+            sets += of_teeth
+            weight += [-duals.cut[k]] * len(of_teeth)
+        inside = np.array(sets, dtype=bool).reshape(-1, self._size)
         of_cut, member = np.nonzero(inside)
-        first_member = np.searchsorted(of_cut, np.arange(len(active) + 1))
+        first_member = np.searchsorted(of_cut, np.arange(len(sets) + 1))
         by_vertex = np.argsort(member, kind="stable")
         first_at = np.searchsorted(member[by_vertex], np.arange(self._size + 1))
         m = int(cluster.max(initial=0)) + 1
         bitten = np.zeros((m, m))
         for k in active:
-            if cuts[k].teeth:
+            if cuts[k].teeth and k not in split:
                 bitten[cuts[k].bitten(m)] += duals.cut[k]
         vertex = 2.0 * duals.degree - duals.cluster[cluster]
         for k in active:
@@ -74,7 +80,7 @@ class Prices:
         least, second, longest = np.empty((3, self._size))
         terms = self._terms = Terms(
             costs, dead, cluster, duals.degree, first_at, of_cut[by_vertex], first_member, member,
-            -duals.cut[active], bitten, vertex, least, second,
+            np.array(weight, dtype=float), bitten, vertex, least, second,
         )  # fmt: skip
         self._by_rows(lambda a, b: _scan(a, b, terms, longest), self._size)
         self._more = least < 0.0

@@ -8,7 +8,7 @@ What is ruled out is forgotten, so the rounds get cheaper as the proof gets clos
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,9 +16,11 @@ from netsp.arrays import Bools, Floats, Ints
 from netsp.mip.blossoms import blossom_cuts, shrunk
 from netsp.mip.combs import comb_cuts, tight_sets
 from netsp.mip.cuts import Cut
+from netsp.mip.overcells import OverGoals
 from netsp.mip.pace import WORTH, Pace
+from netsp.mip.parities import odd_letters, parity_cuts
 from netsp.mip.prices import Prices
-from netsp.mip.program import Point, Relaxation
+from netsp.mip.program import Duals, Point, Relaxation
 from netsp.mip.subtours import branches, fractional_cuts
 from netsp.mip.warm import Warm
 from netsp.solving.legcosts import LEGS, ROWS, LegCosts, squeezed
@@ -76,6 +78,15 @@ TINY = 1e-9
 """Relative: reduced costs and visits smaller than this are rounding."""
 
 
+@dataclass(frozen=True)
+class Best:
+    """What the best bound rests on: vertices that were left, cuts, and dual values."""
+
+    vertices: Ints
+    cuts: tuple[Cut, ...]
+    duals: Duals
+
+
 class Root:
     """The relaxation over what is left of a travel graph.
 
@@ -85,10 +96,12 @@ class Root:
         Of the legs among the vertices left.
     lp
         The relaxation.
-    bound, rise
-        The best bound, and how much it rises at least when a leg is used.
     dead
         Legs in no better tour.
+    patience
+        As `PATIENCE`, where that is not to be used.
+    best
+        What the best bound rests on; None before there is one.
     """
 
     def __init__(
@@ -98,12 +111,16 @@ class Root:
         relaxation: Callable[[Ints, Ints, Floats], Relaxation],
         round_point: Callable[[Root, Point], None],
         warm: Warm | None = None,
-        over_goals: Sequence[Cut] = (),
+        over_goals: OverGoals | None = None,
     ) -> None:
         self.run, self.costs, self.round_point = run, costs, round_point
         graph = costs.graph
-        self.branch = branches([graph.signatures[v] for v in costs.vertices])
+        words = [graph.signatures[v] for v in costs.vertices]
+        self.branch, self.odd = branches(words), odd_letters(words)
         self.dead: Bools = np.isinf(costs.values)
+        self.patience: int | None = None
+        self.best: Best | None = None
+        goals_cuts = [] if over_goals is None else self._rule_out_over(over_goals)
         # without an incumbent, a program with some of the legs may be infeasible when a tour exists
         usable = run.tour is not None and warm and np.isin(warm.vertices, costs.vertices).all()
         warm = warm if usable else None
@@ -115,8 +132,7 @@ class Root:
             self.lp.add_cuts(warm.cuts_over(costs))
         # with these, and those of pairs that `goal_cuts` finds, the LP does not fall below the
         # goals' own, whatever the classes
-        goals = [replace(c, inside=c.inside[costs.cluster]) for c in over_goals]
-        self.lp.add_cuts(goals, for_good=True)
+        self.lp.add_cuts(goals_cuts, for_good=True)
         self.point: Point | None = None
         self._objective = 0.0
 
@@ -156,6 +172,7 @@ class Root:
                 continue
             cuts = self.separate(point)
             patience = PATIENCE if self.costs.exact is not None else MEASURED_PATIENCE
+            patience = patience if self.patience is None else self.patience
             stalled = pace.stalled(run.length - (run.bound or 0.0), patience)
             if not priced and (stalled or not cuts):
                 return
@@ -213,6 +230,33 @@ class Root:
 
     # parts
 
+    def _rule_out_over(self, over: OverGoals) -> list[Cut]:
+        """What a program over goals or cells has proven, taken over: most of what lies far from the
+        base is in no better tour. Its cuts."""
+        run, costs = self.run, self.costs
+        found = over.cells
+        if found is None:
+            return [replace(c, inside=c.inside[costs.cluster]) for c in over.cuts]
+        own = found.cells.of(costs.cluster, self.odd)
+        if run.tour is not None:
+            alive: Bools = (own >= 0) & found.alive[own]
+            alive[self.tour()] = True
+            if not alive.all():
+                self._restrict(alive)
+                own = own[alive]
+            tour = tour_legs(self.tour())
+            for first in range(0, len(own), ROWS):
+                rows = slice(first, first + ROWS)
+                self.dead[rows] |= found.dead[own[rows]][:, own]
+            self.dead[tour[:, 0], tour[:, 1]] = self.dead[tour[:, 1], tour[:, 0]] = False
+        cuts, duals = found.cuts_over(own), found.duals_over(own)
+        if run.tour is not None:
+            prices = Prices(costs.values, self.dead, costs.cluster, cuts, duals, run.check)
+            run.raise_bound(min(prices.bound, run.cutoff))
+            if not run.done:
+                prices.rule_out(run.cutoff)
+        return cuts
+
     def _first_legs(self) -> Ints:
         """The nearest legs of every vertex, all legs to the base, and the incumbent's; all legs if
         there is no incumbent, so that an infeasible program means that there is no tour."""
@@ -258,6 +302,8 @@ class Root:
         assert point.duals is not None
         prices = Prices(self.costs.values, self.dead, cluster, self.lp.cuts, point.duals, run.check)
         # a tour with a dead leg is no shorter than the cutoff
+        if self.best is None or prices.bound > (run.bound or 0.0):
+            self.best = Best(self.costs.vertices.copy(), tuple(self.lp.cuts), point.duals)
         run.raise_bound(min(prices.bound, run.cutoff))
         if run.done:
             return False
@@ -344,25 +390,31 @@ class Root:
 
     def _forget(self) -> None:
         """Drop dead legs from the LP, and dead vertices altogether once they are many."""
-        tour = self.tour()
-        in_tour = np.zeros(len(self.costs), dtype=bool)
-        in_tour[tour] = True
-        legs = self.lp.legs
+        tour, legs = self.tour(), self.lp.legs
         keep = ~self.dead[legs[:, 0], legs[:, 1]]
         keep |= np.isin(self._keys(legs), self._keys(tour_legs(tour)))
         if (~keep).sum() > LEAN * len(keep):
             self.lp.keep_legs(keep)
-        alive = ~self.dead.all(axis=1) | in_tour
-        alive[0] = True
+        alive = self._alive()
         if alive.sum() > SHRINK * len(alive):
             return
         self.lp.keep_legs(np.asarray(alive[self.lp.legs].all(axis=1)))
-        self.costs.restrict(alive)
+        self._restrict(alive)
         self.lp.restrict(alive)
-        self.dead = squeezed(self.dead, alive)
-        self.branch = self.branch[:, alive]
-        self.branch = np.unique(self.branch[self.branch.sum(axis=1) > 1], axis=0)
         self.point = None
+
+    def _alive(self) -> Bools:
+        """(V,) vertices with legs left, and those of the incumbent."""
+        alive = np.asarray(~self.dead.all(axis=1))
+        alive[0] = alive[self.tour()] = True
+        return alive
+
+    def _restrict(self, alive: Bools) -> None:
+        """Forget all vertices but those marked, here and in the costs."""
+        self.costs.restrict(alive)
+        self.dead = squeezed(self.dead, alive)
+        self.branch, self.odd = self.branch[:, alive], self.odd[alive]
+        self.branch = np.unique(self.branch[self.branch.sum(axis=1) > 1], axis=0)
 
     def separate(self, point: Point) -> list[Cut]:
         """Violated cuts, of the LP's point or of one between it and the incumbent."""
@@ -381,6 +433,9 @@ class Root:
             if cuts:
                 return cuts
         cuts = fractional_cuts(point.x, point.legs, point.y, cluster, self.branch, near)
+        if cuts:
+            return cuts
+        cuts = parity_cuts(point.legs, point.y, cluster, self.odd)
         if cuts:
             return cuts
         between = shrunk(point.legs, point.y, cluster)

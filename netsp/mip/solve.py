@@ -19,7 +19,8 @@ from netsp.dp.solve import bound_by_walks
 from netsp.lns import Search
 from netsp.mip.branching import Tree
 from netsp.mip.cuts import Cut
-from netsp.mip.overgoals import bound_over_goals
+from netsp.mip.overcells import OverGoals
+from netsp.mip.overgoals import MANY_CLASSES, bound_over_goals
 from netsp.mip.program import IntegerProgram, Point
 from netsp.mip.root import Root, tour_legs
 from netsp.mip.subtours import component_cuts, heaviest_walk, tour_from
@@ -50,8 +51,9 @@ would take that long, and cannot be stopped."""
 MANY_GOALS = 100
 """With so many the bound of the goals comes first, and its cuts are those of the first LP."""
 
-GOALS_SHARE = 0.1
-"""Part of the time that is left which the bound from the goals alone may take."""
+GOALS_SHARE, CELLS_SHARE = 0.1, 0.6
+"""Part of the time that is left which the bound from the goals alone may take, and that of covers,
+where there are very many classes."""
 
 SEARCH_AGAIN = 0.5
 """Share of the last gap at which the classes that the LP visits are searched once more."""
@@ -132,7 +134,8 @@ class MipRun(SearchingRun):
 
     root: Root | None = None
     cuts: Sequence[Cut] = ()
-    _over_goals: Sequence[Cut] = ()
+    _over_goals: OverGoals | None = None
+    _costs: LegCosts | None = None
 
     def solve(
         self, backend: str, warm_start: Sequence[int] | None, *, walks: bool = False
@@ -164,7 +167,7 @@ class MipRun(SearchingRun):
         warm
             What a proof over a core of the classes has left; it has searched already.
         """
-        costs = LegCosts(self.graph)
+        costs, self._costs = self._costs or LegCosts(self.graph), None
         if warm is None:
             self.search(costs)
             self.report("heuristic", vertices=len(costs))
@@ -176,19 +179,24 @@ class MipRun(SearchingRun):
     def bound_by_goals(self, backend: str) -> None:
         """A first bound for who stops the run before the proof over all classes has one."""
 
-        def prove(graph: TravelGraph, limits: Limits) -> Result:
+        def prove(graph: TravelGraph, limits: Limits) -> tuple[Result, Sequence[Cut]]:
             run = MipRun(graph, limits)
-            result = run.solve(backend, None)
-            self._over_goals = run.cuts
-            return result
+            return run.solve(backend, None), run.cuts
 
-        share = (
-            Clock(GOALS_SHARE * self.clock.left, within=self.clock)
-            if self.clock.limit
-            else self.clock
-        )
-        limits = Limits(share or self.clock, rng=self.rng)
-        self.raise_bound(bound_over_goals(self.graph, prove, limits))
+        part = CELLS_SHARE if len(self.graph) > MANY_CLASSES else GOALS_SHARE
+        share = Clock(part * self.clock.left, within=self.clock) if self.clock.limit else self.clock
+        limits = Limits(share, rng=self.rng)
+
+        def told(bound: float, cells: int) -> None:
+            self.raise_bound(bound)
+            self.report("covers", vertices=cells)
+
+        costs, graph = None, self.graph
+        if len(graph) > MANY_CLASSES and graph.legs_at_once and graph.complete:
+            self._costs = LegCosts(graph)
+            costs = self._costs.values
+        self._over_goals = bound_over_goals(graph, prove, limits, self.tour, costs, told)
+        self.raise_bound(self._over_goals.bound)
         self.report("goals", vertices=len(self.graph))
 
     def program(self) -> Warm | None:

@@ -40,7 +40,8 @@ class Warm:
         out: dict[tuple[bytes, object], Cut] = {}
         for goes_with in (near, akin):
             for cut in self.cuts:
-                inside = cut.inside[akin if cut.teeth else goes_with] | (cluster == cut.cluster)
+                whole = cut.teeth and not cut.splits(held)
+                inside = cut.inside[akin if whole else goes_with] | (cluster == cut.cluster)
                 out.setdefault((inside.tobytes(), cut.teeth), replace(cut, inside=inside))
         return list(out.values())
 

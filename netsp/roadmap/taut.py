@@ -24,6 +24,7 @@ from netsp.roadmap.detours import taut_detours
 from netsp.roadmap.explore import ALL, NON_LOOPING
 from netsp.roadmap.legs import TautLegs
 from netsp.roadmap.paths import TautPaths
+from netsp.roadmap.ways import ways_by_parity
 from netsp.solution import KeptClasses
 from netsp.travel.graph import TravelGraph
 
@@ -97,6 +98,7 @@ class TautRoadmap:
             classes=self.rule if self.complete else "shortest",
             least_left_out=self.least_left_out,
             carrier=None if self.complete else self,
+            by_parity=partial(ways_by_parity, self.paths),
         )
 
     def ways(self, goal: int, most: int) -> list[tuple[int, Word]]:

@@ -6,14 +6,16 @@ With up to eight goals or so all sets of goals are gone through (`netsp.solvers.
 (`netsp.mip`) do the rest, or all of it with more goals, on the vertices that are left. Beyond
 `PROVABLE` the matrices would not fit into a few gigabytes. Few goals are then proven over the
 classes of least tether, which proves the tour for good where it is no longer than twice the tether
-of every other class. With many, `lns` searches among them, and the bound comes from the goals
-alone, as the travelling salesperson's tour over the shortest paths between them in any class.
-That bound is weak, and true.
+of every other class. With many, `lns` searches among them, and the bound comes from covers of
+finitely many sheets (`netsp.mip.covers`), or where there are none from the goals alone, as the
+travelling salesperson's tour over the shortest paths between them in any class.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -58,6 +60,10 @@ GOALS_SHARE = 0.2
 SHARE = 0.6
 """Part of the time that the search has at least where it shares it with a bound that is weak."""
 
+FIRST_SHARE, BOUND_SHARE = 0.2, 0.7
+"""With too many classes for a matrix, parts of the time for the first search, and of what is left
+for the bound."""
+
 
 @dataclass(frozen=True)
 class Params:
@@ -93,34 +99,56 @@ def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | Non
     limits = replace(limits, time=clock)
     if not graph.complete and graph.roadmapped:
         # it says that a proof over the classes that were kept may not come to an end
-        _bound_by_goals(graph, Limits(clock.part(GOALS_SHARE), rng=limits.rng))
-        if graph.goal_count > FEW_GOALS and limits.warm_start is None:
-            limits = _from_few(graph, limits, chosen.backend)
+        if graph.goal_count <= FEW_GOALS or not graph.knows_ways:
+            _bound_by_goals(graph, Limits(clock.part(GOALS_SHARE), rng=limits.rng))
+        if graph.goal_count > FEW_GOALS:
+            if limits.warm_start is None:
+                limits = _from_few(graph, limits, chosen.backend)
+            tour, otherwise = limits.warm_start, graph.least_by_way_of(graph.least_left_out)
+            if tour is not None and graph.knows_ways and otherwise < graph.tour_length(tour):
+                # no proof over the classes kept would count: others may be in a shorter tour
+                return _beyond(graph, limits, clock)
     if len(graph) <= PROVABLE:
         run = MipRun(graph, limits, search_rounds=_rounds(graph))
         return run.solve(chosen.backend, limits.warm_start, walks=graph.goal_count <= FEW_GOALS)
     if graph.goal_count <= FEW_GOALS and graph.roadmapped:
         return _over_shortest(graph, limits, chosen.backend)
+    return _beyond(graph, limits, clock)
+
+
+def _beyond(graph: TravelGraph, limits: Limits, clock: Clock) -> Result:
+    """With too many classes for a matrix: a search, the bound of covers with its tour, and a search
+    from there on."""
     rows: list[Progress] = []
+    bound = 0.0
 
-    def tell(row: Progress) -> None:
-        rows.append(replace(row, stage="goals", incumbent=None, tour=None))
+    def tell(row: Progress, **changed: Any) -> None:
+        rows.append(replace(row, **changed))
         if limits.on_progress:
             limits.on_progress(rows[-1])
 
-    share = clock.part(1.0 - SHARE)
-    bound = _bound_by_goals(graph, Limits(share, rng=limits.rng, on_progress=tell))
+    def with_bound(row: Progress) -> None:
+        tell(row, bound=min(bound, row.incumbent) if row.incumbent else bound or None)
 
-    def tell_both(row: Progress) -> None:
-        rows.append(replace(row, bound=min(bound, row.incumbent or bound)))
-        if limits.on_progress:
-            limits.on_progress(rows[-1])
-
-    found = search(graph, limits=replace(limits, time=clock, on_progress=tell_both))
-    if found.length is None:
+    share = clock.part(FIRST_SHARE) if clock.limit else clock
+    found = search(graph, limits=replace(limits, time=share, on_progress=with_bound))
+    if found.length is None or found.tour is None:
         return found
-    bound = min(found.length, bound)
-    status = Status.OPTIMAL if proven(found.length, bound) else found.status
+    share = clock.part(BOUND_SHARE) if clock.limit else clock
+
+    def told(raised: float, cells: int) -> None:
+        nonlocal bound
+        bound = max(bound, raised)
+        with_bound(replace(found.trace[-1], time=clock.elapsed, stage="covers", vertices=cells))
+
+    bound = max(bound, _bound_by_goals(graph, Limits(share, rng=limits.rng), found.tour, told))
+    tell(found.trace[-1], stage="goals", time=clock.elapsed, bound=min(bound, found.length))
+    if clock.limit and not clock.up:
+        again = replace(limits, time=clock, warm_start=found.tour, on_progress=with_bound)
+        found = min(found, search(graph, limits=again), key=lambda r: r.length or np.inf)
+    length = found.length or np.inf
+    bound = min(length, bound)
+    status = Status.OPTIMAL if proven(length, bound) else found.status
     return replace(found, lower_bound=bound, status=status, trace=tuple(rows))
 
 
@@ -155,10 +183,15 @@ def _in_part_ordered(graph: TravelGraph, limits: Limits, backend: str) -> Result
     return replace(found, lower_bound=bound, status=status)
 
 
-def _bound_by_goals(graph: TravelGraph, limits: Limits) -> float:
-    """A bound on the tours in any class; the one that is known if there is one."""
-    if not graph.bound_in_any_class:
-        bound_over_goals(graph, lambda g, limits: prove(g, limits=limits), limits)
+def _bound_by_goals(
+    graph: TravelGraph, limits: Limits, tour: Sequence[int] | None = None,
+    told: Callable[[float, int], None] = lambda *_: None,
+) -> float:  # fmt: skip
+    """A bound on the tours in any class; the one that is known if there is one, and no tour."""
+    if tour is not None or not graph.bound_in_any_class:
+        bound_over_goals(
+            graph, lambda g, limits: (prove(g, limits=limits), ()), limits, tour, told=told
+        )
     return graph.bound_in_any_class
 
 

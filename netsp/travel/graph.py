@@ -29,6 +29,7 @@ from netsp.travel.costs import CostTable, checked_costs, grain_of, rounded_down
 from netsp.travel.detours import Detours
 from netsp.travel.kept import with_bound, within_kept
 from netsp.travel.legs import Legs
+from netsp.travel.ways import WaysByParity
 
 if TYPE_CHECKING:
     from netsp.solution import KeptClasses
@@ -79,6 +80,8 @@ class TravelGraph(Drawn):
         No class left out for want of time or room has a shorter tether; inf if none is left out.
     carrier : Carrier, optional
         Adds classes that were left out.
+    by_parity : callable, optional
+        Makes the ways of `ways_by_parity`.
 
     Attributes
     ----------
@@ -118,6 +121,7 @@ class TravelGraph(Drawn):
         classes: KeptClasses | None = None,
         least_left_out: float = math.inf,
         carrier: Carrier | None = None,
+        by_parity: Callable[[Callable[[], bool]], WaysByParity | None] | None = None,
     ) -> None:
         self.carrier = carrier
         self.cluster: Ints = np.asarray(cluster, dtype=np.int64)
@@ -133,7 +137,7 @@ class TravelGraph(Drawn):
         self.clock: Clock | None = None
         self._legs = legs
         self._costs: Floats | None = None
-        self._make_detours, self._between = detours, between
+        self._make_detours, self._between, self._by_parity = detours, between, by_parity
         self._detours: dict[bool, Detours] = {}
         self._place: dict[tuple[int, Word], int] | None = None
 
@@ -403,6 +407,26 @@ class TravelGraph(Drawn):
                 legs = self.costs[np.ix_(self.members(a), self.members(b))]
                 out[a, b] = out[b, a] = legs.min()
         return out
+
+    @property
+    def knows_ways(self) -> bool:
+        """Whether `ways_by_parity` may tell any."""
+        return self._by_parity is not None
+
+    def ways_by_parity(self, up: Callable[[], bool] = lambda: False) -> WaysByParity | None:
+        """Ways between goals, by the rays that they cross an odd number of times.
+
+        Parameters
+        ----------
+        up : callable
+            Whether the time is up.
+
+        Returns
+        -------
+        WaysByParity or None
+            None where they are not known.
+        """
+        return None if self._by_parity is None else self._by_parity(up)
 
     def subgraph(self, vertices: npt.ArrayLike) -> TravelGraph:
         """The travel graph on some of the vertices.

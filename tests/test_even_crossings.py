@@ -1,0 +1,273 @@
+"""Inequalities of even crossing: valid for tours, over goals and over classes, certified, and worth
+something."""
+
+import itertools
+import math
+import random
+import sys
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from netsp import Circle, Problem, Status, solve_graph, travel_graph
+from netsp.clock import Clock
+from netsp.mip import root
+from netsp.mip.bound import exact_bound
+from netsp.mip.covers import OverClasses, OverWays, climb
+from netsp.mip.cuts import Cut, cut_coefficients
+from netsp.mip.highs import HighsRelaxation
+from netsp.mip.legprices import LegPrices
+from netsp.mip.overgoals import bound_over_goals
+from netsp.mip.parities import odd_letters, parity_cuts
+from netsp.mip.prices import Prices
+from netsp.mip.program import duals_of_relaxation
+from netsp.mip.solve import solve
+from netsp.solving.limits import Limits
+from netsp.solving.run import Stop
+from netsp.travel.ways import WaysByParity
+from netsp.worlds import random_world
+from tests.brute import brute_tour
+from tests.test_blossoms import all_legs, tours_as_points
+from tests.test_contract import random_graph
+
+
+def some_cut(chance, graph):
+    """Any set of vertices, and an odd number of pairs of clusters."""
+    inside = np.array([chance.random() < 0.5 for _ in graph.cluster])
+    pairs = list(itertools.combinations(range(graph.goal_count + 1), 2))
+    count = chance.choice([k for k in (1, 3, 5) if k <= len(pairs)])
+    return Cut(inside, -1, tuple(sorted(chance.sample(pairs, count))))
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 10**6), st.randoms(use_true_random=False))
+def test_no_tour_violates_an_inequality_of_any_set_of_vertices(seed, chance):
+    graph = random_graph(seed, 6, most=3)
+    legs, _ = all_legs(graph)
+    cuts = [some_cut(chance, graph) for _ in range(8)]
+    rows = cut_coefficients(cuts, graph.cluster, legs)
+    for _, y in tours_as_points(chance, graph, legs):
+        assert (rows @ y >= [-2.0 * c.room - 1e-9 for c in cuts]).all()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_bounds_with_split_clusters_are_below_their_certificate_and_the_optimum(seed):
+    graph = random_graph(seed, 6, most=3)
+    legs, costs = all_legs(graph)
+    lp = HighsRelaxation(graph.cluster, legs, costs)
+    lp.add_cuts([some_cut(random.Random(seed + k), graph) for k in range(25)])
+    point = lp.solve(60.0)
+    assert (point.slack > -1e-6).all()
+    assert any(c.splits(graph.cluster) for c in lp.cuts)
+    rng = np.random.default_rng(seed)
+    for scale in (0.0, 1e-3, 1.0):
+        duals = duals_of_relaxation(
+            point.duals.cluster / 2.0 + scale * rng.normal(size=len(point.duals.cluster)),
+            -point.duals.cut / 2.0 + scale * np.abs(rng.normal(size=len(lp.cuts))),
+            lp.cuts, graph.cluster,
+        )  # fmt: skip
+        dead = ~np.isfinite(graph.costs)
+        prices = Prices(graph.costs, dead, graph.cluster, lp.cuts, duals)
+        exact = exact_bound(graph.costs, graph.cluster, lp.cuts, duals)
+        assert prices.bound <= exact <= brute_tour(graph) * (1 + 1e-12)
+        assert float(exact) - prices.bound <= 1e-9 * max(1.0, scale) * len(lp.cuts)
+        listed = LegPrices(legs, costs, graph.cluster, lp.cuts, duals)
+        assert listed.bound == pytest.approx(prices.bound, abs=1e-9 * max(1.0, scale))
+        if scale == 0.0:
+            assert prices.bound >= point.objective * (1.0 - 1e-6)
+
+
+def test_a_ring_that_lies_on_two_sheets_by_halves_is_cut():
+    """Three goals around an obstacle: from the third one the ring returns on the other sheet."""
+    cluster = np.array([0, 1, 1, 2, 2, 3, 3])
+    odd = np.array([[False], *[[False], [True]] * 3])
+    legs = np.array([(1, 3), (3, 5), (2, 5), (2, 4), (4, 6), (1, 6)])
+    y = np.full(6, 0.5)
+    (cut, *_) = parity_cuts(legs, y, cluster, odd)
+    assert cut.teeth == ((1, 3),)
+    assert (cut_coefficients([cut], cluster, legs) @ y)[0] == pytest.approx(-2.0 * cut.room - 1.0)
+
+
+def small(seed, **more):
+    """A world of few goals and obstacles."""
+    how = {"goals": 5, "obstacles": 4, "side": 60.0, "radii": (4.0, 8.0), "tether_length": 90.0}
+    return random_world(seed, **{**how, **more})
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_ways_are_the_shortest_legs_of_their_parity(seed):
+    graph = travel_graph(small(seed, tether_length=150.0))
+    ways = graph.ways_by_parity()
+    odd, cluster = odd_letters(graph.signatures, ways.obstacles), graph.cluster
+    best = {}
+    for u, v in itertools.combinations(range(len(graph)), 2):
+        a, b = sorted((int(cluster[u]), int(cluster[v])))
+        key = a, b, (odd[u] ^ odd[v]).tobytes()
+        best[key] = min(best.get(key, math.inf), graph.costs[u, v])
+    rows = np.arange(len(ways.ends))
+    found = {
+        (*e, o.tobytes()): length
+        for e, o, length in zip(
+            ways.ends.tolist(), ways.odd_of(rows), ways.length.tolist(), strict=True
+        )
+    }
+    assert len(found) == len(rows)
+    within = {k: c for k, c in best.items() if c <= ways.reach - 1e-6}
+    assert within
+    for key, cost in within.items():
+        assert found[key] <= cost + 1e-6
+        # a leg between classes that the tether reaches is a path as well
+        if found[key] <= 100.0:
+            assert found[key] == pytest.approx(cost, abs=1e-6)
+
+
+def towers(seed):
+    """Covers below the classes of a small world, and below its ways."""
+    graph = travel_graph(small(seed, tether_length=150.0))
+    odd = odd_letters(graph.signatures)
+    classes = OverClasses(graph.costs, graph.cluster, odd)
+    return graph, odd, classes, OverWays(graph.ways_by_parity(), np.inf)
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("obstacles", [(), (1,), (2, 0), (0, 1, 2, 3)])
+def test_a_leg_between_cells_costs_no_more_than_any_between_their_classes(seed, obstacles):
+    graph, odd, *both = towers(seed)
+    for tower in both:
+        cells = tower.cells(obstacles)
+        own, costs = cells.of(graph.cluster, odd), tower.costs(cells)
+        assert (own >= 0).all()
+        assert own[0] == 0
+        assert (cells.cluster[own] == graph.cluster).all()
+        least = np.full(costs.shape, np.inf)
+        np.minimum.at(least, (own[:, None], own[None, :]), graph.costs)
+        if tower is both[0]:
+            np.testing.assert_array_equal(costs, least)
+        assert (costs <= least + 1e-9).all()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_bounds_of_covers_hold_and_what_they_rule_out_is_in_no_best_tour(seed):
+    graph, odd, *both = towers(seed)
+    best = solve_graph(graph, "auto")
+    least = bound_over_goals(graph, proven_goals, Limits()).bound
+    stops = [(int(graph.cluster[v]), odd[v]) for v in best.tour]
+    for tower in both:
+        found = climb(tower, stops, best.length * 1.02, Clock(), Limits())
+        assert least * (1.0 - 1e-6) <= found.bound <= best.length * 1.02
+        own = found.cells.of(graph.cluster, odd)[list(best.tour)]
+        assert found.alive[own].all()
+        assert not found.dead[own, np.roll(own, -1)].any()
+        if found.bound < best.length:
+            # as bounds over classes, from the dual values of the cells
+            own = found.cells.of(graph.cluster, odd)
+            prices = Prices(
+                graph.costs, ~np.isfinite(graph.costs), graph.cluster, found.cuts_over(own),
+                found.duals_over(own),
+            )  # fmt: skip
+            assert prices.bound <= best.length * (1.0 + 1e-9)
+
+
+def around(radius=10.0, goals=6):
+    """Goals on a circle around an obstacle, and the base among them."""
+    angles = 2.0 * np.pi * np.arange(goals + 1) / (goals + 1)
+    places = 1.6 * radius * np.column_stack([np.cos(angles), np.sin(angles)])
+    return Problem(
+        base=tuple(places[0]), goals=[tuple(p) for p in places[1:]], tether_length=20.0 * radius,
+        obstacles=[Circle(center=(0.0, 0.0), radius=radius)],
+    )  # fmt: skip
+
+
+def proven_goals(graph, limits):
+    return solve(graph, limits=limits), ()
+
+
+@pytest.mark.parametrize("kind", ["classes", "ways"])
+def test_two_sheets_know_that_a_ring_around_an_obstacle_is_no_tour(kind):
+    """The tour over shortest paths goes around once; one that is not entangled leaves out a piece
+    of the ring and returns."""
+    graph = travel_graph(around())
+    best, odd = solve_graph(graph, "auto"), odd_letters(graph.signatures)
+    assert bound_over_goals(graph, proven_goals, Limits()).bound < 0.9 * best.length
+    tower = (
+        OverClasses(graph.costs, graph.cluster, odd) if kind == "classes"
+        else OverWays(graph.ways_by_parity(), np.inf)
+    )  # fmt: skip
+    stops = [(int(graph.cluster[v]), odd[v]) for v in best.tour]
+    found = climb(tower, stops, best.length, Clock(), Limits())
+    assert found.cells.obstacles == (0,)
+    assert found.bound == pytest.approx(best.length, rel=1e-5)
+
+
+@pytest.mark.parametrize("most", [30, 6000])
+@pytest.mark.parametrize("seed", range(2))
+def test_covers_in_between_prove_the_same(seed, most, monkeypatch):
+    """With all covers, and where the classes come after the goals at once."""
+    problem = random_world(seed, goals=14, tether_length=320.0)
+    whole, seen = solve(travel_graph(problem)), []
+
+    def climbed(*args, **more):
+        seen.append(climb(*args, **more))
+        return seen[-1]
+
+    monkeypatch.setattr("netsp.mip.overgoals.climb", climbed)
+    monkeypatch.setattr("netsp.mip.covers.MOST_CELLS", most)
+    monkeypatch.setattr(sys.modules["netsp.mip.solve"], "MANY_GOALS", 5)
+    monkeypatch.setattr("netsp.solving.searching.MEASURE_AT_ONCE", 50)
+    for module in ("netsp.mip.solve", "netsp.mip.overgoals"):
+        monkeypatch.setattr(sys.modules[module], "MANY_CLASSES", 50)
+    fewer = solve(travel_graph(problem))
+    assert len(seen) == 1
+    assert whole.status is fewer.status is Status.OPTIMAL
+    assert fewer.length == pytest.approx(whole.length, rel=2e-6)
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_with_too_many_classes_for_a_matrix_covers_bound_the_tour(seed, monkeypatch):
+    problem = random_world(seed, goals=26, tether_length=300.0)
+    best = solve_graph(travel_graph(problem), "auto")
+    goals = bound_over_goals(travel_graph(problem), proven_goals, Limits()).bound
+    monkeypatch.setattr("netsp.solvers.auto.PROVABLE", 30)
+    monkeypatch.setattr("netsp.mip.overgoals.MANY_CLASSES", 30)
+    found = solve_graph(travel_graph(problem), "auto", time_limit=20.0)
+    assert found.lower_bound <= best.length * (1.0 + 1e-6)
+    assert found.length >= best.length * (1.0 - 1e-6)
+    assert found.lower_bound > goals
+    assert {"covers", "goals"} <= {r.stage for r in found.trace}
+
+
+def test_more_obstacles_than_a_word_of_the_machine_has_bits():
+    rows = np.array([[1 << 63, 1], [0, 1 << 5]], dtype=np.uint64)
+    ways = WaysByParity(np.array([(0, 1), (0, 2)]), rows, np.array([1.0, 2.0]), 9.0, 70)
+    assert [np.flatnonzero(o).tolist() for o in ways.odd_of(np.arange(2))] == [[63, 64], [69]]
+    cells = OverWays(ways, np.inf).cells((64, 69))
+    assert list(zip(cells.cluster, cells.code, strict=True)) == [(0, 0), (1, 1), (2, 2)]
+
+
+def test_no_time_leaves_a_bound_that_holds():
+    graph = travel_graph(small(1))
+    clock = Clock()
+    clock.end()
+    found = bound_over_goals(graph, proven_goals, Limits(clock))
+    assert 0.0 <= found.bound <= solve_graph(graph, "auto").length
+
+
+@pytest.mark.parametrize("press", [KeyboardInterrupt, Stop])
+def test_covers_that_are_stopped_keep_what_they_have_proven(press, monkeypatch):
+    graph, odd, tower, _ = towers(2)
+    best, clock = solve_graph(graph, "auto"), Clock()
+    stops = [(int(graph.cluster[v]), odd[v]) for v in best.tour]
+    relaxed, heard = root.Root._relaxed, []
+
+    def stopping(self):
+        if heard and len(self.costs) > graph.goal_count + 1:
+            raise press
+        return relaxed(self)
+
+    monkeypatch.setattr(root.Root, "_relaxed", stopping)
+    found = climb(tower, stops, 1.5 * best.length, clock, Limits(), lambda *b: heard.append(b))
+    assert len(heard) >= 1
+    assert found.bound == heard[-1][0] > 0.0
+    assert clock.up == (press is KeyboardInterrupt)
