@@ -601,6 +601,27 @@ def test_a_look_in_pieces_sees_what_one_at_once_sees(x, course, turn, pieces):
         np.testing.assert_array_equal(one.loop.line, other.loop.line)
 
 
+@settings(max_examples=40, deadline=None)
+@given(
+    there=st.tuples(st.floats(6.5, 11.0), st.floats(-2.0, 5.0)),
+    course=st.floats(-math.pi, math.pi), turn=st.sampled_from([0.0, 0.07, -0.15, 0.3, -0.4]),
+)  # fmt: skip
+def test_leaps_over_open_water_miss_nothing(there, course, turn):
+    site = PlaneSite(SITE)
+    tether = site.model.start((0, 0, 0), (6.0, 2.0, 0.0))
+    place = np.array([*there, 0.0])
+    if site.field.distance(place) > 0.0 and site.field.line_of_sight(tether.robot, place, 0.0):
+        tether = site.model.update(tether, place)
+    velocity = 0.5 * np.array([math.cos(course), math.sin(course), 0.0])
+    motion = Motion(0.0, tether.robot, tether.robot, velocity, turn)
+    leaping, walking = (Look(site, tether, motion, 0.5) for _ in range(2))
+    leaping.go_on(10_000)
+    site.leap = lambda *_: 0
+    walking.go_on(10_000)
+    one, other = leaping.ahead, walking.ahead
+    assert (one.loop_s, one.short_s, one.turning) == (other.loop_s, other.short_s, other.turning)
+
+
 def test_an_alarm_flickers_neither_on_nor_off():
     alarms, warning = Alarms(), Alarm("loop-ahead", Level.WARNING, "x")
     raised = []
