@@ -79,6 +79,25 @@ def test_bounds_with_split_clusters_are_below_their_certificate_and_the_optimum(
             assert prices.bound >= point.objective * (1.0 - 1e-6)
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_bounds_hold_where_a_tooth_does_not_cross_any_more(seed):
+    """Vertices that were forgotten may leave both clusters of a tooth on one side."""
+    graph, rng = random_graph(seed, 6, most=3), np.random.default_rng(seed)
+    side = rng.random(graph.goal_count + 1) < 0.5
+    cuts = [
+        Cut(side[graph.cluster], -1, ((0, 1), (2, 3), (4, 5))),
+        Cut(np.ones(len(graph), dtype=bool), -1, ((1, 2),)),
+    ]
+    duals = duals_of_relaxation(
+        np.full(graph.goal_count + 1, 5.0), np.array([20.0, 30.0]), cuts, graph.cluster
+    )
+    dead = ~np.isfinite(graph.costs)
+    bound = Prices(graph.costs, dead, graph.cluster, cuts, duals).bound
+    exact = float(exact_bound(graph.costs, graph.cluster, cuts, duals))
+    assert bound == pytest.approx(exact, abs=1e-6)
+    assert bound <= brute_tour(graph) * (1 + 1e-12)
+
+
 def test_a_ring_that_lies_on_two_sheets_by_halves_is_cut():
     """Three goals around an obstacle: from the third one the ring returns on the other sheet."""
     cluster = np.array([0, 1, 1, 2, 2, 3, 3])

@@ -28,7 +28,7 @@ import numpy as np
 from netsp.arrays import Bools, Floats, Ints
 from netsp.clock import Clock
 from netsp.compiled.kernel import kernel
-from netsp.errors import interrupted
+from netsp.errors import LimitReachedError, interrupted
 from netsp.mip.cuts import Cut
 from netsp.mip.highs import HighsRelaxation
 from netsp.mip.overcells import Cells, OverCells, packed
@@ -91,7 +91,7 @@ def climb(
                 break
             obstacles += more
             before = level
-    except Stop:
+    except (Stop, LimitReachedError):
         pass
     except (KeyboardInterrupt, SystemError) as error:
         if not interrupted(error):
@@ -239,7 +239,7 @@ def _next_obstacles(tower: Tower, level: _Level) -> list[int]:
         return []
     ends, y = level.used()
     odd = tower.odd_between(level.cells, ends)[:, left]
-    cost = oddness(ends, y, len(level.cells.cluster), odd)
+    cost = oddness(ends, y, len(level.cells.cluster), odd, level.run.check)
     # where few goals are reached on both sides, most say on which side they are
     more = [len(tower.cells((*own, i)).cluster) for i in left]
     out: list[int] = []

@@ -49,12 +49,15 @@ class Cut:
         return np.asarray(out)
 
     def splits(self, cluster: Ints) -> bool:
-        """Whether there are teeth of which S holds some vertices of a cluster and not others."""
-        if not self.teeth:
+        """Whether all teeth are pairs, and S holds some vertices of a cluster and not others, or
+        both or neither of a pair (where vertices were forgotten): then not all legs between the
+        clusters of a tooth are in it."""
+        if not self.teeth or any(len(t) > 2 for t in self.teeth):
             return False
-        size = np.bincount(cluster)
+        size = np.bincount(cluster, minlength=max(max(t) for t in self.teeth) + 1)
         held = np.bincount(cluster[self.inside], minlength=len(size))
-        return bool(((held > 0) & (held < size)).any())
+        within = any((held[a] > 0) == (held[b] > 0) for a, b in self.teeth)
+        return within or bool(((held > 0) & (held < size)).any())
 
     def sets_of_teeth(self, cluster: Ints) -> list[Bools]:
         """For teeth that are pairs of clusters the sets of vertices, two for each, whose legs to

@@ -24,7 +24,8 @@ is sought by changing sides of one cluster after another.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 from itertools import combinations
 
 import numpy as np
@@ -43,6 +44,9 @@ MOST_CUTS = 40
 ENOUGH = 4
 """With so many cuts of single obstacles, two at a time are not looked at."""
 
+MOST_SETS = 500
+"""Of obstacles that are looked at."""
+
 PASSES = 4
 """Times that the sides of all clusters are gone through."""
 
@@ -58,13 +62,17 @@ def odd_letters(signatures: Sequence[Word], obstacles: int | None = None) -> Boo
     return out
 
 
-def parity_cuts(legs: Ints, y: Floats, cluster: Ints, odd: Bools) -> list[Cut]:
+def parity_cuts(
+    legs: Ints, y: Floats, cluster: Ints, odd: Bools, check: Callable[[], None] = lambda: None
+) -> list[Cut]:
     """Violated inequalities of even crossing, the most violated first.
 
     Parameters
     ----------
     odd
         (V, n) as of `odd_letters`.
+    check
+        Called for each set of obstacles; may raise to stop.
     """
     on = y > 1e-9
     u, v = legs[on].T
@@ -75,7 +83,10 @@ def parity_cuts(legs: Ints, y: Floats, cluster: Ints, odd: Bools) -> list[Cut]:
     for size in (1, 2):
         if len(found) >= ENOUGH:
             break
+        if math.comb(odd.shape[1], size) > MOST_SETS:
+            break
         for some in combinations(range(odd.shape[1]), size):
+            check()
             side_of = _sides(odd, some)
             flow = _flow(pair, side_of[u] ^ side_of[v], y[on], len(pairs))
             if not flow[:, 1].any():
@@ -91,7 +102,9 @@ def parity_cuts(legs: Ints, y: Floats, cluster: Ints, odd: Bools) -> list[Cut]:
     return [cut for _, cut in best]
 
 
-def oddness(ends: Ints, y: Floats, size: int, odd: Bools) -> Floats:
+def oddness(
+    ends: Ints, y: Floats, size: int, odd: Bools, check: Callable[[], None] = lambda: None
+) -> Floats:
     """(n,) for each obstacle the cost of the cheapest inequality found, with vertices for clusters:
     0 where a point goes around it an odd number of times, and 1 or more where it does not.
 
@@ -103,11 +116,14 @@ def oddness(ends: Ints, y: Floats, size: int, odd: Bools) -> Floats:
         How many vertices there are.
     odd
         (k, n) which legs write an odd number of letters of each obstacle.
+    check
+        Called for each obstacle; may raise to stop.
     """
     pairs, pair = _pairs_of(ends, size)
     row, beside = _beside(pairs, size)
     out = np.empty(odd.shape[1])
     for i in range(len(out)):
+        check()
         flow = _flow(pair, odd[:, i], y, len(pairs))
         starts = np.zeros(size, dtype=np.bool_), _along_tree(pairs, flow, size)
         out[i] = min(_cheapest(pairs, flow, row, beside, sides)[0] for sides in starts)

@@ -435,7 +435,7 @@ class Root:
         cuts = fractional_cuts(point.x, point.legs, point.y, cluster, self.branch, near)
         if cuts:
             return cuts
-        cuts = parity_cuts(point.legs, point.y, cluster, self.odd)
+        cuts = parity_cuts(point.legs, point.y, cluster, self.odd, self.run.check)
         if cuts:
             return cuts
         between = shrunk(point.legs, point.y, cluster)

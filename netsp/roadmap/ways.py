@@ -23,10 +23,13 @@ FIRST, GROWTH = 1.5, 1.25
 """Ways are sought up to the first multiple of the greatest distance of a goal to its nearest, then
 up to ever more."""
 
+LEAST = 1e-3
+"""Share of the tether that they are sought up to at least."""
+
 MOST_PATHS = 1_000_000
 """With so many no longer ones are sought."""
 
-MOST_STEPS = 50_000_000
+MOST_STEPS = 20_000_000
 """Departures that are looked at from one goal."""
 
 Found = tuple[Ints, Floats, npt.NDArray[np.uint64]]
@@ -39,7 +42,10 @@ def ways_by_parity(paths: TautPaths, up: Callable[[], bool]) -> WaysByParity | N
     points, tether = paths.outline.points, paths.problem.tether_length
     apart = np.hypot(*(points[:, None] - points[None]).transpose(2, 0, 1))
     np.fill_diagonal(apart, np.inf)
-    reach, best = FIRST * float(apart.min(axis=1).max(initial=0.0)), None
+    nearest = float(apart.min(axis=1).max(initial=0.0))
+    reach, best = max(FIRST * nearest, LEAST * tether), None
+    if up():
+        return None
     from_base = _from(paths, 0, tether + paths.margin)
     while from_base is not None and reach < GROWTH * tether:
         found = _within(paths, min(reach, tether), from_base[0], best is None, up)
@@ -56,8 +62,8 @@ def _within(
     or there is no time."""
     each, count = [from_base], 0
     for a in range(1, len(paths.outline.points) - 1):
-        found = _from(paths, a, reach)
-        if found is None or up():
+        found = None if up() else _from(paths, a, reach)
+        if found is None:
             return None
         each.append(found[0])
         count += found[1]

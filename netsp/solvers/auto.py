@@ -108,6 +108,8 @@ def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | Non
             if tour is not None and graph.knows_ways and otherwise < graph.tour_length(tour):
                 # no proof over the classes kept would count: others may be in a shorter tour
                 return _beyond(graph, limits, clock)
+            if tour is None and graph.knows_ways:
+                _bound_by_goals(graph, Limits(clock.part(GOALS_SHARE), rng=limits.rng))
     if len(graph) <= PROVABLE:
         run = MipRun(graph, limits, search_rounds=_rounds(graph))
         return run.solve(chosen.backend, limits.warm_start, walks=graph.goal_count <= FEW_GOALS)
