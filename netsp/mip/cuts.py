@@ -48,16 +48,22 @@ class Cut:
             out &= self.inside[legs[:, 0]] ^ self.inside[legs[:, 1]]
         return np.asarray(out)
 
+    def is_union(self, cluster: Ints) -> bool:
+        """Whether S holds all vertices of a cluster or none."""
+        size = np.bincount(cluster)
+        held = np.bincount(cluster[self.inside], minlength=len(size))
+        return bool(((held == 0) | (held == size)).all())
+
     def splits(self, cluster: Ints) -> bool:
-        """Whether all teeth are pairs, and S holds some vertices of a cluster and not others, or
-        both or neither of a pair (where vertices were forgotten): then not all legs between the
-        clusters of a tooth are in it."""
+        """Whether all teeth are pairs, and S is no union of clusters, or holds both or neither of
+        a pair (where vertices were forgotten): then not all legs between the clusters of a tooth
+        are in it."""
         if not self.teeth or any(len(t) > 2 for t in self.teeth):
             return False
-        size = np.bincount(cluster, minlength=max(max(t) for t in self.teeth) + 1)
-        held = np.bincount(cluster[self.inside], minlength=len(size))
-        within = any((held[a] > 0) == (held[b] > 0) for a, b in self.teeth)
-        return within or bool(((held > 0) & (held < size)).any())
+        holds = set(cluster[self.inside].tolist())
+        return any((a in holds) == (b in holds) for a, b in self.teeth) or not self.is_union(
+            cluster
+        )
 
     def sets_of_teeth(self, cluster: Ints) -> list[Bools]:
         """For teeth that are pairs of clusters the sets of vertices, two for each, whose legs to

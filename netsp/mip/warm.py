@@ -40,7 +40,7 @@ class Warm:
         out: dict[tuple[bytes, object], Cut] = {}
         for goes_with in (near, akin):
             for cut in self.cuts:
-                whole = cut.teeth and not cut.splits(held)
+                whole = cut.teeth and cut.is_union(held)
                 inside = cut.inside[akin if whole else goes_with] | (cluster == cut.cluster)
                 out.setdefault((inside.tobytes(), cut.teeth), replace(cut, inside=inside))
         return list(out.values())
