@@ -183,7 +183,9 @@ class MipRun(SearchingRun):
             run = MipRun(graph, limits)
             return run.solve(backend, None), run.cuts
 
-        part = CELLS_SHARE if len(self.graph) > MANY_CLASSES else GOALS_SHARE
+        # with fewer goals the relaxation over classes is quicker than covers below it
+        climbs = len(self.graph) > MANY_CLASSES and self.graph.goal_count >= MANY_GOALS
+        part = CELLS_SHARE if climbs else GOALS_SHARE
         share = Clock(part * self.clock.left, within=self.clock) if self.clock.limit else self.clock
         limits = Limits(share, rng=self.rng)
 
@@ -192,10 +194,12 @@ class MipRun(SearchingRun):
             self.report("covers", vertices=cells)
 
         costs, graph = None, self.graph
-        if len(graph) > MANY_CLASSES and graph.legs_at_once and graph.complete:
+        if climbs and graph.legs_at_once and graph.complete:
             self._costs = LegCosts(graph)
             costs = self._costs.values
-        self._over_goals = bound_over_goals(graph, prove, limits, self.tour, costs, told)
+        self._over_goals = bound_over_goals(
+            graph, prove, limits, self.tour if climbs else None, costs, told
+        )
         self.raise_bound(self._over_goals.bound)
         self.report("goals", vertices=len(self.graph))
 
