@@ -44,9 +44,10 @@ MOST_KEPT = 3_000
 FEW_GOALS = 24
 """Most goals for which walks come first: with more, remembering them costs more than cuts do."""
 
-LEAST_ROUNDS, ROUNDS_PER_GOAL, ROUNDS_PER_PAIR = 500, 40, 1.0
+LEAST_ROUNDS, ROUNDS_PER_GOAL, ROUNDS_PER_PAIR, MOST_ROUNDS = 500, 40, 1.0, 20_000
 """Rounds of ruin and recreate before and after the root: for each goal so many, or for each two
-goals if that is more."""
+goals if that is more, but no more than the last: another turn, among classes beside a better tour,
+is worth more."""
 
 FEW_CLASSES = 3
 """Of a goal, where the roadmap had to leave classes out: a tour over them comes first."""
@@ -157,7 +158,8 @@ def _beyond(graph: TravelGraph, limits: Limits, clock: Clock) -> Result:
 def _rounds(graph: TravelGraph) -> int:
     """Of one search."""
     n = graph.goal_count
-    return max(LEAST_ROUNDS, ROUNDS_PER_GOAL * n, int(ROUNDS_PER_PAIR * n * (n - 1) / 2))
+    rounds = max(LEAST_ROUNDS, ROUNDS_PER_GOAL * n, int(ROUNDS_PER_PAIR * n * (n - 1) / 2))
+    return min(rounds, MOST_ROUNDS)
 
 
 def _in_part_ordered(graph: TravelGraph, limits: Limits, backend: str) -> Result:

@@ -29,7 +29,11 @@ from netsp.travel.graph import TravelGraph, least_tethers
 from netsp.travel.result import OPTIMALITY_TOLERANCE
 
 CORE = 800
-"""About so many vertices, those of least tether, are searched while there are too many for all."""
+"""About so many vertices, those of least tether, are proven over before all are."""
+
+SEARCHED = 2400
+"""About so many are searched while there are too many for all. With 200 goals at tether 500, three
+classes of each end 3 % above the tour that ten end at, after a few seconds or a minute."""
 
 SEARCHED_WHOLE = 1200
 """So many vertices whose legs are measured are searched altogether."""
@@ -38,7 +42,7 @@ FEW_CLASSES = 3
 """Classes per goal of the first tour of all."""
 
 MOST_CLASSES = 12
-"""Most classes per goal among them."""
+"""Most classes per goal among either."""
 
 CORE_SHARE = 0.4
 """Part of the time that is left which the core may take."""
@@ -98,7 +102,7 @@ class SearchingRun(SolverRun):
         """Search among the classes of least tether, then among those beside the best tour, as long
         as that is improved; the classes of the last search."""
         graph, clock = self.graph, self.clock.part(TURNS_SHARE)
-        core = least_tethers(graph.costs_to_base, graph.cluster, self.classes_per_goal)
+        core = least_tethers(graph.costs_to_base, graph.cluster, self.searched_per_goal)
         vain = 0
         for _ in range(TURNS):
             before = self.length
@@ -110,7 +114,7 @@ class SearchingRun(SolverRun):
                 break
             core = classes_beside(
                 graph.costs_to_base, graph.cluster, graph.lower_bounds(rows=self.tour), self.tour,
-                self.classes_per_goal,
+                self.searched_per_goal,
             )  # fmt: skip
         return core
 
@@ -150,6 +154,11 @@ class SearchingRun(SolverRun):
         """In the core."""
         return min(max(3, CORE // (self.graph.goal_count + 1)), MOST_CLASSES)
 
+    @property
+    def searched_per_goal(self) -> int:
+        """In a search."""
+        return min(max(3, SEARCHED // (self.graph.goal_count + 1)), MOST_CLASSES)
+
     def update_incumbent(
         self,
         tour: Sequence[int] | None,
@@ -186,10 +195,10 @@ class SearchingRun(SolverRun):
             return self._core[1]
         tethers, own = costs.values[0], np.searchsorted(costs.vertices, np.array(self.tour or (0,)))
         if self.tour is None:
-            some = least_tethers(tethers, costs.cluster, self.classes_per_goal)
+            some = least_tethers(tethers, costs.cluster, self.searched_per_goal)
         else:
             some = classes_beside(
-                tethers, costs.cluster, costs.values[own], own, self.classes_per_goal
+                tethers, costs.cluster, costs.values[own], own, self.searched_per_goal
             )
         core = np.unique(np.concatenate([some, own, more]))
         costs.measure(core)
