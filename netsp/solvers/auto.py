@@ -15,7 +15,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -31,9 +30,10 @@ from netsp.solution import Status
 from netsp.solvers import exact
 from netsp.solving.limits import Limits
 from netsp.solving.run import SolverRun
+from netsp.solving.searching import SearchingRun
 from netsp.travel.graph import TravelGraph, least_tethers
 from netsp.travel.kept import within_kept
-from netsp.travel.result import Progress, Result, of_part, proven
+from netsp.travel.result import Result, of_part, proven
 
 PROVABLE = 22_000
 """Most vertices of a travel graph that `mip` is asked to bound: some 3 GiB of matrices."""
@@ -61,9 +61,9 @@ GOALS_SHARE = 0.2
 SHARE = 0.6
 """Part of the time that the search has at least where it shares it with a bound that is weak."""
 
-FIRST_SHARE, BOUND_SHARE = 0.2, 0.7
-"""With too many classes for a matrix, parts of the time for the first search, and of what is left
-for the bound."""
+BOUND_SHARE = 0.9
+"""With too many classes for a matrix, part of the time that is left for the bound after the first
+search."""
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | Non
             tour, otherwise = limits.warm_start, graph.least_by_way_of(graph.least_left_out)
             if tour is not None and graph.knows_ways and otherwise < graph.tour_length(tour):
                 # no proof over the classes kept would count: others may be in a shorter tour
-                return _beyond(graph, limits, clock)
+                return _beyond(graph, limits)
             if tour is None and graph.knows_ways:
                 _bound_by_goals(graph, Limits(clock.part(GOALS_SHARE), rng=limits.rng))
     if len(graph) <= PROVABLE:
@@ -116,43 +116,29 @@ def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | Non
         return run.solve(chosen.backend, limits.warm_start, walks=graph.goal_count <= FEW_GOALS)
     if graph.goal_count <= FEW_GOALS and graph.roadmapped:
         return _over_shortest(graph, limits, chosen.backend)
-    return _beyond(graph, limits, clock)
+    return _beyond(graph, limits)
 
 
-def _beyond(graph: TravelGraph, limits: Limits, clock: Clock) -> Result:
-    """With too many classes for a matrix: a search, the bound of covers with its tour, and a search
-    from there on."""
-    rows: list[Progress] = []
-    bound = 0.0
+def _beyond(graph: TravelGraph, limits: Limits) -> Result:
+    """With too many classes for a matrix: a search, the bound of covers with its tour, and more
+    searches if there is time left."""
+    run = SearchingRun(graph, limits, search_rounds=_rounds(graph))
 
-    def tell(row: Progress, **changed: Any) -> None:
-        rows.append(replace(row, **changed))
-        if limits.on_progress:
-            limits.on_progress(rows[-1])
+    def told(bound: float, cells: int) -> None:
+        run.raise_bound(bound)
+        run.report("covers", vertices=cells)
 
-    def with_bound(row: Progress) -> None:
-        tell(row, bound=min(bound, row.incumbent) if row.incumbent else bound or None)
-
-    share = clock.part(FIRST_SHARE) if clock.limit else clock
-    found = search(graph, limits=replace(limits, time=share, on_progress=with_bound))
-    if found.length is None or found.tour is None:
-        return found
-    share = clock.part(BOUND_SHARE) if clock.limit else clock
-
-    def told(raised: float, cells: int) -> None:
-        nonlocal bound
-        bound = max(bound, raised)
-        with_bound(replace(found.trace[-1], time=clock.elapsed, stage="covers", vertices=cells))
-
-    bound = max(bound, _bound_by_goals(graph, Limits(share, rng=limits.rng), found.tour, told))
-    tell(found.trace[-1], stage="goals", time=clock.elapsed, bound=min(bound, found.length))
-    if clock.limit and not clock.up:
-        again = replace(limits, time=clock, warm_start=found.tour, on_progress=with_bound)
-        found = min(found, search(graph, limits=again), key=lambda r: r.length or np.inf)
-    length = found.length or np.inf
-    bound = min(length, bound)
-    status = Status.OPTIMAL if proven(length, bound) else found.status
-    return replace(found, lower_bound=bound, status=status, trace=tuple(rows))
+    with run.until_stopped():
+        run.update_incumbent(limits.warm_start)
+        run.begin()
+        run.search_beside()
+        share = run.clock.part(BOUND_SHARE) if run.clock.limit else run.clock
+        run.raise_bound(_bound_by_goals(graph, Limits(share, rng=limits.rng), run.tour, told))
+        run.report("goals")
+        while run.clock.limit and not run.done:
+            run.check()
+            run.search_beside()
+    return run.finish("proven" if run.done else "open")
 
 
 def _rounds(graph: TravelGraph) -> int:
