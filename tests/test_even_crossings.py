@@ -15,7 +15,7 @@ from netsp import Circle, Problem, Status, solve_graph, travel_graph
 from netsp.clock import Clock
 from netsp.mip import root
 from netsp.mip.bound import exact_bound
-from netsp.mip.covers import OverClasses, OverWays, climb
+from netsp.mip.covers import climb
 from netsp.mip.cuts import Cut, cut_coefficients
 from netsp.mip.highs import HighsRelaxation
 from netsp.mip.legprices import LegPrices
@@ -24,6 +24,7 @@ from netsp.mip.parities import odd_letters, parity_cuts
 from netsp.mip.prices import Prices
 from netsp.mip.program import duals_of_relaxation
 from netsp.mip.solve import solve
+from netsp.mip.towers import OverClasses, OverWays
 from netsp.solving.limits import Limits
 from netsp.solving.run import Stop
 from netsp.travel.ways import WaysByParity

@@ -4,11 +4,9 @@ Over goals alone a tour may go around obstacles; over all classes there are too 
 the relaxation falls to the bound over goals before it rises. In between are covers of finitely many
 sheets: a *cell* is a goal, and of which of some obstacles the tether's word has an odd number of
 letters. The cells of no obstacle are the goals; with all of them there are still far fewer cells
-than classes. A leg between two cells costs what the cheapest between their classes does
-(`OverClasses`), or where there are too many of these the shortest of any ways from the one to the
-other (`OverWays`, `netsp.travel.ways`), so that every tour over classes is one over cells, no
-longer: what bounds these bounds those. With ways the bound holds for classes that a roadmap has
-left out, too.
+than classes. A leg between two cells costs no more than any between their classes
+(`netsp.mip.towers`), so that every tour over classes is one over cells, no longer: what bounds
+these bounds those.
 
 From one cover to the next a cell falls into those of another obstacle or two. A cut holds for any
 set of vertices, so it holds for all that lies above one; a leg that is in no better tour has none
@@ -21,26 +19,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any, Protocol
 
 import numpy as np
 
 from netsp.arrays import Bools, Floats, Ints
 from netsp.clock import Clock
-from netsp.compiled.kernel import kernel
 from netsp.errors import LimitReachedError, interrupted
 from netsp.mip.cuts import Cut
 from netsp.mip.highs import HighsRelaxation
-from netsp.mip.overcells import Cells, OverCells, packed
+from netsp.mip.overcells import Cells, OverCells
 from netsp.mip.parities import oddness
 from netsp.mip.root import Root, tour_legs
+from netsp.mip.towers import Tower
 from netsp.solving.legcosts import LegCosts
 from netsp.solving.limits import Limits
 from netsp.solving.run import Stop
 from netsp.solving.searching import SearchingRun
 from netsp.travel.costs import CostTable
 from netsp.travel.graph import TravelGraph
-from netsp.travel.ways import WaysByParity
 
 GROWTH = 1.3
 """So many times as many cells, at least, has each cover."""
@@ -100,137 +96,6 @@ def climb(
     return found
 
 
-class Tower(Protocol):
-    """The covers of a problem."""
-
-    obstacles: int
-
-    def cells(self, obstacles: tuple[int, ...]) -> Cells:
-        """Of the cover of some obstacles, those that a tether reaches."""
-
-    def costs(self, cells: Cells) -> Floats:
-        """(m, m) costs between cells, inf within a goal."""
-
-    def odd_between(self, cells: Cells, ends: Ints) -> Bools:
-        """(k, n) of which obstacles the cheapest leg between two cells (k, 2) writes an odd number
-        of letters."""
-
-
-class OverClasses:
-    """Covers below the classes of a travel graph.
-
-    Parameters
-    ----------
-    costs
-        (V, V) of legs.
-    cluster
-        (V,) of the vertices.
-    odd
-        (V, n) as of `netsp.mip.parities.odd_letters`.
-    """
-
-    def __init__(self, costs: Floats, cluster: Ints, odd: Bools) -> None:
-        self._costs, self._cluster, self._odd = costs, cluster, odd
-        self.obstacles = odd.shape[1]
-
-    def cells(self, obstacles: tuple[int, ...]) -> Cells:
-        """As of `Tower.cells`."""
-        both = np.unique(np.column_stack([self._cluster, packed(self._odd, obstacles)]), axis=0)
-        return Cells(obstacles, both[:, 0], both[:, 1])
-
-    def costs(self, cells: Cells) -> Floats:
-        """As of `Tower.costs`."""
-        order, row = self._members(cells)
-        out = np.empty((len(cells.cluster), len(cells.cluster)))
-        _least(self._costs, order, row, out)
-        return out
-
-    def odd_between(self, cells: Cells, ends: Ints) -> Bools:
-        """As of `Tower.odd_between`."""
-        order, row = self._members(cells)
-        out = np.empty((len(ends), self.obstacles), dtype=bool)
-        for k, (a, b) in enumerate(ends.tolist()):
-            us, vs = order[row[a] : row[a + 1]], order[row[b] : row[b + 1]]
-            i, j = divmod(int(np.argmin(self._costs[np.ix_(us, vs)])), len(vs))
-            out[k] = self._odd[us[i]] ^ self._odd[vs[j]]
-        return out
-
-    def _members(self, cells: Cells) -> tuple[Ints, Ints]:
-        """The vertices cell by cell, and where those of each begin."""
-        own = cells.of(self._cluster, self._odd)
-        order = np.argsort(own, kind="stable")
-        row = np.searchsorted(own[order], np.arange(len(cells.cluster) + 1))
-        return order, row.astype(np.int64)
-
-
-@kernel
-def _least(costs: Floats, order: Ints, row: Ints, out: Floats) -> None:
-    """The least cost between the members of two cells."""
-    cells = len(row) - 1
-    own = np.empty(len(order), dtype=np.int64)
-    for b in range(cells):
-        for k in range(row[b], row[b + 1]):
-            own[order[k]] = b
-    out[:] = np.inf
-    for a in range(cells):
-        for k in range(row[a], row[a + 1]):
-            u = order[k]
-            for v in range(len(order)):
-                out[a, own[v]] = min(out[a, own[v]], costs[u, v])
-
-
-class OverWays:
-    """Covers below whatever classes there are.
-
-    Parameters
-    ----------
-    ways
-        Between goals.
-    tether
-        What it is longer than is in no tour.
-    """
-
-    def __init__(self, ways: WaysByParity, tether: float) -> None:
-        self._ways, self.obstacles = ways, ways.obstacles
-        self._odd = ways.odd_of(np.arange(len(ways.ends)))
-        reached = (ways.ends[:, 0] == 0) & (ways.length <= tether)
-        self._goal, self._at_goal = ways.ends[reached, 1], self._odd[reached]
-        self._size = int(ways.ends.max()) + 1
-        self._pair = ways.ends[:, 0] * self._size + ways.ends[:, 1]
-
-    def cells(self, obstacles: tuple[int, ...]) -> Cells:
-        """As of `Tower.cells`."""
-        both = np.column_stack([self._goal, packed(self._at_goal, obstacles)])
-        both = np.unique(np.vstack([[[0, 0]], both]), axis=0)
-        return Cells(obstacles, both[:, 0], both[:, 1])
-
-    def costs(self, cells: Cells) -> Floats:
-        """As of `Tower.costs`."""
-        return self._shortest(cells)[0]
-
-    def odd_between(self, cells: Cells, ends: Ints) -> Bools:
-        """As of `Tower.odd_between`; none where nothing is known."""
-        way = self._shortest(cells)[1][ends[:, 0], ends[:, 1]]
-        return np.asarray(self._odd[np.maximum(way, 0)] & (way >= 0)[:, None])
-
-    def _shortest(self, cells: Cells) -> tuple[Floats, Ints]:
-        """(m, m) costs, and numbers of the ways, -1 for a longer one that is not known."""
-        code, ways = packed(self._odd, cells.obstacles), self._ways
-        order = np.lexsort((ways.length, code, self._pair))
-        pair, code = self._pair[order], code[order]
-        new = np.ones(len(order), dtype=bool)
-        new[1:] = (pair[1:] != pair[:-1]) | (code[1:] != code[:-1])
-        order, pair, code = order[new], pair[new], code[new]
-        row = np.searchsorted(pair, np.arange(self._size**2 + 1)).astype(np.int64)
-        m = len(cells.cluster)
-        costs, way = np.full((m, m), np.inf), np.full((m, m), -1, dtype=np.int64)
-        _between(
-            cells.cluster, cells.code, row, code, order, ways.length[order], ways.reach,
-            self._size, costs, way,
-        )  # fmt: skip
-        return costs, way
-
-
 def _next_obstacles(tower: Tower, level: _Level) -> list[int]:
     """Those whose letters are to count from now on, too."""
     own = level.cells.obstacles
@@ -251,40 +116,6 @@ def _next_obstacles(tower: Tower, level: _Level) -> list[int]:
         if count > GROWTH * len(level.cells.cluster) or len(own) + len(out) == MOST_OBSTACLES:
             break
     return out
-
-
-@kernel
-def _between(
-    cluster: Ints, code: Ints, row: Ints, codes: Ints, numbers: Ints, lengths: Floats, reach: float,
-    size: int, costs: Floats, way: Ints,
-) -> None:  # fmt: skip
-    """Fill in costs and ways between cells: those of a pair of goals are rows row[pair] to
-    row[pair + 1] of ascending codes."""
-    m = len(cluster)
-    for a in range(m):
-        for b in range(a + 1, m):
-            g, h = cluster[a], cluster[b]
-            if g == h:
-                continue
-            wanted = code[a] ^ code[b]
-            pair = g * size + h if g < h else h * size + g
-            low, high = row[pair], row[pair + 1]
-            after = high
-            while low < high:
-                middle = (low + high) // 2
-                if codes[middle] < wanted:
-                    low = middle + 1
-                else:
-                    high = middle
-            cost, number = reach, -1
-            if low < after and codes[low] == wanted:
-                cost, number = lengths[low], numbers[low]
-            costs[a, b] = costs[b, a] = cost
-            way[a, b] = way[b, a] = number
-
-
-class _Run(SearchingRun):
-    """A run over cells, whose tours are none: its incumbent is one over classes."""
 
 
 class _Level:
@@ -313,11 +144,12 @@ class _Level:
         graph = TravelGraph(
             cluster, _words(self.cells), np.zeros(len(cluster)), CostTable(costs, cluster)
         )
-        run = self.run = _Run(graph, Limits(clock, rng=limits.rng))
+        # its tours are none: the incumbent is one over classes
+        run = self.run = SearchingRun(graph, Limits(clock, rng=limits.rng))
         run.tour, run.length = tuple(self.own_tour.tolist()), length
         if before is not None:
             run.bound = before.run.bound
-        self.root = Root(run, LegCosts(graph), HighsRelaxation, _nothing)
+        self.root = Root(run, LegCosts(graph), HighsRelaxation, lambda *_: None)
         self.root.patience = PATIENCE
         if before is not None:
             all_legs = np.vstack([legs, tour_legs(self.own_tour)])
@@ -403,7 +235,3 @@ def _words(cells: Cells) -> list[tuple[int, ...]]:
         tuple(i + 1 for j, i in enumerate(cells.obstacles) if code >> j & 1)
         for code in cells.code.tolist()
     ]
-
-
-def _nothing(*_: Any) -> None:
-    """A point over cells is no tour."""

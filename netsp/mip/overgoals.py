@@ -20,10 +20,11 @@ from scipy.sparse.csgraph import minimum_spanning_tree
 
 from netsp.arrays import Floats
 from netsp.clock import Clock
-from netsp.mip.covers import OverClasses, OverWays, Tower, climb
+from netsp.mip.covers import climb
 from netsp.mip.cuts import Cut
 from netsp.mip.overcells import OverCells, OverGoals
 from netsp.mip.parities import odd_letters
+from netsp.mip.towers import OverClasses, OverWays, Tower
 from netsp.solving.limits import Limits
 from netsp.travel.graph import TravelGraph
 from netsp.travel.result import Result
