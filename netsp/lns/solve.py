@@ -10,7 +10,7 @@ from netsp.arrays import Ints
 from netsp.clock import Clock
 from netsp.lns.layers import Instance
 from netsp.lns.search import Search
-from netsp.solving.beside import classes_beside
+from netsp.solving.beside import classes_beside, searched_per_goal
 from netsp.solving.limits import Limits
 from netsp.solving.run import SolverRun
 from netsp.travel.graph import TravelGraph, least_tethers
@@ -20,7 +20,8 @@ ROUNDS_PER_GOAL = 300
 """Default number of rounds, times the number of goals, when nothing is limited."""
 
 MOST_VERTICES = 1000
-"""By default so many classes of least tether are looked at, shared among the goals."""
+"""By default so many classes of least tether are looked at, shared among the goals; with more
+than a hundred goals as many of each as are worth a search (`netsp.solving.beside`)."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +32,7 @@ class Params:
     ----------
     classes
         Most classes per goal, at first those of least tether, then those beside the best tour; 0
-        for as many as make `MOST_VERTICES` in all.
+        for as many as make `MOST_VERTICES` in all, or are worth a search, whichever is more.
     restarts
         Searches that share the iterations or the time, each from the best so far.
     """
@@ -62,7 +63,7 @@ def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | Non
 def _search(run: SolverRun, rng: np.random.Generator, chosen: Params) -> None:
     graph = run.graph
     run.check()
-    core = core_of(run, chosen.classes)
+    core = core_of(run, chosen.classes or _by_default(graph))
     instance = Instance.among(graph, core)
     by_clock = run.clock.limit is not None and run.iteration_limit == np.inf
     if not by_clock and run.iteration_limit == np.inf:
@@ -106,7 +107,7 @@ def core_beside(run: SolverRun, classes: int = 0) -> Ints:
     """The classes that a search looks at once there is a tour: some of least tether, and those
     beside it."""
     graph, tour = run.graph, run.tour or (0,)
-    some = classes or most_classes(graph, MOST_VERTICES)
+    some = classes or _by_default(graph)
     bounds = graph.lower_bounds(rows=tour)
     return classes_beside(graph.costs_to_base, graph.cluster, bounds, tour, some)
 
@@ -114,6 +115,11 @@ def core_beside(run: SolverRun, classes: int = 0) -> Ints:
 def _take(run: SolverRun, search: Search) -> None:
     length, tour = search.best()
     run.update_incumbent(tour, length=length)
+
+
+def _by_default(graph: TravelGraph) -> int:
+    """Classes per goal."""
+    return max(most_classes(graph, MOST_VERTICES), searched_per_goal(graph.goal_count))
 
 
 def most_classes(graph: TravelGraph, vertices: int) -> int:

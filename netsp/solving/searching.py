@@ -21,7 +21,7 @@ from netsp.clock import Clock
 from netsp.errors import LimitReachedError
 from netsp.lns.layers import Instance
 from netsp.lns.search import Search
-from netsp.solving.beside import classes_beside
+from netsp.solving.beside import classes_beside, searched_per_goal
 from netsp.solving.legcosts import MEASURE_AT_ONCE, LegCosts
 from netsp.solving.limits import Limits
 from netsp.solving.run import SLIVER, SolverRun, Stop
@@ -31,10 +31,6 @@ from netsp.travel.result import OPTIMALITY_TOLERANCE
 CORE = 800
 """About so many vertices, those of least tether, are proven over before all are."""
 
-SEARCHED = 2400
-"""About so many are searched while there are too many for all. With 200 goals at tether 500, three
-classes of each end 3 % above the tour that ten end at, after a few seconds or a minute."""
-
 SEARCHED_WHOLE = 1200
 """So many vertices whose legs are measured are searched altogether."""
 
@@ -42,7 +38,7 @@ FEW_CLASSES = 3
 """Classes per goal of the first tour of all."""
 
 MOST_CLASSES = 12
-"""Most classes per goal among either."""
+"""Most classes per goal among them."""
 
 CORE_SHARE = 0.4
 """Part of the time that is left which the core may take."""
@@ -157,7 +153,7 @@ class SearchingRun(SolverRun):
     @property
     def searched_per_goal(self) -> int:
         """In a search."""
-        return min(max(3, SEARCHED // (self.graph.goal_count + 1)), MOST_CLASSES)
+        return searched_per_goal(self.graph.goal_count)
 
     def update_incumbent(
         self,
