@@ -5,10 +5,11 @@ removals for vehicle routing problems"), carried over to the generalised TSP: a 
 near a random goal is taken out, its clusters are put back one by one where they cost least, and the
 new tour is accepted by simulated annealing.
 
-What an insertion costs is exact in the sense of the whole tour: with ``ahead[k, i]`` the shortest
-path from the base to vertex i of the k-th cluster and ``behind[k, i]`` from there home, the best
-tour that has cluster c after position k is ``min over i, j, l of ahead[k, i] + c_ij + c_jl +
-behind[k + 1, l]``, every class of every other goal chosen anew.
+What an insertion costs is exact in the sense of the whole tour: with ``ahead[p, i]`` the shortest
+path from the base to vertex i of cluster p, through all clusters before it, and ``behind[q, i]``
+from vertex i of cluster q home, the best tour that has cluster c between p and q is ``min over
+i, j, l of ahead[p, i] + c_ij + c_jl + behind[q, l]``, every class of every other goal chosen anew.
+Most of these tables outlives a change: what lies far from it has no say in which classes are best.
 """
 
 from __future__ import annotations
@@ -34,6 +35,9 @@ EVEN = 1e-12
 BLINK = 0.01
 """Chance that a place is overlooked (same paper, section 3.3)."""
 
+AFRESH = 64
+"""Orders accepted, after which the tables are filled afresh: every change adds its rounding."""
+
 
 class Tables(NamedTuple):
     """Of an instance: where the vertices of each cluster begin; legs; least legs between clusters
@@ -50,89 +54,74 @@ class Tables(NamedTuple):
 
 
 @kernel
-def forward(order: Ints, n: int, first: int, start: Ints, costs: Floats, ahead: Floats) -> None:
-    """Fill ``ahead`` from position `first` on; order[0] is the base, positions run to n - 1."""
+def forward(
+    order: Ints, n: int, first: int, settled: int, start: Ints, costs: Floats, ahead: Floats
+) -> None:
+    """Fill ``ahead`` from position `first` on; order[0] is the base, positions run to n - 1.
+
+    From position `settled` on (n for nowhere) the order is that of before, and ``ahead`` holds what
+    was true then. Once all paths to a cluster there have become longer by the same, those to all
+    after it have, too."""
     for k in range(first, n):
         c, p = order[k], order[k - 1]
+        longer, even = 0.0, True
         for j in range(start[c], start[c + 1]):
             best = np.inf
             for i in range(start[p], start[p + 1]):
-                d = ahead[k - 1, i - start[p]] + costs[i, j]
+                d = ahead[p, i - start[p]] + costs[i, j]
                 if d < best:
                     best = d
-            ahead[k, j - start[c]] = best
+            by = best - ahead[c, j - start[c]]
+            if j == start[c]:
+                longer = by
+            elif abs(by - longer) > EVEN * best:
+                even = False
+            ahead[c, j - start[c]] = best
+        if even and k >= settled:
+            for q in range(k + 1, n):
+                c = order[q]
+                for j in range(start[c + 1] - start[c]):
+                    ahead[c, j] += longer
+            return
 
 
 @kernel
 def backward(
-    order: Ints, n: int, last: int, first: int, start: Ints, costs: Floats, behind: Floats
+    order: Ints, n: int, last: int, settled: int, start: Ints, costs: Floats, behind: Floats
 ) -> None:
-    """Fill ``behind`` from position `last` down to `first`; behind[n] is the path from the base
-    home."""
-    for k in range(last, first - 1, -1):
+    """Fill ``behind`` from position `last` down to 1, as `forward`; up to position `settled` (0 for
+    nowhere) it holds what was true before."""
+    for k in range(last, 0, -1):
         c = order[k]
         q = order[k + 1] if k + 1 < n else 0
-        for j in range(start[c], start[c + 1]):
-            best = np.inf
-            for i in range(start[q], start[q + 1]):
-                d = behind[k + 1, i - start[q]] + costs[j, i]
-                if d < best:
-                    best = d
-            behind[k, j - start[c]] = best
-
-
-@kernel
-def forward_again(
-    order: Ints, n: int, first: int, start: Ints, costs: Floats, ahead: Floats
-) -> None:
-    """Fill ``ahead`` from position `first` on, where it holds what was true before a change further
-    back. Where all paths to a cluster have become longer by the same, those to all after it have,
-    too: what lies so far back has no say in which classes are best."""
-    for k in range(first, n):
-        c, p = order[k], order[k - 1]
-        longer, even = 0.0, True
-        for j in range(start[c], start[c + 1]):
-            best = np.inf
-            for i in range(start[p], start[p + 1]):
-                d = ahead[k - 1, i - start[p]] + costs[i, j]
-                if d < best:
-                    best = d
-            by = best - ahead[k, j - start[c]]
-            if j == start[c]:
-                longer = by
-            elif abs(by - longer) > EVEN * best:
-                even = False
-            ahead[k, j - start[c]] = best
-        if even:
-            for q in range(k + 1, n):
-                for j in range(start[order[q] + 1] - start[order[q]]):
-                    ahead[q, j] += longer
-            return
-
-
-@kernel
-def backward_again(order: Ints, last: int, start: Ints, costs: Floats, behind: Floats) -> None:
-    """Fill ``behind`` from position `last` down to 1, as `forward_again`."""
-    for k in range(last, 0, -1):
-        c, q = order[k], order[k + 1]
         longer, even = 0.0, True
         for j in range(start[c], start[c + 1]):
             best = np.inf
             for i in range(start[q], start[q + 1]):
-                d = behind[k + 1, i - start[q]] + costs[j, i]
+                d = behind[q, i - start[q]] + costs[j, i]
                 if d < best:
                     best = d
-            by = best - behind[k, j - start[c]]
+            by = best - behind[c, j - start[c]]
             if j == start[c]:
                 longer = by
             elif abs(by - longer) > EVEN * best:
                 even = False
-            behind[k, j - start[c]] = best
-        if even:
+            behind[c, j - start[c]] = best
+        if even and k <= settled:
             for p in range(k - 1, 0, -1):
-                for j in range(start[order[p] + 1] - start[order[p]]):
-                    behind[p, j] += longer
+                c = order[p]
+                for j in range(start[c + 1] - start[c]):
+                    behind[c, j] += longer
             return
+
+
+@kernel
+def fill(order: Ints, start: Ints, costs: Floats, ahead: Floats, behind: Floats) -> None:
+    """Fill both tables for an order."""
+    n = len(order)
+    ahead[0, 0] = behind[0, 0] = 0.0
+    forward(order, n, 1, n, start, costs, ahead)
+    backward(order, n, n - 1, 0, start, costs, behind)
 
 
 @kernel
@@ -154,13 +143,13 @@ def inserted(
     for j in range(start[c], start[c + 1]):
         there = np.inf
         for i in range(start[p], start[p + 1]):
-            d = ahead[k, i - start[p]] + costs[i, j]
+            d = ahead[p, i - start[p]] + costs[i, j]
             if d < there:
                 there = d
         if there >= best:
             continue
         for i in range(start[q], start[q + 1]):
-            d = there + costs[j, i] + behind[k + 1, i - start[q]]
+            d = there + costs[j, i] + behind[q, i - start[q]]
             if d < best:
                 best = d
     return best
@@ -207,17 +196,10 @@ def insert_best(
             best, at = d, k
     for k in range(n, at + 1, -1):
         order[k] = order[k - 1]
-        for i in range(behind.shape[1]):
-            behind[k + 1, i] = behind[k, i]
-            ahead[k, i] = ahead[k - 1, i]
-    for i in range(behind.shape[1]):
-        behind[at + 2, i] = behind[at + 1, i]
     order[at + 1] = c
     n += 1
-    forward(order, at + 2, at + 1, start, costs, ahead)
-    forward_again(order, n, at + 2, start, costs, ahead)
-    backward(order, n, at + 1, at + 1, start, costs, behind)
-    backward_again(order, at, start, costs, behind)
+    forward(order, n, at + 1, at + 2, start, costs, ahead)
+    backward(order, n, at + 1, at, start, costs, behind)
     return n, best
 
 
@@ -247,9 +229,7 @@ def descend(
                 if order[k] != c:
                     work[size] = order[k]
                     size += 1
-            forward(work, size, 1, start, costs, ahead)
-            behind[size, 0] = 0.0
-            backward(work, size, size - 1, 1, start, costs, behind)
+            fill(work[:size], start, costs, ahead, behind)
             size, d = insert_best(
                 c, work, size, start, costs, near, before, ahead, behind, 0.0, chance
             )
@@ -268,11 +248,11 @@ def tour_length(order: Ints, start: Ints, costs: Floats, ahead: Floats, behind: 
     if n == 1:
         return 0.0
     ahead[0, 0] = 0.0
-    forward(order, n, 1, start, costs, ahead)
+    forward(order, n, 1, n, start, costs, ahead)
     c = order[n - 1]
     best = np.inf
     for j in range(start[c], start[c + 1]):
-        best = min(best, ahead[n - 1, j - start[c]] + costs[j, 0])
+        best = min(best, ahead[c, j - start[c]] + costs[j, 0])
     return best
 
 
@@ -335,7 +315,7 @@ def trace(order: Ints, start: Ints, costs: Floats, ahead: Floats, tour: Ints) ->
         c = order[k]
         best, pick = np.inf, start[c]
         for j in range(start[c], start[c + 1]):
-            d = ahead[k, j - start[c]] + costs[j, v]
+            d = ahead[c, j - start[c]] + costs[j, v]
             if d < best:
                 best, pick = d, j
         tour[k] = pick
@@ -351,18 +331,20 @@ def ruin_and_recreate(
     count: int,
     theta: float,
     tables: Tables,
+    ahead: Floats,
+    behind: Floats,
+    age: Ints,
     chance: npt.NDArray[np.uint64],
 ) -> tuple[float, float]:
     """Make `count` rounds at temperature θ, in place; returns the lengths of the present order and
-    of the best, which is kept in `best`."""
+    of the best, which is kept in `best`. ``ahead`` and ``behind`` are those of the present order,
+    and age[0] counts the orders accepted since they were filled: rounding must not depend on how
+    rounds are counted out."""
     start, costs, nearest = tables.start, tables.costs, tables.nearest
     near, rank, before = tables.near, tables.rank, tables.before
     n = len(order)
-    largest = 0
-    for c in range(n):
-        largest = max(largest, start[c + 1] - start[c])
-    ahead = np.zeros((n + 2, largest))
-    behind = np.zeros((n + 3, largest))
+    present, home = ahead, behind
+    ahead, behind = present.copy(), home.copy()
     work = np.empty(n + 1, dtype=np.int64)
     out = np.zeros(n, dtype=np.bool_)
     position = np.empty(n, dtype=np.int64)
@@ -377,6 +359,7 @@ def ruin_and_recreate(
         strings = int(uniform(chance) * (4.0 * REMOVED / (1.0 + longest))) + 1
         seed = 1 + below(n - 1, chance)
         removed = 0
+        first, last = n, 0
         for r in range(-1, rank.shape[1]):
             if strings == 0:
                 break
@@ -391,6 +374,7 @@ def ruin_and_recreate(
                     out[order[k]] = True
                     gone[removed] = order[k]
                     removed += 1
+                    first, last = min(first, k), max(last, k)
         size = 0
         for k in range(n):
             if not out[order[k]]:
@@ -412,10 +396,11 @@ def ruin_and_recreate(
                 gone[q + 1], key[q + 1] = gone[q], key[q]
                 q -= 1
             gone[q + 1], key[q + 1] = c, x
-        ahead[0, 0] = 0.0
-        forward(work, size, 1, start, costs, ahead)
-        behind[size, 0] = 0.0
-        backward(work, size, size - 1, 1, start, costs, behind)
+        ahead[:] = present
+        behind[:] = home
+        after = last + 1 - removed
+        forward(work, size, first, after, start, costs, ahead)
+        backward(work, size, after - 1, first - 1, start, costs, behind)
         d = 0.0
         for r in range(removed):
             size, d = insert_best(
@@ -425,6 +410,12 @@ def ruin_and_recreate(
             length = d
             for k in range(n):
                 order[k] = work[k]
+            age[0] += 1
+            if age[0] == AFRESH:
+                fill(order, start, costs, ahead, behind)
+                age[0] = 0
+            present[:] = ahead
+            home[:] = behind
             if d < best_length * (1.0 - 1e-12):
                 best_length = d
                 for k in range(n):

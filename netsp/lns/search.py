@@ -11,7 +11,7 @@ from netsp.arrays import Bools, Ints
 from netsp.clock import NEVER, Clock
 from netsp.compiled.chance import seeded
 from netsp.lns.layers import Instance, best_classes
-from netsp.lns.ruin import Tables, descend, ruin_and_recreate, two_opt
+from netsp.lns.ruin import Tables, descend, fill, ruin_and_recreate, two_opt
 
 HOT, COLD = 1.0, 2e-2
 """First and last temperature of ruin and recreate, in mean legs of the tour. A tenth of the first
@@ -93,7 +93,7 @@ class Search:
         self.order: Ints = np.array(order, dtype=np.int64)
         n = len(self.order)
         largest = int(np.diff(instance.start).max())
-        self._ahead, self._behind = np.zeros((n + 2, largest)), np.zeros((n + 3, largest))
+        self._ahead, self._behind = np.zeros((2, n, largest))
         self.chance = seeded(rng)
         self.length = np.inf
         self.best_order, self.best_length = self.order.copy(), np.inf
@@ -141,6 +141,8 @@ class Search:
             Called after every chunk with the number of rounds it had.
         """
         n = len(self.order)
+        i, age = self.instance, np.zeros(1, dtype=np.int64)
+        fill(self.order, i.start, i.costs, self._ahead, self._behind)
         done, chunk = 0, 1
         leg = self.length / n
         # the temperature falls in steps of so many rounds, whatever the time that they take
@@ -152,7 +154,7 @@ class Search:
             begin = clock.elapsed
             self.length, self.best_length = ruin_and_recreate(
                 self.order, self.best_order, self.length, self.best_length, count, theta,
-                self._tables, self.chance,
+                self._tables, self._ahead, self._behind, age, self.chance,
             )  # fmt: skip
             done += count
             if clock.elapsed - begin < CHUNK_SECONDS and chunk < max(1, rounds / STEPS):
