@@ -347,15 +347,26 @@ def test_renaming_clusters_does_not_change_the_optimum(seed, names):
 
 
 def test_the_library_example_of_a_subgraph_keeps_costs_and_paths():
-    g = graph("taut")
+    g = travel_graph(world(), "taut")
     some = np.flatnonzero(np.arange(len(g)) % 3 != 1)
     some = np.unique(np.concatenate([[0], some]))
+    # among some vertices other legs may be pulled, of which the others are sums
+    before = g.subgraph(some).costs
+    assert np.allclose(before, g.costs[np.ix_(some, some)], rtol=1e-12)
     part = g.subgraph(some)
     assert np.array_equal(part.costs, g.costs[np.ix_(some, some)])
     assert np.array_equal(part.costs_to_base[1:], g.costs_to_base[some][1:])
     for u, v in itertools.pairwise(range(0, len(part), max(1, len(part) // 4))):
         if part.cluster[u] != part.cluster[v]:
             assert np.array_equal(part.path(u, v), g.path(int(some[u]), int(some[v])))
+
+
+@pytest.mark.parametrize("solver", ["auto", "lns", "mip", "dp"])
+def test_a_graph_without_a_class_of_some_goal_is_refused(solver):
+    g = random_graph(0, goals=12, most=3)
+    part = g.subgraph(np.flatnonzero(g.cluster != 5))
+    with pytest.raises(InputError, match="no class of goal 5; expected one of every goal"):
+        solve_graph(part, solver)
 
 
 @pytest.mark.parametrize("roadmap", ROADMAPS)

@@ -9,7 +9,7 @@ What an insertion costs is exact in the sense of the whole tour: with ``ahead[p,
 path from the base to vertex i of cluster p, through all clusters before it, and ``behind[q, i]``
 from vertex i of cluster q home, the best tour that has cluster c between p and q is ``min over
 i, j, l of ahead[p, i] + c_ij + c_jl + behind[q, l]``, every class of every other goal chosen anew.
-Most of these tables outlives a change: what lies far from it has no say in which classes are best.
+Most of what they hold outlives a change: what lies far away has no say in which classes are best.
 """
 
 from __future__ import annotations

@@ -20,8 +20,8 @@ ROUNDS_PER_GOAL = 300
 """Default number of rounds, times the number of goals, when nothing is limited."""
 
 MOST_VERTICES = 1000
-"""By default so many classes of least tether are looked at, shared among the goals; with more
-than a hundred goals as many of each as are worth a search (`netsp.solving.beside`)."""
+"""By default so many classes of least tether are looked at, shared among the goals, but
+no fewer of each than are worth a search (`netsp.solving.beside`)."""
 
 
 @dataclass(frozen=True)

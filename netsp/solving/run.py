@@ -44,6 +44,10 @@ class SolverRun:
         limits = limits or Limits()
         if isinstance(graph, BaselessGraph):
             raise InputError("graph: has no base; expected solve_graph to be called with it")
+        # compiled loops take it for granted that every goal has a class
+        lost = np.flatnonzero(np.bincount(graph.cluster) == 0)
+        if len(lost):
+            raise InputError(f"graph: no class of goal {lost[0]}; expected one of every goal")
         self.graph = graph
         self.known = limits.cutoff
         self.clock = Clock.of(limits.time)
