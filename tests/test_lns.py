@@ -6,8 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp.compiled.chance import seeded
+from netsp.lns.descent import descend, two_opt
 from netsp.lns.layers import Instance, best_classes
-from netsp.lns.ruin import Tables, fill, insert_best, ruin_and_recreate
+from netsp.lns.links import Tables, best_place, link, no_links, put, take_out, written
+from netsp.lns.ruin import ruin_and_recreate
 from netsp.lns.solve import Params, solve
 from netsp.solving.limits import Limits
 from tests.test_contract import random_graph
@@ -29,26 +31,76 @@ def test_every_restart_has_its_share_of_time_or_rounds(how):
     assert all(stages[k + 1] == "search" for k in began)
 
 
-@given(st.integers(0, 10_000), st.integers(3, 14), st.sampled_from([1, 5, 1000]))
+COSTS_OF_LEGS = st.sampled_from([1, 5, 1000])
+"""Few places for many vertices: ties."""
+
+
+@given(st.integers(0, 10_000), st.integers(1, 14), COSTS_OF_LEGS)
 @settings(max_examples=60, deadline=None)
-def test_after_an_insertion_the_tables_are_those_of_the_new_order(seed, goals, places):
+def test_whatever_is_taken_out_and_put_back_the_tables_are_those_of_the_tour(seed, goals, places):
     rng = np.random.default_rng(seed)
     i = _random_instance(rng, goals, places)
-    order, n = np.concatenate([[0], 1 + rng.permutation(goals)]), goals
-    out = int(order[n])
-    order[n] = -1
-    width = int(np.diff(i.start).max())
-    ahead, behind = np.zeros((2, goals + 1, width))
-    fill(order[:n], i.start, i.costs, ahead, behind)
-    n, length = insert_best(
-        out, order, n, i.start, i.costs, i.near, i.before, ahead, behind, 0.0, seeded(rng)
-    )
-    assert sorted(order.tolist()) == list(range(goals + 1))
-    _same_tables(i, order, ahead, behind)
+    order = np.concatenate([[0], 1 + rng.permutation(goals)])
+    links, row = no_links(goals + 1, i.largest), np.empty(i.largest)
+    length = link(order, links, i.start, i.costs, row)
     assert length == pytest.approx(best_classes(order[1:], i.start, i.costs)[0], abs=1e-9)
+    after, prior, ahead, behind, grown, rest = links
+    state = (after, prior, i.start, i.costs, ahead, behind, grown, rest, row)
+    for c in rng.permutation(np.arange(1, goals + 1)).tolist():
+        length += take_out(c, *state)
+        if goals > 1:
+            _same_tables(i, links)
+        p, longer = best_place(
+            c, after, prior, i.start, i.costs, i.cluster_costs, *i.beside, i.before, ahead, behind,
+            rest, np.empty(goals + 1, dtype=np.int64), 0.0, seeded(rng),
+        )  # fmt: skip
+        assert put(c, p, *state) == pytest.approx(longer, abs=1e-9)
+        length += longer
+        written(after, order)
+        assert sorted(order.tolist()) == list(range(goals + 1))
+        _same_tables(i, links)
+        assert length == pytest.approx(best_classes(order[1:], i.start, i.costs)[0], abs=1e-9)
 
 
-@given(st.integers(0, 10_000), st.integers(3, 14), st.sampled_from([1, 5, 1000]))
+@given(st.integers(0, 10_000), st.integers(2, 9), COSTS_OF_LEGS)
+@settings(max_examples=60, deadline=None)
+def test_a_cluster_is_put_where_it_lengthens_the_tour_least(seed, goals, places):
+    rng = np.random.default_rng(seed)
+    i = _random_instance(rng, goals, places)
+    order = np.concatenate([[0], 1 + rng.permutation(goals)])
+    c, left = int(order[-1]), order[:-1]
+    links = no_links(goals + 1, i.largest)
+    length = link(left, links, i.start, i.costs, np.empty(i.largest))
+    after, prior, ahead, behind, _, rest = links
+    _, longer = best_place(
+        c, after, prior, i.start, i.costs, i.cluster_costs, *i.beside, i.before, ahead, behind,
+        rest, np.empty(goals + 1, dtype=np.int64), 0.0, seeded(rng),
+    )  # fmt: skip
+    each = [
+        best_classes(np.insert(left, k, c)[1:], i.start, i.costs)[0]
+        for k in range(1, len(left) + 1)
+    ]
+    assert length + longer == pytest.approx(min(each), abs=1e-9)
+
+
+@given(st.integers(0, 10_000), st.integers(4, 14), COSTS_OF_LEGS)
+@settings(max_examples=40, deadline=None)
+def test_descent_ends_where_its_links_and_lengths_say_and_no_longer(seed, goals, places):
+    rng = np.random.default_rng(seed)
+    i = _random_instance(rng, goals, places)
+    order = np.concatenate([[0], 1 + rng.permutation(goals)])
+    links, tables = no_links(goals + 1, i.largest), _tables(i)
+    begun = link(order, links, i.start, i.costs, np.empty(i.largest))
+    moved = descend(order, tables, links, seeded(rng), np.zeros(1, dtype=np.int64))
+    assert moved <= begun + 1e-9
+    assert moved == pytest.approx(best_classes(order[1:], i.start, i.costs)[0], abs=1e-9)
+    _same_tables(i, links)
+    turned = two_opt(order, tables, np.zeros(1, dtype=np.int64))
+    assert turned <= moved + 1e-9
+    assert turned == pytest.approx(best_classes(order[1:], i.start, i.costs)[0], abs=1e-9)
+
+
+@given(st.integers(0, 10_000), st.integers(3, 14), COSTS_OF_LEGS)
 @settings(max_examples=60, deadline=None)
 def test_after_rounds_the_tables_are_those_of_the_order_however_they_were_counted_out(
     seed, goals, places
@@ -58,16 +110,13 @@ def test_after_rounds_the_tables_are_those_of_the_order_however_they_were_counte
     found = []
     for counts in ([200], [1, 1, 48, 150]):
         order, chance = np.arange(goals + 1), seeded(np.random.default_rng(seed))
-        best, age = order.copy(), np.zeros(1, dtype=np.int64)
-        ahead, behind = np.zeros((2, goals + 1, int(np.diff(i.start).max())))
-        fill(order, i.start, i.costs, ahead, behind)
-        tables = Tables(i.start, i.costs, i.cluster_costs, i.near, i.rank, i.before)
-        length = shortest = best_classes(order[1:], i.start, i.costs)[0]
+        best, links = order.copy(), no_links(goals + 1, i.largest)
+        length = shortest = link(order, links, i.start, i.costs, np.empty(i.largest))
         for count in counts:
             length, shortest = ruin_and_recreate(
-                order, best, length, shortest, count, 100.0, tables, ahead, behind, age, chance
+                order, best, length, shortest, count, 100.0, _tables(i), links, chance
             )
-        _same_tables(i, order, ahead, behind)
+        _same_tables(i, links)
         assert length == pytest.approx(best_classes(order[1:], i.start, i.costs)[0], abs=1e-9)
         assert shortest == pytest.approx(best_classes(best[1:], i.start, i.costs)[0], abs=1e-9)
         found.append((order.tolist(), length, shortest))
@@ -75,16 +124,27 @@ def test_after_rounds_the_tables_are_those_of_the_order_however_they_were_counte
 
 
 def _random_instance(rng, goals, places):
-    """Few places for many vertices: ties."""
     cluster = np.concatenate([[0], np.repeat(np.arange(1, goals + 1), rng.integers(1, 5, goals))])
     where = rng.integers(0, places + 1, (len(cluster), 2)).astype(float)
     return Instance(cluster, np.hypot(*(where[:, None] - where[None]).T))
 
 
-def _same_tables(i, order, ahead, behind):
-    fresh, back = np.zeros((2, *ahead.shape))
-    fill(order, i.start, i.costs, fresh, back)
-    for c in order:
+def _tables(i):
+    return Tables(i.start, i.costs, i.cluster_costs, *i.beside, i.rank, i.before)
+
+
+def _same_tables(i, links):
+    """Links and tables are those of the tour filled afresh."""
+    tour = [0]
+    while links.after[tour[-1]] != 0:
+        tour.append(int(links.after[tour[-1]]))
+    fresh = no_links(*links.ahead.shape)
+    link(np.array(tour), fresh, i.start, i.costs, np.empty(i.largest))
+    for c in tour:
         own = int(np.diff(i.start)[c])
-        np.testing.assert_allclose(ahead[c, :own], fresh[c, :own], rtol=1e-10, atol=1e-9)
-        np.testing.assert_allclose(behind[c, :own], back[c, :own], rtol=1e-10, atol=1e-9)
+        assert links.prior[c] == fresh.prior[c]
+        for name in ("ahead", "behind"):
+            is_, should = getattr(links, name)[c, :own], getattr(fresh, name)[c, :own]
+            np.testing.assert_allclose(is_, should, rtol=1e-10, atol=1e-9)
+        assert links.grown[c] == pytest.approx(fresh.grown[c], abs=1e-9)
+        assert links.rest[c] == pytest.approx(fresh.rest[c], abs=1e-9)

@@ -87,6 +87,11 @@ class Instance:
             return cls.of(graph)
         return cls(graph.cluster[core], graph.costs_among(core), core, graph.before)
 
+    @property
+    def largest(self) -> int:
+        """Most vertices of a cluster."""
+        return int(np.diff(self.start).max())
+
     @cached_property
     def cluster_costs(self) -> Floats:
         """(m + 1, m + 1) least leg cost between clusters; inf on the diagonal."""
@@ -107,6 +112,14 @@ class Instance:
         out = np.zeros_like(self.cluster_costs, dtype=bool)
         out[np.arange(len(out))[:, None], self.rank[:, :NEAR]] = True
         return np.asarray(out | out.T)
+
+    @cached_property
+    def beside(self) -> tuple[Ints, Ints]:
+        """Next to which clusters each is put: where those of each begin (m + 2,), and all of them,
+        the nearest first."""
+        c, p = np.nonzero(self.near)
+        order = np.lexsort((self.cluster_costs[c, p], c))
+        return np.searchsorted(c, np.arange(len(self.near) + 1)), p[order]
 
     def original(self, tour: npt.ArrayLike) -> tuple[int, ...]:
         """Labels of the vertices at positions in `order`.

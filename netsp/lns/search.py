@@ -10,8 +10,10 @@ import numpy.typing as npt
 from netsp.arrays import Bools, Ints
 from netsp.clock import NEVER, Clock
 from netsp.compiled.chance import seeded
+from netsp.lns.descent import descend, two_opt
 from netsp.lns.layers import Instance, best_classes
-from netsp.lns.ruin import Tables, descend, fill, ruin_and_recreate, two_opt
+from netsp.lns.links import Tables, link, no_links
+from netsp.lns.ruin import ruin_and_recreate
 
 HOT, COLD = 1.0, 2e-2
 """First and last temperature of ruin and recreate, in mean legs of the tour. A tenth of the first
@@ -91,9 +93,8 @@ class Search:
             if start_order is None else start_order
         )  # fmt: skip
         self.order: Ints = np.array(order, dtype=np.int64)
-        n = len(self.order)
-        largest = int(np.diff(instance.start).max())
-        self._ahead, self._behind = np.zeros((2, n, largest))
+        self._links = no_links(len(self.order), instance.largest)
+        self._row = np.empty(instance.largest)
         self.chance = seeded(rng)
         self.length = np.inf
         self.best_order, self.best_length = self.order.copy(), np.inf
@@ -101,20 +102,22 @@ class Search:
     @property
     def _tables(self) -> Tables:
         i = self.instance
-        return Tables(i.start, i.costs, i.cluster_costs, i.near, i.rank, i.before)
+        return Tables(i.start, i.costs, i.cluster_costs, *i.beside, i.rank, i.before)
+
+    def _link(self) -> None:
+        """Links of the present order."""
+        i = self.instance
+        self.length = link(self.order, self._links, i.start, i.costs, self._row)
 
     def settle(self) -> None:
         """Descend to an order that no move of one cluster and no reversal improves."""
         n = len(self.order)
         before = np.inf
         while True:
-            self.length = descend(
-                self.order, self._tables, self._ahead, self._behind, self.chance, self._stop
-            )
+            self._link()
+            self.length = descend(self.order, self._tables, self._links, self.chance, self._stop)
             if n > 3:
-                self.length = two_opt(
-                    self.order, self._tables, self._ahead, self._behind, self._stop
-                )
+                self.length = two_opt(self.order, self._tables, self._stop)
             if not self.length < before * (1.0 - 1e-12):
                 break
             before = self.length
@@ -141,8 +144,7 @@ class Search:
             Called after every chunk with the number of rounds it had.
         """
         n = len(self.order)
-        i, age = self.instance, np.zeros(1, dtype=np.int64)
-        fill(self.order, i.start, i.costs, self._ahead, self._behind)
+        self._link()
         done, chunk = 0, 1
         leg = self.length / n
         # the temperature falls in steps of so many rounds, whatever the time that they take
@@ -154,7 +156,7 @@ class Search:
             begin = clock.elapsed
             self.length, self.best_length = ruin_and_recreate(
                 self.order, self.best_order, self.length, self.best_length, count, theta,
-                self._tables, self._ahead, self._behind, age, self.chance,
+                self._tables, self._links, self.chance,
             )  # fmt: skip
             done += count
             if clock.elapsed - begin < CHUNK_SECONDS and chunk < max(1, rounds / STEPS):

@@ -27,6 +27,8 @@ def min_cuts(
 
     Where it is not, and C is a single vertex, that vertex lies in no set below `enough` without the
     sink, and counts as the sink from then on (as in Padberg & Rinaldi 1990): flows become short.
+    Clusters come in the order of their distance to the sink, in edges: most are then beside one
+    that counts as it.
 
     Returns (k, n) flags of the sets found, the cluster and the value of each. A source joined to
     each vertex of C without limit makes it one maximum flow; it ends as soon as the flow is enough.
@@ -68,7 +70,25 @@ def min_cuts(
     found = 0
     is_sink = np.zeros(n + 1, dtype=np.bool_)
     is_sink[sink] = True
-    for c in wanted:
+    # breadth first from the sink
+    level[:] = n + 1
+    level[sink], queue[0] = 0, sink
+    low, high = 0, 1
+    while low < high:
+        v = queue[low]
+        low += 1
+        a = first[v]
+        while a >= 0:
+            w = to[a]
+            if w < n and level[w] > n:
+                level[w] = level[v] + 1
+                queue[high] = w
+                high += 1
+            a = following[a]
+    far = np.full(cluster.max() + 1, n + 1)
+    for v in range(n):
+        far[cluster[v]] = min(far[cluster[v]], level[v])
+    for c in wanted[np.argsort(far[wanted], kind="mergesort")]:
         for e in range(edges):
             rest[2 * e] = rest[2 * e + 1] = capacity[e]
         for v in range(n):
