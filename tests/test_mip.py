@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import psutil
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from netsp import solve_graph, travel_graph
@@ -19,6 +19,7 @@ from netsp.mip import solve as mip
 from netsp.mip.bound import exact_bound
 from netsp.mip.cbc_program import CbcRelaxation
 from netsp.mip.cuts import Cut
+from netsp.mip.flows import min_cuts
 from netsp.mip.highs import HighsRelaxation
 from netsp.mip.overgoals import best_tree
 from netsp.mip.prices import Prices
@@ -220,6 +221,35 @@ def test_where_no_cut_of_whole_clusters_is_found_none_is_violated(seed):
             return
         program.add_cuts(cuts)
     raise AssertionError("no end of cuts")
+
+
+@given(st.integers(0, 100_000), st.integers(3, 12), st.integers(1, 4))
+@settings(max_examples=150, deadline=None)
+def test_goals_joined_by_whole_edges_hide_no_violated_set(seed, goals, mixed):
+    rng = np.random.default_rng(seed)
+    between = np.zeros((goals + 1, goals + 1))
+    for _ in range(mixed):  # each a few cycles through all goals and the base, with weights alike
+        order, at = rng.permutation(goals + 1), 0
+        while at < goals + 1:
+            size = goals + 1 - at if goals + 1 - at < 4 else int(rng.integers(2, goals - at))
+            cycle = order[at : at + size]
+            np.add.at(between, (cycle, np.roll(cycle, -1)), 1.0 / mixed)
+            at += size
+    between += between.T
+    np.fill_diagonal(between, 0.0)
+    legs = np.argwhere(np.triu(between) > 0.0)
+    y = between[legs[:, 0], legs[:, 1]]
+    cluster = np.arange(goals + 1)
+    cuts = goal_cuts(legs, y, cluster)
+    for cut in cuts:
+        assert cut.inside[cut.cluster]
+        assert not cut.inside[0]
+        u, v = cut.inside[legs].T
+        assert y[u ^ v].sum() < 2.0 - 1e-5
+    _, which, _ = min_cuts(
+        goals + 1, legs[:, 0], legs[:, 1], y, cluster, 0, np.arange(1, goals + 1), 2.0 - 1e-4
+    )
+    assert bool(cuts) == bool(len(which))
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -12,6 +12,39 @@ TINY = 1e-11
 
 
 @kernel
+def joined(n: int, tail: Ints, head: Ints, capacity: Floats, sink: int) -> Ints:
+    """(n,) what each vertex is part of: two are joined by an edge that is no less than all others
+    of either together. A set that has one of them is cut no more with the other as well."""
+    degree = np.zeros(n)
+    for e in range(len(tail)):
+        degree[tail[e]] += capacity[e]
+        degree[head[e]] += capacity[e]
+    parent = np.arange(n)
+    for e in range(len(tail)):
+        u, v = tail[e], head[e]
+        if sink in (u, v) or 2.0 * capacity[e] < (1.0 - TINY) * max(degree[u], degree[v]):
+            continue
+        while parent[u] != u:
+            parent[u] = parent[parent[u]]
+            u = parent[u]
+        while parent[v] != v:
+            parent[v] = parent[parent[v]]
+            v = parent[v]
+        parent[max(u, v)] = min(u, v)
+    out, count = np.empty(n, dtype=np.int64), 0
+    for v in range(n):
+        if parent[v] == v:
+            out[v] = count
+            count += 1
+        else:
+            u = parent[v]
+            while parent[u] != u:
+                u = parent[u]
+            out[v] = out[u]
+    return out
+
+
+@kernel
 def min_cuts(
     n: int,
     tail: Ints,
@@ -25,10 +58,11 @@ def min_cuts(
     """For every wanted cluster C the vertex set S of least ``capacity(δ(S))`` with all of C and
     without the sink, if that is below `enough`.
 
-    Where it is not, and C is a single vertex, that vertex lies in no set below `enough` without the
-    sink, and counts as the sink from then on (as in Padberg & Rinaldi 1990): flows become short.
-    Clusters come in the order of their distance to the sink, in edges: most are then beside one
-    that counts as it.
+    Two vertices are one where no set is cut more for having both (`joined`), and clusters that lie
+    in one such vertex are asked for once. Where the value is not below `enough`, and C lies in one,
+    that is in no set below `enough` without the sink, and counts as the sink from then on (as in
+    Padberg & Rinaldi 1990): flows become short. Clusters come in the order of their distance to the
+    sink, in edges: most are then beside one that counts as it.
 
     Returns (k, n) flags of the sets found, the cluster and the value of each. A source joined to
     each vertex of C without limit makes it one maximum flow; it ends as soon as the flow is enough.
@@ -40,6 +74,10 @@ def min_cuts(
     tail, head, capacity
         Undirected edges.
     """
+    vertices, node = n, joined(n, tail, head, capacity, sink)
+    n, sink = node.max() + 1, node[sink]
+    between = node[tail] != node[head]
+    tail, head, capacity = node[tail[between]], node[head[between]], capacity[between]
     edges = len(tail)
     arcs = 2 * edges + 2 * n
     # arc 2 e and 2 e + 1 are the two senses of edge e, then come source -> v and back
@@ -64,7 +102,7 @@ def min_cuts(
     queue = np.empty(n + 1, dtype=np.int64)
     at = np.empty(n + 1, dtype=np.int64)
     path = np.empty(n + 2, dtype=np.int64)
-    inside = np.zeros((len(wanted), n), dtype=np.bool_)
+    inside = np.zeros((len(wanted), vertices), dtype=np.bool_)
     which = np.empty(len(wanted), dtype=np.int64)
     value = np.empty(len(wanted))
     found = 0
@@ -86,15 +124,23 @@ def min_cuts(
                 high += 1
             a = following[a]
     far = np.full(cluster.max() + 1, n + 1)
-    for v in range(n):
-        far[cluster[v]] = min(far[cluster[v]], level[v])
+    for v in range(vertices):
+        far[cluster[v]] = min(far[cluster[v]], level[node[v]])
+    met = np.zeros(n, dtype=np.bool_)
     for c in wanted[np.argsort(far[wanted], kind="mergesort")]:
         for e in range(edges):
             rest[2 * e] = rest[2 * e + 1] = capacity[e]
-        for v in range(n):
-            a = 2 * edges + 2 * v
-            rest[a] = np.inf if cluster[v] == c else 0.0
-            rest[a + 1] = 0.0
+        rest[2 * edges :] = 0.0
+        last, alone = -1, True
+        for v in range(vertices):
+            if cluster[v] == c:
+                rest[2 * edges + 2 * node[v]] = np.inf
+                alone = alone and last in (-1, node[v])
+                last = node[v]
+        if alone:
+            if met[last]:
+                continue
+            met[last] = True
         flow = 0.0
         while flow < enough:
             for v in range(n + 1):
@@ -157,19 +203,14 @@ def min_cuts(
                     depth -= 1
                     v = to[path[depth] ^ 1]
         if flow >= enough:
-            last, count = -1, 0
-            for v in range(n):
-                if cluster[v] == c:
-                    last = v
-                    count += 1
-            if count == 1:
+            if alone:
                 is_sink[last] = True
             continue
         # level marks what the source still reaches
         some = False
-        for v in range(n):
-            inside[found, v] = level[v] >= 0
-            some = some or level[v] >= 0
+        for v in range(vertices):
+            inside[found, v] = level[node[v]] >= 0
+            some = some or inside[found, v]
         if some:
             which[found], value[found] = c, flow
             found += 1
