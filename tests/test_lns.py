@@ -48,11 +48,10 @@ def test_whatever_is_taken_out_and_put_back_the_tables_are_those_of_the_tour(see
     state = (after, prior, i.start, i.costs, ahead, behind, grown, rest, row)
     for c in rng.permutation(np.arange(1, goals + 1)).tolist():
         length += take_out(c, *state)
-        if goals > 1:
-            _same_tables(i, links)
+        _same_tables(i, links)
         p, longer = best_place(
-            c, after, prior, i.start, i.costs, i.cluster_costs, *i.beside, i.before, ahead, behind,
-            rest, np.empty(goals + 1, dtype=np.int64), 0.0, seeded(rng),
+            c, after, prior, i.start, i.costs, i.cluster_costs, i.near, *i.beside, i.before, ahead,
+            behind, rest, np.empty(goals + 1, dtype=np.int64), 0.0, seeded(rng),
         )  # fmt: skip
         assert put(c, p, *state) == pytest.approx(longer, abs=1e-9)
         length += longer
@@ -62,25 +61,47 @@ def test_whatever_is_taken_out_and_put_back_the_tables_are_those_of_the_tour(see
         assert length == pytest.approx(best_classes(order[1:], i.start, i.costs)[0], abs=1e-9)
 
 
-@given(st.integers(0, 10_000), st.integers(2, 9), COSTS_OF_LEGS)
-@settings(max_examples=60, deadline=None)
-def test_a_cluster_is_put_where_it_lengthens_the_tour_least(seed, goals, places):
+@given(st.integers(0, 10_000), st.integers(2, 9), COSTS_OF_LEGS, st.booleans())
+@settings(max_examples=100, deadline=None)
+def test_a_cluster_is_put_where_it_lengthens_the_tour_least(seed, goals, places, ordered):
     rng = np.random.default_rng(seed)
     i = _random_instance(rng, goals, places)
     order = np.concatenate([[0], 1 + rng.permutation(goals)])
-    c, left = int(order[-1]), order[:-1]
+    if ordered:
+        i.before = _some_precedences(rng, order)
+    c = int(rng.choice(order[1:]))
+    left = order[order != c]
     links = no_links(goals + 1, i.largest)
     length = link(left, links, i.start, i.costs, np.empty(i.largest))
     after, prior, ahead, behind, _, rest = links
-    _, longer = best_place(
-        c, after, prior, i.start, i.costs, i.cluster_costs, *i.beside, i.before, ahead, behind,
-        rest, np.empty(goals + 1, dtype=np.int64), 0.0, seeded(rng),
+    p, longer = best_place(
+        c, after, prior, i.start, i.costs, i.cluster_costs, i.near, *i.beside, i.before, ahead,
+        behind, rest, np.empty(goals + 1, dtype=np.int64), 0.0, seeded(rng),
     )  # fmt: skip
-    each = [
-        best_classes(np.insert(left, k, c)[1:], i.start, i.costs)[0]
-        for k in range(1, len(left) + 1)
-    ]
-    assert length + longer == pytest.approx(min(each), abs=1e-9)
+    each = [np.insert(left, k, c) for k in range(1, len(left) + 1)]
+    kept = [o for o in each if _keeps(o, i.before)]
+    best = min(best_classes(o[1:], i.start, i.costs)[0] for o in kept)
+    assert length + longer == pytest.approx(best, abs=1e-9)
+    assert _keeps(np.insert(left, int(np.flatnonzero(left == p)[0]) + 1, c), i.before)
+
+
+@given(st.integers(0, 10_000), st.integers(4, 14), COSTS_OF_LEGS)
+@settings(max_examples=40, deadline=None)
+def test_no_move_breaks_a_precedence(seed, goals, places):
+    rng = np.random.default_rng(seed)
+    i = _random_instance(rng, goals, places)
+    order = np.concatenate([[0], 1 + rng.permutation(goals)])
+    i.before = _some_precedences(rng, order)
+    links, tables, stop = no_links(goals + 1, i.largest), _tables(i), np.zeros(1, dtype=np.int64)
+    length = link(order, links, i.start, i.costs, np.empty(i.largest))
+    best, chance = order.copy(), seeded(rng)
+    ruin_and_recreate(order, best, length, length, 100, 100.0, tables, links, chance)
+    assert _keeps(order, i.before)
+    assert _keeps(best, i.before)
+    descend(order, tables, links, chance, stop)
+    assert _keeps(order, i.before)
+    two_opt(order, tables, stop)
+    assert _keeps(order, i.before)
 
 
 @given(st.integers(0, 10_000), st.integers(4, 14), COSTS_OF_LEGS)
@@ -129,8 +150,25 @@ def _random_instance(rng, goals, places):
     return Instance(cluster, np.hypot(*(where[:, None] - where[None]).T))
 
 
+def _some_precedences(rng, order):
+    """Of what an order keeps some, closed transitively."""
+    n = len(order)
+    place = np.argsort(order)
+    before = (rng.random((n, n)) < 0.15) & (place[:, None] < place[None])
+    before[0] = before[:, 0] = False
+    for k in range(n):
+        before |= before[:, k, None] & before[k]
+    return before
+
+
+def _keeps(order, before):
+    """Whether no goal comes after one that it must come before."""
+    place = np.argsort(order)
+    return not len(before) or not (before & (place[:, None] > place[None])).any()
+
+
 def _tables(i):
-    return Tables(i.start, i.costs, i.cluster_costs, *i.beside, i.rank, i.before)
+    return Tables(i.start, i.costs, i.cluster_costs, i.near, *i.beside, i.rank, i.before)
 
 
 def _same_tables(i, links):

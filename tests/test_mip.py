@@ -19,7 +19,7 @@ from netsp.mip import solve as mip
 from netsp.mip.bound import exact_bound
 from netsp.mip.cbc_program import CbcRelaxation
 from netsp.mip.cuts import Cut
-from netsp.mip.flows import min_cuts
+from netsp.mip.flows import joined
 from netsp.mip.highs import HighsRelaxation
 from netsp.mip.overgoals import best_tree
 from netsp.mip.prices import Prices
@@ -246,10 +246,19 @@ def test_goals_joined_by_whole_edges_hide_no_violated_set(seed, goals, mixed):
         assert not cut.inside[0]
         u, v = cut.inside[legs].T
         assert y[u ^ v].sum() < 2.0 - 1e-5
-    _, which, _ = min_cuts(
-        goals + 1, legs[:, 0], legs[:, 1], y, cluster, 0, np.arange(1, goals + 1), 2.0 - 1e-4
-    )
-    assert bool(cuts) == bool(len(which))
+    sets = np.array(list(itertools.product([False, True], repeat=goals)), dtype=bool)[1:]
+    sets = np.hstack([np.zeros((len(sets), 1), dtype=bool), sets])
+    least = ((sets[:, legs[:, 0]] ^ sets[:, legs[:, 1]]) @ y).min()
+    assert bool(cuts) == (least < 2.0 - VIOLATION)
+
+
+def test_strings_of_whole_edges_are_joined_and_the_base_to_nothing():
+    tail, head = np.array([0, 1, 2, 3, 4, 5]), np.array([1, 2, 3, 4, 5, 0])
+    capacity = np.array([1.0, 1.0, 1.0, 0.5, 1.0, 1.0])
+    assert joined(6, tail, head, capacity, 0).tolist() == [0, 1, 1, 1, 2, 2]
+    # 0.5 is all that others of either carry, but not of both
+    pair = joined(4, np.array([0, 1, 2, 1]), np.array([1, 2, 3, 3]), np.full(4, 0.5), 0)
+    assert pair.tolist() == [0, 1, 2, 2]
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -20,7 +20,7 @@ def descend(
 ) -> float:
     """Take every cluster out and put it back where it costs least, until nothing improves; returns
     the length. ``links`` are those of the order, before and after."""
-    start, costs, nearest, first, beside, _, before = tables
+    start, costs, nearest, near, first, beside, _, before = tables
     after, prior, ahead, behind, grown, rest = links
     n = len(order)
     row, place = np.empty(ahead.shape[1]), np.empty(n, dtype=np.int64)
@@ -34,7 +34,7 @@ def descend(
             was = prior[c]
             d = take_out(c, after, prior, start, costs, ahead, behind, grown, rest, row)
             p, more = best_place(
-                c, after, prior, start, costs, nearest, first, beside, before, ahead, behind,
+                c, after, prior, start, costs, nearest, near, first, beside, before, ahead, behind,
                 rest, place, 0.0, chance,
             )  # fmt: skip
             if d + more < -SHORTER * length:

@@ -10,7 +10,7 @@ what cluster c costs between them, every class of every other goal chosen anew.
 
 Both tables are known up to a constant for each cluster only, so a change is written down as far as
 it changes which classes are best, and no farther: seldom more than a few clusters, however long the
-tour is.
+tour is. Legs are the same in either sense.
 """
 
 from __future__ import annotations
@@ -30,14 +30,15 @@ EVEN = 1e-13
 
 class Tables(NamedTuple):
     """Of an instance: where the vertices of each cluster begin; legs; least legs between clusters
-    (m + 1, m + 1); next to which clusters each is put, those of c from first[c] to first[c + 1];
-    the nearest clusters of each (m + 1, k), nearest first; which clusters come before which, (0, 0)
-    for none. The kernels that are called most take what they need of it one by one: handing a tuple
-    of arrays on costs them more than the work."""
+    (m + 1, m + 1); whether a cluster is put next to another, and for each cluster c to which, from
+    first[c] to first[c + 1] of ``beside``; the nearest clusters of each (m + 1, k), nearest first;
+    which clusters come before which, (0, 0) for none. The kernels that are called most take what
+    they need of it one by one: handing a tuple of arrays on costs them more than the work."""
 
     start: Ints
     costs: Floats
     nearest: Floats
+    near: Bools
     first: Ints
     beside: Ints
     rank: Ints
@@ -226,14 +227,15 @@ def between(
 
 @kernel
 def best_place(
-    c: int, after: Ints, prior: Ints, start: Ints, costs: Floats, nearest: Floats, first: Ints,
-    beside: Ints, before: Bools, ahead: Floats, behind: Floats, rest: Floats, place: Ints,
-    blink: float, chance: npt.NDArray[np.uint64],
+    c: int, after: Ints, prior: Ints, start: Ints, costs: Floats, nearest: Floats, near: Bools,
+    first: Ints, beside: Ints, before: Bools, ahead: Floats, behind: Floats, rest: Floats,
+    place: Ints, blink: float, chance: npt.NDArray[np.uint64],
 ) -> tuple[int, float]:  # fmt: skip
-    """After which cluster c costs least, next to one of its near clusters or the base, and between
-    those that come before and after it, and by how much the tour becomes longer. With precedences
-    closed transitively there is such a place, whatever is still to be put back. A place is
-    overlooked with the chance `blink`; `place` is room for the places of clusters in the order."""
+    """After which cluster c costs least, and by how much the tour becomes longer: next to one of
+    its near clusters, or at either end of the stretch between those that come before and after it,
+    without precedences the base. With precedences closed transitively there is such a stretch,
+    whatever is still to be put back. Other places than its ends are overlooked with the chance
+    `blink`; `place` is room for the places of clusters in the order."""
     low, high = 0, prior[0]
     if len(before) > 0:
         x, k = after[0], 1
@@ -256,6 +258,10 @@ def best_place(
             continue
         if k % 2 == 1:
             p = prior[p]
+            if near[c, p]:
+                continue  # the place after that one
+        if p in (low, high):
+            continue
         if len(before) > 0 and not place[low] <= place[p] <= place[high]:
             continue
         if blink > 0.0 and uniform(chance) < blink:

@@ -41,8 +41,8 @@ def ruin_and_recreate(
     """Make `count` rounds at temperature θ, in place; returns the lengths of the present order and
     of the best, which is kept in `best`. ``links`` are those of the present order, before and
     after; they are never filled afresh in between, so that nothing depends on how rounds are
-    counted out."""
-    start, costs, nearest, first, beside, rank, before = tables
+    counted out. A round that is not accepted is undone by a copy of them."""
+    start, costs, nearest, near, first, beside, rank, before = tables
     n = len(order)
     after, prior, ahead, behind = (
         links.after.copy(), links.prior.copy(), links.ahead.copy(), links.behind.copy()
@@ -109,7 +109,7 @@ def ruin_and_recreate(
             gone[k + 1], key[k + 1] = c, x
         for r in range(removed):
             p, _ = best_place(
-                gone[r], after, prior, start, costs, nearest, first, beside, before, ahead,
+                gone[r], after, prior, start, costs, nearest, near, first, beside, before, ahead,
                 behind, rest, place, BLINK, chance,
             )  # fmt: skip
             d += put(gone[r], p, after, prior, start, costs, ahead, behind, grown, rest, row)

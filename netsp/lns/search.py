@@ -102,7 +102,7 @@ class Search:
     @property
     def _tables(self) -> Tables:
         i = self.instance
-        return Tables(i.start, i.costs, i.cluster_costs, *i.beside, i.rank, i.before)
+        return Tables(i.start, i.costs, i.cluster_costs, i.near, *i.beside, i.rank, i.before)
 
     def _link(self) -> None:
         """Links of the present order."""

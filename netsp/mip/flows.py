@@ -10,11 +10,15 @@ from netsp.compiled.kernel import kernel
 TINY = 1e-11
 """Residual capacity that counts as none."""
 
+ALIKE = 1e-11
+"""Share of a capacity up to which two are the same."""
+
 
 @kernel
 def joined(n: int, tail: Ints, head: Ints, capacity: Floats, sink: int) -> Ints:
     """(n,) what each vertex is part of: two are joined by an edge that is no less than all others
-    of either together. A set that has one of them is cut no more with the other as well."""
+    of either together. A set that has one of them is cut no more with the other as well. The sink,
+    which no set may have, is joined to nothing."""
     degree = np.zeros(n)
     for e in range(len(tail)):
         degree[tail[e]] += capacity[e]
@@ -22,7 +26,7 @@ def joined(n: int, tail: Ints, head: Ints, capacity: Floats, sink: int) -> Ints:
     parent = np.arange(n)
     for e in range(len(tail)):
         u, v = tail[e], head[e]
-        if sink in (u, v) or 2.0 * capacity[e] < (1.0 - TINY) * max(degree[u], degree[v]):
+        if sink in (u, v) or 2.0 * capacity[e] < (1.0 - ALIKE) * max(degree[u], degree[v]):
             continue
         while parent[u] != u:
             parent[u] = parent[parent[u]]
@@ -58,14 +62,15 @@ def min_cuts(
     """For every wanted cluster C the vertex set S of least ``capacity(δ(S))`` with all of C and
     without the sink, if that is below `enough`.
 
-    Two vertices are one where no set is cut more for having both (`joined`), and clusters that lie
-    in one such vertex are asked for once. Where the value is not below `enough`, and C lies in one,
-    that is in no set below `enough` without the sink, and counts as the sink from then on (as in
-    Padberg & Rinaldi 1990): flows become short. Clusters come in the order of their distance to the
-    sink, in edges: most are then beside one that counts as it.
+    Vertices that no set is cut more for having together count as one (`joined`), and clusters that
+    lie within the same one are asked for once. Where the value is not below `enough` and C lies
+    within one, that one is in no set below `enough` without the sink, and counts as the sink from
+    then on (as in Padberg & Rinaldi 1990): flows become short. Clusters come in the order of their
+    distance to the sink, in edges: most are then beside one that counts as it.
 
-    Returns (k, n) flags of the sets found, the cluster and the value of each. A source joined to
-    each vertex of C without limit makes it one maximum flow; it ends as soon as the flow is enough.
+    Returns (k, n) flags of the vertices in the sets found, the cluster and the value of each. A
+    source joined to each vertex of C without limit makes it one maximum flow; it ends as soon as
+    the flow is enough.
 
     Parameters
     ----------
@@ -74,14 +79,14 @@ def min_cuts(
     tail, head, capacity
         Undirected edges.
     """
-    vertices, node = n, joined(n, tail, head, capacity, sink)
-    n, sink = node.max() + 1, node[sink]
-    between = node[tail] != node[head]
-    tail, head, capacity = node[tail[between]], node[head[between]], capacity[between]
+    node = joined(n, tail, head, capacity, sink)
+    nodes, sink = node.max() + 1, node[sink]
+    crossing = node[tail] != node[head]
+    tail, head, capacity = node[tail[crossing]], node[head[crossing]], capacity[crossing]
     edges = len(tail)
-    arcs = 2 * edges + 2 * n
+    arcs = 2 * edges + 2 * nodes
     # arc 2 e and 2 e + 1 are the two senses of edge e, then come source -> v and back
-    first = np.full(n + 1, -1, dtype=np.int64)
+    first = np.full(nodes + 1, -1, dtype=np.int64)
     following = np.empty(arcs, dtype=np.int64)
     to = np.empty(arcs, dtype=np.int64)
     rest = np.empty(arcs)
@@ -91,25 +96,25 @@ def min_cuts(
         first[tail[e]] = 2 * e
         following[2 * e + 1] = first[head[e]]
         first[head[e]] = 2 * e + 1
-    for v in range(n):
+    for v in range(nodes):
         a = 2 * edges + 2 * v
-        to[a], to[a + 1] = v, n
-        following[a] = first[n]
-        first[n] = a
+        to[a], to[a + 1] = v, nodes
+        following[a] = first[nodes]
+        first[nodes] = a
         following[a + 1] = first[v]
         first[v] = a + 1
-    level = np.empty(n + 1, dtype=np.int64)
-    queue = np.empty(n + 1, dtype=np.int64)
-    at = np.empty(n + 1, dtype=np.int64)
-    path = np.empty(n + 2, dtype=np.int64)
-    inside = np.zeros((len(wanted), vertices), dtype=np.bool_)
+    level = np.empty(nodes + 1, dtype=np.int64)
+    queue = np.empty(nodes + 1, dtype=np.int64)
+    at = np.empty(nodes + 1, dtype=np.int64)
+    path = np.empty(nodes + 2, dtype=np.int64)
+    inside = np.zeros((len(wanted), n), dtype=np.bool_)
     which = np.empty(len(wanted), dtype=np.int64)
     value = np.empty(len(wanted))
     found = 0
-    is_sink = np.zeros(n + 1, dtype=np.bool_)
+    is_sink = np.zeros(nodes + 1, dtype=np.bool_)
     is_sink[sink] = True
     # breadth first from the sink
-    level[:] = n + 1
+    level[:] = nodes + 1
     level[sink], queue[0] = 0, sink
     low, high = 0, 1
     while low < high:
@@ -118,37 +123,36 @@ def min_cuts(
         a = first[v]
         while a >= 0:
             w = to[a]
-            if w < n and level[w] > n:
+            if w < nodes and level[w] > nodes:
                 level[w] = level[v] + 1
                 queue[high] = w
                 high += 1
             a = following[a]
-    far = np.full(cluster.max() + 1, n + 1)
-    for v in range(vertices):
+    far = np.full(max(cluster.max(), wanted.max() if len(wanted) else 0) + 1, nodes + 1)
+    for v in range(n):
         far[cluster[v]] = min(far[cluster[v]], level[node[v]])
-    met = np.zeros(n, dtype=np.bool_)
+    met = np.zeros(nodes, dtype=np.bool_)
     for c in wanted[np.argsort(far[wanted], kind="mergesort")]:
-        for e in range(edges):
-            rest[2 * e] = rest[2 * e + 1] = capacity[e]
         rest[2 * edges :] = 0.0
-        last, alone = -1, True
-        for v in range(vertices):
+        last, in_one = -1, True
+        for v in range(n):
             if cluster[v] == c:
                 rest[2 * edges + 2 * node[v]] = np.inf
-                alone = alone and last in (-1, node[v])
+                in_one = in_one and last in (-1, node[v])
                 last = node[v]
-        if alone:
-            if met[last]:
-                continue
-            met[last] = True
+        if last < 0 or (in_one and met[last]):
+            continue
+        met[last] = met[last] or in_one
+        for e in range(edges):
+            rest[2 * e] = rest[2 * e + 1] = capacity[e]
         flow = 0.0
         while flow < enough:
-            for v in range(n + 1):
+            for v in range(nodes + 1):
                 level[v] = -1
-            level[n] = 0
-            queue[0] = n
+            level[nodes] = 0
+            queue[0] = nodes
             low, high = 0, 1
-            reached = n + 1
+            reached = nodes + 1
             while low < high:
                 v = queue[low]
                 low += 1
@@ -164,12 +168,12 @@ def min_cuts(
                         if is_sink[w]:
                             reached = level[w]
                     a = following[a]
-            if reached > n:
+            if reached > nodes:
                 break
-            for v in range(n + 1):
+            for v in range(nodes + 1):
                 at[v] = first[v]
             depth = 0
-            v = n
+            v = nodes
             while True:
                 if is_sink[v]:
                     push = np.inf
@@ -203,12 +207,12 @@ def min_cuts(
                     depth -= 1
                     v = to[path[depth] ^ 1]
         if flow >= enough:
-            if alone:
+            if in_one:
                 is_sink[last] = True
             continue
         # level marks what the source still reaches
         some = False
-        for v in range(vertices):
+        for v in range(n):
             inside[found, v] = level[node[v]] >= 0
             some = some or inside[found, v]
         if some:

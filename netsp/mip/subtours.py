@@ -3,7 +3,7 @@
 At integer points by sight: the components of the support. At fractional points by components, too,
 by minimum cuts among the clusters, by the branches of the cover (for every prefix of a word, the
 vertices whose word begins with it: sets that belong together in space and need no search) and by
-minimum cuts among the vertices, one for every cluster, which find a violated cut if there is one.
+minimum cuts among the vertices, which find a violated cut for a cluster if there is one.
 """
 
 from __future__ import annotations
@@ -92,8 +92,9 @@ def strongest_cut(
 
 
 def goal_cuts(legs: Ints, y: Floats, cluster: Ints) -> list[Cut]:
-    """Violated cuts of sets of whole clusters: those of least crossing, one for each cluster. They
-    say nothing of classes, so that no other class of a goal gets round them."""
+    """Violated cuts of sets of whole clusters: those of least crossing, one for each cluster, or
+    for some that no set is crossed more for having together. They say nothing of classes, so that
+    no other class of a goal gets round them."""
     between = shrunk(legs, y, cluster)
     tail, head = np.nonzero(np.triu(between))
     goals = np.arange(1, len(between))

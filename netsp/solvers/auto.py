@@ -45,9 +45,10 @@ FEW_GOALS = 24
 """Most goals for which walks come first: with more, remembering them costs more than cuts do."""
 
 LEAST_ROUNDS, ROUNDS_PER_GOAL, ROUNDS_PER_PAIR, MOST_PER_GOAL = 500, 40, 1.0, 100
-"""Rounds of ruin and recreate before and after the root: for each goal so many, or for each two
-goals if that is more, but no more for each goal than the last: another turn, among classes beside a
-better tour, is worth more. With 500 goals, 40 rounds for each end 1 % above what 100 and 240 do."""
+"""Rounds of ruin and recreate before and after the root: at least the first; for each goal the
+second, or for each pair of goals the third if that is more, up to the last for each goal. With 500
+goals, 40 for each goal end with tours 1 % longer than 100 or 240 do; another turn, among classes
+beside a better tour, is worth more."""
 
 FEW_CLASSES = 3
 """Of a goal, where the roadmap had to leave classes out: a tour over them comes first."""
