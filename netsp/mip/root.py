@@ -134,7 +134,7 @@ class Root:
         # goals' own, whatever the classes
         self.lp.add_cuts(goals_cuts, for_good=True)
         self.point: Point | None = None
-        self._objective = 0.0
+        self._objective, self._reached = 0.0, 0.0
 
     # the incumbent among the vertices left
 
@@ -173,7 +173,9 @@ class Root:
             cuts = self.separate(point)
             patience = PATIENCE if self.costs.exact is not None else MEASURED_PATIENCE
             patience = patience if self.patience is None else self.patience
-            stalled = pace.stalled(run.length - (run.bound or 0.0), patience)
+            # over what is new to it a cover has to come back to the bound of the one below first
+            reached = (run.bound or 0.0) if self.patience is None else self._reached
+            stalled = pace.stalled(run.length - reached, patience)
             if not priced and (stalled or not cuts):
                 return
             self.purge(point, risen=risen)
@@ -304,6 +306,7 @@ class Root:
         # a tour with a dead leg is no shorter than the cutoff
         if self.best is None or prices.bound > (run.bound or 0.0):
             self.best = Best(self.costs.vertices.copy(), tuple(self.lp.cuts), point.duals)
+        self._reached = max(self._reached, prices.bound)
         run.raise_bound(min(prices.bound, run.cutoff))
         if run.done:
             return False

@@ -136,9 +136,7 @@ def _beyond(graph: TravelGraph, limits: Limits) -> Result:
         share = run.clock.part(BOUND_SHARE) if run.clock.limit else run.clock
         run.raise_bound(_bound_by_goals(graph, Limits(share, rng=limits.rng), run.tour, told))
         run.report("goals")
-        while run.clock.limit and limits.iterations is None and not run.done:
-            run.check()
-            run.search_beside()
+        run.search_on()
     return run.finish("proven" if run.done else "open")
 
 

@@ -114,6 +114,13 @@ class SearchingRun(SolverRun):
             )  # fmt: skip
         return core
 
+    def search_on(self) -> None:
+        """Search beside the best tour until the time is up; not at all if it is not limited, or
+        iterations are."""
+        while self.clock.limit and self.iteration_limit == np.inf and not self.done:
+            self.check()
+            self.search_beside()
+
     @contextmanager
     def core(self) -> Iterator[Self | None]:
         """A run like this one over the classes of least tether, and those beside the best tour if
