@@ -244,6 +244,29 @@ def test_covers_in_between_prove_the_same(seed, most, monkeypatch):
     assert fewer.length == pytest.approx(whole.length, rel=2e-6)
 
 
+@pytest.mark.parametrize("limits", [{"time_limit": 3.0}, {"iteration_limit": 3000}])
+def test_beyond_reach_of_the_program_over_all_classes_the_time_left_is_for_the_search(
+    limits, monkeypatch
+):
+    problem = random_world(0, goals=14, tether_length=320.0)
+    whole = solve(travel_graph(problem))
+    monkeypatch.setattr("netsp.mip.covers.MOST_CELLS", 16)
+    monkeypatch.setattr("netsp.solving.searching.MEASURE_AT_ONCE", 50)
+    monkeypatch.setattr(sys.modules["netsp.mip.solve"], "MANY_GOALS", 5)
+    monkeypatch.setattr(sys.modules["netsp.mip.solve"], "OUT_OF_REACH", 0.0)
+    for module in ("netsp.mip.solve", "netsp.mip.overgoals"):
+        monkeypatch.setattr(sys.modules[module], "MANY_CLASSES", 50)
+    graph = travel_graph(problem)
+    found = solve_graph(graph, "mip", **limits)
+    assert graph.is_tour(found.tour)
+    assert found.lower_bound <= whole.length * (1.0 + 1e-6)
+    assert found.length >= whole.length * (1.0 - 1e-6)
+    stages = [r.stage for r in found.trace]
+    assert "covers" in stages
+    # without a limit of time there would be no end of a search
+    assert ("root" in stages) == ("iteration_limit" in limits)
+
+
 @pytest.mark.parametrize("seed", range(2))
 def test_with_too_many_classes_for_a_matrix_covers_bound_the_tour(seed, monkeypatch):
     problem = random_world(seed, goals=26, tether_length=300.0)
