@@ -212,6 +212,7 @@ GRID = st.tuples(st.integers(3, 11), st.integers(-3, 6))
 
 
 @given(st.lists(st.one_of(GRID, st.tuples(st.floats(3, 11), st.floats(-3, 6))), max_size=9))
+@example([(3, 0), (3.0, 2.2e-311), (3, 1), (4, 0)])
 def test_a_line_has_a_loop_exactly_if_one_of_its_steps_closes_one(corners):
     line = np.array(corners, dtype=float).reshape(-1, 2)
     closing = [closed_by(SITE, line[: j + 1], line[j : j + 2]) for j in range(len(line) - 1)]

@@ -116,7 +116,8 @@ def _crossings(line: Floats, step: Floats) -> list[tuple[int, Floats]]:
     a, d = line[:-1], np.diff(line, axis=0)
     p, e = step[0], step[1] - step[0]
     cross = d[:, 0] * e[1] - d[:, 1] * e[0]
-    with np.errstate(divide="ignore", invalid="ignore"):
+    # what is next to parallel may overflow; it is no hit
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         s = ((p - a)[:, 0] * e[1] - (p - a)[:, 1] * e[0]) / cross
         t = ((p - a)[:, 0] * d[:, 1] - (p - a)[:, 1] * d[:, 0]) / cross
     hits = (np.abs(cross) > 1e-15) & (s >= 0.0) & (s <= 1.0) & (t >= 0.0) & (t <= 1.0)
