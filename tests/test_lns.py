@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from netsp.compiled.chance import seeded
 from netsp.lns.descent import descend, two_opt
 from netsp.lns.layers import Instance, best_classes
-from netsp.lns.links import Tables, best_place, link, no_links, put, take_out, written
+from netsp.lns.links import Tables, best_place, link, no_links, put, take_out, write_order
 from netsp.lns.ruin import ruin_and_recreate
 from netsp.lns.solve import Params, solve
 from netsp.solving.limits import Limits
@@ -31,16 +31,14 @@ def test_every_restart_has_its_share_of_time_or_rounds(how):
     assert all(stages[k + 1] == "search" for k in began)
 
 
-COSTS_OF_LEGS = st.sampled_from([1, 5, 1000])
+PLACES = st.sampled_from([1, 5, 1000])
 """Few places for many vertices: ties."""
 
 
-@given(st.integers(0, 10_000), st.integers(1, 14), COSTS_OF_LEGS)
+@given(st.integers(0, 10_000), st.integers(1, 14), PLACES)
 @settings(max_examples=60, deadline=None)
 def test_whatever_is_taken_out_and_put_back_the_tables_are_those_of_the_tour(seed, goals, places):
-    rng = np.random.default_rng(seed)
-    i = _random_instance(rng, goals, places)
-    order = np.concatenate([[0], 1 + rng.permutation(goals)])
+    rng, i, order = _begun(seed, goals, places)
     links, row = no_links(goals + 1, i.largest), np.empty(i.largest)
     length = link(order, links, i.start, i.costs, row)
     assert length == pytest.approx(best_classes(order[1:], i.start, i.costs)[0], abs=1e-9)
@@ -55,18 +53,16 @@ def test_whatever_is_taken_out_and_put_back_the_tables_are_those_of_the_tour(see
         )  # fmt: skip
         assert put(c, p, *state) == pytest.approx(longer, abs=1e-9)
         length += longer
-        written(after, order)
+        write_order(after, order)
         assert sorted(order.tolist()) == list(range(goals + 1))
         _same_tables(i, links)
         assert length == pytest.approx(best_classes(order[1:], i.start, i.costs)[0], abs=1e-9)
 
 
-@given(st.integers(0, 10_000), st.integers(2, 9), COSTS_OF_LEGS, st.booleans())
+@given(st.integers(0, 10_000), st.integers(2, 9), PLACES, st.booleans())
 @settings(max_examples=100, deadline=None)
 def test_a_cluster_is_put_where_it_lengthens_the_tour_least(seed, goals, places, ordered):
-    rng = np.random.default_rng(seed)
-    i = _random_instance(rng, goals, places)
-    order = np.concatenate([[0], 1 + rng.permutation(goals)])
+    rng, i, order = _begun(seed, goals, places)
     if ordered:
         i.before = _some_precedences(rng, order)
     c = int(rng.choice(order[1:]))
@@ -85,12 +81,10 @@ def test_a_cluster_is_put_where_it_lengthens_the_tour_least(seed, goals, places,
     assert _keeps(np.insert(left, int(np.flatnonzero(left == p)[0]) + 1, c), i.before)
 
 
-@given(st.integers(0, 10_000), st.integers(4, 14), COSTS_OF_LEGS)
+@given(st.integers(0, 10_000), st.integers(4, 14), PLACES)
 @settings(max_examples=40, deadline=None)
 def test_no_move_breaks_a_precedence(seed, goals, places):
-    rng = np.random.default_rng(seed)
-    i = _random_instance(rng, goals, places)
-    order = np.concatenate([[0], 1 + rng.permutation(goals)])
+    rng, i, order = _begun(seed, goals, places)
     i.before = _some_precedences(rng, order)
     links, tables, stop = no_links(goals + 1, i.largest), _tables(i), np.zeros(1, dtype=np.int64)
     length = link(order, links, i.start, i.costs, np.empty(i.largest))
@@ -104,12 +98,10 @@ def test_no_move_breaks_a_precedence(seed, goals, places):
     assert _keeps(order, i.before)
 
 
-@given(st.integers(0, 10_000), st.integers(4, 14), COSTS_OF_LEGS)
+@given(st.integers(0, 10_000), st.integers(4, 14), PLACES)
 @settings(max_examples=40, deadline=None)
 def test_descent_ends_where_its_links_and_lengths_say_and_no_longer(seed, goals, places):
-    rng = np.random.default_rng(seed)
-    i = _random_instance(rng, goals, places)
-    order = np.concatenate([[0], 1 + rng.permutation(goals)])
+    rng, i, order = _begun(seed, goals, places)
     links, tables = no_links(goals + 1, i.largest), _tables(i)
     begun = link(order, links, i.start, i.costs, np.empty(i.largest))
     moved = descend(order, tables, links, seeded(rng), np.zeros(1, dtype=np.int64))
@@ -121,7 +113,7 @@ def test_descent_ends_where_its_links_and_lengths_say_and_no_longer(seed, goals,
     assert turned == pytest.approx(best_classes(order[1:], i.start, i.costs)[0], abs=1e-9)
 
 
-@given(st.integers(0, 10_000), st.integers(3, 14), COSTS_OF_LEGS)
+@given(st.integers(0, 10_000), st.integers(3, 14), PLACES)
 @settings(max_examples=60, deadline=None)
 def test_after_rounds_the_tables_are_those_of_the_order_however_they_were_counted_out(
     seed, goals, places
@@ -142,6 +134,13 @@ def test_after_rounds_the_tables_are_those_of_the_order_however_they_were_counte
         assert shortest == pytest.approx(best_classes(best[1:], i.start, i.costs)[0], abs=1e-9)
         found.append((order.tolist(), length, shortest))
     assert found[0] == found[1]
+
+
+def _begun(seed, goals, places):
+    """A generator, an instance and an order."""
+    rng = np.random.default_rng(seed)
+    i = _random_instance(rng, goals, places)
+    return rng, i, np.concatenate([[0], 1 + rng.permutation(goals)])
 
 
 def _random_instance(rng, goals, places):

@@ -8,7 +8,7 @@ import numpy.typing as npt
 from netsp.arrays import Bools, Ints
 from netsp.compiled.kernel import kernel
 from netsp.lns.layers import best_classes
-from netsp.lns.links import Links, Tables, best_place, put, take_out, whole, written
+from netsp.lns.links import Links, Tables, best_place, put, take_out, tour_length, write_order
 
 SHORTER = 1e-9
 """By that part a tour must become shorter for a move to count."""
@@ -24,7 +24,7 @@ def descend(
     after, prior, ahead, behind, grown, rest = links
     n = len(order)
     row, place = np.empty(ahead.shape[1]), np.empty(n, dtype=np.int64)
-    length = whole(after, grown)
+    length = tour_length(after, grown)
     improved = True
     while improved and stop[0] == 0:
         improved = False
@@ -42,8 +42,8 @@ def descend(
             else:
                 p = was
             put(c, p, after, prior, start, costs, ahead, behind, grown, rest, row)
-        length = whole(after, grown)
-    written(after, order)
+        length = tour_length(after, grown)
+    write_order(after, order)
     return length
 
 

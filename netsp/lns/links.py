@@ -66,14 +66,15 @@ def no_links(clusters: int, largest: int) -> Links:
 
 
 @kernel
-def forward(
+def carry_on(
     c: int, sure: int, after: Ints, prior: Ints, start: Ints, costs: Floats, ahead: Floats,
     grown: Floats, row: Floats,
 ) -> float:  # fmt: skip
     """Fill ``ahead`` and ``grown`` from cluster c on, until a cluster after the next `sure` ones
-    has what it had; returns by how much the tour has become longer. What is there already stays
-    where it is within rounding: were it written again and again without those after it, they would
-    drift apart."""
+    has what it had; returns by how much the tour has become longer. With ``after`` and ``prior``
+    exchanged it is ``behind`` and ``rest`` that are filled, towards the base. What is there already
+    stays where it is within rounding: were it written again and again without those after it, they
+    would drift apart."""
     longer = 0.0
     while True:
         p, begin, size = prior[c], start[c], start[c + 1] - start[c]
@@ -105,38 +106,6 @@ def forward(
 
 
 @kernel
-def backward(
-    c: int, sure: int, after: Ints, prior: Ints, start: Ints, costs: Floats, behind: Floats,
-    rest: Floats, row: Floats,
-) -> None:  # fmt: skip
-    """Fill ``behind`` and ``rest`` from cluster c towards the base, as `forward`."""
-    while True:
-        q, begin, size = after[c], start[c], start[c + 1] - start[c]
-        least = np.inf
-        for j in range(size):
-            best = np.inf
-            for i in range(start[q], start[q + 1]):
-                d = behind[q, i - start[q]] + costs[i, begin + j]
-                if d < best:
-                    best = d
-            row[j] = best
-            least = min(least, best)
-        rest[c] = 0.0 if c == q else least
-        if c == 0:
-            return
-        even = sure <= 0
-        for j in range(size):
-            if abs(row[j] - least - behind[c, j]) > EVEN * row[j]:
-                even = False
-        if even:
-            return
-        for j in range(size):
-            behind[c, j] = row[j] - least
-        sure -= 1
-        c = prior[c]
-
-
-@kernel
 def link(order: Ints, links: Links, start: Ints, costs: Floats, row: Floats) -> float:
     """Link clusters in an order, base first, and fill the tables; returns the tour's length."""
     after, prior, ahead, behind, grown, rest = links
@@ -145,13 +114,13 @@ def link(order: Ints, links: Links, start: Ints, costs: Floats, row: Floats) -> 
     grown[:], rest[:] = 0.0, 0.0
     for k in range(n):
         after[order[k]], prior[order[k]] = order[(k + 1) % n], order[k - 1]
-    forward(after[0], n, after, prior, start, costs, ahead, grown, row)
-    backward(prior[0], n, after, prior, start, costs, behind, rest, row)
-    return whole(after, grown)
+    carry_on(after[0], n, after, prior, start, costs, ahead, grown, row)
+    carry_on(prior[0], n, prior, after, start, costs, behind, rest, row)
+    return tour_length(after, grown)
 
 
 @kernel
-def whole(after: Ints, grown: Floats) -> float:
+def tour_length(after: Ints, grown: Floats) -> float:
     """Length of the tour."""
     length, c = grown[0], after[0]
     while c != 0:
@@ -161,7 +130,7 @@ def whole(after: Ints, grown: Floats) -> float:
 
 
 @kernel
-def written(after: Ints, order: Ints) -> None:
+def write_order(after: Ints, order: Ints) -> None:
     """Write the clusters of the tour down in their order, base first."""
     c = 0
     for k in range(len(order)):
@@ -177,8 +146,8 @@ def put(
     """Put cluster c after p; returns by how much the tour has become longer."""
     q = after[p]
     after[p], prior[c], after[c], prior[q] = c, p, q, c
-    backward(c, 1, after, prior, start, costs, behind, rest, row)
-    return float(forward(c, 1, after, prior, start, costs, ahead, grown, row))
+    carry_on(c, 1, prior, after, start, costs, behind, rest, row)
+    return float(carry_on(c, 1, after, prior, start, costs, ahead, grown, row))
 
 
 @kernel
@@ -190,8 +159,8 @@ def take_out(
     p, q, own = prior[c], after[c], grown[c]
     after[p], prior[q], after[c], prior[c] = q, p, -1, -1
     grown[c] = 0.0
-    backward(p, 0, after, prior, start, costs, behind, rest, row)
-    return float(forward(q, 0, after, prior, start, costs, ahead, grown, row) - own)
+    carry_on(p, 0, prior, after, start, costs, behind, rest, row)
+    return float(carry_on(q, 0, after, prior, start, costs, ahead, grown, row) - own)
 
 
 @kernel

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from netsp.arrays import Ints
 from netsp.compiled.chance import below, uniform
 from netsp.compiled.kernel import kernel
-from netsp.lns.links import Links, Tables, backward, best_place, forward, put, whole, written
+from netsp.lns.links import Links, Tables, best_place, carry_on, put, tour_length, write_order
 
 LONGEST_STRING = 10
 """Most clusters in one removed stretch."""
@@ -88,9 +88,9 @@ def ruin_and_recreate(
         for r in range(removed):
             p, q = links.prior[gone[r]], links.after[gone[r]]
             if after[q] >= 0:
-                d += forward(q, 0, after, prior, start, costs, ahead, grown, row)
+                d += carry_on(q, 0, after, prior, start, costs, ahead, grown, row)
             if after[p] >= 0:
-                backward(p, 0, after, prior, start, costs, behind, rest, row)
+                carry_on(p, 0, prior, after, start, costs, behind, rest, row)
         # put back in random order, the farthest from the base first, or the nearest first
         mode = below(4, chance)
         for r in range(removed):
@@ -117,13 +117,13 @@ def ruin_and_recreate(
             links.after[:], links.prior[:] = after, prior
             links.ahead[:], links.behind[:] = ahead, behind
             links.grown[:], links.rest[:] = grown, rest
-            length = whole(after, grown)
+            length = tour_length(after, grown)
             if length < best_length * (1.0 - 1e-12):
                 best_length = length
-                written(after, best)
+                write_order(after, best)
         else:
             after[:], prior[:] = links.after, links.prior
             ahead[:], behind[:] = links.ahead, links.behind
             grown[:], rest[:] = links.grown, links.rest
-    written(links.after, order)
+    write_order(links.after, order)
     return length, best_length

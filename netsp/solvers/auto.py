@@ -47,8 +47,8 @@ FEW_GOALS = 24
 LEAST_ROUNDS, ROUNDS_PER_GOAL, ROUNDS_PER_PAIR, MOST_PER_GOAL = 500, 40, 1.0, 100
 """Rounds of ruin and recreate before and after the root: at least the first; for each goal the
 second, or for each pair of goals the third if that is more, up to the last for each goal. With 500
-goals, 40 for each goal end with tours 1 % longer than 100 or 240 do; another turn, among classes
-beside a better tour, is worth more."""
+goals (one world, 12 s) 40 for each goal leave a tour 1 % longer than 100 or 240 do; another turn,
+among classes beside a better tour, is worth more."""
 
 FEW_CLASSES = 3
 """Of a goal, where the roadmap had to leave classes out: a tour over them comes first."""
