@@ -11,8 +11,8 @@ these bounds those.
 From one cover to the next a cell falls into those of another obstacle or two. A cut holds for any
 set of vertices, so it holds for all that lies above one; a leg that is in no better tour has none
 above it in one. So the program goes on where it stood, its bound does not fall, and most of the
-larger matrix is dead before it is looked at. Obstacles come first which the point goes around an
-odd number of times, as cheaply as `netsp.mip.parities` can tell.
+larger matrix is dead before it is looked at. Which obstacles come first makes all the difference
+(`netsp.mip.splits`).
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ from netsp.errors import LimitReachedError, interrupted
 from netsp.mip.cuts import Cut
 from netsp.mip.highs import HighsRelaxation
 from netsp.mip.overcells import Cells, OverCells
-from netsp.mip.parities import oddness
 from netsp.mip.root import Root, tour_legs
+from netsp.mip.splits import Splits
 from netsp.mip.towers import Tower
 from netsp.solving.legcosts import LegCosts
 from netsp.solving.limits import Limits
@@ -39,25 +39,26 @@ from netsp.travel.costs import CostTable
 from netsp.travel.graph import TravelGraph
 
 GROWTH = 1.3
-"""So many times as many cells, at least, has each cover."""
+"""So many times as many cells, at most, has each cover, unless an obstacle alone adds more."""
 
 MOST_CELLS = 6000
 """Larger covers are not looked at."""
-
-MOST_OBSTACLES = 60
-"""That fit into a number."""
-
-ODD = 0.5
-"""At a cost below that of the inequality of an obstacle the point goes around it."""
 
 PATIENCE = 4
 """Looks at the prices that closed hardly anything of the gap, after which the next cover is
 tried."""
 
+Stops = Sequence[tuple[int, Bools]]
+"""A tour: goals, and of which obstacles each word has an odd number of letters."""
+
+Told = Callable[[float, Cells, Ints], tuple[Stops, float] | None]
+"""Hears, after each cover, the bound, its cells, and which of them the program's point visits; may
+give a better tour, with its length, to go on with."""
+
 
 def climb(
-    tower: Tower, tour: Sequence[tuple[int, Bools]], length: float, clock: Clock, limits: Limits,
-    told: Callable[[float, int], None] = lambda *_: None,
+    tower: Tower, tour: Stops, length: float, clock: Clock, limits: Limits,
+    told: Told = lambda *_: None,
 ) -> OverCells | None:  # fmt: skip
     """Bound tours cover by cover, until they are proven, there are no more covers or time is up;
     None if there was none for the first.
@@ -65,24 +66,29 @@ def climb(
     Parameters
     ----------
     tour
-        The best one known: goals, and of which obstacles each word has an odd number of letters.
+        The best one known.
     length
         Of that.
     told
-        Hears the bound, and how many cells there were, after each cover.
+        See `Told`.
     """
     found: OverCells | None = None
     obstacles: list[int] = []
     before: _Level | None = None
+    splits = Splits(tower, GROWTH, MOST_CELLS)
     try:
         while True:
             level = _Level(tower, tuple(obstacles), tour, length, clock, limits, before)
             found = level.solve() or found
             if found is not None:
-                told(found.bound, len(found.cells.cluster))
+                better = told(found.bound, found.cells, level.visited())
+                # a tour no better than what the legs were ruled out by may have dead ones
+                if better is not None and better[1] < level.run.cutoff:
+                    tour, length = better
             if level.over or clock.up:
                 break
-            more = _next_obstacles(tower, level)
+            gap = length - (level.run.bound or 0.0)
+            more = splits.after(level.cells, *level.used(), gap)
             if not more:
                 break
             obstacles += more
@@ -94,28 +100,6 @@ def climb(
             raise
         clock.end()  # for what this is a part of, too
     return found
-
-
-def _next_obstacles(tower: Tower, level: _Level) -> list[int]:
-    """Those whose letters are to count from now on, too."""
-    own = level.cells.obstacles
-    left = [i for i in range(tower.obstacles) if i not in own]
-    if not left or len(own) >= MOST_OBSTACLES:
-        return []
-    ends, y = level.used()
-    odd = tower.odd_between(level.cells, ends)[:, left]
-    cost = oddness(ends, y, len(level.cells.cluster), odd, level.run.check)
-    # where few goals are reached on both sides, most say on which side they are
-    more = [len(tower.cells((*own, i)).cluster) for i in left]
-    out: list[int] = []
-    for k in np.lexsort((np.array(more), cost > ODD)).tolist():
-        out.append(left[k])
-        count = len(tower.cells((*own, *out)).cluster)
-        if count > MOST_CELLS:
-            return out[:-1]
-        if count > GROWTH * len(level.cells.cluster) or len(own) + len(out) == MOST_OBSTACLES:
-            break
-    return out
 
 
 class _Level:
@@ -130,7 +114,7 @@ class _Level:
     """
 
     def __init__(
-        self, tower: Tower, obstacles: tuple[int, ...], tour: Sequence[tuple[int, Bools]],
+        self, tower: Tower, obstacles: tuple[int, ...], tour: Stops,
         length: float, clock: Clock, limits: Limits, before: _Level | None,
     ) -> None:  # fmt: skip
         self.tower, self.over = tower, False
@@ -186,6 +170,13 @@ class _Level:
         on = point.y > 1e-6
         return self.root.costs.vertices[point.legs[on]], point.y[on]
 
+    def visited(self) -> Ints:
+        """The cells that the point visits; none if there is none."""
+        point = self.root.point
+        if point is None:
+            return np.zeros(0, dtype=np.int64)
+        return self.root.costs.vertices[point.x > 1e-6]
+
     def _dead(self) -> Bools:
         """(m, m) legs in no better tour; those of the best one known are left."""
         m, at = len(self.cells.cluster), self.root.costs.vertices
@@ -201,13 +192,7 @@ class _Level:
         m = len(self.cells.cluster)
         if before is None:
             return np.arange(m), [], np.zeros((0, 2), dtype=np.int64)
-        bits = len(before.cells.obstacles)
-        code = self.cells.code & ((1 << bits) - 1)
-        keys = zip(before.cells.cluster.tolist(), before.cells.code.tolist(), strict=True)
-        place = {k: j for j, k in enumerate(keys)}
-        own = np.array([
-            place[k] for k in zip(self.cells.cluster.tolist(), code.tolist(), strict=True)
-        ])  # fmt: skip
+        own = self.cells.above(before.cells)
         costs[before._dead()[np.ix_(own, own)]] = np.inf
         root, size = before.root, len(before.cells.cluster)
         at = root.costs.vertices

@@ -38,6 +38,15 @@ class Cells:
         place = {k: j for j, k in enumerate(own)}
         return np.array([place.get(k, -1) for k in keys], dtype=np.int64)
 
+    def above(self, below: Cells) -> Ints:
+        """(m,) the cell of a cover below that each lies above; the first of the obstacles are those
+        that count there."""
+        code = self.code & ((1 << len(below.obstacles)) - 1)
+        own = zip(below.cluster.tolist(), below.code.tolist(), strict=True)
+        place = {k: j for j, k in enumerate(own)}
+        keys = zip(self.cluster.tolist(), code.tolist(), strict=True)
+        return np.array([place[k] for k in keys], dtype=np.int64)
+
 
 @dataclass(frozen=True)
 class OverCells:

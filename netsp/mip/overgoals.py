@@ -18,15 +18,15 @@ from dataclasses import replace
 import numpy as np
 from scipy.sparse.csgraph import minimum_spanning_tree
 
-from netsp.arrays import Floats
+from netsp.arrays import Floats, Ints
 from netsp.clock import Clock
-from netsp.mip.covers import climb
+from netsp.mip.covers import Stops, climb
 from netsp.mip.cuts import Cut
-from netsp.mip.overcells import OverCells, OverGoals
+from netsp.mip.overcells import Cells, OverCells, OverGoals
 from netsp.mip.parities import odd_letters
 from netsp.mip.towers import OverClasses, OverWays, Tower
 from netsp.solving.limits import Limits
-from netsp.travel.graph import TravelGraph
+from netsp.travel.graph import TravelGraph, least_tethers
 from netsp.travel.result import Result
 
 ROUNDING = 1e-9
@@ -51,12 +51,19 @@ MANY_CLASSES = 3000
 FEW_GOALS = 60
 """With fewer the tour over shortest paths is proven in any case, which takes a second."""
 
+Told = Callable[[float, int, Ints], Sequence[int] | None]
+"""Hears a bound as it rises, over how many cells, and the classes of least tether above those that
+the program's point visits; may give a better tour."""
+
+ABOVE_CELL = 2
+"""So many of each."""
+
 Prove = Callable[[TravelGraph, Limits], tuple[Result, Sequence[Cut]]]
 
 
 def bound_over_goals(
     graph: TravelGraph, prove: Prove, limits: Limits, tour: Sequence[int] | None = None,
-    costs: Floats | None = None, told: Callable[[float, int], None] = lambda *_: None,
+    costs: Floats | None = None, told: Told = lambda *_: None,
 ) -> OverGoals:  # fmt: skip
     """No tour of the graph is shorter; a bound of 0 if the limits leave nothing.
 
@@ -69,7 +76,7 @@ def bound_over_goals(
     costs
         (V, V) of all legs, if they are known and no class was left out.
     told
-        Hears bounds as they rise, and over how many cells.
+        See `Told`.
     """
     clock = Clock.of(limits.time)
     least = graph.between_goals(lambda: clock.up)
@@ -91,26 +98,32 @@ def bound_over_goals(
 
 def _over_cells(
     graph: TravelGraph, tour: Sequence[int], clock: Clock, limits: Limits, costs: Floats | None,
-    told: Callable[[float, int], None],
+    told: Told,
 ) -> OverCells | None:  # fmt: skip
     """What covers prove; None where the ways between goals are not known."""
     tower: Tower
     if costs is not None:
         odd = odd_letters(graph.signatures)
-        tower, of_tour = OverClasses(costs, graph.cluster, odd), odd[list(tour)]
+        tower = OverClasses(costs, graph.cluster, odd)
     else:
         some = clock.part(WAYS_SHARE)
         ways = graph.ways_by_parity(lambda: some.up)
         if ways is None:
             return None
         tower = OverWays(ways, np.inf)
-        of_tour = odd_letters([graph.signatures[v] for v in tour], ways.obstacles)
-    stops = [(int(graph.cluster[v]), of_tour[k]) for k, v in enumerate(tour)]
+        odd = odd_letters(graph.signatures, ways.obstacles)
 
-    def less(bound: float, cells: int) -> None:
-        told(bound * (1.0 - ROUNDING), cells)
+    def stops(tour: Sequence[int]) -> Stops:
+        return [(int(graph.cluster[v]), odd[v]) for v in tour]
 
-    return climb(tower, stops, graph.tour_length(tour), clock, limits, less)
+    def heard(bound: float, cells: Cells, visited: Ints) -> tuple[Stops, float] | None:
+        own = cells.of(graph.cluster, odd)
+        above = np.flatnonzero(np.isin(own, visited))
+        least = least_tethers(graph.costs_to_base[above], own[above], ABOVE_CELL)
+        better = told(bound * (1.0 - ROUNDING), len(cells.cluster), above[least])
+        return None if better is None else (stops(better), graph.tour_length(better))
+
+    return climb(tower, stops(tour), graph.tour_length(tour), clock, limits, heard)
 
 
 def best_tree(lengths: Floats, up: Callable[[], bool]) -> float:

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from netsp.arrays import Ints
 from netsp.clock import Clock
 from netsp.dp.solve import bound_by_walks
 from netsp.lns import Search
@@ -196,9 +197,11 @@ class MipRun(SearchingRun):
         share = Clock(part * self.clock.left, within=self.clock) if self.clock.limit else self.clock
         limits = Limits(share, rng=self.rng)
 
-        def told(bound: float, cells: int) -> None:
+        def told(bound: float, cells: int, classes: Ints) -> Sequence[int] | None:
             self.raise_bound(bound)
+            self.search_among(classes)
             self.report("covers", vertices=cells)
+            return self.tour
 
         costs, graph = None, self.graph
         if climbs and graph.legs_at_once and graph.complete:

@@ -28,9 +28,9 @@ class Tower(Protocol):
     def costs(self, cells: Cells) -> Floats:
         """(m, m) costs between cells, inf within a goal."""
 
-    def odd_between(self, cells: Cells, ends: Ints) -> Bools:
-        """(k, n) of which obstacles the cheapest leg between two cells (k, 2) writes an odd number
-        of letters."""
+    def by_parity(self, cells: Cells, ends: Ints) -> Floats:
+        """(k, n, 2) costs of the cheapest legs between two cells (k, 2) that write an even, and an
+        odd, number of letters of each obstacle; inf, or less, where there is none."""
 
 
 class OverClasses:
@@ -62,15 +62,10 @@ class OverClasses:
         _least(self._costs, order, row, out)
         return out
 
-    def odd_between(self, cells: Cells, ends: Ints) -> Bools:
-        """As of `Tower.odd_between`."""
+    def by_parity(self, cells: Cells, ends: Ints) -> Floats:
+        """As of `Tower.by_parity`."""
         order, row = self._members(cells)
-        out = np.empty((len(ends), self.obstacles), dtype=bool)
-        for k, (a, b) in enumerate(ends.tolist()):
-            us, vs = order[row[a] : row[a + 1]], order[row[b] : row[b + 1]]
-            i, j = divmod(int(np.argmin(self._costs[np.ix_(us, vs)])), len(vs))
-            out[k] = self._odd[us[i]] ^ self._odd[vs[j]]
-        return out
+        return _least_by_parity(self._costs, self._odd, order, row, ends)
 
     def _members(self, cells: Cells) -> tuple[Ints, Ints]:
         """The vertices cell by cell, and where those of each begin."""
@@ -94,6 +89,21 @@ def _least(costs: Floats, order: Ints, row: Ints, out: Floats) -> None:
             u = order[k]
             for v in range(len(order)):
                 out[a, own[v]] = min(out[a, own[v]], costs[u, v])
+
+
+@kernel
+def _least_by_parity(costs: Floats, odd: Bools, order: Ints, row: Ints, ends: Ints) -> Floats:
+    """(k, n, 2) of the least costs between the members of two cells."""
+    n = odd.shape[1]
+    out = np.full((len(ends), n, 2), np.inf)
+    for k in range(len(ends)):
+        a, b = ends[k]
+        for u in order[row[a] : row[a + 1]]:
+            for v in order[row[b] : row[b + 1]]:
+                for i in range(n):
+                    side = 1 if odd[u, i] != odd[v, i] else 0
+                    out[k, i, side] = min(out[k, i, side], costs[u, v])
+    return out
 
 
 class OverWays:
@@ -123,15 +133,6 @@ class OverWays:
 
     def costs(self, cells: Cells) -> Floats:
         """As of `Tower.costs`."""
-        return self._shortest(cells)[0]
-
-    def odd_between(self, cells: Cells, ends: Ints) -> Bools:
-        """As of `Tower.odd_between`; none where nothing is known."""
-        way = self._shortest(cells)[1][ends[:, 0], ends[:, 1]]
-        return np.asarray(self._odd[np.maximum(way, 0)] & (way >= 0)[:, None])
-
-    def _shortest(self, cells: Cells) -> tuple[Floats, Ints]:
-        """(m, m) costs, and numbers of the ways, -1 for a longer one that is not known."""
         code, ways = packed(self._odd, cells.obstacles), self._ways
         order = np.lexsort((ways.length, code, self._pair))
         pair, code = self._pair[order], code[order]
@@ -140,20 +141,32 @@ class OverWays:
         order, pair, code = order[new], pair[new], code[new]
         row = np.searchsorted(pair, np.arange(self._size**2 + 1)).astype(np.int64)
         m = len(cells.cluster)
-        costs, way = np.full((m, m), np.inf), np.full((m, m), -1, dtype=np.int64)
+        costs = np.full((m, m), np.inf)
         _between(
-            cells.cluster, cells.code, row, code, order, ways.length[order], ways.reach,
-            self._size, costs, way,
+            cells.cluster, cells.code, row, code, ways.length[order], ways.reach, self._size, costs
+        )
+        return costs
+
+    def by_parity(self, cells: Cells, ends: Ints) -> Floats:
+        """As of `Tower.by_parity`."""
+        low = np.minimum(cells.cluster[ends[:, 0]], cells.cluster[ends[:, 1]])
+        high = np.maximum(cells.cluster[ends[:, 0]], cells.cluster[ends[:, 1]])
+        wanted = cells.code[ends[:, 0]] ^ cells.code[ends[:, 1]]
+        order = np.argsort(self._pair, kind="stable")
+        row = np.searchsorted(self._pair[order], np.arange(self._size**2 + 1)).astype(np.int64)
+        code = packed(self._odd, cells.obstacles)
+        return _shortest_by_parity(
+            low * self._size + high, wanted, row, order, code, self._odd, self._ways.length,
+            self._ways.reach,
         )  # fmt: skip
-        return costs, way
 
 
 @kernel
 def _between(
-    cluster: Ints, code: Ints, row: Ints, codes: Ints, numbers: Ints, lengths: Floats, reach: float,
-    size: int, costs: Floats, way: Ints,
+    cluster: Ints, code: Ints, row: Ints, codes: Ints, lengths: Floats, reach: float, size: int,
+    costs: Floats,
 ) -> None:  # fmt: skip
-    """Fill in costs and ways between cells: those of a pair of goals are rows row[pair] to
+    """Fill in costs between cells: the ways between a pair of goals are rows row[pair] to
     row[pair + 1] of ascending codes."""
     m = len(cluster)
     for a in range(m):
@@ -171,8 +184,26 @@ def _between(
                     low = middle + 1
                 else:
                     high = middle
-            cost, number = reach, -1
+            cost = reach
             if low < after and codes[low] == wanted:
-                cost, number = lengths[low], numbers[low]
+                cost = lengths[low]
             costs[a, b] = costs[b, a] = cost
-            way[a, b] = way[b, a] = number
+
+
+@kernel
+def _shortest_by_parity(
+    pair: Ints, wanted: Ints, row: Ints, order: Ints, code: Ints, odd: Bools, lengths: Floats,
+    reach: float,
+) -> Floats:  # fmt: skip
+    """(k, n, 2) of the shortest ways of a code between a pair of goals: those are order[row[pair]]
+    to order[row[pair + 1]]."""
+    n = odd.shape[1]
+    out = np.full((len(pair), n, 2), reach)
+    for k in range(len(pair)):
+        for w in order[row[pair[k]] : row[pair[k] + 1]]:
+            if code[w] != wanted[k]:
+                continue
+            for i in range(n):
+                side = 1 if odd[w, i] else 0
+                out[k, i, side] = min(out[k, i, side], lengths[w])
+    return out

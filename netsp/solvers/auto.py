@@ -13,17 +13,18 @@ travelling salesperson's tour over the shortest paths between them in any class.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from netsp.arrays import Ints
 from netsp.clock import Clock
 from netsp.dp.solve import Params as WalkParams
 from netsp.dp.solve import fits as walks_fit
 from netsp.dp.solve import solve as walk
 from netsp.lns.solve import solve as search
-from netsp.mip.overgoals import bound_over_goals
+from netsp.mip.overgoals import Told, bound_over_goals
 from netsp.mip.solve import MipRun
 from netsp.mip.solve import solve as prove
 from netsp.solution import Status
@@ -125,9 +126,11 @@ def _beyond(graph: TravelGraph, limits: Limits) -> Result:
     searches if there is time left."""
     run = SearchingRun(graph, limits, search_rounds=_rounds(graph))
 
-    def told(bound: float, cells: int) -> None:
+    def told(bound: float, cells: int, classes: Ints) -> Sequence[int] | None:
         run.raise_bound(bound)
+        run.search_among(classes)
         run.report("covers", vertices=cells)
+        return run.tour
 
     with run.until_stopped():
         run.update_incumbent(limits.warm_start)
@@ -174,7 +177,7 @@ def _in_part_ordered(graph: TravelGraph, limits: Limits, backend: str) -> Result
 
 def _bound_by_goals(
     graph: TravelGraph, limits: Limits, tour: Sequence[int] | None = None,
-    told: Callable[[float, int], None] = lambda *_: None,
+    told: Told = lambda *_: None,
 ) -> float:  # fmt: skip
     """A bound on the tours in any class; the one that is known if there is one, and no tour."""
     if tour is not None or not graph.bound_in_any_class:

@@ -114,6 +114,13 @@ class SearchingRun(SolverRun):
             )  # fmt: skip
         return core
 
+    def search_among(self, classes: Ints) -> None:
+        """One search among some classes, if there are any, and the tour's."""
+        if not len(classes):
+            return
+        core = np.union1d(classes, np.array(self.tour or (0,), dtype=np.int64))
+        self._search(Instance.among(self.graph, core), self.clock.part(TURNS_SHARE))
+
     def search_on(self) -> None:
         """Search beside the best tour until the time is up; not at all if it is not limited, or
         iterations are."""
