@@ -20,6 +20,7 @@ from netsp.dp.solve import bound_by_walks
 from netsp.lns import Search
 from netsp.mip.branching import Tree
 from netsp.mip.cuts import Cut
+from netsp.mip.merging import search_and_merge
 from netsp.mip.overcells import OverGoals
 from netsp.mip.overgoals import MANY_CLASSES, bound_over_goals
 from netsp.mip.program import IntegerProgram, Point
@@ -52,7 +53,7 @@ would take that long, and cannot be stopped."""
 MANY_GOALS = 100
 """With so many the bound of the goals comes first, and its cuts are those of the first LP."""
 
-GOALS_SHARE, CELLS_SHARE = 0.1, 0.85
+GOALS_SHARE, CELLS_SHARE = 0.1, 0.8
 """Part of the time that is left which the bound from the goals alone may take, and that of covers,
 where there are very many classes."""
 
@@ -159,7 +160,7 @@ class MipRun(SearchingRun):
                             self.bound_by_goals(backend)
                         left = self.length - (self.bound or 0.0)
                         if self._climbs and left > OUT_OF_REACH * self.length:
-                            self.search_on()
+                            search_and_merge(self, solve_merged)
                         if core is not None:
                             core.prove(backend, walks=walks)
                     warm = core.program() if core is not None else None
@@ -333,6 +334,11 @@ class MipRun(SearchingRun):
                 # an optimal tour of the program: the bound stands at its own length
                 break
             model.add_cuts(cuts)
+
+
+def solve_merged(graph: TravelGraph, limits: Limits) -> Result:
+    """Solve one with few legs, from a tour that other searches have found."""
+    return MipRun(graph, limits, search_rounds=0).solve(DEFAULT_BACKEND, limits.warm_start)
 
 
 def _load(path: str) -> Any:

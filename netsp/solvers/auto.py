@@ -24,8 +24,10 @@ from netsp.dp.solve import Params as WalkParams
 from netsp.dp.solve import fits as walks_fit
 from netsp.dp.solve import solve as walk
 from netsp.lns.solve import solve as search
+from netsp.mip.merging import search_and_merge
 from netsp.mip.overgoals import Told, bound_over_goals
-from netsp.mip.solve import MipRun
+from netsp.mip.solve import MipRun, solve_merged
+from netsp.mip.solve import Params as MipParams
 from netsp.mip.solve import solve as prove
 from netsp.solution import Status
 from netsp.solvers import exact
@@ -63,7 +65,7 @@ GOALS_SHARE = 0.2
 SHARE = 0.6
 """Part of the time that the search has at least where it shares it with a bound that is weak."""
 
-BOUND_SHARE = 0.9
+BOUND_SHARE = 0.8
 """With too many classes for a matrix, part of the time that is left for the bound after the first
 search."""
 
@@ -81,8 +83,6 @@ class Params:
     backend: str = "highs"
 
     def __post_init__(self) -> None:
-        from netsp.mip.solve import Params as MipParams
-
         MipParams(backend=self.backend)
 
 
@@ -139,7 +139,7 @@ def _beyond(graph: TravelGraph, limits: Limits) -> Result:
         share = run.clock.part(BOUND_SHARE) if run.clock.limit else run.clock
         run.raise_bound(_bound_by_goals(graph, Limits(share, rng=limits.rng), run.tour, told))
         run.report("goals")
-        run.search_on()
+        search_and_merge(run, solve_merged)
     return run.finish("proven" if run.done else "open")
 
 

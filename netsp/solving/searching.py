@@ -108,10 +108,7 @@ class SearchingRun(SolverRun):
             vain = 0 if self.length < before else vain + 1
             if clock.up or self.tour is None or vain == IN_VAIN:
                 break
-            core = classes_beside(
-                graph.costs_to_base, graph.cluster, graph.lower_bounds(rows=self.tour), self.tour,
-                self.searched_per_goal,
-            )  # fmt: skip
+            core = self._beside()
         return core
 
     def search_among(self, classes: Ints) -> None:
@@ -121,12 +118,34 @@ class SearchingRun(SolverRun):
         core = np.union1d(classes, np.array(self.tour or (0,), dtype=np.int64))
         self._search(Instance.among(self.graph, core), self.clock.part(TURNS_SHARE))
 
-    def search_on(self) -> None:
-        """Search beside the best tour until the time is up; not at all if it is not limited, or
-        iterations are."""
-        while self.clock.limit and self.iteration_limit == np.inf and not self.done:
-            self.check()
-            self.search_beside()
+    def search_from_start(self, count: int, clock: Clock) -> list[tuple[int, ...]]:
+        """The tours of so many searches, each from the start, among the classes of least tether and
+        those beside the best tour; and that."""
+        graph = self.graph
+        core = least_tethers(graph.costs_to_base, graph.cluster, self.searched_per_goal)
+        if self.tour is not None:
+            core = np.union1d(core, self._beside())
+        instance = Instance.among(graph, core)
+        tours = [] if self.tour is None else [self.tour]
+        for _ in range(count):
+            if clock.up:
+                break
+            search = Search(instance, self.rng, clock=clock)
+            search.settle()
+            search.run(self.search_rounds, clock)
+            self.take(search)
+            self.report("begun", vertices=len(graph))
+            if np.isfinite(search.best()[0]):
+                tours.append(search.best()[1])
+        return tours
+
+    def _beside(self) -> Ints:
+        """The classes beside the best tour."""
+        graph, tour = self.graph, self.tour or (0,)
+        return classes_beside(
+            graph.costs_to_base, graph.cluster, graph.lower_bounds(rows=tour), tour,
+            self.searched_per_goal,
+        )  # fmt: skip
 
     @contextmanager
     def core(self) -> Iterator[Self | None]:
