@@ -75,7 +75,7 @@ def test_legs_of_whole_branches_are_those_pulled_one_by_one(seed, family, obstac
 
 @pytest.mark.parametrize("problem", [TURNS, INLETS, TOUCHING], ids=["turns", "inlets", "touching"])
 def test_so_are_those_around_bare_corners_in_bays_and_after_whole_turns(problem):
-    roadmap = TautRoadmap(problem, max_classes=400)
+    roadmap = TautRoadmap(problem, max_classes=120)
     assert len(roadmap.cluster) > 10
     found = roadmap.legs.lengths(np.arange(len(roadmap.cluster)))
     assert np.allclose(found, one_by_one(roadmap), rtol=1e-10, atol=1e-9)

@@ -263,8 +263,9 @@ def test_beyond_reach_of_the_program_over_all_classes_the_time_left_is_for_the_s
     assert found.length >= whole.length * (1.0 - 1e-6)
     stages = [r.stage for r in found.trace]
     assert "covers" in stages
-    # without a limit of time there would be no end of a search
+    # without a limit of time there would be no end of searches
     assert ("root" in stages) == ("iteration_limit" in limits)
+    assert ("merged" in stages) == ("time_limit" in limits)
 
 
 @pytest.mark.parametrize("seed", range(2))

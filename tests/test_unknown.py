@@ -90,7 +90,7 @@ def test_solids_that_are_not_on_the_map_are_neither_met_nor_wound_about(sensor):
         assert "sensor found" in describe_run(run, "m")
 
 
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=4, deadline=None)
 @given(st.integers(0, 10**6))
 def test_whatever_stands_in_the_way_there_is_no_contact_and_tether_enough(seed):
     rng = np.random.default_rng(seed)

@@ -14,12 +14,13 @@ from claims.claim import Claim
 
 
 def claims() -> Iterator[Claim]:
-    """All of them; names are told apart."""
+    """All of them; names are told apart. The pages' commands take longest, so they come first: in
+    the end no process waits for one."""
     yield from command.starting()
+    yield from command.running()
     yield from offline.claims()
     yield from online.claims()
     yield from sites.claims()
     yield from page.claims()
     yield from space.claims()
     yield from guard.claims()
-    yield from command.running()

@@ -102,34 +102,6 @@ def parity_cuts(
     return [cut for _, cut in best]
 
 
-def oddness(
-    ends: Ints, y: Floats, size: int, odd: Bools, check: Callable[[], None] = lambda: None
-) -> Floats:
-    """(n,) for each obstacle the cost of the cheapest inequality found, with vertices for clusters:
-    0 where a point goes around it an odd number of times, and 1 or more where it does not.
-
-    Parameters
-    ----------
-    ends, y
-        (k, 2) ends of legs, and (k,) what a point has of them.
-    size
-        How many vertices there are.
-    odd
-        (k, n) which legs write an odd number of letters of each obstacle.
-    check
-        Called for each obstacle; may raise to stop.
-    """
-    pairs, pair = _pairs_of(ends, size)
-    row, beside = _beside(pairs, size)
-    out = np.empty(odd.shape[1])
-    for i in range(len(out)):
-        check()
-        flow = _flow(pair, odd[:, i], y, len(pairs))
-        starts = np.zeros(size, dtype=np.bool_), _along_tree(pairs, flow, size)
-        out[i] = min(_cheapest(pairs, flow, row, beside, sides)[0] for sides in starts)
-    return out
-
-
 def _pairs_of(ends: Ints, size: int) -> tuple[Ints, Ints]:
     """(p, 2) pairs that legs are between, and (k,) which is each leg's."""
     g, h = np.sort(ends, axis=1).T
