@@ -37,9 +37,11 @@ from netsp.solving.run import Stop
 from netsp.solving.searching import SearchingRun
 from netsp.travel.costs import CostTable
 from netsp.travel.graph import TravelGraph
+from netsp.travel.result import OPTIMALITY_TOLERANCE
 
 GROWTH = 1.3
-"""So many times as many cells, at most, has each cover, unless an obstacle alone adds more."""
+"""A cover has at most so many times as many cells as the one below, unless an obstacle alone adds
+more."""
 
 MOST_CELLS = 6000
 """Larger covers are not looked at."""
@@ -79,16 +81,17 @@ def climb(
     try:
         while True:
             level = _Level(tower, tuple(obstacles), tour, length, clock, limits, before)
-            found = level.solve() or found
-            if found is not None:
+            proven = level.solve()
+            if proven is not None:
+                found = proven
                 better = told(found.bound, found.cells, level.visited())
                 # a tour no better than what the legs were ruled out by may have dead ones
                 if better is not None and better[1] < level.run.cutoff:
                     tour, length = better
-            if level.over or clock.up:
-                break
             gap = length - (level.run.bound or 0.0)
-            more = splits.after(level.cells, *level.used(), gap)
+            if level.over or clock.up or gap <= OPTIMALITY_TOLERANCE * length:
+                break
+            more = splits.after(level.cells, *level.used(), gap, level.run.check)
             if not more:
                 break
             obstacles += more

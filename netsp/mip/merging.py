@@ -46,12 +46,14 @@ def merged(
 ) -> list[int] | None:
     """The shortest tour of the legs of some tours, or as good a one as the limits leave; None if
     there is none."""
+    if not tours:
+        return None
     vertices = np.unique(np.concatenate([np.asarray(t, dtype=np.int64) for t in tours]))
     used = np.zeros((len(vertices), len(vertices)), dtype=bool)
     for tour in tours:
         at = np.searchsorted(vertices, tour)
         used[at, np.roll(at, -1)] = used[np.roll(at, -1), at] = True
-    costs = np.where(used, graph.subgraph(vertices).costs, np.inf)
+    costs = np.where(used, graph.costs_among(vertices, used), np.inf)
     best = np.searchsorted(vertices, min(tours, key=graph.tour_length)).tolist()
     part = TravelGraph.from_costs(costs, graph.cluster[vertices])
     found = prove(part, replace(limits, warm_start=best))

@@ -32,20 +32,19 @@ class Cells:
     def of(self, cluster: Ints, odd: Bools) -> Ints:
         """(V,) the cells that vertices lie in, -1 for none; `odd` tells as
         `netsp.mip.parities.odd_letters` does."""
-        code = packed(odd, self.obstacles)
-        keys = list(zip(cluster.tolist(), code.tolist(), strict=True))
-        own = zip(self.cluster.tolist(), self.code.tolist(), strict=True)
-        place = {k: j for j, k in enumerate(own)}
-        return np.array([place.get(k, -1) for k in keys], dtype=np.int64)
+        return self._places(cluster, packed(odd, self.obstacles))
 
     def above(self, below: Cells) -> Ints:
         """(m,) the cell of a cover below that each lies above; the first of the obstacles are those
         that count there."""
-        code = self.code & ((1 << len(below.obstacles)) - 1)
-        own = zip(below.cluster.tolist(), below.code.tolist(), strict=True)
+        return below._places(self.cluster, self.code & ((1 << len(below.obstacles)) - 1))
+
+    def _places(self, cluster: Ints, code: Ints) -> Ints:
+        """Numbers of cells, -1 where there is none."""
+        own = zip(self.cluster.tolist(), self.code.tolist(), strict=True)
         place = {k: j for j, k in enumerate(own)}
-        keys = zip(self.cluster.tolist(), code.tolist(), strict=True)
-        return np.array([place[k] for k in keys], dtype=np.int64)
+        keys = zip(cluster.tolist(), code.tolist(), strict=True)
+        return np.array([place.get(k, -1) for k in keys], dtype=np.int64)
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 
-from netsp.arrays import Ints
 from netsp.clock import Clock
 from netsp.dp.solve import bound_by_walks
 from netsp.lns import Search
@@ -158,10 +157,12 @@ class MipRun(SearchingRun):
                         many = self.graph.roadmapped and self.graph.goal_count >= MANY_GOALS
                         if core is not None or many:
                             self.bound_by_goals(backend)
-                        left = self.length - (self.bound or 0.0)
-                        if self._climbs and left > OUT_OF_REACH * self.length:
-                            search_and_merge(self, solve_merged)
-                        if core is not None:
+                            left = self.length - (self.bound or 0.0)
+                            if self._climbs and left > OUT_OF_REACH * self.length:
+                                search_and_merge(self, solve_merged)
+                        if core is not None and not self.done:
+                            # the tours found meanwhile are not all among its classes
+                            core.known = min(core.known, self.length)
                             core.prove(backend, walks=walks)
                     warm = core.program() if core is not None else None
                 self.prove(backend, walks=walks, warm=warm)
@@ -198,18 +199,12 @@ class MipRun(SearchingRun):
         share = Clock(part * self.clock.left, within=self.clock) if self.clock.limit else self.clock
         limits = Limits(share, rng=self.rng)
 
-        def told(bound: float, cells: int, classes: Ints) -> Sequence[int] | None:
-            self.raise_bound(bound)
-            self.search_among(classes)
-            self.report("covers", vertices=cells)
-            return self.tour
-
         costs, graph = None, self.graph
         if climbs and graph.legs_at_once and graph.complete:
             self._costs = LegCosts(graph)
             costs = self._costs.values
         self._over_goals = bound_over_goals(
-            graph, prove, limits, self.tour if climbs else None, costs, told
+            graph, prove, limits, self.tour if climbs else None, costs, self.climbed
         )
         self.raise_bound(self._over_goals.bound)
         self.report("goals", vertices=len(self.graph))

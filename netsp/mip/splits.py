@@ -6,12 +6,13 @@ so does the leg: one that writes an even number of them stays on its side, and o
 odd number changes it. What the point costs then, with the same legs and each cell on the better
 side, is more by what it saved going around that obstacle: the frustration of a signed graph
 (Harary 1959), with lengths for weights. To find the least is NP-hard; a spanning tree of the legs
-that say most, and changing sides of one cell after another, is near it. The program finds other
-legs, and is not more by as much, but where it is much more, it is much.
+that say most, and changing sides of one cell after another, is near it. The program may choose
+other legs and so gains less; but where the promise is large, the gain is too.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -26,8 +27,8 @@ FADES = 0.5
 way here and another there."""
 
 DEAR = 2.5
-"""A promise counts by this power of the cells that it adds: an LP over twice the cells takes far
-more than twice as long."""
+"""A promise is divided by this power of the cells that it adds: an LP over twice the cells takes
+far more than twice as long."""
 
 MOST_OBSTACLES = 60
 """That fit into a number."""
@@ -60,7 +61,10 @@ class Splits:
     most: int
     _promised: dict[int, float] = field(default_factory=dict)
 
-    def after(self, cells: Cells, ends: Ints, y: Floats, gap: float) -> list[int]:
+    def after(
+        self, cells: Cells, ends: Ints, y: Floats, gap: float,
+        check: Callable[[], None] = lambda: None,
+    ) -> list[int]:  # fmt: skip
         """The obstacles whose letters are to count from now on, too; none if there are no more.
 
         Parameters
@@ -71,17 +75,23 @@ class Splits:
             (k, 2) legs that its point uses, and (k,) how much.
         gap
             A leg that is longer by that much is in no better tour.
+        check
+            Called for each obstacle; may raise to stop.
         """
         own = cells.obstacles
         left = [i for i in range(self.tower.obstacles) if i not in own]
+        if not left or len(own) >= MOST_OBSTACLES:
+            return []
         lengths = self.tower.by_parity(cells, ends)
         excess = y[:, None, None] * np.minimum(lengths - lengths.min(axis=2, keepdims=True), gap)
         adds = {}
         for i in left:
+            check()
             split = self.tower.cells((*own, i))
             adds[i] = len(split.cluster) - len(cells.cluster)
             new = frustration(ends, excess[:, i], _sides(cells, split))
             self._promised[i] = max(new, FADES * self._promised.get(i, 0.0))
+        left = [i for i in left if len(cells.cluster) + adds[i] <= self.most]
         promising = [i for i in left if self._promised[i] > HARDLY * gap]
         promising.sort(key=lambda i: -self._promised[i] / max(adds[i], 1) ** DEAR)
         # else where few goals are reached on both sides, most say on which side they are
@@ -92,9 +102,8 @@ class Splits:
         out: list[int] = []
         for i in order:
             count = len(self.tower.cells((*cells.obstacles, *out, i)).cluster)
-            if len(cells.obstacles) + len(out) == MOST_OBSTACLES or count > self.most:
-                break
-            if out and count > self.growth * len(cells.cluster):
+            full = len(cells.obstacles) + len(out) == MOST_OBSTACLES or count > self.most
+            if full or (out and count > self.growth * len(cells.cluster)):
                 break
             out.append(i)
         return out

@@ -124,6 +124,9 @@ class OverWays:
         self._goal, self._at_goal = ways.ends[reached, 1], self._odd[reached]
         self._size = int(ways.ends.max()) + 1
         self._pair = ways.ends[:, 0] * self._size + ways.ends[:, 1]
+        self._order = np.argsort(self._pair, kind="stable")
+        every = np.arange(self._size**2 + 1)
+        self._row = np.searchsorted(self._pair[self._order], every).astype(np.int64)
 
     def cells(self, obstacles: tuple[int, ...]) -> Cells:
         """As of `Tower.cells`."""
@@ -152,12 +155,10 @@ class OverWays:
         low = np.minimum(cells.cluster[ends[:, 0]], cells.cluster[ends[:, 1]])
         high = np.maximum(cells.cluster[ends[:, 0]], cells.cluster[ends[:, 1]])
         wanted = cells.code[ends[:, 0]] ^ cells.code[ends[:, 1]]
-        order = np.argsort(self._pair, kind="stable")
-        row = np.searchsorted(self._pair[order], np.arange(self._size**2 + 1)).astype(np.int64)
         code = packed(self._odd, cells.obstacles)
         return _shortest_by_parity(
-            low * self._size + high, wanted, row, order, code, self._odd, self._ways.length,
-            self._ways.reach,
+            low * self._size + high, wanted, self._row, self._order, code, self._odd,
+            self._ways.length, self._ways.reach,
         )  # fmt: skip
 
 

@@ -18,7 +18,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from netsp.arrays import Ints
 from netsp.clock import Clock
 from netsp.dp.solve import Params as WalkParams
 from netsp.dp.solve import fits as walks_fit
@@ -126,18 +125,14 @@ def _beyond(graph: TravelGraph, limits: Limits) -> Result:
     searches if there is time left."""
     run = SearchingRun(graph, limits, search_rounds=_rounds(graph))
 
-    def told(bound: float, cells: int, classes: Ints) -> Sequence[int] | None:
-        run.raise_bound(bound)
-        run.search_among(classes)
-        run.report("covers", vertices=cells)
-        return run.tour
-
     with run.until_stopped():
         run.update_incumbent(limits.warm_start)
         run.begin()
         run.search_beside()
         share = run.clock.part(BOUND_SHARE) if run.clock.limit else run.clock
-        run.raise_bound(_bound_by_goals(graph, Limits(share, rng=limits.rng), run.tour, told))
+        run.raise_bound(
+            _bound_by_goals(graph, Limits(share, rng=limits.rng), run.tour, run.climbed)
+        )
         run.report("goals")
         search_and_merge(run, solve_merged)
     return run.finish("proven" if run.done else "open")

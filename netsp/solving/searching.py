@@ -111,16 +111,19 @@ class SearchingRun(SolverRun):
             core = self._beside()
         return core
 
-    def search_among(self, classes: Ints) -> None:
-        """One search among some classes, if there are any, and the tour's."""
-        if not len(classes):
-            return
-        core = np.union1d(classes, np.array(self.tour or (0,), dtype=np.int64))
-        self._search(Instance.among(self.graph, core), self.clock.part(TURNS_SHARE))
+    def climbed(self, bound: float, cells: int, classes: Ints) -> tuple[int, ...] | None:
+        """Take the bound of a cover of so many cells, and search among classes, if there are any,
+        and the tour's; the best tour."""
+        self.raise_bound(bound)
+        if len(classes):
+            core = np.union1d(classes, np.array(self.tour or (0,), dtype=np.int64))
+            self._search(Instance.among(self.graph, core), self.clock.part(TURNS_SHARE))
+        self.report("covers", vertices=cells)
+        return self.tour
 
     def search_from_start(self, count: int, clock: Clock) -> list[tuple[int, ...]]:
         """The tours of so many searches, each from the start, among the classes of least tether and
-        those beside the best tour; and that."""
+        those beside the best tour; the one that was best before comes first."""
         graph = self.graph
         core = least_tethers(graph.costs_to_base, graph.cluster, self.searched_per_goal)
         if self.tour is not None:
@@ -133,10 +136,11 @@ class SearchingRun(SolverRun):
             search = Search(instance, self.rng, clock=clock)
             search.settle()
             search.run(self.search_rounds, clock)
-            self.take(search)
+            length, tour = search.best()
+            self.update_incumbent(tour, length=length)
             self.report("begun", vertices=len(graph))
-            if np.isfinite(search.best()[0]):
-                tours.append(search.best()[1])
+            if np.isfinite(length):
+                tours.append(tour)
         return tours
 
     def _beside(self) -> Ints:
