@@ -254,6 +254,7 @@ def test_beyond_reach_of_the_program_over_all_classes_the_time_left_is_for_the_s
     monkeypatch.setattr("netsp.solving.searching.MEASURE_AT_ONCE", 50)
     monkeypatch.setattr(sys.modules["netsp.mip.solve"], "MANY_GOALS", 5)
     monkeypatch.setattr(sys.modules["netsp.mip.solve"], "OUT_OF_REACH", 0.0)
+    monkeypatch.setattr(sys.modules["netsp.mip.solve"], "LARGE", 5)
     for module in ("netsp.mip.solve", "netsp.mip.overgoals"):
         monkeypatch.setattr(sys.modules[module], "MANY_CLASSES", 50)
     graph = travel_graph(problem)

@@ -56,10 +56,11 @@ GOALS_SHARE, CELLS_SHARE = 0.1, 0.8
 """Part of the time that is left which the bound from the goals alone may take, and that of covers,
 where there are very many classes."""
 
-OUT_OF_REACH = 0.02
-"""A larger gap than that after covers, the program over all classes does not close: what time is
-left is worth more in a search. In two worlds of 500 goals, 40 s of the program closed 0.1 % and
-nothing, of a search nothing and 0.4 %."""
+OUT_OF_REACH, LARGE = 0.02, 300
+"""A larger gap than the first after covers, the program over all classes does not close where there
+are more goals than the second: what time is left is worth more in a search. In two worlds of 500
+goals, 40 s of the program closed 0.1 % and nothing, of a search nothing and 0.4 %. With 100 goals
+it closes such gaps, in a minute or in some."""
 
 SEARCH_AGAIN = 0.5
 """Share of the last gap at which the classes that the LP visits are searched once more."""
@@ -157,8 +158,7 @@ class MipRun(SearchingRun):
                         many = self.graph.roadmapped and self.graph.goal_count >= MANY_GOALS
                         if core is not None or many:
                             self.bound_by_goals(backend)
-                            left = self.length - (self.bound or 0.0)
-                            if self._climbs and left > OUT_OF_REACH * self.length:
+                            if self._out_of_reach:
                                 search_and_merge(self, solve_merged)
                         if core is not None and not self.done:
                             # the tours found meanwhile are not all among its classes
@@ -214,6 +214,12 @@ class MipRun(SearchingRun):
         """Whether covers come first: with fewer goals the relaxation over classes is quicker than
         those below it."""
         return len(self.graph) > MANY_CLASSES and self.graph.goal_count >= MANY_GOALS
+
+    @property
+    def _out_of_reach(self) -> bool:
+        """Whether the program over all classes would not close what covers have left."""
+        left = self.length - (self.bound or 0.0)
+        return self._climbs and self.graph.goal_count > LARGE and left > OUT_OF_REACH * self.length
 
     def program(self) -> Warm | None:
         """The program of the root of a run over a core, by vertices of the outer run; also of one
