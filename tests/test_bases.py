@@ -29,6 +29,17 @@ def with_cuts(seed):
     return graph, lp, point
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_a_program_that_takes_too_many_steps_is_begun_anew(seed, monkeypatch):
+    graph, lp, before = with_cuts(seed)
+    again = HighsRelaxation(graph.cluster, *all_legs(graph))
+    again.add_cuts(lp.cuts)
+    monkeypatch.setattr("netsp.mip.highs.STEPS", 0)
+    point = again.solve(60.0)
+    assert point.objective == pytest.approx(before.objective, rel=1e-9)
+    assert steps(again) > 0
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_legs_without_use_leave_at_no_cost(seed):
     _, lp, before = with_cuts(seed)

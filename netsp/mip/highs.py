@@ -23,6 +23,10 @@ _SETTLED = (
     highspy.HighsModelStatus.kInterrupt,
 )
 
+STEPS = 2
+"""Of the simplex method for each row and column, at most, from a basis; four times as many from the
+start."""
+
 
 def _compressed(dense: Floats) -> tuple[int, Ints, Ints, Floats]:
     """Entries, row starts, columns and values of a dense block of rows."""
@@ -167,17 +171,24 @@ class HighsRelaxation:
         h = self._highs
         clock = Clock.of(limit)
         self._interruption.hear(clock, always=False)
-        # a warm basis can end in numerical trouble: then afresh, then with looser tolerances (the
-        # bound does not rest on them)
-        for tolerance, fresh in ((1e-9, False), (1e-9, True), (1e-7, True)):
+        # from a basis the simplex method can end in numerical trouble, or not at all (100 goals at
+        # tether 500, the eighth world: 29,000 steps and no end, where 11,000 from the start are
+        # enough): then afresh, then with looser tolerances (the bound does not rest on them)
+        size = h.getNumRow() + h.getNumCol()
+        for tolerance, fresh, steps in (
+            (1e-9, False, STEPS * size), (1e-9, True, 4 * STEPS * size),
+            (1e-7, True, highspy.kHighsIInf),
+        ):  # fmt: skip
             if fresh:
                 h.clearSolver()
+            h.setOptionValue("simplex_iteration_limit", steps)
             h.setOptionValue("primal_feasibility_tolerance", tolerance)
             h.setOptionValue("dual_feasibility_tolerance", tolerance)
             run(h, clock.left)
             status = h.getModelStatus()
             if status in _SETTLED:
                 break
+        h.setOptionValue("simplex_iteration_limit", highspy.kHighsIInf)
         self.infeasible = status == highspy.HighsModelStatus.kInfeasible
         if status != highspy.HighsModelStatus.kOptimal:
             return None
