@@ -2,6 +2,7 @@
 
 import contextlib
 import itertools
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -33,6 +34,22 @@ def root_of(graph, *, tour=None, rows=None):
     run = MipRun(graph, Limits(on_progress=None if rows is None else rows.append))
     run.update_incumbent(tour)
     return Root(run, LegCosts(graph), HighsRelaxation, run.round)
+
+
+def test_the_first_legs_of_every_vertex_are_found_in_little_memory(monkeypatch):
+    """Of ten rows at a time, and nothing of these is kept but a few legs."""
+    graph = random_graph(0, 60, most=12)
+    root = root_of(graph, tour=[0, *(graph.members(g)[0] for g in range(1, 61))])
+    monkeypatch.setattr("netsp.mip.root.ROWS", 10)
+    tracemalloc.start()
+    legs = root._first_legs()
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 0.5 * 8 * len(graph) ** 2
+    nearest = np.argsort(graph.costs, axis=1)[:, :4]
+    assert {tuple(sorted((u, v))) for u, row in enumerate(nearest.tolist()) for v in row} <= set(
+        map(tuple, legs.tolist())
+    )
 
 
 def only_what_a_whole_point_needs(root, point):

@@ -266,8 +266,9 @@ class Root:
         if self.run.tour is None:
             return np.argwhere(np.triu(np.isfinite(values), 1))
         k = min(NEAREST, len(values) - 1)
+        # a view of some columns would keep all
         near = np.concatenate([
-            np.argpartition(values[first : first + ROWS], k - 1, axis=1)[:, :k]
+            np.argpartition(values[first : first + ROWS], k - 1, axis=1)[:, :k].copy()
             for first in range(0, len(values), ROWS)
         ])  # fmt: skip
         others = np.arange(1, len(values))

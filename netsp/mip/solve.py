@@ -60,7 +60,7 @@ OUT_OF_REACH, LARGE = 0.02, 300
 """A larger gap than the first after covers, the program over all classes does not close where there
 are more goals than the second: what time is left is worth more in a search. In two worlds of 500
 goals, 40 s of the program closed 0.1 % and nothing, of a search nothing and 0.4 %. With 100 goals
-it closes such gaps, in a minute or in some."""
+it has closed such gaps."""
 
 SEARCH_AGAIN = 0.5
 """Share of the last gap at which the classes that the LP visits are searched once more."""
