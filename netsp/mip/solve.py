@@ -52,9 +52,11 @@ would take that long, and cannot be stopped."""
 MANY_GOALS = 100
 """With so many the bound of the goals comes first, and its cuts are those of the first LP."""
 
-GOALS_SHARE, CELLS_SHARE = 0.1, 0.8
-"""Part of the time that is left which the bound from the goals alone may take, and that of covers,
-where there are very many classes."""
+GOALS_SHARE, CELLS_SHARE, CELLS_FOR = 0.1, 0.8, 17_000
+"""Part of the time that is left which the bound from the goals alone may take. That of covers grows
+with the square of the classes, as matrices do, up to the second for so many classes: the program
+over 6000 classes closes in minutes what covers leave after half a minute, that over 14,000 takes
+longer for a step than covers do."""
 
 OUT_OF_REACH, LARGE = 0.02, 300
 """A larger gap than the first after covers, the program over all classes does not close where there
@@ -195,7 +197,7 @@ class MipRun(SearchingRun):
             return run.solve(backend, None), run.cuts
 
         climbs = self._climbs
-        part = CELLS_SHARE if climbs else GOALS_SHARE
+        part = self._cells_share if climbs else GOALS_SHARE
         share = Clock(part * self.clock.left, within=self.clock) if self.clock.limit else self.clock
         limits = Limits(share, rng=self.rng)
 
@@ -214,6 +216,12 @@ class MipRun(SearchingRun):
         """Whether covers come first: with fewer goals the relaxation over classes is quicker than
         those below it."""
         return len(self.graph) > MANY_CLASSES and self.graph.goal_count >= MANY_GOALS
+
+    @property
+    def _cells_share(self) -> float:
+        """Part of the time left that covers may take."""
+        share = CELLS_SHARE * (len(self.graph) / CELLS_FOR) ** 2
+        return min(max(share, GOALS_SHARE), CELLS_SHARE)
 
     @property
     def _out_of_reach(self) -> bool:
