@@ -234,8 +234,8 @@ class Root:
 
     def _rule_out_over(self, over: OverGoals) -> list[Cut]:
         """What a program over goals or cells has proven, taken over: most of what lies far from the
-        base is in no better tour. Its cuts; of covers' those with a price, for with all of them linear
-        programs take half as long again."""
+        base is in no better tour. Its cuts; of those of covers the ones that have a price, for with
+        all of them linear programs take half as long again."""
         run, costs = self.run, self.costs
         found = over.cells
         if found is None:

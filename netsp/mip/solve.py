@@ -163,6 +163,8 @@ class MipRun(SearchingRun):
                             if self._out_of_reach:
                                 search_and_merge(self, solve_merged)
                         if core is not None and not self.done:
+                            # from here on: covers may take longer than its share
+                            core.begin_share()
                             # the tours found meanwhile are not all among its classes
                             core.known = min(core.known, self.length)
                             core.prove(backend, walks=walks)

@@ -154,8 +154,8 @@ class SearchingRun(SolverRun):
     @contextmanager
     def core(self) -> Iterator[Self | None]:
         """A run like this one over the classes of least tether, and those beside the best tour if
-        there is room for enough of them; None where they are too few to be worth it. When its own
-        share of the time is over, the body is left early."""
+        there is room for enough of them; None where they are too few to be worth it. Its share of
+        the time begins with `begin_share`; when that is over, the body is left early."""
         graph = self.graph
         core = least_tethers(graph.costs_to_base, graph.cluster, self.classes_per_goal)
         few = len(graph) <= max(MEASURE_AT_ONCE, LARGER * len(core))
@@ -166,9 +166,8 @@ class SearchingRun(SolverRun):
         if self.classes_per_goal >= ENOUGH_BESIDE:
             core = beside
         core = np.union1d(core, np.array(self.tour or (0,), dtype=np.int64))
-        limit = CORE_SHARE * self.clock.left if self.clock.limit is not None else None
         inner = type(self)(
-            graph.subgraph(core), Limits(Clock(limit, within=self.clock), rng=self.rng),
+            graph.subgraph(core), Limits(self.clock, rng=self.rng),
             search_rounds=self.search_rounds,
         )  # fmt: skip
         inner.iteration_limit = self.iteration_limit - self.iterations
@@ -181,6 +180,10 @@ class SearchingRun(SolverRun):
             self.check()
         finally:
             self.iterations += inner.iterations
+
+    def begin_share(self) -> None:
+        """Give a run over a core its part of the time that is left now."""
+        self.clock = self.clock.part(CORE_SHARE)
 
     @property
     def classes_per_goal(self) -> int:
