@@ -5,6 +5,7 @@ import itertools
 import math
 import random
 import sys
+import time
 
 import numpy as np
 import pytest
@@ -267,6 +268,32 @@ def test_beyond_reach_of_the_program_over_all_classes_the_time_left_is_for_the_s
     # without a limit of time there would be no end of searches
     assert ("root" in stages) == ("iteration_limit" in limits)
     assert ("merged" in stages) == ("time_limit" in limits)
+
+
+def test_however_long_covers_take_the_core_has_its_share_of_what_is_left(monkeypatch):
+    module = sys.modules["netsp.mip.solve"]
+    began, proven = [], []
+
+    def slowly(run, backend):
+        until = run.clock.elapsed + 0.6 * run.clock.left
+        while run.clock.elapsed < until:
+            time.sleep(0.01)
+        began.append(run.clock.left)
+
+    def program(run, known=module.MipRun.program):
+        proven.append(run.done)
+        return known(run)
+
+    monkeypatch.setattr(module.MipRun, "bound_by_goals", slowly)
+    monkeypatch.setattr(module.MipRun, "program", program)
+    monkeypatch.setattr(module, "CORE_FIRST", 50)
+    monkeypatch.setattr("netsp.solving.searching.MEASURE_AT_ONCE", 50)
+    monkeypatch.setattr("netsp.solving.searching.LARGER", 1)
+    graph = travel_graph(random_world(0, goals=14, tether_length=320.0))
+    found = solve_graph(graph, "mip", time_limit=10.0)
+    assert began
+    assert proven[0]
+    assert graph.is_tour(found.tour)
 
 
 @pytest.mark.parametrize("seed", range(2))
