@@ -82,7 +82,7 @@ def test_conjugates_of_relators_are_empty():
 
 
 @given(st.lists(three, max_size=4))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 def test_elimination_leaves_the_group_what_it_is(relators):
     meaning, rank, left = eliminated(3, relators)
 

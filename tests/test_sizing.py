@@ -214,7 +214,7 @@ def test_the_margin_of_a_post_is_the_closed_form():
     assert found.stops[0].tension_ratio == pytest.approx(math.exp(0.3 * found.stops[0].turning))
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=5, deadline=None)
 @given(seed=st.integers(0, 10**6))
 def test_within_its_margin_a_tour_fits_every_world_and_beyond_it_the_grown_one_does_not(seed):
     problem = random_world(seed, goals=4, tether=330.0)
