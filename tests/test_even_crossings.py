@@ -28,6 +28,8 @@ from netsp.mip.solve import solve
 from netsp.mip.towers import OverClasses, OverWays
 from netsp.solving.limits import Limits
 from netsp.solving.run import Stop
+from netsp.travel.costs import CostTable
+from netsp.travel.graph import TravelGraph
 from netsp.travel.ways import WaysByParity
 from netsp.worlds import random_world
 from tests.brute import brute_tour
@@ -294,6 +296,27 @@ def test_however_long_covers_take_the_core_has_its_share_of_what_is_left(monkeyp
     assert began
     assert proven[0]
     assert graph.is_tour(found.tour)
+
+
+def share_of_covers(goals, classes):
+    cluster = np.sort(np.append(np.arange(goals + 1), np.ones(classes - goals - 1, dtype=int)))
+    costs = CostTable(np.broadcast_to(1.0, (classes, classes)), cluster)
+    graph = TravelGraph(cluster, [()] * classes, np.ones(classes), costs)
+    return sys.modules["netsp.mip.solve"].MipRun(graph)._cells_share
+
+
+def test_covers_have_more_of_the_time_the_more_classes_there_are():
+    shares = [share_of_covers(100, n) for n in (500, 3000, 9000, 13_000, 20_000)]
+    module = sys.modules["netsp.mip.solve"]
+    assert shares[0] == module.GOALS_SHARE
+    assert shares[-1] == module.CELLS_SHARE
+    assert shares == sorted(shares)
+    assert len(set(shares)) > 3
+
+
+def test_with_hundreds_of_goals_covers_have_all_the_time_that_they_may():
+    module = sys.modules["netsp.mip.solve"]
+    assert share_of_covers(module.LARGE + 1, 500) == module.CELLS_SHARE
 
 
 @pytest.mark.parametrize("seed", range(2))

@@ -222,6 +222,8 @@ class MipRun(SearchingRun):
     @property
     def _cells_share(self) -> float:
         """Part of the time left that covers may take."""
+        if self.graph.goal_count > LARGE:
+            return CELLS_SHARE  # it is they that close the gap there
         share = CELLS_SHARE * (len(self.graph) / CELLS_FOR) ** 2
         return min(max(share, GOALS_SHARE), CELLS_SHARE)
 
