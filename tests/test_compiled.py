@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 import netsp
+from netsp.compiled.kernel import Kept
 
 CALLEE = """
 from typing import NamedTuple
@@ -64,3 +65,40 @@ def test_a_kernel_is_compiled_again_when_one_that_it_calls_has_changed(package):
 def test_a_class_in_a_signature_may_be_renamed(package):
     assert package("Pair", 3.0) == 6.0
     assert package("Couple", 3.0) == 6.0
+
+
+def test_what_two_processes_compile_at_once_is_found_under_its_own_types_or_not_at_all(tmp_path):
+    one, other = Kept(str(tmp_path), "f", "stamp"), Kept(str(tmp_path), "f", "stamp")
+    write = one._save_data
+
+    def while_the_other_keeps_its_own(name, data):
+        other._load_index = dict  # it has looked before there was any
+        other.save("of ints", "for ints")
+        write(name, data)
+
+    one._save_data = while_the_other_keeps_its_own
+    one.save("of floats", "for floats")
+    kept = Kept(str(tmp_path), "f", "stamp")
+    assert kept.load("of ints") in ("for ints", None)
+    assert kept.load("of floats") in ("for floats", None)
+
+
+def test_nothing_older_is_found_under_a_name_while_it_is_compiled_anew(tmp_path):
+    Kept(str(tmp_path), "f", "old").save("of floats", "as it was")
+    new, seen = Kept(str(tmp_path), "f", "new"), []
+    write = new._save_index
+
+    def look_first(overloads):
+        write(overloads)
+        seen.append(Kept(str(tmp_path), "f", "new").load("of floats"))
+
+    new._save_index = look_first
+    new.save("of floats", "as it is")
+    assert seen == ["as it is"]
+
+
+def test_files_of_sources_that_are_no_more_are_removed(tmp_path):
+    for stamp in ("one", "another", "a third"):
+        Kept(str(tmp_path), "f", stamp).save(f"of {stamp}", "compiled")
+    Kept(str(tmp_path), "g", "stamp").save("of floats", "compiled")
+    assert len(list(tmp_path.glob("f.*.nbc"))) == len(list(tmp_path.glob("g.*.nbc"))) == 1

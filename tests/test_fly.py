@@ -322,7 +322,14 @@ def test_ctrl_c_at_the_command_stops_the_vehicle_offers_the_way_home_and_keeps_t
             # tests that run in the background of a shell have it ignored
             preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
         )  # fmt: skip
-        autopilot.event("target", seconds=90.0)
+        autopilot.until(
+            lambda: (
+                command.poll() is not None
+                or any(e.get("event") == "target" for e in list(autopilot.events))
+            ),
+            seconds=90.0,
+        )
+        assert command.poll() is None, command.communicate()[1]
         autopilot.sleep(4.0)
         command.send_signal(signal.SIGINT)
         told = command.communicate(timeout=60)[1]
