@@ -6,6 +6,7 @@ import random
 import signal
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,9 +17,12 @@ from netsp.command.main import main
 from netsp.errors import InputError
 from netsp.execute.events import Surprises
 from netsp.execute.log import ExecutionOptions
+from netsp.fly.checks import ready
 from netsp.fly.flight import fly
 from netsp.fly.inputs import event_of
+from netsp.fly.rehearsal import rehearse
 from netsp.fly.stopped import RefusedError
+from netsp.guard.fix import Fix
 from netsp.link.address import Address
 from netsp.link.dialect import dialect, parser
 from netsp.link.frame import Frame
@@ -140,6 +144,24 @@ def test_a_vehicle_that_is_not_ready_is_not_moved(tour):
             with pytest.raises(RefusedError, match=why):
                 flown.fly(tour)
             assert flown.targets == []
+
+
+def test_an_armed_vehicle_is_not_refused_before_it_has_said_whether_it_is():
+    """Its first heartbeat comes before its clock is known, its position before the second."""
+    placed = Fix(1.0, (0.0, 0.0, 0.0), estimate=True)
+    said = iter([placed] * 5)
+
+    class Heard:
+        silent_s = 0.0
+        now = property(lambda self: next(said, replace(placed, armed=True, mode="GUIDED")))
+
+        def ask_for_positions(self):
+            pass
+
+        def sleep(self, seconds):
+            pass
+
+    ready(Heard(), np.zeros(3), 2.0)
 
 
 def test_a_link_with_nobody_at_the_other_end_is_told(tour):
@@ -311,8 +333,7 @@ def test_ctrl_c_at_the_command_stops_the_vehicle_offers_the_way_home_and_keeps_t
     problem, solution, run = tmp_path / "p.json", tmp_path / "s.json", tmp_path / "run"
     problem.write_text(SITE.to_json())
     solution.write_text(tour.to_json())
-    with Flown() as flown:
-        flown.fly(tour)  # else, on a fresh machine, the command compiles under way
+    rehearse()  # on a fresh machine that takes a minute, in which an armed vehicle drifts off
     slow = 2.0  # the flight must not be over before it is stopped
     with Autopilot(pace=slow, params={"FS_GCS_ENABLE": 0}) as autopilot:
         autopilot.tell(do="arm")

@@ -55,10 +55,8 @@ def steps() -> Iterator[tuple[str, Callable[[], object]]]:
     import numpy as np
 
     from netsp.errors import InputError, LimitReachedError
-    from netsp.execute import execute
-    from netsp.guard.fix import Fix
-    from netsp.guard.guard import Guard
-    from netsp.guard.space import SpaceSite
+    from netsp.fly.rehearsal import rehearse
+    from netsp.guard.rehearsal import rehearse as watched
     from netsp.judge import verify
     from netsp.mip.prices import Prices
     from netsp.mip.program import Duals
@@ -66,7 +64,6 @@ def steps() -> Iterator[tuple[str, Callable[[], object]]]:
     from netsp.online.equipment import TetherPhysics
     from netsp.online.mission import Mission
     from netsp.online.simulate import simulate
-    from netsp.problem import Problem
     from netsp.solvers.solve import solve, travel_graph
     from netsp.solvers.table import SOLVERS
     from netsp.space.solve import solve_mission
@@ -105,12 +102,7 @@ def steps() -> Iterator[tuple[str, Callable[[], object]]]:
             solve(polygons, roadmap="prm", roadmap_options={"samples": 300}, time_limit=5.0)
 
     yield "sampled roadmap", sampled
-    square = [(5, 2), (6, 2), (6, 3), (5, 3)]
-    small = Problem.model_validate(
-        {"schema_version": 1, "base": (0, 0), "goals": [(4, 1), (4, -1)], "tether_length": 8,
-         "obstacles": [{"center": (2, 0), "radius": 0.5}, {"polygon": square}]}
-    )  # fmt: skip
-    yield "tours carried out", lambda: execute(small, solve(small))
+    yield "tours carried out", rehearse
     solids = [{"capsule": {"a": (0, 0, -3), "b": (0, 0, 3), "radius": 0.5}},
               {"box": {"center": (3, 0, 0), "size": (1, 1, 1)}}]  # fmt: skip
     scene = Scene.model_validate({"schema_version": 1, "name": "warm-up", "solids": solids})
@@ -136,13 +128,8 @@ def steps() -> Iterator[tuple[str, Callable[[], object]]]:
                 scene=scene, time_limit=20.0),
     )  # fmt: skip
 
-    def guarded() -> None:
-        for site in (Guard(small), Guard(SpaceSite(plain, scene))):
-            for k in range(60):
-                place = site.site.start + np.array([0.05 * k, 0.04 * k, -0.01 * k])
-                site.take(Fix(0.1 * k, (place[0], place[1], place[2]), estimate=True))
-
-    yield "a guard", guarded
+    for in_space in (False, True):
+        yield f"a guard in {'space' if in_space else 'a site'}", partial(watched, in_space)
 
     def paper() -> None:
         model = ReactTether(scene.field(), 0.1)

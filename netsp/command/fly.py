@@ -137,6 +137,7 @@ def _flown(
     from netsp.execute.repair import REPLAN_S
     from netsp.files import output_folder
     from netsp.fly.flight import fly
+    from netsp.fly.rehearsal import rehearse
     from netsp.link.address import Address
     from netsp.link.session import Session
     from netsp.link.udp import UdpLink
@@ -151,6 +152,7 @@ def _flown(
     with ExitStack() as stack:
         stack.enter_context(output_folder(args.output))
         stack.enter_context(nullcontext() if args.quiet else compile_messages(sys.stderr))
+        rehearse()
         page, sources = None, []
         if args.events:
             from netsp.fly.inputs import events_of
@@ -212,7 +214,9 @@ def _watched(problem: Problem, page: Page, speed: float) -> Callable[[ExecutionR
     """Has a page show what a guard makes of the flight."""
     from netsp.guard.fix import Fix
     from netsp.guard.guard import Guard, GuardOptions
+    from netsp.guard.rehearsal import rehearse
 
+    rehearse(in_space=False)
     guard = Guard(problem, GuardOptions(noise=0.05, drift=0.05, speed=max(speed, 0.1)))
 
     def on_step(row: ExecutionRow) -> None:

@@ -9,7 +9,6 @@ planned anew when that promises to save more time than planning takes.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +17,6 @@ import shapely
 
 from netsp.arrays import Floats
 from netsp.clock import Clock
-from netsp.compiled.tiers import everything_compiled
 from netsp.errors import LimitReachedError, NetspError
 from netsp.execute.plan import HOME, Leg, legs_of
 from netsp.geometry import polylines
@@ -123,20 +121,6 @@ def _in_the_way(problem: Problem, path: Floats) -> int | None:
         if room < problem.clearance - place:
             return i
     return None
-
-
-def make_ready() -> None:
-    """Have everything loaded that a repair needs, and compiled on a machine that never did: it
-    would take its time from planning."""
-    tiny = Problem(
-        base=(0.0, 0.0, 0.0),
-        goals=(Goal(position=(4.0, 0.0, 0.0)), Goal(position=(4.0, 3.0, 0.0))),
-        tether_length=9.0,
-        obstacles=(Circle(center=(2.0, 1.0), radius=0.5), Circle(center=(3.0, 2.0), radius=0.5)),
-    )  # fmt: skip
-    with everything_compiled():
-        repair(tiny, np.array([4.0, 0.0, 0.0]), np.array([[0.0, 0, 0], [4, 0, 0]]), [0, 1], 1.0,
-               "", limit=math.inf)  # fmt: skip
 
 
 def repair(

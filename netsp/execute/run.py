@@ -14,7 +14,8 @@ from netsp.execute.aside import aside
 from netsp.execute.events import Event, Surprises, changed, index_of
 from netsp.execute.log import Arrival, Entry, Execution, ExecutionOptions, ExecutionRow
 from netsp.execute.plan import HOME, Leg, legs_of
-from netsp.execute.repair import Repair, broken, make_ready, reachable, repair
+from netsp.execute.ready import make_ready
+from netsp.execute.repair import Repair, broken, reachable, repair
 from netsp.fields import LARGEST, checked_argument, checked_instance
 from netsp.geometry import polylines
 from netsp.hsignature import signature

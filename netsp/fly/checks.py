@@ -48,7 +48,14 @@ def ready(
         raise RefusedError(f"no vehicle has been heard for {WAIT_S:g} s: is the link right?")
     session.ask_for_positions()
     m = dialect()
-    placed = until(lambda: session.now.position is not None and session.now.estimate is not None)
+
+    def told() -> bool:
+        # a heartbeat says whether it is armed, but before the vehicle's clock is known it says
+        # nothing yet; the next may come a second after the first position
+        now = session.now
+        return None not in (now.position, now.estimate, now.armed)
+
+    placed = until(told)
     now = session.now
     if not placed or now.position is None or not now.estimate:
         raise RefusedError("the vehicle has no position estimate")

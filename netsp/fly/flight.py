@@ -12,6 +12,7 @@ from netsp.execute.events import Event, Surprises
 from netsp.execute.log import Execution, ExecutionOptions, ExecutionRow
 from netsp.execute.run import StopsFlightError, execute
 from netsp.fly.checks import ready
+from netsp.fly.rehearsal import rehearse
 from netsp.fly.vehicle import LinkedVehicle
 from netsp.judge import verify
 from netsp.link.dialect import dialect
@@ -82,6 +83,7 @@ def fly(
         raise InputError("surprises: push: a real vehicle says itself where it is; expected none")
     if options.reach < LEAST_REACH:
         raise InputError(f"reach: expected at least {LEAST_REACH:g}, got {options.reach:g}")
+    rehearse()
     start = np.array(problem.base if problem.state is None else problem.state.position)
     ready(session, start, NEAR_START, should_stop)
     vehicle = LinkedVehicle(session, options.reach)

@@ -10,7 +10,9 @@ from netsp.errors import InputError
 from netsp.guard.alarms import Level
 from netsp.guard.guard import Guard
 from netsp.guard.memory import restore, save
+from netsp.guard.rehearsal import rehearse
 from netsp.guard.report import Report
+from netsp.guard.space import SpaceSite
 from netsp.guard.stream import Stream
 from netsp.link.address import Address
 from netsp.link.dialect import dialect
@@ -71,6 +73,7 @@ def watch(
         The link cannot be had, or the state file is not of this site.
     """
     tell = say or (lambda _: None)
+    rehearse(isinstance(guard.site, SpaceSite))
     if state is not None:
         known = restore(guard, state)
         if known is not None:

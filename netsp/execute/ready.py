@@ -1,0 +1,39 @@
+"""What a repair needs, compiled before there is one: it would take its time from planning."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+
+import numpy as np
+
+from netsp.compiled.tiers import everything_compiled
+from netsp.execute.repair import repair
+from netsp.problem import Circle, Goal, Problem, State
+from netsp.roadmap.from_state import graph_from_state
+from netsp.solvers.solve import solve_graph
+from netsp.worlds import random_world
+
+_SOLVERS = (("dp", None), ("mip", None), ("lns", 200), ("auto", 30))
+"""Between them, with these iteration limits, they call all that a new order may take."""
+
+
+@cache
+def make_ready() -> None:
+    """Have everything loaded that a repair needs, and compiled on a machine that never did."""
+    tiny = Problem(
+        base=(0.0, 0.0, 0.0),
+        goals=(Goal(position=(4.0, 0.0, 0.0)), Goal(position=(4.0, 3.0, 0.0))),
+        tether_length=9.0,
+        obstacles=(Circle(center=(2.0, 1.0), radius=0.5), Circle(center=(3.0, 2.0), radius=0.5)),
+    )  # fmt: skip
+    world = random_world(1, goals=9, tether_length=450.0)
+    begun = State(position=world.goals[0].position, signature=())
+    with everything_compiled():
+        repair(
+            tiny, np.array([4.0, 0.0, 0.0]), np.array([[0.0, 0, 0], [4, 0, 0]]), [0, 1], 1.0, "",
+            limit=math.inf,
+        )  # fmt: skip
+        graph = graph_from_state(world.model_copy(update={"state": begun}))
+        for solver, iterations in _SOLVERS:
+            solve_graph(graph, solver, iteration_limit=iterations)
