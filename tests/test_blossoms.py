@@ -18,6 +18,7 @@ from netsp.mip.prices import Prices
 from netsp.mip.program import duals_of_relaxation
 from tests.brute import brute_tour
 from tests.test_contract import random_graph
+from tests.worlds import costs_of
 
 PRISM = np.array([(0, 1), (1, 2), (0, 2), (3, 4), (4, 5), (3, 5), (0, 3), (1, 4), (2, 5)])
 HALVES = np.array([0.5] * 6 + [1.0] * 3)
@@ -108,7 +109,7 @@ def test_bounds_with_teeth_are_below_their_certificate_and_the_optimum(seed, pro
             lp.cuts, graph.cluster,
         )  # fmt: skip
         dead = ~np.isfinite(graph.costs)
-        claimed = Prices(graph.costs, dead, graph.cluster, lp.cuts, duals).bound
+        claimed = Prices(costs_of(graph), dead, graph.cluster, lp.cuts, duals).bound
         exact = exact_bound(graph.costs, graph.cluster, lp.cuts, duals)
         assert claimed <= exact <= best * (1 + 1e-12)
         assert float(exact) - claimed <= 1e-9 * max(1.0, scale) * len(lp.cuts)

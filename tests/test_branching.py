@@ -27,6 +27,7 @@ from netsp.travel.graph import TravelGraph
 from tests.brute import brute_tour
 from tests.test_blossoms import all_legs, some_cut, tours_as_points
 from tests.test_contract import random_graph
+from tests.worlds import costs_of
 
 
 def root_of(graph, *, tour=None, rows=None):
@@ -132,7 +133,7 @@ def test_prices_of_a_list_of_legs_are_those_of_a_matrix(seed, chance, scale):
     duals = duals_of_relaxation(
         scale * rng.normal(size=7), scale * np.abs(rng.normal(size=5)), cuts, graph.cluster
     )
-    of_matrix = Prices(graph.costs, dead, graph.cluster, cuts, duals)
+    of_matrix = Prices(costs_of(graph), dead, graph.cluster, cuts, duals)
     costs = graph.costs[legs[:, 0], legs[:, 1]]
     of_list = LegPrices(legs, costs, graph.cluster, cuts, duals)
     assert of_list.bound == pytest.approx(of_matrix.bound, abs=1e-9)

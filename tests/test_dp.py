@@ -18,7 +18,7 @@ from netsp.mip.prices import Prices
 from netsp.mip.program import Duals
 from tests.brute import brute_tour
 from tests.test_contract import random_graph
-from tests.worlds import random_world
+from tests.worlds import costs_of, random_world
 
 SOLVE = importlib.import_module("netsp.dp.solve")
 
@@ -34,7 +34,7 @@ def tours(graph):
 
 
 def walks_of(graph, remembered):
-    walks = Walks(graph.cluster, graph.costs)
+    walks = Walks(graph.cluster, costs_of(graph))
     near = np.argsort(np.random.default_rng(0).random((walks.n + 1, walks.n + 1)), axis=1)
     walks.memory = Memory(near, remembered)
     return walks
@@ -135,7 +135,7 @@ def test_labels_do_not_depend_on_how_many_share_the_work(monkeypatch):
     found = []
     for threads in (1, 2, 5):
         monkeypatch.setattr(walks_module, "THREADS", threads)
-        walks = Walks(graph.cluster, graph.costs)
+        walks = Walks(graph.cluster, costs_of(graph))
         walk = walks.solve(np.zeros(10), np.inf, lambda: None)
         found.append((walk.bound, walk.labels, walk.rows.tolist()))
     assert found[0] == found[1] == found[2]

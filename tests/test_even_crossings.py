@@ -35,6 +35,7 @@ from netsp.worlds import random_world
 from tests.brute import brute_tour
 from tests.test_blossoms import all_legs, tours_as_points
 from tests.test_contract import random_graph
+from tests.worlds import costs_of
 
 
 def some_cut(chance, graph):
@@ -73,7 +74,7 @@ def test_bounds_with_split_clusters_are_below_their_certificate_and_the_optimum(
             lp.cuts, graph.cluster,
         )  # fmt: skip
         dead = ~np.isfinite(graph.costs)
-        prices = Prices(graph.costs, dead, graph.cluster, lp.cuts, duals)
+        prices = Prices(costs_of(graph), dead, graph.cluster, lp.cuts, duals)
         exact = exact_bound(graph.costs, graph.cluster, lp.cuts, duals)
         assert prices.bound <= exact <= brute_tour(graph) * (1 + 1e-12)
         assert float(exact) - prices.bound <= 1e-9 * max(1.0, scale) * len(lp.cuts)
@@ -96,7 +97,7 @@ def test_bounds_hold_where_a_tooth_does_not_cross_any_more(seed):
         np.full(graph.goal_count + 1, 5.0), np.array([20.0, 30.0]), cuts, graph.cluster
     )
     dead = ~np.isfinite(graph.costs)
-    bound = Prices(graph.costs, dead, graph.cluster, cuts, duals).bound
+    bound = Prices(costs_of(graph), dead, graph.cluster, cuts, duals).bound
     exact = float(exact_bound(graph.costs, graph.cluster, cuts, duals))
     assert bound == pytest.approx(exact, abs=1e-6)
     assert bound <= brute_tour(graph) * (1 + 1e-12)
@@ -187,7 +188,7 @@ def test_bounds_of_covers_hold_and_what_they_rule_out_is_in_no_best_tour(seed):
             # as bounds over classes, from the dual values of the cells
             own = found.cells.of(graph.cluster, odd)
             prices = Prices(
-                graph.costs, ~np.isfinite(graph.costs), graph.cluster, found.cuts_over(own),
+                costs_of(graph), ~np.isfinite(graph.costs), graph.cluster, found.cuts_over(own),
                 found.duals_over(own),
             )  # fmt: skip
             assert prices.bound <= best.length * (1.0 + 1e-9)

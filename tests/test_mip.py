@@ -44,7 +44,7 @@ from netsp.travel.graph import TravelGraph
 from netsp.worlds import random_world as far_world
 from tests.brute import brute_tour as brute
 from tests.test_contract import random_graph
-from tests.worlds import random_world
+from tests.worlds import costs_of, random_world
 
 
 def solve(graph, params=None, **limits):
@@ -114,7 +114,7 @@ def test_any_dual_values_give_a_valid_bound(backend):
 
 def priced(graph, cuts, duals):
     """All legs of a graph at dual values, none of them dead."""
-    return Prices(graph.costs, ~np.isfinite(graph.costs), graph.cluster, cuts, duals)
+    return Prices(costs_of(graph), ~np.isfinite(graph.costs), graph.cluster, cuts, duals)
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -139,7 +139,7 @@ def test_what_prices_rule_out_is_in_no_shorter_tour(seed):
             ),
         )  # fmt: skip
         dead = ~np.isfinite(graph.costs)
-        prices = Prices(graph.costs, dead, graph.cluster, program.cuts, shaken)
+        prices = Prices(costs_of(graph), dead, graph.cluster, program.cuts, shaken)
         before = dead.sum()
         prices.rule_out(1.0001 * best)
         left = np.where(dead, np.inf, graph.costs)
@@ -269,12 +269,12 @@ def test_prices_are_the_same_to_the_bit_however_they_are_summed_and_from_either_
     cuts = [Cut(rng.random(n) < 0.5, 1 + k % 6) for k in range(12)]
     duals = duals_of_relaxation(rng.normal(size=7), rng.random(12), cuts, graph.cluster)
     none = ~np.isfinite(graph.costs)
-    all_of_them = row_prices(Prices(graph.costs, none.copy(), graph.cluster, cuts, duals))
+    all_of_them = row_prices(Prices(costs_of(graph), none.copy(), graph.cluster, cuts, duals))
     assert (all_of_them == all_of_them.T).all()
     for u, v in np.argwhere(np.triu(~none, 1))[::7].tolist():
         dead = np.ones_like(none)
         dead[u, v] = dead[v, u] = False
-        alone = Prices(graph.costs, dead, graph.cluster, cuts, duals)
+        alone = Prices(costs_of(graph), dead, graph.cluster, cuts, duals)
         assert row_prices(alone)[u, v] == row_prices(alone)[v, u] == all_of_them[u, v]
         assert alone.of(np.array([[u, v]])) == all_of_them[u, v]
         shared = sum(duals.cut[k] for k, c in enumerate(cuts) if c.inside[u] and c.inside[v])
@@ -701,7 +701,7 @@ def test_looking_at_prices_can_be_stopped_half_way():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("netsp.mip.prices.ROWS", max(1, vertices // 6))
         with pytest.raises(Stop):
-            Prices(graph.costs, dead, graph.cluster, [], duals, stop)
+            Prices(costs_of(graph), dead, graph.cluster, [], duals, stop)
 
 
 def first_legs(graph):

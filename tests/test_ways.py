@@ -25,6 +25,7 @@ from netsp.solving.run import Stop
 from netsp.worlds import random_world
 from tests.test_blossoms import some_cut
 from tests.test_contract import random_graph
+from tests.worlds import costs_of
 
 
 def tours_of(graph):
@@ -44,7 +45,7 @@ def test_no_tour_pays_less_than_the_ways_to_its_vertices_and_along_its_legs(seed
     duals = duals_of_relaxation(
         0.5 + scale * rng.normal(size=5), scale * np.abs(rng.normal(size=3)), cuts, graph.cluster
     )
-    prices = Prices(graph.costs, np.isinf(graph.costs), graph.cluster, cuts, duals)
+    prices = Prices(costs_of(graph), np.isinf(graph.costs), graph.cluster, cuts, duals)
     terms, excess = prices._terms, prices._cost - prices._cheapest[graph.cluster]
     way, other, before = ways_from_base(terms, excess, np.inf)
     lengths, least = [], []

@@ -64,3 +64,9 @@ def small_worlds(draw, max_circles: int = 4, goals: int = 3, grid: bool = False)
         obstacles=[Circle(center=(x, y), radius=r) for x, y, r in obstacles],
         tether_length=draw(st.sampled_from([6.0, 9.0, 12.0])),
     )
+
+
+def costs_of(graph):
+    """Costs of legs, writable as solvers have them: read-only ones are of another type, for which
+    kernels would be compiled anew."""
+    return graph.costs.copy()

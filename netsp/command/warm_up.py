@@ -6,6 +6,8 @@ import argparse
 import contextlib
 import sys
 import time
+from collections.abc import Callable, Iterator
+from functools import partial
 
 EXAMPLE = "netsp warm-up"
 
@@ -17,7 +19,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Compile, and return the exit code."""
-    from netsp.command.compiling import compile_messages, steps
+    from netsp.command.compiling import compile_messages
     from netsp.command.patience import span
     from netsp.compiled.tiers import everything_compiled
 
@@ -34,3 +36,140 @@ def run(args: argparse.Namespace) -> int:
                 )  # fmt: skip
             step()
     return 0
+
+
+def steps() -> Iterator[tuple[str, Callable[[], object]]]:
+    """What to run so that all kernels are compiled, with names."""
+    import numpy as np
+
+    from netsp.clock import Clock
+    from netsp.errors import InputError, LimitReachedError
+    from netsp.fly.rehearsal import rehearse
+    from netsp.guard.rehearsal import rehearse as watched
+    from netsp.judge import verify
+    from netsp.mip.covers import climb
+    from netsp.mip.parities import odd_letters
+    from netsp.mip.prices import Prices
+    from netsp.mip.program import Duals
+    from netsp.mip.towers import OverClasses, OverWays
+    from netsp.online import ReactTether, Scene
+    from netsp.online.equipment import TetherPhysics
+    from netsp.online.mission import Mission
+    from netsp.online.scene import voxels
+    from netsp.online.scene.field import DistanceField
+    from netsp.online.simulate import simulate
+    from netsp.solvers.solve import solve, solve_graph, travel_graph
+    from netsp.solvers.table import SOLVERS
+    from netsp.solving.limits import Limits
+    from netsp.space.solve import solve_mission
+    from netsp.travel.graph import TravelGraph
+    from netsp.worlds import random_world
+
+    problem = random_world(1, goals=9, tether_length=450.0)
+    polygons = random_world(1, family="harbour", goals=4, tether_length=250.0)
+    for solver in SOLVERS:
+        # on a busy machine a time limit alone would leave kernels out
+        yield (
+            f"solver {solver}",
+            partial(solve, problem, solver, iteration_limit=20_000, time_limit=60.0),
+        )
+    fewer = problem.model_copy(update={"goals": problem.goals[:6]})
+    for solver in ("dp", "mip"):
+        yield f"solver {solver}, measured legs", partial(solve, fewer, solver, iteration_limit=4)
+    yield (
+        "solver dp, to the end",
+        partial(solve, random_world(2, goals=12, tether_length=300.0), "dp", iteration_limit=30),
+    )
+
+    def rounded() -> None:
+        graph = travel_graph(fewer)
+        costs, clusters = graph.costs_rounded(np.arange(len(graph))), graph.goal_count + 1
+        duals = Duals(np.zeros(clusters), np.zeros(len(costs)), np.zeros(0))
+        prices = Prices(costs, np.isinf(costs), graph.cluster, [], duals)
+        prices.rule_out(1.0)
+        prices.of(prices.cheapest(-1.0)[0])
+
+    yield "thousands of classes", rounded
+
+    def covered() -> None:
+        graph = travel_graph(random_world(3, goals=4, tether_length=200.0))
+        best = solve_graph(graph, "mip")
+        assert best.length is not None
+        odd, ways = odd_letters(graph.signatures), graph.ways_by_parity()
+        assert ways is not None
+        stops = [(int(graph.cluster[v]), odd[v]) for v in best.tour or ()]
+        for tower in OverClasses(graph.costs, graph.cluster, odd), OverWays(ways, np.inf):
+            climb(tower, stops, 1.02 * best.length, Clock(), Limits())
+
+    yield "covers", covered
+
+    def of_costs() -> None:
+        graph = travel_graph(fewer)
+        for solver in ("dp", "mip"):
+            solve_graph(TravelGraph.from_costs(graph.costs, graph.cluster), solver)
+
+    yield "matrices of costs", of_costs
+    yield "polygons and the judge", lambda: verify(polygons, solve(polygons))
+
+    def sampled() -> None:
+        # OMPL is an extra, and so few samples may miss a goal
+        with contextlib.suppress(InputError, LimitReachedError):
+            solve(polygons, roadmap="prm", roadmap_options={"samples": 300}, time_limit=5.0)
+
+    yield "sampled roadmap", sampled
+    yield "tours carried out", rehearse
+    solids = [{"capsule": {"a": (0, 0, -3), "b": (0, 0, 3), "radius": 0.5}},
+              {"box": {"center": (3, 0, 0), "size": (1, 1, 1)}}]  # fmt: skip
+    scene = Scene.model_validate({"schema_version": 1, "name": "warm-up", "solids": solids})
+    angle = np.linspace(np.pi, np.pi + 5.0, 12)
+    ring = np.column_stack([np.cos(angle), np.sin(angle), 0.1 * angle])
+    mission = Mission.model_validate(
+        {"schema_version": 1, "scene": "-", "anchor": (-2, 0, 0), "start": (-1.9, 0, 0),
+         "tether_length": 4.5, "waypoints": ring.tolist(), "camera": {"range": 2.0}, "speed": 0.5,
+         "tether": {"slack": 0.01, "diameter": 0.01, "pulls_vehicle": True},
+         "current": (0.1, 0, 0)}
+    )  # fmt: skip
+    plain = mission.model_copy(update={"tether": TetherPhysics()})
+    for planner, vehicle in (("predictive", "kinematic"), ("react", "bluerov2")):
+        yield (
+            f"missions, {planner}, {vehicle}",
+            partial(simulate, plain, planner, vehicle=vehicle, scene=scene),
+        )
+    yield "a tether in a current", partial(simulate, mission, vehicle="bluerov2", scene=scene)
+
+    yield (
+        "tours in space",
+        partial(solve_mission, plain.model_copy(update={"waypoints": plain.waypoints[:4]}),
+                scene=scene, time_limit=20.0),
+    )  # fmt: skip
+
+    for in_space in (False, True):
+        yield f"a guard in {'space' if in_space else 'a site'}", partial(watched, in_space)
+
+    def voxelled() -> None:
+        corners = np.array(np.meshgrid((0, 12), (0, 0.5), (0, 0.5), indexing="ij"))
+        faces = [
+            (0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1),
+            (2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4), (1, 5, 7), (1, 7, 3),
+        ]  # fmt: skip
+        # along the diagonal of its box, most of which is empty: with little memory only what is
+        # near surfaces is held, by kernels of its own
+        turn = np.linalg.qr(np.ones((3, 1)), mode="complete")[0].T
+        bar = corners.reshape(3, 8).T @ turn
+        points = np.random.default_rng(1).uniform(size=(5000, 3)) * (12, 0.5, 0.5)
+        points[:, 1] = np.where(points[:, 1] < 0.25, 0.0, 0.5)
+        for scarce in (False, True):
+            for grid in (
+                voxels.of_triangles(bar, faces, voxel=0.1, memory_limit=0.01 if scarce else 1.0),
+                voxels.of_cloud(points @ turn, voxel=0.1, memory_limit=0.018 if scarce else 1.0),
+            ):
+                assert (grid.table is not None) == scarce
+                DistanceField.build([], [], np.empty((0, 4)), [], grid, 0.0).distance(bar)
+
+    yield "meshes and clouds", voxelled
+
+    def paper() -> None:
+        model = ReactTether(scene.field(), 0.1)
+        model.update(model.start((-2, 0, 0), (-1, 0, 0)), (-1, -1, 0))
+
+    yield "the paper's tether", paper

@@ -65,7 +65,7 @@ class Prices:
             sets += of_teeth
             weight += [-duals.cut[k]] * len(of_teeth)
         inside = np.array(sets, dtype=bool).reshape(-1, self._size)
-        of_cut, member = np.nonzero(inside)
+        of_cut, member = map(np.ascontiguousarray, np.nonzero(inside))
         first_member = np.searchsorted(of_cut, np.arange(len(sets) + 1))
         by_vertex = np.argsort(member, kind="stable")
         first_at = np.searchsorted(member[by_vertex], np.arange(self._size + 1))

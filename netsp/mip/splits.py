@@ -84,12 +84,13 @@ class Splits:
             return []
         lengths = self.tower.by_parity(cells, ends)
         excess = y[:, None, None] * np.minimum(lengths - lengths.min(axis=2, keepdims=True), gap)
+        excess = np.ascontiguousarray(excess.swapaxes(0, 1))
         adds = {}
         for i in left:
             check()
             split = self.tower.cells((*own, i))
             adds[i] = len(split.cluster) - len(cells.cluster)
-            new = frustration(ends, excess[:, i], _sides(cells, split))
+            new = frustration(ends, excess[i], _sides(cells, split))
             self._promised[i] = max(new, FADES * self._promised.get(i, 0.0))
         left = [i for i in left if len(cells.cluster) + adds[i] <= self.most]
         promising = [i for i in left if self._promised[i] > HARDLY * gap]

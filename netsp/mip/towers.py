@@ -53,7 +53,7 @@ class OverClasses:
     def cells(self, obstacles: tuple[int, ...]) -> Cells:
         """As of `Tower.cells`."""
         both = np.unique(np.column_stack([self._cluster, packed(self._odd, obstacles)]), axis=0)
-        return Cells(obstacles, both[:, 0], both[:, 1])
+        return Cells(obstacles, *np.ascontiguousarray(both.T))
 
     def costs(self, cells: Cells) -> Floats:
         """As of `Tower.costs`."""
@@ -132,7 +132,7 @@ class OverWays:
         """As of `Tower.cells`."""
         both = np.column_stack([self._goal, packed(self._at_goal, obstacles)])
         both = np.unique(np.vstack([[[0, 0]], both]), axis=0)
-        return Cells(obstacles, both[:, 0], both[:, 1])
+        return Cells(obstacles, *np.ascontiguousarray(both.T))
 
     def costs(self, cells: Cells) -> Floats:
         """As of `Tower.costs`."""
