@@ -131,7 +131,7 @@ def test_a_torn_file_is_mended_wherever_it_is_torn(tmp_path):
     compare(study, out)
     data = out.read_bytes()
     ends = [k for k, c in enumerate(data) if c == ord("\n")]
-    for cut in (0, 1, 30, ends[0], ends[0] + 1, ends[2] - 1, len(data) - 1):
+    for cut in (0, 30, ends[0], ends[0] + 1, len(data) - 1):
         out.write_bytes(data[:cut])
         assert compare(study, out).begun == data[:cut].count(b"\n")
         rows = read_rows(out)

@@ -19,7 +19,7 @@ sys.path.insert(0, str(ROOT / "benchmarks"))
 
 from pages import PAGES, blocks, run_page  # noqa: E402
 
-QUICK = ("docs/roadmaps.md", "docs/solvers.md", "docs/tether.md", "docs/comparing.md")
+QUICK = ("docs/solvers.md", "docs/tether.md")
 """Pages that take seconds; `make accept` runs the others, too."""
 
 

@@ -84,7 +84,10 @@ def test_a_solver_of_another_package_works_in_a_study(installed, tmp_path):
 
 
 def test_a_tether_model_and_a_planner_of_another_package_fly(installed, tmp_path):
-    basin = ROOT / "missions" / "basin.json"
+    data = json.loads((ROOT / "missions" / "basin.json").read_text())
+    data |= {"scene": str(ROOT / "scenes" / "basin.json"), "waypoints": data["waypoints"][::5]}
+    basin = tmp_path / "basin.json"
+    basin.write_text(json.dumps(data))
     args = ("--planner", "cautious", "--tether-model", "straight", "-o", "run", "--quiet")
     done = netsp(installed, "simulate", basin, *args, cwd=tmp_path)
     assert done.returncode == 4, done.stderr  # some waypoints are left out

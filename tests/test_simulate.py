@@ -141,12 +141,6 @@ def test_no_waypoints_make_the_predictive_planner_exceed(waypoints, length):
     assert run.summary["visited"] + len(run.summary["left_out"]) == len(waypoints)
 
 
-def test_the_basin_mission_is_flown_whole():
-    run = simulate(Mission.load(MISSIONS / "basin.json"))
-    assert run.summary["visited"] == run.summary["waypoints"]
-    assert run.summary["exceedance_s"] == 0.0
-
-
 def test_ways_of_the_tree_are_shortest_and_pull_taut_to_the_truth():
     field = POST.field()
     grid = Grid(field, (-4, -4, -1), (4, 4, 1), 0.1, 0.0)
@@ -246,6 +240,7 @@ def test_simulate_writes_log_summary_and_picture(tmp_path, capsys):
     with (out / "log.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert summary["exceedance_s"] == 0.0
+    assert summary["visited"] == summary["waypoints"] > 90
     assert max(float(r["tether"]) for r in rows) == pytest.approx(
         summary["longest_tether"], abs=1e-4
     )
@@ -303,9 +298,17 @@ def test_a_planner_that_fails_holds_says_so_and_goes_on(monkeypatch):
     assert run.summary["defects"] >= 10
 
 
+def few_of_the_basin(folder, waypoints):
+    """A mission file with the first waypoints of the basin."""
+    data = json.loads((MISSIONS / "basin.json").read_text())
+    data |= {"scene": str(MISSIONS / data["scene"]), "waypoints": data["waypoints"][:waypoints]}
+    (folder / "basin.json").write_text(json.dumps(data))
+    return folder / "basin.json"
+
+
 def test_a_defect_of_planning_makes_the_command_fail(monkeypatch, tmp_path, capsys):
     monkeypatch.setitem(PLANNERS, "none", Broken)
-    place = MISSIONS / "basin.json"
+    place = few_of_the_basin(tmp_path, 8)
     assert main(["simulate", str(place), "--planner", "none", "-o", str(tmp_path / "run")]) == 1
     assert "defect" in capsys.readouterr().err
 
@@ -327,20 +330,17 @@ def test_a_dynamic_vehicle_in_a_current_keeps_the_tether_too(planner):
         assert run.summary["exceedance_s"] == 0.0
 
 
-@pytest.mark.parametrize("name", ["basin", "pipes", "jacket", "ship"])
+@pytest.mark.parametrize("name", ["pipes", "jacket", "ship"])
 def test_shipped_missions_are_flown_within_their_tether(name):
     flown = Mission.load(MISSIONS / f"{name}.json")
-    flown = flown.model_copy(update={"waypoints": flown.waypoints[:60], "camera": None})
+    flown = flown.model_copy(update={"waypoints": flown.waypoints[:40], "camera": None})
     run = simulate(flown)
     assert run.summary["exceedance_s"] == 0.0
     assert run.summary["visited"] == run.summary["waypoints"]
 
 
 def test_two_planners_are_drawn_side_by_side(tmp_path):
-    out, file = tmp_path / "run", tmp_path / "basin.json"
-    data = json.loads((MISSIONS / "basin.json").read_text())
-    data |= {"scene": str(MISSIONS / data["scene"]), "waypoints": data["waypoints"][:30]}
-    file.write_text(json.dumps(data))
+    out, file = tmp_path / "run", few_of_the_basin(tmp_path, 12)
     code = main(["simulate", str(file), "--compare", "none", "-o", str(out), "--quiet"])
     assert code == 0
     names = {p.relative_to(out).as_posix() for p in out.rglob("*.*")}

@@ -397,7 +397,7 @@ def test_what_is_not_known_of_classes_is_no_more_than_what_is_found_when_more_ar
     ways = ways_of(mission)
     some = list(range(len(ways.places)))
     few, many = [], []
-    for most, pulled, classes in ((4, 0, few), (40, 0, many)):
+    for most, pulled, classes in ((4, 0, few), (12, 0, many)):
         monkeypatch.setattr("netsp.space.classes.MOST_WORDS", most)
         monkeypatch.setattr("netsp.space.classes.MOST_PULLED", pulled)
         classes += classes_within(ways, some, Clock(60.0))

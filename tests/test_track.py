@@ -55,7 +55,7 @@ def test_a_track_goes_no_faster_than_its_fastest_leg_and_passes_every_position(l
     assert way <= track.speed * later * (1.0 + 1e-9) + 1e-9
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=5, deadline=None)
 @given(st.integers(0, 10**6))
 def test_wherever_a_ship_goes_the_tether_is_never_exceeded_and_comes_home_free(seed):
     rng = np.random.default_rng(seed)
