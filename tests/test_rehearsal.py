@@ -2,6 +2,7 @@
 
 import json
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -9,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from netsp import Circle, Problem, solve
+from netsp.fly import rehearsal
 from netsp.fly.rehearsal import rehearse
 from netsp.guard.rehearsal import rehearse as watched
 from tests.autopilot import Autopilot
@@ -117,6 +119,17 @@ def test_before_a_tour_is_flown_all_is_loaded_that_it_and_its_repairs_need(tmp_p
     assert "local" in entries or "replan" in entries
     assert before > 30
     assert more == []
+
+
+@pytest.mark.parametrize(("stage", "told"), [("solve", "on_progress"), ("execute", "on_step")])
+def test_ctrl_c_before_the_flight_ends_it(stage, told, monkeypatch):
+    """Planning and flying take Ctrl-C for the wish to have what there is."""
+    real = getattr(rehearsal, stage)
+    press = {told: lambda _: signal.raise_signal(signal.SIGINT)}
+    monkeypatch.setattr(rehearsal, stage, lambda *args, **more: real(*args, **{**more, **press}))
+    with pytest.raises(KeyboardInterrupt):
+        rehearse.__wrapped__()
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
 SCENE = {

@@ -7,11 +7,15 @@ before.
 
 from __future__ import annotations
 
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 
 from netsp.compiled.tiers import everything_compiled
 from netsp.execute.events import Surprises
-from netsp.execute.log import ExecutionOptions
+from netsp.execute.log import ExecutionOptions, ExecutionRow
 from netsp.execute.run import execute
 from netsp.problem import Problem
 from netsp.solvers.solve import solve
@@ -43,10 +47,44 @@ _EVENTS = {
 
 @cache
 def rehearse() -> None:
-    """Have everything loaded that a flight needs, and compiled on a machine that never flew."""
+    """Have everything loaded that a flight needs, and compiled on a machine that never flew.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        Ctrl-C, which planning and flying take for the wish to have what there is.
+    """
     site = Problem.model_validate(_SITE)
-    with everything_compiled():
+    with _interrupts() as pressed, everything_compiled():
+        tour = solve(site)
+
+        def on_step(_: ExecutionRow) -> None:
+            if pressed.is_set():
+                raise KeyboardInterrupt
+
         execute(
-            site, solve(site), ExecutionOptions(speed=0.5, reach=0.3),
-            surprises=Surprises.model_validate(_EVENTS),
+            site, tour, ExecutionOptions(speed=0.5, reach=0.3),
+            surprises=Surprises.model_validate(_EVENTS), on_step=on_step,
         )  # fmt: skip
+        if pressed.is_set():
+            raise KeyboardInterrupt
+
+
+@contextmanager
+def _interrupts() -> Iterator[threading.Event]:
+    """Set at Ctrl-C, which interrupts as ever."""
+    pressed = threading.Event()
+    before = signal.getsignal(signal.SIGINT)
+    hears = threading.current_thread() is threading.main_thread() and callable(before)
+
+    def press(*_: object) -> None:
+        pressed.set()
+        raise KeyboardInterrupt
+
+    if hears:
+        signal.signal(signal.SIGINT, press)
+    try:
+        yield pressed
+    finally:
+        if hears:
+            signal.signal(signal.SIGINT, before)
