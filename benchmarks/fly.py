@@ -25,6 +25,7 @@ from netsp.execute.events import Surprises
 from netsp.execute.log import Execution, ExecutionOptions, ExecutionRow
 from netsp.execute.plan import legs_of
 from netsp.fly.flight import fly
+from netsp.fly.rehearsal import rehearse
 from netsp.geometry import polylines
 from netsp.link.address import Address
 from netsp.link.dialect import dialect, parser
@@ -56,6 +57,7 @@ REPAIRS = ("local", "replan", "home")
 @contextmanager
 def vehicle(problem: Problem, pace: float, speed: float, seed: int) -> Iterator[Any]:
     """An autopilot that is armed at the base, and our session with it."""
+    rehearse()
     with Autopilot(
         pace=pace, speed=speed, seed=seed, noise=0.02, drift=0.03, smooth=1.0,
         params={"FS_GCS_TIMEOUT": 30},

@@ -229,6 +229,38 @@ def whole_or_interrupted() -> Iterator[None]:
         raise KeyboardInterrupt
 
 
+@contextmanager
+def interrupts_remembered() -> Iterator[Callable[[], None]]:
+    """Work that is of no use in part: Ctrl-C interrupts as ever, and again where what it met took
+    it for the wish to have what there is (solvers and flights do).
+
+    Yields
+    ------
+    callable
+        Raises KeyboardInterrupt if Ctrl-C was pressed; so does the end of the work.
+    """
+    pressed = threading.Event()
+    before = signal.getsignal(signal.SIGINT)
+    hears = threading.current_thread() is threading.main_thread() and callable(before)
+
+    def press(*_: Any) -> None:
+        pressed.set()
+        raise KeyboardInterrupt
+
+    def check() -> None:
+        if pressed.is_set():
+            raise KeyboardInterrupt
+
+    if hears:
+        signal.signal(signal.SIGINT, press)
+    try:
+        yield check
+    finally:
+        if hears:
+            signal.signal(signal.SIGINT, before)
+    check()
+
+
 def _interruptible() -> bool:
     """Whether Ctrl-C raises KeyboardInterrupt here."""
     return (

@@ -42,6 +42,7 @@ OPTIONS = ExecutionOptions(speed=0.5, reach=0.3)
 
 @pytest.fixture(scope="module")
 def tour():
+    rehearse()  # on a fresh machine that takes a minute, in which an armed vehicle drifts off
     return solve(SITE)
 
 
@@ -333,7 +334,6 @@ def test_ctrl_c_at_the_command_stops_the_vehicle_offers_the_way_home_and_keeps_t
     problem, solution, run = tmp_path / "p.json", tmp_path / "s.json", tmp_path / "run"
     problem.write_text(SITE.to_json())
     solution.write_text(tour.to_json())
-    rehearse()  # on a fresh machine that takes a minute, in which an armed vehicle drifts off
     slow = 2.0  # the flight must not be over before it is stopped
     with Autopilot(pace=slow, params={"FS_GCS_ENABLE": 0}) as autopilot:
         autopilot.tell(do="arm")

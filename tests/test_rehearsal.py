@@ -10,10 +10,14 @@ from pathlib import Path
 import pytest
 
 from netsp import Circle, Problem, solve
+from netsp.compiled.tiers import compiles
+from netsp.execute import execute, ready
 from netsp.fly import rehearsal
 from netsp.fly.rehearsal import rehearse
 from netsp.guard.rehearsal import rehearse as watched
 from tests.autopilot import Autopilot
+
+pytestmark = pytest.mark.skipif(not compiles(), reason="NUMBA_DISABLE_JIT is set")
 
 PACE = 4.0
 ROOT = Path(__file__).parent.parent
@@ -121,15 +125,38 @@ def test_before_a_tour_is_flown_all_is_loaded_that_it_and_its_repairs_need(tmp_p
     assert more == []
 
 
-@pytest.mark.parametrize(("stage", "told"), [("solve", "on_progress"), ("execute", "on_step")])
-def test_ctrl_c_before_the_flight_ends_it(stage, told, monkeypatch):
+@pytest.mark.parametrize(
+    ("module", "stage", "told"),
+    [(rehearsal, "solve", "on_progress"), (rehearsal, "execute", "on_step"),
+     (ready, "solve_graph", "on_progress")],
+)  # fmt: skip
+def test_ctrl_c_before_the_flight_ends_it(module, stage, told, monkeypatch):
     """Planning and flying take Ctrl-C for the wish to have what there is."""
-    real = getattr(rehearsal, stage)
+    real = getattr(module, stage)
     press = {told: lambda _: signal.raise_signal(signal.SIGINT)}
-    monkeypatch.setattr(rehearsal, stage, lambda *args, **more: real(*args, **{**more, **press}))
-    with pytest.raises(KeyboardInterrupt):
-        rehearse.__wrapped__()
-    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    monkeypatch.setattr(module, stage, lambda *args, **more: real(*args, **{**more, **press}))
+    monkeypatch.setattr("netsp.execute.run.make_ready", ready.make_ready.__wrapped__)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            rehearse.__wrapped__()
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def test_a_rehearsal_meets_no_defect(monkeypatch):
+    """It would hide there: a flight goes home with it."""
+    flown = []
+    monkeypatch.setattr(
+        rehearsal, "execute", lambda *args, **more: flown.append(execute(*args, **more))
+    )
+    rehearse.__wrapped__()
+    (done,) = flown
+    kinds = [e.response for e in done.entries]
+    assert "defect" not in kinds
+    assert {"local", "kept"} <= set(kinds)
+    assert done.free
 
 
 SCENE = {

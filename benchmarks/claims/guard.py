@@ -62,6 +62,7 @@ def flown() -> tuple[str, bool]:
     from netsp import solve
     from netsp.execute.log import ExecutionOptions
     from netsp.fly.flight import fly
+    from netsp.fly.rehearsal import rehearse
     from netsp.link.address import Address
     from netsp.link.frame import Frame
     from netsp.link.session import Session
@@ -71,6 +72,7 @@ def flown() -> tuple[str, bool]:
 
     problem = Problem.load(ROOT / "problems" / "pool.json")
     tour, pace = solve(problem), 8.0
+    rehearse()
     with Autopilot(
         pace=pace, noise=0.02, drift=0.03, smooth=1.0, params={"FS_GCS_TIMEOUT": 12}
     ) as autopilot:

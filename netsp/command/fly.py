@@ -136,7 +136,7 @@ def _flown(
     from netsp.execute.log import ExecutionOptions
     from netsp.execute.repair import REPLAN_S
     from netsp.files import output_folder
-    from netsp.fly.flight import fly
+    from netsp.fly.flight import check_options, fly
     from netsp.fly.rehearsal import rehearse
     from netsp.link.address import Address
     from netsp.link.session import Session
@@ -149,6 +149,9 @@ def _flown(
         speed=args.speed, reach=args.reach, seed=args.seed,
         planning_limit=REPLAN_S if args.planning_limit is None else args.planning_limit,
     )  # fmt: skip
+    assert surprises is None or isinstance(surprises, Surprises)
+    address = Address.parse(args.link)
+    check_options(options, surprises)
     with ExitStack() as stack:
         stack.enter_context(output_folder(args.output))
         stack.enter_context(nullcontext() if args.quiet else compile_messages(sys.stderr))
@@ -168,7 +171,7 @@ def _flown(
         told = show_execution(problem) if shows else None
         watched = None if page is None else _watched(problem, page, args.speed)
         # the link last: while it is open, the vehicle counts on our heartbeats
-        session = Session(UdpLink(Address.parse(args.link)), frame, args.system, args.pace)
+        session = Session(UdpLink(address), frame, args.system, args.pace)
         stack.callback(session.close)
         clock = stack.enter_context(until_interrupt(None))
 
@@ -182,7 +185,6 @@ def _flown(
                 if call is not None:
                     call(row)
 
-        assert surprises is None or isinstance(surprises, Surprises)
         done = fly(
             problem, solution, session, options, surprises=surprises, on_step=on_step,
             should_stop=lambda: clock.stopped,

@@ -15,6 +15,7 @@ from types import FunctionType, SimpleNamespace
 from typing import Any, TypeVar
 
 import numpy as np
+from numba import config
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -65,6 +66,11 @@ def interpreted(kernel: Any) -> Callable[..., Any]:
     if used.get("math") is math:
         used["math"] = _c_math()
     return FunctionType(own.__code__, {**own.__globals__, **used}, own.__name__, own.__defaults__)
+
+
+def compiles() -> bool:
+    """Whether anything is compiled at all; with NUMBA_DISABLE_JIT nothing is."""
+    return not config.DISABLE_JIT
 
 
 def _is_compiled(value: object) -> bool:

@@ -1,4 +1,4 @@
-"""What a repair needs, compiled before there is one: it would take its time from planning."""
+"""What a repair needs, compiled before there is one: in it that would take time from planning."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from functools import cache
 
 import numpy as np
 
-from netsp.compiled.tiers import everything_compiled
+from netsp.clock import interrupts_remembered
+from netsp.compiled.tiers import compiles, everything_compiled
 from netsp.execute.repair import repair
 from netsp.problem import Circle, Goal, Problem, State
 from netsp.roadmap.from_state import graph_from_state
@@ -20,7 +21,15 @@ _SOLVERS = (("dp", None), ("mip", None), ("lns", 200), ("auto", 30))
 
 @cache
 def make_ready() -> None:
-    """Have everything loaded that a repair needs, and compiled on a machine that never did."""
+    """Have everything loaded that a repair needs, and compiled on a machine that never did.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        Ctrl-C, which solvers take for the wish to have what there is.
+    """
+    if not compiles():
+        return
     tiny = Problem(
         base=(0.0, 0.0, 0.0),
         goals=(Goal(position=(4.0, 0.0, 0.0)), Goal(position=(4.0, 3.0, 0.0))),
@@ -29,11 +38,12 @@ def make_ready() -> None:
     )  # fmt: skip
     world = random_world(1, goals=9, tether_length=450.0)
     begun = State(position=world.goals[0].position, signature=())
-    with everything_compiled():
+    with interrupts_remembered() as check, everything_compiled():
         repair(
             tiny, np.array([4.0, 0.0, 0.0]), np.array([[0.0, 0, 0], [4, 0, 0]]), [0, 1], 1.0, "",
             limit=math.inf,
         )  # fmt: skip
         graph = graph_from_state(world.model_copy(update={"state": begun}))
         for solver, iterations in _SOLVERS:
+            check()
             solve_graph(graph, solver, iteration_limit=iterations)

@@ -55,10 +55,12 @@ def ready(
         now = session.now
         return None not in (now.position, now.estimate, now.armed)
 
-    placed = until(told)
+    until(told)
     now = session.now
-    if not placed or now.position is None or not now.estimate:
+    if now.position is None or not now.estimate:
         raise RefusedError("the vehicle has no position estimate")
+    if now.armed is None:
+        raise RefusedError(f"the vehicle has not said for {WAIT_S:g} s whether it is armed")
     away = np.array(now.position) - start
     if float(np.hypot(*away[:2])) > near:
         raise RefusedError(

@@ -50,7 +50,8 @@ def fly(
     solution : Solution
         The plan.
     session : Session
-        The vehicle.
+        The vehicle. On a machine that never flew, call `netsp.fly.rehearsal.rehearse` before it is
+        there: it takes a minute or two, and a vehicle that is armed drifts meanwhile.
     options : ExecutionOptions, optional
         Reach, speed and planning limit count.
     surprises : Surprises, optional
@@ -79,10 +80,7 @@ def fly(
     if not judged:
         failed = next(c for c in judged.checks if not c.passed)
         raise InputError(f"solution: fails its check {failed.name!r}: {failed.detail}")
-    if surprises is not None and any(e.kind == "push" for e in surprises.events):
-        raise InputError("surprises: push: a real vehicle says itself where it is; expected none")
-    if options.reach < LEAST_REACH:
-        raise InputError(f"reach: expected at least {LEAST_REACH:g}, got {options.reach:g}")
+    check_options(options, surprises)
     rehearse()
     start = np.array(problem.base if problem.state is None else problem.state.position)
     ready(session, start, NEAR_START, should_stop)
@@ -94,6 +92,27 @@ def fly(
     if done.stopped or done.interrupted:
         _leave(session, vehicle)
     return done
+
+
+def check_options(options: ExecutionOptions, surprises: Surprises | None) -> None:
+    """Whether a vehicle can be flown so.
+
+    Parameters
+    ----------
+    options : ExecutionOptions
+        Reach counts.
+    surprises : Surprises or None
+        Events that are known to come.
+
+    Raises
+    ------
+    InputError
+        It cannot.
+    """
+    if surprises is not None and any(e.kind == "push" for e in surprises.events):
+        raise InputError("surprises: push: a real vehicle says itself where it is; expected none")
+    if options.reach < LEAST_REACH:
+        raise InputError(f"reach: expected at least {LEAST_REACH:g}, got {options.reach:g}")
 
 
 def _leave(session: Session, vehicle: LinkedVehicle) -> None:

@@ -1,21 +1,18 @@
 """A tour carried out before the flight, with all that may happen on the way.
 
 On a machine that never flew, everything that a flight needs is compiled at its first use, a minute
-in all. A vehicle that waits for its next target meanwhile is not looked after: so none is spoken to
-before.
+or two in all. A vehicle that waits for its next target meanwhile is not looked after, so that
+`netsp fly` opens no link until this is done.
 """
 
 from __future__ import annotations
 
-import signal
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
 from functools import cache
 
-from netsp.compiled.tiers import everything_compiled
+from netsp.clock import interrupts_remembered
+from netsp.compiled.tiers import compiles, everything_compiled
 from netsp.execute.events import Surprises
-from netsp.execute.log import ExecutionOptions, ExecutionRow
+from netsp.execute.log import ExecutionOptions
 from netsp.execute.run import execute
 from netsp.problem import Problem
 from netsp.solvers.solve import solve
@@ -54,37 +51,13 @@ def rehearse() -> None:
     KeyboardInterrupt
         Ctrl-C, which planning and flying take for the wish to have what there is.
     """
+    if not compiles():
+        return
     site = Problem.model_validate(_SITE)
-    with _interrupts() as pressed, everything_compiled():
+    with interrupts_remembered() as check, everything_compiled():
         tour = solve(site)
-
-        def on_step(_: ExecutionRow) -> None:
-            if pressed.is_set():
-                raise KeyboardInterrupt
-
+        check()
         execute(
             site, tour, ExecutionOptions(speed=0.5, reach=0.3),
-            surprises=Surprises.model_validate(_EVENTS), on_step=on_step,
+            surprises=Surprises.model_validate(_EVENTS), on_step=lambda _: check(),
         )  # fmt: skip
-        if pressed.is_set():
-            raise KeyboardInterrupt
-
-
-@contextmanager
-def _interrupts() -> Iterator[threading.Event]:
-    """Set at Ctrl-C, which interrupts as ever."""
-    pressed = threading.Event()
-    before = signal.getsignal(signal.SIGINT)
-    hears = threading.current_thread() is threading.main_thread() and callable(before)
-
-    def press(*_: object) -> None:
-        pressed.set()
-        raise KeyboardInterrupt
-
-    if hears:
-        signal.signal(signal.SIGINT, press)
-    try:
-        yield pressed
-    finally:
-        if hears:
-            signal.signal(signal.SIGINT, before)

@@ -10,6 +10,7 @@ from netsp.errors import InputError
 from netsp.guard.alarms import Level
 from netsp.guard.guard import Guard
 from netsp.guard.memory import restore, save
+from netsp.guard.plane import PlaneSite
 from netsp.guard.rehearsal import rehearse
 from netsp.guard.report import Report
 from netsp.guard.space import SpaceSite
@@ -73,12 +74,17 @@ def watch(
         The link cannot be had, or the state file is not of this site.
     """
     tell = say or (lambda _: None)
-    rehearse(isinstance(guard.site, SpaceSite))
+    where = Address.parse(address)
+    if state is not None:
+        restore(guard, state)  # what is wrong with it is told before anything takes long
+    if not isinstance(guard.site, SpaceSite):
+        rehearse(in_space=False)
+    if not isinstance(guard.site, PlaneSite):
+        rehearse(in_space=True)
     if state is not None:
         known = restore(guard, state)
         if known is not None:
             tell(f"going on from {state}, {known.age:.0f} s old")
-    where = Address.parse(address)
     link = UdpLink(where, SYSTEM)
     only = None if where.listens else link.peer
     beat = dialect().MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3)  # a computer on board

@@ -1,4 +1,4 @@
-"""A vehicle watched that is none, before there is one.
+"""A made-up vehicle, watched before there is a real one.
 
 On a machine that never watched, everything that a guard needs is compiled at its first use, some of
 it not before the tether touches something: fixes would wait meanwhile, and alarms with them.
@@ -6,11 +6,13 @@ it not before the tether touches something: fixes would wait meanwhile, and alar
 
 from __future__ import annotations
 
+from contextlib import suppress
 from functools import cache
 
 import numpy as np
 
-from netsp.compiled.tiers import everything_compiled
+from netsp.compiled.tiers import compiles, everything_compiled
+from netsp.errors import InputError
 from netsp.guard.fix import Fix
 from netsp.guard.guard import Guard
 from netsp.guard.site import Site
@@ -52,6 +54,8 @@ def rehearse(in_space: bool) -> None:
     in_space : bool
         Whether the site is a mission's.
     """
+    if not compiles():
+        return
     with everything_compiled():
         site: Site | Problem = Problem.model_validate(_PLANE)
         if in_space:
@@ -62,4 +66,5 @@ def rehearse(in_space: bool) -> None:
         for k, (x, y, z) in enumerate(ring.tolist()):
             after = 0.0 if k < 120 else 20.0  # it is silent for a while, and elsewhere then
             guard.take(Fix(0.1 * k + after, (x + 0.1 * after, y, z), estimate=True))
-        guard.correct("south", "pile")
+        with suppress(InputError):  # what the operator says may be impossible
+            guard.correct("south", "pile")
