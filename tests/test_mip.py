@@ -7,14 +7,16 @@ import time
 import weakref
 from dataclasses import replace
 
+import highspy
 import numpy as np
 import psutil
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.sparse import csc_array, csr_array
 
 from netsp import solve_graph, travel_graph
-from netsp.mip import root
+from netsp.mip import highs, root
 from netsp.mip import solve as mip
 from netsp.mip.bound import exact_bound
 from netsp.mip.cbc_program import CbcRelaxation
@@ -110,6 +112,32 @@ def test_any_dual_values_give_a_valid_bound(backend):
             )
             assert priced(graph, program.cuts, shaken).bound <= best + 1e-9
     assert priced(graph, program.cuts, duals).bound >= program.solve(60.0).objective - 1e-5
+
+
+def test_a_program_that_is_built_in_pieces_is_the_same(monkeypatch):
+    graph = random_graph(7, goals=5)
+    legs = np.argwhere(np.triu(np.isfinite(graph.costs), 1))
+    costs, half = graph.costs[legs[:, 0], legs[:, 1]], len(legs) // 2
+    cuts = [Cut(np.isin(graph.cluster, [k, k + 1]), k) for k in range(1, 5)]
+    programs = []
+    for block in (highs.BLOCK, 7):
+        monkeypatch.setattr(highs, "BLOCK", block)
+        program = HighsRelaxation(graph.cluster, legs[:half], costs[:half])
+        program.add_cuts(cuts[:3])
+        program.add_legs(legs[half:], costs[half:])
+        program.add_cuts(cuts[3:])
+        matrix = program._highs.getLp().a_matrix_
+        by_columns = matrix.format_ == highspy.MatrixFormat.kColwise
+        programs.append(
+            (csc_array if by_columns else csr_array)(
+                (matrix.value_, matrix.index_, matrix.start_),
+                shape=(matrix.num_row_, matrix.num_col_),
+            ).toarray()
+        )
+        np.testing.assert_array_equal(program.legs, legs)
+        assert len(program.cuts) == 4
+    np.testing.assert_array_equal(*programs)
+    assert np.abs(programs[0][-4:]).sum(axis=1).all()
 
 
 def priced(graph, cuts, duals):

@@ -23,6 +23,10 @@ _SETTLED = (
     highspy.HighsModelStatus.kInterrupt,
 )
 
+BLOCK = 4_000_000
+"""Coefficients of legs in rows that are held at once, before the program has those that are not 0;
+thousands of each would take a gigabyte."""
+
 STEPS = 2
 """Of the simplex method for each row and column, at most, from a basis; four times as many from the
 start."""
@@ -71,9 +75,14 @@ class HighsRelaxation:
 
     def add_legs(self, legs: Ints, costs: Floats) -> None:
         """Bring legs (k, 2) into the program, with their coefficients in every row."""
+        # a leg has a coefficient in few of the rows: not all of them are held at once
+        at_once = max(BLOCK // max(len(self.cuts), 1), 1)
+        for first in range(0, len(legs), at_once):
+            some = slice(first, first + at_once)
+            self._add_columns(legs[some], costs[some])
+
+    def _add_columns(self, legs: Ints, costs: Floats) -> None:
         n = len(legs)
-        if n == 0:
-            return
         cut, leg = np.nonzero(block := cut_coefficients(self.cuts, self.cluster, legs))
         rows = np.concatenate([self.cluster[legs].ravel(), self.clusters + cut])
         cols = np.concatenate([np.repeat(np.arange(n), 2), leg])
@@ -146,15 +155,18 @@ class HighsRelaxation:
 
     def add_cuts(self, cuts: list[Cut], *, for_good: bool = False) -> None:
         """Bring cuts into the program."""
-        if not cuts:
-            return
+        at_once = max(BLOCK // max(len(self.legs), 1), 1)
+        for first in range(0, len(cuts), at_once):
+            self._add_rows(cuts[first : first + at_once])
+        self.pool.add(cuts, for_good=for_good)
+
+    def _add_rows(self, cuts: list[Cut]) -> None:
         n = len(cuts)
         block = cut_coefficients(cuts, self.cluster, self.legs)
         no_limit = np.full(n, highspy.kHighsInf)
         least = np.array([-2.0 * c.room for c in cuts])
         entries, start, leg, values = _compressed(block)
         self._highs.addRows(n, least, no_limit, entries, start, self._column[leg], values)
-        self.pool.add(cuts, for_good=for_good)
 
     def keep_cuts(self, keep: Bools) -> None:
         """Take the cuts out of the program but those marked, and those that its basis rests on."""
