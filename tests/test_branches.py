@@ -1,6 +1,7 @@
 """Legs found branch by branch are those that are pulled, or searched for, one by one."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,6 +19,8 @@ from netsp.roadmap.tethertree import GrowingTree
 from netsp.worlds import FAMILIES, random_world
 
 BAY = Polygon(polygon=[(2, -3), (8, -3), (8, 3), (2, 3), (2, 2), (7, 2), (7, -2), (2, -2)])
+
+LIBRARY = Path(__file__).parent.parent / "problems" / "library"
 
 TURNS = Problem(
     base=(0, 0), goals=[(6, 0.2), (3.0, 1.4), (-1, -3), (4.5, -3.5)], tether_length=38,
@@ -137,21 +140,38 @@ def test_few_legs_tell_all(monkeypatch, searches):
     assert len(searches) < 0.05 * len(vertices) ** 2 / 2
 
 
+@pytest.fixture
+def none_pulled(monkeypatch):
+    """Every tether has to be searched for."""
+    monkeypatch.setattr(GrowingTree, "pull", lambda self, ends, point, *_: np.arange(1, len(point)))
+
+
+@pytest.mark.parametrize("together", [False, True])
 def test_tethers_that_cannot_be_pulled_are_searched_for_and_grow_the_same_tree(
-    monkeypatch, searches
+    monkeypatch, searches, request, together
 ):
     problem = random_world(3, goals=6, obstacles=8, tether_length=330.0)
     one, other = TautRoadmap(problem), TautRoadmap(problem)
     tree = one.legs._grown(NEVER)
     searches.clear()
-    monkeypatch.setattr(GrowingTree, "pull", lambda self, ends, point, *_: np.arange(1, len(point)))
+    request.getfixturevalue("none_pulled")
+    monkeypatch.setattr(legs_of, "SEARCHED_TOGETHER", 0 if together else len(one.cluster))
     same = other.legs._grown(NEVER)
-    assert len(searches) == len(one.cluster) - 1
+    assert len(searches) == (0 if together else len(one.cluster) - 1)
     assert (same.node == tree.node).all()
     assert (same.parent == tree.parent).all()
     assert np.allclose(same.length, tree.length)
     assert np.allclose(same.turned, tree.turned, atol=1e-9)
     assert np.allclose(same.slid, tree.slid, atol=1e-9)
+
+
+def test_legs_among_walls_that_one_search_found_the_tethers_of(none_pulled, searches):
+    problem = Problem.load(LIBRARY / "maze-30-0.json").model_copy(update={"tether_length": 330.0})
+    roadmap = TautRoadmap(problem, max_classes=180)
+    roadmap.legs._grown(NEVER)
+    assert not searches
+    found = roadmap.legs.lengths(np.arange(len(roadmap.cluster)))
+    assert np.allclose(found, one_by_one(roadmap), rtol=1e-10, atol=1e-7)
 
 
 def test_the_tree_ends_where_the_tethers_do():

@@ -13,7 +13,7 @@ Sums are of floating point: `ROUNDING` times the size of what is summed is taken
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import pairwise
@@ -31,6 +31,9 @@ ROUNDING = 1e-12
 
 THREADS = 2
 """The goals of a layer are shared among so many; the labels do not depend on it."""
+
+ROWS = 512
+"""Of the matrix that are worked on at a time, so that what is in between stays small."""
 
 REMEMBERED = 6
 """Goals that each goal remembers at first."""
@@ -97,11 +100,25 @@ class Walks:
         self.start: Ints = np.searchsorted(self.goal, np.arange(self.n + 2))
 
     def set_values(self, values: Floats) -> None:
-        """Change the costs of legs."""
-        if (np.diff(self.cluster) < 0).any():
-            values = values[np.ix_(self.order, self.order)]
-        self.values: Floats = np.ascontiguousarray(values, dtype=np.float64)
-        self.longest = float(np.abs(values).max(where=np.isfinite(values), initial=0.0))
+        """Change the costs of legs; to anything when the flag is set."""
+        order = self.order if (np.diff(self.cluster) < 0).any() else None
+        as_they_are = order is None and values.dtype == np.float64 and values.flags.c_contiguous
+        self.values: Floats = values if as_they_are else np.empty(values.shape)
+        self.longest = 0.0
+        for rows in self._blocks():
+            if not as_they_are:
+                block = values[rows] if order is None else values[np.ix_(order[rows], order)]
+                self.values[rows] = block
+            block = self.values[rows]
+            longest = np.abs(block).max(where=np.isfinite(block), initial=0.0)
+            self.longest = max(self.longest, float(longest))
+
+    def _blocks(self) -> Iterator[slice]:
+        """The rows of the matrix, some at a time; no more of them once the flag is set."""
+        for first in range(0, len(self.goal), ROWS):
+            if self.stop[0]:
+                return
+            yield slice(first, first + ROWS)
 
     def restrict(self, keep: Bools) -> None:
         """Forget the rows that are not marked; `set_values` must follow."""
@@ -220,8 +237,11 @@ class Walks:
 
     def _near(self) -> Ints:
         """(n + 1, n + 1) goals by the least leg between any of their classes, nearest first."""
-        rows = np.minimum.reduceat(self.values, self.start[:-1], axis=0)
-        return np.argsort(np.minimum.reduceat(rows, self.start[:-1], axis=1), axis=1, kind="stable")
+        least = np.zeros((len(self.goal), self.n + 1))
+        for rows in self._blocks():
+            least[rows] = np.minimum.reduceat(self.values[rows], self.start[:-1], axis=1)
+        between = np.minimum.reduceat(least, self.start[:-1], axis=0)
+        return np.argsort(between, axis=1, kind="stable")
 
 
 def _together(parts: list[Labels]) -> Labels:

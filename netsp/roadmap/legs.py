@@ -32,6 +32,10 @@ FEW = 20_000
 time where there are more."""
 
 
+SEARCHED_TOGETHER = 20
+"""More tethers than these that could not be pulled are looked for by one search."""
+
+
 class TautLegs:
     """Exact legs between given augmented goals. Satisfies `netsp.travel.graph.Legs`.
 
@@ -59,6 +63,9 @@ class TautLegs:
         is given and false, anything. LimitReachedError when the clock is up before all of many are
         found."""
         vertices = np.asarray(vertices, dtype=np.int64)
+        if asked is None and len(vertices) <= UNTIMED:
+            # one by one, whatever the time: to know where all tethers part may take seconds
+            asked = np.ones((len(vertices), len(vertices)), dtype=bool)
         if asked is not None and asked.sum() <= max(FEW, 2 * len(vertices)):
             return self._few(vertices, asked)
         return self._all(vertices, np.float64, 1.0, clock)
@@ -78,18 +85,14 @@ class TautLegs:
             f"legs between {n} homotopy classes",
             "lower tether_length or max_classes",
         )
-        out: Floats = np.full((n, n), OPEN, dtype=kind)  # type: ignore[assignment]
-        # what takes a fraction of a second is measured all the same, or there would be no tour
-        if n <= UNTIMED:
-            self._fill(vertices, share, out, NEVER)
-        else:
-            clock = clock or Clock()
-            clock.interruptible(lambda: self._fill(vertices, share, out, clock.flag))
-            if clock.flag[0]:
-                raise LimitReachedError(
-                    f"time limit reached while measuring the legs between {n} homotopy classes; "
-                    "lower tether_length or raise the limit"
-                )
+        out: Floats = np.empty((n, n), dtype=kind)  # type: ignore[assignment]
+        clock = clock or Clock()
+        clock.interruptible(lambda: self._fill(vertices, share, out, clock.flag))
+        if clock.flag[0]:
+            raise LimitReachedError(
+                f"time limit reached while measuring the legs between {n} homotopy classes; "
+                "lower tether_length or raise the limit"
+            )
         point = self.cluster[vertices]
         for base in np.flatnonzero(point == 0).tolist():
             out[base] = out[:, base] = share * self.to_base()[vertices]
@@ -101,8 +104,10 @@ class TautLegs:
     def _fill(self, vertices: Ints, share: float, out: Floats, stop: Flag) -> None:
         """The legs between goals, into (k, k) `out`; unfinished when the flag is set."""
         tree = self._grown(stop)
-        if stop[0]:
-            return
+        for first in range(0, len(out), BLOCK):
+            if stop[0]:
+                return
+            out[first : first + BLOCK] = OPEN
         paths, (every, points) = self.paths, self._ends
         letters, row = flattened([self.signatures[v] for v in vertices])
         ends = Ends(every.place[vertices], every.cell[vertices], letters, row)
@@ -129,14 +134,30 @@ class TautLegs:
             return self._tree
         paths, (ends, point) = self.paths, self._ends
         growing = GrowingTree(len(point))
-        for v in growing.pull(ends, point, paths.slits, paths.arcs, stop).tolist():
+        missing = growing.pull(ends, point, paths.slits, paths.arcs, stop).tolist()
+        known = self._tethers(missing, stop) if len(missing) > SEARCHED_TOGETHER else {}
+        for v in missing:
             if stop[0]:
                 break
-            growing.add(v, self._searched(0, v)[1], paths.arcs)
+            path = known[v] if v in known else self._searched(0, v)[1]
+            growing.add(v, path, paths.arcs)
         tree = growing.tree()
         if not stop[0]:
             self._tree = tree
         return tree
+
+    def _tethers(self, vertices: list[int], stop: Flag) -> dict[int, Path]:
+        """The tethers of vertices, by one search; fewer when the flag is set."""
+        paths, (_, point) = self.paths, self._ends
+        found = paths.tethers(
+            point[vertices].tolist(), [self.signatures[v] for v in vertices],
+            float(self.planar[vertices].max()), stop,
+        )  # fmt: skip
+        return {
+            v: path_along(0, pieces, paths.tangents.target, paths.arcs)
+            for v, pieces in zip(vertices, found, strict=True)
+            if pieces is not None
+        }
 
     def to_base(self) -> Floats:
         """(V,) 3D lengths of the legs from the base, which are the tethers."""

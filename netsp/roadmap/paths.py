@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from netsp.arrays import Floats, Ints
+from netsp.clock import Flag
 from netsp.errors import InputError, NetspError
 from netsp.hsignature import Word
 from netsp.problem import Problem
@@ -230,6 +231,32 @@ class TautPaths:
                 return None
             step = min(step**2, DEEPEST)
             limit = min(max(step * limit, LEAST * most), most)
+
+    def tethers(
+        self, goals: Sequence[int], words: Sequence[Word], longest: float, stop: Flag
+    ) -> list[list[tuple[int, float]] | None]:
+        """The pieces of the taut paths from the base to goals, found by one search.
+
+        Parameters
+        ----------
+        goals, words
+            (k,) of each.
+        longest
+            That no planar length exceeds.
+        stop
+            Of a clock; None for each path that was not found till then.
+        """
+        trie, node = Trie.of_words(words, longest + self.margin)
+        found = run_explore(
+            self.tangents, 0, trie, keep=True, margin=self.outline.margin, stop=stop
+        )
+        # of several spellings of one path the shortest comes last
+        hit = {
+            (int(found.goal[k]), int(found.word[k])): int(k)
+            for k in np.argsort(-found.length, kind="stable").tolist()
+        }
+        at = [hit.get((goal, at)) for goal, at in zip(goals, node, strict=True)]
+        return [None if k is None else found.pieces(k) for k in at]
 
     def _knows(self, word: Word) -> bool:
         """Whether there is an obstacle for every letter."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -49,6 +50,24 @@ class Trie:
             trie.limit[k + 1] = limit
         trie.size = len(word) + 1
         return trie
+
+    @classmethod
+    def of_words(cls, words: Sequence[tuple[int, ...]], limit: float) -> tuple[Trie, list[int]]:
+        """The trie of words and their prefixes; and the node of each word."""
+        trie = cls.root(limit, capacity=max(256, 2 + sum(len(w) for w in words)))
+        trie.limit[:] = limit
+        last = []
+        for word in words:
+            node = 0
+            for letter in word:
+                child = int(trie_child(node, letter, trie.nodes))
+                if child < 0:
+                    child = trie.size
+                    add_child(node, letter, 1, child, trie.nodes)
+                    trie.size += 1
+                node = child
+            last.append(node)
+        return trie, last
 
     def word(self, node: int) -> tuple[int, ...]:
         """The word of a node."""
