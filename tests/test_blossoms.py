@@ -12,6 +12,7 @@ from netsp.mip.blossoms import best_teeth, blossom_cuts, shrunk
 from netsp.mip.bound import exact_bound
 from netsp.mip.cbc_program import CbcInteger, CbcRelaxation
 from netsp.mip.cuts import Cut, cut_coefficients
+from netsp.mip.deadlegs import DeadLegs
 from netsp.mip.highs import HighsRelaxation
 from netsp.mip.highs_integer import HighsInteger
 from netsp.mip.prices import Prices
@@ -108,7 +109,7 @@ def test_bounds_with_teeth_are_below_their_certificate_and_the_optimum(seed, pro
             -point.duals.cut / 2.0 + scale * np.abs(rng.normal(size=len(lp.cuts))),
             lp.cuts, graph.cluster,
         )  # fmt: skip
-        dead = ~np.isfinite(graph.costs)
+        dead = DeadLegs(~np.isfinite(graph.costs))
         claimed = Prices(costs_of(graph), dead, graph.cluster, lp.cuts, duals).bound
         exact = exact_bound(graph.costs, graph.cluster, lp.cuts, duals)
         assert claimed <= exact <= best * (1 + 1e-12)

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from netsp.mip.branching import Tree
 from netsp.mip.combs import comb_cuts
 from netsp.mip.cuts import Cut, cut_coefficients
+from netsp.mip.deadlegs import DeadLegs
 from netsp.mip.highs import HighsRelaxation
 from netsp.mip.legprices import LegPrices
 from netsp.mip.prices import Prices
@@ -133,6 +134,7 @@ def test_prices_of_a_list_of_legs_are_those_of_a_matrix(seed, chance, scale):
     duals = duals_of_relaxation(
         scale * rng.normal(size=7), scale * np.abs(rng.normal(size=5)), cuts, graph.cluster
     )
+    dead = DeadLegs(dead)
     of_matrix = Prices(costs_of(graph), dead, graph.cluster, cuts, duals)
     costs = graph.costs[legs[:, 0], legs[:, 1]]
     of_list = LegPrices(legs, costs, graph.cluster, cuts, duals)

@@ -14,6 +14,7 @@ from netsp.dp import walks as walks_module
 from netsp.dp.labels import translate
 from netsp.dp.memory import MOST, Memory
 from netsp.dp.walks import Walks
+from netsp.mip.deadlegs import DeadLegs
 from netsp.mip.prices import Prices
 from netsp.mip.program import Duals
 from tests.brute import brute_tour
@@ -197,9 +198,9 @@ def test_a_tour_through_a_vertex_pays_what_it_costs_above_the_cheapest_of_its_cl
     costs = np.where(cluster[:, None] == cluster[None, :], np.inf, 0.0)
     costs[2], costs[:, 2] = costs[2] + 2.5, costs[:, 2] + 2.5
     for cutoff, gone in ((5.1, False), (4.9, True)):
-        dead = ~np.isfinite(costs)
+        dead = DeadLegs(~np.isfinite(costs))
         prices = Prices(costs, dead, cluster, [], duals)
         assert prices.bound == pytest.approx(0.0, abs=1e-9)
         prices.rule_out(cutoff)
-        assert bool(dead[2].all()) is gone
-        assert not dead[1, 0]
+        assert bool(dead.matrix()[2].all()) is gone
+        assert not dead.matrix()[1, 0]

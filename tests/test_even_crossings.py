@@ -18,6 +18,7 @@ from netsp.mip import root
 from netsp.mip.bound import exact_bound
 from netsp.mip.covers import climb
 from netsp.mip.cuts import Cut, cut_coefficients
+from netsp.mip.deadlegs import DeadLegs
 from netsp.mip.highs import HighsRelaxation
 from netsp.mip.legprices import LegPrices
 from netsp.mip.overgoals import bound_over_goals
@@ -73,7 +74,7 @@ def test_bounds_with_split_clusters_are_below_their_certificate_and_the_optimum(
             -point.duals.cut / 2.0 + scale * np.abs(rng.normal(size=len(lp.cuts))),
             lp.cuts, graph.cluster,
         )  # fmt: skip
-        dead = ~np.isfinite(graph.costs)
+        dead = DeadLegs(~np.isfinite(graph.costs))
         prices = Prices(costs_of(graph), dead, graph.cluster, lp.cuts, duals)
         exact = exact_bound(graph.costs, graph.cluster, lp.cuts, duals)
         assert prices.bound <= exact <= brute_tour(graph) * (1 + 1e-12)
@@ -96,7 +97,7 @@ def test_bounds_hold_where_a_tooth_does_not_cross_any_more(seed):
     duals = duals_of_relaxation(
         np.full(graph.goal_count + 1, 5.0), np.array([20.0, 30.0]), cuts, graph.cluster
     )
-    dead = ~np.isfinite(graph.costs)
+    dead = DeadLegs(~np.isfinite(graph.costs))
     bound = Prices(costs_of(graph), dead, graph.cluster, cuts, duals).bound
     exact = float(exact_bound(graph.costs, graph.cluster, cuts, duals))
     assert bound == pytest.approx(exact, abs=1e-6)
@@ -188,7 +189,7 @@ def test_bounds_of_covers_hold_and_what_they_rule_out_is_in_no_best_tour(seed):
             # as bounds over classes, from the dual values of the cells
             own = found.cells.of(graph.cluster, odd)
             prices = Prices(
-                costs_of(graph), ~np.isfinite(graph.costs), graph.cluster, found.cuts_over(own),
+                costs_of(graph), DeadLegs.of(graph.costs), graph.cluster, found.cuts_over(own),
                 found.duals_over(own),
             )  # fmt: skip
             assert prices.bound <= best.length * (1.0 + 1e-9)

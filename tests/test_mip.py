@@ -21,6 +21,7 @@ from netsp.mip import solve as mip
 from netsp.mip.bound import exact_bound
 from netsp.mip.cbc_program import CbcRelaxation
 from netsp.mip.cuts import Cut
+from netsp.mip.deadlegs import DeadLegs, not_dead
 from netsp.mip.flows import joined
 from netsp.mip.highs import HighsRelaxation
 from netsp.mip.overgoals import best_tree
@@ -142,7 +143,7 @@ def test_a_program_that_is_built_in_pieces_is_the_same(monkeypatch):
 
 def priced(graph, cuts, duals):
     """All legs of a graph at dual values, none of them dead."""
-    return Prices(costs_of(graph), ~np.isfinite(graph.costs), graph.cluster, cuts, duals)
+    return Prices(costs_of(graph), DeadLegs.of(graph.costs), graph.cluster, cuts, duals)
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -166,14 +167,43 @@ def test_what_prices_rule_out_is_in_no_shorter_tour(seed):
                 point.duals.cut + scale * rng.normal(size=point.duals.cut.shape), 0.0
             ),
         )  # fmt: skip
-        dead = ~np.isfinite(graph.costs)
-        prices = Prices(costs_of(graph), dead, graph.cluster, program.cuts, shaken)
-        before = dead.sum()
+        marks = DeadLegs.of(graph.costs)
+        prices = Prices(costs_of(graph), marks, graph.cluster, program.cuts, shaken)
+        before = marks.left
         prices.rule_out(1.0001 * best)
+        dead = marks.matrix()
         left = np.where(dead, np.inf, graph.costs)
         assert brute(TravelGraph.from_costs(left, graph.cluster)) == pytest.approx(best)
-        assert scale > 0.0 or dead.sum() > before
+        assert scale > 0.0 or marks.left < before
         assert (dead == dead.T).all()
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5, 0.99, 1.0])
+@pytest.mark.parametrize("size", [1, 7, 8, 9, 50, 700])
+def test_marks_of_dead_legs_are_those_of_a_matrix(size, share):
+    rng = np.random.default_rng(size)
+    dead = rng.random((size, size)) < share
+    dead |= dead.T
+    marks = DeadLegs.of(np.where(dead, np.inf, 1.0))
+    gone = rng.random(size) < 0.1
+    marks.add_vertices(gone)
+    dead[gone] = dead[:, gone] = True
+    legs = rng.integers(0, size, (20, 2))
+    marks.revive(legs)
+    dead[legs[:, 0], legs[:, 1]] = dead[legs[:, 1], legs[:, 0]] = False
+    keep = rng.random(size) < 0.8
+    for some in (np.ones(size, dtype=bool), keep):
+        marks.restrict(some)
+        dead = dead[np.ix_(some, some)]
+        assert (marks.matrix() == dead).all()
+        assert (marks.with_legs() == ~dead.all(axis=1)).all()
+        assert marks.left == np.count_nonzero(~dead) // 2
+        assert (marks.legs_left() == np.argwhere(np.triu(~dead, 1))).all()
+        u, v = np.indices(dead.shape).reshape(2, -1)
+        assert (marks[u, v] == dead.ravel()).all()
+        other = np.empty(len(dead), dtype=np.int64)
+        for row in range(len(dead)):
+            assert (other[: not_dead(row, marks.bits, other)] == np.flatnonzero(~dead[row])).all()
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -297,12 +327,12 @@ def test_prices_are_the_same_to_the_bit_however_they_are_summed_and_from_either_
     cuts = [Cut(rng.random(n) < 0.5, 1 + k % 6) for k in range(12)]
     duals = duals_of_relaxation(rng.normal(size=7), rng.random(12), cuts, graph.cluster)
     none = ~np.isfinite(graph.costs)
-    all_of_them = row_prices(Prices(costs_of(graph), none.copy(), graph.cluster, cuts, duals))
+    all_of_them = row_prices(Prices(costs_of(graph), DeadLegs(none), graph.cluster, cuts, duals))
     assert (all_of_them == all_of_them.T).all()
     for u, v in np.argwhere(np.triu(~none, 1))[::7].tolist():
         dead = np.ones_like(none)
         dead[u, v] = dead[v, u] = False
-        alone = Prices(costs_of(graph), dead, graph.cluster, cuts, duals)
+        alone = Prices(costs_of(graph), DeadLegs(dead), graph.cluster, cuts, duals)
         assert row_prices(alone)[u, v] == row_prices(alone)[v, u] == all_of_them[u, v]
         assert alone.of(np.array([[u, v]])) == all_of_them[u, v]
         shared = sum(duals.cut[k] for k, c in enumerate(cuts) if c.inside[u] and c.inside[v])
@@ -329,7 +359,7 @@ def test_legs_that_got_longer_since_are_looked_for_again_where_there_may_be_more
     graph = random_graph(3, goals=6, most=4)
     costs = graph.costs.copy()
     duals = duals_of_relaxation(np.full(7, 0.4), np.zeros(0), [], graph.cluster)
-    prices = Prices(costs, ~np.isfinite(costs), graph.cluster, [], duals)
+    prices = Prices(costs, DeadLegs.of(costs), graph.cluster, [], duals)
     legs, cost = first_legs(graph)
     negative = {tuple(leg) for leg in legs[cost < 0.8 - 1e-9].tolist()}
     seen = set()
@@ -719,7 +749,7 @@ def test_looking_at_prices_can_be_stopped_half_way():
     vertices = len(graph)
     assert vertices > 10
     duals = HighsRelaxation(graph.cluster, *first_legs(graph)).solve(None).duals
-    dead, seen = ~np.isfinite(graph.costs), []
+    dead, seen = DeadLegs.of(graph.costs), []
 
     def stop():
         seen.append(1)

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from netsp import TravelGraph, travel_graph
 from netsp.mip import root
 from netsp.mip.cuts import Cut
+from netsp.mip.deadlegs import DeadLegs
 from netsp.mip.prices import Prices
 from netsp.mip.program import Duals, duals_of_relaxation
 from netsp.mip.reducedcosts import reduced_costs
@@ -45,7 +46,7 @@ def test_no_tour_pays_less_than_the_ways_to_its_vertices_and_along_its_legs(seed
     duals = duals_of_relaxation(
         0.5 + scale * rng.normal(size=5), scale * np.abs(rng.normal(size=3)), cuts, graph.cluster
     )
-    prices = Prices(costs_of(graph), np.isinf(graph.costs), graph.cluster, cuts, duals)
+    prices = Prices(costs_of(graph), DeadLegs.of(graph.costs), graph.cluster, cuts, duals)
     terms, excess = prices._terms, prices._cost - prices._cheapest[graph.cluster]
     way, other, before = ways_from_base(terms, excess, np.inf)
     lengths, least = [], []
@@ -80,11 +81,12 @@ def test_a_sheet_far_away_is_ruled_out_though_its_legs_cost_nothing(apart, gone)
     costs, cluster = two_sheets(apart)
     half = np.where(cluster == 0, np.sqrt(2) - 0.5, 0.5)  # every vertex pays for half of its legs
     duals = Duals(2.0 * half[:5], half, np.zeros(0))
-    dead = np.isinf(costs)
-    prices = Prices(costs, dead, cluster, [], duals)
+    marks = DeadLegs.of(costs)
+    prices = Prices(costs, marks, cluster, [], duals)
     local = prices._cost - prices._cheapest[cluster]
     assert (local[5:] < 1e-9).all()
     prices.rule_out(prices.bound + 2.0)
+    dead = marks.matrix()
     assert dead[5:].all() == gone
     assert not dead[0, 1]
     assert not dead[1, 2]
@@ -100,7 +102,7 @@ def test_the_search_for_ways_can_be_stopped(monkeypatch):
         if len(asked) == 3:
             raise Stop
 
-    prices = Prices(costs, np.isinf(costs), cluster, [], duals, stop)
+    prices = Prices(costs, DeadLegs.of(costs), cluster, [], duals, stop)
     monkeypatch.setattr("netsp.mip.ways.AT_ONCE", 1)
     with pytest.raises(Stop):
         prices.rule_out(prices.bound + 100.0)
@@ -117,7 +119,7 @@ def test_once_few_legs_are_left_all_of_them_are_measured(seed, monkeypatch):
     def note(self):
         longer = measure(self)
         if self.costs.exact is not None:
-            after.append(bool((self.costs.exact | self.dead).all()))
+            after.append(bool((self.costs.exact | self.dead.matrix()).all()))
             legs = self.lp.legs
             used = self.costs.vertices[legs]
             alive = ~self.dead[legs[:, 0], legs[:, 1]]

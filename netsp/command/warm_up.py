@@ -48,6 +48,7 @@ def steps() -> Iterator[tuple[str, Callable[[], object]]]:
     from netsp.guard.rehearsal import rehearse as watched
     from netsp.judge import verify
     from netsp.mip.covers import climb
+    from netsp.mip.deadlegs import DeadLegs
     from netsp.mip.parities import odd_letters
     from netsp.mip.prices import Prices
     from netsp.mip.program import Duals
@@ -85,7 +86,7 @@ def steps() -> Iterator[tuple[str, Callable[[], object]]]:
         graph = travel_graph(fewer)
         costs, clusters = graph.costs_rounded(np.arange(len(graph))), graph.goal_count + 1
         duals = Duals(np.zeros(clusters), np.zeros(len(costs)), np.zeros(0))
-        prices = Prices(costs, np.isinf(costs), graph.cluster, [], duals)
+        prices = Prices(costs, DeadLegs.of(costs), graph.cluster, [], duals)
         prices.rule_out(1.0)
         prices.of(prices.cheapest(-1.0)[0])
 

@@ -94,7 +94,7 @@ class Tree:
         self.root, self.run = root, root.run
         self.lp = cast(WarmRelaxation, root.lp)
         self.cluster = root.costs.cluster
-        legs = np.argwhere(np.triu(~root.dead, 1))
+        legs = root.dead.legs_left()
         legs = np.unique(np.vstack([legs, tour_legs(root.tour())]), axis=0)
         size = len(self.cluster)
         wanted, held = legs @ (size, 1), self.lp.legs @ np.array((size, 1))

@@ -184,7 +184,7 @@ class _Level:
         """(m, m) legs in no better tour; those of the best one known are left."""
         m, at = len(self.cells.cluster), self.root.costs.vertices
         out = np.ones((m, m), dtype=bool)
-        out[np.ix_(at, at)] = self.root.dead
+        out[np.ix_(at, at)] = self.root.dead.matrix()
         legs = tour_legs(self.own_tour)
         out[legs[:, 0], legs[:, 1]] = out[legs[:, 1], legs[:, 0]] = False
         return out

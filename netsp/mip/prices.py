@@ -12,10 +12,11 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from netsp.arrays import Bools, Floats, Ints
+from netsp.arrays import Floats, Ints
 from netsp.compiled.kernel import kernel
 from netsp.mip.bound import least_of_clusters, rounding
 from netsp.mip.cuts import Cut
+from netsp.mip.deadlegs import DeadLegs, mark_dead
 from netsp.mip.program import Duals
 from netsp.mip.reducedcosts import Terms, reduced_costs, reduced_row, rooms
 from netsp.mip.ways import beyond, ways_from_base
@@ -34,7 +35,7 @@ class Prices:
     ----------
     costs : ndarray, shape (V, V)
         Of legs; inf where there is none.
-    dead : ndarray of bool, shape (V, V)
+    dead : DeadLegs
         Legs that are of no interest, and those that there are none of.
     cluster : ndarray of int, shape (V,)
         Of the vertices.
@@ -52,10 +53,10 @@ class Prices:
     """
 
     def __init__(
-        self, costs: Floats, dead: Bools, cluster: Ints, cuts: Sequence[Cut], duals: Duals,
+        self, costs: Floats, dead: DeadLegs, cluster: Ints, cuts: Sequence[Cut], duals: Duals,
         check: Callable[[], None] = lambda: None,
     ) -> None:  # fmt: skip
-        self._check = check
+        self._check, self._dead = check, dead
         self._size = len(cluster)
         active = np.flatnonzero(duals.cut < 0.0).tolist()
         sets, weight = [cuts[k].inside for k in active], [-duals.cut[k] for k in active]
@@ -79,8 +80,8 @@ class Prices:
             vertex[cuts[k].inside & (cluster != cuts[k].cluster)] += duals.cut[k]
         least, second, longest = np.empty((3, self._size))
         terms = self._terms = Terms(
-            costs, dead, cluster, duals.degree, first_at, of_cut[by_vertex], first_member, member,
-            np.array(weight, dtype=float), bitten, vertex, least, second,
+            costs, dead.bits, cluster, duals.degree, first_at, of_cut[by_vertex], first_member,
+            member, np.array(weight, dtype=float), bitten, vertex, least, second,
         )  # fmt: skip
         self._by_rows(lambda a, b: _scan(a, b, terms, longest), self._size)
         self._more = least < 0.0
@@ -103,8 +104,7 @@ class Prices:
         )
         gone = (excess > missing) | (way + other_way > missing + excess)
         gone[0] = False
-        terms.dead[gone] = True
-        terms.dead[:, gone] = True
+        self._dead.add_vertices(gone)
 
     def cheapest(self, tolerance: float) -> tuple[Ints, Floats]:
         """(k, 2) legs u < v of reduced costs below minus the tolerance, and these: of each vertex
@@ -171,12 +171,12 @@ def _rule_out(
             there = other_way[u] if before[u] == v else way[u]
             home = other_way[v] if before[v] == u else way[v]
             if there + home + beyond(u, v, r, terms) > missing:
-                terms.dead[u, v] = True
+                mark_dead(u, v, terms.dead)
                 continue
             on = terms.second[u] if r <= terms.least[u] else terms.least[u]
             back = terms.second[v] if r <= terms.least[v] else terms.least[v]
             if above[u] + above[v] + r + 0.5 * (on + back) > missing:
-                terms.dead[u, v] = True
+                mark_dead(u, v, terms.dead)
 
 
 @kernel

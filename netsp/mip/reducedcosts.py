@@ -12,8 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from netsp.arrays import Bools, Floats, Ints
+from netsp.arrays import Floats, Ints
 from netsp.compiled.kernel import kernel
+from netsp.mip.deadlegs import Bits, not_dead
 
 
 class Terms(NamedTuple):
@@ -23,11 +24,11 @@ class Terms(NamedTuple):
     `cut_at[first_at[v] : first_at[v + 1]]`, cut k holds
     `member[first_member[k] : first_member[k + 1]]`, both ascending, and costs `weight[k]`.
     `bitten` (m + 1, m + 1) is what teeth that hold both clusters do; `vertex` r_v; `least` and
-    `second` are r_uv of the two cheapest legs of each vertex.
+    `second` are r_uv of the two cheapest legs of each vertex; `dead` the bits of `DeadLegs`.
     """
 
     costs: Floats
-    dead: Bools
+    dead: Bits
     cluster: Ints
     degree: Floats
     first_at: Ints
@@ -57,12 +58,9 @@ def reduced_row(u: int, terms: Terms, other: Ints, price: Floats, room: Floats) 
     What cuts add is summed over the sets of u, or, where few legs are left, over those of their
     other ends; the order of the sums is the same, and makes r_uv the same as r_vu.
     """
-    count, work = 0, 0
-    for v in range(len(terms.cluster)):
-        if not terms.dead[u, v]:
-            other[count] = v
-            count += 1
-            work += terms.first_at[v + 1] - terms.first_at[v]
+    count, work = not_dead(u, terms.dead, other), 0
+    for v in other[:count]:
+        work += terms.first_at[v + 1] - terms.first_at[v]
     cuts = terms.cut_at[terms.first_at[u] : terms.first_at[u + 1]]
     for k in cuts:
         work -= terms.first_member[k + 1] - terms.first_member[k]

@@ -16,6 +16,7 @@ from netsp.arrays import Bools, Floats, Ints
 from netsp.mip.blossoms import blossom_cuts, shrunk
 from netsp.mip.combs import comb_cuts, tight_sets
 from netsp.mip.cuts import Cut
+from netsp.mip.deadlegs import DeadLegs
 from netsp.mip.overcells import OverGoals
 from netsp.mip.pace import WORTH, Pace
 from netsp.mip.parities import odd_letters, parity_cuts
@@ -23,7 +24,7 @@ from netsp.mip.prices import Prices
 from netsp.mip.program import Duals, Point, Relaxation
 from netsp.mip.subtours import branches, fractional_cuts
 from netsp.mip.warm import Warm
-from netsp.solving.legcosts import LEGS, ROWS, LegCosts, squeezed
+from netsp.solving.legcosts import LEGS, ROWS, LegCosts
 from netsp.solving.run import Stop
 from netsp.solving.searching import SearchingRun
 
@@ -117,7 +118,7 @@ class Root:
         graph = costs.graph
         words = [graph.signatures[v] for v in costs.vertices]
         self.branch, self.odd = branches(words), odd_letters(words)
-        self.dead: Bools = np.isinf(costs.values)
+        self.dead = DeadLegs.of(costs.values)
         self.patience: int | None = None
         self.best: Best | None = None
         goals_cuts = [] if over_goals is None else self._rule_out_over(over_goals)
@@ -218,7 +219,7 @@ class Root:
 
     def measure(self) -> None:
         """Measure all legs that are not ruled out."""
-        self.costs.measure_all(~self.dead)
+        self.costs.measure_all(~self.dead.matrix())
         legs = self.lp.legs
         self.lp.set_costs(self.costs.of(legs))
 
@@ -226,7 +227,7 @@ class Root:
         """For the report."""
         return {
             "cuts": len(self.lp.cuts),
-            "legs": (self.dead.size - int(np.count_nonzero(self.dead))) // 2,
+            "legs": self.dead.left,
             "vertices": len(self.costs),
         }
 
@@ -250,8 +251,8 @@ class Root:
             tour = tour_legs(self.tour())
             for first in range(0, len(own), ROWS):
                 rows = slice(first, first + ROWS)
-                self.dead[rows] |= found.dead[own[rows]][:, own]
-            self.dead[tour[:, 0], tour[:, 1]] = self.dead[tour[:, 1], tour[:, 0]] = False
+                self.dead.add(rows, found.dead[own[rows]][:, own])
+            self.dead.revive(tour)
         cuts, duals = found.cuts_over(own), found.duals_over(own)
         if run.tour is not None:
             prices = Prices(costs.values, self.dead, costs.cluster, cuts, duals, run.check)
@@ -333,7 +334,7 @@ class Root:
         exact = self.costs.exact
         if exact is None or not self.costs.graph.quick_legs:
             return False
-        left = ~(self.dead | exact)
+        left = ~(self.dead.matrix() | exact)
         if np.count_nonzero(left) > 2 * MEASURED_AT:
             return False
         u, v = np.nonzero(left)
@@ -410,14 +411,14 @@ class Root:
 
     def _alive(self) -> Bools:
         """(V,) vertices with legs left, and those of the incumbent."""
-        alive = np.asarray(~self.dead.all(axis=1))
+        alive = self.dead.with_legs()
         alive[0] = alive[self.tour()] = True
         return alive
 
     def _restrict(self, alive: Bools) -> None:
         """Forget all vertices but those marked, here and in the costs."""
         self.costs.restrict(alive)
-        self.dead = squeezed(self.dead, alive)
+        self.dead.restrict(alive)
         self.branch, self.odd = self.branch[:, alive], self.odd[alive]
         self.branch = np.unique(self.branch[self.branch.sum(axis=1) > 1], axis=0)
 

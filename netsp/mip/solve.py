@@ -316,7 +316,7 @@ class MipRun(SearchingRun):
     def integer(self, root: Root, program: Any) -> None:
         """The integer program on what the root has not ruled out, with lazy cuts."""
         costs = root.costs
-        legs = np.argwhere(np.triu(~root.dead, 1))
+        legs = root.dead.legs_left()
         legs = np.unique(np.vstack([legs, tour_legs(root.tour())]), axis=0)
         vertices = np.unique(np.concatenate([[0], legs.ravel()]))
         model: IntegerProgram = program(costs.cluster, vertices, legs, costs.of(legs), root.lp.cuts)
