@@ -174,6 +174,16 @@ def test_a_link_with_nobody_at_the_other_end_is_told(tour):
         session.close()
 
 
+def test_a_vehicle_with_another_system_id_is_named(tour):
+    with Autopilot(pace=PACE) as autopilot:
+        session = Session(UdpLink(Address(True, "127.0.0.1", autopilot.port)), Frame(SITE), 2, PACE)
+        try:
+            with pytest.raises(RefusedError, match="heard system 1, but not system 2 for"):
+                fly(SITE, tour, session, OPTIONS)
+        finally:
+            session.close()
+
+
 @pytest.mark.parametrize(
     ("what", "why"),
     [

@@ -484,6 +484,21 @@ def test_a_guard_beside_a_vehicle_hears_it_and_tells_it_nothing_to_do(tmp_path):
     assert state.exists()
 
 
+def test_a_guard_that_hears_another_vehicle_says_so():
+    said, ended = [], threading.Event()
+    with Autopilot(pace=8.0) as autopilot:
+        work = threading.Thread(
+            target=watch,
+            args=(Guard(SITE), Frame(SITE), f"udpin:{autopilot.port}", lambda _: None),
+            kwargs={"system": 2, "say": said.append, "until": ended.is_set},
+        )
+        work.start()
+        assert autopilot.until(lambda: "heard system 1, but not system 2 yet" in said)
+        ended.set()
+        work.join(5.0)
+    assert len(said) == 2
+
+
 def test_the_page_is_for_who_has_the_token_and_takes_corrections_only():
     with Page(SITE, 0) as page:
 

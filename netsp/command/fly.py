@@ -173,6 +173,8 @@ def _flown(
         # the link last: while it is open, the vehicle counts on our heartbeats
         session = Session(UdpLink(address), frame, args.system, args.pace)
         stack.callback(session.close)
+        if not args.quiet:
+            print(f"waiting for system {args.system} on {args.link}", file=sys.stderr)
         clock = stack.enter_context(until_interrupt(None))
 
         def on_step(row: ExecutionRow) -> None:

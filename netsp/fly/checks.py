@@ -45,6 +45,11 @@ def ready(
         return _until(session, holds, should_stop)
 
     if not until(lambda: session.silent_s < np.inf):
+        if session.others:
+            raise RefusedError(
+                f"heard system {', '.join(map(str, session.others))}, but not system "
+                f"{session.system} for {WAIT_S:g} s: is --system right?"
+            )
         raise RefusedError(f"no vehicle has been heard for {WAIT_S:g} s: is the link right?")
     session.ask_for_positions()
     m = dialect()

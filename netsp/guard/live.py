@@ -91,6 +91,7 @@ def watch(
     beaten = float("-inf")
     listener, stream = Listener(frame, system), Stream(guard)
     heard = saved = sent = told = time.monotonic()
+    others: set[int] = set()
     try:
         tell(f"listening on {address}")
         while until is None or not until():
@@ -120,6 +121,10 @@ def watch(
                 take(report)
                 if publish and report.raised:
                     _publish(link, report)
+            if listener.time is None and listener.others - others:
+                others |= listener.others
+                who = ", ".join(map(str, sorted(others)))
+                tell(f"heard system {who}, but not system {listener.system} yet")
             if corrections is not None:
                 _correct(guard, corrections, tell)
             if state is not None and now - saved >= SAVE_S:

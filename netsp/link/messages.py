@@ -36,12 +36,20 @@ class Listener:
         Of the site.
     system : int, optional
         Its system id; by default that of the first autopilot heard.
+
+    Attributes
+    ----------
+    strangers : int
+        How many messages came from others.
+    others : set of int
+        System ids of the other vehicles among them.
     """
 
     def __init__(self, frame: Frame, system: int | None = None) -> None:
         self.frame, self.system = frame, system
         self.time: float | None = None
         self.strangers = 0
+        self.others: set[int] = set()
 
     def understand(self, message: Any) -> Fix | None:
         """What a message says.
@@ -63,6 +71,8 @@ class Listener:
             self.system = message.get_srcSystem()
         if message.get_srcSystem() != self.system or message.get_srcComponent() != AUTOPILOT:
             self.strangers += 1
+            if kind == "HEARTBEAT" and message.get_srcComponent() == AUTOPILOT:
+                self.others.add(message.get_srcSystem())
             return None
         boot = getattr(message, "time_boot_ms", None)
         if isinstance(boot, int):

@@ -83,6 +83,11 @@ class Session:
         return self._listener.system
 
     @property
+    def others(self) -> list[int]:
+        """System ids of other vehicles that were heard."""
+        return sorted(self._listener.others.copy())
+
+    @property
     def now(self) -> Fix:
         """What the vehicle said last of everything."""
         with self._lock:
