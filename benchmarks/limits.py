@@ -3,8 +3,10 @@
     python benchmarks/limits.py [--limit 1]
 
 Problems that are too large for what is asked: 200 goals at tether 500 (some 20,000 classes are kept
-of many more), 67 turbines with 13 km of tether (millions of classes), and for the solvers that
-bound, 200 goals at tether 400 for three times as long.
+of many more), 67 turbines with 13 km of tether (millions of classes); for the solvers that bound,
+200 goals at tether 400 for three times as long, and two of the library with some 20,000 classes of
+few goals: one where many tethers are only found by a search, and one whose legs are a matrix that
+takes longer than there is time.
 """
 
 from __future__ import annotations
@@ -15,6 +17,7 @@ import time
 from collections.abc import Iterator
 
 import numpy as np
+from library_worlds import FOLDER
 from table import head, heading, row
 
 from netsp import Circle, Problem, solve
@@ -34,6 +37,11 @@ def turbines() -> Problem:
         name="turbines", base=(-500, -500), goals=[(x + 20, y + 20) for x, y in places],
         obstacles=[Circle(center=p, radius=5) for p in places], tether_length=13_000,
     )  # fmt: skip
+
+
+def library_problem(name: str) -> Problem:
+    """A problem of the library."""
+    return Problem.load(FOLDER / f"{name}.json")
 
 
 BOUNDING = ("auto", "mip", "dp")
@@ -65,15 +73,15 @@ def runs(limit: float) -> Iterator[tuple[str, str, float, str]]:
     many = random_world(0, goals=200, tether_length=500.0)
     problems = [("200 goals", many, limit), ("67 turbines", turbines(), limit)]
     # classes enough for legs to be bounded at all, and time enough to begin with that
-    fewer = (
-        "200 goals, shorter tether",
-        random_world(0, goals=200, tether_length=400.0),
-        3 * limit,
-    )
+    fewer = random_world(0, goals=200, tether_length=400.0)
+    bounded = [
+        ("200 goals, shorter tether", fewer, 3 * limit),
+        *((name, library_problem(name), 2 * limit) for name in ("maze-30-0", "windfarm-9-5")),
+    ]
     for solver in SOLVERS:
         for problem in (warm, random_world(0, goals=20, tether_length=500.0)):
             solve(problem, solver, time_limit=0.5)  # compiled before it counts
-        for name, problem, allowed in [*problems, *([fewer] if solver in BOUNDING else [])]:
+        for name, problem, allowed in [*problems, *(bounded if solver in BOUNDING else [])]:
             found = over(problem, solver, allowed)
             if found[0] > WORTH_REPEATING:
                 found = min(found, over(problem, solver, allowed))

@@ -123,9 +123,7 @@ class SolverRun:
             self.update_incumbent([0])
         else:
             there = self.graph.members(1)
-            self.update_incumbent(
-                [0, int(there[np.argmin(self.graph.costs_among([0, *there])[0, 1:])])]
-            )
+            self.update_incumbent([0, int(there[np.argmin(self.graph.costs_to_base[there])])])
         self.bound = self.length
         return True
 
