@@ -54,19 +54,20 @@ class Trie:
     @classmethod
     def of_words(cls, words: Sequence[tuple[int, ...]], limit: float) -> tuple[Trie, list[int]]:
         """The trie of words and their prefixes; and the node of each word."""
-        trie = cls.root(limit, capacity=max(256, 2 + sum(len(w) for w in words)))
-        trie.limit[:] = limit
-        last = []
+        rows, last, child_of = [[-1, 0, -1, -1, 1]], [], dict[tuple[int, int], int]()
         for word in words:
             node = 0
             for letter in word:
-                child = int(trie_child(node, letter, trie.nodes))
-                if child < 0:
-                    child = trie.size
-                    add_child(node, letter, 1, child, trie.nodes)
-                    trie.size += 1
+                child = child_of.setdefault((node, letter), len(rows))
+                if child == len(rows):
+                    rows.append([node, letter, -1, rows[node][CHILD], 1])
+                    rows[node][CHILD] = child
                 node = child
             last.append(node)
+        trie = cls.root(limit, capacity=max(256, 2 * len(rows)))
+        trie.nodes[: len(rows)] = rows
+        trie.limit[:] = limit
+        trie.size = len(rows)
         return trie, last
 
     def word(self, node: int) -> tuple[int, ...]:
