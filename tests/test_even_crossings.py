@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from netsp import Circle, Problem, Status, solve_graph, travel_graph
 from netsp.clock import Clock
+from netsp.errors import LimitReachedError
 from netsp.mip import root
 from netsp.mip.bound import exact_bound
 from netsp.mip.covers import climb
@@ -349,6 +350,30 @@ def test_no_time_leaves_a_bound_that_holds():
     clock.end()
     found = bound_over_goals(graph, proven_goals, Limits(clock))
     assert 0.0 <= found.bound <= solve_graph(graph, "auto").length
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_auto_has_a_tour_and_a_bound_whatever_the_time(seed):
+    problem = random_world(seed, goals=15, tether_length=300.0)
+    best = solve_graph(travel_graph(problem), "auto")
+    clock = Clock()
+    clock.end()
+    found = solve_graph(travel_graph(problem), "auto", time_limit=clock)
+    assert 0.3 * best.length < found.lower_bound <= best.length <= found.length
+    assert found.status is Status.FEASIBLE
+
+
+def test_the_legs_of_a_matrix_that_takes_too_long_leave_the_bound_over_goals(monkeypatch):
+    graph = travel_graph(small(1))
+    best = solve_graph(graph, "auto").length
+
+    def too_long():
+        raise LimitReachedError("the time is up")
+
+    monkeypatch.setattr("netsp.mip.overgoals.MANY_CLASSES", 10)
+    with pytest.raises(LimitReachedError):
+        bound_over_goals(graph, proven_goals, Limits(), [0], too_long)
+    assert 0.5 * best < graph.bound_in_any_class <= best
 
 
 @pytest.mark.parametrize("press", [KeyboardInterrupt, Stop])

@@ -292,7 +292,7 @@ def covers() -> tuple[str, bool]:
     costs, most = graph.costs_rounded(np.arange(len(graph))), module.MOST_CELLS
     module.MOST_CELLS = 450
     try:
-        found = bound_over_goals(graph, lambda *_: None, Limits(), run.tour, costs)
+        found = bound_over_goals(graph, lambda *_: None, Limits(), run.tour, lambda: costs)
     finally:
         module.MOST_CELLS = most
     gap = 100.0 * (1.0 - found.bound / run.length)

@@ -36,6 +36,9 @@ MOST_TREES, FIRST_STEP, SHORTER, PATIENCE = 60, 1.0, 0.7, 4
 """1-trees at most; the first step, as a share of Polyak's; and by how much steps get shorter when
 so many trees have raised nothing."""
 
+LEGS_AT_ONCE = 500_000
+"""Looked at by 1-trees whatever the time, some hundredths of a second."""
+
 MOST_PROGRAMS = 300
 """Of the proof over goals: with hundreds of them it would take the time of that over classes."""
 
@@ -63,7 +66,7 @@ Prove = Callable[[TravelGraph, Limits], tuple[Result, Sequence[Cut]]]
 
 def bound_over_goals(
     graph: TravelGraph, prove: Prove, limits: Limits, tour: Sequence[int] | None = None,
-    costs: Floats | None = None, told: Told = lambda *_: None,
+    costs: Callable[[], Floats] | None = None, told: Told = lambda *_: None,
 ) -> OverGoals:  # fmt: skip
     """No tour of the graph is shorter; a bound of 0 if the limits leave nothing.
 
@@ -74,15 +77,18 @@ def bound_over_goals(
     tour
         The best one known; without one, covers are not looked at.
     costs
-        (V, V) of all legs, if they are known and no class was left out.
+        Gives (V, V) of all legs, if no class was left out; called once there is a first bound, for
+        it may take all the time that is left.
     told
         See `Told`.
     """
     clock = Clock.of(limits.time)
     least = graph.between_goals(lambda: clock.up)
     bound, cuts, cells = best_tree(least, lambda: clock.up), tuple[Cut, ...](), None
+    _holds_in_any_class(graph, bound * (1.0 - ROUNDING))
     if tour is not None and len(graph) > MANY_CLASSES:
-        cells = _over_cells(graph, tour, clock, limits, costs, told)
+        known = None if costs is None else costs()
+        cells = _over_cells(graph, tour, clock, limits, known, told)
     if cells is None or graph.goal_count < FEW_GOALS:
         over = TravelGraph.from_costs(least, range(graph.goal_count + 1))
         most = MOST_PROGRAMS if limits.iterations is None else min(limits.iterations, MOST_PROGRAMS)
@@ -91,9 +97,21 @@ def bound_over_goals(
     bound *= 1.0 - ROUNDING
     over_cells = cells.bound * (1.0 - ROUNDING) if cells else 0.0
     # what lies over the classes that a roadmap has kept says nothing of the others
-    any_class = max(bound, 0.0 if costs is not None else over_cells)
-    graph.bound_in_any_class = max(graph.bound_in_any_class, any_class)
+    _holds_in_any_class(graph, bound if costs is not None else max(bound, over_cells))
     return OverGoals(max(bound, over_cells), cuts, cells)
+
+
+def bound_at_once(graph: TravelGraph) -> None:
+    """A first bound for who has no time: a few 1-trees of straight lines between goals."""
+    if graph.roadmapped and not graph.bound_in_any_class:
+        least = graph.between_goals(lambda: True)
+        left = iter(range(LEGS_AT_ONCE // least.size))
+        bound = best_tree(least, lambda: next(left, None) is None)
+        _holds_in_any_class(graph, bound * (1.0 - ROUNDING))
+
+
+def _holds_in_any_class(graph: TravelGraph, bound: float) -> None:
+    graph.bound_in_any_class = max(graph.bound_in_any_class, bound)
 
 
 def _over_cells(

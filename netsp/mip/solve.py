@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from netsp.arrays import Floats
 from netsp.clock import Clock
 from netsp.dp.solve import bound_by_walks
 from netsp.lns import Search
@@ -203,13 +204,17 @@ class MipRun(SearchingRun):
         share = Clock(part * self.clock.left, within=self.clock) if self.clock.limit else self.clock
         limits = Limits(share, rng=self.rng)
 
-        costs, graph = None, self.graph
-        if climbs and graph.legs_at_once and graph.complete:
+        graph = self.graph
+
+        def costs() -> Floats:
             self._costs = LegCosts(graph)
-            costs = self._costs.values
+            return self._costs.values
+
+        known = climbs and graph.legs_at_once and graph.complete
         self._over_goals = bound_over_goals(
-            graph, prove, limits, self.tour if climbs else None, costs, self.climbed
-        )
+            graph, prove, limits, self.tour if climbs else None, costs if known else None,
+            self.climbed,
+        )  # fmt: skip
         self.raise_bound(self._over_goals.bound)
         self.report("goals", vertices=len(self.graph))
 

@@ -24,7 +24,7 @@ from netsp.dp.solve import fits as walks_fit
 from netsp.dp.solve import solve as walk
 from netsp.lns.solve import solve as search
 from netsp.mip.merging import search_and_merge
-from netsp.mip.overgoals import Told, bound_over_goals
+from netsp.mip.overgoals import Told, bound_at_once, bound_over_goals
 from netsp.mip.solve import MipRun, solve_merged
 from netsp.mip.solve import Params as MipParams
 from netsp.mip.solve import solve as prove
@@ -87,7 +87,13 @@ class Params:
 
 def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | None = None) -> Result:
     """Solve by size. Iterations are those of the solver chosen."""
-    chosen, limits = params or Params(), limits or Limits()
+    found = _by_size(graph, params or Params(), limits or Limits())
+    if not found.lower_bound:
+        bound_at_once(graph)
+    return found
+
+
+def _by_size(graph: TravelGraph, chosen: Params, limits: Limits) -> Result:
     if exact.fits(graph):
         small = SolverRun(graph, limits)
         with small.until_stopped():
