@@ -78,8 +78,9 @@ def overrun() -> tuple[str, bool]:
     """Seconds beyond a limit of one, over solvers, on two large problems."""
     import limits
 
-    worst, where, silent = limits.worst(1.0)
-    return f"{worst:.2f} s ({where}); {silent} without a tour", worst <= 1.0
+    worst, where, silent, unbounded = limits.worst(1.0)
+    shown = f"{worst:.2f} s ({where}); {silent} without a tour, {unbounded} of auto without a bound"
+    return shown, worst <= 1.0 and not unbounded
 
 
 def wharf() -> tuple[str, bool]:
@@ -308,7 +309,9 @@ def claims() -> Iterator[Claim]:
     yield seconds_of(60, 350.0, 1, 12.0)
     yield seconds_of(100, 300.0, 1, 15.0)
     yield Claim("proposals of anneal", "as published (/ 3)", proposals, timed=True)
-    yield Claim("beyond a time limit of 1 s, every solver", "1 s", overrun, timed=True)
+    yield Claim(
+        "beyond a time limit of 1 s, every solver", "1 s; auto has a bound", overrun, timed=True
+    )
     yield Claim("legs pulled along their words", "1 %, 1e-9, 20 µs", pulled, timed=True)
     yield Claim("all legs of 20 goals at tether 500", "1 s, 1e-9", legs_at_once, timed=True)
     yield Claim("covers: gap over 450 cells, 100 goals at tether 500", "4.3 %", covers)
