@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from netsp import InputError
 from netsp.online.vehicle import VEHICLES, make_vehicle
-from netsp.online.vehicle.control import HORIZON, PredictiveControl
+from netsp.online.vehicle.control import HORIZON, PredictiveControl, solve_positive, within
 from netsp.online.vehicle.dynamics import (
     ALLOCATION,
     INERTIA,
@@ -66,11 +66,34 @@ def test_a_vehicle_without_thrust_drifts_with_the_current():
 def test_the_linear_model_predicts_small_changes():
     rng = np.random.default_rng(1)
     states, forces = rng.normal(size=(4, 8)), 5 * rng.normal(size=(3, 4))
-    by_state, by_force, after = linearised(states, forces, STILL, 0.1)
+    by_state, by_force = linearised(states, forces, STILL, 0.1)
     dx, du = 1e-4 * rng.normal(size=8), 1e-3 * rng.normal(size=4)
     for k in range(3):
+        after = step(states[k], forces[k], STILL, 0.1)
         moved = step(states[k] + dx, forces[k] + du, STILL, 0.1)
-        assert moved == pytest.approx(after[k] + by_state[k] @ dx + by_force[k] @ du, abs=1e-6)
+        assert moved == pytest.approx(after + by_state[k] @ dx + by_force[k] @ du, abs=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_thrusts_between_bounds_are_those_of_the_least_cost(seed):
+    """No step within the bounds goes down: the slope is zero where a bound does not hold, and
+    leads out of it where one does."""
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(1, 40))
+    some = rng.normal(size=(n + 3, n))
+    hessian, slope = some.T @ some + 1e-3 * np.eye(n), 10.0 * rng.normal(size=n)
+    low, high = -rng.random(n), rng.random(n)
+    x = within(hessian, slope, low, high, 100)
+    down = hessian @ x + slope
+    assert (low <= x).all()
+    assert (x <= high).all()
+    assert (np.abs(down[(x > low) & (x < high)]) < 1e-5).all()
+    assert (down[x == low] > -1e-5).all()
+    assert (down[x == high] < 1e-5).all()
+    assert low.max() < 0.0 < high.min()
+    right = slope.copy()
+    solve_positive(np.triu(hessian), right)
+    assert hessian @ right == pytest.approx(slope, abs=1e-6)
 
 
 @pytest.mark.parametrize("water", [(0.0, 0.0, 0.0), (0.15, -0.1, 0.05)])

@@ -14,6 +14,9 @@ from netsp.arrays import Floats, Ints
 from netsp.roadmap.outline import Outline, is_free
 from netsp.roadmap.tangents import ARC_STEP, TangentGraph, build_tangents
 
+WAYS_AROUND = (1.5, 3.0, np.inf)
+"""Points are sought within so many times the straight line to them, one after the other."""
+
 AT_ONCE = 16
 """Sources of shortest paths between two looks at the clock."""
 
@@ -131,10 +134,30 @@ class ContactGraph:
         # a rounding less, so that it is never more than what is left
         return Rest(float(found[0]), np.asarray(found[ends]) * (1.0 - 1e-12))
 
-    def tree(self, source: int) -> tuple[Floats, Ints]:
-        """Length to every node and the node before it."""
-        d, before = dijkstra(self._graph, directed=False, indices=source, return_predecessors=True)
+    def tree(self, source: int, limit: float = np.inf) -> tuple[Floats, Ints]:
+        """Length to every node and the node before it; inf for those beyond a limit."""
+        d, before = dijkstra(
+            self._graph, directed=False, indices=source, return_predecessors=True, limit=limit
+        )
         return d, before.astype(np.int64)
+
+    def tree_to(self, source: int, target: int) -> Ints:
+        """The node before each on shortest paths from a point, as far as another point."""
+        straight = math.dist(self.outline.points[source], self.outline.points[target])
+        for way in WAYS_AROUND:
+            length, before = self.tree(source, way * straight)
+            if np.isfinite(length[target]):
+                break
+        return before
+
+    def tree_to_nearest(self, source: int, most: int) -> tuple[Floats, Ints]:
+        """As `tree`, with so many of the points within the limit, if there are that many."""
+        straight = np.sort(np.hypot(*(self.outline.points - self.outline.points[source]).T))
+        for way in WAYS_AROUND:
+            length, before = self.tree(source, way * float(straight[min(most, len(straight) - 1)]))
+            if np.isfinite(length[: self.points]).sum() >= most:
+                break
+        return length, before
 
     def draw(self, source: int, target: int, before: Ints) -> Floats:
         """(k, 2) polyline; arcs as circumscribed chords, finer where a gap is narrow."""

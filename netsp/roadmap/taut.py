@@ -17,7 +17,7 @@ import numpy as np
 from netsp.arrays import Floats
 from netsp.clock import Clock, TimeLimit
 from netsp.errors import InputError
-from netsp.hsignature import Word, is_looping, signature
+from netsp.hsignature import Word, concatenate, is_looping, signature
 from netsp.problem import Problem
 from netsp.roadmap.classes import find_classes
 from netsp.roadmap.detours import taut_detours
@@ -104,7 +104,7 @@ class TautRoadmap:
     def ways(self, goal: int, most: int) -> list[tuple[int, Word]]:
         """As `netsp.travel.graph.Carrier.ways`."""
         contacts = self.paths.contacts
-        length, before = contacts.tree(goal)
+        length, before = contacts.tree_to_nearest(goal, most + 2)  # itself and the base
         near = np.argsort(length[: contacts.points], kind="stable")
         rays = self.outline.rays
         return [
@@ -112,6 +112,13 @@ class TautRoadmap:
             for k in [k for k in near.tolist() if k not in (0, goal)][:most]
             if np.isfinite(length[k])
         ]
+
+    def carried(self, start: int, word: Word, goal: int) -> Word | None:
+        """As `netsp.travel.graph.Carrier.carried`."""
+        contacts = self.paths.contacts
+        line = contacts.draw(start, goal, contacts.tree_to(start, goal))
+        there = concatenate(word, signature(line, self.outline.rays))
+        return None if self._tether(goal, there) is None else there
 
     def with_classes(
         self, wanted: Iterable[tuple[int, Word]], up: Callable[[], bool]

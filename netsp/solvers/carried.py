@@ -5,12 +5,14 @@ all much alike: they differ in the side on which a tether passes obstacles half 
 them keep coming back towards the base. A good tour goes on from goal to goal, and the tether comes
 along. So from the classes of a tour each goal near by is gone on to the shortest way; the classes
 that the tether comes into there join the graph, a search over these few finds a better tour, and so
-on until none is found.
+on until none is found. It begins with the shortest order along straight lines: a tether is carried
+along that, too, whatever it is wound around on the way; it is the way home from the last goal.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -86,6 +88,7 @@ def with_carried(
     ways = {0: carrier.ways(0, graph.goal_count)}
     least = least_tethers(graph.costs_to_base, graph.cluster, FEW)
     looked = dict.fromkeys(_classes(graph, least))
+    graph = _put_back(graph, _along_straight_lines(graph, rng, share), looked, share)
     best: list[Class] = []
     shortest, vain = np.inf, 0
     while not share.up and vain < IN_VAIN:
@@ -110,14 +113,44 @@ def with_carried(
             if goal not in ways and not share.up:
                 ways[goal] = carrier.ways(goal, NEAR)
             wanted |= dict.fromkeys((k, concatenate(word, way)) for k, way in ways.get(goal, ()))
-        new = [c for c in wanted if c not in looked]
-        order = graph.before
-        graph = carrier.with_classes(new, lambda: share.up)
-        graph.before = order
-        there = set(_classes(graph, np.arange(1, len(graph))))
-        looked |= dict.fromkeys(c for c in new if c in there)
+        graph = _put_back(graph, [c for c in wanted if c not in looked], looked, share)
         vain = 0 if improved else vain + 1
     return Carried(graph, _vertices(graph, best) if best else None)
+
+
+def _along_straight_lines(
+    graph: TravelGraph, rng: np.random.Generator, clock: Clock
+) -> list[Class]:
+    """Classes that the tether comes into along a short tour over straight lines; from where it does
+    not reach on, it is carried from the class of least tether; the first of all if the time is up
+    before."""
+    carrier = graph.carrier
+    assert carrier is not None
+    apart, places = graph.between_goals(lambda: True), np.arange(graph.goal_count + 1)
+    _, tour = _tour_of(Instance(places, apart, places, graph.before), rng, None, clock)
+    least = dict(_classes(graph, least_tethers(graph.costs_to_base, graph.cluster, 1)))
+    out: list[Class] = []
+    word: Word = ()
+    for start, goal in pairwise(tour):
+        if clock.up:
+            break
+        there = carrier.carried(start, word, goal)
+        word = least[goal] if there is None else there
+        out.append((goal, word))
+    return out
+
+
+def _put_back(
+    graph: TravelGraph, new: list[Class], looked: dict[Class, None], clock: Clock
+) -> TravelGraph:
+    """The graph with more classes, and what is looked at with those that the tether reaches."""
+    assert graph.carrier is not None
+    order = graph.before
+    graph = graph.carrier.with_classes(new, lambda: clock.up)
+    graph.before = order
+    there = set(_classes(graph, np.arange(1, len(graph))))
+    looked |= dict.fromkeys(c for c in new if c in there)
+    return graph
 
 
 def _classes(graph: TravelGraph, vertices: Ints) -> list[Class]:
@@ -140,8 +173,17 @@ def _searched(
     low = graph.lower_bounds(core)
     low[0] = low[:, 0] = graph.costs_to_base[core]
     start = [0, *(g for g, _ in best)] if best else None
-    search = Search(Instance(graph.cluster[core], low, core, graph.before), rng, start, clock)
-    search.settle()
-    search.run(min(ROUNDS_PER_GOAL * graph.goal_count, MOST_ROUNDS), clock)
-    _, tour = search.best()
+    of_core = Instance(graph.cluster[core], low, core, graph.before)
+    _, tour = _tour_of(of_core, rng, start, clock)
     return graph.tour_length(tour), _classes(graph, np.array(tour, dtype=np.int64))
+
+
+def _tour_of(
+    instance: Instance, rng: np.random.Generator, start: list[int] | None, clock: Clock
+) -> tuple[float, tuple[int, ...]]:
+    """A short tour, from an order of goals if there is one, and its length."""
+    search = Search(instance, rng, start, clock)
+    search.settle()
+    goals = instance.clusters - 1
+    search.run(min(ROUNDS_PER_GOAL * goals, MOST_ROUNDS), clock)
+    return search.best()

@@ -43,6 +43,10 @@ class Carrier(Protocol):
         """The nearest goals to one (from 1; 0 is the base), and the words of the shortest ways
         there."""
 
+    def carried(self, start: int, word: Word, goal: int) -> Word | None:
+        """The word that a tether has when it has come along the shortest way from a goal, or the
+        base, to another goal; None if it does not reach so far."""
+
     def with_classes(
         self, wanted: Iterable[tuple[int, Word]], up: Callable[[], bool]
     ) -> TravelGraph:

@@ -75,37 +75,60 @@ def derivative(state: Floats, force: Floats, water: Floats, out: Floats) -> None
 @kernel
 def step(state: Floats, force: Floats, water: Floats, seconds: float) -> Floats:
     """The state after one step of the classical Runge-Kutta method."""
-    k1, k2, k3, k4 = np.empty(8), np.empty(8), np.empty(8), np.empty(8)
+    out = np.empty(8)
+    step_into(out, state, force, water, seconds, np.empty((5, 8)))
+    return out
+
+
+@kernel
+def step_into(
+    out: Floats, state: Floats, force: Floats, water: Floats, seconds: float, room: Floats
+) -> None:
+    """As `step`, into `out` (8,); `room` (5, 8) may hold anything."""
+    k1, k2, k3, k4, at = room[0], room[1], room[2], room[3], room[4]
     derivative(state, force, water, k1)
-    derivative(state + 0.5 * seconds * k1, force, water, k2)
-    derivative(state + 0.5 * seconds * k2, force, water, k3)
-    derivative(state + seconds * k3, force, water, k4)
-    return state + seconds / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+    for i in range(8):
+        at[i] = state[i] + 0.5 * seconds * k1[i]
+    derivative(at, force, water, k2)
+    for i in range(8):
+        at[i] = state[i] + 0.5 * seconds * k2[i]
+    derivative(at, force, water, k3)
+    for i in range(8):
+        at[i] = state[i] + seconds * k3[i]
+    derivative(at, force, water, k4)
+    for i in range(8):
+        out[i] = state[i] + seconds / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i])
 
 
 @kernel
 def linearised(
     states: Floats, forces: Floats, water: Floats, seconds: float
-) -> tuple[Floats, Floats, Floats]:
+) -> tuple[Floats, Floats]:
     """Along a trajectory (n + 1, 8), (n, 4): the steps' Jacobians by state (n, 8, 8) and by input
-    (n, 8, 4), by central differences, and what each step comes to (n, 8)."""
+    (n, 8, 4), by central differences. Where the vehicle is makes no difference to how it moves."""
     n = len(forces)
-    by_state, by_force, after = np.empty((n, 8, 8)), np.empty((n, 8, 4)), np.empty((n, 8))
-    eps = 1e-6
+    by_state, by_force = np.zeros((n, 8, 8)), np.empty((n, 8, 4))
+    ahead, behind, room = np.empty(8), np.empty(8), np.empty((5, 8))
+    state, force = np.empty(8), np.empty(4)
+    eps, newton = 1e-6, 1e-3
     for k in range(n):
-        after[k] = step(states[k], forces[k], water, seconds)
-        for i in range(8):
-            ahead, behind = states[k].copy(), states[k].copy()
-            ahead[i] += eps
-            behind[i] -= eps
-            by_state[k, :, i] = (
-                step(ahead, forces[k], water, seconds) - step(behind, forces[k], water, seconds)
-            ) / (2.0 * eps)
+        state[:], force[:] = states[k], forces[k]
+        for i in range(3):
+            by_state[k, i, i] = 1.0
+        for i in range(3, 8):
+            state[i] = states[k, i] + eps
+            step_into(ahead, state, force, water, seconds, room)
+            state[i] = states[k, i] - eps
+            step_into(behind, state, force, water, seconds, room)
+            state[i] = states[k, i]
+            for j in range(8):
+                by_state[k, j, i] = (ahead[j] - behind[j]) / (2.0 * eps)
         for i in range(4):
-            more, less = forces[k].copy(), forces[k].copy()
-            more[i] += 1e-3
-            less[i] -= 1e-3
-            by_force[k, :, i] = (
-                step(states[k], more, water, seconds) - step(states[k], less, water, seconds)
-            ) / 2e-3
-    return by_state, by_force, after
+            force[i] = forces[k, i] + newton
+            step_into(ahead, state, force, water, seconds, room)
+            force[i] = forces[k, i] - newton
+            step_into(behind, state, force, water, seconds, room)
+            force[i] = forces[k, i]
+            for j in range(8):
+                by_force[k, j, i] = (ahead[j] - behind[j]) / (2.0 * newton)
+    return by_state, by_force
