@@ -3,6 +3,8 @@ VENV   ?= .venv
 PYTHON ?= python3
 BIN     = $(VENV)/bin
 DEMO   ?= demo
+# one more than there are processors: vehicles and clocks are waited for
+TESTERS = $(shell $(PYTHON) -c 'import os; print((os.cpu_count() or 1) + 1)')
 
 .PHONY: demo test accept docs wheel wheel-installed pythons tables lint bench js clean
 .DELETE_ON_ERROR:
@@ -23,8 +25,8 @@ demo: $(VENV)/.installed
 test: $(VENV)/.installed
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/mypy
-	$(BIN)/python -m pytest -n auto --dist worksteal --durations 20
+	$(BIN)/mypy & types=$$!; \
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n $(TESTERS) --dist worksteal --durations 20 && wait $$types
 
 # the linter and type checker for the page's scripts, where there is npm; `make test` runs them then
 js:

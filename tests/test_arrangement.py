@@ -60,7 +60,7 @@ def brute(graph: TravelGraph) -> float:
     return best
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(
     seed=st.integers(0, 10**6),
     goals=st.integers(1, 6),
@@ -96,7 +96,7 @@ def test_every_solver_that_may_finds_the_best_of_the_orders_and_places_allowed(
         assert walked.status is Status.INVALID or verify(problem, walked)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(seed=st.integers(0, 10**6), n=st.integers(9, 11), ties=st.integers(1, 12))
 def test_walks_with_precedences_prove_what_all_sets_prove(seed, n, ties):
     """Random costs with three classes each; the sets of goals are gone through independently."""

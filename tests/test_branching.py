@@ -177,7 +177,7 @@ def some_comb(chance, graph):
     return Cut(handle[graph.cluster], -1, tuple(tuple(sorted(t)) for t in teeth))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(st.integers(0, 10**6), st.randoms(use_true_random=False))
 def test_no_tour_violates_a_comb(seed, chance):
     graph = random_graph(seed, 8, most=2)

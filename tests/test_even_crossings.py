@@ -329,7 +329,7 @@ def test_with_too_many_classes_for_a_matrix_covers_bound_the_tour(seed, monkeypa
     goals = bound_over_goals(travel_graph(problem), proven_goals, Limits()).bound
     monkeypatch.setattr("netsp.solvers.auto.PROVABLE", 30)
     monkeypatch.setattr("netsp.mip.overgoals.MANY_CLASSES", 30)
-    found = solve_graph(travel_graph(problem), "auto", time_limit=6.0)
+    found = solve_graph(travel_graph(problem), "auto", time_limit=3.0)
     assert found.lower_bound <= best.length * (1.0 + 1e-6)
     assert found.length >= best.length * (1.0 - 1e-6)
     assert found.lower_bound > goals

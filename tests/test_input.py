@@ -276,8 +276,8 @@ def test_damaged_rows_are_told_and_a_page_escapes_every_field(tmp_path, capsys, 
     others, draw = (None, [], {}, -1, True, 1e308), style.svg
     for k, path in enumerate(walk(good)):
         # most of the time would go into drawing
-        monkeypatch.setattr(style, "svg", draw if k % 5 == 1 else lambda figure: "")
-        for bad in (evil, others[k // 5 % len(others)]) if k % 5 == 1 else (evil,):
+        monkeypatch.setattr(style, "svg", draw if k % 9 == 1 else lambda figure: "")
+        for bad in (evil, others[k // 9 % len(others)]) if k % 9 == 1 else (evil,):
             damaged = json.loads(json.dumps(good))
             at = damaged
             for key in path[:-1]:
