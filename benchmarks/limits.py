@@ -71,7 +71,7 @@ def over(problem: Problem, solver: str, limit: float) -> tuple[float, str]:
 
 
 def runs(limit: float) -> Iterator[tuple[str, str, float, str]]:
-    """(solver, problem, seconds over the limit, status) for every solver and both problems."""
+    """(solver, problem, seconds over the limit, status) for every solver and its problems."""
     warm = random_world(0, goals=6, tether_length=500.0)
     many = random_world(0, goals=200, tether_length=500.0)
     problems = [("200 goals", many, limit), ("67 turbines", turbines(), limit)]
@@ -92,8 +92,14 @@ def runs(limit: float) -> Iterator[tuple[str, str, float, str]]:
         ]:
             found = over(problem, solver, allowed)
             if found[0] > WORTH_REPEATING:
-                found = min(found, over(problem, solver, allowed))
+                again = over(problem, solver, allowed)
+                # what was missing the first time is missing
+                found = min(found[0], again[0]), max(found[1], again[1], key=_missing)
             yield solver, name, *found
+
+
+def _missing(status: str) -> bool:
+    return UNBOUNDED in status or ("feasible" not in status and "optimal" not in status)
 
 
 def worst(limit: float) -> tuple[float, str, int, int]:

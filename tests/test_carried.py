@@ -73,6 +73,54 @@ def test_a_tour_along_carried_classes_is_verified_and_much_shorter(monkeypatch):
     assert found.length < 0.9 * before.length
 
 
+def stacked():
+    """Goals over one place, over the base too."""
+    problem = windfarm(3, 1.2)
+    over = [(x, y, -5.0) for x, y, _ in (problem.base, problem.goals[4].position)]
+    goals = [g.position for g in problem.goals]
+    return Problem(
+        base=problem.base, goals=[*goals, *over, (*over[1][:2], -9.0)],
+        obstacles=list(problem.obstacles), tether_length=problem.tether_length,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("problem", [windfarm(4), stacked()], ids=["apart", "stacked"])
+def test_the_nearest_are_found_as_among_all(problem):
+    contacts = few(problem).carrier.paths.contacts
+    for source in range(contacts.points):
+        length, _ = contacts.tree(source)
+        for most in (3, 6, contacts.points, contacts.points + 5):
+            near, _ = contacts.tree_to_nearest(source, most)
+            found = np.isfinite(near[: contacts.points])
+            assert found.sum() >= min(most, contacts.points)
+            assert np.allclose(near[: contacts.points][found], length[: contacts.points][found])
+            farthest = near[: contacts.points][found].max()
+            assert (length[: contacts.points][~found] >= farthest).all()
+        for target in range(contacts.points):
+            line = contacts.draw(source, target, contacts.tree_to(source, target))
+            long = np.hypot(*np.diff(line, axis=0).T).sum()
+            assert long == pytest.approx(length[target], rel=1e-3, abs=1e-6)
+
+
+def test_a_tether_is_carried_along_and_no_farther_than_it_reaches():
+    problem = windfarm(4, 1.05)
+    graph = few(problem)
+    words = {}
+    chain = carried._along_straight_lines(graph, np.random.default_rng(0), Clock())
+    assert sorted(goal for goal, _ in chain) == list(range(1, 17))
+    again = carried._put_back(graph, chain, words, Clock())
+    assert list(words) == chain
+    assert again.tethers.max() <= problem.tether_length * (1.0 + 1e-9)
+    ended = Clock()
+    ended.end()
+    assert carried._along_straight_lines(graph, np.random.default_rng(0), ended) == []
+
+
+def test_goals_over_one_place_are_carried_to():
+    found = solve(stacked(), roadmap_options={"max_classes": 40}, time_limit=10.0)
+    assert verify(stacked(), found)
+
+
 def test_the_same_seed_carries_to_the_same_classes():
     problem = windfarm()
     tours = []

@@ -17,6 +17,7 @@ from netsp.dp.walks import Walks
 from netsp.mip.deadlegs import DeadLegs
 from netsp.mip.prices import Prices
 from netsp.mip.program import Duals
+from netsp.solving.run import Stop
 from tests.brute import brute_tour
 from tests.test_contract import random_graph
 from tests.worlds import costs_of, random_world
@@ -93,6 +94,28 @@ def test_a_bound_is_below_its_own_walk_summed_in_exact_rationals(seed):
     exact -= sum(Fraction(float(prices[graph.cluster[v]])) for v in walk.rows)
     assert Fraction(walk.bound) < exact
     assert exact - Fraction(walk.bound) <= Fraction(2.0 * walks.rounding(prices))
+
+
+@pytest.mark.parametrize("shuffled", [False, True])
+def test_a_matrix_is_taken_over_block_by_block_until_the_flag_is_set(shuffled, monkeypatch):
+    graph = random_graph(5, goals=6, most=5)
+    order = np.random.default_rng(0).permutation(len(graph)) if shuffled else np.arange(len(graph))
+    cluster, costs = graph.cluster[order], graph.costs[np.ix_(order, order)].astype(np.float32)
+    whole = Walks(cluster, costs)
+    monkeypatch.setattr("netsp.dp.walks.ROWS", 3)
+    blocks = Walks(cluster, costs)
+    assert (whole.values == blocks.values).all()
+    assert whole.values.dtype == np.float64
+    assert (whole.values == costs[np.ix_(whole.order, whole.order)]).all()
+    assert whole.longest == blocks.longest == costs[np.isfinite(costs)].max()
+    assert (whole._near() == blocks._near()).all()
+    walks = Walks(cluster, costs, np.ones(1, dtype=np.int64))
+
+    def check():
+        raise Stop
+
+    with pytest.raises(Stop):
+        walks.solve(np.zeros(walks.n + 1), 1e9, check)
 
 
 @settings(max_examples=100, deadline=None)

@@ -178,7 +178,9 @@ def test_a_vehicle_with_another_system_id_is_named(tour):
     with Autopilot(pace=PACE) as autopilot:
         session = Session(UdpLink(Address(True, "127.0.0.1", autopilot.port)), Frame(SITE), 2, PACE)
         try:
-            with pytest.raises(RefusedError, match="heard system 1, but not system 2 for"):
+            with pytest.raises(
+                RefusedError, match="heard from system 1, but nothing from system 2"
+            ):
                 fly(SITE, tour, session, OPTIONS)
         finally:
             session.close()

@@ -493,7 +493,7 @@ def test_a_guard_that_hears_another_vehicle_says_so():
             kwargs={"system": 2, "say": said.append, "until": ended.is_set},
         )
         work.start()
-        assert autopilot.until(lambda: "heard system 1, but not system 2 yet" in said)
+        assert autopilot.until(lambda: "heard from system 1, but nothing from system 2 yet" in said)
         ended.set()
         work.join(5.0)
     assert len(said) == 2

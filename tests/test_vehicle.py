@@ -90,10 +90,16 @@ def test_thrusts_between_bounds_are_those_of_the_least_cost(seed):
     assert (np.abs(down[(x > low) & (x < high)]) < 1e-5).all()
     assert (down[x == low] > -1e-5).all()
     assert (down[x == high] < 1e-5).all()
-    assert low.max() < 0.0 < high.min()
-    right = slope.copy()
-    solve_positive(np.triu(hessian), right)
-    assert hessian @ right == pytest.approx(slope, abs=1e-6)
+
+
+@pytest.mark.parametrize("n", [1, 2, 30, 100])
+def test_equations_are_solved_as_by_lapack(n):
+    rng = np.random.default_rng(n)
+    some = rng.normal(size=(n + 3, n))
+    matrix, right = some.T @ some + np.eye(n), rng.normal(size=n)
+    x = right.copy()
+    solve_positive(np.triu(matrix), x)
+    assert x == pytest.approx(np.linalg.solve(matrix, right), abs=1e-9)
 
 
 @pytest.mark.parametrize("water", [(0.0, 0.0, 0.0), (0.15, -0.1, 0.05)])

@@ -75,7 +75,7 @@ def repeatable() -> tuple[str, bool]:
 
 
 def overrun() -> tuple[str, bool]:
-    """Seconds beyond a limit of one, over solvers, on two large problems."""
+    """Seconds beyond a limit of one to three, over solvers, on large problems."""
     import limits
 
     worst, where, silent, unbounded = limits.worst(1.0)

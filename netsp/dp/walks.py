@@ -100,7 +100,8 @@ class Walks:
         self.start: Ints = np.searchsorted(self.goal, np.arange(self.n + 2))
 
     def set_values(self, values: Floats) -> None:
-        """Change the costs of legs; to anything when the flag is set."""
+        """Change the costs of legs. Once the flag is set they may be anything: `solve` raises then
+        before it uses them."""
         order = self.order if (np.diff(self.cluster) < 0).any() else None
         as_they_are = order is None and values.dtype == np.float64 and values.flags.c_contiguous
         self.values: Floats = values if as_they_are else np.empty(values.shape)

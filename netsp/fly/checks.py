@@ -47,8 +47,8 @@ def ready(
     if not until(lambda: session.silent_s < np.inf):
         if session.others:
             raise RefusedError(
-                f"heard system {', '.join(map(str, session.others))}, but not system "
-                f"{session.system} for {WAIT_S:g} s: is --system right?"
+                f"heard from system {', '.join(map(str, session.others))}, but nothing from system "
+                f"{session.system} for {WAIT_S:g} s: is that its id?"
             )
         raise RefusedError(f"no vehicle has been heard for {WAIT_S:g} s: is the link right?")
     session.ask_for_positions()

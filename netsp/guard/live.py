@@ -121,10 +121,10 @@ def watch(
                 take(report)
                 if publish and report.raised:
                     _publish(link, report)
-            if listener.time is None and listener.others - others:
+            if not listener.heard and listener.others - others:
                 others |= listener.others
                 who = ", ".join(map(str, sorted(others)))
-                tell(f"heard system {who}, but not system {listener.system} yet")
+                tell(f"heard from system {who}, but nothing from system {listener.system} yet")
             if corrections is not None:
                 _correct(guard, corrections, tell)
             if state is not None and now - saved >= SAVE_S:

@@ -39,6 +39,8 @@ class Listener:
 
     Attributes
     ----------
+    heard : bool
+        Whether the vehicle has said anything.
     strangers : int
         How many messages came from others.
     others : set of int
@@ -48,6 +50,7 @@ class Listener:
     def __init__(self, frame: Frame, system: int | None = None) -> None:
         self.frame, self.system = frame, system
         self.time: float | None = None
+        self.heard = False
         self.strangers = 0
         self.others: set[int] = set()
 
@@ -74,6 +77,7 @@ class Listener:
             if kind == "HEARTBEAT" and message.get_srcComponent() == AUTOPILOT:
                 self.others.add(message.get_srcSystem())
             return None
+        self.heard = True
         boot = getattr(message, "time_boot_ms", None)
         if isinstance(boot, int):
             self.time = boot / 1000.0

@@ -83,7 +83,10 @@ class DeadLegs:
     @property
     def left(self) -> int:
         """How many legs are not dead."""
-        dead = sum(int(np.unpackbits(self.bits[rows]).sum()) for rows in self._blocks())
+        dead = sum(
+            int(np.count_nonzero(np.unpackbits(self.bits[rows]).view(bool)))
+            for rows in self._blocks()
+        )
         return (8 * self.bits.size - dead) // 2
 
     def legs_left(self) -> Ints:

@@ -37,7 +37,7 @@ MOST_TREES, FIRST_STEP, SHORTER, PATIENCE = 60, 1.0, 0.7, 4
 so many trees have raised nothing."""
 
 LEGS_AT_ONCE = 500_000
-"""Looked at by 1-trees whatever the time, some hundredths of a second."""
+"""Looked at by 1-trees whatever the time, some hundredths of a second; but for the first tree."""
 
 MOST_PROGRAMS = 300
 """Of the proof over goals: with hundreds of them it would take the time of that over classes."""

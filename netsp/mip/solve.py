@@ -211,10 +211,13 @@ class MipRun(SearchingRun):
             return self._costs.values
 
         known = climbs and graph.legs_at_once and graph.complete
-        self._over_goals = bound_over_goals(
-            graph, prove, limits, self.tour if climbs else None, costs if known else None,
-            self.climbed,
-        )  # fmt: skip
+        try:
+            self._over_goals = bound_over_goals(
+                graph, prove, limits, self.tour if climbs else None, costs if known else None,
+                self.climbed,
+            )  # fmt: skip
+        finally:
+            self.raise_bound(graph.bound_in_any_class)
         self.raise_bound(self._over_goals.bound)
         self.report("goals", vertices=len(self.graph))
 

@@ -31,7 +31,6 @@ FEW = 20_000
 """So many legs asked for in a matrix are pulled one by one, hundredths of a second; as many at a
 time where there are more."""
 
-
 SEARCHED_TOGETHER = 20
 """More tethers than these that could not be pulled are looked for by one search."""
 
@@ -61,7 +60,7 @@ class TautLegs:
     ) -> Floats:
         """(k, k) 3D leg lengths among the given vertices; inf within a cluster, and where `asked`
         is given and false, anything. LimitReachedError when the clock is up before all of many are
-        found."""
+        found; among `UNTIMED` vertices they are, whatever the clock says."""
         vertices = np.asarray(vertices, dtype=np.int64)
         if asked is None and len(vertices) <= UNTIMED:
             # one by one, whatever the time: to know where all tethers part may take seconds
@@ -135,7 +134,9 @@ class TautLegs:
         paths, (ends, point) = self.paths, self._ends
         growing = GrowingTree(len(point))
         missing = growing.pull(ends, point, paths.slits, paths.arcs, stop).tolist()
-        known = self._tethers(missing, stop) if len(missing) > SEARCHED_TOGETHER else {}
+        known: dict[int, Path] = {}
+        if len(missing) > SEARCHED_TOGETHER and not stop[0]:
+            known = self._tethers(missing, stop)
         for v in missing:
             if stop[0]:
                 break
@@ -156,7 +157,7 @@ class TautLegs:
         return {
             v: path_along(0, pieces, paths.tangents.target, paths.arcs)
             for v, pieces in zip(vertices, found, strict=True)
-            if pieces is not None
+            if pieces is not None and not stop[0]
         }
 
     def to_base(self) -> Floats:

@@ -14,11 +14,17 @@ from netsp.arrays import Floats, Ints
 from netsp.roadmap.outline import Outline, is_free
 from netsp.roadmap.tangents import ARC_STEP, TangentGraph, build_tangents
 
-WAYS_AROUND = (1.5, 3.0, np.inf)
-"""Points are sought within so many times the straight line to them, one after the other."""
+WAYS_AROUND = (1.5, 3.0)
+"""Points are sought within so many times the straight line to them, one after the other, then
+anywhere."""
 
 AT_ONCE = 16
 """Sources of shortest paths between two looks at the clock."""
+
+
+def _limits(straight: float) -> list[float]:
+    """Of searches for what is so far away; goals over one place are no distance apart."""
+    return [*(way * straight for way in WAYS_AROUND if straight > 0.0), np.inf]
 
 
 class ShortestPaths(Protocol):
@@ -144,17 +150,19 @@ class ContactGraph:
     def tree_to(self, source: int, target: int) -> Ints:
         """The node before each on shortest paths from a point, as far as another point."""
         straight = math.dist(self.outline.points[source], self.outline.points[target])
-        for way in WAYS_AROUND:
-            length, before = self.tree(source, way * straight)
+        for limit in _limits(straight):
+            length, before = self.tree(source, limit)
             if np.isfinite(length[target]):
                 break
         return before
 
     def tree_to_nearest(self, source: int, most: int) -> tuple[Floats, Ints]:
-        """As `tree`, with so many of the points within the limit, if there are that many."""
+        """As `tree`, with so many of the points, itself among them, within the limit."""
+        if most >= self.points:
+            return self.tree(source)
         straight = np.sort(np.hypot(*(self.outline.points - self.outline.points[source]).T))
-        for way in WAYS_AROUND:
-            length, before = self.tree(source, way * float(straight[min(most, len(straight) - 1)]))
+        for limit in _limits(float(straight[most - 1])):
+            length, before = self.tree(source, limit)
             if np.isfinite(length[: self.points]).sum() >= most:
                 break
         return length, before

@@ -104,7 +104,7 @@ class TautRoadmap:
     def ways(self, goal: int, most: int) -> list[tuple[int, Word]]:
         """As `netsp.travel.graph.Carrier.ways`."""
         contacts = self.paths.contacts
-        length, before = contacts.tree_to_nearest(goal, most + 2)  # itself and the base
+        length, before = contacts.tree_to_nearest(goal, most + 2)  # with itself and the base
         near = np.argsort(length[: contacts.points], kind="stable")
         rays = self.outline.rays
         return [

@@ -5,8 +5,8 @@ all much alike: they differ in the side on which a tether passes obstacles half 
 them keep coming back towards the base. A good tour goes on from goal to goal, and the tether comes
 along. So from the classes of a tour each goal near by is gone on to the shortest way; the classes
 that the tether comes into there join the graph, a search over these few finds a better tour, and so
-on until none is found. It begins with the shortest order along straight lines: a tether is carried
-along that, too, whatever it is wound around on the way; it is the way home from the last goal.
+on until none is found. It begins with a short order along straight lines, along which a tether is
+carried, too: whatever it is wound around on the way, back along it the robot comes home free.
 """
 
 from __future__ import annotations
@@ -121,9 +121,9 @@ def with_carried(
 def _along_straight_lines(
     graph: TravelGraph, rng: np.random.Generator, clock: Clock
 ) -> list[Class]:
-    """Classes that the tether comes into along a short tour over straight lines; from where it does
-    not reach on, it is carried from the class of least tether; the first of all if the time is up
-    before."""
+    """Classes that the tether comes into along a short tour over straight lines. Where it does not
+    reach the next goal, that one's class of least tether is gone on from. When the time is up, what
+    was found till then."""
     carrier = graph.carrier
     assert carrier is not None
     apart, places = graph.between_goals(lambda: True), np.arange(graph.goal_count + 1)
