@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from netsp import Circle, InfeasibleError, InputError, Problem, solve, verify
+from netsp import Circle, InfeasibleError, InputError, Problem, solve, solve_graph, verify
+from netsp.clock import Clock
 from netsp.problem import State
 from netsp.roadmap.from_state import graph_from_state
 from netsp.solvers.table import SOLVERS
@@ -68,6 +69,26 @@ def test_every_solver_takes_a_state(solver):
     assert verify(left, path), verify(left, path)
     assert path.length >= solve(left).length * (1 - 1e-9)
     assert path.lower_bound is None or path.lower_bound <= solve(left).length * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_from_a_state_there_is_a_bound_whatever_the_time(seed):
+    problem = random_world(goals=14, tether_length=300, seed=seed)
+    left, _ = after(problem, solve(problem), 3)
+    best = solve(left).length
+    clock = Clock()
+    clock.end()
+    found = solve_graph(graph_from_state(left), "auto", time_limit=clock)
+    assert 0.2 * best < found.lower_bound <= best <= found.length
+    legs = graph_from_state(left)
+    bounds, costs = legs.between_goals(), legs.costs
+    least = np.array([
+        [costs[np.ix_(legs.members(a), legs.members(b))].min() for b in range(len(bounds))]
+        for a in range(len(bounds))
+    ])  # fmt: skip
+    apart = ~np.eye(len(bounds), dtype=bool)
+    assert (bounds[apart] <= least[apart] * (1.0 + 1e-9)).all()
+    assert (bounds[apart] > 0.5 * least[apart]).mean() > 0.8
 
 
 @pytest.mark.parametrize("solver", sorted(GEOMETRIC))

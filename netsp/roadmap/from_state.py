@@ -11,6 +11,7 @@ shortest tour has the free edge, and is the shortest path and twice the surcharg
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
@@ -72,9 +73,17 @@ class GraphFromState(TravelGraph):
             return (0, *reversed(order[1:]))
         return order
 
+    def between_goals(self, up: Callable[[], bool] = lambda: False) -> Floats:
+        """As of `TravelGraph`, with the surcharge."""
+        places = np.arange(self.goal_count + 1)
+        ends = int(self.cluster[self.start or 0])
+        return charged(self.within.between_goals(up), places, places, ends, self.surcharge)
+
     def as_asked(self, result: Result) -> Result:
         """A solver's result on this graph as one about the path from the state."""
         bound = result.lower_bound
+        if self.bound_in_any_class and result.tour is not None:
+            bound = max(bound or 0.0, self.bound_in_any_class)
         low = None if bound is None else max(0.0, bound - 2.0 * self.surcharge)
         tour = None if result.tour is None else self.as_tour(result.tour)
         if tour is None:
@@ -121,6 +130,29 @@ class GraphFromState(TravelGraph):
         return tell
 
 
+def charged(
+    table: Floats, rows: Ints, columns: Ints, start: int, surcharge: float
+) -> Floats:  # fmt: skip
+    """Lengths with the surcharge on all legs of the base and the start, but for the one between
+    them, which is for nothing.
+
+    Parameters
+    ----------
+    table
+        (k, l) lengths.
+    rows, columns
+        (k,), (l,) vertices or clusters that they are of.
+    start
+        That of the start.
+    """
+    out, ends = np.array(table), (0, start)
+    out += surcharge * np.isin(rows, ends)[:, None]
+    out += surcharge * np.isin(columns, ends)[None, :]
+    for one, other in (ends, ends[::-1]):
+        out[np.ix_(rows == one, columns == other)] = 0.0
+    return out
+
+
 class _OpenedLegs:
     """Legs with the surcharge."""
 
@@ -128,13 +160,7 @@ class _OpenedLegs:
         self.within, self.start, self.surcharge = within, start, surcharge
 
     def _charged(self, table: Floats, rows: Ints, columns: Ints) -> Floats:
-        out = np.array(table)
-        ends = (0, self.start)
-        out += self.surcharge * np.isin(rows, ends)[:, None]
-        out += self.surcharge * np.isin(columns, ends)[None, :]
-        for one, other in (ends, ends[::-1]):
-            out[np.ix_(rows == one, columns == other)] = 0.0
-        return out
+        return charged(table, rows, columns, self.start, self.surcharge)
 
     def lengths(
         self, vertices: Ints, asked: Bools | None = None, clock: Clock | None = None
@@ -211,6 +237,7 @@ def graph_from_state(
     )  # fmt: skip
     part = TravelGraph(
         cluster, words, legs.to_base(), legs, roadmap="taut",
+        between=lambda up: legs.paths.contacts.between(placed.points[:, 2], up),
         classes=roadmap.rule if roadmap.complete else "shortest",
         least_left_out=roadmap.least_left_out,
     )  # fmt: skip
