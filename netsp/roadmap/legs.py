@@ -31,6 +31,9 @@ FEW = 20_000
 """So many legs asked for in a matrix are pulled one by one, hundredths of a second; as many at a
 time where there are more."""
 
+MANY = 1500
+"""Of so many classes or fewer it is soon known where all tethers part."""
+
 SEARCHED_TOGETHER = 20
 """More tethers than these that could not be pulled are looked for by one search."""
 
@@ -62,8 +65,8 @@ class TautLegs:
         is given and false, anything. LimitReachedError when the clock is up before all of many are
         found; among `UNTIMED` vertices they are, whatever the clock says."""
         vertices = np.asarray(vertices, dtype=np.int64)
-        if asked is None and len(vertices) <= UNTIMED:
-            # one by one, whatever the time: to know where all tethers part may take seconds
+        if asked is None and len(vertices) <= UNTIMED and len(self.cluster) > MANY:
+            # one by one, whatever the time: to know where all tethers part takes a while
             asked = np.ones((len(vertices), len(vertices)), dtype=bool)
         if asked is not None and asked.sum() <= max(FEW, 2 * len(vertices)):
             return self._few(vertices, asked)
@@ -85,13 +88,17 @@ class TautLegs:
             "lower tether_length or max_classes",
         )
         out: Floats = np.empty((n, n), dtype=kind)  # type: ignore[assignment]
-        clock = clock or Clock()
-        clock.interruptible(lambda: self._fill(vertices, share, out, clock.flag))
-        if clock.flag[0]:
-            raise LimitReachedError(
-                f"time limit reached while measuring the legs between {n} homotopy classes; "
-                "lower tether_length or raise the limit"
-            )
+        # what takes a fraction of a second is measured all the same, or there would be no tour
+        if n <= UNTIMED and len(self.cluster) <= MANY:
+            self._fill(vertices, share, out, NEVER)
+        else:
+            clock = clock or Clock()
+            clock.interruptible(lambda: self._fill(vertices, share, out, clock.flag))
+            if clock.flag[0]:
+                raise LimitReachedError(
+                    f"time limit reached while measuring the legs between {n} homotopy classes; "
+                    "lower tether_length or raise the limit"
+                )
         point = self.cluster[vertices]
         for base in np.flatnonzero(point == 0).tolist():
             out[base] = out[:, base] = share * self.to_base()[vertices]

@@ -11,6 +11,7 @@ carried, too: whatever it is wound around on the way, back along it the robot co
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -84,11 +85,40 @@ def with_carried(
     if graph.complete or carrier is None or graph.goal_count < 3:
         return Carried(graph)
     share = clock.part(SHARE)
-    most = min(MOST_CLASSES, MOST_PER_GOAL * graph.goal_count)
     ways = {0: carrier.ways(0, graph.goal_count)}
     least = least_tethers(graph.costs_to_base, graph.cluster, FEW)
-    looked = dict.fromkeys(_classes(graph, least))
-    graph = _put_back(graph, _along_straight_lines(graph, rng, share), looked, share)
+    few = _classes(graph, least)
+    best: list[Class] = []
+    shortest = np.inf
+
+    def tell(length: float, vertices: int) -> None:
+        if on_progress:
+            told = min(length, shortest)
+            on_progress(Progress(clock.elapsed, "carried", told, vertices=vertices))
+
+    # from either start the search may end in a tour that the other leads past
+    for along in (True, False):
+        if share.up and best:
+            break
+        looked = dict.fromkeys(few)
+        if along:
+            graph = _put_back(graph, _along_straight_lines(graph, rng, share), looked, share)
+        graph, length, classes = _improved(graph, looked, few, ways, rng, share, tell)
+        if length < shortest:
+            shortest, best = length, classes
+    return Carried(graph, _vertices(graph, best) if best else None)
+
+
+def _improved(
+    graph: TravelGraph, looked: dict[Class, None], few: list[Class],
+    ways: dict[int, list[tuple[int, Word]]], rng: np.random.Generator, share: Clock,
+    tell: Callable[[float, int], None],
+) -> tuple[TravelGraph, float, list[Class]]:  # fmt: skip
+    """The graph with the classes along better and better tours, and the length and classes of the
+    best, from those among the classes looked at on."""
+    carrier = graph.carrier
+    assert carrier is not None
+    most = min(MOST_CLASSES, MOST_PER_GOAL * graph.goal_count)
     best: list[Class] = []
     shortest, vain = np.inf, 0
     while not share.up and vain < IN_VAIN:
@@ -100,12 +130,11 @@ def with_carried(
         improved = length < shortest * (1.0 - 1e-9)
         if improved:
             shortest, best = length, classes
-        if on_progress and best:
-            on_progress(Progress(clock.elapsed, "carried", shortest, vertices=len(looked)))
         if not best:
             break
+        tell(shortest, len(looked))
         if len(looked) > most:
-            looked = dict.fromkeys(_classes(graph, least))
+            looked = dict.fromkeys(few)
         looked |= dict.fromkeys([*best, *classes])
         wanted: dict[Class, None] = {}
         from_all = not improved and len(looked) < most // 2
@@ -115,7 +144,7 @@ def with_carried(
             wanted |= dict.fromkeys((k, concatenate(word, way)) for k, way in ways.get(goal, ()))
         graph = _put_back(graph, [c for c in wanted if c not in looked], looked, share)
         vain = 0 if improved else vain + 1
-    return Carried(graph, _vertices(graph, best) if best else None)
+    return graph, shortest, best
 
 
 def _along_straight_lines(
