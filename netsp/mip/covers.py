@@ -26,6 +26,7 @@ from netsp.arrays import Bools, Floats, Ints
 from netsp.clock import Clock
 from netsp.errors import LimitReachedError, interrupted
 from netsp.mip.cuts import Cut
+from netsp.mip.deadlegs import DeadLegs
 from netsp.mip.highs import HighsRelaxation
 from netsp.mip.overcells import Cells, OverCells
 from netsp.mip.root import Root, tour_legs
@@ -43,6 +44,9 @@ GROWTH = 1.3
 """A cover has at most so many times as many cells as the one below, unless an obstacle alone adds
 more."""
 
+COARSE = 3
+"""After so many covers of ways those of classes follow."""
+
 MOST_CELLS = 6000
 """Larger covers are not looked at."""
 
@@ -58,9 +62,14 @@ Told = Callable[[float, Cells, Ints], tuple[Stops, float] | None]
 give a better tour, with its length, to go on with."""
 
 
+Finer = Callable[[OverCells, Floats, float], Tower]
+"""The same covers with dearer legs, given what is proven over the cells of one, their costs, and
+the length of the best tour."""
+
+
 def climb(
     tower: Tower, tour: Stops, length: float, clock: Clock, limits: Limits,
-    told: Told = lambda *_: None,
+    told: Told = lambda *_: None, finer: Finer | None = None,
 ) -> OverCells | None:  # fmt: skip
     """Bound tours cover by cover, until they are proven, there are no more covers or time is up;
     None if there was none for the first.
@@ -73,17 +82,20 @@ def climb(
         Of that.
     told
         See `Told`.
+    finer
+        Gives another tower to go on with after `COARSE` covers.
     """
     found: OverCells | None = None
     obstacles: list[int] = []
     before: _Level | None = None
+    covers, costs = 0, np.zeros((0, 0))
     splits = Splits(tower, GROWTH, MOST_CELLS)
     try:
         while True:
             level = _Level(tower, tuple(obstacles), tour, length, clock, limits, before)
             proven = level.solve()
             if proven is not None:
-                found = proven
+                found, costs = proven, level.costs
                 better = told(found.bound, found.cells, level.visited())
                 # a tour no better than what the legs were ruled out by may have dead ones
                 if better is not None and better[1] < level.run.cutoff:
@@ -95,7 +107,9 @@ def climb(
             if not more:
                 break
             obstacles += more
-            before = level
+            before, covers = level, covers + 1
+            if finer is not None and found is not None and covers == COARSE:
+                tower = splits.tower = finer(found, costs, length)
     except (Stop, LimitReachedError):
         pass
     except (KeyboardInterrupt, SystemError) as error:
@@ -112,6 +126,8 @@ class _Level:
     ----------
     cells
         Its vertices.
+    costs
+        Of the legs between them.
     over
         Whether the best tour known is proven, or no time is left.
     """
@@ -120,9 +136,9 @@ class _Level:
         self, tower: Tower, obstacles: tuple[int, ...], tour: Stops,
         length: float, clock: Clock, limits: Limits, before: _Level | None,
     ) -> None:  # fmt: skip
-        self.tower, self.over = tower, False
+        self.over = False
         self.cells = tower.cells(obstacles)
-        costs = tower.costs(self.cells)
+        costs = self.costs = tower.costs(self.cells)
         own, cuts, legs = self._from(before, costs)
         self.own_tour = self.cells.of(
             np.array([g for g, _ in tour]), np.array([odd for _, odd in tour])
@@ -184,6 +200,7 @@ class _Level:
         """(m, m) legs in no better tour; those of the best one known are left."""
         m, at = len(self.cells.cluster), self.root.costs.vertices
         out = np.ones((m, m), dtype=bool)
+        assert isinstance(self.root.dead, DeadLegs)
         out[np.ix_(at, at)] = self.root.dead.matrix()
         legs = tour_legs(self.own_tour)
         out[legs[:, 0], legs[:, 1]] = out[legs[:, 1], legs[:, 0]] = False

@@ -18,6 +18,9 @@ Bits = npt.NDArray[np.uint8]
 ALL = np.uint8(255)
 """Eight legs that are dead."""
 
+NO_BITS: Bits = np.zeros((0, 0), dtype=np.uint8)
+"""Where legs are held in rows."""
+
 ROWS = 512
 """Of a matrix that are worked on at a time, so that what is in between stays small."""
 
@@ -60,6 +63,19 @@ class DeadLegs:
     def add(self, rows: slice, dead: Bools) -> None:
         """Mark legs (k, V) of some vertices, too."""
         self.bits[rows] |= _packed(dead)
+
+    def add_above(self, own: Ints, dead: Bools) -> None:
+        """Mark all legs between cells whose own leg is dead.
+
+        Parameters
+        ----------
+        own
+            (V,) the cell of each vertex.
+        dead
+            (m, m) legs between cells.
+        """
+        for rows in self._blocks():
+            self.add(rows, dead[own[rows]][:, own])
 
     def add_vertices(self, gone: Bools) -> None:
         """Mark all legs of some vertices (V,)."""

@@ -24,7 +24,9 @@ from netsp.mip.covers import Stops, climb
 from netsp.mip.cuts import Cut
 from netsp.mip.overcells import Cells, OverCells, OverGoals
 from netsp.mip.parities import odd_letters
+from netsp.mip.survivors import survivors
 from netsp.mip.towers import OverClasses, OverWays, Tower
+from netsp.solving.legrows import LegRows
 from netsp.solving.limits import Limits
 from netsp.travel.graph import TravelGraph, least_tethers
 from netsp.travel.result import Result
@@ -63,10 +65,14 @@ ABOVE_CELL = 2
 
 Prove = Callable[[TravelGraph, Limits], tuple[Result, Sequence[Cut]]]
 
+Keep = Callable[[LegRows], None]
+"""Is given the legs that may be in a better tour, once they are known."""
+
 
 def bound_over_goals(
     graph: TravelGraph, prove: Prove, limits: Limits, tour: Sequence[int] | None = None,
     costs: Callable[[], Floats] | None = None, told: Told = lambda *_: None,
+    keep: Keep | None = None,
 ) -> OverGoals:  # fmt: skip
     """No tour of the graph is shorter; a bound of 0 if the limits leave nothing.
 
@@ -81,6 +87,9 @@ def bound_over_goals(
         it may take all the time that is left.
     told
         See `Told`.
+    keep
+        See `Keep`. If it is given covers of ways come first, and then those of the classes left; no
+        class may have been left out.
     """
     clock = Clock.of(limits.time)
     least = graph.between_goals(lambda: clock.up)
@@ -88,7 +97,7 @@ def bound_over_goals(
     _holds_in_any_class(graph, bound * (1.0 - ROUNDING))
     if tour is not None and len(graph) > MANY_CLASSES:
         known = None if costs is None else costs()
-        cells = _over_cells(graph, tour, clock, limits, known, told)
+        cells = _over_cells(graph, tour, clock, limits, known, told, keep)
     if cells is None or graph.goal_count < FEW_GOALS:
         over = TravelGraph.from_costs(least, range(graph.goal_count + 1))
         most = MOST_PROGRAMS if limits.iterations is None else min(limits.iterations, MOST_PROGRAMS)
@@ -97,7 +106,8 @@ def bound_over_goals(
     bound *= 1.0 - ROUNDING
     over_cells = cells.bound * (1.0 - ROUNDING) if cells else 0.0
     # what lies over the classes that a roadmap has kept says nothing of the others
-    _holds_in_any_class(graph, bound if costs is not None else max(bound, over_cells))
+    over_kept = costs is not None or keep is not None
+    _holds_in_any_class(graph, bound if over_kept else max(bound, over_cells))
     return OverGoals(max(bound, over_cells), cuts, cells)
 
 
@@ -116,7 +126,7 @@ def _holds_in_any_class(graph: TravelGraph, bound: float) -> None:
 
 def _over_cells(
     graph: TravelGraph, tour: Sequence[int], clock: Clock, limits: Limits, costs: Floats | None,
-    told: Told,
+    told: Told, keep: Keep | None,
 ) -> OverCells | None:  # fmt: skip
     """What covers prove; None where the ways between goals are not known."""
     tower: Tower
@@ -139,9 +149,20 @@ def _over_cells(
         above = np.flatnonzero(np.isin(own, visited))
         least = least_tethers(graph.costs_to_base[above], own[above], ABOVE_CELL)
         better = told(bound * (1.0 - ROUNDING), len(cells.cluster), above[least])
-        return None if better is None else (stops(better), graph.tour_length(better))
+        if better is None:
+            return None
+        best[:] = better
+        return stops(better), graph.tour_length(better)
 
-    return climb(tower, stops(tour), graph.tour_length(tour), clock, limits, heard)
+    def finer(over: OverCells, costs: Floats, length: float) -> Tower:
+        assert keep is not None
+        with graph.on_clock(clock):
+            rows = survivors(graph, over, costs, length, best, odd)
+        keep(rows)
+        return OverClasses(rows, graph.cluster, odd)
+
+    best, length = list(tour), graph.tour_length(tour)
+    return climb(tower, stops(tour), length, clock, limits, heard, finer if keep else None)
 
 
 def best_tree(lengths: Floats, up: Callable[[], bool]) -> float:

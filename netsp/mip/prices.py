@@ -16,10 +16,11 @@ from netsp.arrays import Floats, Ints
 from netsp.compiled.kernel import kernel
 from netsp.mip.bound import least_of_clusters, rounding
 from netsp.mip.cuts import Cut
-from netsp.mip.deadlegs import DeadLegs, mark_dead
+from netsp.mip.deadlegs import NO_BITS, Bits, DeadLegs, mark_dead
 from netsp.mip.program import Duals
 from netsp.mip.reducedcosts import Terms, reduced_costs, reduced_row, rooms
 from netsp.mip.ways import beyond, ways_from_base
+from netsp.solving.legrows import NO_ROWS, LegRows, Rows
 
 ROWS = 256
 """Rows of a matrix that a thread works on at a time."""
@@ -35,8 +36,9 @@ class Prices:
     ----------
     costs : ndarray, shape (V, V)
         Of legs; inf where there is none.
-    dead : DeadLegs
-        Legs that are of no interest, and those that there are none of.
+    dead : DeadLegs or LegRows
+        Legs that are of no interest, and those that there are none of; or the others, with costs,
+        and then the matrix is not looked at.
     cluster : ndarray of int, shape (V,)
         Of the vertices.
     cuts : sequence of Cut
@@ -53,8 +55,8 @@ class Prices:
     """
 
     def __init__(
-        self, costs: Floats, dead: DeadLegs, cluster: Ints, cuts: Sequence[Cut], duals: Duals,
-        check: Callable[[], None] = lambda: None,
+        self, costs: Floats, dead: DeadLegs | LegRows, cluster: Ints, cuts: Sequence[Cut],
+        duals: Duals, check: Callable[[], None] = lambda: None,
     ) -> None:  # fmt: skip
         self._check, self._dead = check, dead
         self._size = len(cluster)
@@ -80,7 +82,7 @@ class Prices:
             vertex[cuts[k].inside & (cluster != cuts[k].cluster)] += duals.cut[k]
         least, second, longest = np.empty((3, self._size))
         terms = self._terms = Terms(
-            costs, dead.bits, cluster, duals.degree, first_at, of_cut[by_vertex], first_member,
+            costs, *_held(dead), cluster, duals.degree, first_at, of_cut[by_vertex], first_member,
             member, np.array(weight, dtype=float), bitten, vertex, least, second,
         )  # fmt: skip
         self._by_rows(lambda a, b: _scan(a, b, terms, longest), self._size)
@@ -105,6 +107,15 @@ class Prices:
         gone = (excess > missing) | (way + other_way > missing + excess)
         gone[0] = False
         self._dead.add_vertices(gone)
+
+    def room(self, cutoff: float) -> Floats:
+        """(V, V) by how much more a leg may cost than it does and be in a tour shorter than the
+        cutoff; -inf where it is dead."""
+        terms, out = self._terms, np.full((self._size, self._size), -np.inf)
+        above = terms.vertex - self._cheapest[terms.cluster]
+        missing = cutoff - self.bound
+        self._by_rows(lambda a, b: _room(a, b, terms, above, missing, out), self._size)
+        return out
 
     def cheapest(self, tolerance: float) -> tuple[Ints, Floats]:
         """(k, 2) legs u < v of reduced costs below minus the tolerance, and these: of each vertex
@@ -139,6 +150,11 @@ class Prices:
             list(pool.map(checked, blocks))
 
 
+def _held(dead: DeadLegs | LegRows) -> tuple[Bits, Rows]:
+    """For the kernels."""
+    return (dead.bits, NO_ROWS) if isinstance(dead, DeadLegs) else (NO_BITS, dead.held)
+
+
 @kernel
 def _scan(first: int, last: int, terms: Terms, longest: Floats) -> None:
     """Per row the two least reduced costs, and the largest size of any."""
@@ -161,22 +177,47 @@ def _rule_out(
     first: int, last: int, terms: Terms, above: Floats, way: Floats, other_way: Floats,
     before: Ints, missing: float,
 ) -> None:  # fmt: skip
-    """Mark the legs whose ends cost more than what is missing if they are used: an end pays for
-    half of the leg, and half of its cheapest other one; or to which and from which the ways cost as
-    much."""
+    """Mark the legs whose ends cost more than what is missing if they are used, or to which and
+    from which the ways cost as much; rows let go of them."""
     other, price, room = rooms(terms)
+    rows = terms.rows
+    held = len(rows.first) > 0
     for u in range(first, last):
+        kept = 0
         for i in range(reduced_row(u, terms, other, price, room)):
             v, r = other[i], price[i]
             there = other_way[u] if before[u] == v else way[u]
             home = other_way[v] if before[v] == u else way[v]
-            if there + home + beyond(u, v, r, terms) > missing:
-                mark_dead(u, v, terms.dead)
-                continue
-            on = terms.second[u] if r <= terms.least[u] else terms.least[u]
-            back = terms.second[v] if r <= terms.least[v] else terms.least[v]
-            if above[u] + above[v] + r + 0.5 * (on + back) > missing:
-                mark_dead(u, v, terms.dead)
+            if (
+                there + home + beyond(u, v, r, terms) > missing
+                or with_ends(u, v, r, above, terms) > missing
+            ):
+                if not held:
+                    mark_dead(u, v, terms.dead)
+            elif held:
+                at = rows.first[u]
+                rows.other[at + kept], rows.cost[at + kept] = v, rows.cost[at + i]
+                kept += 1
+        if held:
+            rows.size[u] = kept
+
+
+@kernel
+def with_ends(u: int, v: int, price: float, above: Floats, terms: Terms) -> float:
+    """What a tour along a leg costs above the bound, by what its ends do: an end pays for half of
+    the leg, and half of its cheapest other one."""
+    on = terms.second[u] if price <= terms.least[u] else terms.least[u]
+    back = terms.second[v] if price <= terms.least[v] else terms.least[v]
+    return float(above[u] + above[v] + price + 0.5 * (on + back))
+
+
+@kernel
+def _room(first: int, last: int, terms: Terms, above: Floats, missing: float, out: Floats) -> None:
+    other, price, room = rooms(terms)
+    for u in range(first, last):
+        for i in range(reduced_row(u, terms, other, price, room)):
+            v = other[i]
+            out[u, v] = missing - with_ends(u, v, price[i], above, terms)
 
 
 @kernel

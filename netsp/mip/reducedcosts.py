@@ -15,6 +15,7 @@ import numpy as np
 from netsp.arrays import Floats, Ints
 from netsp.compiled.kernel import kernel
 from netsp.mip.deadlegs import Bits, not_dead
+from netsp.solving.legrows import Rows, place_of
 
 
 class Terms(NamedTuple):
@@ -24,11 +25,13 @@ class Terms(NamedTuple):
     `cut_at[first_at[v] : first_at[v + 1]]`, cut k holds
     `member[first_member[k] : first_member[k + 1]]`, both ascending, and costs `weight[k]`.
     `bitten` (m + 1, m + 1) is what teeth that hold both clusters do; `vertex` r_v; `least` and
-    `second` are r_uv of the two cheapest legs of each vertex; `dead` the bits of `DeadLegs`.
+    `second` are r_uv of the two cheapest legs of each vertex. Legs are those of the matrix `costs`
+    but for `dead`, the bits of `DeadLegs`, or those of `rows`, where these are not empty.
     """
 
     costs: Floats
     dead: Bits
+    rows: Rows
     cluster: Ints
     degree: Floats
     first_at: Ints
@@ -43,22 +46,36 @@ class Terms(NamedTuple):
 
 
 @kernel
-def reduced(u: int, v: int, shared: float, terms: Terms) -> float:
+def reduced(u: int, v: int, cost: float, shared: float, terms: Terms) -> float:
     """r_uv, the same as r_vu."""
     bitten = terms.bitten[terms.cluster[u], terms.cluster[v]]
-    return float(terms.costs[u, v] - (terms.degree[u] + terms.degree[v]) + shared - bitten)
+    return float(cost - (terms.degree[u] + terms.degree[v]) + shared - bitten)
+
+
+@kernel
+def legs_of(u: int, terms: Terms, other: Ints, cost: Floats) -> int:
+    """How many legs at u are left, and the first so many of `other` and `cost`: their other ends,
+    ascending, and costs."""
+    if len(terms.rows.first) > 0:
+        first, count = terms.rows.first[u], terms.rows.size[u]
+        for i in range(count):
+            other[i], cost[i] = terms.rows.other[first + i], terms.rows.cost[first + i]
+        return int(count)
+    count = not_dead(u, terms.dead, other)
+    for i in range(count):
+        cost[i] = terms.costs[u, other[i]]
+    return int(count)
 
 
 @kernel
 def reduced_row(u: int, terms: Terms, other: Ints, price: Floats, room: Floats) -> int:
-    """How many legs at u are not dead, and the first so many of `other` and `price`: their other
-    ends, ascending, and reduced costs. `room` has one place for each vertex or cut and is zero
+    """As `legs_of`, with reduced costs. `room` has one place for each vertex or cut and is zero
     before and after.
 
     What cuts add is summed over the sets of u, or, where few legs are left, over those of their
     other ends; the order of the sums is the same, and makes r_uv the same as r_vu.
     """
-    count, work = not_dead(u, terms.dead, other), 0
+    count, work = legs_of(u, terms, other, price), 0
     for v in other[:count]:
         work += terms.first_at[v + 1] - terms.first_at[v]
     cuts = terms.cut_at[terms.first_at[u] : terms.first_at[u + 1]]
@@ -79,7 +96,7 @@ def reduced_row(u: int, terms: Terms, other: Ints, price: Floats, room: Floats) 
         else:
             for k in terms.cut_at[terms.first_at[v] : terms.first_at[v + 1]]:
                 shared += room[k]
-        price[i] = reduced(u, v, shared, terms)
+        price[i] = reduced(u, v, price[i], shared, terms)
     if work > 0:
         for k in cuts:
             for v in terms.member[terms.first_member[k] : terms.first_member[k + 1]]:
@@ -99,7 +116,7 @@ def rooms(terms: Terms) -> tuple[Ints, Floats, Floats]:
 
 @kernel
 def reduced_costs(legs: Ints, terms: Terms) -> Floats:
-    """The reduced cost of each leg, as `reduced_row` has it."""
+    """The reduced cost of each leg, as `reduced_row` has it; inf where rows have none."""
     out = np.empty(len(legs))
     for k in range(len(legs)):
         u, v = legs[k]
@@ -111,5 +128,10 @@ def reduced_costs(legs: Ints, terms: Terms) -> Floats:
                 shared += terms.weight[a]
             i += a <= b
             j += b <= a
-        out[k] = reduced(u, v, shared, terms)
+        if len(terms.rows.first) > 0:
+            at = place_of(u, v, terms.rows)
+            cost = terms.rows.cost[at] if at >= 0 else np.inf
+        else:
+            cost = terms.costs[u, v]
+        out[k] = reduced(u, v, cost, shared, terms)
     return out

@@ -24,7 +24,8 @@ from netsp.mip.prices import Prices
 from netsp.mip.program import Duals, Point, Relaxation
 from netsp.mip.subtours import branches, fractional_cuts
 from netsp.mip.warm import Warm
-from netsp.solving.legcosts import LEGS, ROWS, LegCosts
+from netsp.solving.legcosts import LEGS, LegCosts
+from netsp.solving.legrows import LegRows
 from netsp.solving.run import Stop
 from netsp.solving.searching import SearchingRun
 
@@ -118,7 +119,7 @@ class Root:
         graph = costs.graph
         words = [graph.signatures[v] for v in costs.vertices]
         self.branch, self.odd = branches(words), odd_letters(words)
-        self.dead = DeadLegs.of(costs.values)
+        self.dead = self._left()
         self.patience: int | None = None
         self.best: Best | None = None
         goals_cuts = [] if over_goals is None else self._rule_out_over(over_goals)
@@ -219,6 +220,7 @@ class Root:
 
     def measure(self) -> None:
         """Measure all legs that are not ruled out."""
+        assert isinstance(self.dead, DeadLegs)  # what rows hold has been measured
         self.costs.measure_all(~self.dead.matrix())
         legs = self.lp.legs
         self.lp.set_costs(self.costs.of(legs))
@@ -249,10 +251,9 @@ class Root:
                 self._restrict(alive)
                 own = own[alive]
             tour = tour_legs(self.tour())
-            for first in range(0, len(own), ROWS):
-                rows = slice(first, first + ROWS)
-                self.dead.add(rows, found.dead[own[rows]][:, own])
-            self.dead.revive(tour)
+            self.dead.add_above(own, found.dead)
+            if isinstance(self.dead, DeadLegs):
+                self.dead.revive(tour)
         cuts, duals = found.cuts_over(own), found.duals_over(own)
         if run.tour is not None:
             prices = Prices(costs.values, self.dead, costs.cluster, cuts, duals, run.check)
@@ -261,33 +262,37 @@ class Root:
                 prices.rule_out(run.cutoff)
         return [c for c, price in zip(cuts, duals.cut.tolist(), strict=True) if price < 0.0]
 
+    def _left(self) -> DeadLegs | LegRows:
+        rows = self.costs.rows
+        return DeadLegs.of(self.costs.values) if rows is None else rows
+
+    def _with_costs(self, legs: Ints) -> Ints:
+        """Of legs those that there are, and the incumbent's whatever has been let go of."""
+        if isinstance(self.dead, LegRows):
+            gone = self.dead[legs[:, 0], legs[:, 1]]
+            return legs[~gone | np.isin(self._keys(legs), self._keys(tour_legs(self.tour())))]
+        return np.asarray(legs[np.isfinite(self.costs.of(legs))])
+
     def _first_legs(self) -> Ints:
         """The nearest legs of every vertex, all legs to the base, and the incumbent's; all legs if
         there is no incumbent, so that an infeasible program means that there is no tour."""
-        values = self.costs.values
         if self.run.tour is None:
-            return np.argwhere(np.triu(np.isfinite(values), 1))
-        k = min(NEAREST, len(values) - 1)
-        # a view of some columns would keep all
-        near = np.concatenate([
-            np.argpartition(values[first : first + ROWS], k - 1, axis=1)[:, :k].copy()
-            for first in range(0, len(values), ROWS)
-        ])  # fmt: skip
-        others = np.arange(1, len(values))
+            return np.argwhere(np.triu(np.isfinite(self.costs.values), 1))
+        others = np.arange(1, len(self.costs))
         pairs = np.vstack(
             [
-                np.column_stack([np.repeat(np.arange(len(values)), k), near.ravel()]),
+                self.costs.nearest_legs(NEAREST),
                 np.column_stack([np.zeros_like(others), others]),
                 tour_legs(self.tour()),
             ]
         )
         legs = np.unique(np.sort(pairs, axis=1), axis=0)
-        return np.asarray(legs[np.isfinite(values[legs[:, 0], legs[:, 1]])])
+        return self._with_costs(legs)
 
     def _warm_legs(self, warm: Warm) -> Ints:
         """The legs of a program over some of the vertices, and the incumbent's."""
         legs = np.vstack([np.sort(warm.legs_over(self.costs), axis=1), tour_legs(self.tour())])
-        return np.unique(legs, axis=0)
+        return self._with_costs(np.unique(legs, axis=0))
 
     def _missing_tour_legs(self) -> bool:
         """Bring the incumbent's legs into the LP; whether any was missing."""
@@ -318,7 +323,7 @@ class Root:
         if run.cutoff - prices.bound < FAR * missing:
             prices.rule_out(run.cutoff)
             longer = self._measure_left()
-        scale = run.length if run.tour is not None else float(self.costs.values[0, 1:].max())
+        scale = run.length if run.tour is not None else float(self.costs.of_base[1:].max())
         new, found_longer = self._most_negative(prices, TINY * scale)
         if len(new):
             self.lp.add_legs(new, self.costs.of(new))
@@ -334,6 +339,7 @@ class Root:
         exact = self.costs.exact
         if exact is None or not self.costs.graph.quick_legs:
             return False
+        assert isinstance(self.dead, DeadLegs)
         left = ~(self.dead.matrix() | exact)
         if np.count_nonzero(left) > 2 * MEASURED_AT:
             return False
@@ -418,7 +424,10 @@ class Root:
     def _restrict(self, alive: Bools) -> None:
         """Forget all vertices but those marked, here and in the costs."""
         self.costs.restrict(alive)
-        self.dead.restrict(alive)
+        if isinstance(self.dead, DeadLegs):
+            self.dead.restrict(alive)
+        else:
+            self.dead = self._left()
         self.branch, self.odd = self.branch[:, alive], self.odd[alive]
         self.branch = np.unique(self.branch[self.branch.sum(axis=1) > 1], axis=0)
 
@@ -428,7 +437,7 @@ class Root:
         tour = tour_legs(self.tour())
         # visited by the point or by the incumbent
         visited = np.union1d(np.flatnonzero(point.x > TINY), self.tour())
-        near = visited[np.argmin(self.costs.values[:, visited], axis=1)]
+        near = visited[self.costs.nearest_of(visited)]
         near[visited] = visited
         if len(tour):
             y = (1.0 - MIX) * point.y

@@ -27,7 +27,8 @@ from netsp.mip.program import IntegerProgram, Point
 from netsp.mip.root import Root, tour_legs
 from netsp.mip.subtours import component_cuts, heaviest_walk, tour_from
 from netsp.mip.warm import Warm
-from netsp.solving.legcosts import LegCosts
+from netsp.solving.legcosts import ROUNDED_FROM, LegCosts
+from netsp.solving.legrows import LegRows
 from netsp.solving.limits import Limits
 from netsp.solving.run import Stop
 from netsp.solving.searching import SearchingRun
@@ -210,11 +211,15 @@ class MipRun(SearchingRun):
             self._costs = LegCosts(graph)
             return self._costs.values
 
+        def keep(rows: LegRows) -> None:
+            self._costs = LegCosts(graph, rows)
+
         known = climbs and graph.legs_at_once and graph.complete
+        in_rows = known and self._in_rows
         try:
             self._over_goals = bound_over_goals(
-                graph, prove, limits, self.tour if climbs else None, costs if known else None,
-                self.climbed,
+                graph, prove, limits, self.tour if climbs else None,
+                costs if known and not in_rows else None, self.climbed, keep if in_rows else None,
             )  # fmt: skip
         finally:
             self.raise_bound(graph.bound_in_any_class)
@@ -226,6 +231,12 @@ class MipRun(SearchingRun):
         """Whether covers come first: with fewer goals the relaxation over classes is quicker than
         those below it."""
         return len(self.graph) > MANY_CLASSES and self.graph.goal_count >= MANY_GOALS
+
+    @property
+    def _in_rows(self) -> bool:
+        """Whether there are so many classes that no matrix of legs is made."""
+        graph = self.graph
+        return len(graph) > ROUNDED_FROM and graph.legs_in_blocks and graph.knows_ways
 
     @property
     def _cells_share(self) -> float:

@@ -83,7 +83,9 @@ class Splits:
         if not left or len(own) >= MOST_OBSTACLES:
             return []
         lengths = self.tower.by_parity(cells, ends)
-        excess = y[:, None, None] * np.minimum(lengths - lengths.min(axis=2, keepdims=True), gap)
+        least = lengths.min(axis=2, keepdims=True)
+        least[np.isinf(least)] = 0.0  # a leg that has none above it says nothing
+        excess = y[:, None, None] * np.minimum(lengths - least, gap)
         excess = np.ascontiguousarray(excess.swapaxes(0, 1))
         adds = {}
         for i in left:

@@ -14,6 +14,7 @@ import numpy as np
 from netsp.arrays import Bools, Floats, Ints
 from netsp.compiled.kernel import kernel
 from netsp.mip.overcells import Cells, packed
+from netsp.solving.legrows import LegRows, Rows
 from netsp.travel.ways import WaysByParity
 
 
@@ -39,40 +40,49 @@ class OverClasses:
     Parameters
     ----------
     costs
-        (V, V) of legs.
+        (V, V) of legs; or those that are left, and only the classes that have any.
     cluster
         (V,) of the vertices.
     odd
         (V, n) as of `netsp.mip.parities.odd_letters`.
     """
 
-    def __init__(self, costs: Floats, cluster: Ints, odd: Bools) -> None:
+    def __init__(self, costs: Floats | LegRows, cluster: Ints, odd: Bools) -> None:
         self._costs, self._cluster, self._odd = costs, cluster, odd
+        self._with_legs = (
+            costs.with_legs() if isinstance(costs, LegRows) else np.ones(len(cluster), dtype=bool)
+        )
         self.obstacles = odd.shape[1]
 
     def cells(self, obstacles: tuple[int, ...]) -> Cells:
         """As of `Tower.cells`."""
-        both = np.unique(np.column_stack([self._cluster, packed(self._odd, obstacles)]), axis=0)
+        both = np.column_stack([self._cluster, packed(self._odd, obstacles)])
+        both = np.unique(both[self._with_legs], axis=0)
         return Cells(obstacles, *np.ascontiguousarray(both.T))
 
     def costs(self, cells: Cells) -> Floats:
         """As of `Tower.costs`."""
-        order, row = self._members(cells)
-        out = np.empty((len(cells.cluster), len(cells.cluster)))
-        _least(self._costs, order, row, out)
+        own, order, row = self._members(cells)
+        out = np.full((len(cells.cluster), len(cells.cluster)), np.inf)
+        if isinstance(self._costs, LegRows):
+            _least_in_rows(self._costs.held, own, out)
+        else:
+            _least(self._costs, order, row, out)
         return out
 
     def by_parity(self, cells: Cells, ends: Ints) -> Floats:
         """As of `Tower.by_parity`."""
-        order, row = self._members(cells)
+        own, order, row = self._members(cells)
+        if isinstance(self._costs, LegRows):
+            return _least_by_parity_in_rows(self._costs.held, self._odd, own, order, row, ends)
         return _least_by_parity(self._costs, self._odd, order, row, ends)
 
-    def _members(self, cells: Cells) -> tuple[Ints, Ints]:
-        """The vertices cell by cell, and where those of each begin."""
+    def _members(self, cells: Cells) -> tuple[Ints, Ints, Ints]:
+        """The cell of each vertex, the vertices cell by cell, and where those of each begin."""
         own = cells.of(self._cluster, self._odd)
         order = np.argsort(own, kind="stable")
         row = np.searchsorted(own[order], np.arange(len(cells.cluster) + 1))
-        return order, row.astype(np.int64)
+        return own, order, row.astype(np.int64)
 
 
 @kernel
@@ -83,7 +93,6 @@ def _least(costs: Floats, order: Ints, row: Ints, out: Floats) -> None:
     for b in range(cells):
         for k in range(row[b], row[b + 1]):
             own[order[k]] = b
-    out[:] = np.inf
     for a in range(cells):
         for k in range(row[a], row[a + 1]):
             u = order[k]
@@ -103,6 +112,35 @@ def _least_by_parity(costs: Floats, odd: Bools, order: Ints, row: Ints, ends: In
                 for i in range(n):
                     side = 1 if odd[u, i] != odd[v, i] else 0
                     out[k, i, side] = min(out[k, i, side], costs[u, v])
+    return out
+
+
+@kernel
+def _least_in_rows(rows: Rows, own: Ints, out: Floats) -> None:
+    """The least cost of the legs left between two cells."""
+    for u in range(len(own)):
+        for k in range(rows.first[u], rows.first[u] + rows.size[u]):
+            a, b = own[u], own[rows.other[k]]
+            out[a, b] = min(out[a, b], rows.cost[k])
+
+
+@kernel
+def _least_by_parity_in_rows(
+    rows: Rows, odd: Bools, own: Ints, order: Ints, row: Ints, ends: Ints
+) -> Floats:  # fmt: skip
+    """As `_least_by_parity`."""
+    n = odd.shape[1]
+    out = np.full((len(ends), n, 2), np.inf)
+    for e in range(len(ends)):
+        a, b = ends[e]
+        for u in order[row[a] : row[a + 1]]:
+            for k in range(rows.first[u], rows.first[u] + rows.size[u]):
+                v = rows.other[k]
+                if own[v] != b:
+                    continue
+                for i in range(n):
+                    side = 1 if odd[u, i] != odd[v, i] else 0
+                    out[e, i, side] = min(out[e, i, side], rows.cost[k])
     return out
 
 

@@ -75,13 +75,16 @@ class Lengths(NamedTuple):
     share
         Of each length that is held: a little less than 1 where lengths are rounded down.
     out
-        (k, k) the lengths in space, `OPEN` where not known yet.
+        (r, k) the lengths in space, `OPEN` where not known yet.
+    row
+        (k,) the row of the vertex at each place in the order; -1 for those that have none.
     """
 
     planar: Floats
     height: Floats
     share: float
     out: Floats
+    row: Ints
 
 
 def branches_of(tree: TetherTree, vertices: Ints) -> Branches:
@@ -141,31 +144,34 @@ def fill(
     branches: Branches, lengths: Lengths, point: Ints, ends: Ends, slits: Slits, arcs: Arcs,
     stop: Ints, i: int, j: int,
 ) -> tuple[int, int]:  # fmt: skip
-    """Find the legs between vertices of different goals, those of the vertices at places i and j
-    in the order first, and then what is open after these; the next pair of places whose leg cannot
-    be pulled, or more places than there are. What is within a goal may be anything, and so may
-    legs of the base (point 0).
+    """Find the legs between vertices of different goals in all rows, those of the vertices at
+    places i and j in the order first, and then what is open after these; the next pair of places
+    whose leg cannot be pulled, or more places than there are. What is within a goal may be
+    anything, and so may legs of the base (point 0).
 
     Parameters
     ----------
     point
         (k,) that each vertex is at.
     """
-    order, out = branches.order, lengths.out
+    order, out, row = branches.order, lengths.out, lengths.row
+    whole = len(out) == len(order)  # then what comes before is known from the other end
     longest = longest_word(ends.row)
     room, path = room_for(longest, slits), path_for(longest)
     while i < len(order) and stop[0] == 0:
         u = order[i]
-        while j < len(order) and point[u] != 0:
+        while j < len(order) and row[i] >= 0 and point[u] != 0:
             v = order[j]
-            if out[u, v] == OPEN and point[u] != point[v] and point[v] != 0:
-                length, _, count = pull(u, v, ends, point, slits, arcs, room, path)
+            if out[row[i], v] == OPEN and point[u] != point[v] and point[v] != 0:
+                # from the one that comes first, in all blocks of rows alike
+                a, b = (u, v) if i < j else (v, u)
+                length, _, count = pull(a, b, ends, point, slits, arcs, room, path)
                 if length < 0.0:
                     return i, j
-                spread(u, v, length, count, path.whole, path.real, branches, lengths)
+                spread(a, b, length, count, path.whole, path.real, branches, lengths)
             j += 1
         i += 1
-        j = i + 1
+        j = i + 1 if whole else 0
     return i, j
 
 
@@ -177,29 +183,31 @@ def spread(
     """Note all legs that cross over as that from u to v does, whose planar length is given, and its
     number of tangents (`Path.whole` and `Path.real`)."""
     i0, i1, j0, j1 = _alike(u, v, count, on, at, branches)
-    order, planar = branches.order, lengths.planar
+    order, planar, row = branches.order, lengths.planar, lengths.row
     saved = planar[u] + planar[v] - length
     # row by row, for memory's sake
     for x in range(i0, i1):
-        _note(order[x], j0, j1, saved, order, lengths)
+        if row[x] >= 0:
+            _note(lengths.out[row[x]], order[x], j0, j1, saved, order, lengths)
     for y in range(j0, j1):
-        _note(order[y], i0, i1, saved, order, lengths)
+        if row[y] >= 0:
+            _note(lengths.out[row[y]], order[y], i0, i1, saved, order, lengths)
 
 
 @kernel
 def _note(
-    a: int, begin: int, end: int, saved: float, order: Ints, lengths: Lengths
+    out: Floats, a: int, begin: int, end: int, saved: float, order: Ints, lengths: Lengths
 ) -> None:  # fmt: skip
-    """The legs from one vertex to those of places in the order, so much shorter than both
-    tethers."""
-    planar, height, share, out = lengths.planar, lengths.height, lengths.share, lengths.out
+    """The legs from one vertex to those of places in the order, so much shorter than both tethers;
+    into its row."""
+    planar, height, share = lengths.planar, lengths.height, lengths.share
     for y in range(begin, end):
         b = order[y]
         rise = height[b] - height[a]
         length = planar[a] + planar[b] - saved
         if rise != 0.0:
             length = np.sqrt(length * length + rise * rise)
-        out[a, b] = share * length
+        out[b] = share * length
 
 
 @kernel

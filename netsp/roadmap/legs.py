@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property
 
@@ -14,7 +14,7 @@ from netsp.clock import NEVER, Clock, Flag
 from netsp.errors import LimitReachedError
 from netsp.hsignature import Word, concatenate, invert
 from netsp.memory import ask
-from netsp.roadmap.branches import OPEN, Lengths, branches_of, fill, spread
+from netsp.roadmap.branches import OPEN, Branches, Lengths, branches_of, fill, spread
 from netsp.roadmap.paths import TautPaths
 from netsp.roadmap.pulled import Path, path_along, pull_each
 from netsp.roadmap.slits import Ends, flattened, slit_lengths
@@ -26,6 +26,10 @@ ROUNDED_DOWN = 1.0 - 2.0**-23
 
 BLOCK = 256
 """Rows of a matrix that are worked on at a time, so that what is in between stays small."""
+
+BLOCK_LEGS = 64_000_000
+"""At a time where not all are held, a quarter of a GiB: a leg that many share is pulled in every
+block again."""
 
 FEW = 20_000
 """So many legs asked for in a matrix are pulled one by one, hundredths of a second; as many at a
@@ -77,6 +81,29 @@ class TautLegs:
         within a cluster. LimitReachedError as of `lengths`."""
         return self._all(np.asarray(vertices, dtype=np.int64), np.float32, ROUNDED_DOWN, clock)
 
+    def blocks(self, vertices: Ints, clock: Clock | None = None) -> Iterator[tuple[Ints, Floats]]:
+        """The legs among vertices in single precision, rounded down, some vertices at a time:
+        which (r,), as positions among them, and (r, k) lengths, to be used before the next are
+        asked for. LimitReachedError as of `lengths`."""
+        vertices = np.asarray(vertices, dtype=np.int64)
+        clock, n = clock or Clock(), len(vertices)
+        _found(clock, lambda: self._grown(clock.flag), n)
+        size = max(BLOCK, BLOCK_LEGS // max(n, 1))
+        branches = branches_of(self._grown(clock.flag), vertices)
+        out: Floats = np.empty((min(size, n), n), dtype=np.float32)  # type: ignore[assignment]
+        for first in range(0, n, size):
+            rows = branches.order[first : first + size]
+            block = out[: len(rows)]
+            row = np.full(n, -1, dtype=np.int64)
+            row[first : first + len(rows)] = np.arange(len(rows))
+
+            def some(row: Ints = row, block: Floats = block) -> None:
+                self._fill(vertices, ROUNDED_DOWN, block, clock.flag, branches, row)
+
+            _found(clock, some, n)
+            self._beyond_goals(vertices, rows, ROUNDED_DOWN, block)
+            yield rows, block
+
     def _all(
         self, vertices: Ints, kind: type[np.floating], share: float, clock: Clock | None
     ) -> Floats:
@@ -88,43 +115,49 @@ class TautLegs:
             "lower tether_length or max_classes",
         )
         out: Floats = np.empty((n, n), dtype=kind)  # type: ignore[assignment]
+
+        def whole(stop: Flag) -> None:
+            branches = branches_of(self._grown(stop), vertices)
+            self._fill(vertices, share, out, stop, branches, branches.order)
+
         # what takes a fraction of a second is measured all the same, or there would be no tour
         if n <= UNTIMED and len(self.cluster) <= MANY:
-            self._fill(vertices, share, out, NEVER)
+            whole(NEVER)
         else:
             clock = clock or Clock()
-            clock.interruptible(lambda: self._fill(vertices, share, out, clock.flag))
-            if clock.flag[0]:
-                raise LimitReachedError(
-                    f"time limit reached while measuring the legs between {n} homotopy classes; "
-                    "lower tether_length or raise the limit"
-                )
-        point = self.cluster[vertices]
-        for base in np.flatnonzero(point == 0).tolist():
-            out[base] = out[:, base] = share * self.to_base()[vertices]
-        for g in np.unique(point).tolist():
-            own = np.flatnonzero(point == g)
-            out[np.ix_(own, own)] = np.inf
+            _found(clock, lambda: whole(clock.flag), n)
+        self._beyond_goals(vertices, np.arange(n), share, out)
         return out
 
-    def _fill(self, vertices: Ints, share: float, out: Floats, stop: Flag) -> None:
-        """The legs between goals, into (k, k) `out`; unfinished when the flag is set."""
-        tree = self._grown(stop)
+    def _beyond_goals(self, vertices: Ints, rows: Ints, share: float, out: Floats) -> None:
+        """What is no leg between goals, into rows (r, k): legs of the base are tethers, and there
+        are none within a goal."""
+        point, tethers = self.cluster[vertices], share * self.to_base()[vertices]
+        for base in np.flatnonzero(point == 0).tolist():
+            out[rows == base] = tethers
+            out[:, base] = tethers[rows]
+        for g in np.unique(point).tolist():
+            out[np.ix_(point[rows] == g, point == g)] = np.inf
+
+    def _fill(
+        self, vertices: Ints, share: float, out: Floats, stop: Flag, branches: Branches, row: Ints
+    ) -> None:
+        """The legs between goals, into (r, k) `out`; unfinished when the flag is set."""
         for first in range(0, len(out), BLOCK):
             if stop[0]:
                 return
             out[first : first + BLOCK] = OPEN
         paths, (every, points) = self.paths, self._ends
-        letters, row = flattened([self.signatures[v] for v in vertices])
-        ends = Ends(every.place[vertices], every.cell[vertices], letters, row)
-        point, branches = points[vertices], branches_of(tree, vertices)
-        lengths = Lengths(self.planar[vertices], self._z[point], share, out)
-        i, j = 0, 1
+        letters, at = flattened([self.signatures[v] for v in vertices])
+        ends = Ends(every.place[vertices], every.cell[vertices], letters, at)
+        point = points[vertices]
+        lengths = Lengths(self.planar[vertices], self._z[point], share, out, row)
+        i, j = 0, 1 if len(out) == len(vertices) else 0
         while True:
             i, j = fill(branches, lengths, point, ends, paths.slits, paths.arcs, stop, i, j)
             if i >= len(vertices) or stop[0]:
                 return
-            u, v = int(branches.order[i]), int(branches.order[j])
+            u, v = branches.order[sorted((i, j))].tolist()
             length, path = self._searched(int(vertices[u]), int(vertices[v]))
             spread(u, v, length, len(path.whole) - 1, path.whole, path.real, branches, lengths)
 
@@ -270,3 +303,13 @@ class TautLegs:
         places, point = self.paths.outline.places, np.asarray(self.cluster, dtype=np.int64)
         letters, row = flattened(self.signatures)
         return Ends(places[point], self.paths.slits.cells(places[:, 0])[point], letters, row), point
+
+
+def _found(clock: Clock, find: Callable[[], object], classes: int) -> None:
+    """Find legs until the clock is up; LimitReachedError if it was."""
+    clock.interruptible(find)
+    if clock.flag[0]:
+        raise LimitReachedError(
+            f"time limit reached while measuring the legs between {classes} homotopy classes; "
+            "lower tether_length or raise the limit"
+        )

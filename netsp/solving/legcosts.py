@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from netsp.arrays import Bools, Floats, Ints
 from netsp.memory import ask
+from netsp.solving.legrows import LegRows
 from netsp.travel.costs import rounded_down
 from netsp.travel.graph import TravelGraph
 
@@ -30,6 +31,9 @@ ROUNDED_FROM = 5000
 
 BYTES_PER_LEG, BYTES_ROUNDED = 24.0, 8.0
 """Of memory that a proof takes: the values, what is known of them, and what is in between."""
+
+NO_VALUES: Floats = np.zeros((0, 0), dtype=np.float32)  # type: ignore[assignment]
+"""Where legs are held in rows."""
 
 ROWS, LEGS = 512, 200_000
 """Of a matrix that are worked on at a time, so that what is in between stays small."""
@@ -45,17 +49,23 @@ class LegCosts:
     cluster
         (k,).
     values
-        (k, k) lengths or lower bounds, inf within a cluster; of single precision if `rounded`.
+        (k, k) lengths or lower bounds, inf within a cluster; of single precision if `rounded`. None
+        of them while there are `rows`.
+    rows
+        The legs left, and their lengths, where there are too many vertices for a matrix.
     exact
         (k, k) which are lengths; None when all are.
     """
 
-    def __init__(self, graph: TravelGraph) -> None:
-        self.graph = graph
+    def __init__(self, graph: TravelGraph, rows: LegRows | None = None) -> None:
+        self.graph, self.rows = graph, rows
         self.vertices: Ints = np.arange(len(graph))
         self.cluster: Ints = graph.cluster
         self.values: Floats
         self.exact: Bools | None = None
+        if rows is not None:
+            self.values = NO_VALUES
+            return
         many = len(graph) > ROUNDED_FROM
         if graph.measured or len(graph) <= MEASURE_AT_ONCE:
             self.values = np.array(graph.costs)
@@ -93,7 +103,7 @@ class LegCosts:
     @property
     def rounded(self) -> bool:
         """Whether values are rounded down to single precision."""
-        return self.values.dtype == np.float32
+        return self.rows is not None or self.values.dtype == np.float32
 
     def _held(self, lengths: Floats) -> Floats:
         """Lengths as they are held."""
@@ -101,10 +111,55 @@ class LegCosts:
 
     def of(self, legs: Ints) -> Floats:
         """(k,) values of legs (k, 2), rows."""
+        if self.rows is not None:
+            out = self.rows.of(*legs.T)
+            gone = np.isinf(out)
+            if gone.any():  # of a tour that is no better than the one they were let go for
+                u, v = self.vertices[legs[gone]].T
+                out[gone] = self._held(self.graph.costs_of(u, v))
+            return out
         return self.values[legs[:, 0], legs[:, 1]].astype(np.float64)
 
     def __len__(self) -> int:
         return len(self.vertices)
+
+    @property
+    def of_base(self) -> Floats:
+        """(k,) values of the legs of the base."""
+        if self.rows is not None:
+            return self._held(self.graph.costs_to_base[self.vertices])
+        return np.asarray(self.values[0])
+
+    def bounds_from(self, some: Ints) -> Floats:
+        """(r, k) values of the legs of some rows, or less."""
+        if self.rows is not None:
+            return self.graph.lower_bounds(self.vertices, some)
+        return np.asarray(self.values[some])
+
+    def among(self, some: Ints) -> Floats:
+        """(r, r) values of the legs among some rows, measured, in double precision."""
+        if self.rows is not None:
+            return self.graph.costs_among(self.vertices[some])
+        self.measure(some)
+        return np.asarray(self.values[np.ix_(some, some)], dtype=np.float64)
+
+    def nearest_of(self, some: Ints) -> Ints:
+        """(k,) which of some rows has the least value to each row."""
+        if self.rows is not None:
+            return self.rows.nearest_of(some)
+        return np.asarray(np.argmin(self.values[:, some], axis=1))
+
+    def nearest_legs(self, most: int) -> Ints:
+        """(j, 2) for each row its legs of least value, so many."""
+        if self.rows is not None:
+            return self.rows.nearest_legs(most)
+        most = min(most, len(self) - 1)
+        # a view of some columns would keep all
+        near = np.concatenate([
+            np.argpartition(self.values[first : first + ROWS], most - 1, axis=1)[:, :most].copy()
+            for first in range(0, len(self), ROWS)
+        ])  # fmt: skip
+        return np.column_stack([np.repeat(np.arange(len(self)), most), near.ravel()])
 
     def measure(self, chosen: Ints) -> None:
         """Measure all legs among chosen rows."""
@@ -162,6 +217,11 @@ class LegCosts:
     def restrict(self, keep: Bools) -> None:
         """Forget all vertices but those marked."""
         self.vertices, self.cluster = self.vertices[keep], self.cluster[keep]
+        if self.rows is not None:
+            self.rows.restrict(keep)
+            if 2 * len(self) <= ROUNDED_FROM:
+                self._spell_out(self.rows)
+            return
         if not self.rounded:
             self.values = np.ascontiguousarray(self.values[np.ix_(keep, keep)])
         else:
@@ -170,6 +230,13 @@ class LegCosts:
             self.exact = squeezed(self.exact, keep)
         if self.rounded and 2 * len(self) <= ROUNDED_FROM:
             self._unround()
+
+    def _spell_out(self, rows: LegRows) -> None:
+        """From rows back to a matrix, in double precision; legs that are gone count as none."""
+        left, u = np.zeros((len(self), len(self)), dtype=bool), rows.legs_left()
+        left[u[:, 0], u[:, 1]] = left[u[:, 1], u[:, 0]] = True
+        self.values = np.where(left, self.graph.costs_among(self.vertices, left), np.inf)
+        self.rows = None
 
     def _unround(self) -> None:
         """Back to double precision; what was measured is measured again when it is asked for."""

@@ -229,19 +229,17 @@ class SearchingRun(SolverRun):
                 whole = Instance(costs.cluster, values, costs.vertices, self.graph.before)
                 self._core = len(costs), whole
             return self._core[1]
-        tethers, own = costs.values[0], np.searchsorted(costs.vertices, np.array(self.tour or (0,)))
+        tethers, own = costs.of_base, np.searchsorted(costs.vertices, np.array(self.tour or (0,)))
         if self.tour is None:
             some = least_tethers(tethers, costs.cluster, self.searched_per_goal)
         else:
             some = classes_beside(
-                tethers, costs.cluster, costs.values[own], own, self.searched_per_goal
+                tethers, costs.cluster, costs.bounds_from(own), own, self.searched_per_goal
             )
         core = np.unique(np.concatenate([some, own, more]))
-        costs.measure(core)
         return Instance(
-            costs.cluster[core], costs.values[np.ix_(core, core)].astype(np.float64),
-            costs.vertices[core], self.graph.before,
-        )  # fmt: skip
+            costs.cluster[core], costs.among(core), costs.vertices[core], self.graph.before
+        )
 
     def search(self, costs: LegCosts, more: Ints | None = None) -> None:
         """Local search, then ruin and recreate, from the incumbent if there is one; again beside a

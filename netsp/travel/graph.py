@@ -276,6 +276,46 @@ class TravelGraph(Drawn):
         finally:
             self.legs_s += time.monotonic() - begin
 
+    @property
+    def legs_in_blocks(self) -> bool:
+        """Whether `costs_in_blocks` may be asked for."""
+        return bool(getattr(self._legs, "in_blocks", hasattr(self._legs, "blocks")))
+
+    def costs_in_blocks(
+        self, vertices: npt.ArrayLike | None = None
+    ) -> Iterator[tuple[Ints, Floats]]:
+        """Leg costs in single precision, those of some vertices at a time, for solvers that let go
+        of most at once.
+
+        Parameters
+        ----------
+        vertices : array_like of int, shape (k,), optional
+            The vertices among which; all of them by default.
+
+        Yields
+        ------
+        rows : ndarray of int, shape (r,)
+            Some of the vertices, as positions among them; every one comes once.
+        costs : ndarray of float32, shape (r, k)
+            Of their legs, as of `costs_rounded`; to be used before the next are asked for.
+
+        Raises
+        ------
+        LimitReachedError
+            The clock was up before they were found.
+        """
+        chosen = np.arange(len(self)) if vertices is None else np.asarray(vertices, dtype=np.int64)
+        blocks = self._legs.blocks(chosen, self.clock)  # type: ignore[attr-defined]
+        while True:
+            begin = time.monotonic()
+            try:
+                block = next(blocks, None)
+            finally:
+                self.legs_s += time.monotonic() - begin
+            if block is None:
+                return
+            yield block
+
     def costs_of(self, us: Ints, vs: Ints) -> Floats:
         """Costs of single legs.
 
@@ -735,6 +775,14 @@ class _PartOfLegs:
     def rounded(self, vertices: Ints, clock: Clock | None = None) -> Floats:
         with self.graph.on_clock(clock or self.graph.clock):
             return self.graph.costs_rounded(self.chosen[vertices])
+
+    @property
+    def in_blocks(self) -> bool:
+        return self.graph.legs_in_blocks
+
+    def blocks(self, vertices: Ints, clock: Clock | None = None) -> Iterator[tuple[Ints, Floats]]:
+        with self.graph.on_clock(clock or self.graph.clock):
+            yield from self.graph.costs_in_blocks(self.chosen[vertices])
 
     def pairs(self, us: Ints, vs: Ints) -> Floats:
         return self.graph.costs_of(self.chosen[us], self.chosen[vs])

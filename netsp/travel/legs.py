@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Protocol
 
 from netsp.arrays import Bools, Floats, Ints
@@ -38,3 +39,11 @@ class LegsAtOnce(Legs, Protocol):
 
     def rounded(self, vertices: Ints, clock: Clock | None = None) -> Floats:
         """As `lengths`, in single precision and no larger."""
+
+
+class LegsInBlocks(LegsAtOnce, Protocol):
+    """Legs that are found some vertices at a time about as quickly as all together."""
+
+    def blocks(self, vertices: Ints, clock: Clock | None = None) -> Iterator[tuple[Ints, Floats]]:
+        """As `rounded`, row by row: some of the vertices (r,), as positions among them, and (r, k)
+        their legs, to be used before the next are asked for."""

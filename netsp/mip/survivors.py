@@ -1,0 +1,66 @@
+"""From covers to classes without the matrix of all legs.
+
+A tour that takes a leg between two classes is over a cover one along the leg between their cells,
+which costs no more. Where that leg, at what the program over the cover has proven, would lead to a
+tour as long as the best one if it were so much longer, every leg above it that is so much longer is
+in no better tour. After a few covers of the ways between goals fewer than one leg in ten is left,
+so that the legs of some classes at a time are measured, and most are let go at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from netsp.arrays import Bools, Floats
+from netsp.mip.deadlegs import DeadLegs
+from netsp.mip.overcells import OverCells
+from netsp.mip.prices import Prices
+from netsp.solving.legrows import LegRows
+from netsp.travel.graph import TravelGraph
+
+ROUNDING = 1e-9
+"""Ways are shortest up to this, relative."""
+
+
+def longest_legs(over: OverCells, costs: Floats, cutoff: float) -> Floats:
+    """(m, m) what a leg above one between two cells may cost, at most, to be in a tour shorter
+    than the cutoff; -inf for nothing.
+
+    Parameters
+    ----------
+    over
+        What is proven over the cells.
+    costs
+        (m, m) of legs between them.
+    """
+    prices = Prices(
+        costs, DeadLegs(over.dead | np.isinf(costs)), over.cells.cluster, over.cuts, over.duals
+    )
+    return np.where(np.isinf(costs), 0.0, costs) + prices.room(cutoff) + ROUNDING * cutoff
+
+
+def survivors(
+    graph: TravelGraph, over: OverCells, costs: Floats, length: float, tour: Sequence[int],
+    odd: Bools,
+) -> LegRows:  # fmt: skip
+    """The legs among all vertices that may be in a tour as short as one of that length.
+
+    Parameters
+    ----------
+    over, costs
+        As of `longest_legs`.
+    tour
+        One as short as that, whose legs are kept in any case.
+    odd
+        (V, n) as of `netsp.mip.parities.odd_letters`.
+
+    Raises
+    ------
+    LimitReachedError
+        The graph's clock was up before they were measured.
+    """
+    own = over.cells.of(graph.cluster, odd)
+    longest = longest_legs(over, costs, length)
+    return LegRows(len(graph), graph.costs_in_blocks(), own, longest, np.asarray(tour))
