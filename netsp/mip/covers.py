@@ -103,13 +103,15 @@ def climb(
             gap = length - (level.run.bound or 0.0)
             if level.over or clock.up or gap <= OPTIMALITY_TOLERANCE * length:
                 break
+            before, covers = level, covers + 1
+            if finer is not None and found is not None and covers == COARSE:
+                # over the same obstacles first: what they tell apart has changed
+                tower = splits.tower = finer(found, costs, length)
+                continue
             more = splits.after(level.cells, *level.used(), gap, level.run.check)
             if not more:
                 break
             obstacles += more
-            before, covers = level, covers + 1
-            if finer is not None and found is not None and covers == COARSE:
-                tower = splits.tower = finer(found, costs, length)
     except (Stop, LimitReachedError):
         pass
     except (KeyboardInterrupt, SystemError) as error:

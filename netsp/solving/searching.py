@@ -218,7 +218,7 @@ class SearchingRun(SolverRun):
     def searches_all(self, costs: LegCosts) -> bool:
         """Whether the heuristic searches all vertices that are left."""
         few = len(costs) <= SEARCHED_WHOLE or not self.graph.roadmapped
-        return costs.exact is None and few
+        return costs.exact is None and costs.rows is None and few
 
     def instance(self, costs: LegCosts, more: Ints) -> Instance:
         """What the heuristic searches: everything if it is not too much, else the classes of least

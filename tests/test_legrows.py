@@ -1,0 +1,241 @@
+"""Legs in rows: those that may be in a better tour and no others, and as good as a matrix."""
+
+import importlib
+
+import numpy as np
+import pytest
+
+from netsp import Status, solve_graph, travel_graph
+from netsp.clock import Clock
+from netsp.mip import overgoals
+from netsp.mip.covers import climb
+from netsp.mip.cuts import Cut
+from netsp.mip.deadlegs import DeadLegs
+from netsp.mip.parities import odd_letters
+from netsp.mip.prices import Prices
+from netsp.mip.program import duals_of_relaxation
+from netsp.mip.survivors import longest_legs, survivors
+from netsp.mip.towers import OverClasses, OverWays
+from netsp.solving import legcosts
+from netsp.solving.legcosts import LegCosts
+from netsp.solving.legrows import LegRows
+from netsp.solving.limits import Limits
+from netsp.travel.graph import TravelGraph
+from netsp.worlds import random_world
+from tests.test_contract import random_graph
+from tests.test_even_crossings import small
+
+SOLVE = importlib.import_module("netsp.mip.solve")  # the package has a function of that name
+NO_TOUR = np.zeros(0, dtype=np.int64)
+
+
+def in_blocks(costs, rng, size):
+    """Rows of a matrix, in any order, and some at a time."""
+    order = rng.permutation(len(costs))
+    for first in range(0, len(order), size):
+        rows = order[first : first + size]
+        yield rows, costs[rows].astype(np.float32)
+
+
+def rows_of(costs, rng, size=7):
+    """All legs of a matrix."""
+    everywhere = np.zeros(len(costs), dtype=np.int64)
+    return LegRows(
+        len(costs), in_blocks(costs, rng, size), everywhere, np.full((1, 1), np.inf), NO_TOUR
+    )
+
+
+def matrix_of(rows):
+    """(V, V) costs; inf where a leg is gone."""
+    every = np.arange(len(rows))
+    u, v = np.meshgrid(every, every, indexing="ij")
+    return rows.of(u.ravel(), v.ravel()).reshape(len(rows), -1)
+
+
+def some_costs(rng, size=40):
+    """Symmetric, of single precision, some of them infinite."""
+    costs = rng.uniform(1.0, 9.0, (size, size)).astype(np.float32).astype(float)
+    costs[rng.random((size, size)) < 0.3] = np.inf
+    costs = np.minimum(costs, costs.T)
+    np.fill_diagonal(costs, np.inf)
+    return costs
+
+
+@pytest.mark.parametrize("size", [1, 7, 100])
+def test_what_costs_more_than_its_cells_allow_is_gone_but_for_the_legs_of_the_tour(size):
+    rng = np.random.default_rng(size)
+    costs = some_costs(rng)
+    own = rng.integers(-1, 5, len(costs))
+    longest = rng.uniform(2.0, 9.0, (5, 5))
+    longest = np.minimum(longest, longest.T)
+    longest[2, 3] = longest[3, 2] = -np.inf
+    tour = rng.permutation(len(costs))[:9]
+    rows = LegRows(len(costs), in_blocks(costs, rng, size), own, longest, tour)
+    kept = (costs <= longest[own][:, own]) & (own >= 0)[:, None] & (own >= 0)
+    kept[tour, np.roll(tour, 1)] = kept[np.roll(tour, 1), tour] = True
+    assert 0 < kept.sum() < np.isfinite(costs).sum()
+    assert (matrix_of(rows) == np.where(kept, costs, np.inf)).all()
+
+
+def test_rows_are_a_matrix_of_which_legs_and_vertices_are_let_go():
+    rng = np.random.default_rng(0)
+    costs = some_costs(rng)
+    rows = rows_of(costs, rng)
+    own, dead = rng.integers(0, 4, len(costs)), rng.random((4, 4)) < 0.3
+    dead |= dead.T
+    rows.add_above(own, dead)
+    costs[dead[own][:, own]] = np.inf
+    assert (matrix_of(rows) == costs).all()
+    for share in (0.1, 0.7):  # with the second they are packed anew
+        gone = rng.random(len(costs)) < share
+        rows.add_vertices(gone)
+        costs[gone] = costs[:, gone] = np.inf
+        assert (matrix_of(rows) == costs).all()
+        assert (rows.with_legs() == np.isfinite(costs).any(axis=1)).all()
+        assert rows.left == np.isfinite(costs).sum() // 2
+        assert (rows.legs_left() == np.argwhere(np.triu(np.isfinite(costs)))).all()
+        u, v = rng.integers(0, len(costs), (2, 50))
+        assert (rows[u, v] == np.isinf(costs[u, v])).all()
+    keep = rng.random(len(costs)) < 0.8
+    rows.restrict(keep)
+    assert (matrix_of(rows) == costs[np.ix_(keep, keep)]).all()
+
+
+def test_the_nearest_are_those_of_the_matrix():
+    rng = np.random.default_rng(1)
+    costs = some_costs(rng)
+    costs[5] = costs[:, 5] = np.inf
+    rows = rows_of(costs, rng)
+    chosen = rng.permutation(len(costs))[:11]
+    assert (rows.nearest_of(chosen) == np.argmin(costs[:, chosen], axis=1)).all()
+    near = rows.nearest_legs(3)
+    for u in range(len(costs)):
+        some = np.sort(costs[u])[:3]
+        of_u = near[near[:, 0] == u]
+        assert sorted(costs[u, of_u[:, 1]]) == some[np.isfinite(some)].tolist()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_prices_over_rows_are_those_over_a_matrix_and_rule_out_the_same(seed):
+    graph, rng = random_graph(seed, goals=6, most=4), np.random.default_rng(seed)
+    costs = graph.costs.astype(np.float32)
+    cuts = [Cut(rng.random(len(graph)) < 0.5, 1 + k % 6) for k in range(12)]
+    duals = duals_of_relaxation(rng.normal(size=7), rng.random(12), cuts, graph.cluster)
+    marks, rows = DeadLegs.of(costs), rows_of(costs, rng)
+    with_marks = Prices(costs, marks, graph.cluster, cuts, duals)
+    in_rows = Prices(legcosts.NO_VALUES, rows, graph.cluster, cuts, duals)
+    assert in_rows.bound == with_marks.bound
+    cutoff = with_marks.bound + 3.0
+    legs = marks.legs_left()
+    assert (in_rows.of(legs) == with_marks.of(legs)).all()
+    before = rows.left
+    in_rows.rule_out(cutoff)
+    with_marks.rule_out(cutoff)
+    assert (matrix_of(rows) == np.where(marks.matrix(), np.inf, costs)).all()
+    assert 0 < rows.left < before
+    for a, b in zip(in_rows.cheapest(1e-9), with_marks.cheapest(1e-9), strict=True):
+        assert (a == b).all()
+    gone = np.argwhere(np.isinf(matrix_of(rows)) & np.isfinite(costs))
+    assert np.isinf(in_rows.of(gone)).all()
+
+
+def over_ways(seed):
+    """A small world, its best tour, and what covers of ways prove with a tour 2 % longer."""
+    graph = travel_graph(small(seed, tether_length=150.0))
+    best = solve_graph(graph, "auto")
+    ways = graph.ways_by_parity()
+    odd = odd_letters(graph.signatures, ways.obstacles)
+    stops = [(int(graph.cluster[v]), odd[v]) for v in best.tour]
+    seen = []
+
+    def finer(over, costs, length):
+        seen.append((over, costs, length))
+        rows = survivors(graph, over, costs, length, best.tour, odd)
+        return OverClasses(rows, graph.cluster, odd)
+
+    length = 1.02 * best.length
+    found = climb(OverWays(ways, np.inf), stops, length, Clock(), Limits(), finer=finer)
+    return graph, best, odd, seen, found
+
+
+def along(graph, u, v, dear=1e4):
+    """Length of the shortest tour along a leg: all others are made so much dearer."""
+    costs = graph.costs + dear
+    costs[u, v] = costs[v, u] = graph.costs[u, v]
+    for w in (u, v):
+        others = (graph.cluster == graph.cluster[w]) & (np.arange(len(graph)) != w)
+        costs[others] = costs[:, others] = np.inf
+    left = np.isfinite(costs).any(axis=1)
+    part = TravelGraph.from_costs(costs[np.ix_(left, left)], graph.cluster[left])
+    return solve_graph(part, "auto").length - graph.goal_count * dear
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_no_leg_of_a_better_tour_is_let_go(seed, monkeypatch):
+    monkeypatch.setattr("netsp.mip.covers.COARSE", 1)
+    graph, best, odd, seen, found = over_ways(seed)
+    ((over, costs, length),) = seen
+    assert over.bound < length
+    rows = survivors(graph, over, costs, length, NO_TOUR, odd)
+    left = matrix_of(rows)
+    assert np.isfinite(left).sum() < np.isfinite(graph.costs).sum()
+    gone = np.isinf(left) & np.isfinite(graph.costs)
+    shortest = [along(graph, *leg) for leg in np.argwhere(np.triu(gone))[::60].tolist()]
+    assert len(shortest) > 5
+    assert min(shortest) >= length * (1.0 - 1e-7)
+    assert found.bound <= best.length * (1.0 + 1e-6)
+    assert np.isfinite(left[list(best.tour), np.roll(best.tour, 1)]).all()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_what_a_leg_may_cost_is_no_less_than_it_costs_in_tours_as_short(seed):
+    graph, best, odd, seen, _ = over_ways(seed)
+    for over, costs, length in seen:
+        longest = longest_legs(over, costs, length)
+        own = over.cells.of(graph.cluster, odd)
+        tour = np.array(best.tour)
+        cost = graph.costs[tour, np.roll(tour, 1)]
+        assert (cost <= longest[own[tour], own[np.roll(tour, 1)]] + 1e-9).all()
+
+
+@pytest.fixture
+def rows_from_the_start(monkeypatch):
+    """Legs of small graphs are held in rows, until few classes are left."""
+    monkeypatch.setattr(SOLVE, "ROUNDED_FROM", 20)
+    monkeypatch.setattr(legcosts, "ROUNDED_FROM", 20)
+    monkeypatch.setattr(SOLVE, "MANY_CLASSES", 20)
+    monkeypatch.setattr(overgoals, "MANY_CLASSES", 20)
+    monkeypatch.setattr(SOLVE, "MANY_GOALS", 5)
+    monkeypatch.setattr("netsp.mip.covers.COARSE", 1)
+    monkeypatch.setattr("netsp.solving.searching.CORE", 30)
+    monkeypatch.setattr("netsp.solving.searching.MEASURE_AT_ONCE", 10)
+    monkeypatch.setattr(legcosts, "MEASURE_AT_ONCE", 10)
+    made, restricted = [], []
+    make, restrict = LegCosts.__init__, LegRows.restrict
+
+    def noted(self, graph, rows=None):
+        made.append(rows is not None)
+        make(self, graph, rows)
+
+    def heard(self, keep):
+        restricted.append(int(keep.sum()))
+        restrict(self, keep)
+
+    monkeypatch.setattr(LegCosts, "__init__", noted)
+    monkeypatch.setattr(LegRows, "restrict", heard)
+    return made, restricted
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_proof_over_rows_finds_the_optimum_of_one_over_a_matrix(seed, rows_from_the_start):
+    made, _ = rows_from_the_start
+    problem = random_world(
+        seed, goals=8, obstacles=6, side=80.0, radii=(4.0, 8.0), tether_length=150.0
+    )
+    graph = travel_graph(problem)
+    expected = solve_graph(travel_graph(problem), "auto")
+    found = solve_graph(graph, "mip", seed=seed)
+    assert any(made)
+    assert found.status is Status.OPTIMAL
+    assert found.length == pytest.approx(expected.length, rel=1e-6)
+    assert not graph.measured
