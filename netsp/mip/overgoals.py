@@ -158,6 +158,15 @@ def _over_cells(
         assert keep is not None
         with graph.on_clock(clock):
             rows = survivors(graph, over, costs, length, best, odd)
+        _holds_in_any_class(graph, over.bound * (1.0 - ROUNDING))
+        print(
+            "ROWS",
+            rows.left,
+            rows.with_legs().sum(),
+            rows.left / (0.5 * len(graph) ** 2),
+            over.bound,
+            length,
+        )
         keep(rows)
         return OverClasses(rows, graph.cluster, odd)
 

@@ -188,7 +188,7 @@ class MipRun(SearchingRun):
         if warm is None:
             self.search(costs)
             self.report("heuristic", vertices=len(costs))
-        if walks:
+        if walks and costs.rows is None:
             bound_by_walks(self, costs, few_legs=FEW_LEGS)
         if not (self.done or self.infeasible):
             self.cut(costs, backend, warm)
@@ -215,7 +215,7 @@ class MipRun(SearchingRun):
             self._costs = LegCosts(graph, rows)
 
         known = climbs and graph.legs_at_once and graph.complete
-        in_rows = known and self._in_rows
+        in_rows = self._in_rows
         try:
             self._over_goals = bound_over_goals(
                 graph, prove, limits, self.tour if climbs else None,
@@ -230,13 +230,16 @@ class MipRun(SearchingRun):
     def _climbs(self) -> bool:
         """Whether covers come first: with fewer goals the relaxation over classes is quicker than
         those below it."""
-        return len(self.graph) > MANY_CLASSES and self.graph.goal_count >= MANY_GOALS
+        many = len(self.graph) > MANY_CLASSES and self.graph.goal_count >= MANY_GOALS
+        return many or self._in_rows
 
     @property
     def _in_rows(self) -> bool:
         """Whether there are so many classes that no matrix of legs is made."""
         graph = self.graph
-        return len(graph) > ROUNDED_FROM and graph.legs_in_blocks and graph.knows_ways
+        # with many goals all that covers prove is to hold for classes left out, too
+        whole = graph.complete or graph.goal_count < MANY_GOALS
+        return len(graph) > ROUNDED_FROM and whole and graph.legs_in_blocks and graph.knows_ways
 
     @property
     def _cells_share(self) -> float:

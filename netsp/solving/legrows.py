@@ -8,7 +8,10 @@ left.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import os
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +21,9 @@ from netsp.arrays import Bools, Floats, Ints
 from netsp.compiled.kernel import kernel
 
 Columns = npt.NDArray[np.int32]
+
+ROWS = 256
+"""That a thread works on at a time."""
 
 HALF = 0.5
 """Rows are packed again when no more than this share of their room is in use."""
@@ -63,17 +69,22 @@ class LegRows:
     ) -> None:  # fmt: skip
         mates = np.full((vertices, 2), -1, dtype=np.int64)
         mates[tour] = np.column_stack([np.roll(tour, 1), np.roll(tour, -1)])
+        # what lies in no cell lies in the last, which has no legs
+        longest = np.pad(longest, (0, 1), constant_values=-np.inf)
+        own = np.where(own < 0, len(longest) - 1, own)
         first, size = np.zeros(vertices, dtype=np.int64), np.zeros(vertices, dtype=np.int64)
         other: Columns = np.zeros(0, dtype=np.int32)
         cost: Floats = np.zeros(0, dtype=np.float32)  # type: ignore[assignment]
         for rows, costs in blocks:
-            counts = _kept_in(rows, costs, own, longest, mates)
+            kept = Kept(rows, costs, own, longest, mates)
+            counts = np.zeros(len(rows), dtype=np.int64)
+            _by_rows(partial(_count, kept, counts), len(rows))
             begin = len(other) + np.cumsum(counts) - counts
             first[rows], size[rows] = begin, counts
             # grows where it stands: two of them may be more than there is room for
             other.resize(len(other) + int(counts.sum()), refcheck=False)
             cost.resize(len(other), refcheck=False)
-            _keep(rows, costs, own, longest, mates, begin, other, cost)
+            _by_rows(partial(_keep, kept, begin, other, cost), len(rows))
         self.held = Rows(first, size, other, cost)
 
     def __len__(self) -> int:
@@ -138,40 +149,59 @@ class LegRows:
         self.held = Rows(*_packed(np.flatnonzero(keep), place, self.held))
 
 
-@kernel
-def _is_kept(
-    u: int, v: int, cost: float, own: Ints, longest: Floats, mates: Ints
-) -> bool:  # fmt: skip
-    if cost == np.inf:
-        return False
-    if v == mates[u, 0] or v == mates[u, 1]:
-        return True
-    return bool(own[u] >= 0 and own[v] >= 0 and cost <= longest[own[u], own[v]])
+class Kept(NamedTuple):
+    """What is kept of the legs `costs` (r, V) of some vertices `rows`: those of their mates in the
+    tour, and what is no longer than the longest between two cells."""
+
+    rows: Ints
+    costs: Floats
+    own: Ints
+    longest: Floats
+    mates: Ints
 
 
 @kernel
-def _kept_in(rows: Ints, costs: Floats, own: Ints, longest: Floats, mates: Ints) -> Ints:
-    """How many legs of each of some vertices are kept."""
-    count = np.zeros(len(rows), dtype=np.int64)
-    for k in range(len(rows)):
-        for v in range(costs.shape[1]):
-            if _is_kept(rows[k], v, costs[k, v], own, longest, mates):
-                count[k] += 1
+def _kept(k: int, kept: Kept, other: Columns, cost: Floats) -> int:
+    """How many legs of a row are kept; the first of them go into `other` and `cost`, as many as
+    there is room for."""
+    costs, longest = kept.costs[k], kept.longest[kept.own[kept.rows[k]]]
+    before, after = kept.mates[kept.rows[k]]
+    top, count = longest.max(), 0
+    for v in range(len(costs)):
+        c = costs[v]
+        # few are as short as any may be: the others are passed over quickly
+        if (c <= top and c <= longest[kept.own[v]]) or v in (before, after):
+            if c == np.inf:
+                continue
+            if count < len(other):
+                other[count], cost[count] = v, c
+            count += 1
     return count
 
 
 @kernel
+def _count(kept: Kept, count: Ints, first: int, last: int) -> None:
+    """How many legs of some rows are kept."""
+    other, cost = NO_ROWS.other, NO_ROWS.cost
+    for k in range(first, last):
+        count[k] = _kept(k, kept, other, cost)
+
+
+@kernel
 def _keep(
-    rows: Ints, costs: Floats, own: Ints, longest: Floats, mates: Ints, begin: Ints,
-    other: Columns, cost: Floats,
+    kept: Kept, begin: Ints, other: Columns, cost: Floats, first: int, last: int
 ) -> None:  # fmt: skip
-    """Write those legs down, each row from its place on."""
-    for k in range(len(rows)):
-        at = begin[k]
-        for v in range(costs.shape[1]):
-            if _is_kept(rows[k], v, costs[k, v], own, longest, mates):
-                other[at], cost[at] = v, costs[k, v]
-                at += 1
+    """Write them down, each row from its place on."""
+    for k in range(first, last):
+        end = begin[k + 1] if k + 1 < len(begin) else len(other)
+        _kept(k, kept, other[begin[k] : end], cost[begin[k] : end])
+
+
+def _by_rows(work: Callable[[int, int], None], count: int) -> None:
+    """Share the rows of a block among threads."""
+    parts = range(0, count, ROWS)
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        list(pool.map(lambda k: work(k, min(k + ROWS, count)), parts))
 
 
 @kernel
