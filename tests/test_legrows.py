@@ -148,9 +148,9 @@ def over_ways(seed):
     stops = [(int(graph.cluster[v]), odd[v]) for v in best.tour]
     seen = []
 
-    def finer(over, costs, length):
-        seen.append((over, costs, length))
-        rows = survivors(graph, over, costs, length, best.tour, odd)
+    def finer(over, length):
+        seen.append((over, length))
+        rows = survivors(graph, over, length, best.tour, odd)
         return OverClasses(rows, graph.cluster, odd)
 
     length = 1.02 * best.length
@@ -174,9 +174,9 @@ def along(graph, u, v, dear=1e4):
 def test_no_leg_of_a_better_tour_is_let_go(seed, monkeypatch):
     monkeypatch.setattr("netsp.mip.covers.COARSE", 1)
     graph, best, odd, seen, found = over_ways(seed)
-    ((over, costs, length),) = seen
+    ((over, length),) = seen
     assert over.bound < length
-    rows = survivors(graph, over, costs, length, NO_TOUR, odd)
+    rows = survivors(graph, over, length, NO_TOUR, odd)
     left = matrix_of(rows)
     assert np.isfinite(left).sum() < np.isfinite(graph.costs).sum()
     gone = np.isinf(left) & np.isfinite(graph.costs)
@@ -190,8 +190,8 @@ def test_no_leg_of_a_better_tour_is_let_go(seed, monkeypatch):
 @pytest.mark.parametrize("seed", range(3))
 def test_what_a_leg_may_cost_is_no_less_than_it_costs_in_tours_as_short(seed):
     graph, best, odd, seen, _ = over_ways(seed)
-    for over, costs, length in seen:
-        longest = longest_legs(over, costs, length)
+    for over, length in seen:
+        longest = longest_legs(over, length)
         own = over.cells.of(graph.cluster, odd)
         tour = np.array(best.tour)
         cost = graph.costs[tour, np.roll(tour, 1)]

@@ -62,9 +62,9 @@ Told = Callable[[float, Cells, Ints], tuple[Stops, float] | None]
 give a better tour, with its length, to go on with."""
 
 
-Finer = Callable[[OverCells, Floats, float], Tower]
-"""The same covers with dearer legs, given what is proven over the cells of one, their costs, and
-the length of the best tour."""
+Finer = Callable[[OverCells, float], Tower]
+"""The same covers with dearer legs, given what is proven over the cells of one, and the length of
+the best tour."""
 
 
 def climb(
@@ -88,14 +88,14 @@ def climb(
     found: OverCells | None = None
     obstacles: list[int] = []
     before: _Level | None = None
-    covers, costs = 0, np.zeros((0, 0))
+    covers = 0
     splits = Splits(tower, GROWTH, MOST_CELLS)
     try:
         while True:
             level = _Level(tower, tuple(obstacles), tour, length, clock, limits, before)
             proven = level.solve()
             if proven is not None:
-                found, costs = proven, level.costs
+                found = proven
                 better = told(found.bound, found.cells, level.visited())
                 # a tour no better than what the legs were ruled out by may have dead ones
                 if better is not None and better[1] < level.run.cutoff:
@@ -106,7 +106,7 @@ def climb(
             before, covers = level, covers + 1
             if finer is not None and found is not None and covers == COARSE:
                 # over the same obstacles first: what they tell apart has changed
-                tower = splits.tower = finer(found, costs, length)
+                tower = splits.tower = finer(found, length)
                 continue
             more = splits.after(level.cells, *level.used(), gap, level.run.check)
             if not more:
@@ -181,7 +181,7 @@ class _Level:
         degree[best.vertices] = best.duals.degree
         cuts = tuple(replace(c, inside=_spread(c.inside, best.vertices, m)) for c in best.cuts)
         return OverCells(
-            float(self.run.bound or 0.0), self.cells, alive, self._dead(),
+            float(self.run.bound or 0.0), self.cells, self.costs, alive, self._dead(),
             cuts, replace(best.duals, degree=degree),
         )  # fmt: skip
 

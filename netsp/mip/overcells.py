@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from netsp.arrays import Bools, Ints
+from netsp.arrays import Bools, Floats, Ints
 from netsp.mip.cuts import Cut
 from netsp.mip.program import Duals
 
@@ -57,6 +57,8 @@ class OverCells:
         No tour is shorter.
     cells
         Its vertices.
+    costs
+        (m, m) of legs between them, inf where there is none.
     alive
         (m,) which of them may be in a better tour.
     dead
@@ -67,6 +69,7 @@ class OverCells:
 
     bound: float
     cells: Cells
+    costs: Floats
     alive: Bools
     dead: Bools
     cuts: tuple[Cut, ...]

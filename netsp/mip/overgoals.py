@@ -154,19 +154,11 @@ def _over_cells(
         best[:] = better
         return stops(better), graph.tour_length(better)
 
-    def finer(over: OverCells, costs: Floats, length: float) -> Tower:
+    def finer(over: OverCells, length: float) -> Tower:
         assert keep is not None
         with graph.on_clock(clock):
-            rows = survivors(graph, over, costs, length, best, odd)
+            rows = survivors(graph, over, length, best, odd)
         _holds_in_any_class(graph, over.bound * (1.0 - ROUNDING))
-        print(
-            "ROWS",
-            rows.left,
-            rows.with_legs().sum(),
-            rows.left / (0.5 * len(graph) ** 2),
-            over.bound,
-            length,
-        )
         keep(rows)
         return OverClasses(rows, graph.cluster, odd)
 

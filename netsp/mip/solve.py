@@ -23,9 +23,11 @@ from netsp.mip.cuts import Cut
 from netsp.mip.merging import search_and_merge
 from netsp.mip.overcells import OverGoals
 from netsp.mip.overgoals import MANY_CLASSES, bound_over_goals
+from netsp.mip.parities import odd_letters
 from netsp.mip.program import IntegerProgram, Point
 from netsp.mip.root import Root, tour_legs
 from netsp.mip.subtours import component_cuts, heaviest_walk, tour_from
+from netsp.mip.survivors import survivors
 from netsp.mip.warm import Warm
 from netsp.solving.legcosts import ROUNDED_FROM, LegCosts
 from netsp.solving.legrows import LegRows
@@ -184,7 +186,7 @@ class MipRun(SearchingRun):
         warm
             What a proof over a core of the classes has left; it has searched already.
         """
-        costs, self._costs = self._costs or LegCosts(self.graph), None
+        costs, self._costs = self._costs or self._left(), None
         if warm is None:
             self.search(costs)
             self.report("heuristic", vertices=len(costs))
@@ -192,6 +194,20 @@ class MipRun(SearchingRun):
             bound_by_walks(self, costs, few_legs=FEW_LEGS)
         if not (self.done or self.infeasible):
             self.cut(costs, backend, warm)
+
+    def _left(self) -> LegCosts:
+        """The costs of legs, where covers have not come to them."""
+        graph, over = self.graph, self._over_goals
+        if not self._in_rows or over is None or self.tour is None:
+            return LegCosts(graph)
+        if over.cells is None:
+            # no cover was proven in most of the time: what is left is worth more in a search
+            search_and_merge(self, solve_merged)
+            self.check()
+            return LegCosts(graph)
+        odd = odd_letters(graph.signatures)
+        with graph.on_clock(self.clock):
+            return LegCosts(graph, survivors(graph, over.cells, self.length, self.tour, odd))
 
     def bound_by_goals(self, backend: str) -> None:
         """A first bound for who stops the run before the proof over all classes has one."""

@@ -24,7 +24,7 @@ ROUNDING = 1e-9
 """Ways are shortest up to this, relative."""
 
 
-def longest_legs(over: OverCells, costs: Floats, cutoff: float) -> Floats:
+def longest_legs(over: OverCells, cutoff: float) -> Floats:
     """(m, m) what a leg above one between two cells may cost, at most, to be in a tour shorter
     than the cutoff; -inf for nothing.
 
@@ -32,24 +32,20 @@ def longest_legs(over: OverCells, costs: Floats, cutoff: float) -> Floats:
     ----------
     over
         What is proven over the cells.
-    costs
-        (m, m) of legs between them.
     """
-    prices = Prices(
-        costs, DeadLegs(over.dead | np.isinf(costs)), over.cells.cluster, over.cuts, over.duals
-    )
+    costs, dead = over.costs, DeadLegs(over.dead | np.isinf(over.costs))
+    prices = Prices(costs, dead, over.cells.cluster, over.cuts, over.duals)
     return np.where(np.isinf(costs), 0.0, costs) + prices.room(cutoff) + ROUNDING * cutoff
 
 
 def survivors(
-    graph: TravelGraph, over: OverCells, costs: Floats, length: float, tour: Sequence[int],
-    odd: Bools,
+    graph: TravelGraph, over: OverCells, length: float, tour: Sequence[int], odd: Bools
 ) -> LegRows:  # fmt: skip
     """The legs among all vertices that may be in a tour as short as one of that length.
 
     Parameters
     ----------
-    over, costs
+    over
         As of `longest_legs`.
     tour
         One as short as that, whose legs are kept in any case.
@@ -62,5 +58,5 @@ def survivors(
         The graph's clock was up before they were measured.
     """
     own = over.cells.of(graph.cluster, odd)
-    longest = longest_legs(over, costs, length)
+    longest = longest_legs(over, length)
     return LegRows(len(graph), graph.costs_in_blocks(), own, longest, np.asarray(tour))
