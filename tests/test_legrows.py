@@ -5,7 +5,8 @@ import importlib
 import numpy as np
 import pytest
 
-from netsp import Status, solve_graph, travel_graph
+from netsp import Problem, Status, solve_graph, travel_graph
+from netsp import solve as solve_problem
 from netsp.clock import Clock
 from netsp.mip import overgoals
 from netsp.mip.covers import climb
@@ -16,6 +17,8 @@ from netsp.mip.prices import Prices
 from netsp.mip.program import duals_of_relaxation
 from netsp.mip.survivors import longest_legs, survivors
 from netsp.mip.towers import OverClasses, OverWays
+from netsp.problem import State
+from netsp.roadmap.from_state import graph_from_state
 from netsp.solving import legcosts
 from netsp.solving.legcosts import LegCosts
 from netsp.solving.legrows import LegRows
@@ -239,3 +242,47 @@ def test_a_proof_over_rows_finds_the_optimum_of_one_over_a_matrix(seed, rows_fro
     assert found.status is Status.OPTIMAL
     assert found.length == pytest.approx(expected.length, rel=1e-6)
     assert not graph.measured
+
+
+def kinds():
+    """Travel graphs whose legs are those of another one, changed."""
+    plain = small(3, goals=6, tether_length=150.0)
+    goals = [g.model_dump() for g in plain.goals]
+    for g in goals[:2]:
+        g["choice"] = "either"
+    choices = Problem.model_validate(plain.model_dump() | {"goals": goals})
+    whole = solve_problem(plain)
+    here = whole.tour[2]
+    state = State(position=plain.goals[here.goal].position, signature=here.signature)
+    left = tuple(plain.goals[v.goal] for v in whole.tour[3:])
+    yield "plain", travel_graph(plain)
+    yield "with alternatives", travel_graph(choices)
+    yield "from a state", graph_from_state(plain.model_copy(update={"goals": left, "state": state}))
+    yield "without precedences", travel_graph(plain).unordered()
+
+
+@pytest.mark.parametrize(("kind", "graph"), list(kinds()), ids=[k for k, _ in kinds()])
+def test_legs_in_blocks_are_those_rounded_and_ways_no_longer(kind, graph, monkeypatch):
+    monkeypatch.setattr("netsp.roadmap.legs.BLOCK", 5)
+    monkeypatch.setattr("netsp.roadmap.legs.BLOCK_LEGS", 17 * len(graph))
+    assert graph.legs_in_blocks
+    expected = graph.costs_rounded(np.arange(len(graph)))
+    seen = np.zeros(len(graph), dtype=int)
+    for rows, costs in graph.costs_in_blocks():
+        seen[rows] += 1
+        assert len(rows) <= 17
+        assert costs.dtype == np.float32
+        assert np.allclose(costs, expected[rows], rtol=3e-7)
+    assert (seen == 1).all()
+    ways = graph.ways_by_parity()
+    assert graph.knows_ways
+    odd = odd_letters(graph.signatures, ways.obstacles)
+    tower = OverWays(ways, np.inf)
+    cells = tower.cells(tuple(range(ways.obstacles)))
+    own = cells.of(graph.cluster, odd)
+    assert (own >= 0).all()
+    least = tower.costs(cells)[own][:, own]
+    finite = np.isfinite(expected)
+    assert (least[finite] <= graph.costs[finite] + 1e-6).all()
+    short = graph.costs < np.quantile(graph.costs[finite], 0.01)
+    assert np.mean(least[short] > 0.9 * graph.costs[short]) > 0.5

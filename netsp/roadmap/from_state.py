@@ -11,7 +11,8 @@ shortest tour has the free edge, and is the shortest path and twice the surcharg
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -25,11 +26,13 @@ from netsp.problem import Goal, Problem
 from netsp.roadmap.legs import TautLegs
 from netsp.roadmap.paths import TautPaths
 from netsp.roadmap.taut import MAX_CLASSES, TautRoadmap
+from netsp.roadmap.ways import ways_by_parity
 from netsp.solution import Status
 from netsp.travel.costs import rounded_down
 from netsp.travel.graph import TravelGraph
 from netsp.travel.kept import within_kept
 from netsp.travel.result import OPTIMALITY_TOLERANCE, OnProgress, Progress, Result
+from netsp.travel.ways import BITS, WaysByParity
 
 ENOUGH = 10.0 * OPTIMALITY_TOLERANCE
 """A path is called optimal when its bound is within this share of it."""
@@ -78,6 +81,29 @@ class GraphFromState(TravelGraph):
         places = np.arange(self.goal_count + 1)
         ends = int(self.cluster[self.start or 0])
         return charged(self.within.between_goals(up), places, places, ends, self.surcharge)
+
+    @property
+    def knows_ways(self) -> bool:
+        """As of `TravelGraph`."""
+        return self.within.knows_ways
+
+    def ways_by_parity(self, up: Callable[[], bool] = lambda: False) -> WaysByParity | None:
+        """As of `TravelGraph`, with the surcharge."""
+        ways = self.within.ways_by_parity(up)
+        if ways is None or self.start is None:
+            return None
+        goal = int(self.cluster[self.start])
+        base, start = (ways.ends == 0).any(axis=1), (ways.ends == goal).any(axis=1)
+        length = ways.length + self.surcharge * (base.astype(np.float64) + start)
+        # the one between them is for nothing, however long
+        rest = ~(base & start)
+        odd = np.zeros((1, ways.odd.shape[1]), dtype=np.uint64)
+        for a in self.signatures[self.start]:
+            odd[0, (abs(a) - 1) // BITS] ^= np.uint64(1 << (abs(a) - 1) % BITS)
+        return dataclasses.replace(
+            ways, ends=np.vstack([ways.ends[rest], [[0, goal]]]),
+            odd=np.vstack([ways.odd[rest], odd]), length=np.append(length[rest], 0.0),
+        )  # fmt: skip
 
     def as_asked(self, result: Result) -> Result:
         """A solver's result on this graph as one about the path from the state."""
@@ -180,6 +206,23 @@ class _OpenedLegs:
             out[k] = out[:, k] = rounded_down(own)[0]
         return out
 
+    @property
+    def in_blocks(self) -> bool:
+        return self.within.legs_in_blocks
+
+    def blocks(self, vertices: Ints, clock: Clock | None = None) -> Iterator[tuple[Ints, Floats]]:
+        ends = np.isin(vertices, (0, self.start))
+        with self.within.on_clock(clock or self.within.clock):
+            for rows, costs in self.within.costs_in_blocks(vertices):
+                # row by row of these two, and what the others have to them
+                for k, columns in (ends[rows], slice(None)), (~ends[rows], ends):
+                    own, to = vertices[rows[k]], vertices[columns]
+                    part = costs[k][:, columns].astype(np.float64)
+                    costs[np.ix_(k, np.arange(len(vertices))[columns])] = rounded_down(
+                        self._charged(part, own, to)
+                    )
+                yield rows, costs
+
     def to_base(self) -> Floats:
         out = self.within.costs_to_base + self.surcharge
         out[self.start] = 0.0
@@ -239,7 +282,7 @@ def graph_from_state(
         cluster, words, legs.to_base(), legs, roadmap="taut",
         between=lambda up: legs.paths.contacts.between(placed.points[:, 2], up),
         classes=roadmap.rule if roadmap.complete else "shortest",
-        least_left_out=roadmap.least_left_out,
+        least_left_out=roadmap.least_left_out, by_parity=partial(ways_by_parity, legs.paths),
     )  # fmt: skip
     if len(problem.precedences):
         part.before = np.zeros((last + 1, last + 1), dtype=bool)

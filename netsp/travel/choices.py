@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from netsp.arrays import Bools, Floats, Ints
 from netsp.clock import Clock
 from netsp.travel.graph import TravelGraph
+from netsp.travel.ways import WaysByParity
 
 
 def with_choices(graph: TravelGraph, clusters: Ints) -> TravelGraph:
@@ -31,6 +33,7 @@ def with_choices(graph: TravelGraph, clusters: Ints) -> TravelGraph:
         cluster, graph.signatures, graph.tethers, _LegsOfChoices(graph, cluster), graph.roadmap,
         between=_between(graph, clusters), classes=graph.classes,
         least_left_out=graph.least_left_out,
+        by_parity=_ways(graph, clusters) if graph.knows_ways else None,
     )  # fmt: skip
     out.goal = graph.goal
     return out
@@ -70,6 +73,19 @@ class _LegsOfChoices:
             out[np.ix_(alike, alike)] = np.inf
         return out
 
+    @property
+    def in_blocks(self) -> bool:
+        """As beneath."""
+        return self.graph.legs_in_blocks
+
+    def blocks(self, vertices: Ints, clock: Clock | None = None) -> Iterator[tuple[Ints, Floats]]:
+        own = self.cluster[vertices]
+        with self.graph.on_clock(clock or self.graph.clock):
+            for rows, costs in self.graph.costs_in_blocks(vertices):
+                for c in np.unique(own[rows]).tolist():
+                    costs[np.ix_(own[rows] == c, own == c)] = np.inf
+                yield rows, costs
+
     def pairs(self, us: Ints, vs: Ints) -> Floats:
         return self.graph.costs_of(us, vs)
 
@@ -86,6 +102,22 @@ class _LegsOfChoices:
 
     def path(self, u: int, v: int) -> Floats:
         return self.graph.path(u, v)
+
+
+def _ways(
+    graph: TravelGraph, clusters: Ints
+) -> Callable[[Callable[[], bool]], WaysByParity | None]:
+    """Ways between goals: those between any of their places."""
+
+    def ways(up: Callable[[], bool]) -> WaysByParity | None:
+        places = graph.ways_by_parity(up)
+        if places is None:
+            return None
+        ends = np.sort(clusters[places.ends], axis=1)
+        apart = ends[:, 0] != ends[:, 1]
+        return replace(places, ends=ends[apart], odd=places.odd[apart], length=places.length[apart])
+
+    return ways
 
 
 def _between(graph: TravelGraph, clusters: Ints) -> Callable[[Callable[[], bool]], Floats]:

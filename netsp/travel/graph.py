@@ -506,6 +506,8 @@ class TravelGraph(Drawn):
         """
         free = self.subgraph(np.arange(len(self)))
         free.before = UNORDERED
+        free.least_left_out = self.least_left_out
+        free._by_parity = self.ways_by_parity if self.knows_ways else None
         return free
 
     @property
