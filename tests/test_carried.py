@@ -9,6 +9,8 @@ import pytest
 
 from netsp import Circle, Problem, Solution, solve, travel_graph, verify
 from netsp.clock import Clock
+from netsp.errors import LimitReachedError
+from netsp.roadmap import taut
 from netsp.solvers import carried
 from netsp.solvers import solve as by_name
 from netsp.solvers.carried import Carried, with_carried
@@ -151,6 +153,40 @@ def test_ctrl_c_while_classes_are_carried_keeps_the_best_tour(tmp_path):
     run.communicate()
     assert run.returncode == 0
     assert verify(Problem.load(path), Solution.load(out))
+
+
+@pytest.fixture
+def pressed(monkeypatch):
+    """Ctrl-C as soon as classes are sought."""
+    find = taut.find_classes
+
+    def press(*args):
+        signal.raise_signal(signal.SIGINT)
+        return find(*args)
+
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    monkeypatch.setattr(taut, "find_classes", press)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+def test_ctrl_c_while_classes_are_sought_leaves_the_tour_of_those_found(pressed):
+    problem = windfarm(5)
+    found = solve(problem)
+    assert found.classes == "shortest"
+    assert verify(problem, found)
+
+
+def test_ctrl_c_while_a_roadmap_is_made_that_is_nothing_until_it_is_whole(pressed, monkeypatch):
+    def never(*_):
+        raise LimitReachedError("time limit reached while doing nothing")
+
+    monkeypatch.setattr(taut, "TautLegs", never)
+    with pytest.raises(KeyboardInterrupt):
+        solve(windfarm(2))
+    monkeypatch.setattr(taut, "find_classes", never)
+    with pytest.raises(LimitReachedError, match="nothing"):
+        solve(windfarm(2))
 
 
 def test_searches_in_vain_end_although_there_is_no_end_of_classes(monkeypatch):

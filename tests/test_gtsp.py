@@ -12,10 +12,12 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from netsp import TravelGraph, solve_graph
+from netsp.clock import Clock
 from netsp.command.main import main
 from netsp.errors import InputError
 from netsp.gtsplib import load
 from netsp.lns.solve import solve as lns
+from netsp.mip.overgoals import bound_at_once
 from netsp.pictures.gtsp import draw_gtsp
 from netsp.solution import Status
 
@@ -292,3 +294,39 @@ def test_clusters_are_made_as_those_of_gtsplib_whose_optimum_is_known():
     found = solve_graph(graph)
     assert found.status is Status.OPTIMAL
     assert found.length == found.lower_bound == OPTIMA["eil51"] == 174
+
+
+@pytest.mark.parametrize("base", [0, None])
+@pytest.mark.parametrize("seed", range(3))
+def test_there_is_a_tour_and_a_bound_whatever_the_time(seed, base):
+    rng = np.random.default_rng(seed)
+    clusters = np.r_[0, np.repeat(np.arange(1, 13), 3)]
+    at = rng.random((13, 2))[clusters] + 0.02 * rng.random((len(clusters), 2))
+    costs = np.linalg.norm(at[:, None] - at[None], axis=2)
+    best = solve_graph(TravelGraph.from_costs(costs, clusters, base=base), "auto").length
+    clock = Clock()
+    clock.end()
+    found = solve_graph(TravelGraph.from_costs(costs, clusters, base=base), time_limit=clock)
+    assert 0.7 * best < found.lower_bound <= best <= found.length
+
+
+def test_the_bound_of_no_time_holds_where_legs_are_missing():
+    costs = np.full((6, 6), np.inf)
+    ring = np.arange(6)
+    costs[ring, np.roll(ring, 1)] = costs[np.roll(ring, 1), ring] = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
+    costs[0, 3] = costs[3, 0] = 1.0
+    graph = TravelGraph.from_costs(costs, range(6))
+    bound_at_once(graph)
+    assert 10.0 < graph.bound_in_any_class <= 21.0
+
+
+def test_least_costs_between_clusters_are_those_of_their_vertices():
+    rng = np.random.default_rng(0)
+    clusters = rng.permutation(np.repeat(np.arange(1, 6), 4))
+    clusters = np.r_[0, clusters]
+    costs = rng.random((21, 21))
+    graph = TravelGraph.from_costs(costs + costs.T, clusters)
+    between = graph.between_goals()
+    for a, b in itertools.permutations(range(6), 2):
+        assert between[a, b] == graph.costs[clusters == a][:, clusters == b].min()
+    assert not between.diagonal().any()

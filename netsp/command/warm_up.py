@@ -61,6 +61,7 @@ def steps() -> Iterator[tuple[str, Callable[[], object]]]:
     from netsp.online.simulate import simulate
     from netsp.solvers.solve import solve, solve_graph, travel_graph
     from netsp.solvers.table import SOLVERS
+    from netsp.solving.legrows import LegRows
     from netsp.solving.limits import Limits
     from netsp.space.solve import solve_mission
     from netsp.travel.graph import TravelGraph
@@ -86,9 +87,24 @@ def steps() -> Iterator[tuple[str, Callable[[], object]]]:
         graph = travel_graph(fewer)
         costs, clusters = graph.costs_rounded(np.arange(len(graph))), graph.goal_count + 1
         duals = Duals(np.zeros(clusters), np.zeros(len(costs)), np.zeros(0))
-        prices = Prices(costs, DeadLegs.of(costs), graph.cluster, [], duals)
-        prices.rule_out(1.0)
-        prices.of(prices.cheapest(-1.0)[0])
+        none = np.zeros(len(graph), dtype=np.int64)
+        rows = LegRows(len(graph), graph.costs_in_blocks(), none, np.full((1, 1), np.inf), none[:1])
+        rows.add_above(none, np.zeros((1, 1), dtype=bool))
+        rows.nearest_of(none[:1])
+        rows.nearest_legs(1)
+        odd = odd_letters(graph.signatures)
+        tower = OverClasses(rows, graph.cluster, odd)
+        cells = tower.cells(())
+        tower.costs(cells)
+        tower.by_parity(cells, np.array([[0, 1]]))
+        for held in DeadLegs.of(costs), rows:
+            prices = Prices(costs, held, graph.cluster, [], duals)
+            prices.room(1.0)
+            prices.rule_out(1.0)
+            prices.of(prices.cheapest(-1.0)[0])
+        rows.restrict(rows.with_legs())
+        legs = rows.legs_left()
+        rows.of(legs[:, 0], legs[:, 1])
 
     yield "thousands of classes", rounded
 

@@ -112,12 +112,19 @@ def bound_over_goals(
 
 
 def bound_at_once(graph: TravelGraph) -> None:
-    """A first bound for who has no time: a few 1-trees of straight lines between goals."""
-    if graph.roadmapped and not graph.bound_in_any_class:
+    """A first bound for who has no time: a few 1-trees of straight lines between goals, or of the
+    least costs between clusters."""
+    if not graph.bound_in_any_class:
         least = graph.between_goals(lambda: True)
         left = iter(range(LEGS_AT_ONCE // least.size))
-        bound = best_tree(least, lambda: next(left, None) is None)
+        bound = best_tree(_finite(least), lambda: next(left, None) is None)
         _holds_in_any_class(graph, bound * (1.0 - ROUNDING))
+
+
+def _finite(lengths: Floats) -> Floats:
+    """With the longest of all where there is no leg: a tree can do without infinities."""
+    longest = float(lengths.max(where=np.isfinite(lengths), initial=0.0))
+    return np.asarray(np.minimum(lengths, longest))
 
 
 def _holds_in_any_class(graph: TravelGraph, bound: float) -> None:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from netsp.clock import Clock, TimeLimit, until_interrupt
-from netsp.errors import InputError
+from netsp.errors import InputError, LimitReachedError
 from netsp.fields import checked_argument
 from netsp.models import shown
 from netsp.problem import Problem
@@ -344,15 +344,23 @@ def solve(
     }
     clock = Clock(time_limit, should_stop=should_stop)
     with contextlib.closing(clock):
-        options: dict[str, Any] = {"time_limit": clock, **(roadmap_options or {})}
+        options: dict[str, Any] = dict(roadmap_options or {})
         if ROADMAPS.named(roadmap).seeded:
             options.setdefault("seed", seed)
-        graph = travel_graph(problem, roadmap, **options)
-        graph = _within_turning(problem, graph, max_turning(friction, max_tension_ratio), clock)
+        most = max_turning(friction, max_tension_ratio)
+        with until_interrupt(clock) as rest:
+            try:
+                graph = travel_graph(problem, roadmap, **{"time_limit": rest, **options})
+                graph = _within_turning(problem, graph, most, rest)
+            except LimitReachedError:
+                if rest.stopped and not clock.up:  # by Ctrl-C
+                    raise KeyboardInterrupt from None
+                raise
+        rest = rest if rest.stopped else clock
         built = clock.elapsed
         if keep_order:
             listener = graph.progress_listener(on_progress)
-            result = graph.as_asked(solve_in_order(graph, clock, listener))
+            result = graph.as_asked(solve_in_order(graph, rest, listener))
             found = to_solution(problem, graph, result, "in-order", seed)
             return found.model_copy(
                 update={"kept_order": True, "timings": _timings(clock, built, graph), **limits}
@@ -360,15 +368,14 @@ def solve(
         # what is too large for its time takes long to draw, too
         spare = 0.0 if graph.complete else min(SPARE * (time_limit or 0.0), 1.0)
         start: Sequence[int] | None = None
-        rest = clock
         if warm_start is not None:
             start = tour_from(problem, warm_start, graph)
         elif solver in CARRIED:
             rng = np.random.default_rng(seed)
-            with until_interrupt(clock) as stoppable:
+            with until_interrupt(rest) as stoppable:
                 carried = with_carried(graph, stoppable, rng, on_progress)
             graph, start = carried.graph, carried.tour
-            rest = stoppable if stoppable.stopped else clock
+            rest = stoppable if stoppable.stopped else rest
         result = solve_graph(
             graph,
             solver,

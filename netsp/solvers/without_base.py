@@ -16,6 +16,7 @@ from netsp.arrays import Ints
 from netsp.clock import Clock, until_interrupt
 from netsp.lns.solve import Params as SearchParams
 from netsp.lns.solve import solve as search
+from netsp.mip.overgoals import bound_at_once
 from netsp.solution import Status
 from netsp.solving.limits import Limits
 from netsp.travel.baseless import BaselessGraph
@@ -81,6 +82,9 @@ def solve(graph: BaselessGraph, run: Run, limits: Limits, *, proves: bool) -> Re
                 tour = tuple(int(vertices[v]) for v in found.tour or ())
                 best = replace(found, tour=tour)
     bound = min(bounds)
+    if proves and bound == 0.0:
+        bound_at_once(graph)
+        bound = graph.bound_in_any_class
     if best.length is None or best.tour is None:
         status = Status.INFEASIBLE if bound == math.inf else Status.NO_SOLUTION_FOUND
         return replace(best, status=status, lower_bound=None, trace=tuple(rows))

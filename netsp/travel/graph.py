@@ -446,10 +446,12 @@ class TravelGraph(Drawn):
         out = np.zeros((self.goal_count + 1, self.goal_count + 1))
         if self.roadmapped:
             return out
+        order = np.argsort(self.cluster, kind="stable")
+        start = np.searchsorted(self.cluster[order], np.arange(len(out)))
         for a in range(len(out)):
-            for b in range(a):
-                legs = self.costs[np.ix_(self.members(a), self.members(b))]
-                out[a, b] = out[b, a] = legs.min()
+            least = self.costs[self.members(a)].min(axis=0)
+            out[a] = np.minimum.reduceat(least[order], start)
+            out[a, a] = 0.0
         return out
 
     @property
