@@ -2,11 +2,11 @@
 
 With up to eight goals or so all sets of goals are gone through (`netsp.solvers.exact`). Up to
 `PROVABLE` vertices it proves: the heuristic finds the tour; for up to `FEW_GOALS` goals walks
-(`netsp.dp`) bound it, which at that size ends with a proof more often than not; cutting planes
-(`netsp.mip`) do the rest, or all of it with more goals, on the vertices that are left. Beyond
-`PROVABLE` the matrices would not fit into a few gigabytes. Few goals are then proven over the
-classes of least tether, which proves the tour for good where it is no longer than twice the tether
-of every other class. With many, `lns` searches among them, and the bound comes from covers of
+(`netsp.dp`) bound it where legs are a matrix, which at that size ends with a proof more often than
+not; cutting planes (`netsp.mip`) do the rest, or all of it with more goals or more vertices, on the
+vertices that are left. Beyond `PROVABLE` few goals are proven over the classes of least tether,
+which proves the tour for good where it is no longer than twice the tether of every other class.
+With many, `lns` searches among them, and the bound comes from covers of
 finitely many sheets (`netsp.mip.covers`), or where there are none from the goals alone, as the
 travelling salesperson's tour over the shortest paths between them in any class.
 """
@@ -38,7 +38,8 @@ from netsp.travel.kept import within_kept
 from netsp.travel.result import Result, of_part, proven
 
 PROVABLE = 22_000
-"""Most vertices of a travel graph that `mip` is asked to bound: some 3 GiB of matrices."""
+"""Most vertices of a travel graph that `mip` is asked to bound: as many as the taut roadmap keeps,
+unless it is asked for more."""
 
 MOST_KEPT = 3_000
 """With more vertices and few goals, about so many, those of least tether, are proven over."""
@@ -65,7 +66,7 @@ SHARE = 0.6
 """Part of the time that the search has at least where it shares it with a bound that is weak."""
 
 BOUND_SHARE = 0.8
-"""With too many classes for a matrix, part of the time that is left for the bound after the first
+"""Where a proof over all classes is not tried, part of the time that is left for the bound after the first
 search."""
 
 
@@ -127,7 +128,7 @@ def _by_size(graph: TravelGraph, chosen: Params, limits: Limits) -> Result:
 
 
 def _beyond(graph: TravelGraph, limits: Limits) -> Result:
-    """With too many classes for a matrix: a search, the bound of covers with its tour, and more
+    """No proof over all classes: a search, the bound of covers with its tour, and more
     searches if there is time left."""
     run = SearchingRun(graph, limits, search_rounds=_rounds(graph))
 

@@ -5,8 +5,10 @@ leg, and there are many. As long as a leg is only bounded from below, everything
 the bound holds: the relaxation is one of a cheaper world. So the relaxation runs on bounds first,
 and what it cannot rule out is measured.
 
-With thousands of classes the matrix is what limits a proof. Then it is in single precision, rounded
-down: bounds stay bounds, and a proof loses 3e-7 of the length at most, of the 5e-7 that it may.
+With thousands of classes the matrix is what limits a proof. Then only the legs that may be in a
+better tour are held (`netsp.solving.legrows`). They, or the matrix where that cannot be, are in
+single precision, rounded down: bounds stay bounds, and a proof loses 3e-7 of the length at most, of
+the 5e-7 that it may.
 """
 
 from __future__ import annotations
