@@ -66,8 +66,8 @@ SHARE = 0.6
 """Part of the time that the search has at least where it shares it with a bound that is weak."""
 
 BOUND_SHARE = 0.8
-"""Where a proof over all classes is not tried, part of the time that is left for the bound after the first
-search."""
+"""Where a proof over all classes is not tried, part of the time that is left for the bound after
+the first search."""
 
 
 @dataclass(frozen=True)
