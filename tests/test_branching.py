@@ -42,7 +42,7 @@ def test_the_first_legs_of_every_vertex_are_found_in_little_memory(monkeypatch):
     """Of ten rows at a time, and nothing of these is kept but a few legs."""
     graph = random_graph(0, 60, most=12)
     root = root_of(graph, tour=[0, *(graph.members(g)[0] for g in range(1, 61))])
-    monkeypatch.setattr("netsp.mip.root.ROWS", 10)
+    monkeypatch.setattr("netsp.solving.legcosts.ROWS", 10)
     tracemalloc.start()
     legs = root._first_legs()
     peak = tracemalloc.get_traced_memory()[1]
