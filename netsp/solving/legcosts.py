@@ -146,10 +146,14 @@ class LegCosts:
         return np.asarray(self.values[np.ix_(some, some)], dtype=np.float64)
 
     def nearest_of(self, some: Ints) -> Ints:
-        """(k,) which of some rows has the least value to each row."""
-        if self.rows is not None:
-            return self.rows.nearest_of(some)
-        return np.asarray(np.argmin(self.values[:, some], axis=1))
+        """(k,) which of some rows has the least value to each row; where all its legs to them are
+        gone, one of its own goal, that with the shortest tether, if there is one."""
+        if self.rows is None:
+            return np.asarray(np.argmin(self.values[:, some], axis=1))
+        out, order = self.rows.nearest_of(some), np.argsort(self.of_base[some], kind="stable")
+        akin = np.zeros(int(self.cluster.max()) + 1, dtype=np.int64)
+        akin[self.cluster[some[order[::-1]]]] = order[::-1]
+        return np.where(out < 0, akin[self.cluster], out)
 
     def nearest_legs(self, most: int) -> Ints:
         """(j, 2) for each row its legs of least value, so many."""

@@ -134,7 +134,7 @@ class LegRows:
         return _cheapest(most, self.held)
 
     def nearest_of(self, chosen: Ints) -> Ints:
-        """(V,) which of some vertices has the cheapest leg to each; 0 where none has any."""
+        """(V,) which of some vertices has the cheapest leg to each; -1 where none has any."""
         place = np.full(len(self), -1, dtype=np.int64)
         place[chosen] = np.arange(len(chosen))
         return _nearest(place, self.held)
@@ -296,7 +296,7 @@ def _cheapest(most: int, rows: Rows) -> Ints:
 
 @kernel
 def _nearest(place: Ints, rows: Rows) -> Ints:
-    out = np.zeros(len(rows.first), dtype=np.int64)
+    out = np.full(len(rows.first), -1, dtype=np.int64)
     for u in range(len(rows.first)):
         least = np.inf
         for k in range(rows.first[u], rows.first[u] + rows.size[u]):
