@@ -208,6 +208,7 @@ def test_what_a_leg_may_cost_is_no_less_than_it_costs_in_tours_as_short(seed):
 def rows_from_the_start(monkeypatch):
     """Legs of small graphs are held in rows, until few classes are left."""
     monkeypatch.setattr(SOLVE, "ROUNDED_FROM", 20)
+    monkeypatch.setattr(SOLVE, "ROWS_FROM", 20)
     monkeypatch.setattr(legcosts, "ROUNDED_FROM", 20)
     monkeypatch.setattr(SOLVE, "MANY_CLASSES", 20)
     monkeypatch.setattr(overgoals, "MANY_CLASSES", 20)
