@@ -164,6 +164,24 @@ def over_ways(seed):
     return graph, best, odd, seen, found
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_covers_go_on_where_a_cell_has_no_class_left(seed, monkeypatch):
+    monkeypatch.setattr("netsp.mip.covers.COARSE", 2)
+    emptied, find = [], survivors
+
+    def fewer(graph, over, length, tour, odd):
+        rows = find(graph, over, length, tour, odd)
+        others = (graph.cluster == 1) & ~np.isin(np.arange(len(graph)), tour)
+        rows.add_vertices(others)
+        emptied.append(set(over.cells.of(graph.cluster, odd)[others].tolist()))
+        return rows
+
+    monkeypatch.setattr("tests.test_legrows.survivors", fewer)
+    _, best, _, seen, found = over_ways(seed)
+    assert found.bound <= 1.02 * best.length
+    assert len(emptied) == len(seen)
+
+
 def along(graph, u, v, dear=1e4):
     """Length of the shortest tour along a leg: all others are made so much dearer."""
     costs = graph.costs + dear

@@ -224,6 +224,8 @@ class _Level:
             above[j].append(k)
         legs = []
         for a, b in at[root.lp.legs].tolist():
+            if not (above[a] and above[b]):
+                continue  # no leg of any class there is left
             block = costs[np.ix_(above[a], above[b])]
             legs += [(above[a][i], above[b][int(j)]) for i, j in enumerate(block.argmin(axis=1))]
             legs += [(above[a][int(i)], above[b][j]) for j, i in enumerate(block.argmin(axis=0))]

@@ -253,7 +253,7 @@ class Root:
             tour = tour_legs(self.tour())
             self.dead.add_above(own, found.dead)
             if isinstance(self.dead, DeadLegs):
-                self.dead.revive(tour)
+                self.dead.revive(tour[np.isfinite(costs.values[tour[:, 0], tour[:, 1]])])
         cuts, duals = found.cuts_over(own), found.duals_over(own)
         if run.tour is not None:
             prices = Prices(costs.values, self.dead, costs.cluster, cuts, duals, run.check)

@@ -179,7 +179,8 @@ class MipRun(SearchingRun):
                             core.known = min(core.known, self.length)
                             core.prove(backend, walks=walks)
                     warm = core.program() if core is not None else None
-                self.prove(backend, walks=walks, warm=warm)
+                if not (self.done and self._in_rows):
+                    self.prove(backend, walks=walks, warm=warm)
         if self.root is not None:
             self.cuts, self.root = self.root.lp.cuts, None
         return self.finish("proven" if self.done else "open")

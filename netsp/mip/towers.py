@@ -121,7 +121,8 @@ def _least_in_rows(rows: Rows, own: Ints, out: Floats) -> None:
     for u in range(len(own)):
         for k in range(rows.first[u], rows.first[u] + rows.size[u]):
             a, b = own[u], own[rows.other[k]]
-            out[a, b] = min(out[a, b], rows.cost[k])
+            if a >= 0 and b >= 0:
+                out[a, b] = min(out[a, b], rows.cost[k])
 
 
 @kernel

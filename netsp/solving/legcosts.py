@@ -61,6 +61,7 @@ class LegCosts:
 
     def __init__(self, graph: TravelGraph, rows: LegRows | None = None) -> None:
         self.graph, self.rows = graph, rows
+        self._let_go = rows is not None  # legs of the incumbent, too
         self.vertices: Ints = np.arange(len(graph))
         self.cluster: Ints = graph.cluster
         self.values: Floats
@@ -113,8 +114,10 @@ class LegCosts:
 
     def of(self, legs: Ints) -> Floats:
         """(k,) values of legs (k, 2), rows."""
-        if self.rows is not None:
-            out = self.rows.of(*legs.T)
+        if self._let_go:
+            out = (
+                self.values[legs[:, 0], legs[:, 1]] if self.rows is None else self.rows.of(*legs.T)
+            )
             gone = np.isinf(out)
             if gone.any():  # of a tour that is no better than the one they were let go for
                 u, v = self.vertices[legs[gone]].T

@@ -508,7 +508,7 @@ class TravelGraph(Drawn):
         """
         free = self.subgraph(np.arange(len(self)))
         free.before = UNORDERED
-        free.least_left_out = self.least_left_out
+        free.least_left_out, free._between = self.least_left_out, self.between_goals
         free._by_parity = self.ways_by_parity if self.knows_ways else None
         return free
 
