@@ -88,8 +88,8 @@ def bound_over_goals(
     told
         See `Told`.
     keep
-        See `Keep`. If it is given covers of ways come first, and then those of the classes left; no
-        class may have been left out.
+        See `Keep`. If it is given, covers of ways come first, then those of the classes left, whose
+        bound says nothing of classes that a roadmap has left out.
     """
     clock = Clock.of(limits.time)
     least = graph.between_goals(lambda: clock.up)
