@@ -45,14 +45,16 @@ def highest() -> float:
     return float(status["VmHWM"].split()[0]) / 2**20
 
 
-def measured(problem: Problem, limit: float) -> Outcome:
-    """What `auto` does in so many seconds."""
+def measured(problem: Problem, limit: float, *, until_rows: bool = False) -> Outcome:
+    """What `auto` does in so many seconds, or until it is known which legs are left."""
     legs = []
     find = overgoals.survivors
 
     def noted(graph, *args):
         rows = find(graph, *args)
         legs.append(200.0 * rows.left / len(graph) ** 2)
+        if until_rows:
+            raise KeyboardInterrupt  # gives the best tour so far
         return rows
 
     overgoals.survivors = noted
@@ -65,6 +67,13 @@ def measured(problem: Problem, limit: float) -> Outcome:
         len(problem.goals), len(travel_graph(problem)), legs[0] if legs else 100.0, peak,
         100.0 * (1.0 if found.gap is None else found.gap), bool(verify(problem, found)),
     )  # fmt: skip
+
+
+def of_library(job: tuple[str, float]) -> Outcome:
+    """Of a problem of the library until its legs are known, in a process of its own."""
+    name, limit = job
+    warmed()
+    return measured(Problem.load(FOLDER / f"{name}.json"), limit, until_rows=True)
 
 
 def of_job(job: tuple[str, int, float, int, float]) -> Outcome:
