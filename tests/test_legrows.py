@@ -104,16 +104,11 @@ def test_rows_are_a_matrix_of_which_legs_and_vertices_are_let_go():
     assert (matrix_of(rows) == costs[np.ix_(keep, keep)]).all()
 
 
-def test_the_nearest_are_those_of_the_matrix():
+def test_the_nearest_legs_are_those_of_the_matrix():
     rng = np.random.default_rng(1)
     costs = some_costs(rng)
     costs[5] = costs[:, 5] = np.inf
     rows = rows_of(costs, rng)
-    chosen = rng.permutation(len(costs))[:11]
-    there = np.isfinite(costs[:, chosen]).any(axis=1)
-    assert not there.all()
-    nearest = np.where(there, np.argmin(costs[:, chosen], axis=1), -1)
-    assert (rows.nearest_of(chosen) == nearest).all()
     near = rows.nearest_legs(3)
     for u in range(len(costs)):
         some = np.sort(costs[u])[:3]
@@ -143,6 +138,37 @@ def test_prices_over_rows_are_those_over_a_matrix_and_rule_out_the_same(seed):
         assert (a == b).all()
     gone = np.argwhere(np.isinf(matrix_of(rows)) & np.isfinite(costs))
     assert np.isinf(in_rows.of(gone)).all()
+
+
+def test_what_lies_nearest_is_so_along_legs_that_were_let_go_too(monkeypatch):
+    monkeypatch.setattr(legcosts, "ROUNDED_FROM", 0)  # never a matrix again
+    graph, rng = travel_graph(small(3, tether_length=150.0)), np.random.default_rng(0)
+    costs, asked, find = graph.costs_rounded(np.arange(len(graph))), [], graph.costs_in_blocks
+
+    def noted(vertices, rows):
+        asked.append(len(rows))
+        return find(vertices, rows)
+
+    graph.costs_in_blocks = noted
+    least = np.full((1, 1), -np.inf)  # no leg is left
+    rows = LegRows(len(graph), find(), np.zeros(len(graph), dtype=np.int64), least, NO_TOUR)
+    held = LegCosts(graph, rows)
+    some = rng.permutation(len(graph))[:30]
+    for fresh in 30, 10, 0:
+        near = held.nearest_of(some)
+        left = costs[np.ix_(held.vertices, held.vertices)]
+        every = np.arange(len(held))
+        assert (left[every, some[near]] == left[:, some].min(axis=1)).all()
+        assert asked[-1:] == [fresh] or fresh == 0
+        if fresh == 30:
+            others = np.setdiff1d(every, some)
+            some = np.concatenate([some[:20], rng.permutation(others)[:10]])
+        else:
+            keep = rng.random(len(held)) < 0.7
+            keep[some] = True
+            held.restrict(keep)
+            some = np.cumsum(keep)[some] - 1
+    assert asked == [30, 10]
 
 
 def over_ways(seed):
@@ -231,7 +257,6 @@ def test_what_a_leg_may_cost_is_no_less_than_it_costs_in_tours_as_short(seed):
 def rows_from_the_start(monkeypatch):
     """Legs of small graphs are held in rows, until few classes are left."""
     monkeypatch.setattr(SOLVE, "ROUNDED_FROM", 20)
-    monkeypatch.setattr(SOLVE, "ROWS_FROM", 20)
     monkeypatch.setattr(legcosts, "ROUNDED_FROM", 20)
     monkeypatch.setattr(SOLVE, "MANY_CLASSES", 20)
     monkeypatch.setattr(overgoals, "MANY_CLASSES", 20)
@@ -294,13 +319,15 @@ def test_legs_in_blocks_are_those_rounded_and_ways_no_longer(kind, graph, monkey
     monkeypatch.setattr("netsp.roadmap.legs.BLOCK_LEGS", 17 * len(graph))
     assert graph.legs_in_blocks
     expected = graph.costs_rounded(np.arange(len(graph)))
-    seen = np.zeros(len(graph), dtype=int)
-    for rows, costs in graph.costs_in_blocks():
-        seen[rows] += 1
-        assert len(rows) <= 17
-        assert costs.dtype == np.float32
-        assert np.allclose(costs, expected[rows], rtol=3e-7)
-    assert (seen == 1).all()
+    for asked in None, np.random.default_rng(0).permutation(len(graph))[:23]:
+        seen = np.zeros(len(graph), dtype=int)
+        for rows, costs in graph.costs_in_blocks(None, asked):
+            seen[rows] += 1
+            assert len(rows) <= 17
+            assert costs.dtype == np.float32
+            assert np.allclose(costs, expected[rows], rtol=3e-7)
+        assert seen.sum() == (len(graph) if asked is None else 23)
+        assert (seen[slice(None) if asked is None else asked] == 1).all()
     ways = graph.ways_by_parity()
     assert graph.knows_ways
     odd = odd_letters(graph.signatures, ways.obstacles)

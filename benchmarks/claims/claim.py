@@ -20,12 +20,14 @@ ABSENT = "not measured: the data are not here"
 @dataclass(frozen=True)
 class Claim:
     """One entry. measure : returns what was measured, and whether it held. timed : measured alone
-    on the machine, and once more before it falls."""
+    on the machine, and once more before it falls. beside : another one may be measured meanwhile,
+    for it has a processor of its own and much time; if it falls, then once more, alone."""
 
     name: str
     threshold: str
     measure: Callable[[], tuple[str, bool]]
     timed: bool = False
+    beside: bool = False
 
 
 def published(table: str) -> list[dict[str, str]]:

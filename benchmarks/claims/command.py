@@ -92,7 +92,13 @@ def page(name: str) -> Claim:
 
 def starting() -> Iterator[Claim]:
     """How long a command takes to start."""
-    yield Claim("cold start: first solve of the wharf", "15 s CPU (x 3)", cold_start, timed=True)
+    yield Claim(
+        "cold start: first solve of the wharf",
+        "15 s CPU (x 3)",
+        cold_start,
+        timed=True,
+        beside=True,
+    )
     yield Claim("`netsp --help` over the start of Python", "8 times", help_start, timed=True)
 
 

@@ -268,7 +268,9 @@ def claims() -> Iterator[Claim]:
     yield Claim("tether: one update", f"0.03 ms (x {ALLOWANCE:g})", update, timed=True)
     yield Claim("tether: closed forms; way back", "0.01 %; 1 mm", closed_forms)
     yield Claim("tether: prisms; classes", "0.01 %; none wrong", prisms)
-    yield Claim("site of 100 x 100 x 30 m at 5 cm", "2 GiB; 95 s CPU (x 3)", large, timed=True)
+    yield Claim(
+        "site of 100 x 100 x 30 m at 5 cm", "2 GiB; 95 s CPU (x 3)", large, timed=True, beside=True
+    )
     yield Claim("tether: above and below among meshes", "0.5 %, 0.5 %; 0.05 %", meshes)
     yield Claim("tether: drives past thin poles", "none through one", drives)
     yield Claim("BlueROV2 in a current: over the limit; visited", "0.0 s; all", windy)

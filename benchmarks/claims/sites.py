@@ -160,6 +160,8 @@ def claims() -> Iterator[Claim]:
     yield Claim("an occupancy image planned on", "proven, verified", formats)
     yield Claim("orders given in part, 12 to 20 goals", "lengths of the docs, proven", arranged)
     yield Claim("curves of tether lengths beside solves", "all agree", curve)
-    yield Claim("where to stand, 100 places", "60 s each, proven", base(60.0), timed=True)
+    yield Claim(
+        "where to stand, 100 places", "60 s each, proven", base(60.0), timed=True, beside=True
+    )
     yield Claim("worlds that are off by a tour's margin and do not fit", "none", margined)
     yield Claim("a wind farm of 67 goals, 9 km of tether", "a verified tour in 60 s", farm)

@@ -90,7 +90,6 @@ def steps() -> Iterator[tuple[str, Callable[[], object]]]:
         none = np.zeros(len(graph), dtype=np.int64)
         rows = LegRows(len(graph), graph.costs_in_blocks(), none, np.full((1, 1), np.inf), none[:1])
         rows.add_above(none, np.zeros((1, 1), dtype=bool))
-        rows.nearest_of(none[:1])
         rows.nearest_legs(1)
         odd = odd_letters(graph.signatures)
         tower = OverClasses(rows, graph.cluster, odd)

@@ -68,12 +68,6 @@ are more goals than the second: what time is left is worth more in a search. In 
 goals, 40 s of the program closed 0.1 % and nothing, of a search nothing and 0.4 %. With 100 goals
 it has closed such gaps."""
 
-ROWS_FROM = 14_000
-"""With more vertices legs are held in rows; where goals are not many, or very many, already where a
-matrix would be rounded. Else the program over all classes closes what covers leave, and it does so
-sooner after covers of a matrix: of two worlds of 100 goals with 6004 and 13,232 classes, proven in
-252 and 217 s, 2.6 and 3.2 % were left after 300 s of rows; their linear programs took that long."""
-
 SEARCH_AGAIN = 0.5
 """Share of the last gap at which the classes that the LP visits are searched once more."""
 
@@ -263,8 +257,7 @@ class MipRun(SearchingRun):
         # with many goals all that covers prove is to hold for classes left out, too
         whole = graph.complete or graph.goal_count < MANY_GOALS
         known = whole and graph.legs_in_blocks and graph.knows_ways
-        closes = MANY_GOALS <= graph.goal_count <= LARGE
-        return known and len(graph) > (ROWS_FROM if closes else ROUNDED_FROM)
+        return known and len(graph) > ROUNDED_FROM
 
     @property
     def _cells_share(self) -> float:

@@ -210,18 +210,20 @@ class _OpenedLegs:
     def in_blocks(self) -> bool:
         return self.within.legs_in_blocks
 
-    def blocks(self, vertices: Ints, clock: Clock | None = None) -> Iterator[tuple[Ints, Floats]]:
+    def blocks(
+        self, vertices: Ints, rows: Ints | None = None, clock: Clock | None = None
+    ) -> Iterator[tuple[Ints, Floats]]:
         ends = np.isin(vertices, (0, self.start))
         with self.within.on_clock(clock or self.within.clock):
-            for rows, costs in self.within.costs_in_blocks(vertices):
+            for some, costs in self.within.costs_in_blocks(vertices, rows):
                 # row by row of these two, and what the others have to them
-                for k, columns in (ends[rows], slice(None)), (~ends[rows], ends):
-                    own, to = vertices[rows[k]], vertices[columns]
+                for k, columns in (ends[some], slice(None)), (~ends[some], ends):
+                    own, to = vertices[some[k]], vertices[columns]
                     part = costs[k][:, columns].astype(np.float64)
                     costs[np.ix_(k, np.arange(len(vertices))[columns])] = rounded_down(
                         self._charged(part, own, to)
                     )
-                yield rows, costs
+                yield some, costs
 
     def to_base(self) -> Floats:
         out = self.within.costs_to_base + self.surcharge

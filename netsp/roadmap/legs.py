@@ -81,28 +81,31 @@ class TautLegs:
         within a cluster. LimitReachedError as of `lengths`."""
         return self._all(np.asarray(vertices, dtype=np.int64), np.float32, ROUNDED_DOWN, clock)
 
-    def blocks(self, vertices: Ints, clock: Clock | None = None) -> Iterator[tuple[Ints, Floats]]:
+    def blocks(
+        self, vertices: Ints, rows: Ints | None = None, clock: Clock | None = None
+    ) -> Iterator[tuple[Ints, Floats]]:
         """The legs among vertices in single precision, rounded down, some vertices at a time:
         which (r,), as positions among them, and (r, k) lengths, to be used before the next are
-        asked for. LimitReachedError as of `lengths`."""
+        asked for; of some rows only, if they are given. LimitReachedError as of `lengths`."""
         vertices = np.asarray(vertices, dtype=np.int64)
         clock, n = clock or Clock(), len(vertices)
         _found(clock, lambda: self._grown(clock.flag), n)
         size = max(BLOCK, BLOCK_LEGS // max(n, 1))
         branches = branches_of(self._grown(clock.flag), vertices)
-        out: Floats = np.empty((min(size, n), n), dtype=np.float32)  # type: ignore[assignment]
-        for first in range(0, n, size):
-            rows = branches.order[first : first + size]
-            block = out[: len(rows)]
+        places = np.arange(n) if rows is None else np.sort(branches.rank[rows])
+        out: Floats = np.empty((min(size, len(places)), n), dtype=np.float32)  # type: ignore[assignment]
+        for first in range(0, len(places), size):
+            at = places[first : first + size]
+            block, own = out[: len(at)], branches.order[at]
             row = np.full(n, -1, dtype=np.int64)
-            row[first : first + len(rows)] = np.arange(len(rows))
+            row[at] = np.arange(len(at))
 
             def some(row: Ints = row, block: Floats = block) -> None:
                 self._fill(vertices, ROUNDED_DOWN, block, clock.flag, branches, row)
 
             _found(clock, some, n)
-            self._beyond_goals(vertices, rows, ROUNDED_DOWN, block)
-            yield rows, block
+            self._beyond_goals(vertices, own, ROUNDED_DOWN, block)
+            yield own, block
 
     def _all(
         self, vertices: Ints, kind: type[np.floating], share: float, clock: Clock | None

@@ -21,6 +21,7 @@ import numpy.typing as npt
 from netsp.arrays import Bools, Floats, Ints
 from netsp.memory import ask
 from netsp.solving.legrows import LegRows
+from netsp.solving.nearrows import NearRows
 from netsp.travel.costs import rounded_down
 from netsp.travel.graph import TravelGraph
 
@@ -62,6 +63,7 @@ class LegCosts:
     def __init__(self, graph: TravelGraph, rows: LegRows | None = None) -> None:
         self.graph, self.rows = graph, rows
         self._let_go = rows is not None  # legs of the incumbent, too
+        self._near = NearRows(graph)
         self.vertices: Ints = np.arange(len(graph))
         self.cluster: Ints = graph.cluster
         self.values: Floats
@@ -149,14 +151,11 @@ class LegCosts:
         return np.asarray(self.values[np.ix_(some, some)], dtype=np.float64)
 
     def nearest_of(self, some: Ints) -> Ints:
-        """(k,) which of some rows has the least value to each row; where all its legs to them are
-        gone, one of its own goal, that with the shortest tether, if there is one."""
+        """(k,) which of some rows has the least value to each row, also along legs that are in no
+        better tour."""
         if self.rows is None:
             return np.asarray(np.argmin(self.values[:, some], axis=1))
-        out, order = self.rows.nearest_of(some), np.argsort(self.of_base[some], kind="stable")
-        akin = np.zeros(int(self.cluster.max()) + 1, dtype=np.int64)
-        akin[self.cluster[some[order[::-1]]]] = order[::-1]
-        return np.where(out < 0, akin[self.cluster], out)
+        return self._near.nearest(self.vertices, some)
 
     def nearest_legs(self, most: int) -> Ints:
         """(j, 2) for each row its legs of least value, so many."""
@@ -228,6 +227,7 @@ class LegCosts:
         self.vertices, self.cluster = self.vertices[keep], self.cluster[keep]
         if self.rows is not None:
             self.rows.restrict(keep)
+            self._near.restrict(keep)
             if 2 * len(self) <= ROUNDED_FROM:
                 self._spell_out(self.rows)
             return
@@ -245,7 +245,7 @@ class LegCosts:
         left, u = np.zeros((len(self), len(self)), dtype=bool), rows.legs_left()
         left[u[:, 0], u[:, 1]] = left[u[:, 1], u[:, 0]] = True
         self.values = np.where(left, self.graph.costs_among(self.vertices, left), np.inf)
-        self.rows = None
+        self.rows, self._near = None, NearRows(self.graph)
 
     def _unround(self) -> None:
         """Back to double precision; what was measured is measured again when it is asked for."""

@@ -133,12 +133,6 @@ class LegRows:
         """(k, 2) the cheapest legs of every vertex, so many at most."""
         return _cheapest(most, self.held)
 
-    def nearest_of(self, chosen: Ints) -> Ints:
-        """(V,) which of some vertices has the cheapest leg to each; -1 where none has any."""
-        place = np.full(len(self), -1, dtype=np.int64)
-        place[chosen] = np.arange(len(chosen))
-        return _nearest(place, self.held)
-
     def restrict(self, keep: Bools) -> None:
         """Forget all vertices but those marked."""
         _without(~keep, self.held)
@@ -292,15 +286,3 @@ def _cheapest(most: int, rows: Rows) -> Ints:
             out[size, 0], out[size, 1] = u, rows.other[first + k]
             size += 1
     return out[:size].copy()
-
-
-@kernel
-def _nearest(place: Ints, rows: Rows) -> Ints:
-    out = np.full(len(rows.first), -1, dtype=np.int64)
-    for u in range(len(rows.first)):
-        least = np.inf
-        for k in range(rows.first[u], rows.first[u] + rows.size[u]):
-            at = place[rows.other[k]]
-            if at >= 0 and rows.cost[k] < least:
-                least, out[u] = rows.cost[k], at
-    return out

@@ -78,13 +78,15 @@ class _LegsOfChoices:
         """As beneath."""
         return self.graph.legs_in_blocks
 
-    def blocks(self, vertices: Ints, clock: Clock | None = None) -> Iterator[tuple[Ints, Floats]]:
+    def blocks(
+        self, vertices: Ints, rows: Ints | None = None, clock: Clock | None = None
+    ) -> Iterator[tuple[Ints, Floats]]:
         own = self.cluster[vertices]
         with self.graph.on_clock(clock or self.graph.clock):
-            for rows, costs in self.graph.costs_in_blocks(vertices):
-                for c in np.unique(own[rows]).tolist():
-                    costs[np.ix_(own[rows] == c, own == c)] = np.inf
-                yield rows, costs
+            for some, costs in self.graph.costs_in_blocks(vertices, rows):
+                for c in np.unique(own[some]).tolist():
+                    costs[np.ix_(own[some] == c, own == c)] = np.inf
+                yield some, costs
 
     def pairs(self, us: Ints, vs: Ints) -> Floats:
         return self.graph.costs_of(us, vs)

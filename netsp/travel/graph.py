@@ -282,7 +282,7 @@ class TravelGraph(Drawn):
         return bool(getattr(self._legs, "in_blocks", hasattr(self._legs, "blocks")))
 
     def costs_in_blocks(
-        self, vertices: npt.ArrayLike | None = None
+        self, vertices: npt.ArrayLike | None = None, rows: Ints | None = None
     ) -> Iterator[tuple[Ints, Floats]]:
         """Leg costs in single precision, those of some vertices at a time, for solvers that let go
         of most at once.
@@ -291,11 +291,13 @@ class TravelGraph(Drawn):
         ----------
         vertices : array_like of int, shape (k,), optional
             The vertices among which; all of them by default.
+        rows : ndarray of int, shape (m,), optional
+            Of which of them, as positions among them; of each by default.
 
         Yields
         ------
-        rows : ndarray of int, shape (r,)
-            Some of the vertices, as positions among them; every one comes once.
+        some : ndarray of int, shape (r,)
+            Some of these; every one comes once.
         costs : ndarray of float32, shape (r, k)
             Of their legs, as of `costs_rounded`; to be used before the next are asked for.
 
@@ -305,7 +307,7 @@ class TravelGraph(Drawn):
             The clock was up before they were found.
         """
         chosen = np.arange(len(self)) if vertices is None else np.asarray(vertices, dtype=np.int64)
-        blocks = self._legs.blocks(chosen, self.clock)  # type: ignore[attr-defined]
+        blocks = self._legs.blocks(chosen, rows, self.clock)  # type: ignore[attr-defined]
         while True:
             begin = time.monotonic()
             try:
@@ -784,9 +786,11 @@ class _PartOfLegs:
     def in_blocks(self) -> bool:
         return self.graph.legs_in_blocks
 
-    def blocks(self, vertices: Ints, clock: Clock | None = None) -> Iterator[tuple[Ints, Floats]]:
+    def blocks(
+        self, vertices: Ints, rows: Ints | None = None, clock: Clock | None = None
+    ) -> Iterator[tuple[Ints, Floats]]:
         with self.graph.on_clock(clock or self.graph.clock):
-            yield from self.graph.costs_in_blocks(self.chosen[vertices])
+            yield from self.graph.costs_in_blocks(self.chosen[vertices], rows)
 
     def pairs(self, us: Ints, vs: Ints) -> Floats:
         return self.graph.costs_of(self.chosen[us], self.chosen[vs])

@@ -44,6 +44,8 @@ class LegsAtOnce(Legs, Protocol):
 class LegsInBlocks(LegsAtOnce, Protocol):
     """Legs that are found some vertices at a time about as quickly as all together."""
 
-    def blocks(self, vertices: Ints, clock: Clock | None = None) -> Iterator[tuple[Ints, Floats]]:
+    def blocks(
+        self, vertices: Ints, rows: Ints | None = None, clock: Clock | None = None
+    ) -> Iterator[tuple[Ints, Floats]]:
         """As `rounded`, row by row: some of the vertices (r,), as positions among them, and (r, k)
-        their legs, to be used before the next are asked for."""
+        their legs, to be used before the next are asked for. If rows are given, of these only."""
