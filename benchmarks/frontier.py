@@ -15,7 +15,6 @@ Worlds: 500 x 500, 20 circles of radius 10 to 30 (`--many`: 50 of radius 10 to 2
 from __future__ import annotations
 
 import argparse
-import resource
 import statistics
 import sys
 import time
@@ -23,6 +22,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from peak import highest
 from peers import EXACT, HEURISTIC
 from resumed import outcomes
 from table import head, heading, row
@@ -91,7 +91,7 @@ def proof(problem: Problem, limit: float, classes: str = "all") -> Outcome:
     except NetspError as error:
         return Outcome(time.perf_counter() - begin, failed=f" ({str(error)[:40]}…)")
     seconds = time.perf_counter() - begin
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
+    peak = highest()
     return Outcome(
         seconds, len(travel_graph(problem, classes=classes)),
         100.0 * (solution.gap if solution.gap is not None else 1.0),

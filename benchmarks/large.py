@@ -9,7 +9,6 @@ a corner of it, in which a full grid fits, with a tether that is driven through 
 from __future__ import annotations
 
 import argparse
-import resource
 import statistics
 import sys
 import tempfile
@@ -18,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
+from peak import highest
 from table import head, heading, row
 
 from netsp.online import Scene
@@ -55,11 +55,6 @@ def write_floor(path: Path) -> None:
     )
 
 
-def used() -> float:
-    """Most memory so far, GiB."""
-    return float(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss) / 2**20
-
-
 def site() -> None:
     """The whole site, by the scene's own ways."""
     print("### 100 x 100 x 30 m\n")
@@ -80,7 +75,7 @@ def site() -> None:
         kept = field.arrays.data.nbytes + field.arrays.grid.nbytes
         blocks = int((field.arrays.grid.size) // 512)
         row(VOXEL, f"{mesh.area + 1e4:,.0f}", f"{blocks:,}", f"{wall:.0f}", f"{cpu:.0f}",
-            f"{used():.2f}", f"{kept / 2**30:.2f}")  # fmt: skip
+            f"{highest():.2f}", f"{kept / 2**30:.2f}")  # fmt: skip
     print()
 
 
@@ -128,7 +123,7 @@ def main() -> None:
     small = trimesh.creation.icosphere(subdivisions=1)
     voxels.of_triangles(small.vertices, small.faces, voxel=0.1)
     voxels.MOST_DENSE = kept
-    before = used()
+    before = highest()
     site()
     print(f"Python and libraries alone: {before:.2f} GiB; slabs of {lattice.SLAB:,} blocks.\n")
     if not args.site:

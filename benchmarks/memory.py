@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import dataclass
-from pathlib import Path
 
 from frontier import warmed, world
 from library_worlds import FOLDER
+from peak import highest
 from resumed import outcomes
 from table import head, heading, row
 
@@ -36,13 +36,6 @@ class Outcome:
     peak: float
     gap: float
     verified: bool
-
-
-def highest() -> float:
-    """GiB that this process has held at most. What getrusage says of a process includes that of
-    the one it was started from."""
-    status = dict(r.split(":", 1) for r in Path("/proc/self/status").read_text().splitlines())
-    return float(status["VmHWM"].split()[0]) / 2**20
 
 
 def measured(problem: Problem, limit: float, *, until_rows: bool = False) -> Outcome:

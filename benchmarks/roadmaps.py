@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import argparse
 import os
-import resource
 import statistics
 import subprocess
 import sys
@@ -16,6 +15,7 @@ import tempfile
 import time
 
 import numpy as np
+from peak import highest
 from table import ROOT, head, heading, row
 
 
@@ -39,7 +39,7 @@ def taut(tether: float, worlds: int = 10) -> None:
         graph.costs  # noqa: B018
         times.append(time.perf_counter() - begin)
         sizes.append(len(graph))
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
+    peak = highest()
     times_row(
         f"taut, classes and matrix, 20 goals, tether {tether:g}",
         times,

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import argparse
 import math
-import resource
 import time
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
@@ -22,6 +21,7 @@ from multiprocessing import get_context
 from typing import Any
 
 import numpy as np
+from peak import highest
 from table import head, heading, row
 
 from netsp import Status, solve_graph
@@ -76,7 +76,7 @@ def measured(job: tuple[str, float, int, float]) -> Sample:
     for solver in ("lns", "auto"):
         solve_graph(warm, solver, iteration_limit=5)
     problem = world(varied, value, seed)
-    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    before = highest()
     seconds: dict[str, float] = {}
 
     def clocked(name: str, run: Any) -> Any:
@@ -88,7 +88,7 @@ def measured(job: tuple[str, float, int, float]) -> Sample:
     roadmap = clocked("roadmap", lambda: TautRoadmap(problem))
     graph: TravelGraph = roadmap.to_travel_graph()
     found = clocked("auto", lambda: solve_graph(graph, "auto", time_limit=limit))
-    mib = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 2**10
+    mib = 1024 * (highest() - before)
     proven = found.status is Status.OPTIMAL
     if len(graph) <= 4000:
         again = TautRoadmap(problem).to_travel_graph()

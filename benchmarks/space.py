@@ -23,6 +23,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+from peak import highest
 from sites import SITES, mission_of, shipped
 from table import ROOT, head, heading, row
 
@@ -117,7 +118,6 @@ def words() -> None:
 
 def group(name: str) -> list[str]:
     """One row of `words`."""
-    import resource
 
     warm = SpaceSignature.of(Scene(solids=shapes()["ring"]).field(), LOW, HIGH, 0.5, ANCHOR)
     assert warm.exact
@@ -132,11 +132,11 @@ def group(name: str) -> list[str]:
         cell, anchor = grid.cell, mission.anchor
         if "," in name:
             cell *= (grid.free.size / 5e6) ** (1 / 3)
-    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    before = highest()
     begin = time.perf_counter()
     made = SpaceSignature.of(field, *box, cell, anchor)
     took = time.perf_counter() - begin
-    more = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024
+    more = 1024 * (highest() - before)
     return [name, f"{made.cells.flags.size:,}", shown(made.group.rank, made.group.relators),
             "yes" if made.exact else "no", f"{took:.1f}", f"{more:.0f}"]  # fmt: skip
 

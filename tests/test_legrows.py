@@ -23,6 +23,7 @@ from netsp.solving import legcosts
 from netsp.solving.legcosts import LegCosts
 from netsp.solving.legrows import LegRows
 from netsp.solving.limits import Limits
+from netsp.solving.nearrows import NearRows
 from netsp.travel.graph import TravelGraph
 from netsp.worlds import random_world
 from tests.test_contract import random_graph
@@ -265,6 +266,9 @@ def rows_from_the_start(monkeypatch):
     monkeypatch.setattr("netsp.solving.searching.CORE", 30)
     monkeypatch.setattr("netsp.solving.searching.MEASURE_AT_ONCE", 10)
     monkeypatch.setattr(legcosts, "MEASURE_AT_ONCE", 10)
+    # covers prove little, so that the program over the classes has something to do
+    monkeypatch.setattr("netsp.mip.covers.MOST_CELLS", 25)
+    monkeypatch.setattr("netsp.mip.covers.PATIENCE", 0)
     made, restricted = [], []
     make, restrict = LegCosts.__init__, LegRows.restrict
 
@@ -282,15 +286,25 @@ def rows_from_the_start(monkeypatch):
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_a_proof_over_rows_finds_the_optimum_of_one_over_a_matrix(seed, rows_from_the_start):
+def test_a_proof_over_rows_finds_the_optimum_of_one_over_a_matrix(
+    seed, rows_from_the_start, monkeypatch
+):
     made, _ = rows_from_the_start
+    asked, find = [], NearRows.nearest
+
+    def heard(self, vertices, some):
+        asked.append(len(some))
+        return find(self, vertices, some)
+
+    monkeypatch.setattr(NearRows, "nearest", heard)
     problem = random_world(
-        seed, goals=8, obstacles=6, side=80.0, radii=(4.0, 8.0), tether_length=150.0
+        seed, goals=9 + seed, obstacles=6, side=80.0, radii=(4.0, 8.0), tether_length=150.0
     )
     graph = travel_graph(problem)
     expected = solve_graph(travel_graph(problem), "auto")
     found = solve_graph(graph, "mip", seed=seed)
     assert any(made)
+    assert asked
     assert found.status is Status.OPTIMAL
     assert found.length == pytest.approx(expected.length, rel=1e-6)
     assert not graph.measured

@@ -62,6 +62,10 @@ with the square of the classes, as matrices do, up to the second for so many cla
 over 6000 classes closes in minutes what covers leave after half a minute, that over 14,000 takes
 longer for a step than covers do."""
 
+FIRST_S = 5.0
+"""Where legs are held in rows nothing is known before a first cover is proven: it has so many
+seconds, or half of the time."""
+
 LEAST_SHARE, ROWS_FOR = 0.05, 20_000
 """The same where legs are held in rows, with the cube of the classes, from the first up to four
 fifths for so many: programs over rows are quick while few legs are left. Of 100 goals at tether
@@ -209,7 +213,7 @@ class MipRun(SearchingRun):
         if not self._in_rows or over is None or self.tour is None:
             return LegCosts(graph)
         if over.cells is None:
-            # no cover was proven in most of the time: what is left is worth more in a search
+            # no cover was proven in half of the time: what is left is worth more in a search
             search_and_merge(self, solve_merged)
             self.check()
             return LegCosts(graph)
@@ -225,8 +229,10 @@ class MipRun(SearchingRun):
             return run.solve(backend, None), run.cuts
 
         climbs = self._climbs
-        part = self._cells_share if climbs else GOALS_SHARE
-        share = Clock(part * self.clock.left, within=self.clock) if self.clock.limit else self.clock
+        part = (self._cells_share if climbs else GOALS_SHARE) * self.clock.left
+        if self._in_rows:
+            part = max(part, min(FIRST_S, 0.5 * self.clock.left))
+        share = Clock(part, within=self.clock) if self.clock.limit else self.clock
         limits = Limits(share, rng=self.rng)
 
         graph = self.graph

@@ -41,6 +41,8 @@ class NearRows:
         costs = np.empty((len(rows), len(vertices)), dtype=np.float32)
         there = np.isin(rows, self._some)
         costs[there] = self._costs[np.isin(self._some, rows)]
+        # not held twice, and if time is up nothing is
+        self._some, self._costs = NOBODY, np.zeros((0, len(vertices)), np.float32)
         missing = rows[~there]
         if len(missing):
             for found, block in self._graph.costs_in_blocks(vertices, missing):

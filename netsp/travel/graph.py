@@ -292,7 +292,7 @@ class TravelGraph(Drawn):
         vertices : array_like of int, shape (k,), optional
             The vertices among which; all of them by default.
         rows : ndarray of int, shape (m,), optional
-            Of which of them, as positions among them; of each by default.
+            Of which of them, as positions among them, no two alike; of each by default.
 
         Yields
         ------
