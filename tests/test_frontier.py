@@ -21,6 +21,7 @@ from netsp import (
     verify,
 )
 from netsp.clock import Clock
+from netsp.errors import MemoryLimitError
 from netsp.lns import Instance, Search
 from netsp.mip.flows import min_cuts
 from netsp.mip.solve import MipRun
@@ -237,6 +238,27 @@ def test_auto_gives_a_tour_and_a_true_bound_where_mip_would_not_fit(monkeypatch)
     solution = solve(problem, "auto", iteration_limit=2_000)
     assert verify(problem, solution)
     assert solution.lower_bound is not None
+    assert 0.3 * best.length < solution.lower_bound <= best.length * (1 + 1e-9)
+    assert solution.length >= best.length * (1 - 1e-6)
+
+
+def test_auto_gives_a_tour_and_a_true_bound_where_there_is_no_room_for_the_legs(monkeypatch):
+    import netsp.solvers.auto
+
+    problem = random_world(1, goals=8, tether=300.0)
+    best = solve(problem, "mip")
+
+    def none_left(size, what, advice):
+        if size > 24.0 * 9**2:  # there is for the legs between the goals
+            raise MemoryLimitError(f"{what} would take {size} bytes; {advice}")
+
+    monkeypatch.setattr(netsp.solvers.auto.exact, "MOST_SUMS", 0.0)
+    monkeypatch.setattr("netsp.solving.legcosts.MEASURE_AT_ONCE", 0)
+    monkeypatch.setattr("netsp.solving.legcosts.ask", none_left)
+    with pytest.raises(MemoryLimitError, match="bounding every tour over"):
+        solve(problem, "mip")
+    solution = solve(problem, "auto")
+    assert verify(problem, solution)
     assert 0.3 * best.length < solution.lower_bound <= best.length * (1 + 1e-9)
     assert solution.length >= best.length * (1 - 1e-6)
 

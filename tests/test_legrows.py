@@ -81,6 +81,17 @@ def test_what_costs_more_than_its_cells_allow_is_gone_but_for_the_legs_of_the_to
     assert (matrix_of(rows) == np.where(kept, costs, np.inf)).all()
 
 
+def test_rows_ask_for_room_before_they_grow(monkeypatch):
+    rng = np.random.default_rng(0)
+    costs = some_costs(rng)
+    asked = []
+    monkeypatch.setattr(
+        "netsp.solving.legrows.ask", lambda size, what, advice: asked.append((size, len(what)))
+    )
+    rows_of(costs, rng)
+    assert sum(size for size, _ in asked) == 8.0 * np.isfinite(costs).sum()
+
+
 def test_rows_are_a_matrix_of_which_legs_and_vertices_are_let_go():
     rng = np.random.default_rng(0)
     costs = some_costs(rng)

@@ -22,6 +22,7 @@ from netsp.clock import Clock
 from netsp.dp.solve import Params as WalkParams
 from netsp.dp.solve import fits as walks_fit
 from netsp.dp.solve import solve as walk
+from netsp.errors import MemoryLimitError
 from netsp.lns.solve import solve as search
 from netsp.mip.merging import search_and_merge
 from netsp.mip.overgoals import Told, bound_at_once, bound_over_goals
@@ -121,7 +122,11 @@ def _by_size(graph: TravelGraph, chosen: Params, limits: Limits) -> Result:
                 _bound_by_goals(graph, Limits(clock.part(GOALS_SHARE), rng=limits.rng))
     if len(graph) <= PROVABLE:
         run = MipRun(graph, limits, search_rounds=_rounds(graph))
-        return run.solve(chosen.backend, limits.warm_start, walks=graph.goal_count <= FEW_GOALS)
+        try:
+            return run.solve(chosen.backend, limits.warm_start, walks=graph.goal_count <= FEW_GOALS)
+        except MemoryLimitError:
+            # a search and covers of ways need no matrix
+            return _beyond(graph, replace(limits, warm_start=run.tour or limits.warm_start))
     if graph.goal_count <= FEW_GOALS and graph.roadmapped:
         return _over_shortest(graph, limits, chosen.backend)
     return _beyond(graph, limits)

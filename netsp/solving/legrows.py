@@ -19,11 +19,15 @@ import numpy.typing as npt
 
 from netsp.arrays import Bools, Floats, Ints
 from netsp.compiled.kernel import kernel
+from netsp.memory import ask
 
 Columns = npt.NDArray[np.int32]
 
 ROWS = 256
 """That a thread works on at a time."""
+
+BYTES = 8.0
+"""Of each leg, either way."""
 
 HALF = 0.5
 """Rows are packed again when no more than this share of their room is in use."""
@@ -61,6 +65,11 @@ class LegRows:
         (m, m) what a leg between two cells may cost to be kept.
     tour
         Its vertices in order; its legs are kept whatever they cost.
+
+    Raises
+    ------
+    MemoryLimitError
+        There is no room for those that are kept.
     """
 
     def __init__(
@@ -79,6 +88,10 @@ class LegRows:
             kept = Kept(rows, costs, own, longest, mates)
             counts = np.zeros(len(rows), dtype=np.int64)
             _by_rows(partial(_count, kept, counts), len(rows))
+            ask(
+                BYTES * counts.sum(), f"the legs left between {vertices} homotopy classes",
+                "lower tether_length or max_classes, or use solver 'lns'",
+            )  # fmt: skip
             begin = len(other) + np.cumsum(counts) - counts
             first[rows], size[rows] = begin, counts
             # grows where it stands: two of them may be more than there is room for
