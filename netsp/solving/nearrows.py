@@ -2,8 +2,8 @@
 
 Which of the vertices that a program visits each other one is nearest to decides which side of a cut
 it comes to lie on. Legs that are in no better tour say that as well as any: without them cuts are
-so much weaker that a program with 6000 classes takes ten times as long. So these legs are found
-again, and kept as long as the same vertices are visited.
+so much weaker that programs over 6000 and 13,000 classes stood still that are solved with them. So
+these legs are found again, and kept as long as the same vertices are visited.
 """
 
 from __future__ import annotations
