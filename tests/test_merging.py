@@ -1,5 +1,6 @@
-"""The shortest tour of the legs of many tours."""
+"""The shortest tour through the classes of many tours."""
 
+import itertools
 import random
 import sys
 
@@ -14,7 +15,6 @@ from netsp.mip.merging import merged
 from netsp.mip.solve import solve_merged
 from netsp.solving.limits import Limits
 from netsp.solving.searching import SearchingRun
-from netsp.travel.graph import TravelGraph
 from netsp.worlds import random_world
 from tests.brute import brute_tour
 from tests.test_contract import random_graph
@@ -31,16 +31,13 @@ def some_tours(graph, chance, count):
 
 @settings(max_examples=25, deadline=None)
 @given(st.integers(0, 10**6), st.integers(1, 6), st.randoms(use_true_random=False))
-def test_it_is_the_shortest_of_their_legs_and_no_longer_than_any(seed, count, chance):
+def test_it_is_the_shortest_through_their_classes(seed, count, chance):
     graph = random_graph(seed, 5, most=3)
     tours = some_tours(graph, chance, count)
     found = merged(graph, tours, solve_merged, Limits())
-    legs = {frozenset(leg) for t in tours for leg in zip(t, np.roll(t, -1).tolist(), strict=True)}
-    assert {frozenset(leg) for leg in zip(found, np.roll(found, -1).tolist(), strict=True)} <= legs
-    only = np.full(graph.costs.shape, np.inf)
-    for u, v in map(tuple, legs):
-        only[u, v] = only[v, u] = graph.costs[u, v]
-    least = brute_tour(TravelGraph.from_costs(only, graph.cluster))
+    classes = np.unique(np.concatenate(tours))
+    assert set(found) <= set(classes.tolist())
+    least = brute_tour(graph.subgraph(classes))
     assert graph.tour_length(found) == pytest.approx(least, rel=2e-6)
 
 
@@ -67,3 +64,44 @@ def test_tours_of_very_many_classes_are_merged_by_a_program_that_merges_nothing(
     tours = some_tours(graph, random.Random(0), 4)
     found = merged(graph, tours, solve_merged, Limits(Clock(60.0)))
     assert graph.is_tour(found)
+
+
+def ends_of(monkeypatch, least, limits):
+    """Tours from which those of a run with so many goals are made, and the run."""
+    module = sys.modules["netsp.mip.solve"]
+    given = []
+
+    def merge(run, tours, prove, clock, known=module.merge):
+        assert len(tours) == len(set(tours)) <= 8
+        given.append(list(tours))
+        known(run, tours, prove, clock)
+
+    monkeypatch.setattr(module, "merge", merge)
+    monkeypatch.setattr(module, "MERGED_FROM", least)
+    graph = travel_graph(random_world(3, goals=30, tether_length=250.0))
+    run = module.MipRun(graph, limits, search_rounds=2)
+    run.solve("highs", None)
+    assert run.done
+    return given
+
+
+def test_what_searches_end_in_is_merged_once_where_goals_are_many(monkeypatch):
+    given = ends_of(monkeypatch, 30, Limits(rng=np.random.default_rng(0)))
+    assert given
+    assert all(set(a) != set(b) for a, b in itertools.pairwise(given))
+    assert not ends_of(monkeypatch, 31, Limits(rng=np.random.default_rng(0)))
+
+
+def test_under_a_limit_of_iterations_nothing_is_merged(monkeypatch):
+    assert not ends_of(monkeypatch, 30, Limits(rng=np.random.default_rng(0), iterations=10_000))
+
+
+def test_the_classes_of_two_hundred_goals_hold_a_shorter_tour_than_their_legs():
+    graph = travel_graph(random_world(3, goals=200, tether_length=300.0))
+    run = SearchingRun(graph, Limits(rng=np.random.default_rng(0)), search_rounds=2000)
+    tours = run.search_from_start(3, Clock())
+    found = merged(graph, tours, solve_merged, Limits())
+    legs = {frozenset(leg) for t in tours for leg in zip(t, np.roll(t, -1).tolist(), strict=True)}
+    new = {frozenset(leg) for leg in zip(found, np.roll(found, -1).tolist(), strict=True)} - legs
+    assert new
+    assert graph.tour_length(found) < 0.999 * run.length

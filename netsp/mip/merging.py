@@ -1,10 +1,12 @@
-"""The shortest tour of the legs of many tours.
+"""The shortest tour through the classes of many tours.
 
-From one start or another, ruin and recreate ends in tours that are some tenths of a percent apart
-and have nine legs of ten in common. A program over the legs of all of them has little to choose
-from, and is solved in a second or two where one over their classes is out of reach; its tour is
-shorter than any of theirs. Source: Cook & Seymour 2003, "Tour merging via branch-decomposition",
-for the travelling salesperson; here the tours may also differ in the classes that they visit.
+From one start or another, ruin and recreate ends in tours that are some tenths of a percent apart,
+and most of their classes are the same. A program over these has hardly more to choose from than a
+travelling salesperson's, and is solved in seconds where one over all classes is out of reach; its
+tour is no longer than any of theirs. The idea is that of Cook & Seymour 2003, "Tour merging via
+branch-decomposition", who take the legs of the tours alone. All legs among their classes are worth
+more: in the fourth world of 200 goals at tether 300, no search comes below 4793.18 m, and the
+legs of many such tours hold none that is shorter; their classes do, 4789.09 m, which is optimal.
 """
 
 from __future__ import annotations
@@ -36,25 +38,24 @@ def search_and_merge(run: SearchingRun, prove: Prove) -> None:
     while run.clock.limit and run.iteration_limit == np.inf and not run.done:
         run.check()
         tours = run.search_from_start(MERGED, run.clock.part(SEARCHED))
-        limits = Limits(Clock.of(run.clock), rng=run.rng)
-        run.update_incumbent(merged(run.graph, tours, prove, limits))
-        run.report("merged")
+        merge(run, tours, prove, Clock.of(run.clock))
+
+
+def merge(run: SearchingRun, tours: Sequence[Sequence[int]], prove: Prove, clock: Clock) -> None:
+    """Take the shortest tour through the classes of some tours, if it is shorter."""
+    run.update_incumbent(merged(run.graph, tours, prove, Limits(clock, rng=run.rng)))
+    run.report("merged")
 
 
 def merged(
     graph: TravelGraph, tours: Sequence[Sequence[int]], prove: Prove, limits: Limits
 ) -> list[int] | None:
-    """The shortest tour of the legs of some tours, or as good a one as the limits leave; None if
-    there is none."""
+    """The shortest tour through the classes of some tours, or as good a one as the limits leave;
+    None if there is none."""
     if not tours:
         return None
     vertices = np.unique(np.concatenate([np.asarray(t, dtype=np.int64) for t in tours]))
-    used = np.zeros((len(vertices), len(vertices)), dtype=bool)
-    for tour in tours:
-        at = np.searchsorted(vertices, tour)
-        used[at, np.roll(at, -1)] = used[np.roll(at, -1), at] = True
-    costs = np.where(used, graph.costs_among(vertices, used), np.inf)
     best = np.searchsorted(vertices, min(tours, key=graph.tour_length)).tolist()
-    part = TravelGraph.from_costs(costs, graph.cluster[vertices])
+    part = TravelGraph.from_costs(graph.costs_among(vertices), graph.cluster[vertices])
     found = prove(part, replace(limits, warm_start=best))
     return None if found.tour is None else vertices[list(found.tour)].tolist()

@@ -14,13 +14,13 @@ from typing import Any
 
 import numpy as np
 
-from netsp.arrays import Floats
+from netsp.arrays import Floats, Ints
 from netsp.clock import Clock
 from netsp.dp.solve import bound_by_walks
 from netsp.lns import Search
 from netsp.mip.branching import Tree
 from netsp.mip.cuts import Cut
-from netsp.mip.merging import search_and_merge
+from netsp.mip.merging import merge, search_and_merge
 from netsp.mip.overcells import OverGoals
 from netsp.mip.overgoals import MANY_CLASSES, bound_over_goals
 from netsp.mip.parities import odd_letters
@@ -33,7 +33,7 @@ from netsp.solving.legcosts import ROUNDED_FROM, LegCosts
 from netsp.solving.legrows import LegRows
 from netsp.solving.limits import Limits
 from netsp.solving.run import Stop
-from netsp.solving.searching import SearchingRun
+from netsp.solving.searching import TURNS_SHARE, SearchingRun
 from netsp.travel.graph import TravelGraph
 from netsp.travel.result import Result
 
@@ -56,11 +56,18 @@ would take that long, and cannot be stopped."""
 MANY_GOALS = 100
 """With so many the bound of the goals comes first, and its cuts are those of the first LP."""
 
+MERGED_FROM = 50
+"""With fewer goals a search ends in the shortest tour through the classes that it finds."""
+
 GOALS_SHARE, CELLS_SHARE, CELLS_FOR = 0.1, 0.8, 17_000
 """Part of the time that is left which the bound from the goals alone may take. That of covers grows
 with the square of the classes, as matrices do, up to the second for so many classes: the program
 over 6000 classes closes in minutes what covers leave after half a minute, that over 14,000 takes
 longer for a step than covers do."""
+
+FIRST_PROGRAMS = 60
+"""Of the bound from the goals alone, where the program over all classes follows: with 200 goals at
+tether 300 it then lacks 0.2 %, of which that program is short for a second, and takes 2 s of 20."""
 
 FIRST_S = 5.0
 """Where legs are held in rows nothing is known before a first cover is proven: it has so many
@@ -161,6 +168,7 @@ class MipRun(SearchingRun):
     cuts: Sequence[Cut] = ()
     _over_goals: OverGoals | None = None
     _costs: LegCosts | None = None
+    _merged: frozenset[tuple[int, ...]] = frozenset()
 
     def solve(
         self, backend: str, warm_start: Sequence[int] | None, *, walks: bool = False
@@ -234,7 +242,7 @@ class MipRun(SearchingRun):
         if self._in_rows:
             part = max(part, min(FIRST_S, 0.5 * self.clock.left))
         share = Clock(part, within=self.clock) if self.clock.limit else self.clock
-        limits = Limits(share, rng=self.rng)
+        limits = Limits(share, iterations=None if climbs else FIRST_PROGRAMS, rng=self.rng)
 
         graph = self.graph
 
@@ -337,6 +345,34 @@ class MipRun(SearchingRun):
             self.integer(root, _load(LAZY[backend]))
 
     # incumbents
+
+    def search_beside(self) -> Ints:
+        """As `SearchingRun.search_beside`, and the shortest tour through the classes found."""
+        core = super().search_beside()
+        self.merge_ends()
+        return core
+
+    def climbed(self, bound: float, cells: int, classes: Ints) -> tuple[int, ...] | None:
+        """As `SearchingRun.climbed`, and the shortest tour through the classes found."""
+        super().climbed(bound, cells, classes)
+        self.merge_ends()
+        return self.tour
+
+    def search(self, costs: LegCosts, more: Ints | None = None) -> None:
+        """As `SearchingRun.search`, and the shortest tour through the classes found."""
+        super().search(costs, more)
+        self.merge_ends()
+
+    def merge_ends(self) -> None:
+        """Take the shortest tour through the classes in which the last searches ended: with many
+        goals they end above it."""
+        few = self.graph.goal_count < MERGED_FROM or not self.graph.roadmapped
+        new = set(self.ends) - self._merged
+        if few or self.iteration_limit < np.inf or not new or self.done:
+            return
+        self._merged = frozenset(self.ends)
+        self.check()
+        merge(self, self.ends, solve_merged, self.clock.part(TURNS_SHARE))
 
     def round(self, root: Root, point: Point) -> None:
         """Turn a point of the root into a tour, if all that is left is searched; else search the

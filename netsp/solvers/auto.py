@@ -33,7 +33,6 @@ from netsp.solution import Status
 from netsp.solvers import exact
 from netsp.solving.limits import Limits
 from netsp.solving.run import SolverRun
-from netsp.solving.searching import SearchingRun
 from netsp.travel.graph import TravelGraph, least_tethers
 from netsp.travel.kept import within_kept
 from netsp.travel.result import Result, of_part, proven
@@ -135,7 +134,7 @@ def _by_size(graph: TravelGraph, chosen: Params, limits: Limits) -> Result:
 def _beyond(graph: TravelGraph, limits: Limits) -> Result:
     """No proof over all classes: a search, the bound of covers with its tour, and more
     searches if there is time left."""
-    run = SearchingRun(graph, limits, search_rounds=_rounds(graph))
+    run = MipRun(graph, limits, search_rounds=_rounds(graph))
 
     with run.until_stopped():
         run.update_incumbent(limits.warm_start)

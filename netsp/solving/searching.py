@@ -47,6 +47,9 @@ TURNS, IN_VAIN, TURNS_SHARE = 8, 2, 0.1
 """So many times at most, until so many in a row were in vain, and in that part of the time, a tour
 is sought beside the best one."""
 
+MOST_ENDS = 8
+"""Ends of searches that are kept."""
+
 ENOUGH_BESIDE = 10
 """With fewer classes of a goal than these, a proof over those of least tether leaves cuts that are
 worth more for all classes than those beside the tour: with 100 goals at tether 500, 2 % of a gap
@@ -67,6 +70,8 @@ class SearchingRun(SolverRun):
     outer
         For a run over a core, the run over all classes and the core's vertices there: its
         incumbent is updated, too, and its report shows it; bounds of the core mean nothing to it.
+    ends
+        Tours in which the last searches ended, `MOST_ENDS` at most, no two the same.
     """
 
     def __init__(
@@ -79,6 +84,7 @@ class SearchingRun(SolverRun):
         super().__init__(graph, limits)
         self.search_rounds = search_rounds
         self.outer: tuple[SearchingRun, Ints] | None = None
+        self.ends: list[tuple[int, ...]] = []
         self.bound = 0.0
         self._core: tuple[int, Instance] | None = None
 
@@ -266,6 +272,8 @@ class SearchingRun(SolverRun):
         rounded."""
         length, tour = search.best()
         self.update_incumbent(tour, length=None if rounded else length)
+        if np.isfinite(length) and tour not in self.ends:
+            self.ends = [*self.ends[1 - MOST_ENDS :], tour]
 
     @property
     def cutoff(self) -> float:
