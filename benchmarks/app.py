@@ -68,7 +68,7 @@ def page_at(url: str):
 SHOWN = (
     "() => { const d = document.getElementById('map').dataset;"
     " return [Number(d.version), d.tour === '' ? -1 : Number(d.tour),"
-    " document.getElementById('answer').className === 'bad']; }"
+    " document.getElementById('answer').classList.contains('bad')]; }"
 )
 
 

@@ -62,7 +62,7 @@ def test_the_prism_of_halves_is_cut():
         assert left[0] == pytest.approx(-2.0 * cut.room - 1.0)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(st.integers(0, 10**6), st.randoms(use_true_random=False))
 def test_no_tour_violates_a_two_matching_inequality(seed, chance):
     graph = random_graph(seed, 6, most=2)

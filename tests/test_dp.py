@@ -118,7 +118,7 @@ def test_a_matrix_is_taken_over_block_by_block_until_the_flag_is_set(shuffled, m
         walks.solve(np.zeros(walks.n + 1), 1e9, check)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(st.integers(1, 30), st.integers(1, MOST), st.randoms(use_true_random=False))
 def test_memory_is_the_intersection_with_what_the_next_goal_remembers(n, size, random):
     near = np.array([random.sample(range(n + 1), n + 1) for _ in range(n + 1)])

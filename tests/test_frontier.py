@@ -82,7 +82,7 @@ def test_for_obstacles_that_are_slits_the_bound_is_the_length(seed):
     assert np.abs(low[held] - graph.costs[held]).max() < 1e-3
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=80, deadline=None)
 @given(
     st.lists(
         st.tuples(st.floats(0, 2), st.floats(-3, 3), st.booleans(), st.floats(0, 2)),

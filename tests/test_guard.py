@@ -82,6 +82,11 @@ ROUND_A = [(0, 0, 0), (3, 0.9, 0), *ring((5, 0), 1.5, math.pi - 0.6, -2.0 * math
 # the recorded flights
 
 
+def every_other(fixes):
+    """Five a second say as much of where a robot went as ten do."""
+    return itertools.islice(fixes, 0, None, 2)
+
+
 @pytest.mark.parametrize(
     ("name", "goals", "longest"),
     [("wharf", 8, 19.25), ("pool", 5, 11.66), ("oc4-jacket", 9, 24.52), ("r1", 6, None),
@@ -94,7 +99,7 @@ def test_recorded_flights_have_the_words_of_their_tours_at_every_goal(name, goal
     guard = Guard(problem, GuardOptions(noise=0.02, drift=0.01))
     nearest, most = {}, 0.0
     file = RECORDED / f"ardusub-{name}.csv.gz"
-    for report in replayed(guard, read_fixes(file, Frame(problem))):
+    for report in replayed(guard, every_other(read_fixes(file, Frame(problem)))):
         now = report.classes[0]
         most = max(most, now.taut)
         for visit in tour.tour:
@@ -321,6 +326,7 @@ def test_a_jump_is_no_motion():
     assert np.allclose(track.velocity, 0.0)
 
 
+@settings(max_examples=30)
 @given(st.integers(0, 10_000))
 def test_a_belief_holds_the_class_of_a_robot_that_is_off_by_a_constant(seed):
     rng = np.random.default_rng(seed)

@@ -51,6 +51,7 @@ def mission(tmp_path_factory):
     mission = Mission(
         scene="scene.json", anchor=(-5, 0.3, -1), start=(-4.8, 0.3, -1), tether_length=22.0,
         waypoints=[(2, 0.5, -3), (6.5, 0, -3), (0.5, 8.5, -4), (-3, 8, -3)], clearance=0.2,
+        speed=EXACT.speed,
     )  # fmt: skip
     (folder / "mission.json").write_text(mission.model_dump_json(exclude_none=True))
     return Mission.load(folder / "mission.json")
@@ -72,14 +73,14 @@ def flown(solved):
 
 
 def along(*points, speed=0.5, t=0.0):
-    """Fixes ten times a second on a polyline."""
+    """Fixes five times a second on a polyline."""
     out = []
     for a, b in itertools.pairwise(points):
         a, b = np.array(a, dtype=float), np.array(b, dtype=float)
-        count = max(1, round(float(np.linalg.norm(b - a)) / speed / 0.1))
+        count = max(1, round(float(np.linalg.norm(b - a)) / speed / 0.2))
         for s in np.linspace(0.0, 1.0, count, endpoint=False):
             out.append(Fix(t, tuple((a + s * (b - a)).tolist()), estimate=True))
-            t += 0.1
+            t += 0.2
     return out
 
 
@@ -150,7 +151,7 @@ def test_a_loop_is_told_before_it_closes_and_is_gone_once_it_is_undone(mission, 
     assert first is not None
     assert first < closed
     back = [(0, 1.5, -2.2), *ROUND_THE_PILE[::-1][1:], tuple(mission.start)]
-    for later in along(*back, t=fix.time + 0.1):
+    for later in along(*back, t=fix.time + 0.2):
         report = guard.take(later)
     assert report.loops == ()
     assert report.classes[0].word == guard.site.start_word()

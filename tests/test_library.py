@@ -242,7 +242,7 @@ def test_ctrl_c_ends_a_ranking_and_what_it_cut_short_has_no_row(small, tour, tmp
     shutil.copy(FOLDER / "windfarm-9-0.json", small)
     run = subprocess.Popen(
         [sys.executable, "-m", "netsp", "library", "rank", "--folder", str(small), "-o", str(rows),
-         "--solver", "lns", "--time-limit", "5"],
+         "--solver", "lns", "--time-limit", "2"],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     )  # fmt: skip

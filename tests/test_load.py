@@ -143,7 +143,7 @@ def fly(planner, physics, length, turns=2, **more):
     return simulate(mission, planner, scene=POST)
 
 
-@settings(deadline=None, max_examples=30)
+@settings(deadline=None, max_examples=15)
 @given(
     slack=st.floats(0, 0.2), speed=st.floats(0, 0.8), tension=st.floats(5, 40),
     length=st.floats(4.5, 7),

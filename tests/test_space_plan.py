@@ -48,17 +48,22 @@ def mission_of(problem, folder, **more):
     return Mission.load(file)
 
 
-@pytest.fixture
-def posts(tmp_path):
+@pytest.fixture(scope="module")
+def posts(tmp_path_factory):
     problem = Problem(
         base=(0, 0, 0), goals=GOALS, obstacles=POSTS, tether_length=7.6, clearance=0.1
     )
-    return problem, mission_of(problem, tmp_path)
+    return problem, mission_of(problem, tmp_path_factory.mktemp("posts"))
 
 
-def test_among_prisms_it_is_as_short_as_the_proven_optimum(posts):
+@pytest.fixture(scope="module")
+def planned(posts):
+    return plan(posts[1])
+
+
+def test_among_prisms_it_is_as_short_as_the_proven_optimum(posts, planned):
     problem, mission = posts
-    found, best = plan(mission), solve(problem)
+    found, best = planned, solve(problem)
     assert best.status.value == "optimal"
     assert found.length == pytest.approx(best.length, rel=2e-3)
     assert found.free
@@ -81,15 +86,15 @@ def test_a_shorter_tether_makes_another_tour_that_keeps_to_it(posts, tmp_path):
     assert max(stop.most for stop in found.stops) <= shorter.tether_length + 0.02
 
 
-def test_the_same_seed_gives_the_same_plan(posts):
-    one, other = (plan(posts[1]) for _ in range(2))
+def test_the_same_seed_gives_the_same_plan(posts, planned):
+    one, other = planned, plan(posts[1])
     assert one.order == other.order
     assert one.length == other.length
     assert [s.word for s in one.stops] == [s.word for s in other.stops]
 
 
-def test_every_stop_has_the_word_of_the_way_to_it(posts):
-    found = plan(posts[1])
+def test_every_stop_has_the_word_of_the_way_to_it(planned):
+    found = planned
     words = found.water.words
     walked = [np.asarray(found.mission.anchor, dtype=float)[None]]
     for stop in found.stops:

@@ -121,10 +121,12 @@ def drawn(figure):
     return figure
 
 
-@pytest.fixture(params=KINDS)
-def figure(request, monkeypatch):
+@pytest.fixture(scope="module", params=KINDS)
+def figure(request):
+    """Of each kind one, for all that looks at it and changes nothing."""
     matplotlib.use("Agg")
-    found = of(request.param, request, monkeypatch)
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        found = of(request.param, request, monkeypatch)
     return drawn(found)
 
 

@@ -42,7 +42,8 @@ def written(folder: Path, **more) -> Path:
     (folder / "scene.json").write_text(json.dumps(SCENE))
     mission = {
         "schema_version": 1, "scene": "scene.json", "anchor": [0, 0, 0], "start": [0, 0.3, 0],
-        "waypoints": WAYPOINTS, "clearance": 0.2, "tether_length": 8.5, **more,
+        "waypoints": WAYPOINTS, "clearance": 0.2, "tether_length": 8.5, "delta": 0.2, "cell": 0.25,
+        **more,
     }  # fmt: skip
     file = folder / "mission.json"
     file.write_text(json.dumps(mission))

@@ -283,7 +283,7 @@ def test_the_example_is_flown_and_drawn(tmp_path, capsys):
     mission = json.loads((ROOT / "missions" / "ship.json").read_text())
     mission["scene"] = str(ROOT / "scenes" / "jetty.json")
     mission["range_sensor"] = {"noise": 0.02}
-    mission["waypoints"] = mission["waypoints"][:8]
+    mission["waypoints"] = mission["waypoints"][:4]
     (tmp_path / "m.json").write_text(json.dumps(mission))
     surprises = ROOT / "examples" / "jetty-surprises.json"
     out = tmp_path / "run"

@@ -37,7 +37,7 @@ def tours_of(graph):
                 yield (0, *rest)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(st.integers(0, 10**6), st.randoms(use_true_random=False), st.floats(0.0, 1.0))
 def test_no_tour_pays_less_than_the_ways_to_its_vertices_and_along_its_legs(seed, chance, scale):
     graph = random_graph(seed, 4, most=3)

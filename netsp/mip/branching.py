@@ -52,7 +52,7 @@ SETTLE_EVERY = 25
 @dataclass(order=True)
 class Node:
     """What is left of the root's program; the least bound comes first, and of equal ones the
-    newest, whose program differs little from the last.
+    newest.
 
     Attributes
     ----------
@@ -81,7 +81,9 @@ class Choice(NamedTuple):
 
 
 class Tree:
-    """Nodes in order of their bounds.
+    """Nodes: of two new ones that where a pair follows each other, or a vertex is visited, is next,
+    and once nothing is left of it, that of least bound. Where the incumbent is the shortest tour,
+    as it mostly is, all have to be looked at in any order.
 
     Parameters
     ----------
@@ -114,26 +116,35 @@ class Tree:
         """Until no node is left that could hold a shorter tour."""
         run = self.run
         whole = np.ones(len(self.legs), dtype=bool)
-        open_nodes = [Node(run.bound or 0.0, next(self._rank), whole, ())]
+        node: Node | None = Node(run.bound or 0.0, next(self._rank), whole, ())
+        open_nodes: list[Node] = []
         settled = np.inf
-        while open_nodes:
-            node = heapq.heappop(open_nodes)
-            run.raise_bound(min(node.bound, settled, run.cutoff))
+        while node is not None or open_nodes:
+            if node is None:
+                node = heapq.heappop(open_nodes)
+            least = min(n.bound for n in (node, *open_nodes[:1]))
+            run.raise_bound(min(least, settled, run.cutoff))
             if run.done:
                 return
             if node.bound >= run.cutoff:
-                settled = min(settled, node.bound)
-                break  # those of all others are no lower
+                settled, node = min(settled, node.bound), None
+                continue
             bound, choice = self._process(node)
+            tried, node = node, None
             if choice is None:
                 settled = min(settled, bound)
             else:
-                for alive, together in (choice.without, choice.within):
-                    heapq.heappush(open_nodes, Node(bound, next(self._rank), alive, together))
+                # the next program differs little from this one; of others it takes thousands of
+                # simplex steps more
+                other, node = (
+                    Node(bound, next(self._rank), alive, together)
+                    for alive, together in (choice.without, choice.within)
+                )
+                heapq.heappush(open_nodes, other)
             self._nodes += 1
             run.report(
-                "branches", cuts=len(self.lp.cuts), legs=int(node.alive.sum()),
-                vertices=len(np.unique(self.legs[node.alive])),
+                "branches", cuts=len(self.lp.cuts), legs=int(tried.alive.sum()),
+                vertices=len(np.unique(self.legs[tried.alive])),
             )  # fmt: skip
         run.infeasible = run.tour is None and settled == np.inf
         if not run.infeasible:
