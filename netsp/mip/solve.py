@@ -293,6 +293,12 @@ class MipRun(SearchingRun):
         return min(max(share, least), CELLS_SHARE)
 
     @property
+    def _core_of_many(self) -> bool:
+        """Whether it is a core of which legs and cuts are wanted, not the tour, which the searches
+        have found."""
+        return self.outer is not None and self.graph.goal_count >= MANY_GOALS
+
+    @property
     def _out_of_reach(self) -> bool:
         """Whether the program over all classes would not close what covers have left."""
         left = self.length - (self.bound or 0.0)
@@ -337,7 +343,7 @@ class MipRun(SearchingRun):
             if self.length < before:
                 root.solve()
         legs = root.size()["legs"]
-        if self.done or legs > MOST_LEGS:
+        if self.done or legs > MOST_LEGS or self._core_of_many:
             return
         if backend not in LAZY:
             Tree(root).solve()

@@ -55,9 +55,11 @@ ENOUGH_BESIDE = 10
 worth more for all classes than those beside the tour: with 100 goals at tether 500, 2 % of a gap
 are left where 5 % are; with 60 goals it is the other way round."""
 
-LARGER = 3
+LARGER, LARGER_OF_MANY, OF_MANY = 3.0, 1.5, 100
 """The core comes first where there are more than so many times as many vertices in all: below that
-it costs more than it saves, and shows no bound meanwhile."""
+it costs more than it saves, and shows no bound meanwhile. With so many goals it is worth it sooner:
+in a world of 200 with 1562 classes the program over all of them is as far after 72 s as it is after
+140 s without."""
 
 
 class SearchingRun(SolverRun):
@@ -164,7 +166,8 @@ class SearchingRun(SolverRun):
         the time begins with `begin_share`; when that is over, the body is left early."""
         graph = self.graph
         core = least_tethers(graph.costs_to_base, graph.cluster, self.classes_per_goal)
-        few = len(graph) <= max(MEASURE_AT_ONCE, LARGER * len(core))
+        larger = LARGER_OF_MANY if graph.goal_count >= OF_MANY else LARGER
+        few = len(graph) <= max(MEASURE_AT_ONCE, larger * len(core))
         if few or not graph.roadmapped or self.outer is not None:
             yield None
             return
