@@ -198,7 +198,7 @@ def panned() -> np.ndarray:
         file = Path(folder) / "p.json"
         file.write_text(crowded())
         with served(file) as (url, _), page_at(url) as page:
-            wait_for_tour(page, -1, 10.0)  # solved on meanwhile
+            wait_for_tour(page, -1, 4.0)  # solved on meanwhile
             page.wait_for_timeout(1000)
             return np.array(page.evaluate(PAN))
 

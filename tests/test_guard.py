@@ -326,7 +326,6 @@ def test_a_jump_is_no_motion():
     assert np.allclose(track.velocity, 0.0)
 
 
-@settings(max_examples=30)
 @given(st.integers(0, 10_000))
 def test_a_belief_holds_the_class_of_a_robot_that_is_off_by_a_constant(seed):
     rng = np.random.default_rng(seed)

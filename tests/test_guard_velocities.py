@@ -118,7 +118,7 @@ def test_one_that_freezes_at_zero_is_found_out_before_the_place_is_off_by_a_metr
     seed=st.integers(0, 1000), wrong=st.tuples(st.floats(-100, 100), st.floats(-100, 100)),
     at=st.floats(8.0, 28.0),
 )  # fmt: skip
-@settings(max_examples=16, deadline=None)
+@settings(max_examples=40, deadline=None)
 def test_a_single_wrong_velocity_moves_a_robot_by_centimetres_at_most(seed, wrong, at):
     times, _, _, places, speeds = drive(30.0, seed=seed)
     good, bad = Track(0.3, 0.5), Track(0.3, 0.5)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from netsp import travel_graph
 from netsp.clock import Clock
-from netsp.mip.merging import merged
+from netsp.mip.merging import classes_of, merge, merged
 from netsp.mip.solve import solve_merged
 from netsp.solving.limits import Limits
 from netsp.solving.searching import SearchingRun
@@ -72,7 +72,7 @@ def ends_of(monkeypatch, least, limits):
     given = []
 
     def merge(run, tours, prove, clock, known=module.merge):
-        assert len(tours) == len(set(tours)) <= 8
+        assert len(tours) == len(set(tours)) <= 9
         given.append(list(tours))
         known(run, tours, prove, clock)
 
@@ -88,8 +88,23 @@ def ends_of(monkeypatch, least, limits):
 def test_what_searches_end_in_is_merged_once_where_goals_are_many(monkeypatch):
     given = ends_of(monkeypatch, 30, Limits(rng=np.random.default_rng(0)))
     assert given
-    assert all(set(a) != set(b) for a, b in itertools.pairwise(given))
+    classes = [set(itertools.chain(*tours)) for tours in given]
+    assert not any(b <= a for a, b in itertools.pairwise(classes))
     assert not ends_of(monkeypatch, 31, Limits(rng=np.random.default_rng(0)))
+
+
+def test_a_merged_tour_that_a_bound_may_have_ruled_out_is_not_taken():
+    graph = random_graph(0, 5, most=3)
+    tours = some_tours(graph, random.Random(0), 6)
+    best = brute_tour(graph.subgraph(classes_of(tours)))
+    for above, taken in ((0.5, True), (-1e-9, False)):
+        run = SearchingRun(graph, Limits())
+        run.known = best + above
+        merge(run, tours, solve_merged, Clock())
+        assert (run.tour is not None) == taken
+    stopped = SearchingRun(graph, Limits())
+    merge(stopped, tours, solve_merged, Clock(0.0))
+    assert stopped.trace[-1].stage == "merged"
 
 
 def test_under_a_limit_of_iterations_nothing_is_merged(monkeypatch):

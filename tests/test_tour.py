@@ -222,7 +222,9 @@ FALSE = {
     "the bound": (
         lambda m: changed(m, bound_of_all=m.tour.length + 1.0, gap_to_all=0.0), "bounds and status"
     ),
-    "the gap": (lambda m: changed(m, gap_to_all=0.0), "bounds and status"),
+    "the gap": (
+        lambda m: changed(m, bound_of_all=0.9 * m.tour.length, gap_to_all=0.0), "bounds and status"
+    ),
     "the status": (
         lambda m: changed(m, status=Status.OPTIMAL, gap=0.5, lower_bound=0.5 * m.tour.length),
         "bounds and status",

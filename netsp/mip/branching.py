@@ -81,9 +81,9 @@ class Choice(NamedTuple):
 
 
 class Tree:
-    """Nodes: of two new ones that where a pair follows each other, or a vertex is visited, is next,
-    and once nothing is left of it, that of least bound. Where the incumbent is the shortest tour,
-    as it mostly is, all have to be looked at in any order.
+    """Of two new nodes the one where the pair follows each other, or the vertex is visited, comes
+    next; only when nothing is left below it, the node of least bound. Where the incumbent is the
+    shortest tour, as it mostly is, all have to be looked at in any order.
 
     Parameters
     ----------

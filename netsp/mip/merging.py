@@ -11,12 +11,15 @@ legs of many such tours hold none that is shorter; their classes do, 4789.09 m, 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 
+from netsp.arrays import Ints
 from netsp.clock import Clock
+from netsp.errors import LimitReachedError
 from netsp.solving.limits import Limits
 from netsp.solving.searching import SearchingRun
 from netsp.travel.graph import TravelGraph
@@ -42,9 +45,18 @@ def search_and_merge(run: SearchingRun, prove: Prove) -> None:
 
 
 def merge(run: SearchingRun, tours: Sequence[Sequence[int]], prove: Prove, clock: Clock) -> None:
-    """Take the shortest tour through the classes of some tours, if it is shorter."""
-    run.update_incumbent(merged(run.graph, tours, prove, Limits(clock, rng=run.rng)))
+    """Take the shortest tour through the classes of some tours, if it is below the cutoff: one at
+    it or above may use what a bound has ruled out."""
+    with run.graph.on_clock(clock), suppress(LimitReachedError):
+        found = merged(run.graph, tours, prove, Limits(clock, rng=run.rng))
+        if found is not None and (length := run.graph.tour_length(found)) < run.cutoff:
+            run.update_incumbent(found, length=length)
     run.report("merged")
+
+
+def classes_of(tours: Iterable[Sequence[int]]) -> Ints:
+    """All that some tours visit, in order."""
+    return np.unique(np.concatenate([np.asarray(t, dtype=np.int64) for t in tours]))
 
 
 def merged(
@@ -54,8 +66,8 @@ def merged(
     None if there is none."""
     if not tours:
         return None
-    vertices = np.unique(np.concatenate([np.asarray(t, dtype=np.int64) for t in tours]))
-    best = np.searchsorted(vertices, min(tours, key=graph.tour_length)).tolist()
+    vertices = classes_of(tours)
     part = TravelGraph.from_costs(graph.costs_among(vertices), graph.cluster[vertices])
-    found = prove(part, replace(limits, warm_start=best))
+    known = [np.searchsorted(vertices, t).tolist() for t in tours]
+    found = prove(part, replace(limits, warm_start=min(known, key=part.tour_length)))
     return None if found.tour is None else vertices[list(found.tour)].tolist()

@@ -269,14 +269,15 @@ class SearchingRun(SolverRun):
         search.settle()
         search.run(self.search_rounds, clock)
         self.take(search, rounded=rounded)
+        length, tour = search.best()
+        if np.isfinite(length) and tour not in self.ends:
+            self.ends = [*self.ends[1 - MOST_ENDS :], tour]
 
     def take(self, search: Search, *, rounded: bool = False) -> None:
         """Offer what a search found; its legs are measured, so its length is known unless they were
         rounded."""
         length, tour = search.best()
         self.update_incumbent(tour, length=None if rounded else length)
-        if np.isfinite(length) and tour not in self.ends:
-            self.ends = [*self.ends[1 - MOST_ENDS :], tour]
 
     @property
     def cutoff(self) -> float:
