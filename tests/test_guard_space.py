@@ -174,21 +174,45 @@ def test_what_is_near_a_pile_is_in_doubt_and_what_is_far_from_all_is_not(mission
     assert len(other.classes) == 1
 
 
-def test_the_operator_says_on_which_side_of_a_solid_the_tether_passes(mission, site):
+@pytest.mark.parametrize("every", [0.1, 0.2])
+def test_the_operator_says_on_which_side_of_a_solid_the_tether_passes(mission, site, every):
     guard = Guard(site)
     way = [tuple(mission.start), (-1, 0.6, -2), (2, 0.2, -2), (3.5, 0, -1.5)]
-    for fix in along(*way, every=0.1):
+    for fix in along(*way, every=every):
         guard.take(fix)
     words = {}
-    for side in ("north", "south"):
+    for side, meant, opposite in (("north", "+y", "−y"), ("south", "−y", "+y")):
         guard.correct(side, "pile")
         words[side] = guard.report.classes[0].word
-        assert ("+y" if side == "north" else "−y") in guard.report.classes[0].passes
+        for now in guard.report.classes:
+            assert meant in now.passes
+            assert opposite not in now.passes
     assert words["north"] != words["south"]
     with pytest.raises(InputError, match="obstacle: expected"):
         guard.correct("north", "nowhere")
     with pytest.raises(InputError, match="side: expected"):
         guard.correct("inside", "pile")
+
+
+def test_the_operator_may_say_how_it_passes_a_body_with_free_ends(mission, site):
+    guard = Guard(site, EXACT)
+    under = [(-1, 0.9, -2), (3.5, 0.9, -4.2), (6.9, 0.1, -4.2), (6.9, 0.1, -2.6)]
+    for fix in along(tuple(mission.start), *under):
+        guard.take(fix)
+    guard.correct("below", "mooring")
+    hangs = guard.report.classes[0]
+    assert "below mooring" in hangs.passes
+    guard.correct("above", "mooring")
+    over = guard.report.classes[0]
+    assert "mooring" not in over.passes
+    assert over.taut < hangs.taut
+    assert over.word == hangs.word  # which sides of it words do not tell
+
+
+def test_a_straight_tether_passes_a_solid_on_the_side_where_it_comes_nearest(site):
+    nodes = np.array([(-5, 2, -1), (5, 2, -1.5)], dtype=float)
+    assert site.agrees(nodes, "north", "pile")
+    assert not any(site.agrees(nodes, side, "pile") for side in ("south", "east", "west"))
 
 
 def test_the_class_outlives_a_restart(mission, site, tmp_path):

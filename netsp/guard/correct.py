@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 import shapely
 
@@ -10,15 +12,18 @@ from netsp.errors import InputError
 from netsp.execute.events import index_of
 from netsp.hsignature import Word
 from netsp.problem import Problem
-from netsp.report.wording import AXES, WINDS
+from netsp.report.wording import AXES
 from netsp.roadmap.tethers import Tethers
 
 SIDES = {"north": 0, "east": 2, "south": 4, "west": 6}
 """Where in `WINDS`; `AXES` has the same order."""
 
 
-def ray_to(problem: Problem, obstacle: int, side: str) -> shapely.LineString:
-    """From an obstacle's middle to one of its sides, as far as a tether goes.
+def rays_of(
+    problem: Problem, obstacle: int, side: str
+) -> tuple[shapely.LineString, shapely.LineString]:
+    """From an obstacle's middle to one of its sides and to the opposite one, as far as a tether
+    goes.
 
     Parameters
     ----------
@@ -31,7 +36,7 @@ def ray_to(problem: Problem, obstacle: int, side: str) -> shapely.LineString:
 
     Returns
     -------
-    shapely.LineString
+    pair of shapely.LineString
         In the plan, metres.
 
     Raises
@@ -46,21 +51,51 @@ def ray_to(problem: Problem, obstacle: int, side: str) -> shapely.LineString:
     angle = np.radians(45.0 * names[side] - heading)
     middle = np.asarray(problem.representative_points[obstacle], dtype=float)
     far = 2.0 * (problem.tether_length + problem.scale)
-    end = middle + far * np.array([np.sin(angle), np.cos(angle)])
-    return shapely.LineString([middle, end])
+    way = far * np.array([np.sin(angle), np.cos(angle)])
+    return shapely.LineString([middle, middle + way]), shapely.LineString([middle, middle - way])
+
+
+def agrees(problem: Problem, path: Floats, side: str, obstacle: int | str) -> bool:
+    """Whether a tether passes an obstacle on one side, and not on the opposite one.
+
+    Parameters
+    ----------
+    problem : Problem
+        The site.
+    path : ndarray, shape (n, 2) or (n, 3)
+        The tether, metres.
+    side : str
+        Side of the obstacle.
+    obstacle : int or str
+        Its index or name.
+
+    Returns
+    -------
+    bool
+        Whether it does.
+
+    Raises
+    ------
+    InputError
+        No such obstacle or side.
+    """
+    index = index_of(obstacle, list(problem.obstacles), "obstacle")
+    on, off = rays_of(problem, index, side)
+    line = shapely.LineString(path[:, :2])
+    return bool(line.intersects(on)) and not line.intersects(off)
 
 
 def corrected(
-    problem: Problem, words: dict[Word, float], robot: Floats, side: str, obstacle: int | str
-) -> dict[Word, float]:
+    problem: Problem, believed: Iterable[Word], robot: Floats, side: str, obstacle: int | str
+) -> set[Word]:
     """The classes that agree with what the operator says.
 
     Parameters
     ----------
     problem : Problem
         The site.
-    words : dict of Word to float
-        Classes that are believed, and their costs.
+    believed : iterable of Word
+        Classes that were believed; at least one.
     robot : ndarray, shape (3,)
         Where the robot is, metres.
     side : str
@@ -70,9 +105,9 @@ def corrected(
 
     Returns
     -------
-    dict of Word to float
-        Those believed that agree; where none does, of all classes that the tether reaches the
-        robot in, those that agree and differ least from one that is believed.
+    set of Word
+        Of all classes that the tether reaches the robot in and that agree, those that differ least
+        from one that was believed.
 
     Raises
     ------
@@ -80,28 +115,35 @@ def corrected(
         No such obstacle or side; no class agrees.
     """
     index = index_of(obstacle, list(problem.obstacles), "obstacle")
-    opposite = WINDS[(SIDES.get(side, 0) + 4) % 8] if side in SIDES else AXES[
-        (AXES.index(side) + 4) % 8 if side in AXES else 0
-    ]  # fmt: skip
-    on, off = ray_to(problem, index, side), ray_to(problem, index, opposite)
-    found = {t.word: t.path for t in Tethers(problem).classes(*robot)}
-
-    def agrees(path: Floats) -> bool:
-        line = shapely.LineString(path[:, :2])
-        return bool(line.intersects(on)) and not line.intersects(off)
-
-    kept = {w: cost for w, cost in words.items() if w in found and agrees(found[w])}
-    if kept:
-        return kept
-    others = {w for w, path in found.items() if agrees(path)}
-    if not others:
+    ways = Tethers(problem).classes(*robot)
+    agree = {t.word for t in ways if agrees(problem, t.path, side, index)}
+    if not agree:
         raise InputError(
             f"side: no tether within {problem.tether_length:g} {problem.units} reaches the robot "
             f"{side} of {problem.obstacle_name(index)}"
         )
-    apart = {w: min(_apart(w, known) for known in words) for w in others}
+    return least_changed(agree, believed)
+
+
+def least_changed(others: Iterable[Word], believed: Iterable[Word]) -> set[Word]:
+    """Of some classes those that differ least from one that was believed.
+
+    Parameters
+    ----------
+    others : iterable of Word
+        At least one.
+    believed : iterable of Word
+        At least one.
+
+    Returns
+    -------
+    set of Word
+        One or more.
+    """
+    known = list(believed)
+    apart = {w: min(_apart(w, one) for one in known) for w in others}
     least = min(apart.values())
-    return {w: 0.0 for w, far in apart.items() if far == least}
+    return {w for w, far in apart.items() if far == least}
 
 
 def _apart(a: Word, b: Word) -> int:

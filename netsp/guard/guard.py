@@ -134,7 +134,8 @@ class Guard:
         self.strands.all = [Strand(w, 1.0, t) for w, t in (tethers or {}).items()]
 
     def correct(self, side: str, obstacle: int | str) -> Report | None:
-        """The operator says on which side of an obstacle the tether passes.
+        """The operator says on which side of an obstacle the tether passes: of the classes that
+        are believed those count that do, and where none does, others that differ least from one.
 
         Parameters
         ----------
@@ -156,8 +157,11 @@ class Guard:
         if self.track.time is None or not self.strands.all:
             raise InputError("side: nothing is known yet of where the robot is")
         here = self.strands.all[0].tether.robot
-        words = {s.word: -float(np.log(max(s.likely, 1e-9))) for s in self.strands.all}
-        known = self.site.corrected(words, here, side, obstacle)
+        agree = [s for s in self.strands.all if self.site.agrees(s.tether.nodes, side, obstacle)]
+        known = {s.word: s.cost for s in agree} or dict.fromkeys(
+            self.site.corrected({s.word for s in self.strands.all}, here, side, obstacle), 0.0
+        )
+        self.strands.all = agree
         assert self._motion is not None
         estimate = self._motion.after
         (step,) = self.site.letters.written(here[None], estimate[None])
@@ -246,7 +250,7 @@ class Guard:
     @property
     def words(self) -> dict[Word, float]:
         """Classes that are believed, at the robot's place, and their costs."""
-        return {s.word: -float(np.log(max(s.likely, 1e-9))) for s in self.strands.all}
+        return {s.word: s.cost for s in self.strands.all}
 
     def _moved(self, motion: Motion) -> None:
         o = self.options

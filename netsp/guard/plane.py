@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
 
 from netsp.arrays import Floats
 from netsp.errors import InputError
-from netsp.guard.correct import SIDES, corrected
+from netsp.guard.correct import SIDES, agrees, corrected
 from netsp.guard.gaps import ways_between
 from netsp.guard.leaps import leap
 from netsp.guard.loops import closed_by, loops_in
@@ -142,10 +142,14 @@ class PlaneSite:
         return leap(self.field, tether, places, self.tether_length)
 
     def corrected(
-        self, words: dict[Word, float], robot: Floats, side: str, obstacle: int | str
-    ) -> dict[Word, float]:  # fmt: skip
+        self, believed: Iterable[Word], robot: Floats, side: str, obstacle: int | str
+    ) -> set[Word]:
         """As of `netsp.guard.correct.corrected`."""
-        return corrected(self.problem, words, robot, side, obstacle)
+        return corrected(self.problem, believed, robot, side, obstacle)
+
+    def agrees(self, nodes: Floats, side: str, obstacle: int | str) -> bool:
+        """As of `netsp.guard.correct.agrees`."""
+        return agrees(self.problem, nodes, side, obstacle)
 
     def passes(self, nodes: Floats, word: Word) -> str:
         """By the obstacles that it rests on, and those whose letters it has."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -159,9 +159,12 @@ class Site(Protocol):
         known without its tether there that it closes no loop and has tether enough."""
 
     def corrected(
-        self, words: dict[Word, float], robot: Floats, side: str, obstacle: int | str
-    ) -> dict[Word, float]:  # fmt: skip
+        self, believed: Iterable[Word], robot: Floats, side: str, obstacle: int | str
+    ) -> set[Word]:
         """The classes that agree with what an operator says (`netsp.guard.correct.corrected`)."""
+
+    def agrees(self, nodes: Floats, side: str, obstacle: int | str) -> bool:
+        """Whether a tether passes an obstacle on that side, and not on the other one as well."""
 
     def passes(self, nodes: Floats, word: Word) -> str:
         """How a taut tether runs, in words."""

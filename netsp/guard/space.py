@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -12,6 +12,8 @@ import numpy as np
 
 from netsp.arrays import Floats
 from netsp.errors import InputError
+from netsp.geometry import polylines
+from netsp.guard.correct import least_changed
 from netsp.guard.silhouettes import silhouette
 from netsp.guard.site import LONGER, ROUNDS, Letters, Loop, beside
 from netsp.guard.winding import TOUCHING, closing, loops_of
@@ -36,6 +38,12 @@ AGAIN = 1.0
 
 UPRIGHT = 0.7
 """Share of a direction that must be vertical for it to be above or below."""
+
+MEANT = {
+    "north": ("+y", "−y"), "east": ("+x", "−x"), "south": ("−y", "+y"), "west": ("−x", "+x"),
+    "above": ("above", "below"), "below": ("below", "above"),
+}  # fmt: skip
+"""The directions that an operator's words mean, and their opposites."""
 
 SURFACE = 1e-6
 """Metres that places are put out of solids."""
@@ -93,7 +101,7 @@ class SpaceSite:
         A moving anchor, an anchor out of the water; as of `netsp.space.signature.SpaceSignature`.
     """
 
-    sides: tuple[str, ...] = ("north", "east", "south", "west", "above", "below")
+    sides: tuple[str, ...] = tuple(MEANT)
     look_steps = 24
 
     def __init__(self, mission: Mission, scene: Scene | None = None) -> None:
@@ -206,15 +214,15 @@ class SpaceSite:
         return 0
 
     def corrected(
-        self, words: dict[Word, float], robot: Floats, side: str, obstacle: int | str
-    ) -> dict[Word, float]:  # fmt: skip
-        """Of the classes believed, or else of all that the tether reaches the robot in, those whose
-        taut tether passes a solid on that side, where it comes nearest to it.
+        self, believed: Iterable[Word], robot: Floats, side: str, obstacle: int | str
+    ) -> set[Word]:
+        """Of all classes that the tether reaches the robot in, those whose taut tether passes a
+        solid on that side (`agrees`), and of them those that differ least from one believed.
 
         Parameters
         ----------
-        words : dict of Word to float
-            Classes that are believed, and their costs.
+        believed : iterable of Word
+            Classes that were believed.
         robot : ndarray, shape (3,)
             Where the robot is, metres.
         side : str
@@ -224,38 +232,44 @@ class SpaceSite:
 
         Returns
         -------
-        dict of Word to float
-            Those that agree, with their costs.
+        set of Word
+            One or more.
 
         Raises
         ------
         InputError
             No such solid or side; no class agrees.
         """
-        if side not in self.sides:
-            raise InputError(f"side: expected {', '.join(self.sides)}, got {side!r}")
         index = self._index(obstacle)
-        names = {"north": "+y", "east": "+x", "south": "−y", "west": "−x"}
-        meant = names.get(side, side)
         end = self.water.words.held(robot)
-        found: dict[Word, Tether] = {}
+        self._told = {}
         if end is not None:
             shape = self.water.words.cells.flags.shape
             root = int(np.ravel_multi_index(tuple(self.water.words.root), shape))
             for _, way in self._ways(root, end, self.tether_length, MOST_ASIDE):
                 tether = self.model.relaxed(np.vstack([self.anchor, way, robot]), ROUNDS)
                 word = self.word_of(tether.nodes)
-                if word is not None and tether.length <= self.tether_length:
-                    found.setdefault(word, tether)
-        agree = {w for w, t in found.items() if meant in self._side_at(index, t.nodes).split()}
-        kept = {w: cost for w, cost in words.items() if w in agree}
-        self._told = {w: found[w] for w in agree}
-        if kept or agree:
-            return kept or dict.fromkeys(agree, 0.0)
-        raise InputError(
-            f"side: no tether within {self.tether_length:g} {self.units} was found that reaches "
-            f"the robot {side} of {self.name_of(index)}"
-        )
+                short = tether.length <= self.tether_length
+                if word is not None and short and self.agrees(tether.nodes, side, index):
+                    self._told.setdefault(word, tether)
+        if not self._told:
+            raise InputError(
+                f"side: no tether within {self.tether_length:g} {self.units} was found that "
+                f"reaches the robot {beside(side, self.name_of(index))}"
+            )
+        return least_changed(self._told, believed)
+
+    def agrees(self, nodes: Floats, side: str, obstacle: int | str) -> bool:
+        """Where it comes nearest to the solid, and not on the other side as well."""
+        if side not in self.sides:
+            raise InputError(f"side: expected {', '.join(self.sides)}, got {side!r}")
+        alone = self._of(self._index(obstacle))
+        places = polylines.dense(nodes, 0.5 * self.model.delta)
+        distance = np.asarray(alone.distance(places))
+        near = distance <= max(float(distance.min()), 0.0) + TOUCHING * self.model.delta
+        sides = {s for away in alone.gradient(places[near]) for s in _direction(away).split()}
+        meant, opposite = MEANT[side]
+        return meant in sides and opposite not in sides
 
     def _index(self, obstacle: int | str) -> int:
         names = [self.name_of(k) for k in range(len(self._solids))]
@@ -268,13 +282,6 @@ class SpaceSite:
     def _of(self, solid: int) -> Any:
         """The field of one solid."""
         return _alone(self._solids[solid])
-
-    def _side_at(self, solid: int, nodes: Floats) -> str:
-        """Where a line passes a solid."""
-        alone = self._of(solid)
-        distance = np.asarray(alone.distance(nodes))
-        place = nodes[int(distance.argmin())]
-        return _direction(alone.gradient(place))
 
     def passes(self, nodes: Floats, word: Word) -> str:
         """By the solids that it rests on."""
