@@ -37,6 +37,9 @@ from netsp.problem import Circle, Polygon, Problem
 
 LEAD, LONGER = 10.0, 12.0
 MOST_S = 90.0
+HORIZON, BREAK = 16.0, 5
+"""A loop is seen coming when it is so many seconds ahead, at most, and until it is not in so many
+updates in a row."""
 AT_ONCE = 20
 """Updates before and after which a guard that knows the position may see what is warned of: it
 tells a turn from noise sooner, and later where the noise happens to turn, too."""
@@ -59,7 +62,9 @@ class Outcome:
     leads: list[float] = field(default_factory=list)
     allowed: list[tuple[float, float, float]] = field(default_factory=list)
     """Of loops that can be foreseen in time: leads of the warning, of the first word, and of a
-    guard that knows the position."""
+    guard that knows the position, since it sees it all the time."""
+    glimpsed: list[tuple[float, float]] = field(default_factory=list)
+    """Of others that such a guard saw in time, but not all the time since."""
     updates_ms: list[float] = field(default_factory=list)
     home_ms: list[float] = field(default_factory=list)
 
@@ -195,7 +200,8 @@ def put_in(
     watching, seeing, turns = copy.deepcopy(guard), copy.deepcopy(clear), copy.deepcopy(counter)
     turns.turned = 0.0
     told = told_of(path, rng, drift.copy(), now + DT, velocities, here)
-    first = spoken = foreseen = by_turns = None
+    first = spoken = by_turns = None
+    coming: list[bool] = []
     before = here
     for k, place in enumerate(path):
         t = now + (k + 1) * DT
@@ -205,8 +211,8 @@ def put_in(
             first = k
         if warned(report, Level.CAUTION) and spoken is None:
             spoken = k
-        if exact.loop_s is not None and exact.loop_s <= 16.0 and foreseen is None:
-            foreseen = k
+        if k <= end:
+            coming.append(exact.loop_s is not None and exact.loop_s <= HORIZON)
         if turns.take(place - before) and by_turns is None:
             by_turns = k
         before = place
@@ -217,8 +223,22 @@ def put_in(
     lead, word = (-math.inf if k is None else (end - k) * DT for k in (first, spoken))
     out.leads.append(lead)
     # where even a guard that knows the position saw it coming ten seconds before
-    if foreseen is not None and (end - foreseen) * DT >= LEAD:
-        out.allowed.append((lead, word, (end - foreseen) * DT))
+    seen = (end - seen_since(coming)) * DT
+    if seen >= LEAD:
+        out.allowed.append((lead, word, seen))
+    elif any(coming) and (end - coming.index(True)) * DT >= LEAD:
+        out.glimpsed.append((lead, word))
+
+
+def seen_since(coming: list[bool]) -> int:
+    """Since which update a loop has been seen coming to the last one, but for short breaks."""
+    since, gone = len(coming), 0
+    for k in range(len(coming) - 1, -1, -1):
+        gone = 0 if coming[k] else gone + 1
+        if gone > BREAK:
+            break
+        since = k if coming[k] else since
+    return since
 
 
 def in_time(leads: np.ndarray) -> str:
@@ -268,6 +288,9 @@ def main() -> None:
     for kind in (*dict.fromkeys(o.kind for o in found), None):
         some = [o for o in found if kind in (None, o.kind)]
         told(kind or "all", some)
+    glimpsed = np.array([v for o in found for v in o.glimpsed]).reshape(-1, 2)
+    if len(glimpsed):
+        print(f"\nSeen coming and lost sight of: warned / told 10 s before {in_time(glimpsed)}")
     print()
 
 

@@ -715,11 +715,59 @@ def test_what_is_ahead_in_two_classes_is_half_a_second_old_at_most():
     motion = replace(guard._motion, velocity=np.array([0.35, 0.35, 0.0]), turn=0.1)
     guard._looks, guard._looked = [], -math.inf
     updates = 1
-    guard._look([half, half], motion)
+    guard._look([half, half], [[], []], motion)
     while guard._looks:
-        guard._look([half, half], motion)
+        guard._look([half, half], [[], []], motion)
         updates += 1
     assert updates <= 5
+
+
+def levels_on_the_way_round_a(guard):
+    """Of loops ahead, from each fix to where the loop closes."""
+    levels = []
+    for fix in along(*ROUND_A):
+        report = guard.take(fix)
+        if report.loops:
+            return levels
+        levels.append(max((a.level for a in report.alarms if a.kind == "loop-ahead"), default=0))
+    raise AssertionError("no loop has closed")
+
+
+def test_a_loop_in_an_unlikely_class_keeps_nothing_from_being_said_of_the_likely_one():
+    """There it is closed already, around the very obstacle that the robot is about to go round."""
+    guard = Guard(SITE, EXACT)
+    guard.remember({(): 0.0, (1,): 2.6}, np.zeros(3), 0.0)
+    assert guard.take(along(*ROUND_A)[0]).classes[1].likely == pytest.approx(0.07, abs=0.01)
+    levels = levels_on_the_way_round_a(guard)
+    assert max(levels) == Level.WARNING
+    assert levels[-100] == Level.WARNING  # ten seconds before
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    off=st.floats(-0.6, 0.6), rate=st.floats(0.5, 2.0), far=st.floats(0.56, 1.6),
+    way=st.sampled_from([1.0, -1.0]),
+)  # fmt: skip
+@example(off=0.5, rate=1.0, far=0.56, way=1.0)
+def test_a_robot_that_goes_round_an_obstacle_is_seen_to_close_its_loop_whatever_the_noise(
+    off, rate, far, way
+):
+    """Where it is tells the circle: not its course, which is off, nor how fast it turns."""
+    site, centre = PlaneSite(SITE), np.array([5.0, 0.0, 0.0])
+    angles = math.pi + way * np.linspace(0.0, 1.25 * math.pi, 40)
+    round_it = centre + far * np.column_stack([np.cos(angles), np.sin(angles), 0.0 * angles])
+    tether = site.model.start((0, 0, 0), (0, 0, 0))
+    for place in round_it:
+        tether = site.model.update(tether, place)
+    course = angles[-1] + way * 0.5 * math.pi + off
+    velocity = 0.5 * np.array([math.cos(course), math.sin(course), 0.0])
+    motion = Motion(0.0, tether.robot, tether.robot, velocity, way * rate * 0.5 / far)
+    look = Look(site, tether, motion, 0.5)
+    look.go_on(10_000)
+    assert look.ahead.loop is not None
+    assert look.ahead.loop.around == (0,)
+    # the loop closes where the tether comes to the obstacle, or before if it turns more tightly
+    assert look.ahead.loop_s <= 0.76 * math.pi * far / 0.5 + 2.0
 
 
 @pytest.mark.parametrize("exact", [True, False])

@@ -23,8 +23,12 @@ HORIZON_S, TURN_HORIZON_S = 36.0, 30.0
 """Seconds that are looked ahead, straight on and turning on: a bit farther than what is spoken of
 (`netsp.guard.reasons`)."""
 
-STEP_S = 1.0
-"""Seconds, about, between two places on the way."""
+STEP_S, STEP_ANGLE = 1.0, 0.5
+"""Seconds, about, and radians at most, between two places on the way."""
+
+SURFACE = 1e-3
+"""Metres off an obstacle, at least, that places on the way are; where the way turns, so many more
+that the straight step between two goes past it, too."""
 
 TURNING = 0.06
 """Radians per second: slower turns are those of noise."""
@@ -76,11 +80,12 @@ class Look:
     def __init__(self, site: Site, tether: Tether, motion: Motion, speed: float) -> None:
         self.site, self.velocity = site, motion.velocity
         pace = float(np.linalg.norm(motion.velocity[:2]))
-        turns: list[float] = []
+        courses: list[tuple[Floats, float]] = []
         if pace >= MOVING * speed:
             turns = [0.0] if abs(motion.turn) < TURNING else [0.0, motion.turn]
-            turns += _orbits(site.centres, tether.robot[:2], motion)
-        self._ways = [_Way(tether, motion.velocity, turn) for turn in turns]
+            courses = [(motion.velocity, turn) for turn in turns]
+            courses += _orbits(site.centres, tether.robot[:2], motion)
+        self._ways = [_Way(tether, velocity, turn) for velocity, turn in courses]
 
     def go_on(self, steps: int) -> int:
         """Look a bit farther.
@@ -120,8 +125,8 @@ class Look:
         )
 
 
-def _orbits(centres: Floats, place: Floats, motion: Motion) -> list[float]:
-    """Rates of turning, of the circles about obstacles that the robot may be on."""
+def _orbits(centres: Floats, place: Floats, motion: Motion) -> list[tuple[Floats, float]]:
+    """Velocities, and rates of turning, of the circles about obstacles that the robot may be on."""
     pace = float(np.hypot(*motion.velocity[:2]))
     out = []
     for x, y in centres:
@@ -133,7 +138,9 @@ def _orbits(centres: Floats, place: Floats, motion: Motion) -> list[float]:
         rate = math.copysign(pace / far, across)
         turns_so = ORBIT <= motion.turn / rate <= 1.0 / ORBIT
         if abs(across) >= TANGENT * pace and turns_so:
-            out.append(rate)
+            velocity = motion.velocity.copy()
+            velocity[:2] = rate * np.array([-away[1], away[0]])
+            out.append((velocity, rate))
     return out
 
 
@@ -144,8 +151,11 @@ class _Way:
         horizon = TURN_HORIZON_S if turn else HORIZON_S
         if abs(turn) * horizon > 2.0 * math.pi:
             horizon = 2.0 * math.pi / abs(turn)  # once around is enough
-        self._steps = math.ceil(horizon / STEP_S)
+        self._steps = math.ceil(max(horizon / STEP_S, abs(turn) * horizon / STEP_ANGLE))
         self._dt = horizon / self._steps
+        pace = float(np.linalg.norm(velocity[:2]))
+        bulge = pace / abs(turn) * (1.0 - math.cos(0.5 * turn * self._dt)) if turn else 0.0
+        self._margin = SURFACE + 1.2 * bulge
         c, s = math.cos(turn * self._dt), math.sin(turn * self._dt)
         rotation = np.array([[c, -s], [s, c]])
         self._least = 0.1 * self._dt * np.linalg.norm(velocity)
@@ -172,7 +182,7 @@ class _Way:
             self._tether, self._k = site.ahead.update(self._tether, places[leap - 1]), k + leap
             return
         self._k += 1
-        there = pushed_out(site.field, places[:1], 1e-3)[0]
+        there = pushed_out(site.field, places[:1], self._margin)[0]
         self.loop = site.closed_by(self._tether.nodes, there)
         if self.loop is not None:
             self.loop_s, self.done = self._k * self._dt, True

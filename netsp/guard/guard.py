@@ -61,6 +61,22 @@ class GuardOptions:
     speed: float = 0.5
 
 
+@dataclass(frozen=True)
+class _Looking:
+    """A look ahead in one class, how likely that is, and what its tether is wound around."""
+
+    likely: float
+    look: Look
+    closed: set[tuple[int, ...]]
+
+    @property
+    def ahead(self) -> Ahead:
+        found = self.look.ahead
+        if found.loop is None or found.loop.around not in self.closed:
+            return found
+        return Ahead(short_s=found.short_s)
+
+
 class Guard:
     """Keeps the class, the taut tether, and what the present motion leads to.
 
@@ -105,7 +121,7 @@ class Guard:
         self._vouched: bool | None = None
         self._last = Fix(0.0)
         self._seen, self._looked = -np.inf, -np.inf
-        self._looks: list[tuple[float, Look]] = []
+        self._looks: list[_Looking] = []
         self._ahead, self._sure = Ahead(), 1.0
         self._on_plan = False
         self._motion: Motion | None = None
@@ -308,7 +324,7 @@ class Guard:
         classes = tuple(self._class(s) for s in strands)
         closed = [self.site.loops_in(s.tether.nodes) for s in strands]
         if strands and motion is not None:
-            self._look(strands, motion)
+            self._look(strands, closed, motion)
         else:
             self._looks, self._ahead, self._sure = [], Ahead(), 1.0
         wound = sum(s.likely for s, found in zip(strands, closed, strict=True) if found)
@@ -356,22 +372,20 @@ class Guard:
         robot, site = strands[0].tether.robot, self.site
         share, found = wound
         loops = next((loops for loops in found if loops), [])
-        closed = {loop.around for loop in loops}
         as_planned = self._as_planned(strands)
         if as_planned is not None:
             self._on_plan = as_planned
         on_plan = self._on_plan
         ahead = self._ahead
-        again = ahead.loop is not None and ahead.loop.around in closed
         return [
             *reasons.in_doubt(classes),
             *reasons.otherwise(as_planned, classes[0]),
             *reasons.little_left(site, classes[0]),
             *reasons.soon_short(site, ahead),
-            *([] if again else reasons.soon_looped(
+            *reasons.soon_looped(
                 site, ahead, robot, self._sure, on_plan, classes[0].likely, self.options.noise,
                 reasons.OF_VELOCITIES if self.track.velocities.believed else reasons.OF_PLACES,
-            )),
+            ),
             *reasons.looped(site, loops, robot, share, on_plan),
         ]  # fmt: skip
 
@@ -382,23 +396,28 @@ class Guard:
         off = o.drift + LEFT_OF_NOISE * o.noise
         return self.site.as_planned(now.tether.robot, now.word, off)
 
-    def _look(self, strands: Sequence[Strand], motion: Motion) -> None:
-        """Ahead, in each class that is worth it: the first loop, and in how likely classes one
-        closes."""
+    def _look(
+        self, strands: Sequence[Strand], closed: Sequence[Sequence[Loop]], motion: Motion
+    ) -> None:
+        """Ahead, in each class that is worth it: the first loop that is not closed there already,
+        and in how likely classes one closes."""
         if not self._looks:
             if 0.0 <= motion.time - self._looked < LOOK_S:
                 return
             self._looked = motion.time
             self._looks = [
-                (s.likely, Look(self.site, s.tether, motion, self.options.speed))
+                _Looking(
+                    s.likely, Look(self.site, s.tether, motion, self.options.speed),
+                    {loop.around for loop in closed[k]},
+                )
                 for k, s in enumerate(strands) if k == 0 or s.likely >= reasons.DOUBT
             ]  # fmt: skip
         steps = self.site.look_steps
-        for _, look in self._looks:
-            steps = look.go_on(steps)
-        if not all(look.done for _, look in self._looks):
+        for looking in self._looks:
+            steps = looking.look.go_on(steps)
+        if not all(looking.look.done for looking in self._looks):
             return
-        found, self._looks = [(likely, look.ahead) for likely, look in self._looks], []
+        found, self._looks = [(v.likely, v.ahead) for v in self._looks], []
         closing = [(likely, a) for likely, a in found if a.loop_s is not None]
         first = max(closing, key=lambda pair: pair[0], default=(0.0, found[0][1]))[1]
         self._ahead = replace(first, short_s=found[0][1].short_s)
