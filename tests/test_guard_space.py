@@ -3,6 +3,7 @@
 import csv
 import itertools
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -172,6 +173,16 @@ def test_what_is_near_a_pile_is_in_doubt_and_what_is_far_from_all_is_not(mission
         other = far.take(fix)
     assert len(one.classes) > 1
     assert len(other.classes) == 1
+
+
+def test_a_step_through_a_solid_has_no_word_and_none_is_sought(site, monkeypatch):
+    """Walks along such steps took up to a second."""
+    through = np.array([[(-0.6, 0.1, -2), (0.6, 0.0, -2)], [(0, 7, -1.5), (0, 7, -2.9)]])
+    beside = np.array([[(-1, 0.6, -2), (1, 0.6, -2)], [(1, 0, -2), (1, -1, -2)]])
+    words = site.letters.written(*beside.swapaxes(0, 1))
+    assert words == [site.water.words.word(step) for step in beside]
+    monkeypatch.setattr(site.letters, "words", replace(site.water.words, labels=None))
+    assert site.letters.written(*through.swapaxes(0, 1)) == [None, None]
 
 
 @pytest.mark.parametrize("every", [0.1, 0.2])

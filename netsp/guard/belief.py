@@ -167,8 +167,8 @@ class Belief:
         if mixes:
             there = self._at(after)
             a, b = there[self._beside[:, 0]], there[self._beside[:, 1]]
-            free = self.letters.depth(0.5 * (a + b)) <= 0.0
-            self._mix(_groups(self.letters.written(a, b), free))
+            free = np.flatnonzero(self.letters.depth(0.5 * (a + b)) <= 0.0)
+            self._mix(_groups(self.letters.written(a[free], b[free]), free))
         self._trim()
         return True
 
@@ -207,7 +207,7 @@ class Belief:
 
     def _rewritten(self, written: list[Word | None], *, spread: bool) -> bool:
         """The same offsets, each with letters more; whether any can have written them."""
-        groups = _groups(written)
+        groups = _groups(written, range(len(written)))
         out: dict[Word, Floats] = {}
         for word, likely in self._likely.items():
             for letters, some in groups.items():
@@ -283,11 +283,11 @@ class Belief:
         self._likely = {w: self._likely[w] / total for w in kept}
 
 
-def _groups(written: list[Word | None], free: np.ndarray | None = None) -> dict[Word, list[int]]:
+def _groups(written: list[Word | None], numbers: Iterable[int]) -> dict[Word, list[int]]:
     """Numbers of steps by what they write, less those that nothing can have gone."""
     out: dict[Word, list[int]] = {}
-    for k, letters in enumerate(written):
-        if letters is not None and (free is None or free[k]):
+    for k, letters in zip(numbers, written, strict=True):
+        if letters is not None:
             out.setdefault(letters, []).append(k)
     return out
 

@@ -65,8 +65,21 @@ class CellLetters:
     def written(self, starts: Floats, ends: Floats) -> list[Word | None]:
         """As of `netsp.guard.site.Letters`; places in solids are put out of them first."""
         a, b = (pushed_out(self.field, points, SURFACE) for points in (starts, ends))
-        numbers = [self.words.number(np.stack(pair))[0] for pair in zip(a, b, strict=True)]
-        return [None if n is None else self._letters(n) for n in numbers]
+        # a step through a solid has no word, which a walk along it finds out the hardest way
+        far = np.linalg.norm(b - a, axis=1)
+        doubt = self.field.distance(a) < far
+        through = [
+            near and not self.field.line_of_sight(p, q, self.words.tolerance)
+            for near, p, q in zip(doubt, a, b, strict=True)
+        ]
+        return [
+            None if hits else self._word(np.stack(pair))
+            for hits, *pair in zip(through, a, b, strict=True)
+        ]
+
+    def _word(self, step: Floats) -> Word | None:
+        number, _ = self.words.number(step)
+        return None if number is None else self._letters(number)
 
     def join(self, a: Word, b: Word) -> Word:
         """The word of one path after another."""
