@@ -98,6 +98,21 @@ def test_places_headings_velocities_arming_modes_and_the_winch_are_read(tmp_path
     assert winch.paid_out == pytest.approx(12.5)
 
 
+WRITTEN = bytes.fromhex(
+    "dcf4362b00000000000f0059006a0098ce46bd4f0bd53d7ae688bd"
+    "7e1dbcbc1ca21c41faacadc05ac72ebf0b0002000400b3210000"
+)
+"""An estimate of an ArduPilot vehicle, 725 s after it had started, byte for byte."""
+
+
+def test_an_estimate_that_a_vehicle_wrote_is_read_as_what_it_is(tmp_path):
+    (fix,) = read(tmp_path, struct.pack("<BBB", 0xA3, 0x95, TYPES["XKF1"]) + WRITTEN)
+    assert fix.time == pytest.approx(725.021916)
+    assert fix.position == pytest.approx((-5.427365, 9.789577, 0.682729), abs=1e-5)
+    assert fix.velocity == pytest.approx((0.104025, -0.048537, 0.066846), abs=1e-5)
+    assert fix.heading == pytest.approx(1.06)
+
+
 def test_a_vehicle_that_has_turned_once_is_believed_on(tmp_path):
     """Bit 10 of the status says that a takeoff was detected, not that nothing is known yet."""
     fixes = read(
