@@ -62,9 +62,9 @@ class Outcome:
     leads: list[float] = field(default_factory=list)
     allowed: list[tuple[float, float, float]] = field(default_factory=list)
     """Of loops that can be foreseen in time: leads of the warning, of the first word, and of a
-    guard that knows the position, since it sees it all the time."""
+    guard that knows the position, since it sees it all the time and the robot goes so."""
     glimpsed: list[tuple[float, float]] = field(default_factory=list)
-    """Of others that such a guard saw in time, but not all the time since."""
+    """Of others that such a guard saw in time, but not all the time since, or by chance."""
     updates_ms: list[float] = field(default_factory=list)
     home_ms: list[float] = field(default_factory=list)
 
@@ -96,8 +96,9 @@ def circle_about(obstacle: Circle | Polygon) -> tuple[tuple[float, float], float
 
 def loop_paths(
     problem: Problem, here: np.ndarray, strands: Strands, rng: np.random.Generator
-) -> Iterator[np.ndarray]:
-    """Straight to obstacles in sight, one after the other, and around each, once and a bit."""
+) -> Iterator[tuple[np.ndarray, int]]:
+    """Straight to obstacles in sight, one after the other, and around each, once and a bit; with
+    the place on the way where each circle begins."""
     for i in rng.permutation(len(problem.obstacles)):
         center, least = circle_about(problem.obstacles[int(i)])
         if math.dist(center, here[:2]) > 25.0:
@@ -121,7 +122,7 @@ def loop_paths(
             continue
         steps = int(math.dist(here, ring[0]) / (SPEED * DT)) + 1
         line = here + np.linspace(0.0, 1.0, steps + 1)[1:, None] * (ring[0] - here)
-        yield np.vstack([line, ring])
+        yield np.vstack([line, ring]), len(line)
 
 
 def closes(problem: Problem, tether: object, path: np.ndarray, strands: Strands) -> int | None:
@@ -190,7 +191,7 @@ def put_in(
     if not clear.strands.all or clear.report is None or clear.report.loops:
         return
     tether = clear.strands.all[0].tether
-    for path in loop_paths(problem, tether.robot, clear.strands, rng):
+    for path, turns_at in loop_paths(problem, tether.robot, clear.strands, rng):
         end = closes(problem, tether, path, clear.strands)
         if end is not None:
             break
@@ -222,8 +223,10 @@ def put_in(
     out.missed_by_turns += by_turns is None or by_turns > end
     lead, word = (-math.inf if k is None else (end - k) * DT for k in (first, spoken))
     out.leads.append(lead)
-    # where even a guard that knows the position saw it coming ten seconds before
-    seen = (end - seen_since(coming)) * DT
+    # where a guard that knows the position sees it coming, and the robot goes as it does then: what
+    # is seen on the straight piece of a loop that closes on the circle is there by chance
+    since = max(seen_since(coming), turns_at if end >= turns_at else 0)
+    seen = (end - since) * DT
     if seen >= LEAD:
         out.allowed.append((lead, word, seen))
     elif any(coming) and (end - coming.index(True)) * DT >= LEAD:
@@ -290,7 +293,7 @@ def main() -> None:
         told(kind or "all", some)
     glimpsed = np.array([v for o in found for v in o.glimpsed]).reshape(-1, 2)
     if len(glimpsed):
-        print(f"\nSeen coming and lost sight of: warned / told 10 s before {in_time(glimpsed)}")
+        print(f"\nSeen in time by chance: warned / told 10 s before {in_time(glimpsed)}")
     print()
 
 
