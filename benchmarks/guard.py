@@ -194,6 +194,7 @@ def put_in(
     for path, turns_at in loop_paths(problem, tether.robot, clear.strands, rng):
         end = closes(problem, tether, path, clear.strands)
         if end is not None:
+            goes_so = turns_at if end >= turns_at else 0
             break
     else:
         return
@@ -225,8 +226,7 @@ def put_in(
     out.leads.append(lead)
     # where a guard that knows the position sees it coming, and the robot goes as it does then: what
     # is seen on the straight piece of a loop that closes on the circle is there by chance
-    since = max(seen_since(coming), turns_at if end >= turns_at else 0)
-    seen = (end - since) * DT
+    seen = (end - max(seen_since(coming), goes_so)) * DT
     if seen >= LEAD:
         out.allowed.append((lead, word, seen))
     elif any(coming) and (end - coming.index(True)) * DT >= LEAD:
