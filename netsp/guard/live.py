@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import queue
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 from netsp.errors import InputError
 from netsp.guard.alarms import Level
@@ -19,6 +20,7 @@ from netsp.link.address import Address
 from netsp.link.dialect import dialect
 from netsp.link.frame import Frame
 from netsp.link.messages import Listener
+from netsp.link.statustext import status_texts
 from netsp.link.udp import UdpLink
 
 SILENT_S = 0.5
@@ -92,6 +94,7 @@ def watch(
     listener, stream = Listener(frame, system), Stream(guard)
     heard = saved = sent = told = time.monotonic()
     others: set[int] = set()
+    numbers = itertools.count()
     try:
         tell(f"listening on {address}")
         while until is None or not until():
@@ -114,13 +117,13 @@ def watch(
                     take(report)
                     if publish and (report.raised or now - sent >= PUBLISH_S):
                         sent = now
-                        _publish(link, report)
+                        _publish(link, report, numbers)
             if now - heard >= SILENT_S and now - told >= SILENT_S and listener.time is not None:
                 told = now
                 report = stream.wait(listener.time + now - heard)
                 take(report)
                 if publish and report.raised:
-                    _publish(link, report)
+                    _publish(link, report, numbers)
             if not listener.heard and listener.others - others:
                 others |= listener.others
                 who = ", ".join(map(str, sorted(others)))
@@ -151,7 +154,7 @@ def _correct(
             tell(f"not corrected: {error}")
 
 
-def _publish(link: UdpLink, report: Report) -> None:
+def _publish(link: UdpLink, report: Report, numbers: Iterator[int]) -> None:
     m = dialect()
     boot = int(report.time * 1000.0) & 0xFFFFFFFF
     figures: dict[bytes, float | None] = {b"loop_s": report.loop_s, b"short_s": report.short_s}
@@ -168,7 +171,5 @@ def _publish(link: UdpLink, report: Report) -> None:
             Level.NOTICE: m.MAV_SEVERITY_NOTICE, Level.CAUTION: m.MAV_SEVERITY_WARNING,
             Level.WARNING: m.MAV_SEVERITY_CRITICAL, Level.ALARM: m.MAV_SEVERITY_ALERT,
         }[alarm.level]  # fmt: skip
-        text = alarm.text.encode("ascii", "replace")
-        for k in range(0, min(len(text), 250), 50):
-            part = text[k : k + 50]
-            link.send(m.MAVLink_statustext_message(severity, part, id=1, chunk_seq=k // 50))
+        for part in status_texts(severity, alarm.text, next(numbers)):
+            link.send(part)

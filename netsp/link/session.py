@@ -6,6 +6,7 @@ heartbeats, and time by its own clock.
 
 from __future__ import annotations
 
+import itertools
 import threading
 import time
 from collections import deque
@@ -21,6 +22,7 @@ from netsp.guard.fix import Fix
 from netsp.link.dialect import dialect
 from netsp.link.frame import Frame
 from netsp.link.messages import Listener
+from netsp.link.statustext import status_texts
 from netsp.link.udp import UdpLink
 
 HEARTBEAT_S = 0.5
@@ -63,6 +65,7 @@ class Session:
         self._places: deque[tuple[float, Point3]] = deque(maxlen=2000)
         self._texts: deque[str] = deque(maxlen=200)
         self._acks: dict[int, int] = {}
+        self._said = itertools.count()
         self._stop = threading.Event()
         self._threads = [
             threading.Thread(target=work, daemon=True) for work in (self._read, self._beat)
@@ -174,12 +177,7 @@ class Session:
         """Words for whoever looks at the ground station."""
         m = dialect()
         severity = m.MAV_SEVERITY_ALERT if urgent else m.MAV_SEVERITY_WARNING
-        data = f"netsp: {text}".encode("ascii", "replace")
-        for k in range(0, len(data), 50):
-            more = len(data) > 50
-            part = m.MAVLink_statustext_message(
-                severity, data[k : k + 50], id=1 if more else 0, chunk_seq=k // 50
-            )
+        for part in status_texts(severity, f"netsp: {text}", next(self._said)):
             self.link.send(part)
 
     def _read(self) -> None:
