@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeGuard
 
 import numpy as np
 from pydantic import BeforeValidator, Field, WithJsonSchema
@@ -43,6 +43,25 @@ def checked_integer(value: Any) -> int:
     if isinstance(value, bool) or not isinstance(value, int | np.integer):
         raise ValueError(f"expected a whole number, got {shown(value)}")
     return int(value)
+
+
+def is_index(value: object, count: int) -> TypeGuard[int]:
+    """Whether it is a whole number from 0 on and below a count; truth values are none.
+
+    Parameters
+    ----------
+    value : object
+        Anything.
+    count : int
+        Of what is numbered.
+
+    Returns
+    -------
+    bool
+        Whether it is.
+    """
+    whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
+    return whole and 0 <= int(value) < count  # type: ignore[call-overload]
 
 
 def _size(value: Any) -> Any:

@@ -1,6 +1,9 @@
 """A guard beside a vehicle: which class, how long, what it leads to, and what it does not know."""
 
+import contextlib
+import copy
 import csv
+import functools
 import gzip
 import http.client
 import itertools
@@ -24,6 +27,7 @@ from netsp.errors import InputError
 from netsp.guard.ahead import Ahead, Look
 from netsp.guard.alarms import Alarm, Alarms, Level
 from netsp.guard.belief import Belief
+from netsp.guard.correct import agrees
 from netsp.guard.fix import Fix
 from netsp.guard.gaps import ways_between
 from netsp.guard.guard import Guard, GuardOptions
@@ -251,10 +255,86 @@ def test_the_operator_knows_better():
     report = guard.correct("north", "A")
     report = guard.take(Fix(report.time + 0.1, (9.0, 0.0, 0.0), estimate=True))
     assert report.classes[0].word == (1,)
-    with pytest.raises(InputError, match="side"):
-        guard.correct("up", "A")
-    with pytest.raises(InputError, match="obstacle"):
-        guard.correct("north", "C")
+    for side in ("up", ["north"]):
+        with pytest.raises(InputError, match="side"):
+            guard.correct(side, "A")
+    for obstacle in ("C", 2, -1, True, None, 0.5):
+        with pytest.raises(InputError, match="obstacle"):
+            guard.correct("north", obstacle)
+
+
+NORTH_OF_A = [(0, 0, 0), (4.2, 0.3, 0), (5, 1.2, 0), (7, 1.2, 0), (9, 0, 0)]
+
+
+@pytest.mark.parametrize("at", [52, 54, 57])
+def test_a_correction_leaves_the_classes_that_agree_where_they_are(at):
+    """Here the robot is on one side of the obstacle's ray in one class, on the other in another."""
+    guard = Guard(SITE)
+    for k, fix in enumerate(every_other(along(*NORTH_OF_A))):
+        guard.take(fix)
+        if k == at:
+            agrees_so = functools.partial(guard.site.agrees, side="north", obstacle="A")
+            agree = {s.word for s in guard.strands.all if agrees_so(s.tether.nodes)}
+            report = guard.correct("north", "A")
+            assert {c.word for c in report.classes} == agree
+    report = guard.report
+    assert report.classes[0].word == (1,)
+    assert report.classes[0].likely > 0.9
+    assert not report.loops
+
+
+def test_a_state_file_has_the_classes_at_one_place(tmp_path):
+    guard, again = Guard(SITE), Guard(SITE)
+    fixes = list(every_other(along(*NORTH_OF_A)))
+    for fix in fixes[:58]:
+        guard.take(fix)
+    assert len(guard.strands.all) > 1
+    save(guard, tmp_path / "state.json")
+    restore(again, tmp_path / "state.json")
+    for fix in fixes[58:]:
+        report = again.take(fix)
+    assert report.classes[0].word == (1,)
+    assert report.classes[0].likely > 0.9
+
+
+def test_what_the_operator_says_of_one_obstacle_changes_nothing_about_others():
+    guard = Guard(SITE, EXACT)
+    for fix in along((0, 0, 0), (4.5, 1, 0), (7, 1, 0), (7, 0, 0)):
+        guard.take(fix)
+    assert [c.word for c in guard.correct("south", "A").classes] == [()]
+
+
+def test_what_was_ahead_in_another_class_is_forgotten_at_once():
+    guard = Guard(SITE, EXACT)
+    guard.remember({(): 0.0, (1,): 0.0}, np.zeros(3), 0.0)
+    told = 0
+    for k, fix in enumerate(along(*ROUND_A)):
+        guard.take(fix)
+        if k % 7 == 0:
+            watching = copy.deepcopy(guard)
+            with contextlib.suppress(InputError):
+                report = watching.correct("south", "A")
+                afresh = Look(watching.site, watching.strands.all[0].tether, watching._motion, 0.5)
+                afresh.go_on(10_000)
+                told += guard.report.loop_s is not None
+                assert report.loop_s in (None, afresh.ahead.loop_s)
+                assert report.loops or all(a.kind != "loop" for a in report.alarms)
+    assert told > 0
+
+
+@pytest.mark.parametrize("side", ["north", "south", "east", "west"])
+def test_a_tether_that_begins_or_ends_on_a_ray_does_not_cross_it(side):
+    """The obstacle is in line with the base."""
+    site = Problem(base=(0, 0), goals=[(1, 8)], tether_length=20,
+                   obstacles=[Circle(center=(0, 5), radius=0.5, name="A")])  # fmt: skip
+    east = np.array([(0, 0), (0.5, 5), (1, 8)], dtype=float)
+    over = np.array([(0, 0), (-0.5, 5), (0, 5.5), (1, 8)], dtype=float)
+    away = np.array([(0, 0), (3, -2)], dtype=float)
+    back = np.array([(0, 0), (0, 3), (0.5, 5), (0, 7)], dtype=float)
+    assert agrees(site, east, side, "A") == (side == "east")
+    assert agrees(site, over, side, "A") == (side in ("north", "west"))
+    assert not agrees(site, away, side, "A")
+    assert agrees(site, back, side, "A") == (side == "east")
 
 
 def test_a_gap_leaves_every_class_that_the_robot_can_have_reached():

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import BeforeValidator, ConfigDict, Field, model_validator
 
 from netsp.errors import InputError
-from netsp.fields import NonNegative, Point2, Point3, Positive, checked_integer
+from netsp.fields import NonNegative, Point2, Point3, Positive, checked_integer, is_index
 from netsp.files import FileModel
 from netsp.models import Model, shown
 from netsp.problem import WIDEST, Circle, GoalLike, Obstacle, Polygon, Problem
@@ -216,6 +216,6 @@ def index_of(which: int | str, things: list, field: str) -> int:  # type: ignore
             return int(which[1:])
         raise InputError(f"{field}: expected the name of one, got {which!r}, of which there are "
                          f"{len(found)}")  # fmt: skip
-    if which >= len(things):
-        raise InputError(f"{field}: expected a number below {len(things)}, got {which}")
-    return which
+    if not is_index(which, len(things)):
+        raise InputError(f"{field}: expected a number below {len(things)}, got {which!r}")
+    return int(which)

@@ -9,6 +9,7 @@ nothing happens there.
 from __future__ import annotations
 
 import math
+from collections.abc import Set
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,7 +28,7 @@ STEP_S, STEP_ANGLE = 1.0, 0.5
 """Seconds, about, and radians at most, between two places on the way."""
 
 SURFACE = 1e-3
-"""Metres off an obstacle, at least, that places on the way are; where the way turns, so many more
+"""Metres off an obstacle, at least, that places on the way are, and more where the way turns, so
 that the straight step between two goes past it, too."""
 
 TURNING = 0.06
@@ -75,10 +76,15 @@ class Look:
         Of the robot.
     speed : float
         Its fastest, m/s: slower than a tenth of it, it is at rest.
+    closed : set of tuple of int
+        What loops that are closed already are around: ways that come to one lead to none.
     """
 
-    def __init__(self, site: Site, tether: Tether, motion: Motion, speed: float) -> None:
-        self.site, self.velocity = site, motion.velocity
+    def __init__(
+        self, site: Site, tether: Tether, motion: Motion, speed: float,
+        closed: Set[tuple[int, ...]] = frozenset(),
+    ) -> None:  # fmt: skip
+        self.site, self.velocity, self._closed = site, motion.velocity, closed
         pace = float(np.linalg.norm(motion.velocity[:2]))
         courses: list[tuple[Floats, float]] = []
         if pace >= MOVING * speed:
@@ -114,7 +120,10 @@ class Look:
     @property
     def ahead(self) -> Ahead:
         """The sooner of what straight on and turning on lead to, as far as it is found out."""
-        loops = [(w.loop_s, k) for k, w in enumerate(self._ways) if w.loop_s is not None]
+        loops = [
+            (w.loop_s, k) for k, w in enumerate(self._ways)
+            if w.loop_s is not None and w.loop is not None and w.loop.around not in self._closed
+        ]  # fmt: skip
         shorts = [w.short_s for w in self._ways if w.short_s is not None]
         first = min(loops, default=None)
         return Ahead(

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from itertools import pairwise
 
 import numpy as np
-import shapely
 
 from netsp.arrays import Floats
 from netsp.errors import InputError
@@ -19,25 +19,20 @@ SIDES = {"north": 0, "east": 2, "south": 4, "west": 6}
 """Where in `WINDS`; `AXES` has the same order."""
 
 
-def rays_of(
-    problem: Problem, obstacle: int, side: str
-) -> tuple[shapely.LineString, shapely.LineString]:
-    """From an obstacle's middle to one of its sides and to the opposite one, as far as a tether
-    goes.
+def direction_of(problem: Problem, side: str) -> Floats:
+    """Where a side of an obstacle is.
 
     Parameters
     ----------
     problem : Problem
         The site.
-    obstacle : int
-        Its index.
     side : str
         One of `SIDES`, or `AXES` where north is not known.
 
     Returns
     -------
-    pair of shapely.LineString
-        In the plan, metres.
+    ndarray, shape (2,)
+        A unit vector in the plan.
 
     Raises
     ------
@@ -45,14 +40,42 @@ def rays_of(
         No such side.
     """
     names = {**SIDES, **{AXES[k]: k for k in range(0, 8, 2)}}
-    if side not in names:
+    if not isinstance(side, str) or side not in names:
         raise InputError(f"side: expected north, east, south or west, got {side!r}")
     heading = problem.origin.heading if problem.origin else 0.0
     angle = np.radians(45.0 * names[side] - heading)
-    middle = np.asarray(problem.representative_points[obstacle], dtype=float)
-    far = 2.0 * (problem.tether_length + problem.scale)
-    way = far * np.array([np.sin(angle), np.cos(angle)])
-    return shapely.LineString([middle, middle + way]), shapely.LineString([middle, middle - way])
+    return np.array([np.sin(angle), np.cos(angle)])
+
+
+def crosses(path: Floats, begin: Floats, way: Floats) -> bool:
+    """Whether a path goes over a ray from one of its sides to the other; what begins or ends on it
+    does not.
+
+    Parameters
+    ----------
+    path : ndarray, shape (n, 2)
+        Metres.
+    begin : ndarray, shape (2,)
+        Of the ray, metres.
+    way : ndarray, shape (2,)
+        Its direction, a unit vector.
+
+    Returns
+    -------
+    bool
+        Whether it does.
+    """
+    off = path - begin
+    along, side = off @ way, off[:, 1] * way[0] - off[:, 0] * way[1]
+    clear = np.flatnonzero(np.abs(side) > 1e-9 * (1.0 + np.abs(off).max()))
+    # between the places that are clear of the ray's line
+    for i, j in pairwise(clear):
+        if side[i] * side[j] < 0.0:
+            k = j - 1  # on the line, or before it
+            share = side[k] / (side[k] - side[j])
+            if along[k] + share * (along[j] - along[k]) > 0.0:
+                return True
+    return False
 
 
 def agrees(problem: Problem, path: Floats, side: str, obstacle: int | str) -> bool:
@@ -80,14 +103,13 @@ def agrees(problem: Problem, path: Floats, side: str, obstacle: int | str) -> bo
         No such obstacle or side.
     """
     index = index_of(obstacle, list(problem.obstacles), "obstacle")
-    on, off = rays_of(problem, index, side)
-    line = shapely.LineString(path[:, :2])
-    return bool(line.intersects(on)) and not line.intersects(off)
+    way, middle = direction_of(problem, side), problem.representative_points[index]
+    return crosses(path[:, :2], middle, way) and not crosses(path[:, :2], middle, -way)
 
 
 def corrected(
     problem: Problem, believed: Iterable[Word], robot: Floats, side: str, obstacle: int | str
-) -> set[Word]:
+) -> dict[Word, Floats]:
     """The classes that agree with what the operator says.
 
     Parameters
@@ -105,9 +127,9 @@ def corrected(
 
     Returns
     -------
-    set of Word
+    dict of Word to ndarray, shape (n, 3)
         Of all classes that the tether reaches the robot in and that agree, those that differ least
-        from one that was believed.
+        from one that was believed, and the taut tethers.
 
     Raises
     ------
@@ -116,13 +138,13 @@ def corrected(
     """
     index = index_of(obstacle, list(problem.obstacles), "obstacle")
     ways = Tethers(problem).classes(*robot)
-    agree = {t.word for t in ways if agrees(problem, t.path, side, index)}
+    agree = {t.word: t.path for t in ways if agrees(problem, t.path, side, index)}
     if not agree:
         raise InputError(
             f"side: no tether within {problem.tether_length:g} {problem.units} reaches the robot "
             f"{side} of {problem.obstacle_name(index)}"
         )
-    return least_changed(agree, believed)
+    return {word: agree[word] for word in least_changed(agree, believed)}
 
 
 def least_changed(others: Iterable[Word], believed: Iterable[Word]) -> set[Word]:
@@ -147,10 +169,10 @@ def least_changed(others: Iterable[Word], believed: Iterable[Word]) -> set[Word]
 
 
 def _apart(a: Word, b: Word) -> int:
-    """Letters that must be put in, left out or changed to make one word of the other."""
+    """Letters that must be put in or left out to make one word of the other."""
     row = list(range(len(b) + 1))
     for i, x in enumerate(a, 1):
         before, row[0] = row[0], i
         for j, y in enumerate(b, 1):
-            before, row[j] = row[j], min(row[j] + 1, row[j - 1] + 1, before + (x != y))
+            before, row[j] = row[j], min(row[j] + 1, row[j - 1] + 1, before + 2 * (x != y))
     return row[-1]

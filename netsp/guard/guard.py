@@ -61,22 +61,6 @@ class GuardOptions:
     speed: float = 0.5
 
 
-@dataclass(frozen=True)
-class _Looking:
-    """A look ahead in one class, how likely that is, and what its tether is wound around."""
-
-    likely: float
-    look: Look
-    closed: set[tuple[int, ...]]
-
-    @property
-    def ahead(self) -> Ahead:
-        found = self.look.ahead
-        if found.loop is None or found.loop.around not in self.closed:
-            return found
-        return Ahead(short_s=found.short_s)
-
-
 class Guard:
     """Keeps the class, the taut tether, and what the present motion leads to.
 
@@ -121,7 +105,7 @@ class Guard:
         self._vouched: bool | None = None
         self._last = Fix(0.0)
         self._seen, self._looked = -np.inf, -np.inf
-        self._looks: list[_Looking] = []
+        self._looks: list[tuple[float, Look]] = []
         self._ahead, self._sure = Ahead(), 1.0
         self._on_plan = False
         self._motion: Motion | None = None
@@ -150,13 +134,15 @@ class Guard:
         self.strands.all = [Strand(w, 1.0, t) for w, t in (tethers or {}).items()]
 
     def correct(self, side: str, obstacle: int | str) -> Report | None:
-        """The operator says on which side of an obstacle the tether passes: of the classes that
-        are believed those count that do, and where none does, others that differ least from one.
+        """The operator says on which side of an obstacle the tether passes.
+
+        Classes that are believed and pass on that side are kept; where there are none, those that
+        differ least from one that was believed take their place.
 
         Parameters
         ----------
         side : str
-            North, east, south or west.
+            One of the site's `sides`, or an axis where north is not known.
         obstacle : int or str
             Its index or name.
 
@@ -172,18 +158,36 @@ class Guard:
         """
         if self.track.time is None or not self.strands.all:
             raise InputError("side: nothing is known yet of where the robot is")
+        strands = self.strands.all
+        agree = [s for s in strands if self.site.agrees(s.tether.nodes, side, obstacle)]
+        if agree:
+            total = sum(s.likely for s in agree)
+            self.strands.all = [replace(s, likely=s.likely / total) for s in agree]
+            self.belief.drop(self.belief.words - {s.believed for s in agree})
+        else:
+            self._begin_with_others(side, obstacle)
+        # what was ahead, or closed, was so in classes that are none
+        self._looks, self._looked, self._ahead, self._sure = [], -np.inf, Ahead(), 1.0
+        self.alarms = Alarms()
+        return self._told(self._last)
+
+    def _begin_with_others(self, side: str, obstacle: int | str) -> None:
+        """Of all classes that the tether reaches the robot in, where it most likely is."""
         here = self.strands.all[0].tether.robot
-        agree = [s for s in self.strands.all if self.site.agrees(s.tether.nodes, side, obstacle)]
-        known = {s.word: s.cost for s in agree} or dict.fromkeys(
-            self.site.corrected({s.word for s in self.strands.all}, here, side, obstacle), 0.0
-        )
-        self.strands.all = agree
+        known = {s.word for s in self.strands.all}
+        others = [
+            Strand(word, 1.0, tether, word)
+            for word, tether in self.site.corrected(known, here, side, obstacle).items()
+        ]
+        self.strands.all = [replace(s, likely=1.0 / len(others)) for s in others]
         assert self._motion is not None
         estimate = self._motion.after
         (step,) = self.site.letters.written(here[None], estimate[None])
-        self.belief.begin({self.site.letters.join(w, step or ()): c for w, c in known.items()})
-        self.strands.follow(self.belief.classes(), estimate, MOST_TETHERS)
-        return self._told(self._last)
+        join = self.site.letters.join
+        self.belief.begin({join(s.word, step or ()): 0.0 for s in others})
+        hanging = self.strands.all
+        if not self.strands.follow(self.belief.classes(), estimate, MOST_TETHERS):
+            self.strands.all = hanging
 
     def take(self, fix: Fix) -> Report:
         """Something that the vehicle says.
@@ -262,11 +266,6 @@ class Guard:
         self.track.lose(fix.time if self.track.time is None else self.track.time)
         self._vouched = None
         return self.take(fix)
-
-    @property
-    def words(self) -> dict[Word, float]:
-        """Classes that are believed, at the robot's place, and their costs."""
-        return {s.word: s.cost for s in self.strands.all}
 
     def _moved(self, motion: Motion) -> None:
         o = self.options
@@ -399,25 +398,26 @@ class Guard:
     def _look(
         self, strands: Sequence[Strand], closed: Sequence[Sequence[Loop]], motion: Motion
     ) -> None:
-        """Ahead, in each class that is worth it: the first loop that is not closed there already,
-        and in how likely classes one closes."""
+        """Ahead, in each class that is worth it: the first loop, of those that are not closed there
+        already, and in how likely classes one closes."""
         if not self._looks:
             if 0.0 <= motion.time - self._looked < LOOK_S:
                 return
             self._looked = motion.time
             self._looks = [
-                _Looking(
-                    s.likely, Look(self.site, s.tether, motion, self.options.speed),
-                    {loop.around for loop in closed[k]},
+                (
+                    s.likely,
+                    Look(self.site, s.tether, motion, self.options.speed,
+                         {loop.around for loop in closed[k]}),
                 )
                 for k, s in enumerate(strands) if k == 0 or s.likely >= reasons.DOUBT
             ]  # fmt: skip
         steps = self.site.look_steps
-        for looking in self._looks:
-            steps = looking.look.go_on(steps)
-        if not all(looking.look.done for looking in self._looks):
+        for _, look in self._looks:
+            steps = look.go_on(steps)
+        if not all(look.done for _, look in self._looks):
             return
-        found, self._looks = [(v.likely, v.ahead) for v in self._looks], []
+        found, self._looks = [(likely, look.ahead) for likely, look in self._looks], []
         closing = [(likely, a) for likely, a in found if a.loop_s is not None]
         first = max(closing, key=lambda pair: pair[0], default=(0.0, found[0][1]))[1]
         self._ahead = replace(first, short_s=found[0][1].short_s)

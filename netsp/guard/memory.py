@@ -6,7 +6,7 @@ import json
 import math
 import time
 from pathlib import Path
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import ConfigDict, Field
@@ -135,22 +135,42 @@ def save(guard: Guard, file: str | Path) -> None:
     file : str or Path
         Is replaced in one step.
     """
-    words = guard.words
-    if not words:
+    if not guard.strands.all:
         return
-    x, y, z = guard.strands.all[0].tether.robot.tolist()
+    position = guard.strands.all[0].tether.robot
     data = {
         "schema_version": 1, "site": guard.site.identity, "saved": round(time.time(), 3),
-        "position": [x, y, z],
-        "classes": [
-            {
-                "word": list(s.word), "cost": round(max(0.0, words[s.word]), 6),
-                "tether": [[round(float(v), 6) for v in p] for p in s.tether.nodes],
-            }
-            for s in guard.strands.all if math.isfinite(words[s.word])
-        ],
+        "position": position.tolist(), "classes": _classes(guard, position),
     }  # fmt: skip
     write_text(file, json.dumps(data, allow_nan=False) + "\n")
+
+
+def _classes(guard: Guard, position: Floats) -> list[dict[str, Any]]:
+    """As at one place: with each class goes another one where the robot is, and words are those of
+    ways to there."""
+    site = guard.site
+    likely: dict[Word, float] = {}
+    hangs: dict[Word, Floats] = {}
+    for strand in guard.strands.all:  # the likeliest first
+        nodes = strand.tether.nodes
+        there = strand.tether.robot
+        (step,) = site.letters.written(there[None], position[None])
+        if step is None:
+            continue
+        word = site.letters.join(strand.word, step)
+        likely[word] = likely.get(word, 0.0) + strand.likely
+        if np.array_equal(there, position):
+            hangs[word] = nodes
+        elif site.field.line_of_sight(there, position):
+            hangs.setdefault(word, np.vstack([nodes, position]))
+    out: list[dict[str, Any]] = []
+    for word, share in likely.items():
+        cost = max(0.0, -math.log(max(share, 1e-9)))
+        known: dict[str, Any] = {"word": list(word), "cost": round(cost, 6)}
+        if word in hangs:
+            known["tether"] = [[round(float(v), 6) for v in p] for p in hangs[word]]
+        out.append(known)
+    return out
 
 
 def restore(guard: Guard, file: str | Path) -> GuardState | None:

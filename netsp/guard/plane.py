@@ -143,9 +143,10 @@ class PlaneSite:
 
     def corrected(
         self, believed: Iterable[Word], robot: Floats, side: str, obstacle: int | str
-    ) -> set[Word]:
+    ) -> dict[Word, Tether]:
         """As of `netsp.guard.correct.corrected`."""
-        return corrected(self.problem, believed, robot, side, obstacle)
+        paths = corrected(self.problem, believed, robot, side, obstacle)
+        return {word: self.model.relaxed(path, ROUNDS) for word, path in paths.items()}
 
     def agrees(self, nodes: Floats, side: str, obstacle: int | str) -> bool:
         """As of `netsp.guard.correct.agrees`."""

@@ -160,8 +160,9 @@ class Site(Protocol):
 
     def corrected(
         self, believed: Iterable[Word], robot: Floats, side: str, obstacle: int | str
-    ) -> set[Word]:
-        """The classes that agree with what an operator says (`netsp.guard.correct.corrected`)."""
+    ) -> dict[Word, Tether]:
+        """The classes that agree with what an operator says (`netsp.guard.correct.corrected`), and
+        how the tether hangs in them."""
 
     def agrees(self, nodes: Floats, side: str, obstacle: int | str) -> bool:
         """Whether a tether passes an obstacle on that side, and not on the other one as well."""

@@ -12,6 +12,7 @@ import numpy as np
 
 from netsp.arrays import Floats
 from netsp.errors import InputError
+from netsp.fields import is_index
 from netsp.geometry import polylines
 from netsp.guard.correct import least_changed
 from netsp.guard.silhouettes import silhouette
@@ -138,7 +139,6 @@ class SpaceSite:
         self.centres = np.zeros((0, 2))
         self._solids = scene.solids
         self._missed: dict[Word, Floats] = {}
-        self._told: dict[Word, Tether] = {}  # what an operator spoke of, as it hangs
 
     def start_word(self) -> Word:
         """Of the tether that the mission begins with."""
@@ -152,9 +152,6 @@ class SpaceSite:
         words = self.water.words
         end = words.held(place)
         missed = self._missed.get(word)
-        told = self._told.pop(word, None)
-        if told is not None and self.field.line_of_sight(told.robot, place):
-            return self.model.update(told, place)
         if end is None or (missed is not None and math.dist(missed, place) < AGAIN):
             return None
         for other, tether in list(hanging) or [(self.start_word(), self._first)]:
@@ -228,7 +225,7 @@ class SpaceSite:
 
     def corrected(
         self, believed: Iterable[Word], robot: Floats, side: str, obstacle: int | str
-    ) -> set[Word]:
+    ) -> dict[Word, Tether]:
         """Of all classes that the tether reaches the robot in, those whose taut tether passes a
         solid on that side (`agrees`), and of them those that differ least from one believed.
 
@@ -245,8 +242,8 @@ class SpaceSite:
 
         Returns
         -------
-        set of Word
-            One or more.
+        dict of Word to Tether
+            One or more, and how the tether hangs.
 
         Raises
         ------
@@ -255,7 +252,7 @@ class SpaceSite:
         """
         index = self._index(obstacle)
         end = self.water.words.held(robot)
-        self._told = {}
+        agree: dict[Word, Tether] = {}
         if end is not None:
             shape = self.water.words.cells.flags.shape
             root = int(np.ravel_multi_index(tuple(self.water.words.root), shape))
@@ -264,16 +261,16 @@ class SpaceSite:
                 word = self.word_of(tether.nodes)
                 short = tether.length <= self.tether_length
                 if word is not None and short and self.agrees(tether.nodes, side, index):
-                    self._told.setdefault(word, tether)
-        if not self._told:
+                    agree.setdefault(word, tether)
+        if not agree:
             raise InputError(
                 f"side: no tether within {self.tether_length:g} {self.units} was found that "
                 f"reaches the robot {beside(side, self.name_of(index))}"
             )
-        return least_changed(self._told, believed)
+        return {word: agree[word] for word in least_changed(agree, believed)}
 
     def agrees(self, nodes: Floats, side: str, obstacle: int | str) -> bool:
-        """Where it comes nearest to the solid, and not on the other side as well."""
+        """A tether passes a solid on the side where it comes nearest to it."""
         if side not in self.sides:
             raise InputError(f"side: expected {', '.join(self.sides)}, got {side!r}")
         alone = self._of(self._index(obstacle))
@@ -288,8 +285,8 @@ class SpaceSite:
         names = [self.name_of(k) for k in range(len(self._solids))]
         if isinstance(obstacle, str) and obstacle in names:
             return names.index(obstacle)
-        if isinstance(obstacle, int) and 0 <= obstacle < len(names):
-            return obstacle
+        if is_index(obstacle, len(names)):
+            return int(obstacle)
         raise InputError(f"obstacle: expected a name or an index of a solid, got {obstacle!r}")
 
     def _of(self, solid: int) -> Any:

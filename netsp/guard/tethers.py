@@ -35,11 +35,6 @@ class Strand:
     tether: Tether
     believed: Word = ()
 
-    @property
-    def cost(self) -> float:
-        """The negative logarithm of its share."""
-        return -float(np.log(max(self.likely, 1e-9)))
-
 
 class Strands:
     """Keeps the tethers of classes taut.
