@@ -823,6 +823,18 @@ def test_a_loop_in_an_unlikely_class_keeps_nothing_from_being_said_of_the_likely
     assert levels[-100] == Level.WARNING  # ten seconds before
 
 
+def test_where_a_loop_is_closed_already_it_counts_as_one_that_going_on_leads_to():
+    """In one of two classes there is one around A: going on, there is one in both."""
+    guard = Guard(SITE, EXACT)
+    guard.remember({(): 0.0, (1,): 0.0}, np.zeros(3), 0.0)
+    sure = []
+    for fix in along(*ROUND_A):
+        report = guard.take(fix)
+        if any("A in" in a.text and a.kind == "loop-ahead" for a in report.alarms):
+            sure.append(guard._sure)
+    assert np.median(sure) == 1.0
+
+
 @settings(max_examples=30, deadline=None)
 @given(
     off=st.floats(-0.6, 0.6), rate=st.floats(0.5, 2.0), far=st.floats(0.56, 1.6),

@@ -108,20 +108,24 @@ def in_space() -> tuple[str, bool]:
 
 
 def loops() -> tuple[str, bool]:
-    """Loops put into two drives, in noise: those of which nothing is said, and false warnings."""
-    from guard import one
+    """Loops put into two drives, in noise: those of which nothing is said, false warnings, and what
+    is told of too late."""
+    from guard import LEAD, LONGER, one
 
     found = [one(("pilot", 5, 4, True)), one(("bluerov2", 1, 4, True))]
     count, silent = sum(o.loops for o in found), sum(o.silent for o in found)
     wrong = sum(o.wrong for o in found)
-    return f"{silent} of {count} silent, {wrong} false", count > 0 and not silent + wrong
+    words = [word for o in found for _, word, seen in o.allowed if seen >= LONGER]
+    late = sum(word < LEAD for word in words)
+    told = f"{silent} of {count} silent, {wrong} false, {late} of {len(words)} late"
+    return told, bool(words) and not silent + wrong + late
 
 
 def claims() -> Iterator[Claim]:
     """All of this file."""
     yield Claim("guard: words at the goals of five recorded flights", "34 of 34", recordings)
     yield Claim("guard: true class below 5 % at the end, in noise", "0 of 2", believed)
-    yield Claim("guard: loops of which nothing is said, in noise", "none, none false", loops)
+    yield Claim("guard: loops told of late or not, in noise", "none, none false", loops)
     yield Claim("guard: stops of the flown basin mission as planned", "97 of 97", in_space)
     # at eight times the pace of a vehicle a machine that is busy is a lost link
     yield Claim("fly: the pool on a fake autopilot", "all, as planned, free", flown, timed=True)

@@ -84,7 +84,7 @@ class Look:
         self, site: Site, tether: Tether, motion: Motion, speed: float,
         closed: Set[tuple[int, ...]] = frozenset(),
     ) -> None:  # fmt: skip
-        self.site, self.velocity, self._closed = site, motion.velocity, closed
+        self.site, self.velocity, self.closed = site, motion.velocity, closed
         pace = float(np.linalg.norm(motion.velocity[:2]))
         courses: list[tuple[Floats, float]] = []
         if pace >= MOVING * speed:
@@ -122,7 +122,7 @@ class Look:
         """The sooner of what straight on and turning on lead to, as far as it is found out."""
         loops = [
             (w.loop_s, k) for k, w in enumerate(self._ways)
-            if w.loop_s is not None and w.loop is not None and w.loop.around not in self._closed
+            if w.loop_s is not None and w.loop is not None and w.loop.around not in self.closed
         ]  # fmt: skip
         shorts = [w.short_s for w in self._ways if w.short_s is not None]
         first = min(loops, default=None)

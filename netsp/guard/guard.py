@@ -399,29 +399,33 @@ class Guard:
         self, strands: Sequence[Strand], closed: Sequence[Sequence[Loop]], motion: Motion
     ) -> None:
         """Ahead, in each class that is worth it: the first loop, of those that are not closed there
-        already, and in how likely classes one closes."""
+        already, and in how likely classes one closes, or this one is closed."""
         if not self._looks:
             if 0.0 <= motion.time - self._looked < LOOK_S:
                 return
             self._looked = motion.time
+            wound = [{loop.around for loop in loops} for loops in closed]
             self._looks = [
-                (
-                    s.likely,
-                    Look(self.site, s.tether, motion, self.options.speed,
-                         {loop.around for loop in closed[k]}),
-                )
-                for k, s in enumerate(strands) if k == 0 or s.likely >= reasons.DOUBT
-            ]  # fmt: skip
+                (s.likely, Look(self.site, s.tether, motion, self.options.speed, around))
+                for k, (s, around) in enumerate(zip(strands, wound, strict=True))
+                if k == 0 or s.likely >= reasons.DOUBT
+            ]
         steps = self.site.look_steps
         for _, look in self._looks:
             steps = look.go_on(steps)
         if not all(look.done for _, look in self._looks):
             return
-        found, self._looks = [(likely, look.ahead) for likely, look in self._looks], []
-        closing = [(likely, a) for likely, a in found if a.loop_s is not None]
-        first = max(closing, key=lambda pair: pair[0], default=(0.0, found[0][1]))[1]
-        self._ahead = replace(first, short_s=found[0][1].short_s)
-        self._sure = sum(likely for likely, _ in closing) / sum(likely for likely, _ in found)
+        looks, self._looks = self._looks, []
+        closing = [(likely, look.ahead) for likely, look in looks if look.ahead.loop is not None]
+        first = max(closing, key=lambda pair: pair[0], default=(0.0, looks[0][1].ahead))[1]
+        self._ahead = replace(first, short_s=looks[0][1].ahead.short_s)
+        # where it is closed already it is there as well
+        there = sum(
+            likely for likely, look in looks
+            if look.ahead.loop is not None
+            or (first.loop is not None and first.loop.around in look.closed)
+        )  # fmt: skip
+        self._sure = there / sum(likely for likely, _ in looks)
 
     def _class(self, strand: Strand) -> ClassNow:
         site, nodes = self.site, strand.tether.nodes
