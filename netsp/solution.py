@@ -4,30 +4,99 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Mapping
 from enum import StrEnum
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import ConfigDict, Field
+from pydantic import ConfigDict, Field, model_validator
 
 from netsp.drawn import Drawn
 from netsp.fields import Name, NonNegative, Number, PathPoint, Total
 from netsp.files import FileModel
+from netsp.lower_bound import LowerBound, Scope
 from netsp.models import Model
 
 
 class Status(StrEnum):
-    """What is proven. `OPTIMAL` speaks of the travel graph; with the exact roadmap and all classes
-    the travel graph holds every admissible tour of the continuous world. `OPTIMAL_OF_KEPT` is the
-    shortest tour over the homotopy classes that the roadmap kept, where it had to leave some out:
-    they were too many, or the time was too short. `INVALID` marks the tour of a baseline that is
-    blind to the tether: it entangles obstacles or overstretches the tether."""
+    """Outcome of a run, and what is proven of its tour.
+
+    Attributes
+    ----------
+    OPTIMAL
+        Proven the shortest of all admissible tours of the continuous world (of those in the given
+        order where the order was kept); of a travel graph that was given as such, the shortest of
+        its tours.
+    OPTIMAL_OF_KEPT
+        Shortest tour over the homotopy classes that the roadmap kept, where it left others out:
+        they were too many, the time was too short, or a rule excluded them.
+    OPTIMAL_OF_ROADMAP
+        Shortest tour along a sampled roadmap (PRM*), or along that of another package. Shorter
+        tours may exist beside the roadmap.
+    OPTIMAL_OF_STATES
+        Shortest tour in space along the legs that were found between the states of the tether that
+        were found. Shorter tours may exist between other states.
+    FEASIBLE
+        A tour, not proven the shortest.
+    INFEASIBLE
+        Proven: there is no tour.
+    NO_SOLUTION_FOUND
+        A limit was reached before there was a tour.
+    INVALID
+        Tour of a baseline that is blind to the tether: it entangles obstacles or overstretches the
+        tether.
+    """
 
     OPTIMAL = "optimal"
     OPTIMAL_OF_KEPT = "optimal_of_kept"
+    OPTIMAL_OF_ROADMAP = "optimal_of_roadmap"
+    OPTIMAL_OF_STATES = "optimal_of_states"
     FEASIBLE = "feasible"
     INFEASIBLE = "infeasible"
     NO_SOLUTION_FOUND = "no_solution_found"
     INVALID = "invalid"
+
+    @property
+    def is_optimal(self) -> bool:
+        """Whether the tour is proven the shortest of some set of tours, which the status names."""
+        return self.value.startswith("optimal")
+
+    @property
+    def verdict(self) -> str:
+        """Words for people, of an optimal status: which tours the tour is the shortest of."""
+        return _VERDICTS.get(self, self.value)
+
+    @classmethod
+    def optimal_of(cls, scope: Scope) -> Status:
+        """Return the status of a tour that is the shortest of a scope.
+
+        Parameters
+        ----------
+        scope : Scope
+            Tours that the closing bound holds for.
+
+        Returns
+        -------
+        Status
+            `OPTIMAL` for all tours, all tours in a given order, and all of a given travel graph.
+        """
+        return _OPTIMAL_OF.get(scope, cls.OPTIMAL)
+
+
+_OPTIMAL_OF = {
+    Scope.KEPT_CLASSES: Status.OPTIMAL_OF_KEPT,
+    Scope.KEPT_IN_ORDER: Status.OPTIMAL_OF_KEPT,
+    Scope.ROADMAP: Status.OPTIMAL_OF_ROADMAP,
+    Scope.ROADMAP_IN_ORDER: Status.OPTIMAL_OF_ROADMAP,
+    Scope.STATES: Status.OPTIMAL_OF_STATES,
+    Scope.STATES_IN_ORDER: Status.OPTIMAL_OF_STATES,
+}
+
+_VERDICTS = {
+    Status.OPTIMAL: "proven optimal",
+    Status.OPTIMAL_OF_KEPT: "shortest over the classes kept; not all were",
+    Status.OPTIMAL_OF_ROADMAP: "shortest along this roadmap; others may be shorter",
+    Status.OPTIMAL_OF_STATES: "shortest between the states found; others may be shorter",
+}
 
 
 KeptClasses = Literal["all", "non-looping", "shortest"]
@@ -54,24 +123,35 @@ def max_turning(friction: float, max_tension_ratio: float | None) -> float:
     return math.log(max_tension_ratio) / friction
 
 
-def above_shortest(gap: float | None, shortest: str = "the shortest") -> str:
-    """How much longer than the shortest a tour may be: the gap is a share of the tour itself.
+EXACT_ROADMAPS = frozenset({"taut"})
+"""Names of roadmaps whose travel graph, with all classes, holds every admissible tour."""
+
+
+def scope_of(roadmap: str, classes: KeptClasses | None, *, kept_order: bool = False) -> Scope:
+    """Return the tours that the lower bound of a solution holds for, by what is known of its run.
 
     Parameters
     ----------
-    gap : float or None
-        (length - bound) / length; None, or 1, where nothing is known.
-    shortest : str
-        What the bound is of.
+    roadmap : str
+        Name of the roadmap.
+    classes : {"all", "non-looping", "shortest"} or None
+        Which homotopy classes it held. Where it held the shortest only, bounds include what the
+        classes left out may bring; where a rule excluded classes, they do not.
+    kept_order : bool
+        The order of the goals was given.
 
     Returns
     -------
-    str
-        A phrase.
+    Scope
+        The tours.
     """
-    if gap is None or gap >= 1.0:
-        return "no bound"
-    return f"at most {100.0 * gap / (1.0 - gap):.3g} % above {shortest}"
+    if roadmap not in EXACT_ROADMAPS:
+        scope = Scope.ROADMAP
+    elif classes == "non-looping":
+        scope = Scope.KEPT_CLASSES
+    else:
+        scope = Scope.ALL_TOURS
+    return scope.in_order if kept_order else scope
 
 
 class ProblemReference(Model):
@@ -131,7 +211,10 @@ class Solution(Drawn, FileModel):
     start_tether : tuple of (x, y, z)
         The taut tether at the start of a tour from a state.
     lower_bound : float or None
-        Proven bound on every admissible tour.
+        Proven lower bound on the tours that `lower_bound_of` names.
+    lower_bound_of : Scope or None
+        Tours that `lower_bound` holds for; None without a bound. Files of older versions lack it
+        and are read as what they held: along `prm` it was a bound on the tours of the roadmap.
     gap : float or None
         (length - lower_bound) / length.
     classes : {"all", "non-looping", "shortest"} or None
@@ -184,8 +267,19 @@ class Solution(Drawn, FileModel):
     ]
     lower_bound: Annotated[
         Total | None,
-        Field(description="no tour is shorter, in the problem's units; null if nothing is known"),
+        Field(
+            description="none of the tours that lower_bound_of names is shorter, in the problem's "
+            "units; null if nothing is known"
+        ),
     ]
+    lower_bound_of: Annotated[
+        Scope | None,
+        Field(
+            description="tours that lower_bound holds for: all_tours, kept_classes (of those that "
+            "the roadmap kept), roadmap (along a sampled one), given_order, or both limits; null "
+            "without a bound"
+        ),
+    ] = None
     gap: Annotated[
         Total | None,
         Field(description="(length - lower_bound) / length; null if either is missing"),
@@ -214,16 +308,41 @@ class Solution(Drawn, FileModel):
         dict[Name, Name], Field(description="of netsp and what it used", default_factory=dict)
     ]
 
+    @model_validator(mode="before")
+    @classmethod
+    def _name_scope(cls, data: Any) -> Any:
+        """Fill in what older files do not say: which tours the bound holds for, and `optimal` of
+        which tours."""
+        if not isinstance(data, Mapping) or data.get("lower_bound") is None:
+            return data
+        if data.get("lower_bound_of") is not None:
+            return data
+        roadmap, classes = data.get("roadmap"), data.get("classes")
+        if not isinstance(roadmap, str):
+            return data  # the field's own check complains
+        scope = scope_of(roadmap, classes, kept_order=data.get("kept_order") is True)
+        out = {**data, "lower_bound_of": scope}
+        if data.get("status") == Status.OPTIMAL:
+            out["status"] = Status.optimal_of(scope)
+        return out
+
     def __repr__(self) -> str:
         """In a line."""
         length = "" if self.length is None else f", length {self.length:.6g}"
-        gap = "" if self.gap is None else f", gap {100 * self.gap:.3g} %"
+        bound = "" if self.bound is None else f", {self.bound.says(self.length)}"
         return (
             f"<Solution of {self.problem.name!r} by {self.solver}: "
-            f"{self.status.value}{length}{gap}, {len(self.tour)} visits>"
+            f"{self.status.value}{length}{bound}, {len(self.tour)} visits>"
         )
 
     __str__ = __repr__
+
+    @property
+    def bound(self) -> LowerBound | None:
+        """The lower bound with the tours that it holds for; None where nothing is known."""
+        if self.lower_bound is None or self.lower_bound_of is None:
+            return None
+        return LowerBound(self.lower_bound, self.lower_bound_of)
 
     @property
     def max_turning(self) -> float:
@@ -244,6 +363,8 @@ class Solution(Drawn, FileModel):
             del data["start_tether"]
         if self.classes is None:
             del data["classes"]
+        if self.lower_bound_of is None:
+            del data["lower_bound_of"]
         if not self.margin:
             del data["margin"]
         for name, plain in (("kept_order", False), ("slack", 0.0), ("friction", 0.0)):

@@ -10,11 +10,11 @@ from matplotlib.figure import Figure
 
 from netsp import Problem, TravelGraph, solve, travel_graph
 from netsp.execute import execute
+from netsp.lower_bound import LowerBound, Scope, above_shortest
 from netsp.online import Scene
 from netsp.online.mission import Mission
 from netsp.online.simulate import simulate
 from netsp.pictures import style
-from netsp.solution import above_shortest
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -96,5 +96,7 @@ def test_colours_that_stand_side_by_side_can_be_told_apart():
 
 
 def test_a_picture_tells_the_excess_over_the_bound_and_not_the_gap():
-    assert above_shortest(0.2) == "at most 25 % above the shortest"
-    assert above_shortest(1.0) == above_shortest(None) == "no bound"
+    bound = LowerBound(80.0, Scope.ALL_TOURS)
+    assert above_shortest(100.0, bound) == "at most 25 % above the shortest tour"
+    assert above_shortest(100.0, None) == "no bound"
+    assert above_shortest(100.0, LowerBound(0.0, Scope.ALL_TOURS)) == "no bound"

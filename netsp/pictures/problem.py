@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from netsp import steps
+from netsp.lower_bound import above_shortest
 from netsp.pictures import style
 from netsp.problem import Circle, Problem
 from netsp.roadmap.paths import TautPaths
-from netsp.solution import Solution, Status, above_shortest
+from netsp.solution import Solution, Status
 from netsp.travel.result import Progress
 
 if TYPE_CHECKING:
@@ -294,11 +295,12 @@ def draw_solution(
 def _title(problem: Problem, solution: Solution | None) -> str:
     if solution is None or solution.length is None:
         return f"{problem.name}: {problem.summary}"
-    if solution.status is Status.OPTIMAL:
-        exact = solution.roadmap == "taut"
-        proof = "proven shortest" if exact else f"shortest over its {solution.roadmap} roadmap"
+    if solution.status is Status.OPTIMAL_OF_KEPT:
+        proof = f"{solution.status.verdict}; {above_shortest(solution.length, solution.bound)}"
+    elif solution.status.is_optimal:
+        proof = solution.status.verdict
     else:
-        proof = above_shortest(solution.gap)
+        proof = above_shortest(solution.length, solution.bound)
     longest = max((v.tether_length for v in solution.tour), default=0.0)
     kind = "non-entangling tour"
     if solution.status is Status.INVALID:

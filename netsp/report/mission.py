@@ -16,6 +16,7 @@ from netsp.arrays import Floats
 from netsp.errors import InputError, counted
 from netsp.files import read_text, write_text
 from netsp.geometry import polylines
+from netsp.lower_bound import LowerBound, Scope, above_shortest
 from netsp.models import parse_json_object
 from netsp.online.mission import Mission
 from netsp.online.scene.scene import Scene
@@ -24,7 +25,6 @@ from netsp.pictures import style
 from netsp.pictures.scene import Stops, figure_of
 from netsp.report import briefing, log
 from netsp.report.page import STYLE
-from netsp.solution import above_shortest
 from netsp.space.judge import verify_mission
 
 
@@ -151,16 +151,18 @@ def _summary(mission: Mission, scene: Scene, summary: dict[str, Any]) -> str:
 def _planned(tour: PlannedTour, mission: Mission, unit: str) -> str:
     """What is known of a tour: what is proven is about the states and legs that were found."""
     proof = "found"
-    if tour.gap is not None:
-        shortest = (
-            f"the shortest along {counted(tour.legs, 'leg')} between "
-            f"{counted(tour.states, 'state')} of the tether"
+    if tour.lower_bound is not None:
+        searched = f"{counted(tour.legs, 'leg')}, {counted(tour.states, 'state')} of the tether"
+        of_states = LowerBound(tour.lower_bound, Scope.STATES)
+        optimal = tour.status.is_optimal
+        proof = (
+            f"{of_states.scope.shortest if optimal else above_shortest(tour.length, of_states)} "
+            f"({searched})"
         )
-        optimal = tour.status.value == "optimal"
-        proof = shortest if optimal else above_shortest(tour.gap, shortest)
     all_of = ""
-    if tour.gap_to_all is not None:
-        all_of = f", and {above_shortest(tour.gap_to_all, 'a bound on all tours')}"
+    if tour.bound_of_all is not None:
+        of_all = LowerBound(tour.bound_of_all, Scope.ALL_TOURS)
+        all_of = f", and {above_shortest(tour.length, of_all)}"
     return (
         f"The tour is {tour.length:.5g} {unit} long: {proof} (solver {html.escape(tour.solver)})"
         f"{all_of}. At {mission.speed:g} m/s it takes {tour.length / mission.speed:.0f} s, stops "

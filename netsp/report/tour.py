@@ -15,11 +15,12 @@ from netsp.execute.plan import HOME
 from netsp.files import write_text
 from netsp.hsignature.measures import measure
 from netsp.judge import verify
+from netsp.lower_bound import above_shortest
 from netsp.problem import Problem
 from netsp.report import briefing, chart, log, moving
 from netsp.report.opened import Opened, json_of, opened
 from netsp.report.page import STYLE
-from netsp.solution import Solution, Status, above_shortest
+from netsp.solution import Solution, Status
 
 TOUR_STYLE = """
 .chart { max-width: 900px; width: 100% }
@@ -121,10 +122,10 @@ def page(what: Opened) -> str:
 def _summary(problem: Problem, solution: Solution, run: Path | None) -> str:
     units = html.escape(problem.units)
     proof = solution.status.value
-    if solution.status is Status.OPTIMAL:
-        proof = "proven optimal"
-    elif solution.gap is not None:
-        proof += f", {above_shortest(solution.gap)}"
+    if solution.status.is_optimal:
+        proof = solution.status.verdict
+    if solution.bound is not None and solution.status is not Status.OPTIMAL:
+        proof += f", {above_shortest(solution.length, solution.bound)}"
     lines = [
         f"{html.escape(problem.summary)}. The plan is {solution.length:.6g} "
         f"{units} long ({proof}; solver {html.escape(solution.solver)}). "
