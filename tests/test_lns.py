@@ -5,11 +5,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from netsp.clock import Clock
 from netsp.compiled.chance import seeded
 from netsp.lns.descent import descend, two_opt
 from netsp.lns.layers import Instance, best_classes
 from netsp.lns.links import Tables, best_place, link, no_links, put, take_out, write_order
 from netsp.lns.ruin import ruin_and_recreate
+from netsp.lns.search import Search
 from netsp.lns.solve import Params, solve
 from netsp.solving.limits import Limits
 from tests.test_contract import random_graph
@@ -167,7 +169,10 @@ def _keeps(order, before):
 
 
 def _tables(i):
-    return Tables(i.start, i.costs, i.cluster_costs, i.near, *i.beside, i.rank, i.before)
+    return Tables(
+        i.start, i.costs, i.cluster_costs, i.near, *i.beside, i.rank, i.before, i.min_gain,
+        i.rounding,
+    )  # fmt: skip
 
 
 def _same_tables(i, links):
@@ -185,3 +190,63 @@ def _same_tables(i, links):
             np.testing.assert_allclose(is_, should, rtol=1e-10, atol=1e-9)
         assert links.grown[c] == pytest.approx(fresh.grown[c], abs=1e-9)
         assert links.rest[c] == pytest.approx(fresh.rest[c], abs=1e-9)
+
+
+COSTS = {
+    "magnitudes from 1e-8 to 1e8": lambda rng, shape: 10.0 ** rng.uniform(-8.0, 8.0, shape),
+    "fractions and forbidden legs of 1e15": lambda rng, shape: np.where(
+        rng.random(shape) < 0.4, 1e15, rng.random(shape)
+    ),
+    "whole numbers and legs of 1e9": lambda rng, shape: np.where(
+        rng.random(shape) < 0.4, 1e9, rng.integers(1, 10_000, shape)
+    ),
+    "huge whole numbers": lambda rng, shape: rng.integers(0, 10**12, shape).astype(float),
+    "ties": lambda rng, shape: rng.integers(0, 3, shape).astype(float),
+    "zeros and noise": lambda rng, shape: np.where(
+        rng.random(shape) < 0.5, 0.0, 1e-12 * rng.random(shape)
+    ),
+    "a large number and noise": lambda rng, shape: 1e12 + rng.random(shape),
+    "a large number and units": lambda rng, shape: 1e11 + rng.integers(0, 10, shape),
+    "missing legs": lambda rng, shape: np.where(
+        rng.random(shape) < 0.3, np.inf, 10.0 ** rng.uniform(-3.0, 12.0, shape)
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", COSTS)
+def test_a_descent_ends_whatever_the_costs_and_its_length_is_that_of_its_order(kind):
+    """A gain that was the rounding of larger numbers was taken again and again."""
+    _settled(np.random.default_rng(0), "ties")  # compiled code is read before time counts
+    clock = Clock(5.0)
+    for seed in range(25):
+        i, search = _settled(np.random.default_rng(seed), kind, clock)
+        assert not clock.up
+        length, _ = best_classes(search.order[1:], i.start, i.costs)
+        assert search.length == pytest.approx(length, rel=1e-12)
+        assert sorted(search.order.tolist()) == list(range(i.clusters))
+
+
+WHOLE = ("whole numbers and legs of 1e9", "a large number and units", "ties")
+
+
+@pytest.mark.parametrize("kind", WHOLE)
+def test_a_move_that_saves_one_unit_counts_among_whole_numbers(kind):
+    for seed in range(10):
+        i, search = _settled(np.random.default_rng(seed), kind)
+        for c in range(1, i.clusters):
+            left = search.order[search.order != c]
+            for k in range(1, i.clusters):
+                moved = np.insert(left, k, c)
+                assert best_classes(moved[1:], i.start, i.costs)[0] >= search.length
+
+
+def _settled(rng, kind, clock=None):
+    """An instance of random costs, and a search in it from a random order to where it settles."""
+    goals = int(rng.integers(3, 12))
+    cluster = np.concatenate([[0], np.repeat(np.arange(1, goals + 1), rng.integers(1, 4))])
+    costs = np.triu(COSTS[kind](rng, (len(cluster), len(cluster))), 1)
+    i = Instance(cluster, costs + costs.T)
+    order = np.concatenate([[0], 1 + rng.permutation(goals)])
+    search = Search(i, rng, order, clock)
+    search.settle()
+    return i, search

@@ -10,6 +10,7 @@ import numpy.typing as npt
 from netsp.arrangement import UNORDERED
 from netsp.arrays import Bools, Floats, Ints
 from netsp.compiled.kernel import kernel
+from netsp.lns.links import EVEN
 from netsp.travel.graph import TravelGraph
 
 NEAR = 12
@@ -17,6 +18,13 @@ NEAR = 12
 
 RANKED = 60
 """Neighbours of a cluster that are taken out with it."""
+
+MIN_GAIN = 1e-9
+"""Share of the tour's length that a move must save to count, where costs are not whole numbers:
+lengths of legs are no more exact."""
+
+EXACT = 2.0**53
+"""Whole numbers below it are added without rounding in double precision."""
 
 
 class Instance:
@@ -50,6 +58,20 @@ class Instance:
         self.penalty = 2.0 * self.clusters * most + 1.0
         grouped[~finite] = self.penalty
         self.costs: Floats = np.ascontiguousarray(grouped)
+        self._largest_cost = most if finite.all() else self.penalty
+
+    @cached_property
+    def min_gain(self) -> float:
+        """Share of a tour's length that a move must save to count; 0 where lengths are exact."""
+        sums = (self.clusters + 1) * self._largest_cost
+        exact = sums < EXACT and bool((self.costs == np.rint(self.costs)).all())
+        return 0.0 if exact else MIN_GAIN
+
+    @property
+    def rounding(self) -> float:
+        """Gain that rounding may feign in the tables of `netsp.lns.links`, through which each leg
+        may go, that of the highest cost too: `EVEN` of it at each cluster, ahead and behind."""
+        return 2.0 * (self.clusters + 1) * EVEN * self._largest_cost
 
     @classmethod
     def of(cls, graph: TravelGraph) -> Instance:

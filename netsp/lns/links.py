@@ -25,15 +25,18 @@ from netsp.compiled.chance import uniform
 from netsp.compiled.kernel import kernel
 
 EVEN = 1e-13
-"""Share of a length up to which two differences are the same."""
+"""Share of a length up to which two differences are the same. Each table may be off by so much of
+the largest number in it at every cluster on the way (`netsp.lns.layers.Instance.rounding`)."""
 
 
 class Tables(NamedTuple):
     """Of an instance: where the vertices of each cluster begin; legs; least legs between clusters
     (m + 1, m + 1); whether a cluster is put next to another, and for each cluster c to which, from
     first[c] to first[c + 1] of ``beside``; the nearest clusters of each (m + 1, k), nearest first;
-    which clusters come before which, (0, 0) for none. The kernels that are called most take what
-    they need of it one by one: handing a tuple of arrays on costs them more than the work."""
+    which clusters come before which, (0, 0) for none; the share of the tour's length that a move
+    must save to count, and the gain that rounding in the tables of the links may feign
+    (`netsp.lns.layers.Instance`). The kernels that are called most take what they need of it one by
+    one: handing a tuple of arrays on costs them more than the work."""
 
     start: Ints
     costs: Floats
@@ -43,6 +46,8 @@ class Tables(NamedTuple):
     beside: Ints
     rank: Ints
     before: Bools
+    min_gain: float
+    rounding: float
 
 
 class Links(NamedTuple):

@@ -11,9 +11,10 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from netsp.arrays import Ints
+from netsp.arrays import Floats, Ints
 from netsp.compiled.chance import below, uniform
 from netsp.compiled.kernel import kernel
+from netsp.lns.layers import best_classes
 from netsp.lns.links import Links, Tables, best_place, carry_on, put, tour_length, write_order
 
 LONGEST_STRING = 10
@@ -42,14 +43,14 @@ def ruin_and_recreate(
     of the best, which is kept in `best`. ``links`` are those of the present order, before and
     after; they are never filled afresh in between, so that nothing depends on how rounds are
     counted out. A round that is not accepted is undone by a copy of them."""
-    start, costs, nearest, near, first, beside, rank, before = tables
+    start, costs, nearest, near, first, beside, rank, before, _, rounding = tables
     n = len(order)
     after, prior, ahead, behind = (
         links.after.copy(), links.prior.copy(), links.ahead.copy(), links.behind.copy()
     )  # fmt: skip
     grown, rest = links.grown.copy(), links.rest.copy()
     out = np.zeros(n, dtype=np.bool_)
-    gone, place = np.empty((2, n), dtype=np.int64)
+    gone, place, work = np.empty((3, n), dtype=np.int64)
     key, row = np.empty(n), np.empty(ahead.shape[1])
     for _ in range(count):
         # strings around clusters near a seed, as in the paper, section 3.1
@@ -118,7 +119,9 @@ def ruin_and_recreate(
             links.ahead[:], links.behind[:] = ahead, behind
             links.grown[:], links.rest[:] = grown, rest
             length = tour_length(after, grown)
-            if length < best_length * (1.0 - 1e-12):
+            if length < best_length * (1.0 - 1e-12) and (
+                best_length - length > rounding or _is_shorter(after, best, start, costs, work)
+            ):
                 best_length = length
                 write_order(after, best)
         else:
@@ -127,3 +130,13 @@ def ruin_and_recreate(
             grown[:], rest[:] = links.grown, links.rest
     write_order(links.after, order)
     return length, best_length
+
+
+@kernel
+def _is_shorter(after: Ints, best: Ints, start: Ints, costs: Floats, work: Ints) -> bool:
+    """Measure the tour and the best one afresh and return whether the tour is shorter: the tables
+    of the links carry the rounding of the largest numbers that went through them."""
+    write_order(after, work)
+    measured, _ = best_classes(work[1:], start, costs)
+    length, _ = best_classes(best[1:], start, costs)
+    return bool(measured < length)

@@ -102,7 +102,10 @@ class Search:
     @property
     def _tables(self) -> Tables:
         i = self.instance
-        return Tables(i.start, i.costs, i.cluster_costs, i.near, *i.beside, i.rank, i.before)
+        return Tables(
+            i.start, i.costs, i.cluster_costs, i.near, *i.beside, i.rank, i.before, i.min_gain,
+            i.rounding,
+        )  # fmt: skip
 
     def _link(self) -> None:
         """Links of the present order."""
@@ -118,7 +121,7 @@ class Search:
             self.length = descend(self.order, self._tables, self._links, self.chance, self._stop)
             if n > 3:
                 self.length = two_opt(self.order, self._tables, self._stop)
-            if not self.length < before * (1.0 - 1e-12):
+            if not self.length < before * (1.0 - self.instance.min_gain):
                 break
             before = self.length
         self._keep()
