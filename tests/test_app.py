@@ -379,6 +379,99 @@ def test_what_cannot_be_opened_changes_nothing(client):
     assert Problem.load(file) == Problem.load(WHARF)
 
 
+MALFORMED = (
+    '{"id": 1, "edit": "x"}', "null", "3", "[1, 2]", "{", '{"id": 1, "edit": null}',
+    '{"id": 1, "edit": {"set": [["goals"]], "value": 1}}', '{"id": 1, "edit": {"set": [{}]}}',
+    '{"id": 1, "edit": {"add": ["goals"], "value": 1}}', '{"id": 1, "edit": {"delete": [[{}, 0]]}}',
+    '{"id": 1, "edit": {"add": "goals", "value": 1}}',
+    '{"id": 1, "edit": {"set": ["goals"], "value": "abc"}}',
+    '{"id": 1, "edit": {"replace": {"goals": "abc"}}}',
+    '{"id": 1, "edit": {"replace": {"goals": ["abc"]}}}',
+    '{"id": 1, "edit": {"replace": {"goal": []}}}',
+    '{"id": NaN, "undo": true}', '{"id": {"a": 1}, "undo": true}',
+    '{"id": 1, "edit": {"set": ["tether_length"], "value": NaN}}',
+    '{"id": 1, "hover": [1]}', '{"id": 1, "along": {}}', '{"id": 1, "classes": true}',
+    '{"id": 1, "save": 3}', '{"id": 1, "space": null}', '{"id": 1, "id": 2}',
+    '{"id": ' + "1" * 5001 + "}", "[" * 100_000,
+    '{"id": 1, "edit": ' + "[" * 2000 + "]" * 2000 + "}",
+)  # fmt: skip
+"""Messages that a page may not send, each wrong in its own way."""
+
+
+def test_every_malformed_message_is_answered_and_changes_nothing(client):
+    made, file = client
+    headers = {"host": "127.0.0.1:1234", "origin": "http://127.0.0.1:1234"}
+    with made.websocket_connect("/live?token=secret", headers=headers) as page:
+        version = listen(page, lambda m: "state" in m)["state"]["version"]
+        for text in MALFORMED:
+            page.send_text(text)
+            assert listen(page, lambda m: "error" in m and "tour" not in m), text
+        page.send_bytes(b"\x00\xff")
+        assert "got bytes" in listen(page, lambda m: "error" in m and "tour" not in m)["error"]
+        page.send_json({"id": 77, "undo": True})
+        assert listen(page, lambda m: m.get("id") == 77) == {"id": 77}
+    assert made.app is not None
+    with made.websocket_connect("/live?token=secret", headers=headers) as page:
+        state = listen(page, lambda m: "state" in m)["state"]
+        assert state["version"] == version
+        assert Problem.from_json(json.dumps(state["data"])) == Problem.load(file)
+
+
+@pytest.mark.parametrize("content", [b'{"a":' * 3000 + b"1" + b"}" * 3000, b"[" * 200_000])
+def test_deeply_nested_json_is_refused_in_one_line(client, content):
+    answer = posted(client[0], None, "a.json", content)
+    assert answer.status_code == 422
+    assert "nested too deeply" in answer.text
+    assert answer.text.count("\n") == 0
+
+
+def test_an_edit_that_the_disk_does_not_take_is_not_there(tmp_path, monkeypatch):
+    """A version is kept beside the file before it becomes the present one."""
+    file = tmp_path / "p.json"
+    file.write_text(WHARF.read_text())
+    document = Document(file)
+    document.apply({"set": ["tether_length"], "value": 21.0})
+    before, version = document.data, document.version
+
+    def full(path, text):
+        raise InputError(f"{path}: cannot be written: No space left on device")
+
+    for change in (
+        lambda: document.apply({"set": ["tether_length"], "value": 99.0}),
+        lambda: document.apply({"set": ["tether_length"], "value": 99.0, "merge": 1}),
+        document.undo,
+    ):
+        with monkeypatch.context() as patched:
+            patched.setattr("netsp.app.state.write_text", full)
+            with pytest.raises(InputError, match="No space left"):
+                change()
+        assert document.data == before
+        assert document.version == version
+    document.save()
+    assert Problem.load(file).tether_length == 21.0
+
+
+def test_a_page_that_goes_away_during_an_import_ends_without_a_traceback(client):
+    """Starlette says by an exception that nobody waits for the answer any more."""
+    made, _ = client
+    told = []
+
+    async def gone():
+        return {"type": "http.disconnect"}
+
+    async def send(message):
+        told.append(message)
+
+    scope = {
+        "type": "http", "method": "POST", "path": "/import", "raw_path": b"/import",
+        "query_string": b"token=secret&name=a.json", "root_path": "", "scheme": "http",
+        "headers": [(b"host", b"127.0.0.1:1234"), (b"content-length", b"100")],
+        "http_version": "1.1", "server": ("127.0.0.1", 1234), "client": ("127.0.0.1", 1),
+    }  # fmt: skip
+    asyncio.run(made.app(scope, gone, send))
+    assert told[0]["status"] == 400
+
+
 def test_what_is_exported_is_what_the_command_writes(tmp_path):
     file = tmp_path / "harbour.json"
     problem = Problem.load(WHARF).model_copy(

@@ -151,6 +151,6 @@ def exported(problem: Problem, solution: Solution, kind: str) -> tuple[str, str]
 def _is_geojson(content: bytes) -> bool:
     try:
         data = json.loads(content)
-    except ValueError:
+    except (ValueError, RecursionError):  # `Problem.load` says what is wrong
         return False
     return isinstance(data, dict) and data.get("type") == "FeatureCollection"

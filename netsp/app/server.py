@@ -24,14 +24,17 @@ from netsp.app.solving import Worker
 from netsp.app.state import Document
 from netsp.app.tethers import Cursor
 from netsp.errors import InputError, NetspError
-from netsp.fields import checked_argument
-from netsp.models import shown
+from netsp.fields import checked_argument, is_index
+from netsp.models import parse_json_object, shown
 from netsp.solution import Solution
 
 STATIC = Path(__file__).parent / "static"
 
 MOST_BYTES = 4 * 2**20
 """Of one message."""
+
+MAX_MESSAGE_ID = 2**53 - 1
+"""Largest number of a message: JavaScript's largest whole number that is exact."""
 
 POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; "
@@ -106,13 +109,33 @@ class Session:
     def asked(self, message: Mapping[str, Any]) -> dict[str, Any] | None:
         """Do what a page asks; what is to be said to that page alone, if anything."""
         number = message.get("id")
+        if number is not None and not is_index(number, MAX_MESSAGE_ID + 1):
+            return {"id": None, "error": f"id: expected a whole number, got {shown(number)}"}
         try:
-            answer = self._do(message)
+            answer = self.do(message)
         except NetspError as error:
             return {"id": number, "error": str(error).removeprefix("problem: ")}
         return None if answer is None and number is None else {"id": number, **(answer or {})}
 
-    def _do(self, message: Mapping[str, Any]) -> dict[str, Any] | None:
+    def do(self, message: Mapping[str, Any]) -> dict[str, Any] | None:
+        """Do what a message asks for.
+
+        Parameters
+        ----------
+        message : mapping
+            One of ``edit``, ``undo``, ``redo``, ``save``, ``hover``, ``along``, ``classes`` and
+            ``space`` with its value.
+
+        Returns
+        -------
+        dict or None
+            The answer to whoever asks; None where the pages are told instead.
+
+        Raises
+        ------
+        InputError
+            Not such a message, or its value is wrong; nothing is changed.
+        """
         document = self.document
         if self.shown is not None and any(k in message for k in ("edit", "undo", "redo", "save")):
             raise InputError("this page only shows: nothing can be edited on it")
@@ -188,7 +211,7 @@ class Session:
     def _classes(self, goal: object) -> dict[str, Any]:
         if self._cursor is None:
             return {"classes": [], "count": 0}
-        if not isinstance(goal, int) or not 0 <= goal < len(self._cursor.problem.goals):
+        if not is_index(goal, len(self._cursor.problem.goals)):
             raise InputError("classes: expected the number of a goal")
         return self._cursor.classes(goal)
 
@@ -261,7 +284,7 @@ def application(session: Session, token: str, port: int) -> Any:
     """
     try:
         from starlette.applications import Starlette
-        from starlette.requests import Request
+        from starlette.requests import ClientDisconnect, Request
         from starlette.responses import FileResponse, PlainTextResponse, Response
         from starlette.routing import Mount, Route, WebSocketRoute
         from starlette.staticfiles import StaticFiles
@@ -299,7 +322,10 @@ def application(session: Session, token: str, port: int) -> Any:
         size = request.headers.get("content-length", "")
         if not size.isdigit() or int(size) > MOST_FILE:
             return PlainTextResponse(f"netsp: expected at most {MOST_FILE} bytes", status_code=413)
-        content = await request.body()
+        try:
+            content = await request.body()
+        except ClientDisconnect:  # nobody is left to read this answer
+            return PlainTextResponse("netsp: the page went away", status_code=400)
         try:
             if session.shown is not None:
                 raise InputError("this page only shows: nothing can be edited on it")
@@ -308,7 +334,7 @@ def application(session: Session, token: str, port: int) -> Any:
                 imported, request.query_params.get("name", ""), content,
                 tether if isinstance(tether, int | float) else None,
             )  # fmt: skip
-            session.asked({"edit": {"replace": data}})
+            session.do({"edit": {"replace": data}})
         except NetspError as error:
             return PlainTextResponse(f"netsp: {error}", status_code=422)
         return PlainTextResponse("\n".join(notes))
@@ -341,7 +367,10 @@ def application(session: Session, token: str, port: int) -> Any:
         try:
             # a page that is gone may be found out by sending to it
             while socket.application_state is WebSocketState.CONNECTED:
-                answer = await asyncio.to_thread(_parsed, await socket.receive_text())
+                received = await socket.receive()
+                if received["type"] == "websocket.disconnect":
+                    break
+                answer = await asyncio.to_thread(_parsed, received.get("text"))
                 said = session.asked(answer) if isinstance(answer, dict) else {"error": answer}
                 if said is not None:
                     queue.put_nowait(json.dumps(said))
@@ -419,13 +448,14 @@ def _numbers(values: object, count: int) -> list[float]:
     return [checked_argument("message", v, -1e12) for v in values]
 
 
-def _parsed(text: str) -> Any:
-    """A message, or what is wrong with it."""
+def _parsed(text: str | None) -> dict[str, Any] | str:
+    """Return a message, or in one line what is wrong with it; None stands for bytes."""
+    if text is None:
+        return "message: expected text, got bytes"
     try:
-        message = json.loads(text)
-    except ValueError:
-        return "message: not JSON"
-    return message if isinstance(message, dict) else "message: expected an object"
+        return parse_json_object(text, "message")
+    except InputError as error:
+        return str(error)
 
 
 def _download(session: Session, name: str) -> Any:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from netsp.errors import InputError
-from netsp.files import read_text
+from netsp.files import csv_rows, read_text
 from netsp.geometry import polylines
 from netsp.models import parse_json_object
 from netsp.online.scene.scene import Scene, scene_of
@@ -212,7 +211,7 @@ def _frame(nodes: Any, row: dict[str, str]) -> dict[str, Any]:
 
 def _rows(file: Path, columns: tuple[str, ...], least: int = 1) -> list[dict[str, str]]:
     text = read_text(file)
-    rows = list(csv.DictReader(text.splitlines()))
+    rows = csv_rows(text, str(file))
     if len(rows) < least:
         raise InputError(f"{file}: holds no row")
     missing = [c for c in columns if rows and c not in rows[0]]

@@ -114,6 +114,8 @@ class Document:
         InputError
             Not such an edit; nothing is changed.
         """
+        if not isinstance(edit, Mapping):
+            raise InputError(f"edit: expected an object, got {shown(edit)}")
         data = dict(self.data)  # what an edit changes is copied on the way to it
         value = copy.deepcopy(edit.get("value"))
         if "set" in edit:
@@ -124,16 +126,21 @@ class Document:
             _delete(data, edit["delete"])
         elif isinstance(edit.get("replace"), dict):
             data = copy.deepcopy(dict(edit["replace"]))
+            _check_fields(data)
         else:
             raise InputError(f"edit: expected set, add, delete or replace, got {shown(edit)}")
+        _check_lists(data)
         try:
             json.dumps(data, allow_nan=False)
+            key = json.dumps([edit.get("set"), edit["merge"]]) if edit.get("merge") else None
         except (TypeError, ValueError):
             raise InputError("edit: expected finite numbers") from None
-        key = json.dumps([edit.get("set"), edit["merge"]]) if edit.get("merge") else None
+        except RecursionError:
+            raise InputError("edit: nested too deeply") from None
         if key is not None and key == self._merging:
+            self._keep(data)
             self._versions[self._at] = data
-            self._changed()
+            self.version += 1
         else:
             self._push(data)
         self._merging = key
@@ -184,24 +191,27 @@ class Document:
         return target
 
     def _push(self, data: dict[str, Any]) -> None:
+        self._keep(data)
         del self._versions[self._at + 1 :]
         self._versions.append(data)
         del self._versions[: max(0, len(self._versions) - MOST_VERSIONS)]
         self._at = len(self._versions) - 1
-        self._changed()
+        self.version += 1
 
     def _go(self, to: int) -> bool:
         if not 0 <= to < len(self._versions):
             return False
+        self._keep(self._versions[to])
         self._at = to
         self._merging = None
-        self._changed()
+        self.version += 1
         return True
 
-    def _changed(self) -> None:
-        self.version += 1
+    def _keep(self, data: dict[str, Any]) -> None:
+        """Write a version beside the file before it becomes the present one; InputError, and no
+        version is changed, where the disk does not take it."""
         if self._aside is not None:
-            write_text(self._aside, json.dumps(self.data, allow_nan=False))
+            write_text(self._aside, json.dumps(data, allow_nan=False))
 
     # what was not saved
 
@@ -234,13 +244,31 @@ def _read(file: Path) -> dict[str, Any]:
 
 def _list(data: dict[str, Any], name: object) -> list[Any]:
     """A list of this version's own, to be changed."""
-    if name not in LISTS:
+    if not isinstance(name, str) or name not in LISTS:
         raise InputError(f"edit: expected one of {', '.join(LISTS)}, got {shown(name)}")
-    found = data.get(str(name), [])
-    if not isinstance(found, list):
-        raise InputError(f"edit: {name} is no list")
-    own = data[str(name)] = list(found)
+    own = data[name] = list(data.get(name, []))
     return own
+
+
+def _check_fields(data: dict[str, Any]) -> None:
+    """InputError where a version has a field that no problem has."""
+    for name in data:
+        if name not in Problem.model_fields:
+            raise InputError(f"edit: unknown field {shown(name)}")
+
+
+def _check_lists(data: dict[str, Any]) -> None:
+    """InputError unless goals and obstacles are lists of objects or positions, as the page draws
+    them; their values may be wrong while somebody is at it."""
+    for name in LISTS:
+        items = data.get(name, [])
+        if not isinstance(items, list):
+            raise InputError(f"edit: {name}: expected a list, got {shown(items)}")
+        for k, item in enumerate(items):
+            if not isinstance(item, dict | list):
+                raise InputError(
+                    f"edit: {name}[{k}]: expected an object or a position, got {shown(item)}"
+                )
 
 
 def _item(data: dict[str, Any], path: object) -> tuple[list[Any], int]:
@@ -256,7 +284,7 @@ def _set(data: dict[str, Any], path: object, value: Any) -> None:
     if not isinstance(path, list) or not path or len(path) > 3:
         raise InputError(f"edit: expected a path of a field, got {shown(path)}")
     if len(path) == 1:
-        if path[0] not in Problem.model_fields:
+        if not isinstance(path[0], str) or path[0] not in Problem.model_fields:
             raise InputError(f"edit: unknown field {shown(path[0])}")
         data[path[0]] = value
         return
