@@ -59,6 +59,10 @@ class Clock:
             self._stop = self._stop or within._stop
         self._flag: Flag | None = None
 
+    def __reduce__(self) -> tuple[type[Clock], tuple[()]]:
+        """Pickle as a clock without a limit: the time of a run ends in its own process."""
+        return Clock, ()
+
     @classmethod
     def of(cls, limit: TimeLimit) -> Clock:
         """A clock that starts now, from seconds, a clock that it may not outlast, or no limit."""

@@ -6,15 +6,19 @@ import json
 import math
 from collections.abc import Mapping
 from enum import StrEnum
-from typing import Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from pydantic import ConfigDict, Field, model_validator
 
 from netsp.drawn import Drawn
-from netsp.fields import Name, NonNegative, Number, PathPoint, Total
+from netsp.fields import LARGEST, Name, NonNegative, Number, PathPoint, Total
 from netsp.files import FileModel
+from netsp.frames import frame_of
 from netsp.lower_bound import LowerBound, Scope
 from netsp.models import Model
+
+if TYPE_CHECKING:
+    import pandas
 
 
 class Status(StrEnum):
@@ -121,6 +125,33 @@ def max_turning(friction: float, max_tension_ratio: float | None) -> float:
     if max_tension_ratio is None or friction == 0.0:
         return math.inf
     return math.log(max_tension_ratio) / friction
+
+
+MAX_FRICTION = 10.0
+"""Largest coefficient of friction of tether on obstacle that is taken; ropes have 0.1 to 1."""
+
+
+def tension_ratio(friction: float, turning: float) -> float:
+    """Return the factor by which friction multiplies a tether's tension, by the capstan's formula.
+
+    Parameters
+    ----------
+    friction : float
+        Coefficient, at least 0.
+    turning : float
+        Sum of the angles by which the tether turns about obstacles, radians, at least 0.
+
+    Returns
+    -------
+    float
+        e^(friction · turning), and 1e12 where that is more: no tether moves then.
+
+    Examples
+    --------
+    >>> round(tension_ratio(0.3, math.pi), 3)
+    2.566
+    """
+    return math.exp(min(friction * turning, math.log(LARGEST)))
 
 
 EXACT_ROADMAPS = frozenset({"taut"})
@@ -248,7 +279,7 @@ class Solution(Drawn, FileModel):
         Field(description="share of the taut length that may be out beyond it"),
     ] = 0.0
     friction: Annotated[
-        Annotated[NonNegative, Field(le=10.0)],
+        Annotated[NonNegative, Field(le=MAX_FRICTION)],
         Field(description="coefficient of friction of tether on obstacle"),
     ] = 0.0
     max_tension_ratio: Annotated[
@@ -336,6 +367,29 @@ class Solution(Drawn, FileModel):
         )
 
     __str__ = __repr__
+
+    def to_frame(self) -> pandas.DataFrame:
+        """Return the visits as a pandas DataFrame, a row for each in the order of the tour.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Columns ``goal`` (from 0), ``name``, ``x``, ``y``, ``z``, ``signature`` and
+            ``tether_length``, in the problem's units.
+
+        Raises
+        ------
+        InputError
+            pandas is not installed.
+        """
+        return frame_of(
+            {
+                "goal": v.goal, "name": v.name,
+                **dict(zip("xyz", v.position or (None, None, None), strict=True)),
+                "signature": v.signature, "tether_length": v.tether_length,
+            }
+            for v in self.tour
+        )  # fmt: skip
 
     @property
     def bound(self) -> LowerBound | None:

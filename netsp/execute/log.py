@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -13,9 +13,13 @@ from netsp.errors import counted
 from netsp.execute.plan import HOME
 from netsp.execute.repair import REPLAN_S
 from netsp.fields import Point3
+from netsp.frames import frame_of
 from netsp.hsignature import Word
 from netsp.problem import Problem
 from netsp.solution import Solution
+
+if TYPE_CHECKING:
+    import pandas
 
 RESOLUTION = 1e-4
 """The tether model is right to this share of the tether length; less is no exceedance."""
@@ -208,6 +212,21 @@ class Execution(Drawn):
     wall_s: float = 0.0
     stopped: str = ""
     maps: list[tuple[float, Problem]] = field(default_factory=list)
+
+    def to_frame(self) -> pandas.DataFrame:
+        """Return the steps as a pandas DataFrame, a column per field of `ExecutionRow`.
+
+        Returns
+        -------
+        pandas.DataFrame
+            In the order of time.
+
+        Raises
+        ------
+        InputError
+            pandas is not installed.
+        """
+        return frame_of(self.rows)
 
     def __repr__(self) -> str:
         """In a line."""

@@ -10,19 +10,23 @@ import os
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from netsp.drawn import Drawn
 from netsp.errors import InputError
 from netsp.fields import LARGEST
-from netsp.files import read_text
+from netsp.files import csv_rows, read_text
+from netsp.frames import frame_of
 from netsp.models import parse_json_object, shown
 from netsp.online.mission import Mission
 from netsp.online.scene.scene import Scene
 from netsp.online.tether import Tether
 from netsp.online.tether.strand import WIDTH
+
+if TYPE_CHECKING:
+    import pandas
 
 
 @dataclass(frozen=True)
@@ -111,6 +115,21 @@ class Run(Drawn):
     summary: dict[str, Any]
     scene: Scene | None = None
     tethers: tuple[tuple[int, Tether], ...] = ()
+
+    def to_frame(self) -> pandas.DataFrame:
+        """Return the log as a pandas DataFrame, a row per step and a column per field of `LogRow`.
+
+        Returns
+        -------
+        pandas.DataFrame
+            In the order of time.
+
+        Raises
+        ------
+        InputError
+            pandas is not installed.
+        """
+        return frame_of(self.log)
 
     def __repr__(self) -> str:
         """In a line."""
@@ -218,7 +237,7 @@ def read_run(folder: str | Path) -> Run:
     mission = Mission.load(place / "mission.json")
     summary = parse_json_object(read_text(place / "summary.json"), str(place / "summary.json"))
     file = place / "log.csv"
-    rows = list(csv.DictReader(read_text(file).splitlines()))
+    rows = csv_rows(read_text(file), str(file))
     try:
         log = tuple(LogRow(**{k: _KINDS[k](v) for k, v in row.items()}) for row in rows)
         planner = str(summary["planner"])

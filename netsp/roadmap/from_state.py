@@ -282,7 +282,7 @@ def graph_from_state(
     )  # fmt: skip
     part = TravelGraph(
         cluster, words, legs.to_base(), legs, roadmap="taut",
-        between=lambda up: legs.paths.contacts.between(placed.points[:, 2], up),
+        between=legs.paths.bounds_in_any_class,
         classes=roadmap.rule if roadmap.complete else "shortest",
         least_left_out=roadmap.least_left_out, by_parity=partial(ways_by_parity, legs.paths),
     )  # fmt: skip

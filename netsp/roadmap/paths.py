@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -55,6 +55,16 @@ class TautPaths:
     def contacts(self) -> ContactGraph:
         """Shortest paths in any class over the same tangents."""
         return ContactGraph(self.outline, self.tangents)
+
+    def bounds_in_any_class(self, up: Callable[[], bool]) -> Floats:
+        """Return (points, points) lower bounds on 3D paths between points, in any class.
+
+        Parameters
+        ----------
+        up : callable
+            Whether the time is up; straight distances stand for pairs not looked at by then.
+        """
+        return self.contacts.between(self._z, up)
 
     @cached_property
     def arcs(self) -> Arcs:

@@ -131,7 +131,7 @@ class PrmRoadmap:
         they fit was decided by the length along the roadmap, which is no shorter."""
         return TravelGraph(
             self.cluster, self.signatures, self.tethers, self, roadmap="prm", detours=self._detours,
-            between=lambda up: self.paths.contacts.between(self.problem.points[:, 2], up),
+            between=self.paths.bounds_in_any_class,
             classes="non-looping" if self.complete else "shortest",
             least_left_out=math.inf if self.complete else 0.0,
         )  # fmt: skip

@@ -94,7 +94,7 @@ class TautRoadmap:
             self.legs,
             roadmap="taut",
             detours=partial(taut_detours, self.problem),
-            between=lambda up: self.paths.contacts.between(self.problem.points[:, 2], up),
+            between=self.paths.bounds_in_any_class,
             classes=self.rule if self.complete else "shortest",
             least_left_out=self.least_left_out,
             carrier=None if self.complete else self,

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from netsp.arrays import Bools, Floats
+from netsp.arrays import Bools, ComparesArrays, Floats
 from netsp.errors import NetspError
 from netsp.fields import checked_argument
 from netsp.hsignature import Word, invert, reduce
@@ -30,8 +30,8 @@ MOST_STEPS = 5_000_000
 """Departures that are looked at for one place."""
 
 
-@dataclass(frozen=True)
-class TautTether:
+@dataclass(frozen=True, eq=False)
+class TautTether(ComparesArrays):
     """A taut tether from the base to a place.
 
     Parameters

@@ -15,7 +15,7 @@ import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -25,6 +25,7 @@ from netsp.clock import Clock
 from netsp.drawn import Drawn
 from netsp.errors import InfeasibleError, InputError, LimitReachedError
 from netsp.files import cell, write_text
+from netsp.frames import frame_of
 from netsp.mip.overgoals import ROUNDING
 from netsp.problem import Problem
 from netsp.roadmap.outline import build_outline
@@ -33,6 +34,9 @@ from netsp.solution import Solution, Status
 from netsp.solvers.solve import solve, solve_graph
 from netsp.travel.graph import TravelGraph
 from netsp.travel.result import OPTIMALITY_TOLERANCE
+
+if TYPE_CHECKING:
+    import pandas
 
 MOST_CANDIDATES = 10_000
 
@@ -100,6 +104,21 @@ class BaseSearch(Drawn):
     candidates: tuple[Candidate, ...]
     solution: Solution | None
     proven: bool
+
+    def to_frame(self) -> pandas.DataFrame:
+        """Return the ranking as a pandas DataFrame, a column per field of `Candidate`.
+
+        Returns
+        -------
+        pandas.DataFrame
+            The best candidate first.
+
+        Raises
+        ------
+        InputError
+            pandas is not installed.
+        """
+        return frame_of(self.candidates)
 
     @property
     def best(self) -> Candidate | None:

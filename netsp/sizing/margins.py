@@ -13,14 +13,20 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from netsp.arrays import Floats
 from netsp.errors import InputError, NetspError
+from netsp.fields import checked_argument
+from netsp.frames import frame_of
 from netsp.problem import Circle, Problem
 from netsp.roadmap.paths import TautPaths
-from netsp.solution import Solution
+from netsp.solution import MAX_FRICTION, Solution, tension_ratio
+
+if TYPE_CHECKING:
+    import pandas
 
 STEPS = 40
 """Of a bisection: to 1e-12 of where it began."""
@@ -85,15 +91,34 @@ class Margins:
     friction: float
     stops: tuple[StopMargin, ...]
 
+    def to_frame(self) -> pandas.DataFrame:
+        """Return the visits as a pandas DataFrame, a column per field of `StopMargin`.
+
+        Returns
+        -------
+        pandas.DataFrame
+            In the order of the visits.
+
+        Raises
+        ------
+        InputError
+            pandas is not installed.
+        """
+        return frame_of(self.stops)
+
     def to_json(self) -> str:
         """The margins as JSON.
 
         Returns
         -------
         str
-            Object with the stops in a list.
+            Object with the stops in a list; null stands for a margin without limit, as there is
+            where a problem has no obstacles.
         """
-        return json.dumps(asdict(self), indent=1, allow_nan=False, ensure_ascii=False) + "\n"
+        data = asdict(self)
+        for part in (data, *data["stops"]):
+            part.update({k: None for k, v in part.items() if v == math.inf})
+        return json.dumps(data, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
 
 
 def margins(problem: Problem, solution: Solution, friction: float = 0.0) -> Margins:
@@ -106,7 +131,7 @@ def margins(problem: Problem, solution: Solution, friction: float = 0.0) -> Marg
     solution : Solution
         With a tour that fits.
     friction : float
-        Coefficient of friction of the tether on obstacles.
+        Coefficient of friction of the tether on obstacles, 0 to 10.
 
     Returns
     -------
@@ -116,8 +141,10 @@ def margins(problem: Problem, solution: Solution, friction: float = 0.0) -> Marg
     Raises
     ------
     InputError
-        No tour, one of another problem, one that starts with the robot out, or that does not fit.
+        Friction out of range; no tour, one of another problem, one that starts with the robot
+        out, or that does not fit.
     """
+    friction = checked_argument("friction", friction, 0.0, MAX_FRICTION)
     if solution.problem.sha256 != problem.sha256:
         raise InputError("solution: is for another problem (sha256 differs)")
     if not solution.tour:
@@ -144,7 +171,7 @@ def _stop(
     turning = _turning(tether[:, :2])
     return StopMargin(
         goal, problem.goal_name(goal), length, problem.tether_length - length, turning,
-        math.exp(friction * turning), _nearest(problem, tether),
+        tension_ratio(friction, turning), _nearest(problem, tether),
     )  # fmt: skip
 
 

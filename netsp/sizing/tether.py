@@ -21,7 +21,7 @@ import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -31,6 +31,7 @@ from netsp.drawn import Drawn
 from netsp.errors import InputError, LimitReachedError
 from netsp.fields import checked_argument
 from netsp.files import write_text
+from netsp.frames import frame_of
 from netsp.problem import Problem
 from netsp.roadmap.reach import shortest_tethers
 from netsp.solution import Status
@@ -38,6 +39,9 @@ from netsp.solvers.solve import solve_graph, travel_graph
 from netsp.travel.graph import TravelGraph
 from netsp.travel.kept import within_kept
 from netsp.travel.result import Result, relative_gap
+
+if TYPE_CHECKING:
+    import pandas
 
 MEASURED = 1500
 """Vertices among which all legs are measured at once, for all steps together."""
@@ -110,6 +114,21 @@ class TetherCurve(Drawn):
     shortest: float
     needs: int
     whole: bool
+
+    def to_frame(self) -> pandas.DataFrame:
+        """Return the staircase as a pandas DataFrame, a column per field of `Step`.
+
+        Returns
+        -------
+        pandas.DataFrame
+            From the shortest tether up.
+
+        Raises
+        ------
+        InputError
+            pandas is not installed.
+        """
+        return frame_of(self.steps)
 
     @property
     def proven(self) -> bool:

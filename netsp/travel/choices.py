@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -31,9 +32,9 @@ def with_choices(graph: TravelGraph, clusters: Ints) -> TravelGraph:
     cluster = clusters[graph.cluster]
     out = TravelGraph(
         cluster, graph.signatures, graph.tethers, _LegsOfChoices(graph, cluster), graph.roadmap,
-        between=_between(graph, clusters), classes=graph.classes,
+        between=partial(_goal_bounds, graph, clusters), classes=graph.classes,
         least_left_out=graph.least_left_out,
-        by_parity=_ways(graph, clusters) if graph.knows_ways else None,
+        by_parity=partial(_paths_by_parity, graph, clusters) if graph.knows_ways else None,
     )  # fmt: skip
     out.goal = graph.goal
     return out
@@ -106,31 +107,23 @@ class _LegsOfChoices:
         return self.graph.path(u, v)
 
 
-def _ways(
-    graph: TravelGraph, clusters: Ints
-) -> Callable[[Callable[[], bool]], WaysByParity | None]:
-    """Ways between goals: those between any of their places."""
-
-    def ways(up: Callable[[], bool]) -> WaysByParity | None:
-        places = graph.ways_by_parity(up)
-        if places is None:
-            return None
-        ends = np.sort(clusters[places.ends], axis=1)
-        apart = ends[:, 0] != ends[:, 1]
-        return replace(places, ends=ends[apart], odd=places.odd[apart], length=places.length[apart])
-
-    return ways
+def _paths_by_parity(
+    graph: TravelGraph, clusters: Ints, up: Callable[[], bool]
+) -> WaysByParity | None:
+    """Return the paths between goals: those between any of their places."""
+    places = graph.ways_by_parity(up)
+    if places is None:
+        return None
+    ends = np.sort(clusters[places.ends], axis=1)
+    apart = ends[:, 0] != ends[:, 1]
+    return replace(places, ends=ends[apart], odd=places.odd[apart], length=places.length[apart])
 
 
-def _between(graph: TravelGraph, clusters: Ints) -> Callable[[Callable[[], bool]], Floats]:
-    """Bounds between goals: the least between any of their places."""
-
-    def bounds(up: Callable[[], bool]) -> Floats:
-        places = graph.between_goals(up)
-        out = np.full((int(clusters.max()) + 1,) * 2, np.inf)
-        rows, columns = np.meshgrid(clusters, clusters, indexing="ij")
-        np.minimum.at(out, (rows, columns), places)
-        np.fill_diagonal(out, 0.0)
-        return out
-
-    return bounds
+def _goal_bounds(graph: TravelGraph, clusters: Ints, up: Callable[[], bool]) -> Floats:
+    """Return the bounds between goals: the least between any of their places."""
+    places = graph.between_goals(up)
+    out = np.full((int(clusters.max()) + 1,) * 2, np.inf)
+    rows, columns = np.meshgrid(clusters, clusters, indexing="ij")
+    np.minimum.at(out, (rows, columns), places)
+    np.fill_diagonal(out, 0.0)
+    return out

@@ -14,7 +14,7 @@ import math
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, ClassVar, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -32,6 +32,8 @@ from netsp.travel.legs import Legs
 from netsp.travel.ways import WaysByParity
 
 if TYPE_CHECKING:
+    import networkx
+
     from netsp.solution import KeptClasses
     from netsp.travel.result import OnProgress, Result
 
@@ -192,6 +194,49 @@ class TravelGraph(Drawn):
         graph = kind(cluster, [()] * len(cluster), np.zeros(len(cluster)), table)
         graph.grain = grain_of(table.costs)
         return graph
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Pickle everything but the clock of the solver that runs on it."""
+        return {**self.__dict__, "clock": None}
+
+    def to_networkx(self) -> networkx.Graph:
+        """Return the travel graph as a NetworkX graph.
+
+        Returns
+        -------
+        networkx.Graph
+            Node v is vertex v, with the attributes ``goal`` (from 0 as in the problem, None at the
+            base), ``cluster``, ``signature`` and ``tether`` (problem's units). Every leg that a
+            tour can take is an edge whose ``weight`` is its length. Attributes of the graph are
+            ``roadmap`` and ``classes``.
+
+        Raises
+        ------
+        InputError
+            NetworkX is not installed.
+
+        Examples
+        --------
+        >>> from netsp import TravelGraph
+        >>> costs = [[0, 3, 4], [3, 0, 5], [4, 5, 0]]
+        >>> TravelGraph.from_costs(costs, clusters=[0, 1, 2]).to_networkx().edges[0, 2]["weight"]
+        4.0
+        """
+        try:
+            import networkx
+        except ImportError:
+            raise InputError("to_networkx: NetworkX is missing: pip install networkx") from None
+        out = networkx.Graph(roadmap=self.roadmap, classes=self.classes)
+        for v, signature in enumerate(self.signatures):
+            out.add_node(
+                v, goal=int(self.goal[v]) - 1 if self.goal[v] else None,
+                cluster=int(self.cluster[v]), signature=tuple(int(x) for x in signature),
+                tether=float(self.tethers[v]),
+            )  # fmt: skip
+        us, vs = np.nonzero(np.triu(np.isfinite(self.costs), 1))
+        weights = self.costs[us, vs]
+        out.add_weighted_edges_from(zip(us.tolist(), vs.tolist(), weights.tolist(), strict=True))
+        return out
 
     def __repr__(self) -> str:
         """In a line."""

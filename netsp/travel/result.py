@@ -4,10 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
-from netsp.arrays import Floats, Ints
+from netsp.arrays import ComparesArrays, Floats, Ints
+from netsp.frames import frame_of
 from netsp.hsignature import Word
 from netsp.solution import Status
+
+if TYPE_CHECKING:
+    import pandas
 
 OPTIMALITY_TOLERANCE = 1e-6
 """A tour is called optimal when (length - bound) <= this fraction of its length. Bounds are
@@ -90,8 +95,8 @@ def of_part(listener: OnProgress | None, chosen: Ints) -> OnProgress | None:
     return tell
 
 
-@dataclass(frozen=True)
-class Trajectory:
+@dataclass(frozen=True, eq=False)
+class Trajectory(ComparesArrays):
     """What a baseline blind to the tether walked: a closed path, whatever it entangles.
 
     Parameters
@@ -150,6 +155,21 @@ class Result:
     def gap(self) -> float | None:
         """(length - lower_bound) / length; None without a tour or a bound."""
         return relative_gap(self.length, self.lower_bound)
+
+    def to_frame(self) -> pandas.DataFrame:
+        """Return the progress rows as a pandas DataFrame, a column per field of `Progress`.
+
+        Returns
+        -------
+        pandas.DataFrame
+            In the order they were reported.
+
+        Raises
+        ------
+        InputError
+            pandas is not installed.
+        """
+        return frame_of(self.trace)
 
     def __repr__(self) -> str:
         """In a line."""

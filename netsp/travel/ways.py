@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from netsp.arrays import Bools, Floats, Ints
+from netsp.arrays import Bools, ComparesArrays, Floats, Ints
 
 BITS = 64
 
 
-@dataclass(frozen=True)
-class WaysByParity:
+@dataclass(frozen=True, eq=False)
+class WaysByParity(ComparesArrays):
     """The shortest way between two goals of each set of rays crossed an odd number of times, as
     far as it is no longer than `reach`; from the base, than the tether.
 
