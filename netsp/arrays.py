@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import numpy.typing as npt
 
@@ -16,3 +18,29 @@ Ints = npt.NDArray[np.int64]
 
 Bools = npt.NDArray[np.bool_]
 """Marks, one per row."""
+
+
+class ComparesArrays:
+    """Base of dataclasses with arrays among their fields: equal where all fields are.
+
+    A dataclass compares its fields in one tuple, which raises for arrays of more than one element.
+    Derived classes are declared with ``@dataclass(eq=False)``. Arrays are equal if shapes and all
+    elements are; NaN equals NaN.
+    """
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, ComparesArrays) or type(self) is not type(other):
+            return NotImplemented
+        return all(
+            _is_equal(getattr(self, f.name), getattr(other, f.name))
+            for f in dataclasses.fields(self)  # type: ignore[arg-type]
+            if f.compare
+        )
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+def _is_equal(a: object, b: object) -> bool:
+    if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
+        return a.dtype == b.dtype and np.array_equal(a, b, equal_nan=a.dtype.kind == "f")
+    return bool(a == b)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import json
 import os
 import re
@@ -13,6 +14,7 @@ import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import lru_cache
+from itertools import zip_longest
 from pathlib import Path
 from typing import ClassVar, Self
 
@@ -21,7 +23,7 @@ import numpy as np
 from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.fields import LARGEST
-from netsp.models import Model, read_model, shown
+from netsp.models import Model, parse_json, read_model, shown
 
 STANDARD = "-"
 """The name of a file that stands for standard input, or output."""
@@ -203,6 +205,65 @@ def cell(text: str | None) -> str:
     return f"'{text}" if risky else text
 
 
+def csv_lines(text: str, source: str) -> Iterator[list[str]]:
+    """Yield the cells of each line of a CSV text, as `csv.reader`.
+
+    Parameters
+    ----------
+    text : str
+        The text.
+    source : str
+        What messages call it, such as the name of the file.
+
+    Raises
+    ------
+    InputError
+        A line cannot be read, for example because a cell has more than 131,072 characters.
+    """
+    reader = csv.reader(io.StringIO(text, newline=""))
+    try:
+        yield from reader
+    except csv.Error as error:
+        raise InputError(f"{source}: line {reader.line_num}: {error}") from None
+
+
+def csv_rows(text: str, source: str) -> list[dict[str, str]]:
+    """Return the rows of a CSV text by column name; the first line that is not empty has the names.
+
+    Parameters
+    ----------
+    text : str
+        The text, with or without a byte order mark.
+    source : str
+        What messages call it, such as the name of the file.
+
+    Returns
+    -------
+    list of dict
+        Cells as text. Lines without cells are left out; cells that a short line lacks are empty.
+
+    Raises
+    ------
+    InputError
+        A line cannot be read, or has more cells than there are names.
+
+    Examples
+    --------
+    >>> csv_rows("x,y\\n1,2\\n", "path.csv")
+    [{'x': '1', 'y': '2'}]
+    """
+    lines = (line for line in csv_lines(text.removeprefix("\ufeff"), source) if line)
+    names = next(lines, [])
+    rows = []
+    for number, line in enumerate(lines, 1):
+        if len(line) > len(names):
+            raise InputError(
+                f"{source}: row {number}: expected at most {len(names)} cells, got {len(line)}"
+            )
+        rows.append(dict(zip_longest(names, line, fillvalue="")))
+    return rows
+
+
 def read_path(file: str | Path) -> Floats | None:
     """The (k, 2) or (k, 3) polyline of a path file: CSV rows ``x,y[,z]`` with or without a head, or
     a JSON list of points; None if the file holds a JSON object, which is taken for a solution.
@@ -215,17 +276,14 @@ def read_path(file: str | Path) -> Floats | None:
     if text.lstrip().startswith("{"):
         return None
     if text.lstrip().startswith("["):
-        try:
-            rows = json.loads(text)
-        except (json.JSONDecodeError, RecursionError) as error:
-            raise InputError(f"{file}: not valid JSON: {error}") from None
+        rows = parse_json(text, str(file))
     else:
-        rows = [row for row in csv.reader(text.splitlines()) if row]
+        rows = [row for row in csv_lines(text, str(file)) if row]
         if rows and not any(_is_number(cell) for cell in rows[0]):
             rows = rows[1:]
     for k, row in enumerate(rows):
         if not _is_point(row) or len(row) != len(rows[0]):
-            raise InputError(f"{file}: point {k}: expected x, y or x, y, z, got {row!r}")
+            raise InputError(f"{file}: point {k}: expected x, y or x, y, z, got {shown(row)}")
     if len(rows) < 2:
         raise InputError(f"{file}: expected a path of at least 2 points, got {len(rows)}")
     return np.array(rows, dtype=float)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 from collections.abc import Iterable, Mapping
-from typing import Any, Self, TypeVar
+from typing import Any, Self, TypeVar, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
@@ -39,6 +40,12 @@ class Model(BaseModel):
     # names the whole path of a field
     __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
 
+    @classmethod
+    def __pydantic_init_subclass__(cls, **kwargs: Any) -> None:
+        """Give the class a signature with plain types, without the checks of its fields."""
+        super().__pydantic_init_subclass__(**kwargs)
+        cls.__signature__ = _signature(cls)
+
     def __eq__(self, other: object) -> bool:
         """By the fields: cached properties may be arrays, which are not equal or unequal."""
         if not isinstance(other, Model) or type(self) is not type(other):
@@ -51,6 +58,22 @@ class Model(BaseModel):
         for name in copy.__dict__.keys() - type(self).model_fields.keys():
             del copy.__dict__[name]
         return copy
+
+
+def _signature(model: type[BaseModel]) -> inspect.Signature:
+    """Return the signature that `inspect.signature` and help show of a model's constructor."""
+    types = get_type_hints(model)  # without Annotated, in which the checks of fields stand
+    return inspect.Signature(
+        [
+            inspect.Parameter(
+                name, inspect.Parameter.KEYWORD_ONLY, annotation=types.get(name, field.annotation),
+                default=inspect.Parameter.empty if field.is_required() else field.get_default(
+                    call_default_factory=True, validated_data={}
+                ),
+            )
+            for name, field in model.model_fields.items()
+        ]
+    )  # fmt: skip
 
 
 M = TypeVar("M", bound=BaseModel)
@@ -89,8 +112,31 @@ def _check_kind(model: type[BaseModel], data: dict[str, Any], source: str) -> No
         raise InputError(f"{source}: this is a {kind}; expected a {own}")
 
 
-def parse_json_object(text: str | bytes, source: str) -> dict[str, Any]:
-    """A JSON object without repeated keys, or `InputError` in one line."""
+def parse_json(text: str | bytes, source: str) -> Any:
+    """Return the value that a JSON text holds; no object in it may repeat a key.
+
+    Parameters
+    ----------
+    text : str or bytes
+        The text; bytes are UTF-8.
+    source : str
+        What messages call it, such as the name of the file.
+
+    Returns
+    -------
+    object
+        As `json.loads` gives it.
+
+    Raises
+    ------
+    InputError
+        Not JSON, a key is repeated, a number has too many digits, or lists are nested too deeply.
+
+    Examples
+    --------
+    >>> parse_json("[1, 2.5]", "path.json")
+    [1, 2.5]
+    """
 
     def unique(pairs: Iterable[tuple[str, Any]]) -> dict[str, Any]:
         out: dict[str, Any] = {}
@@ -101,7 +147,7 @@ def parse_json_object(text: str | bytes, source: str) -> dict[str, Any]:
         return out
 
     try:
-        data = json.loads(text, object_pairs_hook=unique)
+        return json.loads(text, object_pairs_hook=unique)
     except json.JSONDecodeError as error:
         known = "NODE_COORD_SECTION" in str(text) or "GTSP_SET_SECTION" in str(text)
         hint = "; `netsp gtsp` reads this format" if known else ""
@@ -116,6 +162,11 @@ def parse_json_object(text: str | bytes, source: str) -> dict[str, Any]:
         ) from None
     except RecursionError:
         raise InputError(f"{source}: not JSON that netsp reads: nested too deeply") from None
+
+
+def parse_json_object(text: str | bytes, source: str) -> dict[str, Any]:
+    """Return the object that a JSON text holds, as `parse_json`; InputError for other values."""
+    data = parse_json(text, source)
     if not isinstance(data, dict):
         raise InputError(f"{source}: expected a JSON object, got {type(data).__name__}")
     return data

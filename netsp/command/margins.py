@@ -6,7 +6,7 @@ import argparse
 import math
 from typing import TYPE_CHECKING
 
-from netsp.command.types import check_writable, length, load_pair
+from netsp.command.types import check_writable, friction, load_pair
 
 if TYPE_CHECKING:
     from netsp.problem import Problem
@@ -20,8 +20,9 @@ def arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument("problem", metavar="PROBLEM", help="problem file (JSON)")
     p.add_argument("solution", metavar="SOLUTION", help="solution file (JSON)")
     p.add_argument(
-        "--friction", type=length, default=0.0, metavar="MU",
-        help="coefficient of friction of tether on obstacle, for the tension ratios; default 0",
+        "--friction", type=friction, default=0.0, metavar="MU",
+        help="coefficient of friction of tether on obstacle, 0 to 10, for the tension ratios; "
+        "default 0",
     )  # fmt: skip
     p.add_argument("-o", "--output", metavar="FILE", help="write the margins (JSON)")
 

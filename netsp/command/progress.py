@@ -11,7 +11,7 @@ from netsp.solution import Solution, Status
 from netsp.travel.result import Progress
 
 _HEADER = (
-    f"{'time':>7}  {'stage':<10} {'tour':>12} {'bound':>12} {'gap':>8} {'cuts':>6} {'classes':>8} "
+    f"{'time':>7}  {'stage':<10} {'tour':>12} {'bound':>12} {'gap':>8} {'cuts':>6} {'vertices':>8} "
     f"{'legs':>9} {'iteration':>11}"
 )
 

@@ -11,6 +11,7 @@ from netsp.command import messages, told
 from netsp.command.types import (
     check_writable,
     choices,
+    friction,
     length,
     natural,
     option,
@@ -112,8 +113,8 @@ def _for_problems(p: argparse._ArgumentGroup) -> None:
         help="share of the taut length that must fit beyond it, as 0.05; default 0",
     )  # fmt: skip
     p.add_argument(
-        "--friction", type=length, default=0.0, metavar="MU",
-        help="coefficient of friction of tether on obstacle; default 0",
+        "--friction", type=friction, default=0.0, metavar="MU",
+        help="coefficient of friction of tether on obstacle, 0 to 10; default 0",
     )  # fmt: skip
     p.add_argument(
         "--max-tension-ratio", type=length, metavar="K",

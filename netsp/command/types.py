@@ -35,6 +35,19 @@ def _above_zero(what: str) -> Callable[[str], float]:
     return read
 
 
+def friction(text: str) -> float:
+    """Return a coefficient of friction, 0 to 10."""
+    from netsp.solution import MAX_FRICTION
+
+    try:
+        value = float(text)
+    except ValueError:
+        value = -1.0
+    if not 0.0 <= value <= MAX_FRICTION:
+        raise argparse.ArgumentTypeError(f"expected 0 to {MAX_FRICTION:g}, got {text!r}")
+    return value
+
+
 seconds, length = _above_zero(" of seconds"), _above_zero("")
 """A positive number."""
 

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from netsp.arrays import Bools, Floats, Ints
+from netsp.arrays import Bools, ComparesArrays, Floats, Ints
 from netsp.clock import Clock
 
 LARGEST = 4_000_000
@@ -26,8 +26,8 @@ LARGEST = 4_000_000
 simplest."""
 
 
-@dataclass(frozen=True)
-class Choice:
+@dataclass(frozen=True, eq=False)
+class Choice(ComparesArrays):
     """Viewpoints that were chosen.
 
     Parameters

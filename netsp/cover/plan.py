@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from netsp.arrays import Bools, Floats
+from netsp.arrays import Bools, ComparesArrays, Floats
 from netsp.clock import TimeLimit, until_interrupt
 from netsp.cover.alternatives import alternatives
 from netsp.cover.choose import Choice, choose
@@ -40,8 +40,8 @@ SHARE = 0.99
 """Of the tether that may be needed to stand at a viewpoint, as planners allow."""
 
 
-@dataclass(frozen=True)
-class Cover:
+@dataclass(frozen=True, eq=False)
+class Cover(ComparesArrays):
     """Waypoints that see a structure.
 
     Parameters

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from netsp.arrays import Bools, Floats, Ints
+from netsp.arrays import Bools, ComparesArrays, Floats, Ints
 from netsp.clock import Clock
 from netsp.online.coverage import Coverage, Patches
 from netsp.online.equipment import Camera
@@ -35,8 +35,8 @@ NEARER = 0.4
 """Of the stand-off: as near as that the robot goes where there is no other place."""
 
 
-@dataclass(frozen=True)
-class Viewpoints:
+@dataclass(frozen=True, eq=False)
+class Viewpoints(ComparesArrays):
     """Places to look from.
 
     Parameters

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from netsp.arrays import Floats
+from netsp.arrays import ComparesArrays, Floats
 from netsp.errors import InputError
 from netsp.geometry import polylines
 from netsp.hsignature import Word, signature
@@ -17,8 +17,8 @@ HOME = -1
 """The goal of the last leg."""
 
 
-@dataclass(frozen=True)
-class Leg:
+@dataclass(frozen=True, eq=False)
+class Leg(ComparesArrays):
     """The path to one goal.
 
     Attributes

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import queue
 import threading
 from collections.abc import Callable
@@ -12,7 +11,7 @@ from pydantic import ValidationError
 
 from netsp.errors import InputError
 from netsp.execute.events import Event
-from netsp.models import explain
+from netsp.models import explain, parse_json_object
 
 MOST_LINE = 100_000
 """Characters of a line."""
@@ -61,12 +60,7 @@ def events_of(
 
 def event_of(line: str) -> Event:
     """An event from a line of JSON; InputError for what is none."""
-    try:
-        data = json.loads(line)
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"event: no JSON: {error}") from None
-    if not isinstance(data, dict):
-        raise InputError("event: expected a JSON object")
+    data = parse_json_object(line, "event")
     try:
         return Event.model_validate({"time": 0.0, **data})
     except ValidationError as error:

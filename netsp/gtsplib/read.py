@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from netsp.arrays import Floats, Ints
+from netsp.arrays import ComparesArrays, Floats, Ints
 from netsp.errors import InputError
 from netsp.files import read_text
 from netsp.gtsplib.metrics import METRICS
@@ -49,8 +49,8 @@ MOST_VERTICES = 20_000
 BYTES_PER_LEG = 40.0
 
 
-@dataclass(frozen=True)
-class Instance:
+@dataclass(frozen=True, eq=False)
+class Instance(ComparesArrays):
     """A generalised TSP.
 
     Parameters

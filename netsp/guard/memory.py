@@ -16,10 +16,13 @@ from netsp.errors import InputError
 from netsp.fields import Point3
 from netsp.files import FileModel, write_text
 from netsp.guard.guard import Guard
-from netsp.guard.site import ROUNDS, Site
+from netsp.guard.site import LONGER, ROUNDS, Site
 from netsp.hsignature import Word
 from netsp.models import Model
 from netsp.online.tether import Tether
+
+MAX_LETTERS = 10_000
+"""Letters of a word in a state file; a damaged file may hold a word that takes hours to read."""
 
 LONGEST_S = 600.0
 """Seconds without us after which the robot may be anywhere: then the memory is of no use."""
@@ -28,7 +31,10 @@ LONGEST_S = 600.0
 class KnownClass(Model):
     """A class that was believed."""
 
-    word: Annotated[tuple[int, ...], Field(description="its h-signature, at the position")]
+    word: Annotated[
+        tuple[int, ...],
+        Field(description="its h-signature, at the position", max_length=MAX_LETTERS),
+    ]
     cost: Annotated[
         float, Field(description="negative logarithm of its likelihood", ge=0.0, le=1e6)
     ]  # fmt: skip
@@ -80,6 +86,12 @@ class GuardState(FileModel):
                 site.check_word(known.word)
             except InputError as error:
                 raise InputError(f"--state: classes: {error}") from None
+        reach = LONGER * site.tether_length
+        if (far := float(np.linalg.norm(self.place - site.anchor))) > reach:
+            raise InputError(
+                f"--state: position: expected at most {reach:.6g} {site.units} from where the "
+                f"tether is fixed, twice its length, got {far:.6g}"
+            )
         if self.saved > time.time() + LONGEST_S:
             raise InputError("--state: saved: lies in the future; is the clock right?")
         return {c.word: c.cost for c in self.classes}

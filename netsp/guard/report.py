@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from netsp.arrays import Floats
+from netsp.arrays import ComparesArrays, Floats
 from netsp.fields import Point3
 from netsp.guard.alarms import Alarm
 from netsp.hsignature import Word
 
 
-@dataclass(frozen=True)
-class ClassNow:
+@dataclass(frozen=True, eq=False)
+class ClassNow(ComparesArrays):
     """A class that the tether may be in.
 
     Parameters

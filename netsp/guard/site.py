@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from netsp.arrays import Floats
+from netsp.arrays import ComparesArrays, Floats
 from netsp.hsignature import Word
 from netsp.online.scene.field import DistanceField
 from netsp.online.tether import GeodesicTether, Tether
@@ -18,8 +18,8 @@ ROUNDS = 300
 """Of pulling a tether taut that was just found, or written down."""
 
 
-@dataclass(frozen=True)
-class Loop:
+@dataclass(frozen=True, eq=False)
+class Loop(ComparesArrays):
     """A loop of a tether.
 
     Parameters

@@ -8,7 +8,6 @@ plain distances (Shapely).
 from __future__ import annotations
 
 import itertools
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,7 +19,7 @@ from netsp.hsignature import Word, concatenate, crossings, entangled, reduce
 from netsp.judge.solids import Inset, bridges
 from netsp.judge.stringpull import PLACE_TOLERANCE, StringPuller, reduce_sleeve
 from netsp.problem import Circle, Problem
-from netsp.solution import Solution, Status
+from netsp.solution import Solution, Status, tension_ratio
 
 STAND_OFF_ALLOWANCE = 3e-8
 """As a share of the problem's size, what standing off from a boundary may add to a length."""
@@ -421,7 +420,7 @@ class _Judge:
         s = self.solution
         if s.max_tension_ratio is None:
             return []
-        ratio = math.exp(s.friction * turning)
+        ratio = tension_ratio(s.friction, turning)
         return [
             Check(
                 "tension ratio is kept",

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from netsp.arrays import Bools, Floats, Ints
+from netsp.arrays import Bools, ComparesArrays, Floats, Ints
 from netsp.compiled.kernel import kernel
 from netsp.errors import InputError
 from netsp.online.equipment import Camera
@@ -26,8 +26,8 @@ from netsp.online.scene.surfaces import drawn_points, extent, surface_of
 MOST_PATCHES = 200_000
 
 
-@dataclass(frozen=True)
-class Patches:
+@dataclass(frozen=True, eq=False)
+class Patches(ComparesArrays):
     """A surface in pieces.
 
     Attributes

@@ -14,6 +14,7 @@ from netsp.online.mission import Mission
 from netsp.online.planner import Planner
 from netsp.online.planner.base import DWELL, FREE, WAIT
 from netsp.online.simulation import STEP, Simulation
+from netsp.solution import tension_ratio
 
 
 def summarise(
@@ -135,7 +136,7 @@ def _stops(mission: Mission, planner: Planner, log: list[LogRow]) -> list[dict[s
             "tether": r.tether,
             "payout": r.payout,
             "turning_deg": math.degrees(r.turning),
-            "tension_ratio": math.exp(mu * r.turning),
+            "tension_ratio": tension_ratio(mu, r.turning),
         }
         for k, r in arrival.items()
     ]
@@ -150,6 +151,6 @@ def _friction(mission: Mission, turnings: Floats) -> dict[str, float] | None:
     most = float(turnings.max(initial=0.0))
     return {
         "most_turning_deg": math.degrees(most),
-        "most_tension_ratio": math.exp(physics.friction * most),
+        "most_tension_ratio": tension_ratio(physics.friction, most),
         "over_s": float((turnings > physics.max_turning * (1 + 1e-9)).sum() * STEP),
     }

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from netsp.arrays import Floats
+from netsp.arrays import ComparesArrays, Floats
 from netsp.errors import InputError
 from netsp.geometry import polylines
 
@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from netsp.online.scene.field import DistanceField
 
 
-@dataclass(frozen=True)
-class Track:
+@dataclass(frozen=True, eq=False)
+class Track(ComparesArrays):
     """Positions over time, straight and steady in between; at the last one the anchor stays.
 
     Parameters

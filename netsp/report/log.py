@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import csv
 import html
 from pathlib import Path
 
 import numpy as np
 
 from netsp.arrays import Floats
-from netsp.files import read_text
+from netsp.files import csv_rows, read_text
 from netsp.pictures import style
 
 
@@ -26,7 +25,7 @@ def rows_of(file: Path) -> list[dict[str, str]]:
     list of dict
         Cells as text, by column.
     """
-    return list(csv.DictReader(read_text(file).splitlines()))
+    return csv_rows(read_text(file), str(file))
 
 
 def over_time(t: Floats, length: Floats, limit: Floats, units: str) -> str:

@@ -17,6 +17,7 @@ from netsp.errors import InputError
 from netsp.execute.plan import HOME
 from netsp.files import read_text
 from netsp.geometry import polylines
+from netsp.models import parse_json
 from netsp.online.log import check_log
 from netsp.pictures.film import Film, film_of_plan, film_of_run
 from netsp.pictures.moments import CANCELLED, LEFT_OUT, VISITED
@@ -223,9 +224,4 @@ def _maps_of(file: Path) -> list[tuple[float, Problem]]:
 
 def json_of(file: Path) -> Any:
     """What a file of a run holds; InputError if that is no JSON."""
-    try:
-        return json.loads(read_text(file))
-    except json.JSONDecodeError as error:
-        raise InputError(f"{file}: not JSON: {error.msg}") from None
-    except (ValueError, RecursionError):
-        raise InputError(f"{file}: not JSON that netsp reads") from None
+    return parse_json(read_text(file), str(file))

@@ -8,7 +8,7 @@ from typing import Any
 
 from netsp.errors import InputError
 from netsp.files import read_text
-from netsp.models import parse_json_object
+from netsp.models import parse_json_object, shown
 from netsp.site.feature import Feature, Map
 
 SHAPES = {
@@ -79,8 +79,8 @@ def _feature(data: Any, where: str, *, degrees: bool) -> Feature | None:
         raise InputError(f"{where}: expected an object as geometry and as properties")
     kind = geometry.get("type")
     coordinates: Any = geometry.get("coordinates")
-    if kind not in SHAPES:
-        raise InputError(f"{where}: expected a {', '.join(SHAPES)}, got {kind!r}")
+    if not isinstance(kind, str) or kind not in SHAPES:
+        raise InputError(f"{where}: expected a {', '.join(SHAPES)}, got {shown(kind)}")
     _check(coordinates, SHAPES[kind], kind, where, degrees=degrees)
     if kind.endswith("Polygon"):
         for rings in coordinates if kind == "MultiPolygon" else [coordinates]:

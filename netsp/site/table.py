@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from pathlib import Path
 
@@ -11,7 +9,8 @@ import numpy as np
 
 from netsp.arrays import Floats
 from netsp.errors import InputError
-from netsp.files import read_text
+from netsp.files import csv_rows, read_text
+from netsp.models import shown
 
 
 def from_table(file: str | Path) -> tuple[Floats, list[str | None]]:
@@ -34,7 +33,7 @@ def from_table(file: str | Path) -> tuple[Floats, list[str | None]]:
     InputError
         Not such a table.
     """
-    rows = list(csv.DictReader(io.StringIO(read_text(file))))
+    rows = csv_rows(read_text(file), str(file))
     if not rows or not {"x", "y"} <= rows[0].keys():
         raise InputError(f"{file}: expected a table with the columns x, y and perhaps z, name")
     axes = ("x", "y", "z") if "z" in rows[0] else ("x", "y")
@@ -47,6 +46,6 @@ def from_table(file: str | Path) -> tuple[Floats, list[str | None]]:
                 places[k, j] = math.nan
             if not math.isfinite(places[k, j]):
                 raise InputError(
-                    f"{file}: row {k + 1}: {axis}: expected a number, got {row[axis]!r}"
+                    f"{file}: row {k + 1}: {axis}: expected a number, got {shown(row[axis])}"
                 )
     return places, [row.get("name") or None for row in rows]

@@ -16,7 +16,7 @@ from netsp.fields import checked_argument
 from netsp.models import shown
 from netsp.problem import Problem
 from netsp.registry import foreign, load
-from netsp.solution import ProblemReference, Solution, Timings, max_turning
+from netsp.solution import MAX_FRICTION, ProblemReference, Solution, Timings, max_turning
 from netsp.solvers import without_base
 from netsp.solvers.answer import to_solution
 from netsp.solvers.carried import with_carried
@@ -339,7 +339,7 @@ def solve(
             on_progress=on_progress, should_stop=should_stop,
         )  # fmt: skip
     limits = {
-        "friction": checked_argument("friction", friction, 0.0, 10.0),
+        "friction": checked_argument("friction", friction, 0.0, MAX_FRICTION),
         "max_tension_ratio": _tension_ratio(max_tension_ratio, friction),
     }
     clock = Clock(time_limit, should_stop=should_stop)

@@ -27,6 +27,7 @@ from netsp.online.tether.measure import cut_off
 from netsp.online.tether.pull import PullSettings, pull_end
 from netsp.online.tether.strand import EXTRA, X, Y, Z, gap, rests, strand_length
 from netsp.online.tether.tether import Tether
+from netsp.solution import tension_ratio
 
 MOST_SAG = 40.0
 """q at most: beyond, a span is as good as endless."""
@@ -218,7 +219,7 @@ def pull_on_robot(
     if length < 1e-9:
         return np.zeros(3)
     along = span / length
-    tension = load.tension * math.exp(friction * turning(tether, delta))
+    tension = load.tension * tension_ratio(friction, turning(tether, delta))
     flow = np.array([load.x, load.y, load.z]) - 0.5 * velocity
     across = flow - (flow @ along) * along
     drag = 0.5 * load.drag * length * float(np.linalg.norm(across)) * across

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from netsp.arrays import Floats
+from netsp.arrays import ComparesArrays, Floats
 from netsp.online.tether.strand import EXTRA, NX, NZ, PART, REACH0, REACH1, USED, WIDTH
 
 
@@ -34,8 +34,8 @@ class Contact:
     length: float
 
 
-@dataclass(frozen=True)
-class Tether:
+@dataclass(frozen=True, eq=False)
+class Tether(ComparesArrays):
     """A tether at rest, from its anchor to the robot.
 
     Parameters
