@@ -144,6 +144,7 @@ COMMANDS = {
     },
     "compare": {
         "compare": ("compare", "solvers side by side over random worlds, resumable"),
+        "compare-path": ("compare_path", "paths made by hand or recorded, beside the planned tour"),
         "library": ("library", "list, check and rank on the library of problems"),
         "combine": ("combine", "join the results of shards of one study"),
         "report": ("report", "one page about a comparison, a solution or a run"),

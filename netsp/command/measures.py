@@ -1,4 +1,4 @@
-"""What `netsp verify --measures` prints: how entangled a path is, and the tether at every visit."""
+"""Measures of a path and of tethers as text, for `netsp verify --measures` and `compare-path`."""
 
 from __future__ import annotations
 
@@ -6,7 +6,9 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.hsignature.measures import Measures, measure
+from netsp.pathmeasures import PathMeasures, measure_path
 from netsp.problem import Problem
+from netsp.report.path_wording import path_rows
 from netsp.roadmap.paths import TautPaths
 from netsp.solution import Solution
 
@@ -17,19 +19,57 @@ DEFINITIONS = (
 )
 
 
-def describe_path(problem: Problem, path: npt.ArrayLike) -> str:
-    """All measures of one path, a line each."""
-    m = measure(problem, path)
+def describe_path(
+    problem: Problem, path: npt.ArrayLike, times: npt.ArrayLike | None = None
+) -> str:  # fmt: skip
+    """Return all measures of one path, a line each."""
+    figures = measure_path(problem, path, times=times)
+    m = measure(problem, figures.route if figures.is_closed else _open_route(figures))
     rows = [
-        ("word", f"{list(m.signature)}" if m.signature else "empty"),
-        ("entangled obstacles", _entangled(problem, m)),
+        *path_rows(figures),
         ("winding numbers", _winding(problem, m)),
         ("self-crossings", str(m.self_crossings)),
     ]
     if not m.closed:
         rows += [(name, _verdict(problem, getattr(m, field))) for name, field in DEFINITIONS]
+    return aligned(rows)
+
+
+def aligned(rows: list[tuple[str, str]]) -> str:
+    """Return names and what they stand for, a line each, in two columns."""
     width = max(len(name) for name, _ in rows)
     return "\n".join(f"{name:<{width}}  {value}" for name, value in rows)
+
+
+def _open_route(figures: PathMeasures) -> npt.NDArray[np.float64]:
+    """Return the part of the route up to the end of the path."""
+    return figures.route[: figures.route_end + 1]
+
+
+def visit_table(m: PathMeasures) -> str:
+    """Return every visit of a path as a table.
+
+    Parameters
+    ----------
+    m : PathMeasures
+        The figures.
+
+    Returns
+    -------
+    str
+        A line for the head and each visit.
+    """
+    lines = [
+        f"{'visit':>5}  {'goal':<12} {'along':>9} {'time s':>9} {'off by':>8} {'tether':>10}  word"
+    ]
+    for k, v in enumerate(m.visits, 1):
+        name = m.problem.goal_name(v.goal) + ("" if v.is_first else " again")
+        tether = "unknown" if v.tether is None else f"{v.tether:.6g}"
+        lines.append(
+            f"{k:>5}  {name:<12.12} {v.along:>9.5g} {v.time_s:>9.5g} {v.miss:>8.3g} "
+            f"{tether:>10}  {list(v.word)}"
+        )
+    return "\n".join(lines)
 
 
 def describe_tethers(problem: Problem, solution: Solution) -> str:
@@ -52,15 +92,6 @@ def describe_tethers(problem: Problem, solution: Solution) -> str:
         "visibility\nhomotopy of the taut tether from the base (Battocletti et al. 2024)"
     )
     return "\n".join(lines)
-
-
-def _entangled(problem: Problem, m: Measures) -> str:
-    if m.entangled is None:
-        return "the path is not closed"
-    if not m.entangled:
-        return "none"
-    names = ", ".join(problem.obstacle_name(k) for k in m.entangled)
-    return f"{len(m.entangled)}: {names}"
 
 
 def _winding(problem: Problem, m: Measures) -> str:

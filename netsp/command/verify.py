@@ -11,6 +11,7 @@ from netsp.errors import EXIT_NOT_VERIFIED, InputError
 
 if TYPE_CHECKING:
     from netsp.judge import Verification
+    from netsp.problem import Problem
 
 EXAMPLE = "netsp verify problems/wharf.json solution.json"
 
@@ -29,7 +30,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
         "--measures",
         action="store_true",
         help="print measures of entanglement; SOLUTION may then be any path "
-        "(CSV x,y[,z] or a JSON list of points)",
+        "(a file that netsp compare-path reads, or a JSON list of points)",
     )
     p.add_argument(
         "--margins", action="store_true",
@@ -57,19 +58,10 @@ def run(args: argparse.Namespace) -> int:
         read_text(args.problem)  # a file that is not there is told as ever
         raise InputError(f"SOLUTION: {args.problem} is no mission; expected a solution beside it")
     if args.measures:
-        from netsp.command.measures import describe_path, entered
-        from netsp.files import read_path
         from netsp.problem import Problem
 
-        path = read_path(args.solution)
-        if path is not None:
-            problem = Problem.load(args.problem)
-            text = describe_path(problem, path)
-            for name in entered(problem, path):
-                messages.warning(f"{args.solution}: the path passes through {name}; its word there "
-                                 "depends on where the ray stands")  # fmt: skip
-            if not args.quiet:
-                print(text)
+        if _is_path(args.solution):
+            _measure_paths(Problem.load(args.problem), args)
             return 0
     elif _is_path(args.solution):
         raise InputError(
@@ -83,7 +75,7 @@ def run(args: argparse.Namespace) -> int:
     if args.measures and solution.path and not args.quiet:
         if solution.problem.sha256 != problem.sha256:
             return EXIT_NOT_VERIFIED
-        from netsp.command.measures import describe_tethers
+        from netsp.command.measures import describe_path, describe_tethers
 
         print(f"\n{describe_path(problem, solution.path)}\n\n{describe_tethers(problem, solution)}")
     if args.margins and verdict and not args.quiet:
@@ -139,11 +131,43 @@ def _mission(args: argparse.Namespace) -> int:
     return 0 if verdict else EXIT_NOT_VERIFIED
 
 
-def _is_path(file: str) -> bool:
-    """Whether a file holds a path; what cannot be read as one is left to who reads solutions."""
-    from netsp.files import read_path
+PATH_ENDINGS = (".csv", ".csv.gz", ".gpx", ".geojson", ".tlog", ".bin")
+"""Endings of files that hold paths and nothing else."""
 
-    try:
-        return read_path(file) is not None
-    except InputError:
-        return False
+
+def _is_path(file: str) -> bool:
+    """Return whether a file holds a path; any other is left to the reader of solutions."""
+    from netsp.files import read_text
+    from netsp.models import parse_json_object
+
+    if file.lower().endswith(PATH_ENDINGS):
+        return True
+    text = read_text(file).lstrip("\ufeff \t\r\n")
+    if not text.startswith("{"):
+        return bool(text)
+    return "tour" not in parse_json_object(text, file) and '"coordinates"' in text
+
+
+def _measure_paths(problem: Problem, args: argparse.Namespace) -> None:
+    """Print the measures of every path of a file."""
+    from netsp.command.measures import describe_path, entered
+    from netsp.files import read_path
+    from netsp.guard.recorded_path import read_any_paths
+    from netsp.site.path_file import ENDINGS, FoundPath
+
+    if args.solution.lower().endswith((*ENDINGS, *PATH_ENDINGS)):
+        paths = read_any_paths(args.solution, problem)
+    else:
+        points = read_path(args.solution)
+        assert points is not None
+        paths = [FoundPath("", points)]
+    for k, path in enumerate(paths):
+        text = describe_path(problem, path.points, path.times)
+        for name in entered(problem, path.points):
+            messages.warning(
+                f"{args.solution}: the path passes through {name}; it counts as going round on "
+                "the shorter side"
+            )
+        if not args.quiet:
+            head = f"path {path.name}\n" if len(paths) > 1 else ""
+            print(("\n" if k else "") + head + text)

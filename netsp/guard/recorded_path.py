@@ -1,0 +1,85 @@
+"""Paths of files of any kind, recorded flights among them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from netsp.errors import InputError
+from netsp.files import read_text
+from netsp.geometry import polylines
+from netsp.guard.replay import read_fixes
+from netsp.link.frame import Frame
+from netsp.problem import Problem
+from netsp.site.path_file import FoundPath, read_paths
+
+RECORDINGS = (".tlog", ".bin")
+"""Endings of logs of ground stations and of vehicles."""
+
+
+def read_any_paths(
+    file: str | Path,
+    problem: Problem,
+    *,
+    frame: str | None = None,
+    system: int | None = None,
+    noise: float = 0.0,
+) -> list[FoundPath]:
+    """Read the paths of a file, or the flight of a recording.
+
+    Parameters
+    ----------
+    file : str or Path
+        As of `netsp.site.path_file.read_paths`, or as of `netsp guard --replay`.
+    problem : Problem
+        Whose plane they are brought to.
+    frame : str, optional
+        "local" or "global": how recordings and GeoJSON are read.
+    system : int, optional
+        System id of the vehicle in a telemetry log; by default the first heard.
+    noise : float
+        Points within this distance of a simpler path are left out (Douglas & Peucker 1973), in the
+        problem's units: noise of positions lengthens a path.
+
+    Returns
+    -------
+    list of FoundPath
+        In the order of the file.
+
+    Raises
+    ------
+    InputError
+        As of the readers.
+    """
+    lower = str(file).lower()
+    if lower.endswith(RECORDINGS) or (lower.endswith(".csv") and _has_north_and_east(file)):
+        found = [_flight(file, Frame(problem, frame), system)]
+    else:
+        found = read_paths(file, problem, frame)
+    return [_straightened(path, noise) for path in found] if noise else found
+
+
+def _has_north_and_east(file: str | Path) -> bool:
+    head = read_text(file)[:4096].removeprefix("\ufeff").splitlines()[:1]
+    names = {name.strip().lower() for name in head[0].split(",")} if head else set()
+    return {"north", "east"} <= names
+
+
+def _flight(file: str | Path, frame: Frame, system: int | None) -> FoundPath:
+    try:
+        fixes = [f for f in read_fixes(file, frame, system) if f.position is not None]
+    except InputError as error:
+        raise InputError(str(error).removeprefix("--replay: ")) from None
+    points = np.array([f.position for f in fixes], dtype=float)
+    times = np.array([f.time for f in fixes], dtype=float)
+    if len(np.unique(points, axis=0)) < 2:
+        raise InputError(f"{file}: expected a recording with two positions or more that differ")
+    order = np.argsort(times, kind="stable")
+    return FoundPath(Path(file).stem, points[order], times[order])
+
+
+def _straightened(path: FoundPath, noise: float) -> FoundPath:
+    kept = polylines.telling(path.points, noise)
+    times = None if path.times is None else path.times[kept]
+    return FoundPath(path.name, path.points[kept], times)

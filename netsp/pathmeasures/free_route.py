@@ -1,0 +1,354 @@
+"""Lead a path round what it runs through, so that its homotopy class is defined.
+
+A recorded or drawn path may cut a corner of an obstacle, come closer than the clearance or leave
+the bounds. Each such part is replaced by a part of the outline of free space between the same two
+ends. Of the two ways along the outline, the one that passes every obstacle on the side of the path
+is taken; where the path runs through the obstacle itself, the shorter one. The parts are reported.
+
+Free space is that of the judge (`netsp.judge.solids`): obstacles drawn in by its tolerance, so a
+path that only touches an obstacle stays as it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+
+from netsp.arrays import Floats
+from netsp.geometry import polylines
+from netsp.hsignature.measures import winding_numbers
+from netsp.judge.solids import bridges
+from netsp.judge.stringpull import StringPuller
+from netsp.problem import Circle, Polygon
+
+INSET_SHARE = 0.25
+"""Share of the judge's inset by which an obstacle is grown back: a path led along its outline then
+clears the judge's obstacles, and a path along the true outline is not touched."""
+
+SAME_PLACE = 1e-9
+"""Two places on a path, as shares of a segment, that count as one."""
+
+DEPTH_SAMPLES = 64
+"""Places on a part of a path at which its depth in an obstacle is measured, besides its corners."""
+
+BOX_SHARE = 1.5
+"""Room around everything where there are no bounds, in reaches; the judge triangulates twice the
+reach."""
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """A part of a path that no robot should go.
+
+    Parameters
+    ----------
+    kind : str
+        "obstacle", "clearance", "bounds" or "touching" (between obstacles that touch).
+    obstacles : tuple of int
+        Indices of the obstacles; none for the bounds.
+    start, end : float
+        Lengths along the path, in the plan.
+    depth : float
+        How far it reaches in, in the problem's units.
+    place : (float, float)
+        Where it begins.
+    """
+
+    kind: str
+    obstacles: tuple[int, ...]
+    start: float
+    end: float
+    depth: float
+    place: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Route:
+    """A path that has been led round everything.
+
+    Parameters
+    ----------
+    xy : ndarray, shape (n, 2)
+        Its points, in the problem's frame.
+    along : ndarray, shape (n,)
+        Length along the path as it was given, at each of them.
+    shut_in : float
+        Length from which on no free way leads to the path; infinite if there is one throughout.
+    """
+
+    xy: Floats
+    along: Floats
+    shut_in: float
+
+
+class FreeSpace:
+    """The part of the plane in which a tether can lie.
+
+    Parameters
+    ----------
+    puller : StringPuller
+        Of the judge.
+    reach : float
+        How far from the base paths go.
+    """
+
+    def __init__(self, puller: StringPuller, reach: float) -> None:
+        problem = puller.problem
+        self.problem, self.origin, self.place = problem, puller.origin, puller.place
+        shapes = [
+            s.shape.buffer(INSET_SHARE * s.depth, join_style="mitre") if s.depth else s.shape
+            for s in puller.solids
+        ]
+        self._bridges = bridges(problem, puller.solids, problem.tolerance)
+        for _, _, ends in self._bridges:
+            shapes.append(shapely.LineString(ends).buffer(INSET_SHARE * self.place))
+        if problem.bounds is not None:
+            box = shapely.box(*(np.array(problem.bounds) - np.tile(self.origin, 2)))
+        else:
+            every = [shapely.MultiPoint(problem.points[:, :2] - self.origin), *shapes]
+            box = shapely.union_all(every).envelope
+            box = box.buffer(BOX_SHARE * max(reach, problem.scale), join_style="mitre")
+        self.shape = box.difference(shapely.union_all(shapes)) if shapes else box
+        shapely.prepare(self.shape)
+        parts = shapely.get_parts(self.shape)
+        self._rings = [ring for p in parts for ring in (p.exterior, *p.interiors)]
+
+    def sees(self, a: Floats, b: Floats) -> bool:
+        """Return whether the straight line between two places is free."""
+        if np.array_equal(a, b):
+            return True
+        return bool(shapely.covers(self.shape, shapely.LineString([a, b] - self.origin)))
+
+    def route(self, xy: Floats, along: Floats) -> Route:
+        """Lead a path round everything.
+
+        Parameters
+        ----------
+        xy : ndarray, shape (n, 2)
+            The path; consecutive points differ.
+        along : ndarray, shape (n,)
+            Length along it.
+
+        Returns
+        -------
+        Route
+            The same path with every part outside of free space replaced.
+        """
+        line = xy - self.origin
+        shut_in = np.inf
+        points, lengths = [xy[:1]], [along[:1]]
+        done = 0.0  # place on the path, in segments
+        for start, end in self._outside(line):
+            inner = np.arange(int(np.floor(done)) + 1, int(np.ceil(start - SAME_PLACE)))
+            points.append(xy[inner])
+            lengths.append(along[inner])
+            s = np.array([_at(along, start), _at(along, end)])
+            way = self._round(_part(line, start, end))
+            if way is None:
+                shut_in = min(shut_in, float(s[0]))
+                way = _part(line, start, end)
+            share = polylines.along(way)
+            share = share / share[-1] if share[-1] else np.linspace(0.0, 1.0, len(way))
+            if start <= 0.0:
+                points[0], lengths[0] = way[:0], along[:0]
+            points.append(way + self.origin)
+            lengths.append(s[0] + share * (s[1] - s[0]))
+            done = end
+        inner = np.arange(int(np.floor(done + SAME_PLACE)) + 1, len(line))
+        points.append(xy[inner])
+        lengths.append(along[inner])
+        out, s_out = np.vstack(points), np.concatenate(lengths)
+        keep = np.concatenate([[True], np.any(np.diff(out, axis=0) != 0.0, axis=1)])
+        return Route(out[keep], s_out[keep], shut_in)
+
+    def _outside(self, line: Floats) -> list[tuple[float, float]]:
+        """Return the parts outside of free space, each from a place to a place, in segments."""
+        if len(line) < 2:
+            return []
+        segments = shapely.linestrings(np.stack([line[:-1], line[1:]], axis=1))
+        parts = [
+            part
+            for k in np.flatnonzero(~shapely.covers(self.shape, segments)).tolist()
+            for part in _shares(line, k, segments[k].difference(self.shape))
+        ]
+        return _merged(parts)
+
+    def _round(self, part: Floats) -> Floats | None:
+        """Return the way along the outline that takes the place of a part; None if there is
+        none."""
+        ends = [shapely.Point(p) for p in part[[0, -1]]]
+        near = [[ring.distance(p) for ring in self._rings] for p in ends]
+        which = [int(np.argmin(d)) for d in near]
+        if which[0] != which[1]:
+            return None
+        ring = self._rings[which[0]]
+        a, b = (float(ring.project(p)) for p in ends)
+        forward = _along_ring(ring, a, b)
+        back = _along_ring(ring, b, a)[::-1]
+        pierced = set(self._pierced(part))
+        others = [i for i in range(len(self.problem.obstacles)) if i not in pierced]
+        rays = self.problem.representative_points[others].reshape(-1, 2) - self.origin
+
+        def rank(way: Floats) -> tuple[int, float]:
+            turns = winding_numbers(np.vstack([part, way[::-1], part[:1]]), rays)
+            return int(np.count_nonzero(np.round(turns))), polylines.length(way)
+
+        return min((forward, back), key=rank)
+
+    def _pierced(self, part: Floats) -> list[int]:
+        """Return the obstacles that a part runs through."""
+        line = shapely.LineString(part + self.origin)
+        return [
+            i for i, o in enumerate(self.problem.obstacles)
+            if line.intersection(o.shape()).length > self.place
+        ]  # fmt: skip
+
+    def stretches(self, xy: Floats, along: Floats) -> tuple[Stretch, ...]:
+        """List the parts of a path in obstacles, within their clearance and out of bounds.
+
+        Parameters
+        ----------
+        xy : ndarray, shape (n, 2)
+            The path.
+        along : ndarray, shape (n,)
+            Length along it.
+
+        Returns
+        -------
+        tuple of Stretch
+            In their order along the path; nothing shallower than the judge's tolerance.
+        """
+        if len(xy) < 2:
+            return ()
+        found: list[Stretch] = []
+        segments = shapely.linestrings(np.stack([xy[:-1], xy[1:]], axis=1))
+        tree = shapely.STRtree(segments)
+        clearance = self.problem.clearance
+        for i, o in enumerate(self.problem.obstacles):
+            shape = o.shape()
+            grown = shape.buffer(clearance) if clearance > self.place else shape
+            hits = np.sort(tree.query(grown, predicate="intersects"))
+            if not len(hits):
+                continue
+            inside = _merged([
+                part for k in hits.tolist() for part in _shares(xy, k, segments[k] & shape)
+            ])  # fmt: skip
+            depths = [_depth(_part(xy, *part), o) for part in inside]
+            deep = [
+                (part, depth) for part, depth in zip(inside, depths, strict=True)
+                if depth > self.place
+            ]  # fmt: skip
+            found += [_stretch("obstacle", (i,), xy, along, p, d) for p, d in deep]
+            if deep or clearance <= self.place:
+                continue
+            close = _merged([
+                part for k in hits.tolist() for part in _shares(xy, k, segments[k] & grown)
+            ])  # fmt: skip
+            for part in close:
+                line = _part(xy, *part)
+                lack = clearance - float(shapely.LineString(line).distance(shape))
+                if lack > max(self.place, 1e-3 * clearance):
+                    found.append(_stretch("clearance", (i,), xy, along, part, lack))
+        found += self._beyond_bounds(xy, along, segments)
+        found += self._between_touching(xy, along)
+        return tuple(sorted(found, key=lambda s: (s.start, s.obstacles)))
+
+    def _beyond_bounds(
+        self, xy: Floats, along: Floats, segments: Sequence[shapely.Geometry]
+    ) -> list[Stretch]:
+        if self.problem.bounds is None:
+            return []
+        bounds = np.array(self.problem.bounds)
+        box = shapely.box(*bounds)
+        shapely.prepare(box)
+        parts = _merged([
+            part for k in np.flatnonzero(~shapely.covers(box, segments)).tolist()
+            for part in _shares(xy, k, segments[k] - box)
+        ])  # fmt: skip
+        out = []
+        for part in parts:
+            line = _part(xy, *part)
+            away = float(max((bounds[:2] - line).max(), (line - bounds[2:]).max()))
+            if away > self.place:
+                out.append(_stretch("bounds", (), xy, along, part, away))
+        return out
+
+    def _between_touching(self, xy: Floats, along: Floats) -> list[Stretch]:
+        """Return the places where a path slips between obstacles that touch."""
+        out = []
+        line = shapely.LineString(xy - self.origin)
+        for i, j, ends in self._bridges:
+            meeting = line.intersection(shapely.LineString(ends))
+            for point in shapely.get_parts(shapely.centroid(shapely.get_parts(meeting))):
+                s = float(np.interp(line.project(point), polylines.along(xy), along))
+                place = (float(point.x + self.origin[0]), float(point.y + self.origin[1]))
+                out.append(Stretch("touching", (i, j), s, s, 0.0, place))
+        return out
+
+
+def _shares(line: Floats, k: int, part: shapely.Geometry) -> list[tuple[float, float]]:
+    """Return pieces of segment k as places on the path, in segments."""
+    step = line[k + 1] - line[k]
+    size = float(step @ step)
+    out = []
+    for piece in shapely.get_parts(part):
+        ends = shapely.get_coordinates(piece)
+        if len(ends) < 2 or not size:
+            continue
+        share = np.clip((ends[[0, -1], :2] - line[k]) @ step / size, 0.0, 1.0)
+        if abs(share[1] - share[0]) > SAME_PLACE:
+            out.append((k + float(share.min()), k + float(share.max())))
+    return out
+
+
+def _merged(parts: list[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Join the parts that follow one another without a gap."""
+    out: list[tuple[float, float]] = []
+    for start, end in sorted(parts):
+        if out and start <= out[-1][1] + SAME_PLACE:
+            out[-1] = (out[-1][0], max(out[-1][1], end))
+        else:
+            out.append((start, end))
+    return out
+
+
+def _at(values: Floats, place: float) -> float:
+    """Return a value given at the points of a path at a place between them, in segments."""
+    return float(np.interp(place, np.arange(len(values)), values))
+
+
+def _part(line: Floats, start: float, end: float) -> Floats:
+    """Return the points of a part of a path, from a place to a place, in segments."""
+    inner = line[int(np.floor(start)) + 1 : int(np.ceil(end))]
+    ends = [[_at(line[:, k], place) for k in range(2)] for place in (start, end)]
+    return np.vstack([ends[:1], inner, ends[1:]])
+
+
+def _along_ring(ring: shapely.LinearRing, a: float, b: float) -> Floats:
+    """Return a closed line from one length along it forward to another."""
+    corners = shapely.get_coordinates(ring)
+    s = polylines.along(corners)
+    ends = [shapely.get_coordinates(ring.interpolate(v)) for v in (a, b)]
+    if a <= b:
+        inner = corners[(s > a) & (s < b)]
+    else:
+        inner = np.vstack([corners[(s > a) & (s < s[-1])], corners[(s >= 0.0) & (s < b)]])
+    return np.vstack([ends[0], inner, ends[1]])
+
+
+def _depth(part: Floats, obstacle: Circle | Polygon) -> float:
+    """Return how far inside an obstacle a part of a path gets."""
+    every = polylines.points_along(part, max(polylines.length(part) / DEPTH_SAMPLES, 1e-300))
+    return float(-np.min(obstacle.signed_distance(np.vstack([part, every]))))
+
+
+def _stretch(
+    kind: str, obstacles: tuple[int, ...], xy: Floats, along: Floats,
+    part: tuple[float, float], depth: float,
+) -> Stretch:  # fmt: skip
+    s = [_at(along, place) for place in part]
+    place = (_at(xy[:, 0], part[0]), _at(xy[:, 1], part[0]))
+    return Stretch(kind, obstacles, s[0], s[1], depth, place)

@@ -1,0 +1,166 @@
+"""Figures of paths in words, as the command line and the page tell them."""
+
+from __future__ import annotations
+
+from netsp.compare.path_comparison import ComparedPath, PathComparison
+from netsp.errors import counted
+from netsp.pathmeasures import PathMeasures
+from netsp.pathmeasures.free_route import Stretch
+from netsp.problem import Problem
+
+LEAST_PERCENT = 0.005
+"""Difference of two lengths, in percent, below which they count as the same: arcs of drawn tours
+are circumscribed."""
+
+
+def path_rows(m: PathMeasures) -> list[tuple[str, str]]:
+    """Return the figures of a path, by what they are called.
+
+    Parameters
+    ----------
+    m : PathMeasures
+        The figures.
+
+    Returns
+    -------
+    list of (str, str)
+        Name and value of each.
+    """
+    problem = m.problem
+    u = problem.units
+    names = " → ".join(problem.goal_name(g) for g in m.order)
+    seen = f"{len(m.order)} of {problem.visits} within {m.radius:g} {u}"
+    rows = [
+        ("length", f"{m.length:.6g} {u}" + ("" if m.has_heights else ", heights of the goals")),
+        ("time", _time(m)),
+        ("goals visited", f"{seen}: {names}" if names else seen),
+    ]
+    if m.missing:
+        missed = ", ".join(problem.goal_name(g) for g in m.missing)
+        rows.append(("goals missed", missed))
+    if m.revisits:
+        again = [
+            problem.goal_name(g) + (f" ({n}×)" if n > 1 else "") for g, n in m.revisits.items()
+        ]
+        rows.append(("goals revisited", ", ".join(again)))
+    rows += [
+        ("longest tether", _longest(m)),
+        ("word", f"{list(m.word)}" if m.word else "empty"),
+        ("entangled obstacles", _entangled(problem, m)),
+        ("comes home", _home(m)),
+    ]
+    for kind, name in (
+        ("obstacle", "runs through"), ("touching", "runs between"), ("bounds", "leaves the bounds"),
+        ("clearance", "within the clearance"),
+    ):  # fmt: skip
+        found = [s for s in m.stretches if s.kind == kind]
+        if found:
+            rows.append((name, _stretches(problem, found)))
+    return rows
+
+
+def _time(m: PathMeasures) -> str:
+    how = "by its time stamps, mean speed" if m.is_timed else "at"
+    return f"{m.duration_s:.5g} s {how} {m.speed:.3g} {m.problem.units}/s"
+
+
+def _longest(m: PathMeasures) -> str:
+    limit, u = m.problem.tether_length, m.problem.units
+    if m.longest_tether is None:
+        return "unknown: the path leads to a place that is shut in"
+    x, y = m.longest_place
+    over = "" if m.fits else f", {m.longest_tether - limit:.4g} {u} too long"
+    return (
+        f"{m.longest_tether:.6g} of {limit:g} {u}{over}, at ({x:.4g}, {y:.4g}), "
+        f"{m.longest_at:.5g} {u} along"
+    )
+
+
+def _home(m: PathMeasures) -> str:
+    u = m.problem.units
+    if not m.is_closed:
+        which = f"ends {m.end_gap:.4g} {u} from the base"
+        if m.start_gap > m.radius:
+            which = f"begins {m.start_gap:.4g} {u} from the base" + (
+                f" and {which}" if m.end_gap > m.radius else ""
+            )
+        held = "entangled" if m.entangled else "free"
+        return f"no, {which}; going straight there it would be {held}"
+    if m.word:
+        return "yes, entangled"
+    return "yes, free" if m.is_free else "yes"
+
+
+def _stretches(problem: Problem, found: list[Stretch]) -> str:
+    """Return in words where a path runs that no robot should."""
+    u, out = problem.units, []
+    for key in dict.fromkeys(s.obstacles for s in found):
+        own = [s for s in found if s.obstacles == key]
+        names = " and ".join(problem.obstacle_name(k) for k in key)
+        size = sum(s.end - s.start for s in own)
+        depth = max(s.depth for s in own)
+        times = f", {counted(len(own), 'time')}" if len(own) > 1 else ""
+        x, y = own[0].place
+        if own[0].kind == "touching":
+            out.append(f"{names} at ({x:.4g}, {y:.4g}){times}")
+            continue
+        by = {
+            "obstacle": "deep", "clearance": f"of {problem.clearance:g} short", "bounds": "out",
+        }[own[0].kind]  # fmt: skip
+        begin = f"{names} " if names else ""
+        out.append(
+            f"{begin}for {size:.3g} {u} from ({x:.4g}, {y:.4g}) on, {depth:.3g} {u} {by}{times}"
+        )
+    return "; ".join(out)
+
+
+def _entangled(problem: Problem, m: PathMeasures) -> str:
+    if not m.entangled:
+        return "none"
+    names = ", ".join(problem.obstacle_name(k) for k in m.entangled)
+    return f"{len(m.entangled)}: {names}" + ("" if m.is_closed else ", going straight home")
+
+
+def beside_tour(found: PathComparison, length: float | None) -> str:
+    """Return in words how much longer a path is than the tour."""
+    more, percent = found.longer_by(length), found.percent(length)
+    if more is None or percent is None:
+        return "no tour to compare with"
+    if abs(percent) < LEAST_PERCENT:
+        return "as long"
+    word = "longer" if more >= 0.0 else "shorter"
+    return f"{abs(more):.4g} {found.problem.units} ({abs(percent):.3g} %) {word}"
+
+
+def order_in_words(found: PathComparison, path: ComparedPath) -> str:
+    """Return in words what the order of a path is worth with the best classes."""
+    if path.order_length is None:
+        return path.order_note
+    return (
+        f"{path.order_length:.6g} {found.problem.units} with the best classes, "
+        f"beside the tour {beside_tour(found, path.order_length)}"
+    )
+
+
+def figures_of(found: PathComparison, path: ComparedPath) -> list[tuple[str, str]]:
+    """Return the figures of a path as text, with those beside the tour.
+
+    Parameters
+    ----------
+    found : PathComparison
+        The comparison.
+    path : ComparedPath
+        One of its paths.
+
+    Returns
+    -------
+    list of (str, str)
+        Name and value of each.
+    """
+    rows = path_rows(path.measures)
+    rows[1:1] = [("beside the tour", beside_tour(found, path.measures.length))]
+    rows.append(("this order", order_in_words(found, path)))
+    if path.visited_length is not None:
+        u = found.problem.units
+        rows.append(("goals visited alone", f"a tour of {path.visited_length:.6g} {u} visits them"))
+    return rows

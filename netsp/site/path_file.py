@@ -1,0 +1,356 @@
+"""Paths that somebody made: tables, GeoJSON, GPX and solutions, in the frame of a problem.
+
+Positions in degrees are brought into the problem's plane by its origin; those in metres are taken
+as they are.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from netsp.arrays import Floats
+from netsp.errors import InputError
+from netsp.fields import LARGEST
+from netsp.files import read_gzip, read_path, read_text
+from netsp.models import parse_json_object, shown
+from netsp.problem import Problem
+from netsp.site.gpx import read_gpx, seconds_of
+from netsp.site.projection import Projection
+
+COLUMNS = {
+    "x": "x", "y": "y", "z": "z", "height": "z", "alt": "z", "altitude": "z", "ele": "z",
+    "elevation": "z", "depth": "depth", "down": "depth", "lon": "lon", "lng": "lon", "long": "lon",
+    "longitude": "lon", "lat": "lat", "latitude": "lat", "t": "t", "time": "t", "seconds": "t",
+    "time_s": "t",
+}  # fmt: skip
+"""Names of columns, in small letters, and what each holds; a depth is a negative z."""
+
+ENDINGS = (".csv", ".csv.gz", ".txt", ".json", ".geojson", ".gpx")
+"""Endings of files with paths."""
+
+FRAMES = ("local", "global")
+
+
+@dataclass(frozen=True)
+class FoundPath:
+    """A path of a file.
+
+    Parameters
+    ----------
+    name : str
+        Its own, or that of the file.
+    points : ndarray, shape (k, 2) or (k, 3)
+        In the frame of the problem.
+    times : ndarray, shape (k,), optional
+        Seconds.
+    """
+
+    name: str
+    points: Floats = field(repr=False)
+    times: Floats | None = field(repr=False, default=None)
+
+
+def read_paths(file: str | Path, problem: Problem, frame: str | None = None) -> list[FoundPath]:
+    """Read the paths of a file.
+
+    Parameters
+    ----------
+    file : str or Path
+        A table (x, y and perhaps z or depth; or lon, lat; perhaps t), GeoJSON with lines, GPX with
+        tracks or routes, a solution, or a JSON list of points.
+    problem : Problem
+        Whose plane they are brought to.
+    frame : str, optional
+        "local" (metres of the problem's plane) or "global" (degrees), for GeoJSON; by default what
+        the file says, else global where the problem has an origin.
+
+    Returns
+    -------
+    list of FoundPath
+        In the order of the file.
+
+    Raises
+    ------
+    InputError
+        The file holds no path, a number is wrong, or degrees are given and the problem has no
+        origin.
+    """
+    if frame is not None and frame not in FRAMES:
+        raise InputError(f"--frame: expected local or global, got {shown(frame)}")
+    name = Path(file).name
+    lower = name.lower()
+    stem = name[: -len(".csv.gz")] if lower.endswith(".csv.gz") else Path(file).stem
+    if lower.endswith(".gpx"):
+        found = _of_gpx(file, problem, stem)
+    elif lower.endswith((".csv", ".csv.gz", ".txt")):
+        found = [_of_table(file, problem, stem)]
+    elif lower.endswith((".json", ".geojson")):
+        found = _of_json(file, problem, stem, frame)
+    else:
+        raise InputError(f"{file}: expected a path in a file that ends in {', '.join(ENDINGS)}")
+    for path in found:
+        where = file if len(found) == 1 else f"{file}: {path.name}"
+        if len(np.unique(path.points, axis=0)) < 2:
+            raise InputError(f"{where}: expected two points or more that differ")
+        if path.times is not None and (np.diff(path.times) < 0.0).any():
+            k = int(np.argmax(np.diff(path.times) < 0.0)) + 1
+            raise InputError(
+                f"{where}: point {k}: time: expected times that never fall, got "
+                f"{path.times[k]:.10g} after {path.times[k - 1]:.10g}"
+            )
+    return found
+
+
+def _to_plane(problem: Problem, latlon: Sequence[tuple[float, float]], where: str) -> Floats:
+    projection = Projection.of(problem)
+    if projection is None:
+        raise InputError(
+            f"{where}: positions are in degrees, and the problem has no origin; expected an origin "
+            "in the problem file, or x and y in its plane"
+        )
+    return np.asarray(projection.to_plane(latlon))
+
+
+def _of_gpx(file: str | Path, problem: Problem, stem: str) -> list[FoundPath]:
+    out = []
+    lines = read_gpx(file)
+    for k, line in enumerate(lines):
+        xy = _to_plane(problem, [(p.latitude, p.longitude) for p in line.points], str(file))
+        heights = [p.height for p in line.points]
+        known = None not in heights
+        points = np.column_stack([xy, np.array(heights, dtype=float)]) if known else xy
+        stamps = [p.time_s for p in line.points]
+        times = None if None in stamps else np.array(stamps, dtype=float)
+        own = line.name or (stem if len(lines) == 1 else f"{stem} {k + 1}")
+        out.append(FoundPath(own, points, times))
+    return out
+
+
+def _of_table(file: str | Path, problem: Problem, stem: str) -> FoundPath:
+    if str(file).lower().endswith(".gz"):
+        try:
+            text = read_gzip(file).decode("utf-8-sig")
+        except UnicodeDecodeError:
+            raise InputError(f"{file}: not a text file in UTF-8") from None
+    else:
+        text = read_text(file).removeprefix("\ufeff")
+    first = text.lstrip().splitlines()[:1]
+    delimiter = ";" if first and ";" in first[0] else "\t" if first and "\t" in first[0] else ","
+    try:
+        rows = list(csv.reader(io.StringIO(text, newline=""), delimiter=delimiter))
+    except csv.Error as error:
+        raise InputError(f"{file}: {error}") from None
+    numbered = [(k, row) for k, row in enumerate(rows, 1) if any(cell.strip() for cell in row)]
+    if not numbered:
+        raise InputError(f"{file}: expected columns x, y or lon, lat, got nothing")
+    head = [cell.strip().lower() for cell in numbered[0][1]]
+    if any(_is_number(cell) for cell in head):
+        points = read_path(file) if not str(file).lower().endswith(".gz") else None
+        if points is None:
+            raise InputError(f"{file}: expected names of columns in the first line")
+        return FoundPath(stem, points)
+    where = {COLUMNS[name]: k for k, name in reversed(list(enumerate(head))) if name in COLUMNS}
+    if {"x", "y"} <= where.keys():
+        plan = ("x", "y")
+    elif {"lon", "lat"} <= where.keys():
+        plan = ("lon", "lat")
+    else:
+        raise InputError(f"{file}: expected columns x, y or lon, lat, got {shown(', '.join(head))}")
+    up = next((name for name in ("z", "depth") if name in where), None)
+    values, times = [], []
+    for number, row in numbered[1:]:
+        cells = {name: row[k].strip() if k < len(row) else "" for name, k in where.items()}
+        wanted = [*plan, *([up] if up else [])]
+        if all(cells[name].lower() in ("", "nan") for name in plan):
+            continue  # a gap of the recording
+        place = f"{file}: line {number}, point {len(values)}"
+        values.append([_number(cells[name], f"{place}: {name}") for name in wanted])
+        if "t" in where:
+            times.append(_seconds(cells["t"], f"{place}: t"))
+    if len(values) < 2:
+        raise InputError(f"{file}: expected a path of at least 2 points, got {len(values)}")
+    points = np.array(values)
+    if up == "depth":
+        points[:, 2] *= -1.0
+    if plan == ("lon", "lat"):
+        wrong = np.flatnonzero((np.abs(points[:, 0]) > 180.0) | (np.abs(points[:, 1]) > 90.0))
+        if len(wrong):
+            raise InputError(
+                f"{file}: point {wrong[0]}: expected degrees, lon within 180 and lat within 90, "
+                f"got {points[wrong[0], 0]:g}, {points[wrong[0], 1]:g}"
+            )
+        points[:, :2] = _to_plane(problem, [(b, a) for a, b in points[:, :2]], str(file))
+    return FoundPath(stem, points, np.array(times) if times else None)
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True
+
+
+def _number(text: str, where: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not abs(value) <= LARGEST:
+        raise InputError(f"{where}: expected a number, got {shown(text)}")
+    return value
+
+
+def _seconds(text: str, where: str) -> float:
+    return _number(text, where) if _is_number(text) else seconds_of(text, where)
+
+
+def _of_json(
+    file: str | Path, problem: Problem, stem: str, frame: str | None
+) -> list[FoundPath]:  # fmt: skip
+    text = read_text(file).removeprefix("\ufeff")
+    if text.lstrip().startswith("["):
+        points = read_path(file)
+        assert points is not None
+        return [FoundPath(stem, points)]
+    data = parse_json_object(text, str(file))
+    if "tour" in data and "path" in data:
+        from netsp.solution import Solution
+
+        solution = Solution.from_json(text, source=str(file))
+        if len(solution.path) < 2:
+            raise InputError(f"{file}: the solution has no path")
+        return [FoundPath(stem, np.array(solution.path, dtype=float))]
+    return _of_geojson(file, data, problem, stem, frame)
+
+
+def _of_geojson(
+    file: str | Path, data: Mapping[str, Any], problem: Problem, stem: str, frame: str | None
+) -> list[FoundPath]:
+    lines = list(_lines(data, str(file), "", {}))
+    if not lines:
+        raise InputError(
+            f"{file}: expected GeoJSON with a LineString or MultiLineString, got "
+            f"{shown(data.get('type'))} without one"
+        )
+    own = data.get("frame")
+    is_global = (frame or (own if own in FRAMES else None) or (
+        "global" if problem.origin is not None else "local"
+    )) == "global"  # fmt: skip
+    out = []
+    for k, (where, coordinates, properties) in enumerate(lines):
+        place = f"{file}: {where}" if where else str(file)
+        size = min(len(c) for c in coordinates)
+        points = np.array([c[: min(size, 3)] for c in coordinates], dtype=float)
+        if is_global:
+            if (np.abs(points[:, :2]) > (180.0, 90.0)).any():
+                n = int(np.argmax((np.abs(points[:, :2]) > (180.0, 90.0)).any(axis=1)))
+                raise InputError(
+                    f"{place}: position {n}: expected [longitude, latitude] within 180 and 90 "
+                    f"degrees, got {points[n, :2].tolist()}; if these are metres of the problem's "
+                    "plane, give --frame local"
+                )
+            points[:, :2] = _to_plane(problem, [(b, a) for a, b in points[:, :2]], place)
+        name = properties.get("name")
+        label = name if isinstance(name, str) and name else (
+            stem if len(lines) == 1 else f"{stem} {k + 1}"
+        )  # fmt: skip
+        out.append(FoundPath(label, points, _times_of(properties, len(points), place)))
+    return out
+
+
+def _times_of(properties: Mapping[str, Any], count: int, where: str) -> Floats | None:
+    """Return the times of a line, from the property `coordTimes` or `times` that converters
+    write; None if it has none for each point."""
+    given = properties.get("coordTimes", properties.get("times"))
+    if not isinstance(given, list) or len(given) != count:
+        return None
+    return np.array([_seconds(str(v), f"{where}: times[{k}]") for k, v in enumerate(given)])
+
+
+def _lines(data: Any, file: str, where: str, properties: Mapping[str, Any], depth: int = 0) -> Any:
+    """Yield the lines of GeoJSON: where each stands, its positions, its properties."""
+    here = f"{file}: {where}" if where else file
+    if not isinstance(data, Mapping) or depth > 8:
+        raise InputError(f"{here}: expected a GeoJSON object, got {shown(data)}")
+    kind = data.get("type")
+    if kind == "FeatureCollection":
+        features = data.get("features")
+        if not isinstance(features, list):
+            raise InputError(f"{here}: features: expected a list, got {shown(features)}")
+        for k, feature in enumerate(features):
+            yield from _lines(feature, file, f"features[{k}]", {}, depth + 1)
+    elif kind == "Feature":
+        if data.get("geometry") is not None:
+            own = data.get("properties")
+            yield from _lines(
+                data["geometry"], file, where, own if isinstance(own, dict) else {}, depth + 1
+            )
+    elif kind == "GeometryCollection":
+        parts = data.get("geometries")
+        for part in parts if isinstance(parts, list) else []:
+            yield from _lines(part, file, where, properties, depth + 1)
+    elif kind == "LineString":
+        yield where, _positions(data.get("coordinates"), here), properties
+    elif kind == "MultiLineString":
+        parts = data.get("coordinates")
+        if not isinstance(parts, list) or not parts:
+            raise InputError(f"{here}: coordinates: expected a list of lines, got {shown(parts)}")
+        yield where, [p for part in parts for p in _positions(part, here)], properties
+    elif not isinstance(kind, str):
+        raise InputError(f"{here}: type: expected a type of GeoJSON, got {shown(kind)}")
+
+
+def _positions(coordinates: Any, where: str) -> list[list[float]]:
+    if not isinstance(coordinates, list) or len(coordinates) < 2:
+        raise InputError(f"{where}: coordinates: expected two positions or more")
+    for k, c in enumerate(coordinates):
+        good = isinstance(c, list) and len(c) >= 2 and all(
+            isinstance(v, int | float) and not isinstance(v, bool) and abs(v) <= LARGEST
+            for v in c[:3]
+        )  # fmt: skip
+        if not good:
+            raise InputError(f"{where}: position {k}: expected [x, y] or [x, y, z], got {shown(c)}")
+    return coordinates
+
+
+def path_to_geojson(name: str, points: Floats, problem: Problem) -> str:
+    """Return a path as GeoJSON: degrees where the problem has an origin, else its own metres.
+
+    Parameters
+    ----------
+    name : str
+        Of the path.
+    points : ndarray, shape (k, 2) or (k, 3)
+        In the problem's frame.
+    problem : Problem
+        Its origin counts.
+
+    Returns
+    -------
+    str
+        A FeatureCollection with one LineString. Without an origin its member "frame" says "local".
+    """
+    projection = Projection.of(problem)
+    xy = np.asarray(points, dtype=float)
+    rows = xy.copy()
+    if projection is not None:
+        rows[:, :2] = np.round(projection.to_earth(xy[:, :2])[:, ::-1], 9)
+    data: dict[str, Any] = {
+        "type": "FeatureCollection",
+        **({} if projection is not None else {"frame": "local", "units": problem.units}),
+        "features": [{
+            "type": "Feature", "properties": {"name": name, "problem": problem.name},
+            "geometry": {"type": "LineString", "coordinates": rows.tolist()},
+        }],
+    }  # fmt: skip
+    return json.dumps(data, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
