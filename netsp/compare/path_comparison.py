@@ -15,12 +15,13 @@ from netsp.arrays import Floats
 from netsp.clock import Clock
 from netsp.errors import InfeasibleError, InputError, LimitReachedError
 from netsp.files import cell
+from netsp.lower_bound import above_shortest
 from netsp.pathmeasures import PathMeasures, PathPolicy, measure_path
 from netsp.pathmeasures.path_measures import SPEED
 from netsp.problem import Goal, Problem
 from netsp.roadmap.tethers import Tethers
 from netsp.site.path_file import FoundPath
-from netsp.solution import Solution, Status, above_shortest
+from netsp.solution import Solution, Status
 from netsp.solvers.solve import solve
 from netsp.travel.result import OnProgress
 
@@ -92,10 +93,11 @@ class PathComparison:
         """How short the tour is proven to be, in words."""
         if self.tour is None:
             return self.tour_note
-        if self.tour.status is Status.OPTIMAL:
-            exact = self.tour.roadmap == "taut"
-            return "proven shortest" if exact else f"shortest over its {self.tour.roadmap} roadmap"
-        return above_shortest(self.tour.gap)
+        status = self.tour.status
+        above = above_shortest(self.tour.length, self.tour.bound)
+        if status.is_optimal and status is not Status.OPTIMAL_OF_KEPT:
+            return status.verdict
+        return f"{status.verdict}; {above}" if status.is_optimal else above
 
     @property
     def tour_length(self) -> float | None:
@@ -168,6 +170,7 @@ class PathComparison:
             "problem": problem.name, "units": problem.units, "speed": self.speed,
             "tour": None if tour is None else {
                 "length": tour.length, "lower_bound": tour.lower_bound,
+                "lower_bound_of": tour.lower_bound_of,
                 "status": tour.status.value,
                 "order": [problem.goal_name(v.goal) for v in tour.tour],
                 "longest_tether": max((v.tether_length for v in tour.tour), default=None),
@@ -348,7 +351,9 @@ def _order_length(
         )
     except (InfeasibleError, LimitReachedError) as error:
         return None, str(error)
-    return found.length, "shortest tour in this order, whatever its classes"
+    proven = found.status is Status.OPTIMAL
+    note = "shortest tour in this order" if proven else "shortest tour found in this order"
+    return found.length, note
 
 
 def _visited_length(

@@ -137,8 +137,8 @@ def order_in_words(found: PathComparison, path: ComparedPath) -> str:
     if path.order_length is None:
         return path.order_note
     return (
-        f"{path.order_length:.6g} {found.problem.units} with the best classes, "
-        f"beside the tour {beside_tour(found, path.order_length)}"
+        f"{path.order_length:.6g} {found.problem.units}, {path.order_note}; beside the planned "
+        f"tour {beside_tour(found, path.order_length)}"
     )
 
 

@@ -166,7 +166,8 @@ def _of_table(file: str | Path, problem: Problem, stem: str) -> FoundPath:
     else:
         raise InputError(f"{file}: expected columns x, y or lon, lat, got {shown(', '.join(head))}")
     up = next((name for name in ("z", "depth") if name in where), None)
-    values, times = [], []
+    values: list[list[float]] = []
+    times: list[float] = []
     for number, row in numbered[1:]:
         cells = {name: row[k].strip() if k < len(row) else "" for name, k in where.items()}
         wanted = [*plan, *([up] if up else [])]
