@@ -45,7 +45,7 @@ def run(limit: float, only: str, jobs: int) -> None:
             if found is None or found.length is None:
                 print(f"{name}: {wrong or 'no tour'}", flush=True)
                 continue
-            library.take(found, by="netsp", commit=commit, bound=found.lower_bound)
+            library.take(found, by="netsp", commit=commit, bound=found.bound)
             library.save()
             print(f"{name}: {found}, {found.timings.total_s:.1f} s", flush=True)
 

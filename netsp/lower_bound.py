@@ -40,6 +40,8 @@ class Scope(StrEnum):
         Those of the classes kept, of the roadmap, of the states, in the order given.
     TRAVEL_GRAPH
         Tours of a travel graph that was given as such, a generalised TSP.
+    PART
+        Tours over some vertices of a travel graph; a step on the way to a bound on all of it.
     """
 
     ALL_TOURS = "all_tours"
@@ -51,6 +53,7 @@ class Scope(StrEnum):
     ROADMAP_IN_ORDER = "roadmap_in_order"
     STATES_IN_ORDER = "states_in_order"
     TRAVEL_GRAPH = "travel_graph"
+    PART = "part"
 
     @property
     def tours(self) -> str:
@@ -73,9 +76,9 @@ class Scope(StrEnum):
         return _of_limits(_LIMITS[self] | {"order"})
 
     @property
-    def with_all_classes(self) -> Scope:
-        """Scope that it becomes once the homotopy classes left out are included."""
-        return _of_limits(_LIMITS[self] - {"kept"})
+    def keeps_order(self) -> bool:
+        """Whether its tours visit the goals in the order given."""
+        return "order" in _LIMITS[self]
 
     def includes(self, other: Scope) -> bool:
         """Say whether every tour of another scope of the same problem is one of this scope.
@@ -104,6 +107,7 @@ _LIMITS: Mapping[Scope, frozenset[str]] = MappingProxyType({
     Scope.STATES_IN_ORDER: frozenset({"states", "order"}),
     # a travel graph that was given has no world around it
     Scope.TRAVEL_GRAPH: frozenset({"graph"}),
+    Scope.PART: frozenset({"part"}),
 })  # fmt: skip
 """What limits each scope: fewer limits, more tours."""
 
@@ -117,6 +121,7 @@ _TOURS: Mapping[Scope, str] = MappingProxyType({
     Scope.ROADMAP_IN_ORDER: "tours of this roadmap in the given order",
     Scope.STATES_IN_ORDER: "tours between the states found in the given order",
     Scope.TRAVEL_GRAPH: "tours of the travel graph",
+    Scope.PART: "tours over a part of the travel graph",
 })  # fmt: skip
 
 _COLUMN: Mapping[Scope, str] = MappingProxyType({
@@ -129,6 +134,7 @@ _COLUMN: Mapping[Scope, str] = MappingProxyType({
     Scope.ROADMAP_IN_ORDER: "road+order",
     Scope.STATES_IN_ORDER: "state+order",
     Scope.TRAVEL_GRAPH: "graph",
+    Scope.PART: "part",
 })  # fmt: skip
 
 
@@ -162,8 +168,8 @@ class LowerBound:
     >>> bound = LowerBound(90.0, Scope.KEPT_CLASSES)
     >>> bound.above(100.0)
     'at most 11.1 % above the shortest tour over the classes kept'
-    >>> whole = bound.or_elsewhere(80.0, because="classes left out have tethers of at least 40")
-    >>> whole.above(100.0)
+    >>> because = "classes left out have tethers of at least 40"
+    >>> bound.or_elsewhere(80.0, Scope.ALL_TOURS, because).above(100.0)
     'at most 25 % above the shortest tour'
     """
 
@@ -247,20 +253,22 @@ class LowerBound:
             )
         return LowerBound(self.length, scope, because)
 
-    def or_elsewhere(self, least: float, because: str) -> LowerBound:
-        """Return a bound on the tours over all classes, the classes left out included.
+    def or_elsewhere(self, least: float, scope: Scope, because: str) -> LowerBound:
+        """Return a bound on a larger set of tours: those of this scope, and all others of it.
 
         Parameters
         ----------
         least : float
-            No tour that uses a class left out is shorter.
+            No tour of the larger scope that is not one of this bound's is shorter.
+        scope : Scope
+            The larger scope.
         because : str
-            Reason why.
+            Reason why no other tour is shorter than `least`.
 
         Returns
         -------
         LowerBound
-            The lesser of the two, of the scope with all classes.
+            The lesser of the two.
 
         Raises
         ------
@@ -268,7 +276,7 @@ class LowerBound:
             No reason.
         """
         _check_reason(because)
-        return LowerBound(min(self.length, max(least, 0.0)), self.scope.with_all_classes, because)
+        return LowerBound(min(self.length, max(least, 0.0)), scope, because)
 
     def above(self, length: float) -> str:
         """Say how far above the shortest tour of the scope a tour may be.

@@ -14,7 +14,7 @@ from netsp.drawn import Drawn
 from netsp.fields import LARGEST, Name, NonNegative, Number, PathPoint, Total
 from netsp.files import FileModel
 from netsp.frames import frame_of
-from netsp.lower_bound import LowerBound, Scope
+from netsp.lower_bound import LowerBound, Scope, above_shortest
 from netsp.models import Model
 
 if TYPE_CHECKING:
@@ -89,6 +89,7 @@ class Status(StrEnum):
 _OPTIMAL_OF = {
     Scope.KEPT_CLASSES: Status.OPTIMAL_OF_KEPT,
     Scope.KEPT_IN_ORDER: Status.OPTIMAL_OF_KEPT,
+    Scope.PART: Status.OPTIMAL_OF_KEPT,
     Scope.ROADMAP: Status.OPTIMAL_OF_ROADMAP,
     Scope.ROADMAP_IN_ORDER: Status.OPTIMAL_OF_ROADMAP,
     Scope.STATES: Status.OPTIMAL_OF_STATES,
@@ -97,9 +98,9 @@ _OPTIMAL_OF = {
 
 _VERDICTS = {
     Status.OPTIMAL: "proven optimal",
-    Status.OPTIMAL_OF_KEPT: "shortest over the classes kept; not all were",
-    Status.OPTIMAL_OF_ROADMAP: "shortest along this roadmap; others may be shorter",
-    Status.OPTIMAL_OF_STATES: "shortest between the states found; others may be shorter",
+    Status.OPTIMAL_OF_KEPT: "shortest over the classes kept, which are not all",
+    Status.OPTIMAL_OF_ROADMAP: "shortest along this roadmap, not of all tours",
+    Status.OPTIMAL_OF_STATES: "shortest between the states found, not of all tours",
 }
 
 
@@ -152,6 +153,34 @@ def tension_ratio(friction: float, turning: float) -> float:
     2.566
     """
     return math.exp(min(friction * turning, math.log(LARGEST)))
+
+
+def proof(status: Status, length: float | None, bound: LowerBound | None) -> str:
+    """Say what is proven of a tour, and of which tours it is the shortest.
+
+    Parameters
+    ----------
+    status : Status
+        Of the tour.
+    length : float or None
+        Its length.
+    bound : LowerBound or None
+        Lower bound with the tours that it holds for.
+
+    Returns
+    -------
+    str
+        As in "proven optimal", "at most 3.8 % above the shortest tour", "no bound".
+    """
+    if status is Status.INVALID:
+        return "no tour for a tether: the solver is blind to it"
+    if not status.is_optimal:
+        return above_shortest(length, bound)
+    narrow = length is not None and bound is not None and not bound.proves(length)
+    if narrow and status is not Status.OPTIMAL:
+        return f"{status.verdict}; {above_shortest(length, bound)}"
+    in_order = bound is not None and bound.scope.keeps_order
+    return f"{status.verdict}, in the given order" if in_order else status.verdict
 
 
 EXACT_ROADMAPS = frozenset({"taut"})
@@ -402,6 +431,11 @@ class Solution(Drawn, FileModel):
     def max_turning(self) -> float:
         """Sum of angles (radians) by which the tether may turn; inf where friction has no limit."""
         return max_turning(self.friction, self.max_tension_ratio)
+
+    @property
+    def proof(self) -> str:
+        """What is proven of the tour, in words."""
+        return proof(self.status, self.length, self.bound)
 
     def to_json(self) -> str:
         """The solution as JSON of format version 1.

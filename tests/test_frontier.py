@@ -359,7 +359,7 @@ def test_a_proof_over_the_core_first_ends_at_the_same_optimum(monkeypatch, seed,
     assert 0.3 * best < goals.bound <= best * (1 + 1e-9)
     assert run.status is Status.OPTIMAL
     assert run.length == pytest.approx(best, rel=1e-6)
-    assert all((row.bound or 0.0) <= best * (1 + 1e-6) for row in run.trace)
+    assert all(row.bound is None or row.bound.length <= best * (1 + 1e-6) for row in run.trace)
 
 
 @pytest.mark.parametrize("iterations", [1, 3, 6, 12, 25])

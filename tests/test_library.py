@@ -16,6 +16,7 @@ from netsp.command.main import main
 from netsp.errors import InputError, VerificationError
 from netsp.library import Library, Record, rank
 from netsp.library.rank import Row, append_row, ranking, read_rows
+from netsp.lower_bound import LowerBound, Scope
 
 FOLDER = Path(__file__).parent.parent / "problems" / "library"
 SMALL = "jacket-6-0"
@@ -68,7 +69,7 @@ def test_the_problems_are_those_of_their_recipes():
 
 def test_a_first_tour_becomes_the_record_and_a_longer_one_does_not(small, tour):
     library = Library(small)
-    assert library.take(tour, by="me", bound=tour.lower_bound).better
+    assert library.take(tour, by="me", bound=tour.bound).better
     library.save()
     again = Library(small)
     assert again.records[SMALL].length == tour.length
@@ -83,7 +84,7 @@ def test_a_bound_that_a_contribution_states_is_not_taken(small, tour):
     library = Library(small)
     library.take(tour, by="me")
     assert library.records[SMALL].lower_bound is None
-    library.take(tour, by="me", bound=0.5 * tour.length)
+    library.take(tour, by="me", bound=LowerBound(0.5 * tour.length, Scope.ALL_TOURS))
     assert library.records[SMALL].lower_bound == 0.5 * tour.length
 
 
@@ -133,7 +134,7 @@ def in_order_of_the_file(graph):
 
 def with_records(folder, tour):
     library = Library(folder)
-    library.take(tour, by="me", bound=tour.lower_bound)
+    library.take(tour, by="me", bound=tour.bound)
     library.take(solve(library.problem("maze-5-0")), by="me")
     library.save()
 

@@ -9,6 +9,7 @@ import shapely
 from netsp import Circle, InfeasibleError, InputError, Problem, Status, solve, verify
 from netsp.errors import LimitReachedError
 from netsp.hsignature import concatenate, crossings, is_looping, signature
+from netsp.lower_bound import Scope
 from netsp.roadmap.prm import PrmRoadmap
 from netsp.roadmap.taut import TautRoadmap
 from tests.worlds import random_world
@@ -134,7 +135,8 @@ def test_costs_among_some_vertices_are_those_of_the_whole(world):
 @pytest.mark.parametrize("options", [{}, {"shortcut": True}])
 def test_a_solution_over_the_roadmap_is_verified(world, options):
     solution = solve(world, roadmap="prm", roadmap_options={"samples": 400, **options})
-    assert solution.status is Status.OPTIMAL
+    assert solution.status is Status.OPTIMAL_OF_ROADMAP
+    assert solution.lower_bound_of is Scope.ROADMAP
     assert solution.roadmap == "prm"
     assert verify(world, solution), str(verify(world, solution))
     assert solution.length >= solve(world).length * (1 - 1e-9)

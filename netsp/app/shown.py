@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from netsp.app.solving import told_bound
 from netsp.errors import InputError
 from netsp.files import csv_rows, read_text
 from netsp.geometry import polylines
@@ -134,7 +135,8 @@ def _of_plan(problem: Problem, solution: Solution, source: str) -> Shown:
 def _answer(problem: Problem, solution: Solution) -> dict[str, Any]:
     return {
         "version": 0, "stage": "done", "status": solution.status.value, "length": solution.length,
-        "bound": solution.lower_bound, "path": [list(p) for p in solution.path],
+        **told_bound(solution.status, solution.length, solution.bound),
+        "path": [list(p) for p in solution.path],
         "visits": [{"goal": v.goal, "tether": v.tether_length, "word": list(v.signature)}
                    for v in solution.tour],
     }  # fmt: skip

@@ -16,8 +16,9 @@ from multiprocessing.connection import Connection
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from netsp.lower_bound import LowerBound
     from netsp.problem import Problem
-    from netsp.solution import Solution
+    from netsp.solution import Solution, Status
 
 TELL = 0.15
 """Shortest time between two tours that are told, seconds."""
@@ -116,14 +117,17 @@ def _solve(
     from netsp.clock import Clock
     from netsp.errors import InfeasibleError, InputError, NetspError
     from netsp.problem import Problem
+    from netsp.solution import Status
     from netsp.solvers.answer import to_solution
-    from netsp.solvers.solve import solve_graph, travel_graph
-    from netsp.solvers.warm import tour_from
+    from netsp.solvers.solve import DEFAULT_SOLVER as SOLVER
+    from netsp.solvers.solve import solve_over, travel_graph
+    from netsp.solvers.warm import old_tour
     from netsp.travel.graph import TravelGraph
     from netsp.travel.result import Progress
 
     problem = Problem.from_json(text)
     told: list[Any] = [0.0, None]
+    graphs: list[TravelGraph] = []
 
     def drawn(graph: TravelGraph, tour: tuple[int, ...]) -> dict[str, Any]:
         legs = [graph.path(u, v) for u, v in pairwise((*tour, 0))]
@@ -138,38 +142,40 @@ def _solve(
         ]
         return {"path": path, "visits": visits}
 
-    def tell(graph: TravelGraph, row: Progress) -> None:
+    def tell(row: Progress) -> None:
+        graph = graphs[-1]
         if row.tour is None or row.incumbent is None:
             return
-        if row.tour == told[1] or time.monotonic() < told[0] + TELL:
+        if row.incumbent == told[1] or time.monotonic() < told[0] + TELL:
             return
-        told[:] = time.monotonic(), row.tour
+        told[:] = time.monotonic(), row.incumbent
         connection.send({
             "version": version, "stage": "searching", "length": row.incumbent,
-            "bound": row.bound, **drawn(graph, row.tour),
+            **told_bound(Status.FEASIBLE, row.incumbent, row.bound), **drawn(graph, row.tour),
         })  # fmt: skip
 
+    start: Solution | None = None
     clock = Clock(time_limit, should_stop=connection.poll)
     try:
         graph = travel_graph(problem, time_limit=clock)
-        start = None
-        with contextlib.suppress(InputError):  # nothing is left of it
-            start = tour_from(problem, before, graph) if before is not None else None
-        if start is not None and graph.is_tour(start):
-            tell(graph, Progress(0.0, "edited", graph.tour_length(start), tour=tuple(start)))
-        result = solve_graph(
-            graph, time_limit=clock, warm_start=start,
-            on_progress=lambda row: tell(graph, row),
+        graphs.append(graph)
+        if before is not None:
+            with contextlib.suppress(InputError):
+                old_tour(problem, before)
+                start = before  # else nothing is left of it
+        graph, result = solve_over(
+            problem, graph, SOLVER, clock, warm_start=start, on_progress=tell,
+            on_graph=graphs.append,
         )  # fmt: skip
         if clock.stopped:
             return None
         if result.tour is None:
             connection.send({"version": version, "stage": "done", "error": result.status.value})
             return None
-        found = to_solution(problem, graph, result, "auto", 0)
+        found = to_solution(problem, graph, result, SOLVER, 0)
         connection.send({
             "version": version, "stage": "done", "status": result.status.value,
-            "length": result.length, "bound": result.lower_bound,
+            "length": result.length, **told_bound(result.status, result.length, result.bound),
             "solution": found.to_json(), **drawn(graph, result.tour),
         })  # fmt: skip
         known = facts(problem, found, connection.poll)
@@ -187,6 +193,18 @@ def _solve(
     finally:
         clock.close()
     return None
+
+
+def told_bound(status: Status, length: float | None, bound: LowerBound | None) -> dict[str, Any]:
+    """Return what the page is told of a tour's bound: its length, the tours that it holds for, and
+    the words that it shows."""
+    from netsp.solution import proof
+
+    return {
+        "lower_bound": None if bound is None else bound.length,
+        "lower_bound_of": None if bound is None else bound.scope.value,
+        "proof": proof(status, length, bound),
+    }
 
 
 def _out_of_reach(problem: Problem) -> dict[str, Any]:

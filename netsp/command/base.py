@@ -79,7 +79,7 @@ def run(args: argparse.Namespace) -> int:
     )  # fmt: skip
     print(f"{'rank':>4}  {'place':<12} {'x':>10} {'y':>10} {'tether':>10} {'tour':>12}  status")
     for k, c in enumerate(search.candidates[: args.top], 1):
-        tour = f">= {c.lower_bound:.6g}" if c.length is None else f"{c.length:.6g}"
+        tour = f">= {c.bound.length:.6g}" if c.length is None else f"{c.length:.6g}"
         status = c.why or (c.status.value if c.status is not None else "proven worse")
         if c.why:
             tour = "-"

@@ -106,12 +106,12 @@ def _summary(result: Result, spent: float, output: str | None, plot: str | None)
     if result.length is None:
         why = "there is no tour" if result.status.value == "infeasible" else "no tour found"
         return f"{why} ({spent:.2f} s)"
-    if result.status.value == "optimal":
-        verdict = "proven optimal"
-    elif result.lower_bound is None:
+    if result.status.is_optimal:
+        verdict = result.status.verdict
+    elif result.bound is None:
         verdict = "no bound"
     else:
-        verdict = f"bound {result.lower_bound:.10g}, gap {100 * (result.gap or 0.0):.3f} %"
+        verdict = result.bound.says(result.length, digits=10)
     lines = [f"tour     {result.length:.10g}, {verdict}", f"time     {spent:.2f} s"]
     if output:
         lines.append(f"written  {output}")
@@ -126,6 +126,7 @@ def _told(instance: Instance, result: Result, spent: float) -> dict[str, object]
         "instance": instance.name, "vertices": len(instance.clusters),
         "clusters": int(instance.clusters.max()) + 1, "status": result.status.value,
         "length": result.length, "lower_bound": result.lower_bound, "gap": result.gap,
+        "lower_bound_of": None if result.bound is None else result.bound.scope.value,
         "tour": None if result.tour is None else [v + 1 for v in result.tour],
         "seconds": round(spent, 3),
     }  # fmt: skip

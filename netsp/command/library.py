@@ -12,6 +12,7 @@ from netsp.command import messages, told
 from netsp.command.patience import span
 from netsp.command.types import check_writable, natural, seconds
 from netsp.errors import EXIT_NOT_VERIFIED, InputError, counted
+from netsp.lower_bound import Scope
 
 if TYPE_CHECKING:
     from netsp.library import Library
@@ -83,11 +84,13 @@ def _list(args: argparse.Namespace, library: Library) -> int:
         told.tell({"problems": [
             {"problem": name} | (
                 {"length": r.length, "lower_bound": r.lower_bound, "gap": r.gap,
+                 "lower_bound_of": None if r.bound is None else r.bound.scope.value,
                  "solver": r.solver, "by": r.by, "date": r.date}
                 if (r := library.records.get(name)) else {}
             ) for name in names
         ]})  # fmt: skip
         return 0
+    print(f"bounds are on {Scope.ALL_TOURS.tours}")
     print(f"{'problem':<20} {'goals':>6} {'best':>12} {'bound':>12} {'gap':>9}  found by")
     for name in names:
         goals = library.problem(name).visits
@@ -95,8 +98,10 @@ def _list(args: argparse.Namespace, library: Library) -> int:
         if r is None:
             print(f"{name:<20} {goals:>6} {'-':>12} {'-':>12} {'-':>9}")
             continue
-        gap = "proven" if r.proven else "-" if r.gap is None else f"{100 * r.gap:.3f} %"
-        bound = "-" if r.lower_bound is None else f"{r.lower_bound:.6g}"
+        bound, gap = "-", "-"
+        if r.bound is not None:
+            bound = f"{r.bound.length:.6g}"
+            gap = "proven" if r.proven else r.bound.percent(r.length, 3)
         print(f"{name:<20} {goals:>6} {r.length:>12.6g} {bound:>12} {gap:>9}  {r.solver}, {r.by}")
     return 0
 

@@ -11,8 +11,8 @@ from netsp.solution import Solution, Status
 from netsp.travel.result import Progress
 
 _HEADER = (
-    f"{'time':>7}  {'stage':<10} {'tour':>12} {'bound':>12} {'gap':>8} {'cuts':>6} {'vertices':>8} "
-    f"{'legs':>9} {'iteration':>11}"
+    f"{'time':>7}  {'stage':<10} {'tour':>12} {'bound':>12} {'gap':>9} {'of':>11} {'cuts':>6} "
+    f"{'vertices':>8} {'legs':>9} {'iteration':>11}"
 )
 
 QUIET_S = 3.0
@@ -95,10 +95,13 @@ class ProgressTable:
             self._print(_HEADER)
             self._header = True
         tour = "-" if row.incumbent is None else f"{row.incumbent:.6g}"
-        bound = f"{row.bound:.6g}" if row.bound else "-"  # no tour is shorter than 0 anyway
-        gap = "-" if row.gap is None or not row.bound else f"{100 * row.gap:.3f}%"
+        bound = gap = of = "-"
+        if row.bound is not None and row.bound.length > 0.0:  # no tour is shorter than 0 anyway
+            bound, of = f"{row.bound.length:.6g}", row.bound.scope.column
+            if row.incumbent is not None:
+                gap = row.bound.percent(row.incumbent, 3)
         self._print(
-            f"{seconds:>6.1f}s  {row.stage:<10} {tour:>12} {bound:>12} {gap:>8} "
+            f"{seconds:>6.1f}s  {row.stage:<10} {tour:>12} {bound:>12} {gap:>9} {of:>11} "
             f"{row.cuts or '-':>6} {row.vertices or '-':>8} {row.legs or '-':>9} "
             f"{row.iteration:>11}"
         )
@@ -128,20 +131,15 @@ def summary(
             f"no tour found by {solution.solver} ({times}); give it more time or more iterations, "
             "or choose another --solver"
         )
-    if solution.status is Status.OPTIMAL:
-        exact = solution.roadmap == "taut"
-        verdict = "proven optimal" if exact else f"optimal over this {solution.roadmap} roadmap"
-    elif solution.status is Status.OPTIMAL_OF_KEPT:
-        verdict = (
-            f"shortest over the classes kept; bound over all classes {solution.lower_bound:.6g} "
-            f"{problem.units}, gap {100 * (solution.gap or 0.0):.2f} %"
-        )
-    elif solution.status is Status.INVALID:
+    verdict = solution.proof
+    if solution.status is Status.INVALID:
         verdict = "INVALID: the solver is blind to the tether"
-    elif not solution.lower_bound:
-        verdict = "no bound"
-    else:
-        verdict = f"bound {solution.lower_bound:.6g}, gap {100 * (solution.gap or 0.0):.2f} %"
+    elif solution.bound is not None and solution.lower_bound:
+        if not solution.status.is_optimal:
+            verdict = solution.bound.says(solution.length, problem.units)
+        elif not solution.bound.proves(solution.length):
+            said = solution.bound.says(solution.length, problem.units)
+            verdict = f"{solution.status.verdict}; {said}"
     names = [problem.goal_name(v.goal) for v in solution.tour]
     if solution.classes == "shortest" and solution.status is not Status.OPTIMAL_OF_KEPT:
         verdict += "; not all classes were kept"

@@ -45,6 +45,7 @@ def of_solution(problem: Problem, solution: Solution) -> dict[str, Any]:
     return {
         "problem": problem.name, "units": problem.units, "status": solution.status.value,
         "length": solution.length, "lower_bound": solution.lower_bound, "gap": solution.gap,
+        "lower_bound_of": None if solution.bound is None else solution.bound.scope.value,
         "order": [problem.goal_name(v.goal) for v in solution.tour],
         "longest_tether": max((v.tether_length for v in solution.tour), default=None),
         "tether_length": problem.tether_length,

@@ -105,7 +105,7 @@ _VALUES: dict[str, tuple[type, ...]] = {
     "roadmap_s": _MAYBE, "matrix_s": _MAYBE, "solve_s": _MAYBE, "longest_tether": _MAYBE,
     "entangled": (int, type(None)), "redrawn": (int, type(None)),
     "problem_sha256": (str, type(None)), "versions": (dict, type(None)),
-    "history": (list, type(None)),
+    "history": (list, type(None)), "lower_bound_of": (str, type(None)),
 }  # fmt: skip
 """Which types the fields of a row may have; a page is made of them without asking again."""
 

@@ -52,8 +52,9 @@ def run(trial: Trial) -> TrialRow:
     history: list[tuple[float, float | None, float | None]] = []
 
     def listen(p: Progress) -> None:
-        if not history or (p.incumbent, p.bound) != history[-1][1:]:
-            history.append((round(p.time, 4), p.incumbent, p.bound))
+        bound = None if p.bound is None else p.bound.length
+        if not history or (p.incumbent, bound) != history[-1][1:]:
+            history.append((round(p.time, 4), p.incumbent, bound))
 
     begin = time.perf_counter()
     try:
@@ -86,6 +87,7 @@ def run(trial: Trial) -> TrialRow:
             "status": solution.status.value,
             "length": solution.length,
             "lower_bound": solution.lower_bound,
+            "lower_bound_of": None if solution.bound is None else solution.bound.scope.value,
             "gap": solution.gap,
             "entangled": len(solution.entangled),
             "longest_tether": max((v.tether_length for v in solution.tour), default=0.0),

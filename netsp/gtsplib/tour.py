@@ -22,10 +22,10 @@ def tour_text(instance: Instance, result: Result) -> str:
         Vertices count from 1; length, bound and status are in the comment.
     """
     vertices = result.tour or ()
-    bound = "none" if result.lower_bound is None else f"{result.lower_bound:.12g}"
+    bound = "no bound" if result.bound is None else result.bound.says(digits=12)
     return "\n".join([
         f"NAME : {instance.name}.tour",
-        f"COMMENT : length {result.length:.12g}, lower bound {bound}, {result.status.value}",
+        f"COMMENT : length {result.length:.12g}, {bound}, {result.status.value}",
         "TYPE : TOUR",
         f"DIMENSION : {len(vertices)}",
         "TOUR_SECTION",

@@ -19,10 +19,17 @@ from netsp.hsignature import Word, concatenate, crossings, entangled, reduce
 from netsp.judge.solids import Inset, bridges
 from netsp.judge.stringpull import PLACE_TOLERANCE, StringPuller, reduce_sleeve
 from netsp.problem import Circle, Problem
-from netsp.solution import Solution, Status, tension_ratio
+from netsp.solution import Solution, Status, scope_of, tension_ratio
 
 STAND_OFF_ALLOWANCE = 3e-8
 """As a share of the problem's size, what standing off from a boundary may add to a length."""
+
+MAX_GAP_ERROR = 1e-6
+"""Largest difference of a stated gap from that of the stated lengths; files round both."""
+
+MAX_CLOSED_GAP = 1e-5
+"""Largest gap of a tour that may be called the shortest: a path from the robot's state is proven to
+that share of its length."""
 
 LENGTH_TOLERANCE = 1e-3
 """How much longer than the stated length the drawn path may be (arcs are circumscribed)."""
@@ -446,25 +453,33 @@ class _Judge:
 
     def _status(self) -> Check:
         s = self.solution
-        length, bound, gap = float(s.length or 0.0), s.lower_bound, s.gap
-        tiny = 1e-9 * max(length, self.problem.scale)
-        if (bound is None) != (gap is None):
-            return Check(
-                "bound, gap and status agree", False, "bound without gap or gap without bound"
-            )
-        if bound is not None and gap is not None:
-            expected = (length - bound) / length if length > 0 else 0.0
-            if bound > length + tiny:
-                return Check(
-                    "bound, gap and status agree", False, f"bound {bound:g} above length {length:g}"
-                )
-            if abs(gap - expected) > 1e-6:
-                return Check(
-                    "bound, gap and status agree", False, f"gap {gap:g}, should be {expected:g}"
-                )
-        if s.status is Status.OPTIMAL and (gap is None or gap > 1e-5):
-            return Check("bound, gap and status agree", False, f"optimal, but gap is {gap}")
-        if s.status in (Status.INFEASIBLE, Status.NO_SOLUTION_FOUND):
-            return Check("bound, gap and status agree", False, f"{s.status.value}, yet has a tour")
-        shown = "no bound" if gap is None else f"gap {gap:.2g}"
-        return Check("bound, gap and status agree", True, f"{s.status.value}, {shown}")
+        fault = self._fault_of_bound()
+        said = "no bound" if s.bound is None else s.bound.says(s.length, self.problem.units)
+        return Check(
+            "bound, gap and status agree", fault is None, fault or f"{s.status.value}, {said}"
+        )
+
+    def _fault_of_bound(self) -> str | None:
+        """Return what is wrong with what the solution says of its bound; None for nothing."""
+        s = self.solution
+        length, gap, status = float(s.length or 0.0), s.gap, s.status
+        if status in (Status.INFEASIBLE, Status.NO_SOLUTION_FOUND):
+            return f"{status.value}, yet has a tour"
+        if (s.lower_bound is None) != (gap is None):
+            return "bound without gap or gap without bound"
+        if s.bound is None:
+            return f"{status.value}, but there is no bound" if status.is_optimal else None
+        bound, scope = s.bound.length, s.bound.scope
+        if bound > length + 1e-9 * max(length, self.problem.scale):
+            return f"bound {bound:g} above length {length:g}"
+        if gap is None or abs(gap - s.bound.gap(length)) > MAX_GAP_ERROR:
+            return f"gap {gap:g}, should be {s.bound.gap(length):g}"
+        able = scope_of(s.roadmap, s.classes, kept_order=s.kept_order)
+        if not able.includes(scope) or scope.keeps_order != s.kept_order:
+            return f"a bound on {scope.tours}, but a run like this can bound {able.tours}"
+        closed = gap <= MAX_CLOSED_GAP
+        if status.is_optimal and status is not Status.OPTIMAL_OF_KEPT and not closed:
+            return f"{status.value}, but gap is {gap}"
+        if status.is_optimal and closed and status is not Status.optimal_of(scope):
+            return f"{status.value}, but the bound is one on {scope.tours}"
+        return None

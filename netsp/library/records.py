@@ -17,6 +17,7 @@ from netsp.fields import Name, NonNegative, Total
 from netsp.files import FileModel, write_text
 from netsp.hsignature import Word
 from netsp.judge import Verification, verify
+from netsp.lower_bound import LowerBound, Scope, gap_of, strongest
 from netsp.models import Model
 from netsp.problem import Problem
 from netsp.solution import Solution
@@ -28,13 +29,14 @@ SAME = 1e-6
 
 
 class Record(Model):
-    """The best tour that is known of a problem, and a bound on all."""
+    """The best tour that is known of a problem, and a lower bound on all tours."""
 
     problem: Annotated[Name, Field(description="name of the problem, and of its file")]
     sha256: Annotated[str, Field(description="of what its answer depends on")]
     length: Annotated[Total, Field(description="of the best tour known, in the problem's units")]
     lower_bound: Annotated[
-        Total | None, Field(description="no tour is shorter; null if nothing is known")
+        Total | None,
+        Field(description="no tour at all is shorter (scope all_tours); null if nothing is known"),
     ] = None
     solver: Annotated[Name, Field(description="what found the tour")]
     by: Annotated[Name, Field(description="who ran it")]
@@ -48,16 +50,19 @@ class Record(Model):
     ] = ()
 
     @property
+    def bound(self) -> LowerBound | None:
+        """The lower bound, on all tours; None where nothing is known."""
+        return None if self.lower_bound is None else LowerBound(self.lower_bound, Scope.ALL_TOURS)
+
+    @property
     def proven(self) -> bool:
         """Whether no tour is shorter."""
-        return self.lower_bound is not None and self.length - self.lower_bound <= SAME * self.length
+        return self.bound is not None and self.bound.proves(self.length)
 
     @property
     def gap(self) -> float | None:
         """(length - lower_bound) / length; None without a bound."""
-        if self.lower_bound is None:
-            return None
-        return max(0.0, (self.length - self.lower_bound) / self.length)
+        return gap_of(self.length, self.bound)
 
 
 class RecordFile(FileModel):
@@ -198,7 +203,7 @@ class Library:
         return Comparison(name, verification, solution.length, self.records.get(name))
 
     def take(
-        self, solution: Solution, by: str, commit: str = "unknown", bound: float | None = None
+        self, solution: Solution, by: str, commit: str = "unknown", bound: LowerBound | None = None
     ) -> Comparison:
         """Keep a solution as a record if it is better; `save` writes it.
 
@@ -210,9 +215,9 @@ class Library:
             Who found it.
         commit : str
             Of the solver, where it is netsp.
-        bound : float, optional
-            Proven by a solver that is trusted: a bound cannot be judged, so the one that a
-            contribution states is not taken.
+        bound : LowerBound, optional
+            Proven by a solver that is trusted, on all tours: a bound cannot be judged, so the one
+            that a contribution states is not taken.
 
         Returns
         -------
@@ -222,7 +227,7 @@ class Library:
         Raises
         ------
         InputError
-            As of `compared`.
+            As of `compared`; a bound of another scope.
         VerificationError
             The judge did not pass it.
         """
@@ -231,8 +236,12 @@ class Library:
             failed = [c.name for c in found.verification.checks if not c.passed]
             raise VerificationError(f"{found.name}: the judge did not pass: {', '.join(failed)}")
         old = found.record
-        bounds = [bound, None if old is None else old.lower_bound]
-        low = max((b for b in bounds if b is not None), default=None)
+        if bound is not None and bound.scope is not Scope.ALL_TOURS:
+            raise InputError(
+                f"bound: holds for {bound.scope.tours}; expected one on {Scope.ALL_TOURS.tours}"
+            )
+        best = strongest(bound, None if old is None else old.bound)
+        low = None if best is None else best.length
         if found.better:
             self.records[found.name] = Record(
                 problem=found.name, sha256=solution.problem.sha256, length=solution.length,

@@ -25,6 +25,7 @@ import numpy as np
 from netsp.arrays import Bools, Floats, Ints
 from netsp.clock import Clock
 from netsp.errors import LimitReachedError, interrupted
+from netsp.lower_bound import OPTIMALITY_TOLERANCE
 from netsp.mip.cuts import Cut
 from netsp.mip.deadlegs import DeadLegs
 from netsp.mip.highs import HighsRelaxation
@@ -38,7 +39,6 @@ from netsp.solving.run import Stop
 from netsp.solving.searching import SearchingRun
 from netsp.travel.costs import CostTable
 from netsp.travel.graph import TravelGraph
-from netsp.travel.result import OPTIMALITY_TOLERANCE
 
 GROWTH = 1.3
 """A cover has at most so many times as many cells as the one below, unless an obstacle alone adds

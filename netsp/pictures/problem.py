@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from netsp import steps
-from netsp.lower_bound import above_shortest
 from netsp.pictures import style
 from netsp.problem import Circle, Problem
 from netsp.roadmap.paths import TautPaths
@@ -126,11 +125,16 @@ def save_trace(rows: Sequence[Progress], title: str, units: str, path: str | Pat
     for field, label, look in (
         ("current", "current path", {"color": style.OBSTACLE, "lw": 0.7}),
         ("incumbent", "best tour", {"color": style.PATH, "lw": 1.6, "drawstyle": "steps-post"}),
-        ("bound", "lower bound", {"color": style.TETHER, "lw": 1.2, "drawstyle": "steps-post"}),
     ):
         seen = [(r.iteration, getattr(r, field)) for r in rows if getattr(r, field) is not None]
         if seen:
             top.plot(*zip(*seen, strict=True), label=label, marker=_mark(seen), **look)
+    look = {"color": style.TETHER, "lw": 1.2, "drawstyle": "steps-post"}
+    bounds = [(r.iteration, r.bound) for r in rows if r.bound is not None]
+    for scope in dict.fromkeys(b.scope for _, b in bounds):
+        line = [(at, b.length) for at, b in bounds if b.scope is scope]
+        label = f"lower bound on {scope.tours}"
+        top.plot(*zip(*line, strict=True), label=label, marker=_mark(line), **look)
     top.set_ylabel(f"length ({units})")
     top.legend(frameon=False, fontsize=8)
     top.set_title(title, fontsize=10, loc="left")
@@ -295,12 +299,7 @@ def draw_solution(
 def _title(problem: Problem, solution: Solution | None) -> str:
     if solution is None or solution.length is None:
         return f"{problem.name}: {problem.summary}"
-    if solution.status is Status.OPTIMAL_OF_KEPT:
-        proof = f"{solution.status.verdict}; {above_shortest(solution.length, solution.bound)}"
-    elif solution.status.is_optimal:
-        proof = solution.status.verdict
-    else:
-        proof = above_shortest(solution.length, solution.bound)
+    proof = solution.proof
     longest = max((v.tether_length for v in solution.tour), default=0.0)
     kind = "non-entangling tour"
     if solution.status is Status.INVALID:

@@ -11,9 +11,15 @@ from scipy.stats import binom
 
 from netsp.arrays import Floats
 from netsp.compare.rows import FAILED, TrialRow
+from netsp.lower_bound import LowerBound, Scope
+from netsp.solution import Status, scope_of
 
 ROUNDING = 1e-6
 """Per cent over the best that are taken for none: the same tour, summed in another order."""
+
+MAX_CLOSED_GAP = 1e-5
+"""Largest gap, as a share of the length, at which a tour counts as proven; also that of the judge,
+because a path from the robot's state is proven to that share only."""
 
 CONFIDENCE = 0.95
 """Of the intervals about medians."""
@@ -96,15 +102,57 @@ def failures(rows: Iterable[TrialRow]) -> list[TrialRow]:
     return [r for r in rows if r["status"] in FAILED or r["status"] == "no_solution_found"]
 
 
+def is_proven(row: TrialRow) -> bool:
+    """Say whether a row's tour is the shortest of the tours that its bound holds for: of all, of
+    its roadmap, or of its rule for classes.
+
+    Parameters
+    ----------
+    row : dict
+        A trial's.
+
+    Returns
+    -------
+    bool
+        False where the bound is open.
+    """
+    try:
+        status = Status(row["status"])
+    except ValueError:  # of a failed trial
+        return False
+    return status.is_optimal and (row.get("gap") or 0.0) <= MAX_CLOSED_GAP
+
+
+def bound_of(row: TrialRow) -> LowerBound | None:
+    """Return the lower bound of a row, with the tours that it holds for.
+
+    Parameters
+    ----------
+    row : dict
+        A trial's; one of an older version does not say which tours, but its roadmap does.
+
+    Returns
+    -------
+    LowerBound or None
+        None without a bound.
+    """
+    if row.get("lower_bound") is None:
+        return None
+    named = row.get("lower_bound_of")
+    if named in set(Scope):
+        return LowerBound(row["lower_bound"], Scope(named))
+    rule = row["roadmap"].get("options", {}).get("classes")
+    scope = scope_of(row["roadmap"]["name"], "non-looping" if rule == "non-looping" else None)
+    return LowerBound(row["lower_bound"], scope)
+
+
 def profile(by_method: dict[str, list[TrialRow]]) -> dict[str, Floats]:
     """For each method the sorted ratios of its time to proof to the fastest's, over the problems
     that any of them proved (Dolan & Moré 2002); inf where it proved nothing. Methods that prove
     nothing at all are left out."""
     times: dict[str, dict[tuple[str, int], float]] = {}
     for method, rows in by_method.items():
-        proven = {
-            (r["problem_sha256"], r["seed"]): r["total_s"] for r in rows if r["status"] == "optimal"
-        }
+        proven = {(r["problem_sha256"], r["seed"]): r["total_s"] for r in rows if is_proven(r)}
         if proven:
             times[method] = proven
     problems = sorted(set().union(*times.values())) if times else []

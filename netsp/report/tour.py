@@ -15,7 +15,6 @@ from netsp.execute.plan import HOME
 from netsp.files import write_text
 from netsp.hsignature.measures import measure
 from netsp.judge import verify
-from netsp.lower_bound import above_shortest
 from netsp.problem import Problem
 from netsp.report import briefing, chart, log, moving
 from netsp.report.opened import Opened, json_of, opened
@@ -119,16 +118,17 @@ def page(what: Opened) -> str:
     )
 
 
+def _proof(solution: Solution) -> str:
+    """What is proven of a tour; its status comes first where that is no proof."""
+    status = solution.status
+    return solution.proof if status.is_optimal else f"{status.value}, {solution.proof}"
+
+
 def _summary(problem: Problem, solution: Solution, run: Path | None) -> str:
     units = html.escape(problem.units)
-    proof = solution.status.value
-    if solution.status.is_optimal:
-        proof = solution.status.verdict
-    if solution.bound is not None and solution.status is not Status.OPTIMAL:
-        proof += f", {above_shortest(solution.length, solution.bound)}"
     lines = [
         f"{html.escape(problem.summary)}. The plan is {solution.length:.6g} "
-        f"{units} long ({proof}; solver {html.escape(solution.solver)}). "
+        f"{units} long ({html.escape(_proof(solution))}; solver {html.escape(solution.solver)}). "
         f"{html.escape(briefing.first_words(problem, solution))}"
     ]
     if planned := briefing.planned_with(solution):

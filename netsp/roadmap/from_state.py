@@ -22,6 +22,7 @@ from netsp.arrays import Bools, Floats, Ints
 from netsp.clock import Clock, TimeLimit
 from netsp.errors import InputError, NetspError
 from netsp.hsignature import reduce
+from netsp.lower_bound import OPTIMALITY_TOLERANCE, LowerBound
 from netsp.problem import Goal, Problem
 from netsp.roadmap.legs import TautLegs
 from netsp.roadmap.paths import TautPaths
@@ -30,8 +31,7 @@ from netsp.roadmap.ways import ways_by_parity
 from netsp.solution import Status
 from netsp.travel.costs import rounded_down
 from netsp.travel.graph import TravelGraph
-from netsp.travel.kept import within_kept
-from netsp.travel.result import OPTIMALITY_TOLERANCE, OnProgress, Progress, Result
+from netsp.travel.result import OnProgress, Progress, Result
 from netsp.travel.ways import BITS, WaysByParity
 
 ENOUGH = 10.0 * OPTIMALITY_TOLERANCE
@@ -69,6 +69,8 @@ class GraphFromState(TravelGraph):
         self.within, self.start, self.surcharge = within, start, surcharge
         self.start_tether = start_tether
         self.goal, self.before = within.goal, within.before
+        self.excluded_by_rule = within.excluded_by_rule
+        self.declared_scope = within.declared_scope
 
     def as_tour(self, order: tuple[int, ...]) -> tuple[int, ...]:
         """A closed tour with the state right after the base, whichever way round it was found."""
@@ -106,14 +108,18 @@ class GraphFromState(TravelGraph):
         )  # fmt: skip
 
     def as_asked(self, result: Result) -> Result:
-        """A solver's result on this graph as one about the path from the state."""
-        bound = result.lower_bound
-        if self.bound_in_any_class and result.tour is not None:
-            bound = max(bound or 0.0, self.bound_in_any_class)
-        low = None if bound is None else max(0.0, bound - 2.0 * self.surcharge)
-        tour = None if result.tour is None else self.as_tour(result.tour)
-        if tour is None:
-            return dataclasses.replace(result, lower_bound=low)
+        """Return a solver's result on this graph as one about the path from the state."""
+        own = self._of_path(result.bound)
+        low = self._of_path(self.bound_as_asked(result.bound, anywhere=result.tour is not None))
+        result = dataclasses.replace(
+            result,
+            trace=tuple(self._row_of_path(r, anywhere=False) for r in result.trace),
+            lower_bound=None if low is None else low.length,
+            lower_bound_of=self.scope if low is None else low.scope,
+        )
+        if result.tour is None:
+            return result
+        tour = self.as_tour(result.tour)
         walk = result.walk or (*tour, 0)
         if walk[1] != self.start:
             walk = tuple(reversed(walk))
@@ -122,14 +128,21 @@ class GraphFromState(TravelGraph):
         legs = [(u, v) for u, v in pairwise(walk[1:]) if u != v]
         length = sum(self.within.walk_length([u, v]) for u, v in legs)
         status = result.status
-        # proven to a millionth of the surcharged length, which is some lengths of the path
-        if status is Status.OPTIMAL and length - (low or 0.0) > ENOUGH * length:
-            status = Status.FEASIBLE
-        # home from a goal in a class that was left out is at least its tether
-        path = dataclasses.replace(
-            result, tour=tour, length=length, lower_bound=low, status=status, walk=walk[1:]
-        )
-        return within_kept(path, self.least_left_out)
+        if status.is_optimal:
+            # proven to a millionth of the surcharged length, which is some lengths of the path
+            closed = [b for b in (low, own) if b is not None and b.gap(length) <= ENOUGH]
+            status = Status.optimal_of(closed[0].scope) if closed else Status.FEASIBLE
+        return dataclasses.replace(
+            result, tour=tour, length=length, status=status, walk=walk[1:],
+            lower_bound=None if low is None else low.at_most(length).length,
+        )  # fmt: skip
+
+    def _of_path(self, bound: LowerBound | None) -> LowerBound | None:
+        """Return a bound on closed tours, which pay the surcharge twice, as one on paths from the
+        state."""
+        if bound is None:
+            return None
+        return dataclasses.replace(bound, length=max(0.0, bound.length - 2.0 * self.surcharge))
 
     def least_by_way_of(self, tether: float) -> float:
         """No path by way of a class with so long a tether is shorter than the way home from there;
@@ -137,23 +150,20 @@ class GraphFromState(TravelGraph):
         return tether + 2.0 * self.surcharge
 
     def progress_listener(self, listener: OnProgress | None) -> OnProgress | None:
-        """Tells a listener about the path instead of the tour."""
+        """Return a listener that is told about the path instead of the tour."""
         if listener is None:
             return None
+        return lambda row: listener(self._row_of_path(row))
+
+    def _row_of_path(self, row: Progress, *, anywhere: bool = True) -> Progress:
         off = 2.0 * self.surcharge
-
-        def tell(p: Progress) -> None:
-            listener(
-                dataclasses.replace(
-                    p,
-                    incumbent=None if p.incumbent is None else p.incumbent - off,
-                    bound=None if p.bound is None else max(0.0, p.bound - off),
-                    current=None if p.current is None else p.current - off,
-                    tour=None if p.tour is None else self.as_tour(p.tour),
-                )
-            )
-
-        return tell
+        return dataclasses.replace(
+            row,
+            incumbent=None if row.incumbent is None else row.incumbent - off,
+            bound=self._of_path(self.bound_as_asked(row.bound, anywhere=anywhere)),
+            current=None if row.current is None else row.current - off,
+            tour=None if row.tour is None else self.as_tour(row.tour),
+        )
 
 
 def charged(
@@ -286,6 +296,7 @@ def graph_from_state(
         classes=roadmap.rule if roadmap.complete else "shortest",
         least_left_out=roadmap.least_left_out, by_parity=partial(ways_by_parity, legs.paths),
     )  # fmt: skip
+    part.excluded_by_rule = roadmap.rule != "all"
     if len(problem.precedences):
         part.before = np.zeros((last + 1, last + 1), dtype=bool)
         part.before[:last, :last] = problem.precedences

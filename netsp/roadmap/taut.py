@@ -87,7 +87,7 @@ class TautRoadmap:
 
     def to_travel_graph(self) -> TravelGraph:
         """The travel graph over this roadmap; legs are computed when first asked for."""
-        return TravelGraph(
+        graph = TravelGraph(
             self.cluster,
             self.signatures,
             self.tethers,
@@ -100,6 +100,8 @@ class TautRoadmap:
             carrier=None if self.complete else self,
             by_parity=partial(ways_by_parity, self.paths),
         )
+        graph.excluded_by_rule = self.rule != "all"
+        return graph
 
     def ways(self, goal: int, most: int) -> list[tuple[int, Word]]:
         """As `netsp.travel.graph.Carrier.ways`."""

@@ -83,7 +83,10 @@ def within_turning(problem: Problem, graph: TravelGraph, most: float) -> TravelG
         return graph
     turning = turnings(problem, graph)
     part = graph.subgraph(np.flatnonzero(turning <= most + ROUNDING))
+    # the limit is the problem's: no class that breaks it is in an admissible tour
+    part.declared_scope = graph.scope
     part.classes, part.least_left_out = graph.classes, graph.least_left_out
+    part.excluded_by_rule = graph.excluded_by_rule
     lost = sorted(set(graph.cluster.tolist()) - set(part.cluster.tolist()))
     if lost:
         members = graph.members(lost[0])

@@ -26,6 +26,7 @@ from netsp.drawn import Drawn
 from netsp.errors import InfeasibleError, InputError, LimitReachedError
 from netsp.files import cell, write_text
 from netsp.frames import frame_of
+from netsp.lower_bound import OPTIMALITY_TOLERANCE, LowerBound, Scope, strongest
 from netsp.mip.overgoals import ROUNDING
 from netsp.problem import Problem
 from netsp.roadmap.outline import build_outline
@@ -33,7 +34,6 @@ from netsp.roadmap.shortest import ContactGraph
 from netsp.solution import Solution, Status
 from netsp.solvers.solve import solve, solve_graph
 from netsp.travel.graph import TravelGraph
-from netsp.travel.result import OPTIMALITY_TOLERANCE
 
 if TYPE_CHECKING:
     import pandas
@@ -80,6 +80,11 @@ class Candidate:
     def possible(self) -> bool:
         """Whether there may be a tour from here."""
         return not self.why
+
+    @property
+    def bound(self) -> LowerBound:
+        """The lower bound, on all tours from here."""
+        return LowerBound(self.lower_bound, Scope.ALL_TOURS)
 
 
 @dataclass(frozen=True)
@@ -246,10 +251,12 @@ def best_base(
             continue
         except LimitReachedError:
             continue
-        bound = max(candidate.lower_bound, found.lower_bound or 0.0)
+        bound = strongest(candidate.bound, found.bound) or candidate.bound
         if found.length is not None:
-            bound = min(bound, found.length)
-        rated[k] = replace(candidate, length=found.length, lower_bound=bound, status=found.status)
+            bound = bound.at_most(found.length)
+        rated[k] = replace(
+            candidate, length=found.length, lower_bound=bound.length, status=found.status
+        )
         if found.length is not None and (
             best is None or best.length is None or found.length < best.length
         ):

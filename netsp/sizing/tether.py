@@ -18,6 +18,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -32,13 +33,14 @@ from netsp.errors import InputError, LimitReachedError
 from netsp.fields import checked_argument
 from netsp.files import write_text
 from netsp.frames import frame_of
+from netsp.lower_bound import LowerBound, Scope
 from netsp.problem import Problem
 from netsp.roadmap.reach import shortest_tethers
 from netsp.solution import Status
 from netsp.solvers.solve import solve_graph, travel_graph
 from netsp.travel.graph import TravelGraph
-from netsp.travel.kept import within_kept
-from netsp.travel.result import Result, relative_gap
+from netsp.travel.kept import with_classes_left_out
+from netsp.travel.result import Result
 
 if TYPE_CHECKING:
     import pandas
@@ -81,9 +83,14 @@ class Step:
     order: tuple[int, ...]
 
     @property
+    def bound(self) -> LowerBound:
+        """The lower bound, on all tours with such a tether."""
+        return LowerBound(self.lower_bound, Scope.ALL_TOURS)
+
+    @property
     def gap(self) -> float:
         """(length - lower_bound) / length."""
-        return relative_gap(self.length, self.lower_bound) or 0.0
+        return self.bound.gap(self.length)
 
 
 @dataclass(frozen=True)
@@ -319,6 +326,7 @@ def _shortest(
     vertices = np.flatnonzero(fits)
     with graph.on_clock(clock):
         result = solve_graph(graph.subgraph(vertices), solver, time_limit=clock, seed=seed)
-    if graph.least_left_out <= limit:
-        result = within_kept(result, graph.least_by_way_of(graph.least_left_out))
-    return result, vertices
+    left_out = graph.least_left_out
+    least = graph.least_by_way_of(left_out) if left_out <= limit else math.inf
+    because = "a tour by way of a class left out goes along its tether and back"
+    return with_classes_left_out(result, least, Scope.ALL_TOURS, because), vertices

@@ -14,7 +14,7 @@ from netsp.hsignature import Word, entangled
 from netsp.problem import Problem
 from netsp.solution import ProblemReference, Solution, Timings, Visit
 from netsp.travel.graph import TravelGraph
-from netsp.travel.result import Result, Trajectory, relative_gap
+from netsp.travel.result import Result, Trajectory
 
 
 def to_solution(
@@ -43,7 +43,8 @@ def to_solution(
         status=result.status,
         length=result.length,
         lower_bound=result.lower_bound,
-        gap=relative_gap(result.length, result.lower_bound),
+        lower_bound_of=None if result.bound is None else result.bound.scope,
+        gap=result.gap,
         entangled=wrapped,
         tour=visits,
         path=tuple((float(x), float(y), float(z)) for x, y, z in path),

@@ -24,18 +24,18 @@ from netsp.dp.solve import fits as walks_fit
 from netsp.dp.solve import solve as walk
 from netsp.errors import MemoryLimitError
 from netsp.lns.solve import solve as search
+from netsp.lower_bound import LowerBound, strongest
 from netsp.mip.merging import search_and_merge
 from netsp.mip.overgoals import Told, bound_at_once, bound_over_goals
 from netsp.mip.solve import MipRun, solve_merged
 from netsp.mip.solve import Params as MipParams
 from netsp.mip.solve import solve as prove
-from netsp.solution import Status
 from netsp.solvers import exact
 from netsp.solving.limits import Limits
 from netsp.solving.run import SolverRun
 from netsp.travel.graph import TravelGraph, least_tethers
-from netsp.travel.kept import within_kept
-from netsp.travel.result import Result, of_part, proven
+from netsp.travel.kept import with_bound, with_classes_left_out
+from netsp.travel.result import Result, of_part
 
 PROVABLE = 22_000
 """Most vertices of a travel graph that `mip` is asked to bound: as many as the taut roadmap keeps,
@@ -163,22 +163,22 @@ def _in_part_ordered(graph: TravelGraph, limits: Limits, backend: str) -> Result
     limits = replace(limits, time=clock)
     few = walks_fit(graph) and graph.goal_count <= FEW_GOALS
     rounds = _rounds(graph)
-    bound = 0.0
+    bound: LowerBound | None = None
     if len(graph) <= PROVABLE:
         share = Clock((1.0 - SHARE) * clock.left, within=clock) if clock.limit else clock
         free = MipRun(
             graph.unordered(), replace(limits, time=share, warm_start=None, on_progress=None),
             search_rounds=rounds,
         ).solve(backend, None)  # fmt: skip
-        bound = free.lower_bound or 0.0
+        if free.bound is not None:
+            bound = free.bound.for_part(graph.scope, "tours in the order asked for are tours")
     found = (
         walk(graph, WalkParams(rounds), limits) if few else search(graph, limits=limits)
     )  # fmt: skip
     if found.length is None:
         return found
-    bound = min(max(found.lower_bound or 0.0, bound), found.length)
-    status = Status.OPTIMAL if proven(found.length, bound) else found.status
-    return replace(found, lower_bound=bound, status=status)
+    best = strongest(found.bound, bound)
+    return found if best is None else with_bound(found, best)
 
 
 def _bound_by_goals(
@@ -203,7 +203,8 @@ def _from_few(graph: TravelGraph, limits: Limits, backend: str) -> Limits:
     share = Clock.of(limits.time).part(FEW_SHARE)
     found = MipRun(
         graph.subgraph(core),
-        replace(limits, time=share, on_progress=of_part(limits.on_progress, core)),
+        # bounds over few classes say nothing of the others
+        replace(limits, time=share, on_progress=of_part(limits.on_progress, core, lambda _: None)),
         search_rounds=_rounds(graph),
     ).solve(backend, None)  # fmt: skip
     if found.tour is None:
@@ -222,19 +223,24 @@ def _over_shortest(graph: TravelGraph, limits: Limits, backend: str) -> Result:
     others[core] = False
     place = {int(v): k for k, v in enumerate(core)}
     warm = None if given is None else [place[int(v)] for v in given]
+    least = graph.least_by_way_of(float(graph.tethers[others].min(initial=np.inf)))
+    because = "a tour by way of another class goes along its tether and back"
+
+    def bound_of_whole(bound: LowerBound | None) -> LowerBound | None:
+        return None if bound is None else bound.or_elsewhere(least, graph.scope, because)
+
     run = MipRun(
         graph.subgraph(core),
-        replace(limits, on_progress=of_part(limits.on_progress, core)),
+        replace(limits, on_progress=of_part(limits.on_progress, core, bound_of_whole)),
         search_rounds=_rounds(graph),
     )
     found = run.solve(backend, warm, walks=True)
     if found.tour is None:
-        return found
+        return with_classes_left_out(found, least, graph.scope, because)
     whole = replace(found, tour=tuple(int(core[v]) for v in found.tour))
-    least = float(graph.tethers[others].min(initial=np.inf))
-    otherwise = graph.least_by_way_of(min(least, graph.least_left_out))
+    otherwise = min(least, graph.least_by_way_of(graph.least_left_out))
     clock = Clock.of(limits.time)
     if otherwise < (whole.length or 0.0) and not clock.up:
         # of few goals the shortest tour in any class is soon known
-        otherwise = max(otherwise, _bound_by_goals(graph, Limits(clock, rng=limits.rng)))
-    return within_kept(whole, otherwise)
+        _bound_by_goals(graph, Limits(clock, rng=limits.rng))
+    return with_classes_left_out(whole, least, graph.scope, because)

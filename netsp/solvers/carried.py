@@ -6,12 +6,13 @@ them keep coming back towards the base. A good tour goes on from goal to goal, a
 along. So from the classes of a tour each goal near by is gone on to the shortest way; the classes
 that the tether comes into there join the graph, a search over these few finds a better tour, and so
 on until none is found. It begins with a short order along straight lines, along which a tether is
-carried, too: whatever it is wound around on the way, back along it the robot comes home free.
+carried, too: whatever it is wound around on the way, back along it the robot comes home free. A
+tour to start from is gone on from in the same way.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -58,11 +59,16 @@ class Carried:
     tour: tuple[int, ...] | None = None
 
 
+OnGraph = Callable[[TravelGraph], None]
+"""Hears the travel graph that the tours of all later rows of progress are of."""
+
+
 def with_carried(
     graph: TravelGraph, clock: Clock, rng: np.random.Generator,
-    on_progress: OnProgress | None = None,
+    on_progress: OnProgress | None = None, on_graph: OnGraph | None = None,
+    start: Sequence[int] | None = None,
 ) -> Carried:  # fmt: skip
-    """The graph with the classes along good tours.
+    """Return the graph with the classes along good tours.
 
     Parameters
     ----------
@@ -73,35 +79,43 @@ def with_carried(
     rng : numpy.random.Generator
         Of the searches.
     on_progress : callable, optional
-        Told the length of the best tour after each search; the tour itself is one of a graph that
-        is still growing.
+        Told the best tour after each search.
+    on_graph : callable, optional
+        Told the graph before each of these rows: it grows from search to search.
+    start : sequence of int, optional
+        A tour to start from, as vertices of the graph.
 
     Returns
     -------
     Carried
-        The graph and the best tour found in it.
+        The graph and the best tour found in it, or the start.
     """
     carrier = graph.carrier
     if graph.complete or carrier is None or graph.goal_count < 3:
-        return Carried(graph)
+        return Carried(graph, None if start is None else tuple(start))
     share = clock.part(SHARE)
     ways = {0: carrier.ways(0, graph.goal_count)}
     least = least_tethers(graph.costs_to_base, graph.cluster, FEW)
     few = _classes(graph, least)
     best: list[Class] = []
     shortest = np.inf
+    if start is not None:
+        shortest, best = graph.tour_length(start), _classes(graph, np.array(start, dtype=np.int64))
 
-    def tell(length: float, vertices: int) -> None:
+    def tell(graph: TravelGraph, length: float, classes: list[Class], vertices: int) -> None:
+        if on_graph:
+            on_graph(graph)
         if on_progress:
-            told = min(length, shortest)
-            on_progress(Progress(clock.elapsed, "carried", told, vertices=vertices))
+            told = (length, classes) if length < shortest else (shortest, best)
+            tour = _vertices(graph, told[1])
+            on_progress(Progress(clock.elapsed, "carried", told[0], vertices=vertices, tour=tour))
 
     # from either start the search may end in a tour that the other leads past
     for along in (True, False):
         if share.up and best:
             break
-        looked = dict.fromkeys(few)
-        if along:
+        looked = dict.fromkeys([*few, *(best if along else ())])
+        if along and not best:
             graph = _put_back(graph, _along_straight_lines(graph, rng, share), looked, share)
         graph, length, classes = _improved(graph, looked, few, ways, rng, share, tell)
         if length < shortest:
@@ -112,7 +126,7 @@ def with_carried(
 def _improved(
     graph: TravelGraph, looked: dict[Class, None], few: list[Class],
     ways: dict[int, list[tuple[int, Word]]], rng: np.random.Generator, share: Clock,
-    tell: Callable[[float, int], None],
+    tell: Callable[[TravelGraph, float, list[Class], int], None],
 ) -> tuple[TravelGraph, float, list[Class]]:  # fmt: skip
     """The graph with the classes along better and better tours, and the length and classes of the
     best, from those among the classes looked at on."""
@@ -132,7 +146,7 @@ def _improved(
             shortest, best = length, classes
         if not best:
             break
-        tell(shortest, len(looked))
+        tell(graph, shortest, best, len(looked))
         if len(looked) > most:
             looked = dict.fromkeys(few)
         looked |= dict.fromkeys([*best, *classes])

@@ -14,13 +14,14 @@ from typing import Any
 import numpy as np
 
 from netsp.errors import InputError
+from netsp.lower_bound import OPTIMALITY_TOLERANCE
 from netsp.models import shown
 from netsp.solution import Status
 from netsp.solving.limits import Limits
 from netsp.solving.params import read_params
 from netsp.solving.run import SolverRun
 from netsp.travel.graph import TravelGraph
-from netsp.travel.result import OPTIMALITY_TOLERANCE, Result
+from netsp.travel.result import Result
 
 OFFERED = ("params", "limits", "time", "iterations", "rng", "warm_start")
 """What a solver may ask for by name: its options, the limits, and each field of them."""

@@ -12,6 +12,7 @@ from netsp.arrangement import keeps
 from netsp.clock import Clock
 from netsp.errors import InputError
 from netsp.lns.layers import Instance, best_classes
+from netsp.lower_bound import LowerBound
 from netsp.solution import Status
 from netsp.travel.graph import TravelGraph
 from netsp.travel.result import OnProgress, Progress, Result
@@ -57,6 +58,9 @@ def solve_in_order(graph: TravelGraph, clock: Clock, on_progress: OnProgress | N
     order = np.arange(1, last + 1, dtype=np.int64)
     length, tour = best_classes(order, instance.start, instance.costs)
     found = instance.original(tour)
+    bound = LowerBound(float(length), graph.scope.in_order)
     if on_progress is not None:
-        on_progress(Progress(clock.elapsed, "in order", length, length, tour=found))
-    return Result(found, float(length), float(length), Status.OPTIMAL)
+        on_progress(Progress(clock.elapsed, "in order", bound.length, bound, tour=found))
+    return Result(
+        found, bound.length, bound.length, Status.OPTIMAL, lower_bound_of=bound.scope
+    )  # fmt: skip

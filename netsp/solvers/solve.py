@@ -13,22 +13,23 @@ import numpy as np
 from netsp.clock import Clock, TimeLimit, until_interrupt
 from netsp.errors import InputError, LimitReachedError
 from netsp.fields import checked_argument
+from netsp.lower_bound import Scope
 from netsp.models import shown
 from netsp.problem import Problem
 from netsp.registry import foreign, load
 from netsp.solution import MAX_FRICTION, ProblemReference, Solution, Timings, max_turning
 from netsp.solvers import without_base
 from netsp.solvers.answer import to_solution
-from netsp.solvers.carried import with_carried
+from netsp.solvers.carried import OnGraph, with_carried
 from netsp.solvers.custom import call, read_options, whole_numbers
 from netsp.solvers.in_order import solve_in_order
 from netsp.solvers.table import ROADMAPS, SOLVERS
-from netsp.solvers.warm import old_tour, tour_from
+from netsp.solvers.warm import old_tour, tour_from, with_old_classes
 from netsp.solving.limits import Limits
 from netsp.solving.params import NoParams, read_params
 from netsp.travel.baseless import BaselessGraph
 from netsp.travel.graph import TravelGraph
-from netsp.travel.result import OnProgress, Result
+from netsp.travel.result import OnProgress, Progress, Result
 
 SolverLike = str | Callable[..., Any]
 """A solver's name, or a callable that takes a travel graph (`netsp.solvers.custom`)."""
@@ -127,6 +128,7 @@ def _graph_of_places(problem: Problem, roadmap: str, options: dict[str, Any]) ->
             raise InputError(
                 f"roadmap {roadmap!r}: expected a TravelGraph from it, got {shown(graph)}"
             )
+        graph.declared_scope = Scope.ROADMAP  # netsp cannot check that it holds all tours
     graph.before = problem.precedences
     return graph
 
@@ -365,30 +367,84 @@ def solve(
             return found.model_copy(
                 update={"kept_order": True, "timings": _timings(clock, built, graph), **limits}
             )
-        # what is too large for its time takes long to draw, too
-        spare = 0.0 if graph.complete else min(SPARE * (time_limit or 0.0), 1.0)
-        start: Sequence[int] | None = None
-        if warm_start is not None:
-            start = tour_from(problem, warm_start, graph)
-        elif solver in CARRIED:
-            rng = np.random.default_rng(seed)
-            with until_interrupt(rest) as stoppable:
-                carried = with_carried(graph, stoppable, rng, on_progress)
-            graph, start = carried.graph, carried.tour
-            rest = stoppable if stoppable.stopped else rest
-        result = solve_graph(
-            graph,
-            solver,
-            time_limit=Clock(rest.left - spare, within=rest) if spare else rest,
-            iteration_limit=iteration_limit,
-            seed=seed,
-            params=params,
-            warm_start=start,
-            on_progress=on_progress,
-        )
+        graph, result = solve_over(
+            problem, graph, solver, rest, iteration_limit=iteration_limit, seed=seed,
+            params=params, warm_start=warm_start, on_progress=on_progress,
+        )  # fmt: skip
         timings = _timings(clock, built, graph)
         found = to_solution(problem, graph, result, name_of(solver), seed, timings)
         return found.model_copy(update=limits) if friction else found
+
+
+def solve_over(
+    problem: Problem,
+    graph: TravelGraph,
+    solver: SolverLike,
+    clock: Clock,
+    *,
+    iteration_limit: int | None = None,
+    seed: int = 0,
+    params: Mapping[str, Any] | None = None,
+    warm_start: Solution | None = None,
+    on_progress: OnProgress | None = None,
+    on_graph: OnGraph | None = None,
+) -> tuple[TravelGraph, Result]:
+    """Solve a problem over its travel graph, as `solve` does.
+
+    Parameters
+    ----------
+    problem : Problem
+        What to solve.
+    graph : TravelGraph
+        Of the problem.
+    solver : str or callable
+        As of `solve_graph`.
+    clock : Clock
+        Of the run.
+    iteration_limit, seed, params, warm_start : int, int, mapping, Solution
+        As of `solve`.
+    on_progress : callable, optional
+        Called with a `netsp.travel.result.Progress` now and then.
+    on_graph : callable, optional
+        Told the graph that the tours of later rows are of, whenever that is another one.
+
+    Returns
+    -------
+    graph : TravelGraph
+        With more classes than before, where the roadmap had to leave some out.
+    result : Result
+        Its tour is one of that graph.
+    """
+    # what is too large for its time takes long to draw, too
+    spare = 0.0 if graph.complete else min(SPARE * (clock.limit or 0.0), 1.0)
+    start: Sequence[int] | None = None
+    if warm_start is not None:
+        graph = with_old_classes(problem, warm_start, graph, clock)
+        start = tour_from(problem, warm_start, graph)
+        if on_graph is not None:
+            on_graph(graph)
+        if on_progress is not None and start is not None:
+            length = graph.tour_length(start)
+            on_progress(Progress(clock.elapsed, "edited", length, tour=tuple(start)))
+    if solver in CARRIED:
+        rng = np.random.default_rng(seed)
+        with until_interrupt(clock) as stoppable:
+            carried = with_carried(graph, stoppable, rng, on_progress, on_graph, start)
+        graph, start = carried.graph, carried.tour
+        clock = stoppable if stoppable.stopped else clock
+    if on_graph is not None:
+        on_graph(graph)
+    result = solve_graph(
+        graph,
+        solver,
+        time_limit=Clock(clock.left - spare, within=clock) if spare else clock,
+        iteration_limit=iteration_limit,
+        seed=seed,
+        params=params,
+        warm_start=start,
+        on_progress=on_progress,
+    )
+    return graph, result
 
 
 def _walks_between_places(solver: SolverLike) -> bool:

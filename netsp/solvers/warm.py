@@ -14,6 +14,7 @@ import numpy as np
 
 from netsp.arrangement import keeps
 from netsp.arrays import Floats
+from netsp.clock import Clock
 from netsp.errors import InputError
 from netsp.hsignature import Word, concatenate
 from netsp.hsignature.rays import crossings
@@ -109,6 +110,42 @@ def _nearest(problem: Problem, place: Floats, taken: set[int]) -> int:
     away[list(taken)] = np.inf
     k = int(np.argmin(away))
     return k if away[k] <= NEAR * problem.scale else -1
+
+
+def with_old_classes(
+    problem: Problem, solution: Solution, graph: TravelGraph, clock: Clock
+) -> TravelGraph:
+    """Return the graph with the classes of an old tour, where its roadmap had to leave some out.
+
+    Parameters
+    ----------
+    problem : Problem
+        That there is now.
+    solution : Solution
+        Of this problem, or of one that it was edited from.
+    graph : TravelGraph
+        Of the problem.
+    clock : Clock
+        When it is up, the rest of the classes stay left out.
+
+    Returns
+    -------
+    TravelGraph
+        The same graph where no class was left out.
+
+    Raises
+    ------
+    InputError
+        None of its goals is in the problem.
+    """
+    if graph.complete or graph.carrier is None:
+        return graph
+    found = old_tour(problem, solution)
+    wanted = [(goal + 1, word) for goal, word in zip(found.goals, found.words, strict=True)]
+    before = graph.before
+    graph = graph.carrier.with_classes(wanted, lambda: clock.up)
+    graph.before = before
+    return graph
 
 
 def tour_from(problem: Problem, solution: Solution, graph: TravelGraph) -> list[int] | None:

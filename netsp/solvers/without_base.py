@@ -16,6 +16,7 @@ from netsp.arrays import Ints
 from netsp.clock import Clock, until_interrupt
 from netsp.lns.solve import Params as SearchParams
 from netsp.lns.solve import solve as search
+from netsp.lower_bound import Scope
 from netsp.mip.overgoals import bound_at_once
 from netsp.solution import Status
 from netsp.solving.limits import Limits
@@ -65,12 +66,15 @@ def solve(graph: BaselessGraph, run: Run, limits: Limits, *, proves: bool) -> Re
                 bounds += [0.0] * left
                 break
             part, vertices = graph.rooted(root)
-            tell = _told(rows, limits.on_progress, clock, best, bounds if left == 1 else None)
+            tell = _told(
+                graph.scope, rows, limits.on_progress, clock, best, bounds if left == 1 else None
+            )
             share = replace(
                 limits, time=clock if left == 1 else clock.part(1.0 / left),
                 iterations=None if limits.iterations is None
                 else max(1, limits.iterations // len(roots)),
-                on_progress=of_part(tell, vertices), warm_start=_from(root, best, vertices),
+                on_progress=of_part(tell, vertices, lambda b: b),
+                warm_start=_from(root, best, vertices),
                 cutoff=math.inf if best.length is None else best.length,
             )  # fmt: skip
             found = run(part, share)
@@ -85,6 +89,7 @@ def solve(graph: BaselessGraph, run: Run, limits: Limits, *, proves: bool) -> Re
     if proves and bound == 0.0:
         bound_at_once(graph)
         bound = graph.bound_in_any_class
+    best = replace(best, lower_bound_of=graph.scope)
     if best.length is None or best.tour is None:
         status = Status.INFEASIBLE if bound == math.inf else Status.NO_SOLUTION_FOUND
         return replace(best, status=status, lower_bound=None, trace=tuple(rows))
@@ -130,7 +135,7 @@ def _from(root: int, best: Result, vertices: Ints) -> list[int] | None:
 
 
 def _told(
-    rows: list[Progress], listener: OnProgress | None, clock: Clock, best: Result,
+    scope: Scope, rows: list[Progress], listener: OnProgress | None, clock: Clock, best: Result,
     bounds: list[float] | None,
 ) -> OnProgress:  # fmt: skip
     """A listener to one run that tells the best tour of all runs, and in the last of them, when
@@ -138,7 +143,9 @@ def _told(
     others = math.inf if bounds is None else min(bounds, default=math.inf)
 
     def tell(row: Progress) -> None:
-        bound = None if bounds is None else min(row.bound or 0.0, others)
+        bound = None
+        if bounds is not None and row.bound is not None:
+            bound = row.bound.or_elsewhere(others, scope, "each other root has a bound")
         row = replace(row, bound=bound, time=clock.elapsed)
         if best.length is not None and best.length <= (row.incumbent or math.inf):
             row = replace(row, incumbent=best.length, tour=best.tour)

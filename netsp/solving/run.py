@@ -11,6 +11,7 @@ import numpy as np
 
 from netsp.clock import Clock
 from netsp.errors import InputError, LimitReachedError, MemoryLimitError, interrupted
+from netsp.lower_bound import LowerBound
 from netsp.solution import Status
 from netsp.solving.limits import Limits
 from netsp.travel.baseless import BaselessGraph
@@ -187,7 +188,7 @@ class SolverRun:
             self.clock.elapsed,
             stage,
             None if self.tour is None else self.length,
-            self.bound,
+            None if self.bound is None else LowerBound(self.bound, self.graph.scope),
             iteration=self.iterations,
             tour=self.tour,
             **more,
@@ -200,7 +201,13 @@ class SolverRun:
         """The outcome as it stands."""
         if self.tour is None:
             status = Status.INFEASIBLE if self.infeasible else Status.NO_SOLUTION_FOUND
-            return Result(None, None, self.bound or None, status, tuple(self.trace))
+            return Result(
+                None, None, self.bound or None, status, tuple(self.trace),
+                lower_bound_of=self.graph.scope,
+            )  # fmt: skip
         optimal = self.bound is not None and proven(self.length, self.bound)
         status = Status.OPTIMAL if optimal else Status.FEASIBLE
-        return Result(self.tour, self.length, self.bound, status, tuple(self.trace), walk=self.walk)
+        return Result(
+            self.tour, self.length, self.bound, status, tuple(self.trace), walk=self.walk,
+            lower_bound_of=self.graph.scope,
+        )  # fmt: skip

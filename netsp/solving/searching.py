@@ -21,12 +21,12 @@ from netsp.clock import Clock
 from netsp.errors import LimitReachedError
 from netsp.lns.layers import Instance
 from netsp.lns.search import Search
+from netsp.lower_bound import OPTIMALITY_TOLERANCE
 from netsp.solving.beside import classes_beside, searched_per_goal
 from netsp.solving.legcosts import MEASURE_AT_ONCE, LegCosts
 from netsp.solving.limits import Limits
 from netsp.solving.run import SLIVER, SolverRun, Stop
 from netsp.travel.graph import TravelGraph, least_tethers
-from netsp.travel.result import OPTIMALITY_TOLERANCE
 
 CORE = 800
 """About so many vertices, those of least tether, are proven over before all are."""

@@ -13,6 +13,7 @@ import numpy as np
 
 from netsp.arrays import Floats, Ints
 from netsp.errors import InputError, counted
+from netsp.lower_bound import Scope
 from netsp.travel.costs import CostTable
 from netsp.travel.graph import TravelGraph
 
@@ -80,5 +81,5 @@ class BaselessGraph(TravelGraph):
         costs = self.costs[np.ix_(vertices, vertices)]
         table = CostTable(costs, cluster)
         graph = TravelGraph(cluster, [()] * len(cluster), np.zeros(len(cluster)), table)
-        graph.grain = self.grain
+        graph.grain, graph.declared_scope = self.grain, Scope.PART
         return graph, vertices

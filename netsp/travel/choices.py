@@ -36,7 +36,8 @@ def with_choices(graph: TravelGraph, clusters: Ints) -> TravelGraph:
         least_left_out=graph.least_left_out,
         by_parity=partial(_paths_by_parity, graph, clusters) if graph.knows_ways else None,
     )  # fmt: skip
-    out.goal = graph.goal
+    out.goal, out.excluded_by_rule = graph.goal, graph.excluded_by_rule
+    out.declared_scope = graph.declared_scope
     return out
 
 

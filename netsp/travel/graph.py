@@ -14,6 +14,7 @@ import math
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 import numpy as np
@@ -25,9 +26,11 @@ from netsp.clock import NEVER, Clock, Flag
 from netsp.drawn import Drawn
 from netsp.errors import InputError, counted
 from netsp.hsignature import Word
+from netsp.lower_bound import LowerBound, Scope, strongest
+from netsp.solution import EXACT_ROADMAPS
 from netsp.travel.costs import CostTable, checked_costs, grain_of, rounded_down
 from netsp.travel.detours import Detours
-from netsp.travel.kept import with_bound, within_kept
+from netsp.travel.kept import with_bound
 from netsp.travel.legs import Legs
 from netsp.travel.ways import WaysByParity
 
@@ -99,6 +102,10 @@ class TravelGraph(Drawn):
         The tether that is out at the start.
     bound_in_any_class : float
         No tour is shorter, whichever classes it takes, kept or left out; 0 while nothing is known.
+    excluded_by_rule : bool
+        Whether a rule (`non-looping`) left classes out, of whose tethers nothing is known.
+    declared_scope : Scope or None
+        Tours that the graph holds, where its maker knows; None to tell by roadmap and classes.
     grain : float
         Lengths of tours are multiples of it; 0 where they may be anything.
     goal : ndarray of int, shape (V,)
@@ -113,6 +120,8 @@ class TravelGraph(Drawn):
     start: int | None = None
     start_tether: Floats
     bound_in_any_class = 0.0
+    excluded_by_rule = False
+    declared_scope: Scope | None = None
     grain = 0.0
 
     def __init__(
@@ -532,7 +541,8 @@ class TravelGraph(Drawn):
         Returns
         -------
         TravelGraph
-            Its vertex k is vertex ``vertices[k]`` of this one.
+            Its vertex k is vertex ``vertices[k]`` of this one; bounds on its tours are of the scope
+            `PART`.
         """
         chosen = np.asarray(vertices, dtype=np.int64)
         part = TravelGraph(
@@ -543,6 +553,7 @@ class TravelGraph(Drawn):
             self.roadmap,
         )
         part.goal, part.before, part.grain = self.goal[chosen], self.before, self.grain
+        part.declared_scope = Scope.PART
         return part
 
     def unordered(self) -> TravelGraph:
@@ -554,7 +565,7 @@ class TravelGraph(Drawn):
             What no tour of it falls short of, none of this graph does.
         """
         free = self.subgraph(np.arange(len(self)))
-        free.before = UNORDERED
+        free.before, free.declared_scope = UNORDERED, self.scope
         free.least_left_out, free._between = self.least_left_out, self.between_goals
         free._by_parity = self.ways_by_parity if self.knows_ways else None
         return free
@@ -752,8 +763,20 @@ class TravelGraph(Drawn):
         """
         return self._legs.path(u, v)
 
+    @property
+    def scope(self) -> Scope:
+        """Tours that this graph holds: a bound that a solver proves over it is one on those."""
+        if self.declared_scope is not None:
+            return self.declared_scope
+        if self.roadmap == "custom":
+            return Scope.TRAVEL_GRAPH
+        if self.roadmap not in EXACT_ROADMAPS:
+            return Scope.ROADMAP
+        whole = self.complete and not self.excluded_by_rule
+        return Scope.ALL_TOURS if whole else Scope.KEPT_CLASSES
+
     def as_asked(self, result: Result) -> Result:
-        """A solver's result as callers are to see it.
+        """Return a solver's result as callers are to see it.
 
         Parameters
         ----------
@@ -763,10 +786,56 @@ class TravelGraph(Drawn):
         Returns
         -------
         Result
-            The same, with a bound that holds for the classes that were left out, too.
+            The same, with a bound that holds for the classes that were left out, too, unless a rule
+            excluded them.
         """
-        otherwise = max(self.least_by_way_of(self.least_left_out), self.bound_in_any_class)
-        return with_bound(within_kept(result, otherwise), self.bound_in_any_class)
+        trace = tuple(
+            replace(row, bound=self.bound_as_asked(row.bound, anywhere=False))
+            for row in result.trace
+        )
+        result = replace(result, trace=trace)
+        if result.bound is None and (result.tour is None or not self.bound_in_any_class):
+            return result
+        bound = self.bound_as_asked(result.bound, anywhere=result.tour is not None)
+        return result if bound is None else with_bound(result, bound)
+
+    def bound_as_asked(
+        self, bound: LowerBound | None, *, anywhere: bool = True
+    ) -> LowerBound | None:
+        """Return what a bound on the tours of this graph proves of the tours that were asked for.
+
+        Parameters
+        ----------
+        bound : LowerBound or None
+            On the tours of this graph, all or those in the order given.
+        anywhere : bool
+            Use the bound on the tours in any class as well, where it is better.
+
+        Returns
+        -------
+        LowerBound or None
+            On all tours, if the classes left out are known to have long tethers.
+        """
+        own = self.scope if bound is None else bound.scope
+        whole = self._with_classes_left_out(own)
+        if bound is not None and whole is not own:
+            bound = bound.or_elsewhere(
+                self.least_by_way_of(self.least_left_out), whole,
+                "a tour by way of a class left out goes along its tether and back",
+            )  # fmt: skip
+        if not anywhere or not self.bound_in_any_class or own is Scope.PART:
+            return bound
+        everywhere = Scope.TRAVEL_GRAPH if own is Scope.TRAVEL_GRAPH else Scope.ALL_TOURS
+        free = LowerBound(self.bound_in_any_class, everywhere)
+        return strongest(bound, free.for_part(whole, "it holds in any class, in any order"))
+
+    def _with_classes_left_out(self, own: Scope) -> Scope:
+        """Return the scope that a bound of this graph can be one on, the classes left out
+        included."""
+        if self.excluded_by_rule:
+            return own
+        larger = {Scope.KEPT_CLASSES: Scope.ALL_TOURS, Scope.KEPT_IN_ORDER: Scope.GIVEN_ORDER}
+        return larger.get(own, own)
 
     def least_by_way_of(self, tether: float) -> float:
         """No tour by way of a class with so long a tether is shorter: it goes there and back.
@@ -784,7 +853,7 @@ class TravelGraph(Drawn):
         return 2.0 * tether
 
     def progress_listener(self, listener: OnProgress | None) -> OnProgress | None:
-        """A listener to a solver's progress that is told what callers are to see.
+        """Return a listener to a solver's progress that is told what callers are to see.
 
         Parameters
         ----------
@@ -796,7 +865,9 @@ class TravelGraph(Drawn):
         callable or None
             What the solver is to call.
         """
-        return listener
+        if listener is None:
+            return None
+        return lambda row: listener(replace(row, bound=self.bound_as_asked(row.bound)))
 
 
 def least_tethers(tethers: Floats, cluster: Ints, classes: int) -> Ints:

@@ -1,54 +1,61 @@
-"""What is proven of all classes when a roadmap kept only some of them."""
+"""What is proven of all classes when a travel graph holds only some of them."""
 
 from __future__ import annotations
 
 import dataclasses
 
+from netsp.lower_bound import LowerBound, Scope
 from netsp.solution import Status
-from netsp.travel.result import Result, proven
+from netsp.travel.result import Result
 
 
-def within_kept(result: Result, otherwise: float) -> Result:
-    """A result over the classes kept as one about all classes.
-
-    Parameters
-    ----------
-    result : Result
-        Over the classes kept.
-    otherwise : float
-        No tour that uses a class left out is shorter.
-
-    Returns
-    -------
-    Result
-        The same tour, with the bound and the status that hold for all classes.
-    """
-    bound, length = result.lower_bound, result.length
-    if bound is None or otherwise >= bound:
-        return result
-    status = result.status
-    if status is Status.OPTIMAL and length is not None and not proven(length, otherwise):
-        status = Status.OPTIMAL_OF_KEPT
-    return dataclasses.replace(result, lower_bound=otherwise, status=status)
-
-
-def with_bound(result: Result, bound: float) -> Result:
-    """A result with a bound that holds for all classes, if it is better than its own.
+def with_bound(result: Result, bound: LowerBound) -> Result:
+    """Return a result with another bound, and the status that follows from it.
 
     Parameters
     ----------
     result : Result
         Of a solver.
-    bound : float
-        No tour is shorter.
+    bound : LowerBound
+        Bound that is stated instead of the result's own.
 
     Returns
     -------
     Result
-        The same tour; optimal if the bound proves it.
+        The same tour: optimal of the bound's scope if the bound proves it; if only the old bound
+        did, optimal of the old scope.
     """
-    if result.tour is None or result.length is None or bound <= (result.lower_bound or 0.0):
+    if result.length is None:
+        return dataclasses.replace(result, lower_bound=bound.length, lower_bound_of=bound.scope)
+    bound, status = bound.at_most(result.length), result.status
+    if bound.proves(result.length) and (status.is_optimal or status is Status.FEASIBLE):
+        status = Status.optimal_of(bound.scope)
+    elif status is Status.OPTIMAL:
+        status = Status.optimal_of(result.lower_bound_of)
+    return dataclasses.replace(
+        result, status=status, lower_bound=bound.length, lower_bound_of=bound.scope
+    )
+
+
+def with_classes_left_out(result: Result, least: float, scope: Scope, because: str) -> Result:
+    """Return a result over some classes as one about a scope that includes the others.
+
+    Parameters
+    ----------
+    result : Result
+        Over the classes kept.
+    least : float
+        No tour that uses a class left out is shorter.
+    scope : Scope
+        What the classes are together.
+    because : str
+        Reason why no such tour is shorter.
+
+    Returns
+    -------
+    Result
+        The same tour, with the bound and the status that hold for the scope.
+    """
+    if result.bound is None:
         return result
-    bound = min(bound, result.length)
-    status = Status.OPTIMAL if proven(result.length, bound) else result.status
-    return dataclasses.replace(result, lower_bound=bound, status=status)
+    return with_bound(result, result.bound.or_elsewhere(least, scope, because))

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING
 
 from netsp.arrays import ComparesArrays, Floats, Ints
 from netsp.frames import frame_of
 from netsp.hsignature import Word
+from netsp.lower_bound import OPTIMALITY_TOLERANCE, LowerBound, Scope, gap_of
 from netsp.solution import Status
 
 if TYPE_CHECKING:
     import pandas
-
-OPTIMALITY_TOLERANCE = 1e-6
-"""A tour is called optimal when (length - bound) <= this fraction of its length. Bounds are
-computed in floating point from dual values; their rounding is orders of magnitude smaller."""
 
 
 @dataclass(frozen=True)
@@ -31,8 +28,8 @@ class Progress:
         What the solver is doing.
     incumbent : float, optional
         Length of the best tour, in the problem's units; None while there is none.
-    bound : float, optional
-        Proven bound on every tour; None while nothing is known.
+    bound : LowerBound, optional
+        Proven lower bound with the tours that it holds for; None while nothing is known.
     cuts : int
         Cuts in the program.
     legs : int
@@ -52,7 +49,7 @@ class Progress:
     time: float
     stage: str
     incumbent: float | None = None
-    bound: float | None = None
+    bound: LowerBound | None = None
     cuts: int = 0
     legs: int = 0
     vertices: int = 0
@@ -63,15 +60,21 @@ class Progress:
 
     @property
     def gap(self) -> float | None:
-        """(incumbent - bound) / incumbent."""
-        return relative_gap(self.incumbent, self.bound)
+        """(incumbent - bound) / incumbent, of the scope of the bound."""
+        return gap_of(self.incumbent, self.bound)
 
 
 OnProgress = Callable[[Progress], None]
 
 
-def of_part(listener: OnProgress | None, chosen: Ints) -> OnProgress | None:
-    """A listener for a run over a part of a travel graph.
+BoundOfWhole = Callable[[LowerBound | None], LowerBound | None]
+"""What a bound on the tours over a part of a travel graph proves of all of it."""
+
+
+def of_part(
+    listener: OnProgress | None, chosen: Ints, bound_of_whole: BoundOfWhole
+) -> OnProgress | None:
+    """Return a listener for a run over a part of a travel graph.
 
     Parameters
     ----------
@@ -79,18 +82,20 @@ def of_part(listener: OnProgress | None, chosen: Ints) -> OnProgress | None:
         Of the run over all of it.
     chosen : ndarray of int
         The part's vertices in the whole graph.
+    bound_of_whole : callable
+        Turns a bound on the part's tours into one on all tours of the graph; None for none.
 
     Returns
     -------
     callable or None
-        Tells tours by the vertices of the whole graph.
+        Tells tours by the vertices of the whole graph, and bounds that hold for all of it.
     """
     if listener is None:
         return None
 
     def tell(row: Progress) -> None:
         tour = None if row.tour is None else tuple(int(chosen[v]) for v in row.tour)
-        listener(replace(row, tour=tour))
+        listener(replace(row, tour=tour, bound=bound_of_whole(row.bound)))
 
     return tell
 
@@ -131,7 +136,7 @@ class Result:
     length : float, optional
         Length of the closed tour.
     lower_bound : float, optional
-        Proven bound on every tour.
+        Proven lower bound on the tours that `lower_bound_of` names.
     status : Status
         What is proven.
     trace : tuple of Progress
@@ -141,6 +146,8 @@ class Result:
         solver retraces its steps; `length` is then that of the walk.
     trajectory : Trajectory, optional
         Of a blind baseline with status `invalid`; `tour` is then None.
+    lower_bound_of : Scope
+        Tours that the lower bound holds for.
     """
 
     tour: tuple[int, ...] | None
@@ -150,14 +157,23 @@ class Result:
     trace: tuple[Progress, ...] = ()
     walk: tuple[int, ...] | None = None
     trajectory: Trajectory | None = None
+    lower_bound_of: Scope = Scope.TRAVEL_GRAPH
+
+    @property
+    def bound(self) -> LowerBound | None:
+        """The lower bound with the tours that it holds for; None where nothing is known."""
+        if self.lower_bound is None:
+            return None
+        return LowerBound(self.lower_bound, self.lower_bound_of)
 
     @property
     def gap(self) -> float | None:
         """(length - lower_bound) / length; None without a tour or a bound."""
-        return relative_gap(self.length, self.lower_bound)
+        return gap_of(self.length, self.bound)
 
     def to_frame(self) -> pandas.DataFrame:
-        """Return the progress rows as a pandas DataFrame, a column per field of `Progress`.
+        """Return the progress rows as a pandas DataFrame, a column per field of `Progress`; the
+        bound is a number, and ``bound_of`` says which tours it holds for.
 
         Returns
         -------
@@ -169,12 +185,19 @@ class Result:
         InputError
             pandas is not installed.
         """
-        return frame_of(self.trace)
+        return frame_of(
+            {
+                **{f.name: getattr(row, f.name) for f in fields(row)},
+                "bound": None if row.bound is None else row.bound.length,
+                "bound_of": None if row.bound is None else row.bound.scope.value,
+            }
+            for row in self.trace
+        )
 
     def __repr__(self) -> str:
         """In a line."""
         length = "no tour" if self.length is None else f"length {self.length:.6g}"
-        bound = "" if self.lower_bound is None else f", bound {self.lower_bound:.6g}"
+        bound = "" if self.bound is None else f", {self.bound.says(self.length)}"
         visits = "" if self.tour is None else f", tour of {len(self.tour)} vertices"
         return f"<Result: {self.status.value}, {length}{bound}{visits}>"
 

@@ -85,10 +85,7 @@ function say() {
       + `${s.longest_tether.toFixed(2)} of ${page.data.tether_length} m, over the limit for ${s.exceedance_s.toFixed(1)} s`;
   } else if (!tour || tour.version !== page.version) answer.textContent = "solving …";
   else {
-    const above = tour.bound ? 100 * (tour.length / tour.bound - 1) : null;
-    answer.textContent = `${tour.length.toFixed(2)} m` + (tour.status === "optimal" ? ", proven shortest"
-      : above === null ? ", searching" : `, at most ${Math.max(above, 0).toFixed(2)} % above the shortest`)
-      + (tour.stage === "searching" ? " …" : "");
+    answer.textContent = `${tour.length.toFixed(2)} m, ${tour.proof}` + (tour.stage === "searching" ? " …" : "");
   }
   answer.title = answer.textContent;
   const walkable = Boolean(tour?.path?.length) && (page.shown || !(tour.error || page.error));
