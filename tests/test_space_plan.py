@@ -17,15 +17,14 @@ from netsp.online.mission import Mission
 from netsp.online.scene.scene import scene_of
 from netsp.online.surprises import SceneSurprises
 from netsp.space.board import Board
-from netsp.space.bound import LegLengths, _costs, _least, bound_of_all
-from netsp.space.classes import ANY, classes_within
+from netsp.space.bound import bound_of_all
 from netsp.space.judge import verify_mission
 from netsp.space.labels import LENGTHS, STEPS, axes_of, lower_end, nth_axis, staircase
 from netsp.space.legs import Legs, Ways
 from netsp.space.places import Places
 from netsp.space.plan import plan
 from netsp.space.states import Effort, first_states
-from netsp.space.water import Water, along, has_room
+from netsp.space.water import Water, has_room
 
 POSTS = [
     Circle(center=(3.0, 0.4), radius=0.5),
@@ -288,45 +287,6 @@ def free_bar() -> tuple[Water, Places]:
     return Water.of(mission, scene, field), Places.of(mission, field)
 
 
-def test_a_leg_is_bounded_by_the_shortest_of_its_class_and_not_by_a_way_that_hangs():
-    water, _ = free_bar()
-    over = np.array([[-2, 0, -0.5], [-1, 0, 1.5], [1, 0, 1.5], [2, 0, -0.5]], dtype=float)
-    assert along(water.taut(over)) > 4.1  # it hangs on the bar, whose ends are free
-    assert water.number(over) == water.number(over[[0, -1]])
-    assert _least(water, over[1::-1], over[1:]) <= 4.01
-
-
-def ways_of(mission):
-    """All ways of the robot between waypoints."""
-    scene = mission.load_scene()
-    water = Water.of(mission, scene, scene.field())
-    places = Places.of(mission, water.field)
-    ways = Ways(water, places, Effort.of(len(places)))
-    ways.prepare_all(Clock(), lambda _: None)
-    return ways
-
-
-def test_classes_that_legs_lead_to_are_those_that_a_longer_search_finds(posts, monkeypatch):
-    mission = posts[1].model_copy(update={"tether_length": 10.0})
-    ways = ways_of(mission)
-    some = list(range(len(ways.places)))
-    found = {}
-    for most, pulled in ((2, 0), (2, 40_000), (60, 0)):
-        monkeypatch.setattr("netsp.space.classes.MOST_WORDS", most)
-        monkeypatch.setattr("netsp.space.classes.MOST_PULLED", pulled)
-        found[most, pulled] = {
-            (c.point, c.word): c for c in classes_within(ways, some, Clock(60.0))
-            if c.word != ANY
-        }  # fmt: skip
-    searched, gone_on, more = found.values()
-    assert len(searched) < len(gone_on)
-    for key in gone_on.keys() & more.keys():
-        assert along(gone_on[key].line) == pytest.approx(more[key].length, abs=0.02)
-        # what a tether is at least long is never taken to be more than it is
-        assert gone_on[key].length <= more[key].length + 0.02
-    assert gone_on.keys() <= more.keys()
-
-
 BESIDE_A_BAR = {
     "schema_version": 1, "scene": "scene.json", "anchor": [-4, 0, -1], "start": [-4, 0, -1],
     "waypoints": [[2, 0, -1], [2, 0, 2]], "tether_length": 12.0, "clearance": 0.2,
@@ -393,33 +353,3 @@ def test_ways_made_of_tethers_are_ways_of_their_words_and_no_bound_rests_on_them
             made += len(path) > 2
         assert all(len(path) == 2 for _, path in ways.sought(n, m))
     assert made
-
-
-def test_what_is_not_known_of_classes_is_no_more_than_what_is_found_when_more_are_sought(
-    posts, monkeypatch
-):
-    mission = posts[1].model_copy(update={"tether_length": 12.0})
-    ways = ways_of(mission)
-    some = list(range(len(ways.places)))
-    few, many = [], []
-    for most, pulled, classes in ((4, 0, few), (12, 0, many)):
-        monkeypatch.setattr("netsp.space.classes.MOST_WORDS", most)
-        monkeypatch.setattr("netsp.space.classes.MOST_PULLED", pulled)
-        classes += classes_within(ways, some, Clock(60.0))
-    known = LegLengths(ways)
-    least = _costs(known, few)[0]
-    for n, m in itertools.combinations(some, 2):
-        known.go_on(n, m)
-    assert (_costs(known, few)[0] >= least - 1e-9).all()
-    least, exact = _costs(known, few)[0], _costs(known, many)[0]
-    number = {(c.point, c.word): k for k, c in enumerate(few, 1)}
-    unknown = 0
-    of = []
-    for c in many:
-        at = number.get((c.point, c.word))
-        unknown += at is None
-        of.append(number.get((c.point, ANY)) if at is None else at)
-    assert unknown
-    for (a, i), (b, j) in itertools.combinations(zip([0, *of], range(len(of) + 1), strict=True), 2):
-        if a is not None and b is not None:
-            assert least[a, b] <= exact[i, j] + 1e-6

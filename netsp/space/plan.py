@@ -245,7 +245,7 @@ def _planned(
     mission = mission.checked_waypoints(field)
     places = Places.of(mission, field)
     tell("words of the scene")
-    water = Water.within(mission, field, grid)
+    water = Water.within(mission, field, grid, None if scene is None else scene.bounds)
     # a robot that is farther out than the share may still come back
     limit = max(SHARE * mission.tether_length, water.present.length * (1.0 + ROUNDING))
     check_tether(mission, water.present.length)

@@ -59,6 +59,9 @@ class Water:
         Its classes of paths, in the tether's water.
     model : GeodesicTether
         The tether.
+    bounds : tuple of float, optional
+        The scene's (xmin, ymin, zmin, xmax, ymax, zmax), metres; None where it has none, or where
+        the scene was not at hand.
     """
 
     mission: Mission
@@ -66,6 +69,7 @@ class Water:
     grid: Grid
     words: SpaceSignature
     model: GeodesicTether
+    bounds: tuple[float, ...] | None = None
 
     @classmethod
     def of(cls, mission: Mission, scene: Scene, field: DistanceField) -> Water:
@@ -90,10 +94,13 @@ class Water:
         InputError
             As of `netsp.space.signature.SpaceSignature.of`.
         """
-        return cls.within(mission, field, grid_of(mission, scene, field))
+        return cls.within(mission, field, grid_of(mission, scene, field), scene.bounds)
 
     @classmethod
-    def within(cls, mission: Mission, field: DistanceField, grid: Grid) -> Water:
+    def within(
+        cls, mission: Mission, field: DistanceField, grid: Grid,
+        bounds: tuple[float, ...] | None = None,
+    ) -> Water:  # fmt: skip
         """The same where a grid is at hand.
 
         Parameters
@@ -104,6 +111,8 @@ class Water:
             Its scene's field.
         grid : Grid
             The box and the size of cells.
+        bounds : tuple of float, optional
+            The scene's, where they are known, metres.
 
         Returns
         -------
@@ -119,7 +128,7 @@ class Water:
         words = SpaceSignature.of(
             field, grid.low, high, grid.cell, mission.anchor, tolerance=DIP * mission.delta
         )
-        return cls(mission, field, grid, words, GeodesicTether(field, mission.delta))
+        return cls(mission, field, grid, words, GeodesicTether(field, mission.delta), bounds)
 
     @cached_property
     def laid(self) -> Tether:
