@@ -15,12 +15,13 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
-from netsp.errors import LimitReachedError
+from netsp.errors import InputError, LimitReachedError
 
 Flag = npt.NDArray[np.int64]
 T = TypeVar("T")
@@ -30,6 +31,27 @@ ASKED = 0.02
 
 NEVER: Flag = np.zeros(1, dtype=np.int64)
 """The flag of a clock without a limit."""
+
+
+@dataclass(frozen=True)
+class TimingPolicy:
+    """How clocks are heard.
+
+    Parameters
+    ----------
+    untimed_steps : int
+        Work of at most so many steps of a compiled innermost loop is done whatever the time. The
+        default takes a few tenths of a second; less leaves more problems without any tour when the
+        limit is short, more makes runs end later.
+    """
+
+    untimed_steps: int = 300_000_000
+
+    def __post_init__(self) -> None:
+        if self.untimed_steps < 0:
+            raise InputError(
+                f"untimed_steps: expected a number that is not negative, got {self.untimed_steps}"
+            )
 
 
 class Clock:
@@ -45,6 +67,8 @@ class Clock:
         Asked every `ASKED` seconds, in a thread of its own: once it says so, the time is up for
         this clock and all within it. `close` ends that.
     """
+
+    policy = TimingPolicy()
 
     def __init__(
         self, limit: float | None = None, *, within: Clock | None = None,
@@ -136,6 +160,32 @@ class Clock:
                 f"{'stopped' if self.stopped else 'time limit reached'} while {doing}"
             )
 
+    def finish(self, doing: str, steps: float, call: Callable[[Flag], T]) -> T:
+        """Make a call that hears a flag, as `interruptible` does, and return what it returns.
+        Little work is done whatever the time (`TimingPolicy`).
+
+        Parameters
+        ----------
+        doing : str
+            What is being done, for the message.
+        steps : float
+            Most steps of the innermost loop.
+        call : callable
+            The work, given the flag; it returns anything when the flag is set.
+
+        Raises
+        ------
+        LimitReachedError
+            The time was up before or meanwhile, so what was returned is incomplete.
+        """
+        if steps <= self.policy.untimed_steps:
+            return call(NEVER)
+        self.check(doing)
+        flag = self.flag
+        out = self.interruptible(lambda: call(flag))
+        self.check(doing)
+        return out
+
     def interruptible(self, call: Callable[[], T]) -> T:
         """Make a call that hears the flag, in a thread, so that Ctrl-C ends it at once."""
         outcome: list[T] = []
@@ -175,8 +225,9 @@ TimeLimit = float | Clock | None
 @contextmanager
 def until_interrupt(limit: TimeLimit) -> Iterator[Clock]:
     """A clock whose time is up at Ctrl-C, too, so that many stages of work end one after another
-    with what they have; pressed again, it interrupts as ever. In threads, and where somebody else
-    hears the signal, Ctrl-C does what it did.
+    with what they have; pressed again, it interrupts as ever. SIGTERM does the same where it
+    interrupts (`netsp.command.interrupts`). In threads, and where somebody else hears the signal,
+    it does what it did.
 
     Parameters
     ----------
@@ -188,48 +239,33 @@ def until_interrupt(limit: TimeLimit) -> Iterator[Clock]:
     Clock
         The clock.
     """
-    if not _interruptible() or (isinstance(limit, Clock) and limit.stoppable):
+    if not _interrupts() or (isinstance(limit, Clock) and limit.stoppable):
         yield Clock.of(limit)
         return
-    before = signal.getsignal(signal.SIGINT)
     pressed = threading.Event()
     within, seconds = (limit, None) if isinstance(limit, Clock) else (None, limit)
     clock = Clock(seconds, within=within, should_stop=pressed.is_set)
 
-    def press(*_: Any) -> None:
+    def press() -> None:
         pressed.set()
         if clock._stop is not None:
             clock._stop.now = True  # also where the work ends before the thread asks again
-        signal.signal(signal.SIGINT, before)
 
-    signal.signal(signal.SIGINT, press)
-    try:
-        yield clock
-    finally:
-        signal.signal(signal.SIGINT, before)
-        clock.close()
+    with _on_interrupt(press, once=True):
+        try:
+            yield clock
+        finally:
+            clock.close()
 
 
 @contextmanager
 def whole_or_interrupted() -> Iterator[None]:
     """Work that is not broken off in the middle: Ctrl-C interrupts at its end. Compiled code that
     hands over tuples calls Python for it, and an interrupt just then is more than it can take."""
-    if not _interruptible():
+    pressed = threading.Event()
+    with _on_interrupt(pressed.set):
         yield
-        return
-    before = signal.getsignal(signal.SIGINT)
-    pressed = False
-
-    def press(*_: Any) -> None:
-        nonlocal pressed
-        pressed = True
-
-    signal.signal(signal.SIGINT, press)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
-    if pressed:
+    if pressed.is_set():
         raise KeyboardInterrupt
 
 
@@ -244,10 +280,8 @@ def interrupts_remembered() -> Iterator[Callable[[], None]]:
         Raises KeyboardInterrupt if Ctrl-C was pressed; so does the end of the work.
     """
     pressed = threading.Event()
-    before = signal.getsignal(signal.SIGINT)
-    hears = threading.current_thread() is threading.main_thread() and callable(before)
 
-    def press(*_: Any) -> None:
+    def press() -> None:
         pressed.set()
         raise KeyboardInterrupt
 
@@ -255,22 +289,62 @@ def interrupts_remembered() -> Iterator[Callable[[], None]]:
         if pressed.is_set():
             raise KeyboardInterrupt
 
-    if hears:
-        signal.signal(signal.SIGINT, press)
-    try:
+    with _on_interrupt(press, callable):
         yield check
-    finally:
-        if hears:
-            signal.signal(signal.SIGINT, before)
     check()
 
 
-def _interruptible() -> bool:
-    """Whether Ctrl-C raises KeyboardInterrupt here."""
-    return (
-        threading.current_thread() is threading.main_thread()
-        and signal.getsignal(signal.SIGINT) is signal.default_int_handler
-    )
+INTERRUPTS = (signal.SIGINT, signal.SIGTERM)
+"""Signals that ask a command for its end. Python raises KeyboardInterrupt at the first; at the
+second it does so where `netsp.command.interrupts` had it."""
+
+
+def _is_default(handler: object) -> bool:
+    """Return whether a handler raises KeyboardInterrupt and does nothing else."""
+    return handler is signal.default_int_handler
+
+
+def _interrupts(hears: Callable[[object], bool] = _is_default) -> dict[signal.Signals, Any]:
+    """Return the handlers of those `INTERRUPTS` whose handler is one that `hears` accepts; none in
+    threads, where no handler can be set."""
+    if threading.current_thread() is not threading.main_thread():
+        return {}
+    handlers = {number: signal.getsignal(number) for number in INTERRUPTS}
+    return {number: handler for number, handler in handlers.items() if hears(handler)}
+
+
+@contextmanager
+def _on_interrupt(
+    press: Callable[[], None], hears: Callable[[object], bool] = _is_default, *, once: bool = False
+) -> Iterator[None]:
+    """Call a function at Ctrl-C and SIGTERM instead of their handlers.
+
+    Parameters
+    ----------
+    press : callable
+        What is called.
+    hears : callable
+        Whether a handler is one to be replaced.
+    once : bool
+        Whether the second signal does what it did before.
+    """
+    before = _interrupts(hears)
+
+    def restore() -> None:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+    def handle(*_: Any) -> None:
+        if once:
+            restore()
+        press()
+
+    for number in before:
+        signal.signal(number, handle)
+    try:
+        yield
+    finally:
+        restore()
 
 
 class _Stop:

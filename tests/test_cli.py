@@ -148,7 +148,8 @@ def test_plot_draws_problem_and_solution(tmp_path):
     assert main(["plot", str(PROBLEMS / "known" / "square.json"), str(out), "-o", str(svg)]) == 2
 
 
-def test_ctrl_c_leaves_a_verified_solution(tmp_path):
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_ctrl_c_and_sigterm_leave_a_verified_solution_and_no_process(number, tmp_path):
     """A large problem is interrupted; its tour so far is written and judged."""
     from tests.worlds import random_world
 
@@ -158,8 +159,10 @@ def test_ctrl_c_leaves_a_verified_solution(tmp_path):
     command = [sys.executable, "-m", "netsp", "solve", str(problem), "-o", str(out)]
 
     def heard() -> None:
-        """A shell that puts the tests in the background has them ignore Ctrl-C."""
-        signal.signal(signal.SIGINT, signal.default_int_handler)
+        """Have the process hear Ctrl-C, or ignore it as one in the background does, which SIGTERM
+        ends all the same."""
+        handler = signal.default_int_handler if number == signal.SIGINT else signal.SIG_IGN
+        signal.signal(signal.SIGINT, handler)
 
     with subprocess.Popen(
         [*command, "--mip-backend", "cbc"], stderr=subprocess.PIPE, text=True, cwd=ROOT,
@@ -169,14 +172,27 @@ def test_ctrl_c_leaves_a_verified_solution(tmp_path):
             if " root " in line or " core " in line:  # with many classes the core comes first
                 break
         time.sleep(0.5)
-        process.send_signal(signal.SIGINT)
+        children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
+        begun = children.read_text().split() if children.exists() else []
+        process.send_signal(number)
         process.stderr.read()
         process.wait(timeout=60)
     assert process.returncode == 0
+    assert not any(Path(f"/proc/{child}").exists() for child in begun)
     solution = json.loads(out.read_text())
     assert solution["status"] == "feasible"
     assert 0 < solution["gap"] < 1
     assert main(["verify", str(problem), str(out), "--quiet"]) == 0
+
+
+def test_sigterm_before_any_result_ends_as_ctrl_c_does(monkeypatch, capsys):
+    before = signal.getsignal(signal.SIGTERM)
+    monkeypatch.setattr(
+        "netsp.command.plot.run", lambda _: signal.raise_signal(signal.SIGTERM) or time.sleep(9.0)
+    )
+    assert main(["plot", "problems/known/square.json", "-o", "x.png"]) == 130
+    assert "interrupted" in capsys.readouterr().err
+    assert signal.getsignal(signal.SIGTERM) is before
 
 
 LOST_IN = {

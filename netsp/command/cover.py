@@ -86,12 +86,14 @@ def run(args: argparse.Namespace) -> int:
     camera = _camera(args.camera, args.patch)
     anchor = vector(args.anchor, "--anchor")
     start = None if args.start is None else vector(args.start, "--start")
+    from netsp.clock import Clock
     from netsp.command.compiling import compile_messages
     from netsp.command.stages import Stages
     from netsp.cover import cover
     from netsp.files import write_text
     from netsp.online.scene.scene import Scene
 
+    clock = Clock(args.time_limit)  # reading the scene counts
     scene = Scene.load(args.scene)
     stages = None if args.quiet else Stages(sys.stderr, args.time_limit)
     compiling = contextlib.nullcontext() if args.quiet else compile_messages(sys.stderr)
@@ -101,7 +103,7 @@ def run(args: argparse.Namespace) -> int:
             tether_length=args.tether, clearance=args.clearance, share=args.share,
             incidence=args.incidence, farthest=args.farthest,
             inspect=tuple(args.inspect) if args.inspect else None,
-            time_limit=args.time_limit, seed=args.seed, on_progress=stages,
+            time_limit=clock, seed=args.seed, on_progress=stages,
         )  # fmt: skip
     placed = args.scene
     if args.output is not None:

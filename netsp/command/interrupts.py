@@ -1,4 +1,4 @@
-"""Ctrl-C is heard wherever it comes.
+"""Ctrl-C is heard wherever it comes, and SIGTERM does what Ctrl-C does.
 
 What is raised where nobody can catch it (finalizers, callbacks of weak references, hooks of a fork)
 Python reports and forgets, KeyboardInterrupt too: the work would go on as if nobody had asked.
@@ -22,8 +22,15 @@ AGAIN = 0.05
 
 @contextmanager
 def interrupts_are_heard() -> Iterator[None]:
-    """An interrupt that was raised where nobody can catch it comes again a moment later."""
+    """Have SIGTERM raise KeyboardInterrupt, as Ctrl-C does, and an interrupt that was raised where
+    nobody can catch it come again a moment later."""
     before = sys.unraisablehook
+    hears_sigterm = (
+        threading.current_thread() is threading.main_thread()
+        and signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+    )
+    if hears_sigterm:
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
 
     def hook(unraisable: Any) -> None:
         if unraisable.exc_value is None or not interrupted(unraisable.exc_value):
@@ -38,12 +45,16 @@ def interrupts_are_heard() -> Iterator[None]:
         yield
     finally:
         sys.unraisablehook = before
+        if hears_sigterm:
+            signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
 
 def _interrupt() -> None:
-    """Ctrl-C for the main thread, which also wakes it up where there are real signals."""
+    """Interrupt the main thread, which also wakes it up where there are real signals. What a shell
+    starts in the background ignores SIGINT; the interrupt that was lost was SIGTERM then."""
     main = threading.main_thread().ident
     if hasattr(signal, "pthread_kill") and main is not None:
-        signal.pthread_kill(main, signal.SIGINT)
+        is_ignored = signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+        signal.pthread_kill(main, signal.SIGTERM if is_ignored else signal.SIGINT)
     else:
         _thread.interrupt_main()

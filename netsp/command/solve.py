@@ -64,7 +64,8 @@ def for_all(p: argparse.ArgumentParser) -> None:
         "--time-limit",
         type=seconds,
         metavar="S",
-        help="seconds for roadmap, legs and solver together; default no limit, for missions 60",
+        help="seconds for reading, roadmap, legs and solver together; default no limit, for "
+        "missions 60",
     )
     p.add_argument(
         "--iteration-limit",
@@ -159,6 +160,11 @@ def run(args: argparse.Namespace) -> int:
     from netsp.solution import Solution
 
     told.check_stdout(args)
+    from netsp.clock import Clock
+    from netsp.solvers import warm as warm_starts
+    from netsp.solvers.solve import solve
+
+    clock = Clock(args.time_limit)  # reading and checking the files counts
     problem = Problem.load(args.problem)
     warm = Solution.load(args.warm_start) if args.warm_start else None
     check_writable(args.output, args.plot, args.plot_trace, inputs=(args.problem, args.warm_start))
@@ -168,9 +174,6 @@ def run(args: argparse.Namespace) -> int:
 
         for picture in filter(None, (args.plot, args.plot_trace)):
             style.check_format(picture)
-    from netsp.solvers import warm as warm_starts
-    from netsp.solvers.solve import solve
-
     if warm is not None and (text := warm_starts.told(problem, warm)):
         messages.note(text)
 
@@ -198,7 +201,7 @@ def run(args: argparse.Namespace) -> int:
                 args.solver,
                 roadmap=args.roadmap,
                 roadmap_options=roadmap_options(args),
-                time_limit=args.time_limit,
+                time_limit=clock,
                 iteration_limit=args.iteration_limit,
                 seed=args.seed,
                 params=_params(args),

@@ -70,13 +70,15 @@ def solve(
         from netsp.pictures import style
 
         style.check_format(plot)
-    mission = Mission.load(file)
+    from netsp.clock import Clock
     from netsp.command.compiling import compile_messages
     from netsp.command.stages import Stages
     from netsp.space.solve import solve_mission
 
-    stages = None if quiet else Stages(sys.stderr, time_limit or TIME_LIMIT)
+    clock = Clock(time_limit or TIME_LIMIT)  # reading the mission and its scene counts
     begin = time.monotonic()
+    mission = Mission.load(file)
+    stages = None if quiet else Stages(sys.stderr, time_limit or TIME_LIMIT)
     compiling = contextlib.nullcontext() if quiet else compile_messages(sys.stderr)
     with stages or contextlib.nullcontext(), compiling:
         scene = mission.load_scene()
@@ -91,7 +93,7 @@ def solve(
             )
         found = solve_mission(
             mission, scene=scene, field=field, solver=solver, params=params,
-            time_limit=time_limit or TIME_LIMIT, iteration_limit=iteration_limit, seed=seed,
+            time_limit=clock, iteration_limit=iteration_limit, seed=seed,
             on_progress=stages,
         )  # fmt: skip
     placed = Mission.from_json(read_text(file)).scene

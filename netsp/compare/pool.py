@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from typing import Any
 
+from netsp.clock import INTERRUPTS
 from netsp.compare.rows import LOST, TrialRow
 from netsp.compare.study import Trial
 from netsp.errors import PluginError
@@ -112,7 +113,8 @@ def _work(pipe: Connection) -> None:
     """The worker's loop."""
     from netsp.compare.trial import run
 
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to handle
+    for number in INTERRUPTS:  # the parent's to handle: it kills its workers
+        signal.signal(number, signal.SIG_IGN)
     limited = False
     while True:
         try:

@@ -143,7 +143,9 @@ def repair(
         legs = [_home(problem, state, FAR * max(problem.tether_length, polylines.length(tether)))]
         return Repair("home", why, legs, tuple(left_out), legs[0].length, clock.elapsed)
     rest = _rest(problem, order, state)
-    graph = graph_from_state(rest, max_classes=MOST_CLASSES, time_limit=clock)
+    graph = graph_from_state(
+        rest, max_classes=MOST_CLASSES, time_limit=clock, limits_paths=False
+    )  # fmt: skip
     with graph.within.on_clock(clock):
         local = _keeping_order(graph, len(order))
     assert local.length is not None

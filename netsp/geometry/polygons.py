@@ -49,11 +49,24 @@ def counterclockwise(vertices: npt.ArrayLike) -> npt.NDArray[np.float64]:
         flat = np.abs(cross) <= 1e-12 * np.hypot(*a.T) * np.hypot(*b.T)
         if not flat.any():
             break
-        v = np.delete(v, int(np.argmax(flat)), axis=0)
+        v = v[~_every_other(flat)]
     x, y = v.T
     if np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y) < 0:
         v = v[::-1].copy()
     return v
+
+
+def _every_other(flat: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+    """Choose flat corners of a ring to leave out together: of neighbours every other one, because
+    whether a corner is flat depends on its neighbours; at least one, and at most all but three."""
+    k = len(flat)
+    number = np.arange(k)
+    last_other = np.maximum.accumulate(np.where(flat, -1, number))
+    out = flat & ((number - last_other) % 2 == 1)
+    if flat[0] and flat[-1]:
+        out[-1] = False
+    out[np.flatnonzero(out)[k - 3 :]] = False
+    return np.asarray(out)
 
 
 def polygon_signed_distance(vertices: Vertices, xy: npt.ArrayLike) -> npt.NDArray[np.float64]:

@@ -74,6 +74,7 @@ def find_classes(paths: TautPaths, rule: int, most: int, clock: Clock) -> Classe
 class _Search:
     def __init__(self, paths: TautPaths, rule: int, most: int, clock: Clock) -> None:
         self.paths, self.rule, self.most, self.clock = paths, rule, most, clock
+        self.whole = clock
         self.problem = paths.problem
         points = self.problem.points
         self.goals = len(points) - 1
@@ -102,7 +103,7 @@ class _Search:
             return None
         missing = sorted(set(range(1, self.goals + 1)) - {g for g, _ in best})
         if missing:
-            raise unreached(self.problem, self.paths.outline, missing)
+            raise unreached(self.problem, self.paths.outline, missing, self.whole)
         rows = sorted((g, length, trie.word(w)) for (g, w), length in best.items())
         return _together(rows, math.inf)
 
@@ -114,7 +115,7 @@ class _Search:
         planar, before = contacts.tree(0)
         missing = [g for g in range(1, self.goals + 1) if planar[g] > self.within[g]]
         if missing:
-            raise unreached(self.problem, self.paths.outline, missing)
+            raise unreached(self.problem, self.paths.outline, missing, self.whole)
         rays = self.problem.representative_points - self.paths.outline.origin
         rows: list[tuple[int, float, Word]] = []
         left_out = math.inf

@@ -16,7 +16,7 @@ import numpy as np
 import shapely
 
 from netsp.arrays import Floats, Ints
-from netsp.clock import NEVER, Flag
+from netsp.clock import Clock
 from netsp.compiled.kernel import kernel
 from netsp.hsignature import signature
 from netsp.problem import Problem
@@ -34,24 +34,26 @@ OFF = 0.05
 
 def taut_detours(
     problem: Problem, with_sub_goals: bool, check: Callable[[], None] = lambda: None,
-    stop: Flag = NEVER,
+    clock: Clock | None = None,
 ) -> Detours:  # fmt: skip
     """The detours over tangents and arcs: exact shortest paths.
 
     Parameters
     ----------
     check
-        May raise to stop; and it does when the flag is set.
+        May raise to stop.
+    clock
+        The clock of the run; LimitReachedError when it is up.
     """
     places, side = sub_goals(problem, with_sub_goals)
     check()
-    outline = build_outline(problem)
+    outline = build_outline(problem, clock)
     outline = replace(
         outline,
         points=np.vstack([outline.points, places]),
         places=np.vstack([outline.places, places]),
     )
-    tangents = build_tangents(outline, np.inf, stop)
+    tangents = build_tangents(outline, np.inf, clock)
     check()
     graph = ContactGraph(outline, tangents)
     check()

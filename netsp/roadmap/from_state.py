@@ -253,9 +253,9 @@ class _OpenedLegs:
 
 def graph_from_state(
     problem: Problem, *, classes: str = "all", max_classes: int = MAX_CLASSES,
-    time_limit: TimeLimit = None,
+    time_limit: TimeLimit = None, limits_paths: bool = True,
 ) -> GraphFromState:  # fmt: skip
-    """The travel graph of a problem with a state; options as of `TautRoadmap`.
+    """Return the travel graph of a problem with a state; options as of `TautRoadmap`.
 
     Raises
     ------
@@ -263,6 +263,8 @@ def graph_from_state(
         A goal that no tether within the limit reaches.
     InputError
         No taut tether to the state has its word, or what `TautRoadmap` raises.
+    LimitReachedError
+        As of `TautRoadmap`.
     """
     state = problem.state
     assert state is not None
@@ -274,7 +276,8 @@ def graph_from_state(
     word = reduce(state.signature)
     # a tether that is out may be far longer than a limit that was lowered since
     around = max([np.hypot(*(np.array(state.position[:2]) - plain.base[:2])), plain.scale])
-    far = TautPaths(placed, FAR * max(limit, float(around)))
+    within = clock if limits_paths else None
+    far = TautPaths(placed, FAR * max(limit, float(around)), within)
     try:
         planar = far.planar_length(0, last, word)
     except NetspError:
@@ -283,12 +286,15 @@ def graph_from_state(
         ) from None
     start_tether = far.path(0, last, word)
     # the goals' classes as ever; the state's own may be one that no tour would choose
-    roadmap = TautRoadmap(plain, classes=classes, max_classes=max_classes, time_limit=clock)
+    roadmap = TautRoadmap(
+        plain, classes=classes, max_classes=max_classes, time_limit=clock,
+        limits_paths=limits_paths,
+    )  # fmt: skip
     cluster = np.append(roadmap.cluster, last)
     words = [*roadmap.signatures, word]
     lengths = np.append(roadmap.planar, planar)
     legs = TautLegs(
-        TautPaths(placed, limit + max(limit, planar)), cluster, words, lengths
+        TautPaths(placed, limit + max(limit, planar), within), cluster, words, lengths
     )  # fmt: skip
     part = TravelGraph(
         cluster, words, legs.to_base(), legs, roadmap="taut",

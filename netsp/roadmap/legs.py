@@ -161,13 +161,15 @@ class TautLegs:
             if i >= len(vertices) or stop[0]:
                 return
             u, v = branches.order[sorted((i, j))].tolist()
-            length, path = self._searched(int(vertices[u]), int(vertices[v]))
+            length, path = self._searched(int(vertices[u]), int(vertices[v]), stop)
             spread(u, v, length, len(path.whole) - 1, path.whole, path.real, branches, lengths)
 
-    def _searched(self, u: int, v: int) -> tuple[float, Path]:
-        """Planar length and path of a leg that could not be pulled."""
+    def _searched(self, u: int, v: int, stop: Flag) -> tuple[float, Path]:
+        """Search for a leg that could not be pulled, and return its planar length and its path;
+        LimitReachedError when the flag is set before it is found."""
         a, b = int(self.cluster[u]), int(self.cluster[v])
-        length, pieces = self.paths.pieces(a, b, self.relative_word(u, v), self._longest(u, v))
+        word, longest = self.relative_word(u, v), self._longest(u, v)
+        length, pieces = self.paths.pieces(a, b, word, longest, stop)
         return length, path_along(a, pieces, self.paths.tangents.target, self.paths.arcs)
 
     def _grown(self, stop: Flag) -> TetherTree:
@@ -183,7 +185,7 @@ class TautLegs:
         for v in missing:
             if stop[0]:
                 break
-            path = known[v] if v in known else self._searched(0, v)[1]
+            path = known[v] if v in known else self._searched(0, v, stop)[1]
             growing.add(v, path, paths.arcs)
         tree = growing.tree()
         if not stop[0]:

@@ -20,7 +20,8 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from netsp.arrays import Floats
+from netsp.arrays import Floats, Ints
+from netsp.clock import Clock
 from netsp.compiled.growing import more_rows, sort_in_place
 from netsp.compiled.kernel import kernel
 from netsp.compiled.tiers import choose
@@ -38,6 +39,9 @@ from netsp.problem import Circle, Problem
 
 MARGIN = 1e-10
 EPSILON = 1e-12
+OUTLINING = "outlining the obstacles"
+"""Work that a clock may end, as its message calls it."""
+
 STAND_OFF = 1e-8
 """How far from a grown boundary a point is kept, as a fraction of the size: far enough that its
 tangents are well conditioned even at the tiny arcs of a polygon without clearance, near enough that
@@ -94,8 +98,21 @@ class Outline:
     margin: float
 
 
-def build_outline(problem: Problem) -> Outline:
-    """The outline of a problem's free space in the plane."""
+def build_outline(problem: Problem, clock: Clock | None = None) -> Outline:
+    """Return the outline of a problem's free space in the plane.
+
+    Parameters
+    ----------
+    problem : Problem
+        Its obstacles, clearance and bounds, and the points of base and goals.
+    clock : Clock, optional
+        The clock of the run.
+
+    Raises
+    ------
+    LimitReachedError
+        The time was up before the outline was complete.
+    """
     scale = problem.scale
     margin, eps = MARGIN * scale, EPSILON * scale
     origin = np.array(problem.base[:2])
@@ -103,7 +120,11 @@ def build_outline(problem: Problem) -> Outline:
     bounds = np.array(problem.bounds if problem.bounds else (-np.inf, -np.inf, np.inf, np.inf))
     bounds = bounds - np.tile(origin, 2)
     parts = len(blockers.box) + len(blockers.edges)
-    rows = choose(_visible_arcs, 4 * len(disks) * parts)(disks, blockers, bounds)
+    steps = 4 * len(disks) * parts
+    find_arcs = choose(_visible_arcs, steps)
+    rows = (clock or Clock()).finish(
+        OUTLINING, steps, lambda stop: find_arcs(disks, blockers, bounds, stop)
+    )
     places = problem.points[:, :2] - origin
     points = np.array([pushed_out(p, blockers, STAND_OFF * scale) for p in places])
     rays = problem.representative_points - origin
@@ -208,8 +229,9 @@ def _covered(x: float, y: float, blockers: Blockers, bounds: Floats) -> bool:
 
 
 @kernel
-def _visible_arcs(disks: Floats, blockers: Blockers, bounds: Floats) -> Floats:
-    """The parts of each disk's cone that no other obstacle covers and that lie within bounds."""
+def _visible_arcs(disks: Floats, blockers: Blockers, bounds: Floats, stop: Ints) -> Floats:
+    """Return the parts of each disk's cone that no other obstacle covers and that lie within
+    bounds; some are missing when the flag of a clock is set."""
     circles, edges, edge_start = blockers.circles, blockers.edges, blockers.edge_start
     grow, box, eps = blockers.grow, blockers.box, blockers.eps
     arcs = np.empty((16, 6))  # the sixth column tells a whole circle
@@ -219,6 +241,8 @@ def _visible_arcs(disks: Floats, blockers: Blockers, bounds: Floats) -> Floats:
     cuts = np.empty(room)
     inside = np.empty(room + 2)
     for k in range(len(disks)):
+        if stop[0] != 0:
+            break
         cx, cy, r = disks[k, 0], disks[k, 1], disks[k, 2]
         start, end = disks[k, 3], disks[k, 4]
         n = zero

@@ -9,8 +9,8 @@ from functools import cached_property
 import numpy as np
 
 from netsp.arrays import Floats, Ints
-from netsp.clock import Flag
-from netsp.errors import InputError, NetspError
+from netsp.clock import NEVER, Clock, Flag
+from netsp.errors import InputError, LimitReachedError, NetspError
 from netsp.hsignature import Word
 from netsp.problem import Problem
 from netsp.roadmap.arcs import Arcs, arcs_of
@@ -38,13 +38,22 @@ class TautPaths:
     longest
         Limit on their planar length; by default that of a leg between two admissible classes, and
         then only what the tether can touch is looked at.
+    clock
+        The clock of the run; without one, nothing here ends before it is done.
+
+    Raises
+    ------
+    LimitReachedError
+        The clock was up before outline and tangents were complete.
     """
 
-    def __init__(self, problem: Problem, longest: float | None = None) -> None:
+    def __init__(
+        self, problem: Problem, longest: float | None = None, clock: Clock | None = None
+    ) -> None:
         self.problem = problem
-        self.outline: Outline = build_outline(problem)
+        self.outline: Outline = build_outline(problem, clock)
         reach = problem.tether_length if longest is None else longest
-        self.tangents: TangentGraph = build_tangents(self.outline, reach)
+        self.tangents: TangentGraph = build_tangents(self.outline, reach, clock)
         self._longest = 2.0 * problem.tether_length if longest is None else longest
         # what rounding and the extra growth of obstacles can add to a length
         self.margin = 100.0 * self.outline.margin
@@ -186,7 +195,7 @@ class TautPaths:
         )
 
     def pieces(
-        self, a: int, b: int, word: Word, longest: float | None = None
+        self, a: int, b: int, word: Word, longest: float | None = None, stop: Flag = NEVER
     ) -> tuple[float, list[tuple[int, float]]]:
         """Length in the plan, and (departure, angle slid before it) along the taut path of a word
         from point a to point b.
@@ -195,24 +204,26 @@ class TautPaths:
         ----------
         longest
             That it is known not to exceed.
+        stop
+            Flag of a clock; LimitReachedError when it is set before the path is found.
         """
         key = (a, b, tuple(word))
         if key not in self._known:
             if len(self._known) >= MOST_KNOWN:
                 self._known.clear()
-            self._known[key] = self._search(a, b, word, longest)
+            self._known[key] = self._search(a, b, word, longest, stop)
         return self._known[key]
 
     def _search(
-        self, a: int, b: int, word: Word, longest: float | None
+        self, a: int, b: int, word: Word, longest: float | None, stop: Flag
     ) -> tuple[float, list[tuple[int, float]]]:
-        found = self._sought(a, b, word, longest)
+        found = self._sought(a, b, word, longest, stop)
         if found is None:
             raise NetspError(f"internal: no taut path of word {word} from {a} to {b}")
         return found
 
     def _sought(
-        self, a: int, b: int, word: Word, longest: float | None
+        self, a: int, b: int, word: Word, longest: float | None, stop: Flag = NEVER
     ) -> tuple[float, list[tuple[int, float]]] | None:
         """Length and pieces; None if there is no path so short."""
         if not self._knows(word):
@@ -220,10 +231,10 @@ class TautPaths:
         length, edges, slid = self._pulled(a, b, word)
         if length >= 0.0:
             return length, list(zip(edges.tolist(), slid.tolist(), strict=True))
-        return self._searched(a, b, word, longest)
+        return self._searched(a, b, word, longest, stop)
 
     def _searched(
-        self, a: int, b: int, word: Word, longest: float | None = None
+        self, a: int, b: int, word: Word, longest: float | None = None, stop: Flag = NEVER
     ) -> tuple[float, list[tuple[int, float]]] | None:
         """As `_sought`, by a search."""
         most = (self._longest if longest is None else longest) + self.margin
@@ -232,11 +243,15 @@ class TautPaths:
         limit, step = min(FIRST * apart + self.margin, most), FIRST
         while True:
             trie = Trie.of_word(word, limit)
-            found = run_explore(self.tangents, a, trie, keep=True, margin=self.outline.margin)
+            found = run_explore(
+                self.tangents, a, trie, keep=True, margin=self.outline.margin, stop=stop
+            )
             wanted = np.flatnonzero((found.goal == b) & (found.word == len(word)))
             if len(wanted):
                 best = int(wanted[np.argmin(found.length[wanted])])
                 return float(found.length[best]), found.pieces(best)
+            if stop[0]:
+                raise LimitReachedError(f"time limit reached while pulling a leg of word {word}")
             if limit >= most:
                 return None
             step = min(step**2, DEEPEST)

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from netsp.arrays import Bools, Floats, Ints
-from netsp.clock import NEVER, Clock, Flag, TimeLimit
+from netsp.clock import Clock, TimeLimit
 from netsp.compiled.kernel import kernel
 from netsp.errors import InputError, LimitReachedError
 from netsp.geometry.kernels import Blockers, depth_in_obstacle, segment_blocked
@@ -93,11 +93,11 @@ class PrmRoadmap:
                 f"roadmap 'prm': samples: expected a positive whole number, got {samples!r}"
             )
         self.problem = problem
-        self.paths = TautPaths(problem)
+        clock = Clock.of(time_limit)
+        self.paths = TautPaths(problem, clock=clock)
         outline = self.paths.outline
         fixed = problem.points.copy()
         fixed[:, :2] = outline.points
-        clock = Clock.of(time_limit)
         self.clock = clock
         sampled = _sample(problem, outline, samples, seed, Clock(SHARE * clock.left, within=clock))
         self.complete = len(sampled[0]) >= samples
@@ -156,10 +156,10 @@ class PrmRoadmap:
         return planar
 
     def _detours(
-        self, with_sub_goals: bool, check: Callable[[], None], stop: Flag = NEVER
+        self, with_sub_goals: bool, check: Callable[[], None], clock: Clock | None = None
     ) -> Detours:
         """Detours in any class along the milestones; sub-goals are joined as base and goals are."""
-        del stop  # nothing compiled takes long here
+        del clock  # nothing compiled takes long here
         places, side = sub_goals(self.problem, with_sub_goals)
         outline = self.paths.outline
         fixed = len(self.problem.points)

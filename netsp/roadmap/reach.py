@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from netsp.arrays import Floats
+from netsp.clock import Clock
 from netsp.errors import InfeasibleError, counted
 from netsp.problem import Circle, Problem
 from netsp.roadmap.outline import Outline, build_outline
@@ -25,8 +26,10 @@ FARTHER = 1.2
 """Times the distance, as which the ways to goals are long, at first."""
 
 
-def shortest_tethers(problem: Problem, outline: Outline | None = None) -> Floats:
-    """The shortest tether that reaches each goal, in any class.
+def shortest_tethers(
+    problem: Problem, outline: Outline | None = None, clock: Clock | None = None
+) -> Floats:
+    """Return the shortest tether that reaches each goal, in any class.
 
     Parameters
     ----------
@@ -34,11 +37,18 @@ def shortest_tethers(problem: Problem, outline: Outline | None = None) -> Floats
         Its tether length does not matter.
     outline : Outline, optional
         Of the problem, if it is at hand.
+    clock : Clock, optional
+        The clock of the run.
 
     Returns
     -------
     ndarray, shape (n,)
         Lengths in 3D; inf where a goal cannot be reached.
+
+    Raises
+    ------
+    LimitReachedError
+        The clock was up before they were known.
     """
     points = problem.points
     far = np.hypot(*(points[1:, :2] - points[0, :2]).T)
@@ -47,11 +57,12 @@ def shortest_tethers(problem: Problem, outline: Outline | None = None) -> Floats
     while True:
         near = away <= within + problem.clearance
         if len(away) <= MANY_OBSTACLES or near.all():
-            planar = ContactGraph(outline or build_outline(problem)).lengths([0])[0, 1:]
+            outline = outline or build_outline(problem, clock)
+            planar = ContactGraph(outline, clock=clock).lengths([0])[0, 1:]
             break
         some = tuple(o for o, there in zip(problem.obstacles, near, strict=True) if there)
-        local = build_outline(problem.model_copy(update={"obstacles": some}))
-        planar = ContactGraph(local).lengths([0])[0, 1:]
+        local = build_outline(problem.model_copy(update={"obstacles": some}), clock)
+        planar = ContactGraph(local, clock=clock).lengths([0])[0, 1:]
         # a path no longer than that does not get to the others
         longest = float(planar[np.isfinite(planar)].max(initial=0.0))
         if longest <= within:
@@ -65,9 +76,13 @@ def explain_unreached(problem: Problem, outline: Outline, missing: list[int]) ->
     return str(unreached(problem, outline, missing))
 
 
-def unreached(problem: Problem, outline: Outline, missing: list[int]) -> InfeasibleError:
-    """The error about goals (as point numbers, base 0) that no admissible tether reaches."""
-    return why_unreached(problem, shortest_tethers(problem, outline), [g - 1 for g in missing])
+def unreached(
+    problem: Problem, outline: Outline, missing: list[int], clock: Clock | None = None
+) -> InfeasibleError:
+    """Return the error about goals (as point numbers, base 0) that no admissible tether reaches;
+    LimitReachedError when the clock is up before it is known why."""
+    needed = shortest_tethers(problem, outline, clock)
+    return why_unreached(problem, needed, [g - 1 for g in missing])
 
 
 def why_unreached(problem: Problem, needed: Floats, missing: list[int]) -> InfeasibleError:

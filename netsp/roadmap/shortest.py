@@ -11,8 +11,9 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from netsp.arrays import Floats, Ints
+from netsp.clock import Clock
 from netsp.roadmap.outline import Outline, is_free
-from netsp.roadmap.tangents import ARC_STEP, TangentGraph, build_tangents
+from netsp.roadmap.tangents import ARC_STEP, JOINING, TangentGraph, build_tangents
 
 WAYS_AROUND = (1.5, 3.0)
 """Points are sought within so many times the straight line to them, one after the other, then
@@ -20,6 +21,9 @@ anywhere."""
 
 AT_ONCE = 16
 """Sources of shortest paths between two looks at the clock."""
+
+ARCS_AT_ONCE = 1024
+"""Arcs whose contacts are joined between two looks at the clock, some tens of milliseconds."""
 
 
 def _limits(straight: float) -> list[float]:
@@ -64,9 +68,13 @@ class ContactGraph:
     Nodes 0 … points-1 are the outline's points (base, goals); then two for every tangent.
     """
 
-    def __init__(self, outline: Outline, tangents: TangentGraph | None = None) -> None:
+    def __init__(
+        self, outline: Outline, tangents: TangentGraph | None = None, clock: Clock | None = None
+    ) -> None:
         self.outline = outline
-        t = self.tangents = build_tangents(outline, np.inf) if tangents is None else tangents
+        if tangents is None:
+            tangents = build_tangents(outline, np.inf, clock)
+        t = self.tangents = tangents
         arcs, points = len(t.arcs), len(t.points)
         self.points = points
         edges = len(t.target)
@@ -81,6 +89,8 @@ class ContactGraph:
         self.angle = np.zeros(points + 2 * edges)
         outward, inward = _by_number(tail // 2, arcs), _by_number(t.target // 2, arcs)
         for a in range(arcs):
+            if clock is not None and a % ARCS_AT_ONCE == ARCS_AT_ONCE - 1:
+                clock.check(JOINING)
             out_e, in_e = outward[a], inward[a]
             contact = np.concatenate([leave[out_e], arrive[in_e]])
             theta = np.concatenate([t.angle[out_e, 0], t.angle[in_e, 1]])

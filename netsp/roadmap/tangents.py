@@ -10,12 +10,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from netsp.arrays import Bools, Floats, Ints
-from netsp.clock import NEVER, Flag
+from netsp.clock import NEVER, Clock, Flag
 from netsp.compiled.growing import more_rows
 from netsp.compiled.kernel import kernel
 from netsp.compiled.tiers import choose
@@ -25,6 +26,10 @@ from netsp.roadmap.outline import Outline
 
 ARC_STEP = math.radians(3.0)
 """Arcs are drawn as circumscribed chords of at most this turn: 0.023 % longer than the arc."""
+
+JOINING = "finding tangents between the corners of obstacles"
+WRITING = "finding the rays that tangents cross"
+"""Work that a clock may end, as its messages call it."""
 
 ANGLE_TOLERANCE = 1e-7
 """A departure this little before the arrival counts as straight on (radians)."""
@@ -95,12 +100,16 @@ class TangentGraph:
         return 2 * len(self.arcs) + p
 
 
-def build_tangents(outline: Outline, reach: float, stop: Flag = NEVER) -> TangentGraph:
-    """All free tangents whose ends lie within `reach` of the base (inf for all); some are missing
-    when the flag of a clock is set.
+def build_tangents(outline: Outline, reach: float, clock: Clock | None = None) -> TangentGraph:
+    """Return all free tangents whose ends lie within `reach` of the base (inf for all).
 
     Nothing farther from the base than the tether is ever touched: a leg between two admissible
     goals stays in the ball of that radius, which is convex in the covering space.
+
+    Raises
+    ------
+    LimitReachedError
+        The clock was up before all were found.
     """
     base = outline.points[0]
     if np.isfinite(reach):
@@ -108,7 +117,12 @@ def build_tangents(outline: Outline, reach: float, stop: Flag = NEVER) -> Tangen
         arcs, full = outline.arcs[near], outline.full[near]
     else:
         arcs, full = outline.arcs, outline.full
-    return assembled(outline, arcs, full, tangent_rows(outline, arcs, full, reach, stop=stop))
+    parts = len(outline.blockers.box) + len(outline.blockers.edges)
+    steps = 2.0 * (len(arcs) + len(outline.points)) ** 2 * parts
+    rows = (clock or Clock()).finish(
+        JOINING, steps, lambda stop: tangent_rows(outline, arcs, full, reach, stop=stop)
+    )
+    return assembled(outline, arcs, full, rows, clock)
 
 
 def tangent_rows(
@@ -120,6 +134,8 @@ def tangent_rows(
     ----------
     since
         Only those with an end at point `since` or a later one, of all if 0.
+    stop
+        Flag of a clock; some rows are missing when it is set.
     """
     place = np.zeros((len(arcs) + len(outline.points), 5))
     place[: len(arcs)] = arcs
@@ -133,8 +149,11 @@ def tangent_rows(
     )
 
 
-def assembled(outline: Outline, arcs: Floats, full: Bools, rows: Floats) -> TangentGraph:
-    """The graph of rows of `_tangents`."""
+def assembled(
+    outline: Outline, arcs: Floats, full: Bools, rows: Floats, clock: Clock | None = None
+) -> TangentGraph:
+    """Return the graph of rows of `_tangents`; LimitReachedError when the clock is up before it is
+    complete."""
     source, target = rows[:, 0].astype(np.int64), rows[:, 1].astype(np.int64)
     key, arrival_key, length = rows[:, 2], rows[:, 3], rows[:, 4]
     ends, angle = np.ascontiguousarray(rows[:, 5:9]), np.ascontiguousarray(rows[:, 9:])
@@ -151,18 +170,17 @@ def assembled(outline: Outline, arcs: Floats, full: Bools, rows: Floats) -> Tang
         at_point = node >= 2 * len(arcs)
         ends[at_point, column : column + 2] = outline.places[node[at_point] - 2 * len(arcs)]
     _merge_contacts(source, target, length, ends, angle, len(arcs))
-    write_letters = choose(_write_letters, 3 * len(target) * (4 + len(outline.rays)))
-    first, turn, gap, letters, segment_row, arrival_row, gap_row = write_letters(
-        arcs,
-        full,
-        start,
-        target,
-        key,
-        arrival_key,
-        ends,
-        angle,
-        outline.rays,
-        order_of_rays,
+    steps = 3 * len(target) * (4 + len(outline.rays))
+    write_letters = choose(_write_letters, steps)
+
+    def written(stop: Flag) -> Any:
+        return write_letters(
+            arcs, full, start, target, key, arrival_key, ends, angle, outline.rays, order_of_rays,
+            stop,
+        )  # fmt: skip
+
+    first, turn, gap, letters, segment_row, arrival_row, gap_row = (clock or Clock()).finish(
+        WRITING, steps, written
     )
     radius = np.zeros(node_count)
     radius[: 2 * len(arcs)] = np.repeat(arcs[:, 2], 2)
@@ -213,10 +231,13 @@ def _merge_contacts(
     # an angle just below a full turn is one just above nothing
     first, last = np.flatnonzero(fresh), np.append(np.flatnonzero(fresh)[1:], len(order)) - 1
     start_of_arc = np.append(True, np.diff(arc[order][first]) != 0)
-    for g in np.flatnonzero(np.append(start_of_arc[1:], True)):
-        h = int(np.flatnonzero(start_of_arc[: g + 1])[-1])
-        if h != g and theta[order[first[h]]] + TWO_PI - theta[order[last[g]]] <= ANGLE_TOLERANCE:
-            group[group == g] = h
+    opening = np.flatnonzero(start_of_arc)
+    closing = np.append(opening[1:] - 1, len(first) - 1)
+    turned = theta[order[first[opening]]] + TWO_PI - theta[order[last[closing]]]
+    joined = turned <= ANGLE_TOLERANCE
+    one = np.arange(len(first))
+    one[closing[joined]] = opening[joined]
+    group = one[group]
     xy = np.vstack([ends[:, :2], ends[:, 2:]])
     # where a point lies on the arc, the far end of its edge of no length is the point itself
     far = np.vstack([ends[:, 2:], ends[:, :2]])[on_arc]
@@ -302,6 +323,8 @@ def _tangents(
         if stop[0] != 0:
             break
         for j in range(max(i + 1, first), total):
+            if stop[0] != 0:
+                break
             xi, yi, ri, si, ei = place[i, 0], place[i, 1], place[i, 2], place[i, 3], place[i, 4]
             xj, yj, rj, sj, ej = place[j, 0], place[j, 1], place[j, 2], place[j, 3], place[j, 4]
             dx, dy = xj - xi, yj - yi
@@ -372,8 +395,10 @@ def _write_letters(
     angle: Floats,
     rays: Floats,
     order: Ints,
+    stop: Ints,
 ) -> tuple[Ints, Floats, Floats, npt.NDArray[np.int32], Ints, Ints, Ints]:
-    """Words of segments and of the arc pieces between arrivals and departures."""
+    """Return the words of segments and of the arc pieces between arrivals and departures; some are
+    missing when the flag of a clock is set."""
     e_count = len(target)
     arc_nodes = 2 * len(arcs)
     first = np.full(e_count, -1, dtype=np.int64)
@@ -387,6 +412,8 @@ def _write_letters(
     room = 16 * (len(rays) + 1)
     for node in range(len(start) - 1):
         for e in range(start[node], start[node + 1]):
+            if stop[0] != 0:
+                break
             if n + 3 * room > len(pool):
                 bigger = np.empty(2 * len(pool) + 3 * room, dtype=np.int32)
                 for k in range(n):

@@ -44,6 +44,8 @@ class TautRoadmap:
     max_classes : when there are more, the shortest of every goal are kept, about as many of each.
     time_limit : seconds, or the clock of the run. When it ends while classes are sought, those
         found till then are kept; when it ends while legs are measured, `lengths` raises.
+    limits_paths : whether the limit holds for outline and tangents, too, without which there is
+        nothing to plan with.
 
     Attributes
     ----------
@@ -58,6 +60,8 @@ class TautRoadmap:
         A goal that no taut tether reaches; names it and the tether that would do.
     InputError
         An unknown rule, a bad number of classes.
+    LimitReachedError
+        The time was up before outline and tangents were complete.
     """
 
     def __init__(
@@ -67,6 +71,7 @@ class TautRoadmap:
         classes: str = "all",
         max_classes: int = MAX_CLASSES,
         time_limit: TimeLimit = None,
+        limits_paths: bool = True,
     ) -> None:
         if not isinstance(max_classes, (int, np.integer)) or max_classes < 1:
             raise InputError(f"max_classes: expected a positive whole number, got {max_classes!r}")
@@ -75,7 +80,7 @@ class TautRoadmap:
         self.problem = problem
         self.rule: KeptClasses = "non-looping" if RULES[classes] == NON_LOOPING else "all"
         self.clock = Clock.of(time_limit)
-        self.paths = TautPaths(problem)
+        self.paths = TautPaths(problem, clock=self.clock if limits_paths else None)
         self.outline, self.tangents = self.paths.outline, self.paths.tangents
         self._margin = self.paths.margin
         self._z = problem.points[:, 2]

@@ -46,7 +46,7 @@ def turnings(problem: Problem, graph: TravelGraph) -> Floats:
     LimitReachedError
         The clock was up.
     """
-    paths = TautPaths(problem)
+    paths = TautPaths(problem, clock=graph.clock)
     out = np.zeros(len(graph))
     for v in range(1, len(graph)):
         if graph.clock is not None:

@@ -237,7 +237,7 @@ def solve(
     *,
     roadmap: str = DEFAULT_ROADMAP,
     roadmap_options: Mapping[str, Any] | None = None,
-    time_limit: float | None = None,
+    time_limit: TimeLimit = None,
     iteration_limit: int | None = None,
     seed: int = 0,
     params: Mapping[str, Any] | None = None,
@@ -262,8 +262,9 @@ def solve(
         Name of the roadmap: `taut` (exact), `prm`, or another package's.
     roadmap_options : mapping, optional
         For ``taut``: ``classes``, ``max_classes``; for ``prm``: ``samples``, ``shortcut``.
-    time_limit : float, optional
-        Seconds for the whole call; the best tour so far is returned when it is up.
+    time_limit : float or Clock, optional
+        Seconds for the whole call, or the clock of a run that this one is a part of; the best tour
+        so far is returned when it is up.
     iteration_limit : int, optional
         Iterations of the solver; each says what one is.
     seed : int
@@ -344,7 +345,8 @@ def solve(
         "friction": checked_argument("friction", friction, 0.0, MAX_FRICTION),
         "max_tension_ratio": _tension_ratio(max_tension_ratio, friction),
     }
-    clock = Clock(time_limit, should_stop=should_stop)
+    seconds, within = (None, time_limit) if isinstance(time_limit, Clock) else (time_limit, None)
+    clock = Clock(seconds, within=within, should_stop=should_stop)
     with contextlib.closing(clock):
         options: dict[str, Any] = dict(roadmap_options or {})
         if ROADMAPS.named(roadmap).seeded:

@@ -22,7 +22,7 @@ import numpy.typing as npt
 
 from netsp.arrangement import UNORDERED, keeps
 from netsp.arrays import Bools, Floats, Ints
-from netsp.clock import NEVER, Clock, Flag
+from netsp.clock import Clock
 from netsp.drawn import Drawn
 from netsp.errors import InputError, counted
 from netsp.hsignature import Word
@@ -131,7 +131,7 @@ class TravelGraph(Drawn):
         tethers: npt.ArrayLike,
         legs: Legs,
         roadmap: str = "custom",
-        detours: Callable[[bool, Callable[[], None], Flag], Detours] | None = None,
+        detours: Callable[[bool, Callable[[], None], Clock | None], Detours] | None = None,
         between: Callable[[Callable[[], bool]], Floats] | None = None,
         classes: KeptClasses | None = None,
         least_left_out: float = math.inf,
@@ -480,8 +480,7 @@ class TravelGraph(Drawn):
                 "solver: needs the geometry of a problem, and this travel graph has none"
             )
         if sub_goals not in self._detours:
-            stop = NEVER if self.clock is None else self.clock.flag
-            self._detours[sub_goals] = self._make_detours(sub_goals, check, stop)
+            self._detours[sub_goals] = self._make_detours(sub_goals, check, self.clock)
         return self._detours[sub_goals]
 
     def between_goals(self, up: Callable[[], bool] = lambda: False) -> Floats:
