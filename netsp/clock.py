@@ -41,11 +41,11 @@ class TimingPolicy:
     ----------
     untimed_steps : int
         Work of at most so many steps of a compiled innermost loop is done whatever the time. The
-        default takes a few tenths of a second; less leaves more problems without any tour when the
+        default takes about a tenth of a second; less leaves more problems without any tour when the
         limit is short, more makes runs end later.
     """
 
-    untimed_steps: int = 300_000_000
+    untimed_steps: int = 100_000_000
 
     def __post_init__(self) -> None:
         if self.untimed_steps < 0:

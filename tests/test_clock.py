@@ -13,6 +13,7 @@ from netsp.memory import ask, available
 from netsp.mip.cutpool import IDLE, CutPool
 from netsp.mip.cuts import Cut
 from netsp.worlds import random_world, reachable_world
+from tests.clock_sites import watched
 
 
 def test_a_flag_is_set_when_the_time_is_up_and_not_before():
@@ -153,3 +154,57 @@ def test_one_that_never_stops_changes_nothing():
     plain = solve(problem, "mip")
     asked = solve(problem, "mip", should_stop=lambda: False)
     assert (asked.length, asked.tour, asked.path) == (plain.length, plain.tour, plain.path)
+
+
+def _in_order(problem):
+    return solve(problem, keep_order=True, time_limit=20.0)
+
+
+def _by(name):
+    return lambda problem: solve(problem, name, time_limit=20.0)
+
+
+RUNS = {
+    "auto": _by("auto"), "mip": _by("mip"), "dp": _by("dp"), "reduced-mip": _by("reduced-mip"),
+    "greedy": _by("greedy"), "in order": _in_order,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("run", RUNS)
+def test_wherever_the_clock_is_asked_a_run_whose_time_is_up_there_ends_at_once(run):
+    """A clock that fires at every call site once: a loop that does not ask goes on behind one."""
+    problem = random_world(3, goals=10, tether_length=300.0)
+    RUNS[run](problem)  # compiled code is read before time counts
+    with watched() as sites:
+        RUNS[run](problem)
+    assert sites.asked
+    for site, count in sites.asked.items():
+        for times in {1, count}:
+            with watched(site, times) as fired:
+                found = RUNS[run](problem)
+            if fired.fired is not None:
+                assert fired.overtime < 1.0, (site, times)
+            assert verify(problem, found), (site, times)
+
+
+def _rough_disks(corners):
+    """Three islands of many corners, in the way of two goals."""
+    rng = np.random.default_rng(0)
+    obstacles = []
+    for x in (0.0, 100.0, 200.0):
+        angle = np.sort(rng.uniform(0.0, 2.0 * np.pi, corners))
+        radius = 35.0 * (1.0 + 0.2 * rng.uniform(-1.0, 1.0, corners))
+        island = np.column_stack([x + radius * np.cos(angle), 60.0 + radius * np.sin(angle)])
+        obstacles.append({"polygon": island.tolist()})
+    goals = [(50, 60), (150, 60), (0, 120)]
+    return Problem(base=(0, 0), goals=goals, obstacles=obstacles, tether_length=400)
+
+
+def test_many_corners_end_in_time_and_say_where_it_was_up():
+    """Outline, tangents and letters knew no clock: 66,672 corners took 258 s of 60."""
+    solve(_rough_disks(100), time_limit=5.0)  # compiled code is read before time counts
+    problem = _rough_disks(4000)
+    begin = time.process_time()
+    with pytest.raises(LimitReachedError, match=r"time limit reached while (outlining|finding)"):
+        solve(problem, time_limit=0.3)
+    assert time.process_time() - begin < 1.3

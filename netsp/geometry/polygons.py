@@ -119,17 +119,36 @@ def polygon_interior_point(vertices: Vertices) -> tuple[float, float]:
             np.sum((y + np.roll(y, -1)) * cross),
         ]
     ) / (3.0 * np.sum(cross))
-    candidates = [centroid]
+    candidates, half = [centroid], [np.inf]
     low, high = v[:, 1].min(), v[:, 1].max()
     for k in range(1, 16):
         height = low + (high - low) * k / 16
-        candidates += [
-            np.array([(x0 + x1) / 2, height]) for x0, x1 in _chords(v, float(height)) if x1 > x0
-        ]
-    depth = -polygon_signed_distance(vertices, np.array(candidates))
+        chords = [(x0, x1) for x0, x1 in _chords(v, float(height)) if x1 > x0]
+        candidates += [np.array([(x0 + x1) / 2, height]) for x0, x1 in chords]
+        half += [(x1 - x0) / 2 for x0, x1 in chords]
+    depth = _depths(vertices, np.array(candidates), np.array(half))
     best = int(np.argmax(depth))
     chosen = candidates[0] if depth[0] >= 0.1 * depth[best] else candidates[best]
     return float(chosen[0]), float(chosen[1])
+
+
+AT_ONCE = 64
+"""Points whose distance to an outline is measured at a time; more take more memory."""
+
+
+def _depths(
+    vertices: Vertices, points: npt.NDArray[np.float64], most: npt.NDArray[np.float64]
+) -> npt.NDArray[np.float64]:
+    """Return how deep points (n, 2) lie in a polygon, given what each depth cannot exceed; -inf
+    where that alone shows that another point lies deeper."""
+    out = np.full(len(points), -np.inf)
+    order = np.argsort(-most, kind="stable")
+    for first in range(0, len(order), AT_ONCE):
+        some = order[first : first + AT_ONCE]
+        if most[some[0]] * (1.0 + 1e-9) < out.max():
+            break
+        out[some] = -polygon_signed_distance(vertices, points[some])
+    return out
 
 
 def _chords(v: npt.NDArray[np.float64], height: float) -> list[tuple[float, float]]:

@@ -255,6 +255,11 @@ def _visible_arcs(disks: Floats, blockers: Blockers, bounds: Floats, stop: Ints)
                 )
             for e in range(edge_start[o], edge_start[o + 1]):
                 ax, ay, bx, by = edges[e, 0], edges[e, 1], edges[e, 2], edges[e, 3]
+                if (
+                    min(ax, bx) - grow[o] > cx + r or max(ax, bx) + grow[o] < cx - r
+                    or min(ay, by) - grow[o] > cy + r or max(ay, by) + grow[o] < cy - r
+                ):  # fmt: skip
+                    continue
                 n = circle_circle_angles(cx, cy, r, ax, ay, grow[o] - eps, cuts, n)
                 length = math.hypot(bx - ax, by - ay)
                 ux = (by - ay) / length * (grow[o] - eps)
