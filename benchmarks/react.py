@@ -16,11 +16,13 @@ from table import head, heading, row
 from netsp.online import Scene
 from netsp.online.equipment import Camera
 from netsp.online.mission import Mission
+from netsp.online.paths.refine import RefineParams
 from netsp.online.planner import PlannerOptions
 from netsp.online.simulate import simulate
 
 HERE = Path(__file__).parent.parent / "missions"
-PLANNERS = ("none", "react", "react-draft", "predictive")
+PLANNERS = ("none", "react", "react-draft", "react-thresholds", "predictive")
+FARTHER = RefineParams(keeps="farther")
 CURRENT, GUSTS = (0.08, 0.05, 0.0), 0.04
 
 
@@ -51,6 +53,7 @@ as long to come back as to inspect."""
 VARIANTS = (
     *((p, {}) for p in PLANNERS),
     ("react, unrefined", {"refine": "none"}),
+    ("react, farther moves only", {"refine_params": FARTHER}),
     ("predictive, BIT*", {"paths": "bitstar"}),
 )
 """Planners, and what is different about them."""

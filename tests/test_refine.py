@@ -8,7 +8,14 @@ from hypothesis import strategies as st
 from netsp import InputError
 from netsp.geometry import polylines
 from netsp.online import Scene
-from netsp.online.paths.refine import REFINEMENTS, clear, refined, smoothed
+from netsp.online.paths.refine import (
+    REFINEMENTS,
+    RefineParams,
+    clear,
+    perturbed,
+    refined,
+    smoothed,
+)
 from netsp.online.paths.sampled import OMPL_PLANNERS, SampledPaths
 from netsp.online.paths.tree import Grid, homotopic, taut
 from netsp.online.planner import PlannerOptions, make_planner
@@ -46,6 +53,41 @@ def test_the_papers_steps_widen_an_arc_about_a_post_and_are_the_same_for_the_sam
     a, b = (refined("paper", FIELD, path, 0.3, np.random.default_rng(5)) for _ in range(2))
     assert np.array_equal(a, b)
     assert FIELD.distance(a)[8:-8].min() > FIELD.distance(path)[8:-8].min()
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.floats(0.52, 2.0), st.integers(0, 100))
+def test_of_random_moves_any_free_one_is_kept_or_those_away_from_solids(radius, seed):
+    """By the paper's sentence each point that can move freely has moved once, by the step."""
+    path, step = arc(radius), 0.03
+    moved = {
+        keeps: perturbed(
+            FIELD, path, step, np.random.default_rng(seed), RefineParams(keeps=keeps, max_trials=30)
+        )
+        for keeps in ("free", "farther")
+    }
+    lengths = np.linalg.norm(moved["free"] - path, axis=1)
+    assert np.allclose(lengths[1:-1], step)
+    assert lengths[[0, -1]].tolist() == [0.0, 0.0]
+    assert FIELD.distance(moved["free"]).min() > 0.0
+    assert (FIELD.distance(moved["farther"]) >= FIELD.distance(path)).all()
+    assert (FIELD.distance(moved["free"]) < FIELD.distance(path))[1:-1].any()
+
+
+@pytest.mark.parametrize(
+    ("fields", "said"),
+    [
+        ({"keeps": "any"}, "keeps: expected free or farther, got 'any'"),
+        ({"max_trials": 0}, "max_trials: expected 1 or more, got 0"),
+        ({"segment": 4}, "segment: expected 5 or more, got 4"),
+        ({"overlap": 10}, "overlap: expected less than 10, got 10"),
+        ({"max_rounds": 0}, "max_rounds: expected 1 or more, got 0"),
+        ({"step_share": 0.0}, "step_share: expected more than 0, got 0.0"),
+    ],
+)
+def test_refinement_out_of_range_is_refused(fields, said):
+    with pytest.raises(InputError, match=said):
+        RefineParams(**fields)
 
 
 def test_smoothing_leaves_a_cubic_alone():

@@ -21,7 +21,10 @@ def arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument("mission", metavar="MISSION", help="mission file (JSON)")
     p.add_argument(
         "--planner", default="predictive", metavar="NAME",
-        help=choices("predictive (default), repair, react, react-draft or none", "netsp.planners"),
+        help=choices(
+            "predictive (default), repair, react, react-draft, react-thresholds or none",
+            "netsp.planners",
+        ),
     )  # fmt: skip
     p.add_argument(
         "--tether", type=length, metavar="L", help="tether length, instead of the mission's"
@@ -42,6 +45,11 @@ def arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument(
         "--refine", metavar="NAME", help="none, paper or gradient; default is the planner's own"
     )
+    p.add_argument(
+        "--perturbation", choices=("free", "farther"), default="free",
+        help="random moves that --refine paper keeps: free (default), as the paper says, or those "
+        "that lead farther from solids",
+    )  # fmt: skip
     p.add_argument(
         "--seed",
         type=natural,
@@ -71,6 +79,7 @@ def run(args: argparse.Namespace) -> int:
     from netsp.command.flight import fly
     from netsp.online.limits import check_names
     from netsp.online.mission import Mission
+    from netsp.online.paths.refine import RefineParams
     from netsp.online.planner import PLANNERS, PlannerOptions
     from netsp.online.surprises import SceneSurprises
 
@@ -91,7 +100,9 @@ def run(args: argparse.Namespace) -> int:
         source=args.surprise,
         inputs=(args.mission, args.surprise), vehicle=args.vehicle, tether=args.tether_model,
         snap=args.snap, seed=args.seed,
-        options=PlannerOptions(args.paths, args.refine, args.seed),
+        options=PlannerOptions(
+            args.paths, args.refine, args.seed, RefineParams(keeps=args.perturbation)
+        ),
     )  # fmt: skip
     if any(r.summary["defects"] for r in runs):
         return EXIT_DEFECT

@@ -4,49 +4,104 @@
 `gradient`: ours; it moves points up the distance field only, so no point's clearance gets smaller,
 and keeps the ends where they are.
 
-What the paper does not say: how long its segments are (here 10 points, 5 in common), how far points
-are moved (0.1 of the clearance), and that moving points away from the path's centroid pushes those
+What the paper does not say: how long its segments are, how far points are moved, how many trials a
+point has (all in `RefineParams`), and that moving points away from the path's centroid pushes those
 between centroid and structure *into* the structure. The ends are kept, or the path would not lead
 from the robot to the waypoint.
+
+What a perturbation keeps: "only those that are collision-free are accepted", says the paper, and in
+the next sentence that this is "to locally increase clearance". By the first sentence any free move
+is kept (`RefineParams.keeps` "free"); by the second, one that takes the point farther from solids
+("farther").
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from netsp.arrays import Floats
+from netsp.errors import InputError
 from netsp.geometry import polylines
 from netsp.online.scene.field import DistanceField, pushed_out
 
 REFINEMENTS = ("none", "paper", "gradient")
 
-SEGMENT, OVERLAP = 10, 5
-TRIALS = 10
-ROUNDS = 5
+PERTURBATIONS = ("free", "farther")
+
+
+@dataclass(frozen=True)
+class RefineParams:
+    """How the paper's three steps are carried out.
+
+    Parameters
+    ----------
+    keeps : {"free", "farther"}
+        Which random moves of a point are kept: the first that is free, or every one that takes the
+        point farther from solids.
+    max_trials : int
+        Random directions tried for each point; 1 or more.
+    step_share : float
+        Length of a random move, as a share of the clearance; more than 0.
+    segment : int
+        Points of a segment that one cubic is fitted to; 5 or more.
+    overlap : int
+        Points that two segments in a row have in common; fewer than a segment's.
+    max_rounds : int
+        Repetitions of the three steps before the path is left as it was; 1 or more.
+    """
+
+    keeps: str = "free"
+    max_trials: int = 10
+    step_share: float = 0.1
+    segment: int = 10
+    overlap: int = 5
+    max_rounds: int = 5
+
+    def __post_init__(self) -> None:
+        if self.keeps not in PERTURBATIONS:
+            raise InputError(f"keeps: expected {' or '.join(PERTURBATIONS)}, got {self.keeps!r}")
+        for name, least in (("max_trials", 1), ("segment", 5), ("overlap", 0), ("max_rounds", 1)):
+            if getattr(self, name) < least:
+                raise InputError(f"{name}: expected {least} or more, got {getattr(self, name)!r}")
+        if self.overlap >= self.segment:
+            raise InputError(f"overlap: expected less than {self.segment}, got {self.overlap!r}")
+        if not 0.0 < self.step_share < np.inf:
+            raise InputError(f"step_share: expected more than 0, got {self.step_share!r}")
 
 
 def refined(
-    name: str, field: DistanceField, path: Floats, clearance: float, rng: np.random.Generator
-) -> Floats:
-    """A path (k, 3) refined; as it was if what came of it is not free."""
+    name: str, field: DistanceField, path: Floats, clearance: float, rng: np.random.Generator,
+    params: RefineParams | None = None,
+) -> Floats:  # fmt: skip
+    """Refine a path (k, 3); return it as it was if what came of it is not free."""
+    params = params or RefineParams()
     if name == "none" or len(path) < 3:
         return path
-    room = max(0.0, min(clearance, float(field.distance(path[[0, -1]]).min())) - 1e-3)
     if name == "gradient":
+        room = max(0.0, min(clearance, float(field.distance(path[[0, -1]]).min())) - 1e-3)
         better = lifted(field, path, clearance)
         return better if clear(field, better, min(room, lowest(field, path))) else path
     best = path
-    for _ in range(ROUNDS):
-        best = offset(best, clearance)
-        best = perturbed(field, best, 0.1 * clearance, rng)
-        best = smoothed(best)
+    for _ in range(params.max_rounds):
+        best = stepped(field, best, clearance, rng, params)
         if clear(field, best, 0.0):
             return best
         # what went into something is brought out again, and the three steps are repeated
         best = lifted(field, best, clearance)
     return path
+
+
+def stepped(
+    field: DistanceField, path: Floats, clearance: float, rng: np.random.Generator,
+    params: RefineParams,
+) -> Floats:  # fmt: skip
+    """Carry out the paper's three steps once; what comes of them need not be free."""
+    moved = offset(path, clearance)
+    moved = perturbed(field, moved, params.step_share * clearance, rng, params)
+    return smoothed(moved, params)
 
 
 def offset(path: Floats, by: float) -> Floats:
@@ -58,25 +113,30 @@ def offset(path: Floats, by: float) -> Floats:
     return np.asarray(out)
 
 
-def perturbed(field: DistanceField, path: Floats, by: float, rng: np.random.Generator) -> Floats:
-    """Every point but the ends moved in the best of some random directions, if that takes it
-    farther from solids."""
+def perturbed(
+    field: DistanceField, path: Floats, by: float, rng: np.random.Generator, params: RefineParams
+) -> Floats:
+    """Move every point but the ends in random directions, as far as such moves are kept."""
     out = path.copy()
-    inner = len(path) - 2
-    for _ in range(TRIALS):
-        direction = rng.normal(size=(inner, 3))
+    waits = np.ones(len(path) - 2, dtype=bool)
+    for _ in range(params.max_trials):
+        direction = rng.normal(size=(len(waits), 3))
         tried = out[1:-1] + by * direction / np.linalg.norm(direction, axis=1, keepdims=True)
-        better = field.distance(tried) > field.distance(out[1:-1])
-        out[1:-1][better] = tried[better]
+        if params.keeps == "farther":
+            kept = field.distance(tried) > field.distance(out[1:-1])
+        else:
+            kept = waits & (field.distance(tried) > 0.0)
+            waits &= ~kept
+        out[1:-1][kept] = tried[kept]
     return out
 
 
-def smoothed(path: Floats) -> Floats:
-    """Cubic least-squares fits on overlapping segments, averaged where they overlap."""
+def smoothed(path: Floats, params: RefineParams | None = None) -> Floats:
+    """Fit cubics to overlapping segments by least squares, and average where they overlap."""
+    params = params or RefineParams()
     total, count = np.zeros_like(path), np.zeros((len(path), 1))
-    step = SEGMENT - OVERLAP
-    for first in range(0, max(1, len(path) - OVERLAP), step):
-        part = slice(first, min(first + SEGMENT, len(path)))
+    for first in range(0, max(1, len(path) - params.overlap), params.segment - params.overlap):
+        part = slice(first, min(first + params.segment, len(path)))
         points = path[part]
         if len(points) <= 4:
             total[part] += points

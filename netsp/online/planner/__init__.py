@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 from netsp.errors import InputError
@@ -12,16 +13,10 @@ from netsp.online.paths.tree import Grid
 from netsp.online.planner.base import Command, Planner, PlannerOptions, Tethers
 from netsp.online.planner.predictive import PredictivePlanner
 from netsp.online.planner.react import ReactPlanner
+from netsp.online.planner.react_draft import ReactDraftPlanner, ReactThresholdsPlanner
 from netsp.online.scene.field import DistanceField
 from netsp.online.tether import GeodesicTether
 from netsp.registry import Registry, later
-
-
-def _draft(
-    mission: Mission, scene: DistanceField, tethers: Tethers, grid: Grid, options: PlannerOptions
-) -> Planner:
-    return ReactPlanner(mission, scene, tethers, grid, options, draft=True)
-
 
 PLANNERS: Registry[Callable[..., Planner]] = Registry(
     "planner",
@@ -30,7 +25,8 @@ PLANNERS: Registry[Callable[..., Planner]] = Registry(
         "predictive": PredictivePlanner,
         "repair": later("repair", "netsp.space.repair:RepairPlanner"),
         "react": ReactPlanner,
-        "react-draft": _draft,
+        "react-draft": ReactDraftPlanner,
+        "react-thresholds": ReactThresholdsPlanner,
         "none": Planner,
     },
     later,
@@ -75,6 +71,8 @@ def make_planner(
         raise InputError(f"paths: expected {', '.join(known)}, got {options.paths!r}")
     if options.refine not in (None, *REFINEMENTS):
         raise InputError(f"refine: expected {', '.join(REFINEMENTS)}, got {options.refine!r}")
+    if options.pivot_spacing is not None and not 0.0 < options.pivot_spacing < math.inf:
+        raise InputError(f"pivot_spacing: expected more than 0, got {options.pivot_spacing!r}")
     if name in ("predictive", "repair") and not isinstance(tethers, GeodesicTether):
         raise InputError(f"tether: planner {name!r} needs geodesic, got {tethers.name!r}")
     return make(mission, scene, tethers, grid, options)

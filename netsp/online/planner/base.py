@@ -16,7 +16,7 @@ from netsp.errors import interrupted
 from netsp.geometry import polylines
 from netsp.online.mission import Mission, MissionWaypoint
 from netsp.online.paths.beside import beside
-from netsp.online.paths.refine import refined
+from netsp.online.paths.refine import RefineParams, refined, stepped
 from netsp.online.paths.sampled import SampledPaths
 from netsp.online.paths.tree import Grid, Paths, ShortestTree, taut
 from netsp.online.scene.field import DistanceField
@@ -73,6 +73,11 @@ class PlannerOptions:
         the others, whose paths keep the clearance from the start.
     seed : int
         Of what is random in either.
+    refine_params : RefineParams
+        How the paper's refinement is carried out.
+    pivot_spacing : float, optional
+        Distance between the pivots along a tether that the paper's planners try, metres; more than
+        0; by default 0.25 m, or a cell where that is more.
     looks : int
         How often `predictive` simulates the tether ahead for one plan; then the best path so far is
         taken, and the first if there is none yet.
@@ -90,6 +95,8 @@ class PlannerOptions:
     paths: str = "tree"
     refine: str | None = None
     seed: int = 0
+    refine_params: RefineParams = field(default_factory=RefineParams)
+    pivot_spacing: float | None = None
     looks: int = 10
     metres: float = 15.0
     planning_limit: float = 10.0
@@ -583,7 +590,35 @@ class Planner:
             return path
         rng = np.random.default_rng([self.options.seed, self.index])
         even = polylines.points_along(path, self.grid.cell)
-        return refined(name, self.scene, even, self.mission.clearance, rng)
+        params = self.options.refine_params
+        return refined(name, self.scene, even, self.mission.clearance, rng, params)
+
+    def refined_once(self, path: Floats, number: int) -> Floats:
+        """Refine a path once, free or not; any refinement but the paper's is as in `refined`.
+
+        Parameters
+        ----------
+        path : ndarray, shape (k, 3)
+            The path, metres.
+        number : int
+            Of the path, for the random moves: another one moves otherwise.
+
+        Returns
+        -------
+        ndarray, shape (m, 3)
+            The refined path, metres.
+        """
+        if (self.options.refine or self.refine) != "paper" or len(path) < 3:
+            return self.refined(path)
+        rng = np.random.default_rng([self.options.seed, self.index, number])
+        even = polylines.points_along(path, self.grid.cell)
+        params = self.options.refine_params
+        return stepped(self.scene, even, self.mission.clearance, rng, params)
+
+    @property
+    def pivot_spacing(self) -> float:
+        """Distance between pivots along a tether, metres."""
+        return self.options.pivot_spacing or max(self.grid.cell, 0.25)
 
     def pulled(self, path: Floats) -> Floats:
         """A path pulled taut in its class, at the clearance.
