@@ -274,7 +274,19 @@ def test_that_there_is_no_tour_is_proven_by_mip_and_claimed_by_none_else(backend
             {"solver": "mip", "params": {"search_rounds": "many"}},
             "expected a whole number, got 'many'",
         ),
-        ({"solver": "greedy-2016", "params": {"k": 1}}, "unknown option 'k'; it takes none"),
+        ({"solver": "greedy-tsp", "params": {"k": 1}}, "unknown option 'k'; it takes none"),
+        (
+            {"solver": "greedy-2016", "params": {"k": 1}},
+            "unknown option 'k'; expected one of retrace",
+        ),
+        (
+            {"solver": "greedy-2016", "params": {"retrace": "tether"}},
+            "option 'retrace': expected goal or end, got 'tether'",
+        ),
+        (
+            {"solver": "mip-2017", "params": {"cuts": "all"}},
+            "option 'cuts': expected goals or vertices, got 'all'",
+        ),
         ({"solver": "anneal", "params": {"hot": 1, "cold": 2}}, "expected 0 < cold <= hot"),
         ({"solver": "anneal", "params": {"hot": math.nan}}, "expected a finite number"),
         ({"time_limit": 0.0}, "time_limit: expected a positive"),

@@ -57,6 +57,15 @@ def test_greedy_2016_is_twice_the_shortest_tethers(roadmap):
     assert solve_graph(g, "greedy-2016").length == pytest.approx(2.0 * sum(shortest))
 
 
+@pytest.mark.parametrize("roadmap", ROADMAPS)
+def test_by_its_other_reading_greedy_2016_retraces_once_as_greedy_does(roadmap):
+    g = graph(roadmap)
+    other = solve_graph(g, "greedy-2016", params={"retrace": "end"})
+    assert other.tour == solve_graph(g, "greedy").tour
+    assert other.length == pytest.approx(solve_graph(g, "greedy").length)
+    assert other.length != pytest.approx(solve_graph(g, "greedy-2016").length)
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_reduced_mip_is_optimal_over_the_classes_of_least_tether(seed):
     g = random_graph(seed, goals=5)

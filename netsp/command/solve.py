@@ -44,8 +44,8 @@ def for_all(p: argparse.ArgumentParser) -> None:
         default="auto",
         metavar="NAME",
         help=choices(
-            "auto (default), mip, dp, reduced-mip, lns, anneal, anneal-2016, greedy, greedy-2016 "
-            "or greedy-tsp",
+            "auto (default), mip, dp, reduced-mip, mip-2017, lns, anneal, anneal-2016, greedy, "
+            "greedy-2016 or greedy-tsp",
             "netsp.solvers",
         ),
     )

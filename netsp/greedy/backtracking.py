@@ -1,8 +1,16 @@
 """Greedy backtracking: nearest goal by tether, then back along the own path.
 
 McCammon & Hollinger 2017, section V-A: the robot goes to the closest goal that does not violate the
-tether length, again and again, and retraces its path after the last one. The 2016 workshop paper
-has it retrace its path to the base after every goal.
+tether length, again and again, and retraces its path after the last one (`greedy`).
+
+The 2016 workshop paper has one sentence: the planner "also travels to the closest goal, but then
+retraces its path back to the start position, ensuring no entanglements". It has two readings:
+
+- *out and back*: the robot returns after every goal, so the closest goal is the closest to the base
+  each time (`greedy-2016`, and what its published figures are of);
+- *retrace once*: the robot goes from goal to goal, as the Greedy-TSP of the sentence before, and
+  retraces its whole path from the last (`greedy-2016` with `retrace=end`). This is the reading of
+  the 2017 paper, so the tour is that of `greedy`.
 
 On the covering space a leg between two admissible classes never needs more tether than its ends do
 (docs/theory.md), so "does not violate the tether length" is: is a vertex of the travel graph. With
@@ -117,18 +125,39 @@ def _nearest(
     return nearest
 
 
-def solve_2016(graph: TravelGraph, params: None = None, limits: Limits | None = None) -> Result:
+@dataclass(frozen=True)
+class Params2016:
+    """Options of `greedy-2016`.
+
+    Attributes
+    ----------
+    retrace
+        When the robot retraces its path: ``goal``, after every goal, or ``end``, after the last one
+        only. The paper's sentence can be read either way.
+    """
+
+    retrace: str = "goal"
+
+    def __post_init__(self) -> None:
+        if self.retrace not in ("goal", "end"):
+            raise ValueError(f"option 'retrace': expected goal or end, got {self.retrace!r}")
+
+
+def solve_2016(
+    graph: TravelGraph, params: Params2016 | None = None, limits: Limits | None = None
+) -> Result:
     """`greedy-2016`: out to the goal nearest to the base and back, then the next.
 
-    No leg between goals is ever measured. One iteration builds the whole tour. Source: McCammon &
+    This is the first of two readings of the paper's sentence (see `Params2016`). By it no leg
+    between goals is ever measured. One iteration builds the whole tour. Source: McCammon &
     Hollinger 2016, section IV.
 
     Parameters
     ----------
     graph : TravelGraph
         What to solve.
-    params : None
-        It has no options.
+    params : Params2016, optional
+        See `Params2016`.
     limits : Limits, optional
         Time, iterations, random generator, warm start, listener.
 
@@ -137,14 +166,18 @@ def solve_2016(graph: TravelGraph, params: None = None, limits: Limits | None = 
     Result
         The tour; no bound.
     """
-    limits = limits or Limits()
+    chosen, limits = params or Params2016(), limits or Limits()
     run = SolverRun(graph, limits)
+    stage = "greedy"
     with run.until_stopped():
         run.update_incumbent(limits.warm_start)
         if not run.trivial():
             run.check()
-            _out_and_back(run)
-    return run.finish("greedy")
+            if chosen.retrace == "goal":
+                _out_and_back(run)
+            else:
+                stage = _nearest_by_tether(run, retrace=graph.geometric)
+    return run.finish(stage)
 
 
 def _out_and_back(run: SolverRun) -> None:

@@ -114,6 +114,7 @@ class CbcInteger:
     ) -> None:
         self.cluster, self.legs = cluster, legs
         self.cuts: list[Cut] = []
+        self._forbidden = 0
         self.problem = pulp.LpProblem("netsp", pulp.LpMinimize)
         self._x = {int(v): pulp.LpVariable(f"x_{v}", 0, 1, pulp.LpInteger) for v in vertices}
         self._y = [pulp.LpVariable(f"y_{u}_{v}", 0, 1, pulp.LpInteger) for u, v in legs.tolist()]
@@ -147,6 +148,16 @@ class CbcInteger:
                 name = f"cut_{len(self.cuts)}"
                 _row(self.problem, terms, pulp.LpConstraintLE, cut.room, name)
             self.cuts.append(cut)
+
+    def forbid_subtour(self, members: Ints, visits: int) -> None:
+        """Allow one leg fewer than visits within a set of vertices."""
+        inside = np.zeros(len(self.cluster), dtype=bool)
+        inside[members] = True
+        within = np.flatnonzero(inside[self.legs].all(axis=1))
+        terms = [(self._y[k], 1.0) for k in within]
+        name = f"subtour_{self._forbidden}"
+        _row(self.problem, terms, pulp.LpConstraintLE, visits - 1.0, name)
+        self._forbidden += 1
 
     def solve(self, limit: TimeLimit) -> IntegerOutcome:
         """The best integer solution, as far as the time goes."""

@@ -83,6 +83,10 @@ SOLVERS: Registry[Solver] = Registry(
                 "dp", "netsp.dp.solve:solve", "netsp.dp.solve:Params", ordered=True, proves=True
             ),
             Solver("reduced-mip", "netsp.mip.reduced:solve", "netsp.mip.reduced:ReducedParams"),
+            Solver(
+                "mip-2017", "netsp.mip.published_program:solve",
+                "netsp.mip.published_program:Params",
+            ),
             Solver("lns", "netsp.lns.solve:solve", "netsp.lns.solve:Params", ordered=True),
             Solver("anneal", "netsp.anneal.icra2017:solve", "netsp.anneal.icra2017:Params"),
             Solver(
@@ -92,7 +96,10 @@ SOLVERS: Registry[Solver] = Registry(
             Solver(
                 "greedy", "netsp.greedy.backtracking:solve", "netsp.greedy.backtracking:Params"
             ),
-            Solver("greedy-2016", "netsp.greedy.backtracking:solve_2016"),
+            Solver(
+                "greedy-2016", "netsp.greedy.backtracking:solve_2016",
+                "netsp.greedy.backtracking:Params2016",
+            ),
             Solver("greedy-tsp", "netsp.greedy.blind:solve", geometric=True, blind=True),
         )
     },

@@ -1,0 +1,153 @@
+"""`mip-2017`: the program of McCammon & Hollinger 2017, section IV-B, as published: a baseline.
+
+Equations (2) to (4) over all vertices and all legs, as an integer program that CBC solves where the
+paper has Gurobi. No tour to start from, no cut at fractional points, no elimination: subtours are
+looked for at integer points only. CBC takes no cuts while it runs, so each integer program is
+solved to its end, cut at its subtours, and solved again.
+
+What the paper prints, and what it must mean:
+
+- (3) multiplies y by x and sums over a goal. Its text asks for degree 2 at a vertex that is visited
+  and 0 at any other, with one class for the legs in and out: Σ y over the legs at v = 2 x_v.
+- (4) bounds a sum over all legs by |S ∩ T_Aug|, without restricting it to S, and a subtour has as
+  many legs as vertices, so nothing would be cut. The constraint is to "disallow" the solution
+  found, so T_Aug is that solution, the legs are those within S, and the right side is one less. Its
+  sums run over all classes of two goals, so S holds all classes of the goals of a subtour:
+  Σ y within S <= (goals of S) - 1 (`Params.cuts` "goals"). If S holds only the vertices of the
+  subtour, the constraint disallows that one subtour and not the same in neighbouring classes:
+  Σ y within S <= |S| - 1 ("vertices"), which takes more rounds.
+
+Limits, by the method: until the last round there is no tour to show, where Gurobi's callback would
+have one, so a run that is stopped has a bound and no tour. A bound is the optimum, or CBC's own
+bound, of a program that leaves subtours in; it is as right as CBC's arithmetic.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from netsp.arrays import Floats, Ints
+from netsp.errors import InputError
+from netsp.memory import ask
+from netsp.mip.cbc_program import CbcInteger
+from netsp.mip.subtours import tour_from
+from netsp.solving.limits import Limits
+from netsp.solving.run import SolverRun, Stop
+from netsp.travel.graph import TravelGraph
+from netsp.travel.result import Result
+
+CUTS = ("goals", "vertices")
+
+BYTES_PER_LEG = 4000
+"""Memory of a leg in the program, bytes: PuLP's variable and its terms in objective, two degree
+rows and the file for CBC. Measured with 100,000 legs."""
+
+
+@dataclass(frozen=True)
+class Params:
+    """Options of the solver.
+
+    Attributes
+    ----------
+    cuts
+        Which constraint forbids a subtour: ``goals``, over all classes of its goals, or
+        ``vertices``, over its own vertices.
+    max_legs
+        Most legs that the program may have; 1 or more.
+    """
+
+    cuts: str = "goals"
+    max_legs: int = 500_000
+
+    def __post_init__(self) -> None:
+        if self.cuts not in CUTS:
+            raise ValueError(f"option 'cuts': expected {' or '.join(CUTS)}, got {self.cuts!r}")
+        if self.max_legs < 1:
+            raise ValueError(f"option 'max_legs': expected 1 or more, got {self.max_legs}")
+
+
+def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | None = None) -> Result:
+    """`mip-2017`: solve the published program, cut its subtours, and solve it again.
+
+    A warm start is not used: a baseline shows what it does by itself. An iteration is one integer
+    program solved. Source: McCammon & Hollinger 2017, section IV-B.
+
+    Parameters
+    ----------
+    graph : TravelGraph
+        What to solve.
+    params : Params, optional
+        See `Params`.
+    limits : Limits, optional
+        Time, iterations, listener.
+
+    Returns
+    -------
+    Result
+        The optimal tour; or, where a limit came first, a bound alone.
+
+    Raises
+    ------
+    InputError
+        The program would have more legs than `Params.max_legs`.
+    """
+    chosen, limits = params or Params(), limits or Limits()
+    run = SolverRun(graph, limits)
+    # blind: a run that is stopped before its first tour gets none from elsewhere
+    with run.until_stopped(blind=True):
+        if not run.trivial():
+            legs, costs = _all_legs(graph, chosen.max_legs)
+            run.check()
+            _lazy_rounds(run, legs, costs, chosen)
+    return run.finish("proven" if run.done else "open")
+
+
+def _all_legs(graph: TravelGraph, max_legs: int) -> tuple[Ints, Floats]:
+    """Return all legs (k, 2) between vertices of different goals, and their costs."""
+    sizes = np.bincount(graph.cluster).astype(float)
+    count = (sizes.sum() ** 2 - (sizes**2).sum()) / 2.0
+    if count > max_legs:
+        raise InputError(
+            f"solver 'mip-2017': the program has {count:.0f} legs; expected at most {max_legs} "
+            "(option max_legs): choose fewer goals, a shorter tether or solver mip"
+        )
+    ask(BYTES_PER_LEG * count, f"a program of {count:.0f} legs", "choose solver mip")
+    finite = np.triu(np.isfinite(graph.costs), 1)
+    legs = np.argwhere(finite & (graph.cluster[:, None] != graph.cluster[None, :]))
+    return legs.astype(np.int64), graph.costs[legs[:, 0], legs[:, 1]]
+
+
+def _lazy_rounds(run: SolverRun, legs: Ints, costs: Floats, params: Params) -> None:
+    """Solve and cut until the integer optimum is one tour."""
+    graph = run.graph
+    model = CbcInteger(graph.cluster, np.arange(len(graph)), legs, costs, [])
+    size = {"legs": len(legs), "vertices": len(graph)}
+    cut_count = 0
+    while True:
+        run.check()
+        outcome = model.solve(run.clock)
+        run.iterations += 1
+        if outcome.infeasible:
+            run.infeasible = True
+            return
+        if outcome.bound is not None:
+            run.raise_bound(outcome.bound)
+        point = outcome.point
+        if point is None or not outcome.finished:
+            run.report("integer", cuts=cut_count, **size)
+            raise Stop
+        x, y = np.rint(point.x), np.rint(point.y)
+        cycles = tour_from(x, legs, y)
+        if len(cycles) == 1:
+            run.update_incumbent(cycles[0])
+            run.report("integer", cuts=cut_count, **size)
+            return
+        run.report("integer", cuts=cut_count, **size)
+        for cycle in cycles:
+            members = np.array(cycle)
+            if params.cuts == "goals":
+                members = np.flatnonzero(np.isin(graph.cluster, graph.cluster[members]))
+            model.forbid_subtour(members, len(cycle))
+        cut_count += len(cycles)
