@@ -213,7 +213,7 @@ def random_world(
     *,
     family: str = "icra2017",
     goals: int | None = None,
-    obstacles: int | None = None,
+    obstacles: int | tuple[int, int] | None = None,
     tether_length: float = 300.0,
     side: float = 500.0,
     radii: tuple[float, float] = (10.0, 30.0),
@@ -230,8 +230,10 @@ def random_world(
         One of `FAMILIES`.
     goals : int, optional
         How many; by default 20, in `rss2016` 5 to 10.
-    obstacles : int, optional
-        How many; by default 20, in `rss2016` 5 to 10.
+    obstacles : int or (int, int), optional
+        How many, or least and most, both of them included, between which their number is drawn
+        uniformly; by default 20, in `rss2016` 5 to 10. The studies of the 2017 paper, which has "up
+        to 20", draw 1 to 20.
     tether_length : float
         Length of the tether.
     side : float
@@ -257,7 +259,11 @@ def random_world(
     # text is hashed by Python into a seed of its own, the same in every version
     draw = random.Random(seed if attempt == 0 else f"{seed}/{attempt}")
     if family == "rss2016":
-        obstacles = 5 + int(6 * draw.random()) if obstacles is None else obstacles
+        obstacles = (5, 10) if obstacles is None else obstacles
+    if isinstance(obstacles, tuple):
+        least, most = obstacles
+        obstacles = least + int((most - least + 1) * draw.random())
+    if family == "rss2016":
         goals = 5 + int(6 * draw.random()) if goals is None else goals
     goals, obstacles = 20 if goals is None else goals, 20 if obstacles is None else obstacles
 
@@ -332,7 +338,7 @@ def reachable_world(seed: int, **recipe: object) -> tuple[Problem, int]:
 def _check(
     family: str,
     goals: int | None,
-    obstacles: int | None,
+    obstacles: int | tuple[int, int] | None,
     tether_length: float,
     side: float,
     radii: tuple[float, float],
@@ -341,8 +347,13 @@ def _check(
         raise InputError(f"family: unknown {family!r}; expected one of {', '.join(FAMILIES)}")
     if goals is not None and not 1 <= goals <= MOST:
         raise InputError(f"world: goals: expected 1 to {MOST}, got {goals}")
-    if obstacles is not None and not 0 <= obstacles <= MOST:
-        raise InputError(f"world: obstacles: expected 0 to {MOST}, got {obstacles}")
+    least, most = obstacles if isinstance(obstacles, tuple) else (obstacles or 0, obstacles or 0)
+    if not (0 <= least <= MOST and 0 <= most <= MOST):
+        raise InputError(
+            f"world: obstacles: expected 0 to {MOST}, got {most if 0 <= least <= MOST else least}"
+        )
+    if least > most:
+        raise InputError(f"world: obstacles: expected minimum <= maximum, got {least} and {most}")
     for name, value in (("tether_length", tether_length), ("side", side), ("radii", radii[1])):
         if not 0.0 < value <= 1e11:
             raise InputError(f"world: {name}: expected more than 0 and at most 1e11, got {value:g}")

@@ -48,6 +48,24 @@ def test_a_world_is_the_same_on_every_machine(family):
     assert hashlib.sha256(text.encode()).hexdigest()[:16] == DIGESTS[family]
 
 
+def test_up_to_twenty_obstacles_are_one_to_twenty_with_the_same_odds():
+    """400 worlds, 20 of each number on average; one in 10,000 sets would be as uneven."""
+    counts = np.zeros(21)
+    for seed in range(400):
+        world, _ = reachable_world(seed, goals=1, obstacles=(1, 20), radii=(5.0, 10.0))
+        counts[len(world.obstacles)] += 1
+    assert counts[0] == 0
+    assert ((counts[1:] - 20.0) ** 2 / 20.0).sum() < 50.0
+
+
+def test_obstacles_in_a_range_leave_worlds_of_a_number_alone():
+    assert len(random_world(3, goals=2, obstacles=(6, 6)).obstacles) == 6
+    assert random_world(3, goals=2, obstacles=6) != random_world(3, goals=2, obstacles=(6, 6))
+    for wrong in ((-1, 4), (3, 10**6), (5, 4)):
+        with pytest.raises(InputError, match="world: obstacles: expected"):
+            random_world(3, obstacles=wrong)
+
+
 @settings(max_examples=60, deadline=None)
 @given(st.sampled_from(sorted(FAMILIES)), st.integers(0, 10**9), st.integers(0, 24))
 def test_in_every_family_obstacles_are_apart_and_goals_in_reach(family, seed, count):
@@ -71,6 +89,16 @@ def test_a_seed_whose_world_does_not_fit_is_drawn_again_and_counted():
             with pytest.raises(InputError):
                 random_world(seed, **crowded)
     assert sum(map(bool, in_vain)) > 0
+
+
+def test_netsp_world_draws_a_number_from_a_range(tmp_path, capsys):
+    out = tmp_path / "w.json"
+    command = ["world", "--seed", "4", "--goals", "3", "-o", str(out), "--obstacles"]
+    assert main([*command, "1-20"]) == 0
+    assert Problem.load(out) == reachable_world(4, goals=3, obstacles=(1, 20))[0]
+    for wrong in ("20-1", "1-", "-1", "1-2-3", "a-b"):
+        assert main([*command[:-1], f"--obstacles={wrong}"]) == 2
+    assert "expected" in capsys.readouterr().err
 
 
 def test_netsp_world_writes_a_problem_that_solve_reads(tmp_path, capsys):

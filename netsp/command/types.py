@@ -85,6 +85,17 @@ def natural(text: str) -> int:
     return value
 
 
+def count_or_range(text: str) -> int | tuple[int, int]:
+    """Parse a whole number from 0 on, or two of them as in ``1-20``."""
+    least, dash, most = text.partition("-")
+    if not (least and dash):
+        return natural(text)
+    numbers = natural(least), natural(most)
+    if numbers[0] > numbers[1]:
+        raise argparse.ArgumentTypeError(f"expected minimum-maximum, got {text!r}")
+    return numbers
+
+
 def positive(text: str) -> int:
     """A whole number from 1 on."""
     value = natural(text)

@@ -6,7 +6,7 @@ import argparse
 import sys
 
 from netsp.command import messages
-from netsp.command.types import check_writable, length, natural, positive
+from netsp.command.types import check_writable, count_or_range, length, natural, positive
 from netsp.errors import counted
 
 EXAMPLE = "netsp world --goals 30 --tether 350 --seed 7 -o world.json"
@@ -26,9 +26,10 @@ def arguments(p: argparse.ArgumentParser) -> None:
     )
     p.add_argument(
         "--obstacles",
-        type=natural,
+        type=count_or_range,
         metavar="N",
-        help="number of obstacles; default 20, rss2016: 5 to 10",
+        help="number of obstacles, or a range such as 1-20 that it is drawn from; default 20, "
+        "rss2016: 5 to 10",
     )
     p.add_argument(
         "--tether", type=length, default=300.0, metavar="L", help="tether length; default 300"

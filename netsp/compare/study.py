@@ -36,7 +36,11 @@ class Worlds(Model):
     count: Annotated[Whole, Field(description="worlds per cell")] = 10
     first: Annotated[Natural, Field(description="seed of the first")] = 0
     obstacles: Annotated[
-        Natural | None, Field(description="per world; null for the family's own")
+        Natural | tuple[Natural, Natural] | None,
+        Field(
+            description="per world: how many, or least and most of a number that is drawn "
+            "uniformly; null for the family's own"
+        ),
     ] = None
     side: Annotated[Positive, Field(description="of the square, in units of length")] = 500.0
     radii: Annotated[
@@ -48,6 +52,10 @@ class Worlds(Model):
     def _known(self) -> Self:
         if self.family not in FAMILIES:
             raise ValueError(f"family: unknown {self.family!r}; expected one of {_list(FAMILIES)}")
+        if isinstance(self.obstacles, tuple) and self.obstacles[0] > self.obstacles[1]:
+            raise ValueError(
+                "obstacles: expected minimum <= maximum, got {} and {}".format(*self.obstacles)
+            )
         if self.radii[0] > self.radii[1]:
             raise ValueError(
                 f"radii: expected minimum <= maximum, got {self.radii[0]:g} and {self.radii[1]:g}"
