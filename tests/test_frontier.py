@@ -356,7 +356,7 @@ def test_a_proof_over_the_core_first_ends_at_the_same_optimum(monkeypatch, seed,
     run = core_first(monkeypatch, problem)
     assert any(row.stage == "core" for row in run.trace)
     goals = next(row for row in run.trace if row.stage == "goals")
-    assert 0.3 * best < goals.bound <= best * (1 + 1e-9)
+    assert 0.3 * best < goals.bound.length <= best * (1 + 1e-9)
     assert run.status is Status.OPTIMAL
     assert run.length == pytest.approx(best, rel=1e-6)
     assert all(row.bound is None or row.bound.length <= best * (1 + 1e-6) for row in run.trace)

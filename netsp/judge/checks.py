@@ -473,13 +473,13 @@ class _Judge:
         if bound > length + 1e-9 * max(length, self.problem.scale):
             return f"bound {bound:g} above length {length:g}"
         if gap is None or abs(gap - s.bound.gap(length)) > MAX_GAP_ERROR:
-            return f"gap {gap:g}, should be {s.bound.gap(length):g}"
+            return f"the stated gap is not that of the bound, {s.bound.percent(length, 6)}"
         able = scope_of(s.roadmap, s.classes, kept_order=s.kept_order)
         if not able.includes(scope) or scope.keeps_order != s.kept_order:
             return f"a bound on {scope.tours}, but a run like this can bound {able.tours}"
         closed = gap <= MAX_CLOSED_GAP
         if status.is_optimal and status is not Status.OPTIMAL_OF_KEPT and not closed:
-            return f"{status.value}, but gap is {gap}"
+            return f"{status.value}, but the gap is {s.bound.percent(length, 6)}"
         if status.is_optimal and closed and status is not Status.optimal_of(scope):
             return f"{status.value}, but the bound is one on {scope.tours}"
         return None

@@ -155,6 +155,8 @@ def _over_cells(
         own = cells.of(graph.cluster, odd)
         above = np.flatnonzero(np.isin(own, visited))
         least = least_tethers(graph.costs_to_base[above], own[above], ABOVE_CELL)
+        if costs is None and keep is None:  # covers of ways, whichever classes were kept
+            _holds_in_any_class(graph, bound * (1.0 - ROUNDING))
         better = told(bound * (1.0 - ROUNDING), len(cells.cluster), above[least])
         if better is None:
             return None

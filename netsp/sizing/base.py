@@ -41,7 +41,8 @@ if TYPE_CHECKING:
 MOST_CANDIDATES = 10_000
 
 HEAD = (
-    "rank", "name", "x", "y", "z", "shortest_tether", "lower_bound", "length", "status", "why",
+    "rank", "name", "x", "y", "z", "shortest_tether", "lower_bound", "lower_bound_of",
+    "length", "status", "why",
 )  # fmt: skip
 """Columns of a ranking."""
 
@@ -148,7 +149,8 @@ class BaseSearch(Drawn):
             {
                 "name": c.name, "position": list(c.position),
                 "shortest_tether": _finite(c.shortest_tether),
-                "lower_bound": _finite(c.lower_bound), "length": c.length,
+                "lower_bound": _finite(c.bound.length), "lower_bound_of": c.bound.scope.value,
+                "length": c.length,
                 "status": None if c.status is None else c.status.value, "why": c.why or None,
             }
             for c in self.candidates
@@ -171,7 +173,8 @@ class BaseSearch(Drawn):
         for k, c in enumerate(self.candidates, 1):
             table.writerow(
                 [k, cell(c.name), *(f"{v:.9g}" for v in c.position), f"{c.shortest_tether:.9g}",
-                 f"{c.lower_bound:.9g}", "" if c.length is None else f"{c.length:.9g}",
+                 f"{c.bound.length:.9g}", c.bound.scope.value,
+                 "" if c.length is None else f"{c.length:.9g}",
                  "" if c.status is None else c.status.value, c.why]
             )  # fmt: skip
         return text.getvalue()

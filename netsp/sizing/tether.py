@@ -166,7 +166,11 @@ class TetherCurve(Drawn):
         str
             Object with the steps in a list.
         """
-        steps = [{**vars(s), "status": s.status.value, "order": list(s.order)} for s in self.steps]
+        steps = [
+            {**vars(s), "lower_bound_of": s.bound.scope.value, "status": s.status.value,
+             "order": list(s.order)}
+            for s in self.steps
+        ]  # fmt: skip
         data = {
             "problem": self.name, "units": self.units, "shortest_tether": self.shortest,
             "needed_by_goal": self.needs, "whole": self.whole, "steps": steps,
@@ -183,11 +187,14 @@ class TetherCurve(Drawn):
         """
         text = io.StringIO()
         table = csv.writer(text, lineterminator="\n")
-        table.writerow(["tether", "until", "length", "lower_bound", "status", "order"])
+        table.writerow(
+            ["tether", "until", "length", "lower_bound", "lower_bound_of", "status", "order"]
+        )
         for s in self.steps:
             table.writerow(
-                [f"{s.tether:.9g}", f"{s.until:.9g}", f"{s.length:.9g}", f"{s.lower_bound:.9g}",
-                 s.status.value, " ".join(map(str, s.order))]
+                [f"{s.tether:.9g}", f"{s.until:.9g}", f"{s.length:.9g}",
+                 f"{s.bound.length:.9g}", s.bound.scope.value, s.status.value,
+                 " ".join(map(str, s.order))]
             )  # fmt: skip
         return text.getvalue()
 

@@ -462,7 +462,7 @@ def _over_nearest_places(problem: Problem, solver: SolverLike, **more: Any) -> S
     found = solve(problem.model_copy(update={"goals": goals}), solver, **more)
     visits = tuple(v.model_copy(update={"goal": chosen[v.goal]}) for v in found.tour)
     own = ProblemReference(name=problem.name, sha256=problem.sha256)
-    none = {"lower_bound": None, "gap": None}
+    none = {"lower_bound": None, "lower_bound_of": None, "gap": None}
     return found.model_copy(update={"problem": own, "tour": visits, **none})
 
 

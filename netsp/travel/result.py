@@ -203,23 +203,22 @@ class Result:
 
 
 def relative_gap(length: float | None, bound: float | None) -> float | None:
-    """(length - bound) / length, at least 0.
+    """Return the gap of a tour by a bound whose tours the name of its field says, as
+    ``bound_of_all`` of a mission.
 
     Parameters
     ----------
     length : float, optional
         Length of a tour.
     bound : float, optional
-        Proven bound on every tour.
+        Lower bound.
 
     Returns
     -------
     float or None
-        The gap; None if either is unknown.
+        (length - bound) / length, at least 0; None if either is unknown.
     """
-    if length is None or bound is None:
-        return None
-    return max(0.0, (length - bound) / length) if length > 0.0 else 0.0
+    return gap_of(length, None if bound is None else LowerBound(bound, Scope.TRAVEL_GRAPH))
 
 
 def proven(length: float, bound: float) -> bool:
