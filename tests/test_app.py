@@ -34,7 +34,9 @@ from netsp.geometry import polylines
 from netsp.online.log import write_run
 from netsp.online.mission import Mission
 from netsp.online.simulate import simulate
+from netsp.pathmeasures import measure_path
 from netsp.problem import Origin
+from netsp.site.path_file import read_paths
 from netsp.site.read import read_site
 from netsp.sizing.margins import margins
 
@@ -377,6 +379,51 @@ def test_what_cannot_be_opened_changes_nothing(client):
     assert made.post("/import?token=secret&name=a", content=b"x", headers=large).status_code == 413
     assert made.get("/download/problem.json?token=secret").text == before
     assert Problem.load(file) == Problem.load(WHARF)
+
+
+def test_a_path_drawn_by_hand_has_the_figures_of_compare_path_and_goes_out_as_geojson(client):
+    made, file = client
+    headers = {"host": "127.0.0.1:1234", "origin": "http://127.0.0.1:1234"}
+    live = "/live?token=secret"
+    problem = Problem.load(file)
+    assert made.get("/download/drawn.geojson?token=secret").status_code == 409
+    points = [[0, 0], [3, 3.5], [7.5, 3.5], [7.5, 5], [0.3, 5]]
+    with (
+        made.websocket_connect(live, headers=headers) as one,
+        made.websocket_connect(live, headers=headers) as other,
+    ):
+        one.send_json({"id": 1, "drawn": points, "by": "one"})
+        told = listen(one, lambda m: m.get("id") == 1)["drawn"]
+        assert listen(other, lambda m: "drawn_points" in m)["drawn_points"] == points
+        m = measure_path(problem, points)
+        assert told["length"] == pytest.approx(m.length)
+        assert told["longest_tether"] == pytest.approx(m.longest_tether)
+        assert [v["goal"] for v in told["visits"]] == list(m.order) == [0, 1]
+        assert told["end_word"] == list(m.end_word)
+        assert told["entangled"] == list(m.entangled)
+        taut = polylines.length(np.array(told["tether"]))
+        assert np.hypot(taut, told["end_z"]) == pytest.approx(m.end_tether, rel=1e-3)
+        # with the cursor at the base, once round a pile; what is drawn stays as it is
+        one.send_json({"id": 2, "drawn": points[:4], "cursor": [2, 2.5]})
+        assert listen(one, lambda m: m.get("id") == 2)["drawn"]["missing"]
+        one.send_json({"id": 3, "drawn": [*points, [0.3, 0], [0, 0]]})
+        assert listen(one, lambda m: m.get("id") == 3)["drawn"]["free"]
+        one.send_json({"id": 4, "order": [0, 1]})
+        worth = listen(one, lambda m: m.get("id") == 4)["worth"]
+        only = problem.model_copy(update={"goals": problem.goals[:2]})
+        assert worth["length"] == pytest.approx(solve(only, keep_order=True).length)
+        for wrong in (
+            {"drawn": 3}, {"drawn": [[1]]}, {"drawn": [[1, "a"]]}, {"drawn": [[0, 0]] * 9999},
+            {"order": [0, 0]}, {"order": [99]}, {"order": "a"},
+        ):  # fmt: skip
+            one.send_json({"id": 5, **wrong})
+            assert "error" in listen(one, lambda m: m.get("id") == 5)
+    text = made.get("/download/drawn.geojson?token=secret").text
+    file.with_suffix(".geojson").write_text(text)
+    (found,) = read_paths(file.with_suffix(".geojson"), problem)
+    assert measure_path(problem, found.points).is_free
+    with made.websocket_connect(live, headers=headers) as again:  # a page opened later
+        assert listen(again, lambda m: "drawn_points" in m)["drawn_points"][-1] == [0.0, 0.0]
 
 
 MALFORMED = (

@@ -16,6 +16,13 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
+from netsp.app.drawn_path import (
+    drawn_figures,
+    drawn_file,
+    drawn_points,
+    end_tether,
+    worth_of_order,
+)
 from netsp.app.facts import facts
 from netsp.app.files import EXPORTS, bare_name, exported, imported
 from netsp.app.files import MOST_BYTES as MOST_FILE
@@ -26,12 +33,16 @@ from netsp.app.tethers import Cursor
 from netsp.errors import InputError, NetspError
 from netsp.fields import checked_argument, is_index
 from netsp.models import parse_json_object, shown
+from netsp.problem import Problem
 from netsp.solution import Solution
 
 STATIC = Path(__file__).parent / "static"
 
 MOST_BYTES = 4 * 2**20
 """Of one message."""
+
+MAX_PAGE_NAME = 40
+"""Letters by which a page calls itself when it has drawn."""
 
 MAX_MESSAGE_ID = 2**53 - 1
 """Largest number of a message: JavaScript's largest whole number that is exact."""
@@ -66,6 +77,7 @@ class Session:
         self.answer: dict[str, Any] | None = None
         self.solution: str | None = None
         self.facts: dict[str, Any] | None = None
+        self.drawn: list[list[float]] = []
         self._cursor: Cursor | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
         self._worker = Worker(self._solver_told, time_limit) if shown is None else None
@@ -98,6 +110,8 @@ class Session:
             told.append({"tour": self.answer})
         if self.facts is not None:
             told.append({"facts": self.facts})
+        if self.drawn:
+            told.append({"drawn_points": self.drawn})
         return told
 
     def tell(self, message: Mapping[str, Any]) -> None:
@@ -123,8 +137,8 @@ class Session:
         Parameters
         ----------
         message : mapping
-            One of ``edit``, ``undo``, ``redo``, ``save``, ``hover``, ``along``, ``classes`` and
-            ``space`` with its value.
+            One of ``edit``, ``undo``, ``redo``, ``save``, ``hover``, ``along``, ``classes``,
+            ``space``, ``drawn`` and ``order`` with its value.
 
         Returns
         -------
@@ -162,11 +176,34 @@ class Session:
         elif "space" in message:
             (share,) = _numbers([message["space"]], 1)
             return {"space": self._space(share)}
+        elif "drawn" in message:
+            return {"drawn": self._figures_of_drawn(message)}
+        elif "order" in message:
+            return {"worth": worth_of_order(self._problem(), message["order"])}
         else:
             raise InputError(
-                "message: expected edit, undo, redo, save, hover, along, classes or space"
+                "message: expected edit, undo, redo, save, hover, along, classes, space, drawn or "
+                "order"
             )
         return None
+
+    def _problem(self) -> Problem:
+        return self.document.problem() if self.shown is None else self.shown.problem()
+
+    def _figures_of_drawn(self, message: Mapping[str, Any]) -> dict[str, Any] | None:
+        """Keep the path that is drawn, and measure it: as it would be at the cursor, if that is
+        given."""
+        points = drawn_points(message["drawn"])
+        if message.get("cursor") is not None:
+            points = [*points, _numbers(message["cursor"], 2)]
+        else:
+            self.drawn = points
+            # a page that goes on drawing must not be set back by the echo of what it said
+            self.tell({"drawn_points": points, "by": str(message.get("by"))[:MAX_PAGE_NAME]})
+        figures = drawn_figures(self._problem(), points)
+        if figures is not None and self._cursor is not None:
+            figures["tether"] = end_tether(self._cursor.tethers, points, figures)
+        return figures
 
     def _target(self, asked: object) -> Path | None:
         """Where to save: in the folder that was opened, and over no other file."""
@@ -363,6 +400,11 @@ def application(session: Session, token: str, port: int) -> Any:
                 while True:
                     await socket.send_text(await queue.get())
 
+        async def solve_order(message: dict[str, Any]) -> None:
+            """Answer what takes seconds at times, while other messages are answered."""
+            queue.put_nowait(json.dumps(await asyncio.to_thread(session.asked, message)))
+
+        later: set[asyncio.Task[None]] = set()
         sending = asyncio.create_task(send())
         try:
             # a page that is gone may be found out by sending to it
@@ -371,6 +413,10 @@ def application(session: Session, token: str, port: int) -> Any:
                 if received["type"] == "websocket.disconnect":
                     break
                 answer = await asyncio.to_thread(_parsed, received.get("text"))
+                if isinstance(answer, dict) and "order" in answer:
+                    later.add(task := asyncio.create_task(solve_order(answer)))
+                    task.add_done_callback(later.discard)
+                    continue
                 said = session.asked(answer) if isinstance(answer, dict) else {"error": answer}
                 if said is not None:
                     queue.put_nowait(json.dumps(said))
@@ -471,6 +517,8 @@ def _download(session: Session, name: str) -> Any:
         )  # fmt: skip
         if name == "problem.json":
             text, kind = problem.to_json(), "application/json"
+        elif name == "drawn.geojson":
+            text, kind = drawn_file(problem, session.drawn), "application/geo+json"
         elif session.solution is None:
             return PlainTextResponse("netsp: there is no tour yet", status_code=409)
         elif name == "solution.json":

@@ -30,7 +30,7 @@ class Cursor:
 
     def __init__(self, problem: Problem, path: Any = ()) -> None:
         self.problem = problem
-        self._tethers = Tethers(problem)
+        self.tethers = Tethers(problem)
         self._path: Floats = np.array(path, dtype=float).reshape(-1, 3)
         self._along = polylines.along(self._path) if len(self._path) > 1 else np.zeros(0)
 
@@ -63,15 +63,15 @@ class Cursor:
             there = np.vstack([self._path[: k + 1, :2], near[k], [x, y]])
             rays = self.problem.representative_points
             word = concatenate((), crossings(there, rays))
-        found = self._tethers.to(x, y, word)
+        found = self.tethers.to(x, y, word)
         if found is None and word is not None:
-            found = self._tethers.to(x, y)
+            found = self.tethers.to(x, y)
         return {"x": x, "y": y} | (_told(found) if found else {"length": None})
 
     def classes(self, goal: int) -> dict[str, Any]:
         """The shortest classes of a goal, and how many there are."""
         x, y, z = self.problem.goals[goal].position
-        every = self._tethers.classes(x, y, z)
+        every = self.tethers.classes(x, y, z)
         return {"classes": [_told(t) for t in every[:MOST_CLASSES]], "count": len(every)}
 
     def along(self, share: float) -> dict[str, Any]:
@@ -85,7 +85,7 @@ class Cursor:
         place = (1.0 - f) * self._path[k] + f * self._path[k + 1]
         walked = np.vstack([self._path[: k + 1], place])
         word = concatenate((), crossings(walked[:, :2], self.problem.representative_points))
-        found = self._tethers.to(float(place[0]), float(place[1]), word, float(place[2]))
+        found = self.tethers.to(float(place[0]), float(place[1]), word, float(place[2]))
         told = {
             "x": float(place[0]), "y": float(place[1]), "z": float(place[2]), "share": share,
             "base_z": float(self.problem.base[2]),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import sys
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from netsp.command import messages, told
@@ -13,6 +14,8 @@ from netsp.errors import EXIT_INFEASIBLE, EXIT_NOT_ALL, InputError
 
 if TYPE_CHECKING:
     from netsp.compare.path_comparison import PathComparison
+    from netsp.problem import Problem
+    from netsp.site.path_file import FoundPath
 
 EXAMPLE = (
     "netsp compare-path problems/wharf.json examples/paths/wharf-systematic-1.csv --html page.html"
@@ -23,9 +26,12 @@ TABLES = (".csv", ".json")
 
 def arguments(p: argparse.ArgumentParser) -> None:
     """Add the arguments of the command line."""
-    p.add_argument("problem", metavar="PROBLEM", help="problem file (JSON)")
     p.add_argument(
-        "paths", metavar="PATH", nargs="+",
+        "problem", metavar="PROBLEM",
+        help="problem file (JSON), or a study of paths (.toml), which names problem and paths",
+    )  # fmt: skip
+    p.add_argument(
+        "paths", metavar="PATH", nargs="*",
         help="a path: table (.csv; columns x, y[, z] or lon, lat[, depth], and t), GeoJSON, GPX, a "
         "recorded flight (.csv.gz, .tlog, .bin) or a solution",
     )  # fmt: skip
@@ -73,11 +79,9 @@ def run(args: argparse.Namespace) -> int:
     """Compare, tell, write what is asked for, and return the exit code."""
     from netsp.compare.path_comparison import compare_paths
     from netsp.files import STANDARD, write_text
-    from netsp.guard.recorded_path import read_any_paths
     from netsp.pathmeasures import PathPolicy
     from netsp.pathmeasures.path_measures import SPEED
     from netsp.pictures import style
-    from netsp.problem import Problem
     from netsp.solution import Solution
 
     if args.json and args.output == STANDARD:
@@ -91,14 +95,8 @@ def run(args: argparse.Namespace) -> int:
     )
     if args.plot is not None:
         style.check_format(args.plot)
-    problem = Problem.load(args.problem)
+    problem, paths = _inputs(args)
     solution = Solution.load(args.solution) if args.solution else None
-    paths = [
-        path for file in args.paths
-        for path in read_any_paths(
-            file, problem, frame=args.frame, system=args.system, noise=args.noise
-        )
-    ]  # fmt: skip
     from netsp.command.compiling import compile_messages
     from netsp.command.stages import Stages
 
@@ -140,6 +138,35 @@ def run(args: argparse.Namespace) -> int:
         messages.warning(f"there is no tour to compare with: {found.tour_note}")
         return EXIT_INFEASIBLE if found.is_infeasible else EXIT_NOT_ALL
     return 0
+
+
+def _inputs(args: argparse.Namespace) -> tuple[Problem, list[FoundPath]]:
+    """Return the problem and the paths, those of a study among them; a study's settings become
+    arguments where these are not given."""
+    from dataclasses import replace
+
+    from netsp.compare.path_study import PathStudy
+    from netsp.guard.recorded_path import read_any_paths
+    from netsp.problem import Problem
+
+    files: list[tuple[str, str]] = [(file, "") for file in args.paths]
+    problem_file = args.problem
+    if problem_file.lower().endswith(".toml"):
+        study, place = PathStudy.load(problem_file), Path(problem_file).parent
+        problem_file = str(place / study.problem)
+        files = [(str(place / path.file), path.label) for path in study.paths] + files
+        args.radius, args.speed = args.radius or study.radius, args.speed or study.speed
+        args.noise = args.noise or study.noise
+    if not files:
+        raise InputError("PATH: expected a file with a path, got none")
+    problem = Problem.load(problem_file)
+    paths = []
+    for file, label in files:
+        found = read_any_paths(
+            file, problem, frame=args.frame, system=args.system, noise=args.noise
+        )
+        paths += [replace(p, name=label) for p in found] if label else found
+    return problem, paths
 
 
 def describe(found: PathComparison) -> str:

@@ -295,15 +295,20 @@ def compare_paths(
                 solution, note = None, "no tour was found within the time limit"
         except (InfeasibleError, LimitReachedError) as error:
             note, is_infeasible = str(error), isinstance(error, InfeasibleError)
+
+    def left() -> float | None:
+        """Return the seconds for one more solve: an order is brief, and has a share of its own."""
+        return None if time_limit is None else max(clock.left, ORDER_SHARE * time_limit)
+
     known: dict[tuple[int, ...], tuple[float | None, str]] = {}
     out = []
     for path, m in zip(paths, measured, strict=True):
         if m.order not in known:
             on_stage(f"solving the order of {path.name}")
-            known[m.order] = _order_length(problem, m.order, clock, time_limit)
+            known[m.order] = order_length(problem, m.order, time_limit=left())
         visited = None
         if m.missing and m.order:
-            visited = _visited_length(problem, m.order, clock, time_limit, seed)
+            visited = _visited_length(problem, m.order, time_limit=left(), seed=seed)
         out.append(ComparedPath(path.name, m, *known[m.order], visited))
     return PathComparison(problem, tuple(out), solution, note, speed, is_infeasible)
 
@@ -319,11 +324,6 @@ def _laid_tether(problem: Problem) -> Floats | None:
     return np.asarray(found.path)
 
 
-def _left(clock: Clock, time_limit: float | None) -> float | None:
-    """Return the seconds for one more solve; it is brief, so it has a share of its own."""
-    return None if time_limit is None else max(clock.left, ORDER_SHARE * time_limit)
-
-
 def _goals_in_order(problem: Problem, order: Sequence[int]) -> Problem:
     """Return the problem with these goals only, in this order, free of what ties them together."""
     free: Mapping[str, Any] = {"after": (), "choice": None}
@@ -331,10 +331,25 @@ def _goals_in_order(problem: Problem, order: Sequence[int]) -> Problem:
     return problem.model_copy(update={"goals": goals})
 
 
-def _order_length(
-    problem: Problem, order: tuple[int, ...], clock: Clock, time_limit: float | None
+def order_length(
+    problem: Problem, order: Sequence[int], *, time_limit: float | None = None
 ) -> tuple[float | None, str]:
-    """Return the length of the shortest tour in an order; if there is none, why."""
+    """Return the length of the shortest tour that visits goals in an order.
+
+    Parameters
+    ----------
+    problem : Problem
+        Of the goals.
+    order : sequence of int
+        Indices of some of its goals, none twice.
+    time_limit : float, optional
+        Seconds.
+
+    Returns
+    -------
+    (float or None, str)
+        The length in the problem's units, and what it is; None, and why there is none.
+    """
     if not order:
         return None, "no goal is visited"
     if problem.state is not None:
@@ -346,9 +361,7 @@ def _order_length(
                 first, then = problem.goal_name(later), problem.goal_name(earlier)
                 return None, f"the order breaks an 'after': {first} comes before {then}"
     try:
-        found = solve(
-            _goals_in_order(problem, order), time_limit=_left(clock, time_limit), keep_order=True
-        )
+        found = solve(_goals_in_order(problem, order), time_limit=time_limit, keep_order=True)
     except (InfeasibleError, LimitReachedError) as error:
         return None, str(error)
     proven = found.status is Status.OPTIMAL
@@ -357,13 +370,12 @@ def _order_length(
 
 
 def _visited_length(
-    problem: Problem, order: tuple[int, ...], clock: Clock, time_limit: float | None, seed: int
+    problem: Problem, order: tuple[int, ...], *, time_limit: float | None, seed: int
 ) -> float | None:
     """Return the length of the shortest tour of some of the goals that was found."""
     if problem.state is not None or len(problem.precedences):
         return None
     try:
-        only = _goals_in_order(problem, order)
-        return solve(only, time_limit=_left(clock, time_limit), seed=seed).length
+        return solve(_goals_in_order(problem, order), time_limit=time_limit, seed=seed).length
     except (InfeasibleError, LimitReachedError):
         return None

@@ -158,9 +158,18 @@ def figures_of(found: PathComparison, path: ComparedPath) -> list[tuple[str, str
         Name and value of each.
     """
     rows = path_rows(path.measures)
-    rows[1:1] = [("beside the tour", beside_tour(found, path.measures.length))]
+    m, u = path.measures, found.problem.units
+    beside = beside_tour(found, m.length)
+    if m.missing and found.tour is not None:
+        beside += f", but misses {counted(found.problem.visits - len(m.order), 'goal')}"
+    rows[1:1] = [("beside the tour", beside)]
     rows.append(("this order", order_in_words(found, path)))
     if path.visited_length is not None:
-        u = found.problem.units
-        rows.append(("goals visited alone", f"a tour of {path.visited_length:.6g} {u} visits them"))
+        more = m.length - path.visited_length
+        percent = 100.0 * more / path.visited_length if path.visited_length else 0.0
+        rows.append((
+            "its goals alone",
+            f"a tour of {path.visited_length:.6g} {u} visits them; the path is {more:.4g} {u} "
+            f"({percent:.3g} %) longer",
+        ))  # fmt: skip
     return rows

@@ -31,6 +31,7 @@ export function edits(page, link) {
     goal: "click where the goals are; with keys: arrows move the cross, Space puts a goal there",
     circle: "drag from the centre, or click; with keys: arrows move the cross, Space puts a circle there",
     polygon: "click its corners, the first again to finish; with keys: arrows, Space, then Enter",
+    path: "click the points of a path, or hold and draw; Ctrl+Z takes a stroke back; it ends at the base",
     bounds: "drag a rectangle",
   };
   /** @param {[number, number]} p @param {MouseEvent} event @returns {[number, number]} */
@@ -73,6 +74,7 @@ export function edits(page, link) {
     for (const b of document.querySelectorAll("[data-tool]")) {
       b.setAttribute("aria-pressed", String(b.getAttribute("data-tool") === tool));
     }
+    page.refill();
     page.redraw();
   }
   for (const b of document.querySelectorAll("[data-tool]")) {
@@ -117,7 +119,10 @@ export function edits(page, link) {
     const target = /** @type {Element} */ (event.target);
     const handle = target.closest("[data-corner]");
     const thing = target.closest("[data-list]");
-    if (page.tool === "goal") {
+    if (page.tool === "path") {
+      held = { kind: "path" };
+      page.drawn.begin(snapped(at, event));
+    } else if (page.tool === "goal") {
       page.edit({ add: "goals", value: { position: [...snapped(at, event), 0], name: freeName("g") } });
     } else if (page.tool === "bounds") {
       held = { kind: "bounds", from: snapped(at, event) };
@@ -157,7 +162,9 @@ export function edits(page, link) {
       return;
     }
     if (before) fingers.set(event.pointerId, event);
-    if (held?.kind === "pan") {
+    if (held?.kind === "path") {
+      page.drawn.add(snapped(at, event));
+    } else if (held?.kind === "pan") {
       view.pan(-(event.clientX - held.x) / view.scale, (event.clientY - held.y) / view.scale);
       held.x = event.clientX; held.y = event.clientY;
     } else if (held?.kind === "move") {
@@ -189,7 +196,9 @@ export function edits(page, link) {
       page.redraw();
     }
     tell(at_(at));
-    if (!held) {
+    if (!held && page.tool === "path") {
+      page.drawn.look(at, (text) => tell(`${at_(at)}; ${text}`));
+    } else if (!held) {
       link.latest("hover", { hover: at }, (answer) => {
         page.hovered = answer.hover;
         if (answer.hover?.length != null) {
@@ -206,6 +215,7 @@ export function edits(page, link) {
     const was = held;
     held = null;
     if (was?.kind === "pan") view.place();
+    if (was?.kind === "path") page.drawn.end();
     if (was?.kind === "move" && was.changes) {
       for (const [path, value] of was.changes) await page.edit({ set: path, value });
     } else if (was?.kind === "corner" && was.value) {
@@ -297,7 +307,8 @@ export function edits(page, link) {
   function atCross() {
     /** @type {[number, number]} */
     const p = [tidy(view.x), tidy(view.y)];
-    if (page.tool === "goal") page.edit({ add: "goals", value: { position: [...p, 0], name: freeName("g") } });
+    if (page.tool === "path") { page.drawn.begin(p); page.drawn.end(); }
+    else if (page.tool === "goal") page.edit({ add: "goals", value: { position: [...p, 0], name: freeName("g") } });
     else if (page.tool === "circle") page.edit({ add: "obstacles", value: { center: p, radius: tidy(30 / view.scale), name: freeName("o") } });
     else if (page.tool === "polygon") corner(p);
   }
@@ -308,7 +319,8 @@ export function edits(page, link) {
     const key = event.key, control = event.ctrlKey || event.metaKey;
     const step = (event.shiftKey ? 60 : 12) / view.scale;
     const ways = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
-    if (control && key.toLowerCase() === "z") link.ask(event.shiftKey ? { redo: true } : { undo: true });
+    if (control && key.toLowerCase() === "z" && !event.shiftKey && page.tool === "path" && page.drawn.points.length) page.drawn.undo();
+    else if (control && key.toLowerCase() === "z") link.ask(event.shiftKey ? { redo: true } : { undo: true });
     else if (control && key.toLowerCase() === "y") link.ask({ redo: true });
     else if (control && key.toLowerCase() === "s") document.getElementById("save")?.click();
     else if (control && key.toLowerCase() === "d") duplicate();
@@ -336,6 +348,7 @@ export function edits(page, link) {
     else if (key === "c") pick("circle");
     else if (key === "p") pick("polygon");
     else if (key === "b") pick("bounds");
+    else if (key === "h") pick("path");
     else if (key === "3") document.getElementById("space-on")?.click();
     else if (key === "f") view.fit(page.data);
     else return;

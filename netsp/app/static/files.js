@@ -30,6 +30,7 @@ export function files(page, link, say) {
     say(`${a.download} is downloaded`);
   }
 
+  page.download = fetched;
   document.getElementById("open")?.addEventListener("click", () => input.click());
   input.addEventListener("change", () => { if (input.files?.[0]) takeIn(input.files[0]); input.value = ""; });
   const menu = /** @type {HTMLSelectElement} */ (document.getElementById("get"));

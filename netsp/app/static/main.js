@@ -1,6 +1,7 @@
 // @ts-check
 /** The page: what is shown of the state, and what is asked for. */
 
+import { DrawnPath } from "./draw.js";
 import { edits } from "./edit.js";
 import { files } from "./files.js";
 import { Link } from "./link.js";
@@ -17,13 +18,14 @@ const page = {
   data: null, version: -1, error: null, saved: true, file: null, tour: null, chosen: [], along: 0,
   tool: "select", draft: null, ask: (m) => link.ask(m), edit, redraw, drawTethers, view: null, facts: null,
   inSpace: () => space.open, picked: null, note, wrong: null, undo: false, redo: false,
-  shown: false, run: false, events: [], refit: () => { fitted = false; }, go: goTo,
+  drawn: null, download: null, refill: () => fill(page), shown: false, run: false, events: [], refit: () => { fitted = false; }, go: goTo,
 };
 
 const view = new ChartView(by("map"));
 page.view = view;
 view.onplaced = () => redraw();
 const link = new Link(heard);
+page.drawn = new DrawnPath(page, link);
 const space = new Space(by("space"), link, note);
 let fitted = false;
 
@@ -54,6 +56,7 @@ function heard(message) {
       page.classes = [];
       page.classesOf = null;
       by("along-said").textContent = "";
+      if (page.drawn.any) page.drawn.measure();
     }
     document.body.classList.toggle("shown", page.shown);
     page.chosen = page.chosen.filter(([list, k]) => list === "base" || k < (page.data[list] ?? []).length);
@@ -62,6 +65,7 @@ function heard(message) {
     fill(page);
   }
   if (message.tour) { page.tour = message.tour; page.fresh = true; showAlong(); fill(page); }
+  if (message.drawn_points) page.drawn.take(message.drawn_points, message.by);
   if (message.facts) { page.facts = message.facts; fill(page); mark(by("along").value / 1000); }
   redraw();
   page.fresh = false;
@@ -137,6 +141,7 @@ function redraw() {
   const data = page.data;
   if (!data) return;
   const world = [], screen = [];
+  const held = new Set(page.drawn.figures?.entangled ?? []);
   const blamed = new Set(page.tour?.enclosing ?? []);
   // what the reason names, as in "base: …" and "goals[3]: … obstacles[0] …"
   const wrong = new Set(page.error?.match(/\bbase\b|\b(?:goals|obstacles)\[\d+\]/g) ?? []);
@@ -149,7 +154,7 @@ function redraw() {
     });
   }
   (data.obstacles ?? []).forEach((o, k) => {
-    const look = { class: `obstacle${blamed.has(k) ? " blamed" : ""}${wrong.has(`obstacles[${k}]`) ? " wrong" : ""}${isChosen("obstacles", k) ? " chosen" : ""}`,
+    const look = { class: `obstacle${blamed.has(k) ? " blamed" : ""}${held.has(k) ? " held" : ""}${wrong.has(`obstacles[${k}]`) ? " wrong" : ""}${isChosen("obstacles", k) ? " chosen" : ""}`,
       "data-list": "obstacles", "data-index": k };
     if (o.center) {
       world.push(make("circle", { cx: o.center[0], cy: o.center[1], r: o.radius + data.clearance, class: "clearance" }),
@@ -177,6 +182,12 @@ function redraw() {
     world.push(make("polyline", { points: line(tour.path), class: `tour${stale ? " stale" : ""}${page.fresh ? " new" : ""}` }));
   }
   if (tour?.path && tour.version === page.version && !tour.stale) screen.push(...arrows(tour.path));
+  const drawn = page.drawn.points;
+  if (drawn.length > 1) world.push(make("polyline", { points: line(drawn), class: "drawn" }));
+  if (page.tool === "path") for (const [x, y] of drawn.length < 400 ? drawn : []) {
+    const [sx, sy] = view.toScreen(x, y);
+    screen.push(make("circle", { cx: sx, cy: sy, r: 2.5, class: "drawn-point" }));
+  }
   for (const c of page.classes ?? []) world.push(make("polyline", { points: line(c.path), class: "hover" }));
   if (page.draft) world.push(make(page.draft.radius === undefined ? "polyline" : "circle", page.draft.radius === undefined
     ? { points: line(page.draft.points), class: "draft" }
@@ -209,7 +220,11 @@ function drawTethers() {
   const at = (x, y) => { const [sx, sy] = view.toScreen(x, y); return [sx - px, sy - py]; };
   /** @param {number[][]} path @param {string} look */
   const add = (path, look) => over.push(make("polyline", { class: look, points: path.map((p) => at(p[0], p[1]).join(",")).join(" ") }));
-  if (page.hovered?.path) add(page.hovered.path, "hover");
+  const path = page.drawn;
+  if (page.tool === "path") {
+    const shown = path.ahead ?? path.figures;
+    if (shown?.tether?.length) add(shown.tether, "tether");
+  } else if (page.hovered?.path) add(page.hovered.path, "hover");
   if (page.picked?.path) add(page.picked.path, "picked");
   if (page.walked?.path) add(page.walked.path, "tether");
   if (page.walked && page.walked.x !== undefined) {

@@ -73,9 +73,32 @@ export function fill(page) {
     parts.push(element("h2", "Tour"), element("table",
       element("tr", element("th", ""), element("th", "goal"), element("th", "tether m"), element("th", "slack m")), ...rows));
   }
-  parts.push(...profiles(page, page.go), ...margins(page));
+  parts.push(...drawn(page), ...profiles(page, page.go), ...margins(page));
   if (!page.shown) parts.push(...origin(data, set));
   panel.replaceChildren(...parts);
+}
+
+/** A path drawn by hand, beside the tour. @param {any} page */
+function drawn(page) {
+  const path = page.drawn;
+  if (!path?.points.length && page.tool !== "path") return [];
+  const back = element("button", "Take back"), none = element("button", "Clear"), save = element("button", "Download");
+  back.title = "the last stroke (Ctrl+Z)";
+  save.title = "as GeoJSON, which netsp compare-path reads";
+  back.addEventListener("click", () => path.undo());
+  none.addEventListener("click", () => path.clear());
+  save.addEventListener("click", () => page.download("drawn.geojson"));
+  back.disabled = none.disabled = !path.points.length;
+  save.disabled = !path.any;
+  const rows = path.rows().map(([name, value, bad]) => {
+    const cell = element("td", value);
+    if (bad) cell.className = "bad";
+    return element("tr", element("th", name), cell);
+  });
+  const table = element("table", ...rows);
+  table.id = "drawn";
+  const hint = path.points.length ? [] : [element("p", "Click the points of a path on the map, or hold and draw; it begins at the base.")];
+  return [element("h2", "Path by hand"), ...hint, table, element("div", back, " ", none, " ", save)];
 }
 
 /** How far the world may be off. @param {any} page */

@@ -1,0 +1,167 @@
+"""A path that is drawn by hand on the map: its figures while it grows, and as a file."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from netsp.arrays import Floats
+from netsp.compare.path_comparison import order_length
+from netsp.errors import InputError
+from netsp.fields import checked_argument, is_index
+from netsp.models import shown
+from netsp.pathmeasures import PathMeasures, measure_path
+from netsp.problem import Problem
+from netsp.roadmap.tethers import Tethers
+from netsp.site.path_file import path_to_geojson
+
+MAX_POINTS = 5000
+"""Points of a drawn path that the server takes: a message of them has 0.2 MB."""
+
+ORDER_LIMIT_S = 20.0
+"""Seconds in which the shortest tour of a drawn order is sought."""
+
+
+def drawn_points(value: object) -> list[list[float]]:
+    """Check the points of a drawn path.
+
+    Parameters
+    ----------
+    value : object
+        Of a message.
+
+    Returns
+    -------
+    list of [x, y]
+        Finite numbers.
+
+    Raises
+    ------
+    InputError
+        Not a list of pairs of numbers, or too many.
+    """
+    if not isinstance(value, list) or len(value) > MAX_POINTS:
+        raise InputError(f"drawn: expected a list of at most {MAX_POINTS} points")
+    out = []
+    for k, point in enumerate(value):
+        if not isinstance(point, list) or len(point) != 2:
+            raise InputError(f"drawn: point {k}: expected [x, y], got {shown(point)}")
+        out.append([checked_argument(f"drawn: point {k}", v, -1e12) for v in point])
+    return out
+
+
+def drawn_figures(problem: Problem, points: list[list[float]]) -> dict[str, Any] | None:
+    """Measure a drawn path.
+
+    Parameters
+    ----------
+    problem : Problem
+        Where it is drawn.
+    points : list of [x, y]
+        As of `drawn_points`.
+
+    Returns
+    -------
+    dict or None
+        Figures as of `netsp compare-path`; None for fewer than two points that differ.
+    """
+    line = np.array(points, dtype=float).reshape(-1, 2)
+    if len(np.unique(line, axis=0)) < 2:
+        return None
+    m = measure_path(problem, line)
+    through = sorted({k for s in m.stretches if s.kind == "obstacle" for k in s.obstacles})
+    return {
+        "length": m.length, "time_s": m.duration_s, "speed": m.speed, "radius": m.radius,
+        "visits": [
+            {"goal": v.goal, "first": v.is_first, "tether": v.tether, "word": list(v.word)}
+            for v in m.visits
+        ],
+        "order": list(m.order), "missing": list(m.missing), "revisits": list(m.revisits),
+        "longest_tether": m.longest_tether, "longest_place": list(m.longest_place),
+        "fits": m.fits, "end_tether": m.end_tether, "end_z": float(m.points[-1, 2]),
+        "end_word": list(m.end_word),
+        "word": list(m.word), "entangled": list(m.entangled), "comes_home": m.is_closed,
+        "free": m.is_free, "through": through,
+        "out_of_bounds": any(s.kind == "bounds" for s in m.stretches),
+    }  # fmt: skip
+
+
+def end_tether(
+    tethers: Tethers, points: list[list[float]], figures: dict[str, Any]
+) -> list[list[float]]:
+    """Return the taut tether at the end of a path, to be drawn.
+
+    Parameters
+    ----------
+    tethers : Tethers
+        Of the problem.
+    points : list of [x, y]
+        The path.
+    figures : dict
+        As of `drawn_figures`.
+
+    Returns
+    -------
+    list of [x, y]
+        Empty where it is longer than the tether or ends in an obstacle.
+    """
+    x, y = points[-1]
+    found = tethers.to(x, y, tuple(figures["end_word"]), figures["end_z"])
+    return [] if found is None else [[float(x), float(y)] for x, y in found.path[:, :2]]
+
+
+def worth_of_order(problem: Problem, value: object) -> dict[str, Any]:
+    """Find the shortest tour that visits goals in an order.
+
+    Parameters
+    ----------
+    problem : Problem
+        Of the goals.
+    value : object
+        Of a message: indices of goals, none twice.
+
+    Returns
+    -------
+    dict
+        ``order``, its ``length`` (None if there is no tour), and a ``note``.
+
+    Raises
+    ------
+    InputError
+        Not such indices.
+    """
+    good = isinstance(value, list) and len(set(map(str, value))) == len(value)
+    if not isinstance(value, list) or not good or not all(
+        is_index(g, len(problem.goals)) for g in value
+    ):  # fmt: skip
+        raise InputError(f"order: expected numbers of goals, none twice, got {shown(value)}")
+    length, note = order_length(problem, tuple(value), time_limit=ORDER_LIMIT_S)
+    return {"order": value, "length": length, "note": note}
+
+
+def drawn_file(problem: Problem, points: list[list[float]]) -> str:
+    """Return a drawn path as GeoJSON, as `netsp compare-path` reads it.
+
+    Parameters
+    ----------
+    problem : Problem
+        Where it is drawn.
+    points : list of [x, y]
+        The path.
+
+    Returns
+    -------
+    str
+        Text of the file, with the heights that its figures are for.
+
+    Raises
+    ------
+    InputError
+        Fewer than two points that differ.
+    """
+    line: Floats = np.array(points, dtype=float).reshape(-1, 2)
+    if len(np.unique(line, axis=0)) < 2:
+        raise InputError("no path is drawn yet; draw one on the map")
+    m: PathMeasures = measure_path(problem, line)
+    return path_to_geojson(f"{problem.name} by hand", m.points, problem)
