@@ -1,4 +1,4 @@
-"""Studies of paths: which files are compared on which problem, and what others published of them."""
+"""Studies of paths: which files are compared on which problem, and what others published."""
 
 from __future__ import annotations
 
