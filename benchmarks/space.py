@@ -39,15 +39,9 @@ from netsp.online.simulate import grid_of, simulate
 from netsp.solvers.solve import solve_graph
 from netsp.space.bound import bound_of_all
 from netsp.space.order import order_by_going_on
-from netsp.space.plan import plan
+from netsp.space.plan import AS_GIVEN, OUT_AND_BACK, PLANE, plan
 from netsp.space.signature import SpaceSignature
-from netsp.space.solve import (
-    AS_GIVEN,
-    GOING_ON,
-    SolvedMission,
-    seconds_until_home,
-    solve_mission,
-)
+from netsp.space.solve import GOING_ON, SolvedMission, seconds_until_home, solve_mission
 from netsp.space.water import SHARE, Water, along, straight
 from netsp.travel.graph import TravelGraph
 from netsp.worlds import reachable_world
@@ -56,7 +50,10 @@ MISSIONS = ("basin", "pipes", "jacket")
 LONGER_PEN = "net pen, 24 m of tether"
 """Where the tether leads round the pen to what is behind it."""
 
-WAYS = {GOING_ON: "going straight on", AS_GIVEN: "the order given"}
+WAYS = {
+    GOING_ON: "going straight on", AS_GIVEN: "the order given", PLANE: "the plane",
+    OUT_AND_BACK: "out and back",
+}  # fmt: skip
 
 LOW, HIGH, ANCHOR = [-5.0] * 3, [5.0] * 3, [4.0, 0.3, 3.0]
 POSTS = np.array([[-2.0, -1.0], [0.5, 1.5], [2.0, -2.0]])

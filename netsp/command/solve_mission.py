@@ -140,7 +140,8 @@ def summary(
     units: str,
 ) -> str:  # fmt: skip
     """What was found, in a few lines."""
-    from netsp.space.solve import AS_GIVEN, GOING_ON, seconds_until_home
+    from netsp.space.plan import AS_GIVEN, OUT_AND_BACK, PLANE
+    from netsp.space.solve import GOING_ON, seconds_until_home
 
     tour, status = found.tour, found.tour.status.value
     legs = f"{counted(tour.legs, 'leg')} between {counted(tour.states, 'state')}"
@@ -154,6 +155,10 @@ def summary(
         verdict = "in the order given, for no better one was found"
     elif tour.solver == GOING_ON:
         verdict = "found by going straight on"
+    elif tour.solver == PLANE:
+        verdict = "the shortest found in the plane: all solids are upright prisms"
+    elif tour.solver == OUT_AND_BACK:
+        verdict = "out along the tether to each waypoint and back, for no shorter one was found"
     else:
         verdict = f"along {legs} of the tether, with detours past what it would hang on"
     lines = [f"tour     {tour.length:.6g} {units}, {verdict}"]

@@ -18,7 +18,7 @@ from netsp.solution import Status
 from netsp.solvers.solve import solve_graph
 from netsp.space.legs import Legs
 from netsp.space.states import States, alike
-from netsp.space.water import Water, along, has_room
+from netsp.space.water import Water, along
 from netsp.travel.graph import TravelGraph
 from netsp.travel.result import Result
 
@@ -147,15 +147,12 @@ class Board:
         return whole
 
     def _own_way(self, v: int) -> Floats | None:
-        """From the start along a state's own tether, pulled taut in its class."""
+        """Return the path from the start along a state's own tether, pulled taut in its class;
+        None where the robot has no room on it: a tether goes through gaps that a robot does
+        not."""
         tether = self.states.all[v].tether
         line = np.vstack([self.water.laid.nodes[::-1], tether.nodes[1:]])
-        return self._with_room(self.water.taut(line))
-
-    def _with_room(self, path: Floats) -> Floats | None:
-        """A path that has room; None for others: a tether goes through gaps that a robot does
-        not."""
-        return path if has_room(self.water.field, path, self.water.mission) else None
+        return self.water.taut_beside(line)
 
     def _find_ways(self, legs: dict[tuple[int, int], Floats]) -> None:
         """How far it is from the start to each state: along its own tether, or where the robot has
@@ -323,6 +320,49 @@ class Board:
             return None
         return result, [some[int(k) - 1] for k in result.tour[len(first) :]]
 
+    def out_and_back(self) -> Driven | None:
+        """Drive a tour that goes out to each waypoint along a taut tether, and back the same way.
+
+        It needs no legs between states, so there is one wherever each waypoint can be reached.
+
+        Returns
+        -------
+        Driven or None
+            What came of it, in the order of the waypoints; None where no waypoint has a way out
+            and back on which the tether keeps to its limit and comes free, or where the mission
+            does not begin at the start and its tether does not come free there.
+        """
+        first: dict[int, int] = {}
+        # when there was no time for it, only the first state of each waypoint has a way out
+        for v, state in enumerate(self.states.all):
+            if (
+                self._out[v] is None
+                and self.states.places.waypoint[state.point] not in self.reached
+            ):
+                self._out[v] = self._own_way(v)
+        self._find_ways(self.legs)
+        for v in sorted(self._usable, key=lambda v: self._home[v]):
+            waypoint = int(self.states.places.waypoint[self.states.all[v].point])
+            if v == self.states.begin or waypoint in first:
+                continue
+            if self._comes_back(v):
+                first[waypoint] = v
+        if not first:
+            return None
+        by_the_start = replace(self, legs={}, _one_way={})
+        # where a way out leads by way of other states, its legs are those of this board
+        by_the_start._out = [self.way_out(v) for v in range(len(self._out))]
+        driven = by_the_start._driven([first[n] for n in sorted(first)])
+        return driven if driven.fault is None else None
+
+    def _comes_back(self, v: int) -> bool:
+        """Whether the tether keeps to its limit out to a state and back, and comes free."""
+        water, way = self.water, self._way_out(v)
+        there, longest = water.driven(water.laid, way, fine=True)
+        back, most = water.driven(there, way[::-1], fine=True)
+        free = alike(back, water.laid, water.mission.delta)
+        return free and max(longest, most) <= self.states.limit
+
     def driven(self, tour: Sequence[int]) -> Driven:
         """A tour, driven with the tether it begins with, in the direction that is right for more of
         its legs, and where that fails, in the other.
@@ -361,27 +401,32 @@ class Board:
         stops: list[Stop] = []
         total, fault, astray = 0.0, None, None
         delta = water.mission.delta
+        word, at_home = water.number(tether.nodes), water.number(water.laid.nodes)
         for state in [*tour, -1]:
             path = self.path(before, state)
             tether, longest = water.driven(tether, path, fine=True)
             total += along(path)
             meant = water.laid if state < 0 else states.all[state].tether
             pair = (min(before, state), max(before, state))
-            # since which leg the tether hangs otherwise than in its state; it does no harm if all
-            # ends well
-            astray = None if alike(tether, meant, delta) else astray or pair
-            if fault is None and longest > states.limit:
+            writes = water.number(path)
+            word = None if word is None or writes is None else water.words.times(word, writes)
+            as_meant = word == (at_home if state < 0 else states.all[state].word)
+            # since which leg the tether hangs otherwise than in its state, or is of another class;
+            # it does no harm if all ends well
+            astray = None if as_meant and alike(tether, meant, delta) else astray or pair
+            if fault is None and (longest > states.limit or word is None):
                 fault = astray or pair
             if state >= 0:
                 s = states.all[state]
                 stops.append(
                     Stop(
                         int(places.waypoint[s.point]), int(places.choice[s.point]),
-                        water.words.letters(s.word), tether.length, path, longest,
+                        () if word is None else water.words.letters(word), tether.length, path,
+                        longest,
                     )
                 )  # fmt: skip
             before = state
-        free = alike(tether, water.laid, delta)
+        free = word == at_home and alike(tether, water.laid, delta)
         return Driven(list(tour), stops, path, total, free, fault or astray)
 
 

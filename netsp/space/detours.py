@@ -357,8 +357,8 @@ class Detours:
 
     def _is_free(self, tether: Tether, word: int) -> bool:
         water = self.ways.water
-        empty = not water.words.exact or not water.words.letters(word)
-        return empty and alike(tether, water.laid, water.mission.delta)
+        same = not water.words.exact or word == water.number(water.laid.nodes)
+        return same and alike(tether, water.laid, water.mission.delta)
 
     def _as_driven(self, line: _Line) -> Driven:
         *legs, home = line.legs

@@ -44,8 +44,9 @@ ROUNDING = 1e-6
 
 
 def verify_mission(
-    mission: Mission, *, scene: Scene | None = None, field: DistanceField | None = None
-) -> Verification:
+    mission: Mission, *, scene: Scene | None = None, field: DistanceField | None = None,
+    water: Water | None = None,
+) -> Verification:  # fmt: skip
     """Judge a planned mission.
 
     Checks that the tour leads from the start through the first waypoints and home, clear of solids;
@@ -61,6 +62,8 @@ def verify_mission(
         Its scene, when it is at hand.
     field : DistanceField, optional
         The scene's field, when it is at hand.
+    water : Water, optional
+        Of the mission, when its words are at hand: they depend on field, box and cell alone.
 
     Returns
     -------
@@ -77,10 +80,13 @@ def verify_mission(
     if mission.track:
         raise InputError("track: a tour is for a fixed anchor; expected a mission without")
     check_size(mission)
-    scene = scene or mission.load_scene()
-    check_bounds(mission, scene)
-    field = field or scene.field()
-    return Verification(tuple(_Judge(mission, mission.tour, scene, field).run()))
+    if water is None:
+        scene = scene or mission.load_scene()
+        check_bounds(mission, scene)
+        water = Water.of(mission, scene, field or scene.field())
+    finer = GeodesicTether(water.field, FINER * mission.delta)
+    water = replace(water, mission=mission, model=finer)
+    return Verification(tuple(_Judge(mission, mission.tour, water).run()))
 
 
 def checked_mission(mission: Mission, scene: Scene, field: DistanceField) -> None:
@@ -113,8 +119,12 @@ def _shown(point: Floats) -> str:
 class _Judge:
     mission: Mission
     tour: PlannedTour
-    scene: Scene
-    field: DistanceField
+    water: Water
+
+    @property
+    def field(self) -> DistanceField:
+        """Return the scene's field."""
+        return self.water.field
 
     def run(self) -> list[Check]:
         within = self._within()
@@ -131,20 +141,14 @@ class _Judge:
         """(k, 3) each; the last is the way home."""
         return [*(np.array(s.path) for s in self.tour.stops), np.array(self.tour.home)]
 
-    @cached_property
-    def water(self) -> Water:
-        """With the mission's own cells, and its tether at the judge's resolution."""
-        water = Water.of(self.mission, self.scene, self.field)
-        return replace(water, model=GeodesicTether(self.field, FINER * self.mission.delta))
-
     def _name(self, leg: int) -> str:
         return "the way home" if leg == len(self.tour.stops) else f"the way to stop {leg}"
 
     def _within(self) -> Check:
         """No path leads where the scene ends, nor farther than any tether."""
         line, mission, name = self.tour.line, self.mission, "within the scene and the tether"
-        if self.scene.bounds is not None:
-            low, high = np.array(self.scene.bounds[:3]), np.array(self.scene.bounds[3:])
+        if self.water.bounds is not None:
+            low, high = np.array(self.water.bounds[:3]), np.array(self.water.bounds[3:])
             out = np.flatnonzero(((line < low) | (line > high)).any(axis=1))
             if len(out):
                 return Check(name, False, f"{_shown(line[out[0]])} is out of the scene's bounds")

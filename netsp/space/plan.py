@@ -15,7 +15,7 @@ all tours there are.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -35,9 +35,12 @@ from netsp.solution import Status
 from netsp.solvers.solve import SolverLike, solve_graph
 from netsp.solvers.table import SOLVERS
 from netsp.space.board import Board, Driven, Stop, with_status
-from netsp.space.detours import Detours
+from netsp.space.detours import SAVED, Detours
+from netsp.space.given_order import drive_given_order
+from netsp.space.judge import verify_mission
 from netsp.space.legs import Growth, Ways
 from netsp.space.places import Places
+from netsp.space.prisms import tours_of_plan
 from netsp.space.states import Effort, first_states, states_with_room
 from netsp.space.trees import states_of_trees
 from netsp.space.water import SHARE, Water
@@ -61,6 +64,14 @@ with detours."""
 EARLY = 0.1
 """Of the time left, what the solver may take while there are more states to come: its tour is then
 where the next search starts."""
+
+IN_PLANE = 0.3
+"""Share of the time left for the tours of the plane, where all solids are upright prisms."""
+
+TAUT_LEGS, DETOURS, PLANE = "taut", "detours", "plane"
+OUT_AND_BACK, AS_GIVEN = "out-and-back", "as-given"
+"""Kinds of plans: along states and legs, with detours, of the plane of a scene of upright prisms,
+out along a taut tether to each waypoint and back, and in the order of the file."""
 
 LEAST_GROWING, LEAST_SOLVING = 1.0, 0.5
 """Seconds that legs and the solver get even if the time is up: there would be no tour, or one by
@@ -95,8 +106,8 @@ class SpacePlan:
         With the words.
     ways : Ways
         Of the robot between waypoints.
-    taut : SpacePlan, optional
-        Where legs make detours, the best tour without any.
+    kind : str
+        `TAUT_LEGS`, `DETOURS`, `PLANE`, `OUT_AND_BACK` or `AS_GIVEN`.
     """
 
     mission: Mission
@@ -110,7 +121,7 @@ class SpacePlan:
     free: bool
     water: Water
     ways: Ways
-    taut: SpacePlan | None = None
+    kind: str = TAUT_LEGS
 
     @property
     def order(self) -> tuple[int, ...]:
@@ -122,6 +133,25 @@ class SpacePlan:
         """The same, and then those that no tether reaches."""
         rest = set(range(len(self.mission.waypoints))) - set(self.order)
         return (*self.order, *sorted(rest))
+
+    def replaces(self, other: SpacePlan) -> bool:
+        """Return whether this plan is to be taken instead of another that has passed the judge.
+
+        Parameters
+        ----------
+        other : SpacePlan
+            The other plan.
+
+        Returns
+        -------
+        bool
+            It visits more waypoints, or as many and is shorter. A tour along states and legs may
+            be longer than one of the plane by `SAVED`, for more is known of it.
+        """
+        if len(self.stops) != len(other.stops):
+            return len(self.stops) > len(other.stops)
+        known = self.kind == TAUT_LEGS and other.kind == PLANE
+        return self.length < other.length * (1.0 + (SAVED if known else 0.0))
 
     def planned(self, solver: str = "auto", seed: int = 0, bound: float | None = None) -> Mission:
         """The mission with its waypoints in the order of the tour, and the tour; waypoints that no
@@ -153,7 +183,8 @@ class SpacePlan:
                 )
                 for stop in self.stops
             ),
-            home=in_file(self.home), status=result.status, solver=solver, seed=seed,
+            home=in_file(self.home), status=result.status,
+            solver=solver if self.kind in (TAUT_LEGS, DETOURS) else self.kind, seed=seed,
             length=self.length, lower_bound=result.lower_bound,
             gap=relative_gap(self.length, result.lower_bound),
             bound_of_all=bound, gap_to_all=relative_gap(self.length, bound),
@@ -221,31 +252,162 @@ def plan(
     LimitReachedError
         No tour was found whose tether stays within its limit all along.
     """
+    kept: SpacePlan | None = None
+    with until_interrupt(time_limit) as clock:
+        for found in plans(
+            mission, scene=scene, field=field, grid=grid, solver=solver, params=params,
+            clock=clock, iteration_limit=iteration_limit, seed=seed, on_progress=on_progress,
+        ):  # fmt: skip
+            if kept is None or found.replaces(kept):
+                verdict = verify_mission(found.planned(), scene=scene, water=found.water)
+                kept = found if verdict else kept
+            if kept is not None and found.kind == TAUT_LEGS:
+                break
+        if kept is None:
+            raise LimitReachedError(
+                "waypoints: no tour was found whose tether stays within the limit all along"
+            )
+        return kept
+
+
+def plans(
+    mission: Mission,
+    *,
+    scene: Scene | None = None,
+    field: DistanceField | None = None,
+    grid: Grid | None = None,
+    water: Water | None = None,
+    solver: SolverLike = "auto",
+    params: Mapping[str, Any] | None = None,
+    clock: Clock,
+    iteration_limit: int | None = None,
+    seed: int = 0,
+    whole_tether: bool = False,
+    on_progress: Callable[[str], None] | None = None,
+) -> Iterator[SpacePlan]:
+    """Find tours of a mission's waypoints, the best first, which nobody has judged yet.
+
+    Parameters
+    ----------
+    mission : Mission
+        As of `plan`, as are all others.
+    scene : Scene, optional
+        Its scene.
+    field : DistanceField, optional
+        The scene's field.
+    grid : Grid, optional
+        That paths are sought on.
+    water : Water, optional
+        Of the mission, when its words are at hand.
+    solver : str or callable
+        As of `netsp.solvers.solve.solve_graph`.
+    params : mapping, optional
+        Options of the solver.
+    clock : Clock
+        When it is up, the best tours by then come.
+    iteration_limit : int, optional
+        Iterations of the solver.
+    seed : int
+        Of the solver.
+    whole_tether : bool
+        Whether tours of the plane may need all of the tether, for a caller that flies them.
+    on_progress : callable, optional
+        Called with a line of text now and then.
+
+    Yields
+    ------
+    SpacePlan
+        The tour of the plane, where all solids are upright prisms, before anything else is sought;
+        the tour with detours, if it is shorter than the next; the tour along taut ways; the tour
+        out along a taut tether to each waypoint and back, which is sought only when it is asked
+        for.
+
+    Raises
+    ------
+    InputError
+        As of `plan`.
+    """
+    check_plannable(mission, solver, params, seed)
+    how = {
+        "solver": solver, "seed": seed, "params": params, "iteration_limit": iteration_limit
+    }  # fmt: skip
+    if water is None:
+        check_size(mission)
+        if field is None or grid is None:
+            scene = scene or mission.load_scene()
+            check_bounds(mission, scene)
+            field = field or scene.field()
+            grid = grid_of(mission, scene, field)
+        mission = mission.checked_waypoints(field)
+        Places.of(mission, field)  # before words are sought, which takes longest
+        (on_progress or _silent)("words of the scene")
+        water = Water.within(mission, field, grid, None if scene is None else scene.bounds)
+    yield from _planned(water, scene, clock, on_progress or _silent, how, whole_tether)
+
+
+def given_plan(water: Water) -> SpacePlan | None:
+    """Drive a mission in the order of its file, as the plan that others have to be better than.
+
+    Parameters
+    ----------
+    water : Water
+        Of the mission.
+
+    Returns
+    -------
+    SpacePlan or None
+        As of `netsp.space.given_order.drive_given_order`; its ways are not sought.
+    """
+    driven = drive_given_order(water)
+    if driven is None:
+        return None
+    mission, places = water.mission, Places.of(water.mission, water.field)
+    visited = {stop.waypoint for stop in driven.stops}
+    return SpacePlan(
+        mission, tuple(driven.stops), driven.home, driven.length,
+        Result(None, driven.length, None, Status.FEASIBLE), len(driven.stops),
+        len(driven.stops) + 1,
+        tuple(n for n in range(len(mission.waypoints)) if n not in visited), driven.free, water,
+        Ways(water, places, Effort.of(len(places))), AS_GIVEN,
+    )  # fmt: skip
+
+
+def check_plannable(
+    mission: Mission, solver: SolverLike, params: Mapping[str, Any] | None, seed: int
+) -> None:
+    """Refuse what can be told to be wrong before anything is sought.
+
+    Parameters
+    ----------
+    mission : Mission
+        The mission.
+    solver : str or callable
+        As of `netsp.solvers.solve.solve_graph`.
+    params : mapping, optional
+        Options of the solver.
+    seed : int
+        Of the solver.
+
+    Raises
+    ------
+    InputError
+        A moving anchor; an unknown solver or option.
+    """
     if mission.track:
         raise InputError("track: a moving anchor has no one best order; expected a mission without")
-    with until_interrupt(time_limit) as clock:
-        _try_out(solver, params, seed)
-        how = {
-            "solver": solver, "seed": seed, "params": params, "iteration_limit": iteration_limit
-        }  # fmt: skip
-        return _planned(mission, scene, field, grid, clock, on_progress or (lambda _: None), how)
+    _try_out(solver, params, seed)
+
+
+def _silent(_: str) -> None:
+    """Tell nobody."""
 
 
 def _planned(
-    mission: Mission, scene: Scene | None, field: DistanceField | None, grid: Grid | None,
-    clock: Clock,
-    tell: Callable[[str], None], how: dict[str, Any],
-) -> SpacePlan:  # fmt: skip
-    check_size(mission)
-    if field is None or grid is None:
-        scene = scene or mission.load_scene()
-        check_bounds(mission, scene)
-        field = field or scene.field()
-        grid = grid_of(mission, scene, field)
-    mission = mission.checked_waypoints(field)
+    water: Water, scene: Scene | None, clock: Clock, tell: Callable[[str], None],
+    how: dict[str, Any], whole_tether: bool,
+) -> Iterator[SpacePlan]:  # fmt: skip
+    mission, field = water.mission, water.field
     places = Places.of(mission, field)
-    tell("words of the scene")
-    water = Water.within(mission, field, grid, None if scene is None else scene.bounds)
     # a robot that is farther out than the share may still come back
     limit = max(SHARE * mission.tether_length, water.present.length * (1.0 + ROUNDING))
     check_tether(mission, water.present.length)
@@ -267,11 +429,24 @@ def _planned(
         )
     hanging = {n: [states.all[s].tether.nodes for s in of] for n, of in states.of.items()}
     ways = Ways(water, places, effort, hanging)
+    board, growth = Board(water, states), Growth(states, ways)
+
+    def planned(result: Result, driven: Driven, kind: str) -> SpacePlan:
+        visited = {stop.waypoint for stop in driven.stops}
+        unreached = tuple(n for n in range(len(mission.waypoints)) if n not in visited)
+        return SpacePlan(
+            mission, tuple(driven.stops), driven.home, driven.length, result, len(states.all),
+            len(board.legs), unreached, driven.free, water, ways, kind,
+        )  # fmt: skip
+
+    if scene is not None:
+        for driven in tours_of_plan(
+            water, scene, places, clock.part(IN_PLANE), how["seed"], whole_tether=whole_tether
+        ):
+            yield planned(Result(None, driven.length, None, Status.FEASIBLE), driven, PLANE)
     ways.prepare_all(clock, tell)
     tell("trees of legs")
     states_of_trees(states, ways, clock.part(PLANTING))
-    growth = Growth(states, ways)
-    board = Board(water, states)
     board.take(growth.legs, clock.part(WAYS_OUT))
     if lacking := set(range(len(mission.waypoints))) - board.reached:
         tell("ways with room for the robot")
@@ -304,29 +479,22 @@ def _planned(
     shorter = None
     if states.hang_on_free_ends or not proven:
         shorter = Detours(board, ways).shortened(best and best[1], clock, tell, how["seed"])
-    if best is None and shorter is None:
-        raise LimitReachedError(
-            "waypoints: no tour was found whose tether stays within the limit all along"
-        )
-
-    def planned(result: Result, driven: Driven, taut: SpacePlan | None = None) -> SpacePlan:
-        unreached = (n for n in range(len(mission.waypoints)) if n not in board.reached)
-        return SpacePlan(
-            mission, tuple(driven.stops), driven.home, driven.length, result, len(states.all),
-            len(board.legs), tuple(unreached), driven.free, water, ways, taut,
-        )  # fmt: skip
 
     along_taut = None
     if best is not None:
         result, driven = best
         if not complete and result.status is Status.OPTIMAL:
             result = replace(result, status=Status.FEASIBLE)  # there are more legs within reach
-        along_taut = planned(result, driven)
-    if shorter is None:
-        assert along_taut is not None
-        return along_taut
-    # what the solver knew of its graph says nothing of legs that are not in it
-    return planned(Result(None, shorter.length, None, Status.FEASIBLE), shorter, along_taut)
+        along_taut = planned(result, driven, TAUT_LEGS)
+    if shorter is not None:
+        # what the solver knew of its graph says nothing of legs that are not in it
+        yield planned(Result(None, shorter.length, None, Status.FEASIBLE), shorter, DETOURS)
+    if along_taut is not None:
+        yield along_taut
+    tell("out along the tether and back")
+    fallback = board.out_and_back()
+    if fallback is not None:
+        yield planned(Result(None, fallback.length, None, Status.FEASIBLE), fallback, OUT_AND_BACK)
 
 
 def _try_out(solver: SolverLike, params: Mapping[str, Any] | None, seed: int) -> None:

@@ -1,57 +1,73 @@
 """From a mission to the same mission planned: order, legs, and a flight that proves them.
 
-Two ways are tried, and the better is kept: the tour of states and legs (`netsp.space.plan`), and
-the order by going straight on (`netsp.space.order`), which is better for some bodies with many free
-ends. What counts is the time until the robot is home, of a flight by `predictive`, which keeps to
-the legs of the first, and finds those of the second.
+The order in which the mission gives its waypoints comes first: it is driven and judged before
+anything is sought, and whatever is found later has to be better. Then come the tour of the plane
+where all solids are upright prisms (`netsp.space.prisms`), the tour of states and legs
+(`netsp.space.plan`), and the order by going straight on (`netsp.space.order`), which is better for
+some bodies with many free ends. What counts is the time until the robot is home, of a flight by
+`predictive`, and the length where there is no time to fly. One place takes tours in
+(`_Incumbents`), and it takes none that the judge refuses.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from netsp.clock import Clock, TimeLimit, until_interrupt
-from netsp.errors import LimitReachedError
+from netsp.errors import InputError, LimitReachedError
+from netsp.online.limits import check_bounds, check_size, check_tether
 from netsp.online.log import LogRow, Run
 from netsp.online.mission import Mission
 from netsp.online.planner import PlannerOptions
 from netsp.online.scene.field import DistanceField
 from netsp.online.scene.scene import Scene
-from netsp.online.simulate import grid_of, simulate
+from netsp.online.simulate import simulate
 from netsp.online.tour import PlannedStop, PlannedTour, in_file
 from netsp.solution import Status
 from netsp.solvers.solve import SolverLike
 from netsp.space.bound import bound_of_all
+from netsp.space.detours import SAVED
 from netsp.space.judge import verify_mission
 from netsp.space.order import order_by_going_on
-from netsp.space.plan import SpacePlan, plan
-from netsp.space.water import Water, along, has_room
+from netsp.space.places import Places
+from netsp.space.plan import (
+    AS_GIVEN,
+    OUT_AND_BACK,
+    PLANE,
+    ROUNDING,
+    TAUT_LEGS,
+    SpacePlan,
+    check_plannable,
+    given_plan,
+    plans,
+)
+from netsp.space.water import SHARE, Water, along, has_room
 from netsp.travel.result import relative_gap
 
-PLANNING, BOUNDING, ORDERING = 0.7, 0.3, 0.3
-"""Of the time left, what the tour of states and legs may take, then the bound, then the order by
-going straight on; the rest is for flights."""
+FLYING = 0.25
+"""Share of the time that the flight of the mission as it was given may take before anything is
+sought. Where that is not enough it is flown last, and compared by its length until then."""
 
-HURRY = 0.5
-"""Of the time limit: when less than that is left, flights that cannot be the best are cut short."""
+PLANNING, BOUNDING, ORDERING = 0.7, 0.3, 0.3
+"""Shares of the time left: what the tour of states and legs may take, then the bound, then the
+order by going straight on; the rest is for flights."""
 
 WORTH = 0.005
-"""Share of its time that a flight must save to be taken instead of a tour of which more is known;
-what is saved by stopping within reach of the start is less."""
+"""Share of its time that a flight by going straight on must save to be taken instead of a tour of
+which more is known; what is saved by stopping within reach of the start is less."""
 
-GOING_ON, AS_GIVEN = "going-straight-on", "as-given"
-"""Names of the older way and of the order of the file, where tours tell their solver."""
+GOING_ON = "going-straight-on"
+"""Name of the older way, where tours tell their solver."""
 
 
 @dataclass(frozen=True)
 class SolvedMission:
-    """A mission, planned.
+    """A mission, planned; its tour has passed the judge.
 
     Parameters
     ----------
@@ -94,32 +110,43 @@ class _Flights:
 
     mission: Mission
     scene: Scene
-    field: DistanceField
+    water: Water
     clock: Clock
     tell: Callable[[str], None]
-    planned: SpacePlan | None
 
-    @cached_property
-    def water(self) -> Water:
-        """With the words that tours name."""
-        if self.planned is not None:
-            return self.planned.water
-        return Water.of(self.mission, self.scene, self.field)
+    def of(
+        self, mission: Mission, name: str, worth: float = np.inf, clock: Clock | None = None
+    ) -> tuple[Run | None, bool]:
+        """Fly a mission to its end.
 
-    def of(self, mission: Mission, name: str, best: SolvedMission | None = None) -> Run | None:
-        """A flight to its end; None if the time was up before, or, where not much of it is left,
-        if the flight has taken longer than the best already: way home and all, it would be far from
-        it, and to plan the way home of a tether that is wound up takes longest."""
-        if self.clock.up:
-            return None
+        Parameters
+        ----------
+        mission : Mission
+            What is flown.
+        name : str
+            What it is called in progress.
+        worth : float
+            Seconds of the best flight so far: one that takes longer is cut short.
+        clock : Clock, optional
+            When it is up, the flight is cut short; by default that of all.
+
+        Returns
+        -------
+        run : Run or None
+            None where it was cut short.
+        slower : bool
+            Whether that was because it took longer than the best.
+        """
+        clock = clock or self.clock
+        if clock.up:
+            return None, False
         self.tell(f"flying {name}")
-
-        worth = np.inf if best is None or best.run is None else seconds_until_home(best.run)
-        limit = self.clock.limit or np.inf
+        slower = False
 
         def watch(row: LogRow, _: object) -> None:
-            hopeless = row.time > worth and self.clock.left < HURRY * limit
-            if self.clock.up or hopeless:
+            nonlocal slower
+            slower = row.time > worth
+            if slower or clock.up:
                 raise KeyboardInterrupt  # it ends a flight
 
         if all(w.heading is None for w in mission.waypoints):
@@ -127,15 +154,136 @@ class _Flights:
             mission = mission.model_copy(update={"camera": None})
         run = simulate(
             mission,
-            scene=self.scene, field=self.field, on_step=watch,
-            options=PlannerOptions(prepared=False, clock=self.clock),
+            scene=self.scene, field=self.water.field, on_step=watch,
+            options=PlannerOptions(prepared=False, clock=clock),
         )  # fmt: skip
-        return None if run.summary["status"] == "interrupted" else run
+        return (None, slower) if run.summary["status"] == "interrupted" else (run, False)
 
     def judged(self, mission: Mission) -> bool:
-        """Whether the judge finds no fault with a tour."""
+        """Return whether the judge finds no fault with a tour."""
         self.tell("judging the tour")
-        return bool(verify_mission(mission, scene=self.scene, field=self.field))
+        return bool(verify_mission(mission, scene=self.scene, water=self.water))
+
+
+@dataclass
+class _Incumbents:
+    """The best tour so far. All tours come in here, and none that the judge refuses.
+
+    Parameters
+    ----------
+    flights : _Flights
+        Of the mission.
+    first : SolvedMission or None
+        The order of the file, if it may be flown: no tour that is longer, or home later, is taken.
+    given : Run or None
+        The mission as it was given, flown.
+    best : SolvedMission or None
+        The best so far.
+    """
+
+    flights: _Flights
+    first: SolvedMission | None = None
+    given: Run | None = None
+    best: SolvedMission | None = None
+
+    def take_first(self, found: SolvedMission) -> bool:
+        """Take the order of the file, unless the judge refuses it; return whether it does not."""
+        if not self.flights.judged(found.mission):
+            return False
+        self.first = self.best = found
+        return True
+
+    def take_given(self, run: Run | None) -> None:
+        """Take the flight of the mission as it was given."""
+        self.given = run or self.given
+
+    def offer(self, found: SolvedMission, name: str) -> None:
+        """Take a tour if it passes the judge and is better than the best so far."""
+        best = self.best
+        if best is not None and (
+            len(found.tour.stops) < len(best.tour.stops)
+            or (len(found.tour.stops) == len(best.tour.stops) and not self._may_be_better(found))
+        ):
+            return
+        if not self.flights.judged(found.mission):
+            return
+        run, slower = self.flights.of(found.mission, name, self._worth())
+        found = replace(found, run=run)
+        if self._needs_flight(found) and (found.run is None or not _good(found.run)):
+            return
+        if best is None or (not slower and self._is_better(found, best)):
+            self.best = found
+
+    def _needs_flight(self, found: SolvedMission) -> bool:
+        """Return whether only a flight can tell that a tour is good: it needs what plans spare of
+        the tether for how the robot is steered."""
+        limit = SHARE * self.flights.mission.tether_length
+        in_plane = found.plan is not None and found.plan.kind == PLANE
+        return in_plane and found.tour.longest_tether > limit
+
+    def fly_best(self) -> None:
+        """Fly the best tour as it will be written, if it has not been flown."""
+        best = self.best
+        if best is not None and best.run is None:
+            run, _ = self.flights.of(best.mission, "it as it will be written")
+            self.best = replace(best, run=run)
+            self.first = self.best if best is self.first else self.first
+
+    def _seconds(self, found: SolvedMission) -> float | None:
+        """Return the seconds until home of a tour that was flown; the order of the file has been
+        flown as it was given."""
+        if found.run is not None:
+            return seconds_until_home(found.run)
+        if found is self.first and self.given is not None and _good(self.given):
+            return seconds_until_home(self.given)
+        return None
+
+    def _worth(self) -> float:
+        """Return the seconds after which a flight is not worth going on with."""
+        seconds = None if self.best is None else self._seconds(self.best)
+        return np.inf if seconds is None else (1.0 + SAVED) * seconds
+
+    def _may_be_better(self, found: SolvedMission) -> bool:
+        """Return whether a tour through as many waypoints may be better than the best so far."""
+        assert self.best is not None
+        seconds, mission = self._seconds(self.best), self.flights.mission
+        if seconds is None:
+            return found.tour.length < self.best.tour.length * self._allowed(found, self.best)
+        # a flight turns back within reach of each stop, and is faster by no more than that
+        saved = 2.0 * mission.reach * (1 + len(found.tour.stops))
+        return (found.tour.length - saved) / mission.speed < (1.0 + SAVED) * seconds
+
+    def _allowed(self, found: SolvedMission, best: SolvedMission) -> float:
+        """Return the factor by which a tour may be longer than the best: one along states and
+        legs, of which more is known, a little; one by going straight on must be shorter."""
+        old_way = (GOING_ON, AS_GIVEN)
+        if found.tour.solver == GOING_ON and best.tour.solver not in old_way:
+            return 1.0 - WORTH
+        known = found.plan is not None and found.plan.kind == TAUT_LEGS
+        return 1.0 + SAVED if known and best.tour.solver == PLANE else 1.0
+
+    def _is_better(self, found: SolvedMission, best: SolvedMission) -> bool:
+        """Return whether a tour that passed the judge is to be taken instead of the best."""
+        if found.run is not None and not _good(found.run):
+            return False
+        if len(found.tour.stops) > len(best.tour.stops):
+            return True
+        if self.first is not None and not self._no_worse(found, self.first):
+            return False
+        allowed = self._allowed(found, best)
+        seconds, of_best = self._seconds(found), self._seconds(best)
+        if seconds is not None and of_best is not None:
+            return seconds < allowed * of_best
+        return found.tour.length < allowed * best.tour.length
+
+    def _no_worse(self, found: SolvedMission, first: SolvedMission) -> bool:
+        """Return whether a tour is neither longer than the order of the file nor home later."""
+        if len(found.tour.stops) > len(first.tour.stops):
+            return True
+        if found.tour.length > first.tour.length * (1.0 + ROUNDING):
+            return False
+        seconds, of_first = self._seconds(found), self._seconds(first)
+        return seconds is None or of_first is None or seconds <= of_first * (1.0 + ROUNDING)
 
 
 def solve_mission(
@@ -188,129 +336,171 @@ def solve_mission(
     tell = on_progress or (lambda _: None)
     name = solver if isinstance(solver, str) else getattr(solver, "__name__", "solver")
     with until_interrupt(time_limit) as clock:
+        check_plannable(mission, solver, params, seed)
+        check_size(mission)
         scene = scene or mission.load_scene()
+        check_bounds(mission, scene)
         field = field or scene.field()
         mission = mission.checked_waypoints(field)
-        planned, failure, bound = None, None, None
-        best: SolvedMission | None = None
-        try:
-            planned = plan(
-                mission, scene=scene, field=field, solver=solver, params=params,
-                time_limit=clock.part(PLANNING), iteration_limit=iteration_limit, seed=seed,
-                on_progress=tell,
-            )  # fmt: skip
-        except LimitReachedError as error:
-            failure = error
-        flights = _Flights(mission, scene, field, clock, tell, planned)
-        if planned is not None:
-            tell("bound on all tours")
-            reached = sorted(planned.order)
-            bound = bound_of_all(planned.ways, reached, clock.part(BOUNDING), seed)
-            best = _of_plan(planned, name, seed, bound)
-            best = replace(best, run=flights.of(best.mission, "the tour"))
-            best = _or_without_detours(best, planned.taut, flights, name, seed, bound)
-        given = flights.of(mission, "the order as given", best)
-        best = _or_as_given(best, given, flights, bound, seed)
-        best = _or_going_on(best, flights, bound, seed)
-        if best is None:
-            raise failure or LimitReachedError("time limit reached before any tour was found")
-        return replace(best, given=given, plan=planned, interrupted=clock.stopped)
+        Places.of(mission, field)  # before words are sought, which takes longest
+        tell("words of the scene")
+        water = Water.of(mission, scene, field)
+        check_tether(mission, water.present.length)
+        flights = _Flights(mission, scene, water, clock, tell)
+        found = _Incumbents(flights)
+        _begin_as_given(found, clock.part(FLYING), seed)
+        searched = _search(found, clock, name, solver, params, iteration_limit, seed)
+        planned = searched.plan
+        if found.given is None:
+            given, _ = flights.of(mission, "the order as given")
+            found.take_given(given)
+            _offer_given_flight(found, seed)
+        _offer_going_on(found, seed)
+        if found.best is None:
+            raise searched.failure or LimitReachedError(
+                "waypoints: no tour was found whose tether stays within the limit all along"
+            )
+        found.fly_best()
+        _offer_given_flight(found, seed)
+        best = _with_bound(found.best, planned, searched.bound)
+        return replace(best, given=found.given, plan=planned, interrupted=clock.stopped)
 
 
-def _of_plan(planned: SpacePlan, solver: str, seed: int, bound: float | None) -> SolvedMission:
-    mission = planned.planned(solver, seed, bound)
+@dataclass
+class _Searched:
+    """What the search of states and legs has come to: its plan, the bound on all tours, and why
+    there is none."""
+
+    plan: SpacePlan | None = None
+    bound: float | None = None
+    failure: InputError | LimitReachedError | None = None
+
+
+def _begin_as_given(found: _Incumbents, flying: Clock, seed: int) -> None:
+    """Take the mission as it was given, first of all, whatever the time: its own tour, if it has
+    one that passes the judge, else its order. It is flown as long as the clock lasts."""
+    flights = found.flights
+    mission, tell = flights.mission, flights.tell
+    order = tuple(range(len(mission.waypoints)))
+    tell("the order as given")
+    taken = mission.tour is not None and found.take_first(
+        SolvedMission(mission, order, None, None, None)
+    )
+    if not taken:
+        water = replace(flights.water, mission=mission.model_copy(update={"tour": None}))
+        driven = given_plan(water)
+        if driven is not None:
+            found.take_first(_of_plan(driven, AS_GIVEN, seed))
+    given, _ = flights.of(mission, "the order as given", clock=flying)
+    found.take_given(given)
+    _offer_given_flight(found, seed)
+
+
+def _offer_given_flight(found: _Incumbents, seed: int) -> None:
+    """Offer the flight of the mission as it was given as a tour, where it is home earlier than the
+    best."""
+    given, best, mission = found.given, found.best, found.flights.mission
+    if given is None or not _good(given) or (best is not None and best.run is None):
+        return
+    worth = np.inf if best is None or best.run is None else seconds_until_home(best.run)
+    if seconds_until_home(given) >= worth:
+        return
+    order = tuple(range(len(mission.waypoints)))
+    water = found.flights.water
+    kept = tour_of_flight(mission, order, given, water.field, water, None, seed, AS_GIVEN)
+    if kept is None:
+        return
+    if best is None:
+        found.take_first(kept)
+    else:
+        found.offer(kept, "it as it will be written")
+
+
+def _search(
+    found: _Incumbents, clock: Clock, name: str, solver: SolverLike,
+    params: Mapping[str, Any] | None, iteration_limit: int | None, seed: int,
+) -> _Searched:  # fmt: skip
+    """Offer the tours that are found in the plane and of states and legs."""
+    flights, out = found.flights, _Searched()
+    if clock.up and found.best is not None:
+        return out  # what comes before the first plan is not cut short
+    candidates = plans(
+        flights.mission, scene=flights.scene, water=flights.water, solver=solver, params=params,
+        clock=clock.part(PLANNING), iteration_limit=iteration_limit, seed=seed,
+        whole_tether=True, on_progress=flights.tell,
+    )  # fmt: skip
+    try:
+        for plan in candidates:
+            if plan.kind == PLANE and found.best is not None and found.best.tour.solver == PLANE:
+                continue  # that for all of the tether is no longer
+            if plan.kind != PLANE and out.bound is None:
+                flights.tell("bound on all tours")
+                out.bound = bound_of_all(plan.ways, sorted(plan.order), clock.part(BOUNDING), seed)
+            out.plan = out.plan if out.plan is not None and plan.kind == OUT_AND_BACK else plan
+            found.offer(_of_plan(plan, name, seed), f"the tour ({plan.kind})")
+            if plan.kind == TAUT_LEGS and found.best is not None:
+                break
+    except (InputError, LimitReachedError) as error:
+        if found.best is None or not found.best.tour.stops:
+            raise
+        out.failure = error
+    return out
+
+
+def _of_plan(planned: SpacePlan, solver: str, seed: int) -> SolvedMission:
+    mission = planned.planned(solver, seed)
     return SolvedMission(mission, planned.every_waypoint, None, None, planned)
 
 
-def _or_without_detours(
-    best: SolvedMission, taut: SpacePlan | None, flights: _Flights, solver: str, seed: int,
-    bound: float | None,
-) -> SolvedMission:  # fmt: skip
-    """The better of a tour with detours and of the best one without: a tether that hangs otherwise
-    than it should after a detour may take long to come free."""
-    if taut is None:
+def _with_bound(
+    best: SolvedMission, planned: SpacePlan | None, bound: float | None
+) -> SolvedMission:
+    """Return a tour with the bound on all tours, where that is about the same waypoints. A robot
+    that turns back a bit before them goes less, by twice as much as it stays away, and once at
+    home."""
+    reached = set() if planned is None else set(planned.order)
+    if bound is None or reached != set(best.order[: len(best.tour.stops)]):
         return best
-    other = _of_plan(taut, solver, seed, bound)
-    if not flights.judged(best.mission):
-        return replace(other, run=flights.of(other.mission, "the tour without detours"))
-    if best.run is None or seconds_until_home(best.run) <= taut.length / best.mission.speed:
-        return best
-    run = flights.of(other.mission, "the tour without detours", best)
-    return best if run is None or not _better_than(run, best) else replace(other, run=run)
+    tour, mission = best.tour, best.mission
+    off = sum(
+        float(np.linalg.norm(np.subtract(stop.path[-1], place)))
+        for stop, place in zip(tour.stops, mission.places, strict=False)
+    )
+    off = 2.0 * off + float(np.linalg.norm(np.subtract(tour.home[-1], mission.start)))
+    bound = min(tour.length, max(0.0, bound - (off if off > ROUNDING else 0.0)))
+    tour = tour.model_copy(
+        update={"bound_of_all": bound, "gap_to_all": relative_gap(tour.length, bound)}
+    )
+    return replace(best, mission=mission.model_copy(update={"tour": tour}))
 
 
-def _or_going_on(
-    best: SolvedMission | None, flights: _Flights, bound: float | None, seed: int
-) -> SolvedMission | None:  # fmt: skip
-    """The better of a tour and of the order by going straight on, in both directions."""
+def _offer_going_on(found: _Incumbents, seed: int) -> None:
+    """Offer the order by going straight on, in both directions."""
+    flights = found.flights
     mission, clock = flights.mission.model_copy(update={"tour": None}), flights.clock
     if clock.up or mission.state is not None:
-        return best  # that way begins at the start
+        return  # that way begins at the start
     flights.tell("order by going straight on")
-    grid = grid_of(mission, flights.scene, flights.field)
-    limited = clock.part(ORDERING)
+    water = flights.water
     try:
-        found = order_by_going_on(mission, flights.field, grid, clock=limited, seed=seed)
-    except LimitReachedError:
-        return best
-    rest = tuple(n for n in range(len(mission.waypoints)) if n not in found)
-    for direction, tour in (("forward", found), ("in reverse", found[::-1])):
-        order = (*tour, *rest)
-        there = mission.model_copy(update={"waypoints": tuple(mission.waypoints[n] for n in order)})
-        run = flights.of(there, f"that order {direction}", best)
+        tour = order_by_going_on(
+            mission, water.field, water.grid, clock=clock.part(ORDERING), seed=seed
+        )
+    except (InputError, LimitReachedError):
+        return
+    rest = tuple(n for n in range(len(mission.waypoints)) if n not in tour)
+    for direction, there in (("forward", tour), ("in reverse", tour[::-1])):
+        order = (*there, *rest)
+        waypoints = tuple(mission.waypoints[n] for n in order)
+        ordered = mission.model_copy(update={"waypoints": waypoints})
+        run, slower = flights.of(ordered, f"that order {direction}", found._worth())
+        if slower:
+            continue
         if run is None:
             break
-        if best is not None and not _better_than(run, best):
-            continue
-        kept = tour_of_flight(there, order, run, flights.field, flights.water, bound, seed)
-        if kept is None or not flights.judged(kept.mission):
-            continue
-        again = flights.of(kept.mission, "it as it will be written")
-        if again is None or (best is not None and not _better_than(again, best)):
-            continue
-        best = replace(kept, run=again)
-    return best
-
-
-def _or_as_given(
-    best: SolvedMission | None, given: Run | None, flights: _Flights, bound: float | None,
-    seed: int,
-) -> SolvedMission | None:  # fmt: skip
-    """The better of a tour and of the mission as it was given, whose own tour is kept if it has
-    one."""
-    mission = flights.mission
-    order = tuple(range(len(mission.waypoints)))
-    if given is None and mission.tour is not None:
-        # no time to fly it, but to judge it
-        if best is not None and best.tour.length <= mission.tour.length:
-            return best
-        good = flights.judged(mission)
-        return SolvedMission(mission, order, None, None, None) if good else best
-    if given is None or (best is not None and not _better_than(given, best)):
-        return best
-    if mission.tour is not None and _good(given):
-        return SolvedMission(mission, order, given, None, None)
-    kept = tour_of_flight(
-        mission, order, given, flights.field, flights.water, bound, seed, AS_GIVEN
-    )
-    if kept is None or not flights.judged(kept.mission):
-        return best
-    again = flights.of(kept.mission, "it as it will be written")
-    if again is None:
-        if best is not None and best.run is not None:
-            return best
-        return kept  # there was no time to fly what will be written, but to judge it
-    return replace(kept, run=again) if best is None or _better_than(again, best) else best
-
-
-def _better_than(run: Run, best: SolvedMission) -> bool:
-    """Whether a flight is better than a tour that was flown; one that there was no time to fly
-    takes at least as long as its length says."""
-    if best.run is not None:
-        worth = (1.0 - WORTH) * seconds_until_home(best.run)
-        return better(run, best.run) and seconds_until_home(run) < worth
-    least = best.tour.length / best.mission.speed
-    return run.summary["visited"] >= len(best.tour.stops) and seconds_until_home(run) < least
+        kept = tour_of_flight(ordered, order, run, water.field, water, None, seed)
+        if kept is not None:
+            found.offer(kept, "it as it will be written")
 
 
 def _good(run: Run) -> bool:

@@ -13,12 +13,14 @@ from netsp.arrays import Bools, Floats
 from netsp.geometry import polylines
 from netsp.online.laid import first_tether, present_tether
 from netsp.online.mission import Mission
+from netsp.online.paths.beside import beside
 from netsp.online.paths.tree import OPEN as ALL_FREE
 from netsp.online.paths.tree import Grid, free_cells, states_of, taut
 from netsp.online.scene.field import DistanceField, pushed_out
 from netsp.online.scene.scene import Scene
 from netsp.online.simulate import grid_of
 from netsp.online.tether import GeodesicTether, Tether
+from netsp.online.tether.resolution import THINNEST
 from netsp.space.cells import FREE, OPEN
 from netsp.space.search import NONE, Found, shortest_words, way_back
 from netsp.space.signature import SpaceSignature
@@ -255,6 +257,39 @@ class Water:
         if mission.clearance >= 0.5 * mission.delta:
             return line
         return lifted(self.field, line, min(mission.clearance, room_at_ends(self.field, path)))
+
+    def taut_beside(self, line: Floats) -> Floats | None:
+        """Pull a tether's line taut as a path of the robot, in the line's class.
+
+        A tether rests on surfaces, so its line lies nearer to them than the clearance. Between
+        solids that are grown by the clearance such a line has no class: to pull it may take it
+        across a bar. So a path of another word is not taken, and the line is moved off the
+        surfaces before it is pulled once more.
+
+        Parameters
+        ----------
+        line : ndarray, shape (k, 3)
+            Free or on surfaces, metres.
+
+        Returns
+        -------
+        ndarray, shape (m, 3), or None
+            Metres; None where no path with room was found in the line's class.
+        """
+        word = self.number(line)
+        if word is None:
+            return None
+        path = self.taut(line)
+        if self.number(path) == word and has_room(self.field, path, self.mission):
+            return path
+        step = min(self.grid.cell, 0.5 * THINNEST * self.mission.delta)
+        clear = beside(self.field, polylines.points_along(line, step), self.mission.clearance)
+        if self.number(clear) != word:
+            return None
+        for path in (self.taut(clear), clear):
+            if self.number(path) == word and has_room(self.field, path, self.mission):
+                return path
+        return None
 
     def driven(self, tether: Tether, path: Floats, *, fine: bool = False) -> tuple[Tether, float]:
         """A tether, once the robot has gone a path.
