@@ -1,16 +1,30 @@
 """The judge passes what is right and fails every single thing that can be wrong."""
 
 import math
+from fractions import Fraction
 
 import numpy as np
 import pytest
+import shapely
 from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from netsp import Circle, InfeasibleError, Problem, solve, travel_graph, verify
+from netsp import (
+    Circle,
+    InfeasibleError,
+    Polygon,
+    Problem,
+    Solution,
+    State,
+    solve,
+    travel_graph,
+    verify,
+)
 from netsp.hsignature import signature
+from netsp.judge.orientation import orientation, orientations
 from netsp.judge.stringpull import StringPuller, reduce_sleeve
 from netsp.roadmap.taut import TautRoadmap
-from netsp.solution import ProblemReference, Status
+from netsp.solution import ProblemReference, Status, Visit
 from tests.worlds import random_world, small_worlds
 
 
@@ -199,3 +213,172 @@ def test_every_solution_of_a_small_world_is_verified(problem):
         return
     verdict = verify(problem, solve(problem))
     assert verdict, f"{problem.to_json()}\n{verdict}"
+
+
+def box(x0, y0, x1, y1):
+    return Polygon(polygon=[(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
+
+
+def test_a_tether_along_an_edge_of_the_triangles_is_pulled_right():
+    """The base, a corner of the obstacle and a corner of the judge's box lie on one line."""
+    problem = Problem(base=(11, 1), goals=[(0, 10)], obstacles=[box(5, 6, 6, 7)], tether_length=20)
+    verdict = verify(problem, solve(problem))
+    assert verdict, str(verdict)
+
+
+@pytest.mark.parametrize(
+    ("base", "goals"),
+    [((0, 0), [(-1, 1), (1, -1)]), ((0, 0), [(1, -1)]), ((-2, 2), [(0, 0), (2, -2)])],
+)
+def test_a_tour_may_stand_where_two_obstacles_touch(base, goals):
+    problem = Problem(
+        base=base, goals=goals, obstacles=[box(0, 0, 2, 2), box(-2, -2, 0, 0)], tether_length=14
+    )
+    verdict = verify(problem, solve(problem))
+    assert verdict, str(verdict)
+
+
+def out_and_back(problem, *path):
+    """The tour to the only goal by way of a path, and back on it, whatever lies in its way."""
+    there = [(*problem.base[:2], 0.0), *((float(x), float(y), 0.0) for x, y in path)]
+    line = np.array(there)
+    length = float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
+    visit = Visit(
+        goal=0, signature=signature(line, problem.representative_points), tether_length=length
+    )
+    return Solution(
+        problem=ProblemReference(name="x", sha256=problem.sha256), solver="drawn", roadmap="drawn",
+        status=Status.FEASIBLE, length=2.0 * length, lower_bound=None, gap=None, tour=(visit,),
+        path=tuple(map(tuple, [*there, *there[-2::-1]])),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        (box(0, 0, 2, 2), box(-2, -2, 0, 0)),
+        (box(0, -2, 2, 2), box(-2, -1, 0, 1)),
+        (Circle(center=(2, 0), radius=2), Circle(center=(-1, 0), radius=1)),
+        (Circle(center=(1, -1), radius=2**0.5), box(-2, 0, 0, 2)),
+    ],
+)
+def test_no_path_passes_where_two_obstacles_touch(one, other):
+    """Straight through the contact, from one side to the other."""
+    across = (-1.0, 1.0) if one == box(0, 0, 2, 2) else (0.0, 1.0)
+    if isinstance(one, Circle) and isinstance(other, Polygon):
+        across = (1.0, 1.0)
+    start, end = (3.0 * across[0], 3.0 * across[1]), (-3.0 * across[0], -3.0 * across[1])
+    problem = Problem(base=start, goals=[end], obstacles=[one, other], tether_length=20)
+    assert "enters no obstacle" in failed(problem, out_and_back(problem, (0, 0), end))
+
+
+@pytest.mark.parametrize(
+    ("obstacle", "clearance"),
+    [
+        (Circle(center=(5, 0), radius=1), 0.0),
+        (Circle(center=(5, 0), radius=0.5), 0.5),
+        (box(4, -1, 6, 1), 0.0),
+        (box(4.5, -1, 5.5, 0.5), 0.5),
+    ],
+)
+@pytest.mark.parametrize("depth", [1e-2, 1e-4])
+def test_a_path_that_enters_an_obstacle_by_little_fails(obstacle, clearance, depth):
+    """A straight path just below the top, at a height of 1 with the clearance."""
+    problem = Problem(
+        base=(0, 1.0 - depth), goals=[(10, 1.0 - depth)], obstacles=[obstacle],
+        clearance=clearance, tether_length=12,
+    )  # fmt: skip
+    inside = out_and_back(problem, problem.goals[0].position[:2])
+    assert "enters no obstacle" in failed(problem, inside)
+    free = Problem(
+        base=(0, 1), goals=[(10, 1)], obstacles=[obstacle], clearance=clearance, tether_length=12
+    )
+    assert verify(free, out_and_back(free, (10, 1.0)))
+
+
+def test_a_path_beyond_the_reach_of_the_tether_fails(pair):
+    """A spur on the way, out and back on one line: no goal has another tether for it."""
+    given, tour = pair
+    free = Problem(base=given.base, goals=given.goals, obstacles=given.obstacles, tether_length=12)
+    tour = edit(tour, problem=ProblemReference(name="x", sha256=free.sha256))
+    # the tether from the base straight to the left is as long as the spur
+    for far, right in ((11.99, True), (12.01, False), (37.8, False)):
+        spur = (tour.path[0], (-far, 0.0, 0.0), *tour.path)
+        length = tour.length + 2.0 * far
+        lie = edit(tour, path=spur, length=length, lower_bound=None, gap=None,
+                   status=Status.FEASIBLE)  # fmt: skip
+        assert failed(free, lie) == (set() if right else {"taut tether fits"})
+
+
+def test_the_reach_of_the_tether_counts_heights():
+    problem = Problem(base=(0, 0), goals=[(3, 0)], tether_length=5)
+    for depth, right in ((-3.99, True), (-4.01, False)):
+        spur = ((0.0, 0.0, 0.0), (3.0, 0.0, 0.0), (3.0, 0.0, depth), (3.0, 0.0, 0.0), (0.0,) * 3)
+        tour = out_and_back(problem, (3, 0))
+        lie = edit(tour, path=spur, length=6.0 - 2.0 * depth)
+        assert failed(problem, lie) == (set() if right else {"taut tether fits"})
+
+
+def test_a_tether_too_long_at_the_start_may_only_be_taken_in():
+    """The robot stands 2 m beyond its tether; on the way to the goal it may not go farther."""
+    state = State(position=(12, 0))
+    problem = Problem(base=(0, 0), goals=[(5, 0)], tether_length=10, state=state)
+    tour = solve(problem)
+    assert verify(problem, tour)
+    for x, right in ((11.5, True), (12.5, False)):
+        by_way = (tour.path[0], (x, 0.0, 0.0), (11.0, 0.0, 0.0), *tour.path[1:])
+        length = 2.0 * abs(x - 12.0) * (x > 12.0) + tour.length
+        lie = edit(tour, path=by_way, length=length, lower_bound=None, gap=None,
+                   status=Status.FEASIBLE)  # fmt: skip
+        assert failed(problem, lie) == (set() if right else {"taut tether fits"})
+    back = (tour.path[0], (11.0, 0.0, 0.0), (11.5, 0.0, 0.0), *tour.path[1:])
+    lie = edit(tour, path=back, length=tour.length + 1.0, lower_bound=None, gap=None,
+               status=Status.FEASIBLE)  # fmt: skip
+    assert failed(problem, lie) == {"taut tether fits"}
+
+
+@pytest.mark.parametrize("name", ["length", "lower_bound", "gap"])
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_numbers_that_are_none_fail(pair, name, value):
+    problem, solution = pair
+    assert "numbers are finite" in failed(problem, edit(solution, **{name: value}))
+
+
+def test_a_goal_behind_a_wall_thinner_than_the_tolerance_is_not_visited():
+    """The path ends within the tolerance of the goal, on the other side of a wall."""
+    wall = box(-5, 1.0, 5, 1.0 + 2e-7)
+    problem = Problem(base=(0, -5), goals=[(0, 1.0 + 3e-7)], obstacles=[wall], tether_length=20)
+    near = out_and_back(problem, (0, 1.0 - 1e-7))
+    assert failed(problem, near)
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_orientation_is_that_of_fractions(seed):
+    rng = np.random.default_rng(seed)
+    a, b = rng.integers(-3, 4, (2, 2)) / 10.0
+    c = a + rng.integers(-3, 4) * (b - a) + rng.integers(-1, 2, 2) * 2.0**-54
+    (ax, ay), (bx, by), (cx, cy) = ([Fraction(float(v)) for v in p] for p in (a, b, c))
+    exact = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+    sign = (exact > 0) - (exact < 0)
+    assert orientation(tuple(a), tuple(b), tuple(c)) == sign
+    assert orientations(a[None], b[None], c[None]).tolist() == [sign]
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.lists(st.tuples(st.integers(-4, 14), st.integers(-4, 14)), min_size=2, max_size=6))
+def test_a_path_run_backwards_crosses_the_same_edges(corners):
+    """Whole numbers: paths run along edges of triangles, and through their ends."""
+    obstacles = [box(2, 2, 4, 4), box(4, 4, 6, 6), box(7, 1, 8, 2), Circle(center=(1, 7), radius=1)]
+    problem = Problem(base=(0, 0), goals=[(10, 10)], obstacles=obstacles, tether_length=20)
+    puller = PULLERS.setdefault("whole", StringPuller(problem, 20.0))
+    path = np.array(corners, dtype=float)
+    shapes = [shapely.Polygon(s.shape) for s in puller.solids]
+    line = shapely.LineString(path)
+    pieces = [puller.crossings(path), puller.crossings(path[::-1])]
+    there, back = ([c for piece in p for c in piece] for p in pieces)
+    if not any(line.intersects(s) for s in shapes):
+        assert there == [(edge, not side) for edge, side in back[::-1]]
+        assert reduce_sleeve(there + [(e, not s) for e, s in there[::-1]]) == []
+
+
+PULLERS = {}

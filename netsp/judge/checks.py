@@ -8,7 +8,10 @@ plain distances (Shapely).
 from __future__ import annotations
 
 import itertools
+import math
+from collections import deque
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import shapely
@@ -16,6 +19,8 @@ import shapely
 from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.hsignature import Word, concatenate, crossings, entangled, reduce
+from netsp.judge.carried_tether import first_overstretch
+from netsp.judge.passage import passes
 from netsp.judge.solids import Inset, bridges
 from netsp.judge.stringpull import PLACE_TOLERANCE, StringPuller, reduce_sleeve
 from netsp.problem import Circle, Problem
@@ -127,6 +132,9 @@ def verify(problem: Problem, solution: Solution) -> Verification:
 TURNING_TOLERANCE = 1e-6
 """Radians; contacts with obstacles are found exactly."""
 
+AT_CONTACT = 8.0
+"""In tolerances: how far beyond a contact of two obstacles a path may reach and come back."""
+
 
 class _Judge:
     def __init__(self, problem: Problem, solution: Solution) -> None:
@@ -141,7 +149,6 @@ class _Judge:
         self.path: Floats = np.vstack([before, walked])
         self.out = len(before)
         self.place = max(PLACE_TOLERANCE * problem.scale, problem.tolerance)
-        self.puller = StringPuller(problem, problem.tether_length, self.place)
         self.tiny = 5.0 * problem.tolerance
         xy = problem.points[:, :2]
         near = [float(o.signed_distance(xy).min()) - problem.clearance for o in problem.obstacles]
@@ -150,10 +157,18 @@ class _Judge:
             self.tiny += STAND_OFF_ALLOWANCE * problem.scale
         self.visits: list[int] = []
 
+    @cached_property
+    def puller(self) -> StringPuller:
+        """Triangles of the free space, which cover the path."""
+        return StringPuller(self.problem, self.problem.tether_length, self.place, self.path)
+
     def run(self) -> list[Check]:
         checks = [self._belongs()]
         if self.solution.length is None:
             checks.append(Check("has a tour", False, f"status {self.solution.status.value}"))
+            return checks
+        if not self._is_finite():
+            checks.append(Check("numbers are finite", False, "one is not a number, or infinite"))
             return checks
         if self.problem.state is not None or self.out:
             checks.append(self._starts())
@@ -184,6 +199,14 @@ class _Judge:
             f"({self.solution.problem.sha256[:12]}…, this is {self.sha256[:12]}…)",
         )
 
+    def _is_finite(self) -> bool:
+        """Return whether all numbers are finite; copies of a model may hold others."""
+        s = self.solution
+        numbers = [s.length, s.lower_bound, s.gap, *(v.tether_length for v in s.tour)]
+        return bool(np.isfinite(self.path).all()) and all(
+            x is None or math.isfinite(x) for x in numbers
+        )
+
     def _starts(self) -> Check:
         """The path starts at the problem's state, with a tether of the state's word."""
         name, state = "starts at the state", self.problem.state
@@ -194,6 +217,8 @@ class _Judge:
             np.linalg.norm(self.path[k] - np.array(state.position))
             for k in (self.out - 1, self.out)
         )
+        if miss <= self.place:
+            self.path[[self.out - 1, self.out]] = state.position
         word = reduce(crossings(tether, self.problem.representative_points))
         if word != reduce(state.signature):
             return Check(name, False, f"the tether there has the word {list(word)}")
@@ -204,6 +229,8 @@ class _Judge:
             return Check("starts and ends at the base", False, "the path has fewer than 2 points")
         base = self.problem.points[0]
         miss = max(np.linalg.norm(self.path[0] - base), np.linalg.norm(self.path[-1] - base))
+        if miss <= self.place:
+            self.path[[0, -1]] = base
         return Check(
             "starts and ends at the base", bool(miss <= self.place), self._off(float(miss))
         )
@@ -251,30 +278,58 @@ class _Judge:
 
     def _visited(self) -> Check:
         """Find for each visit the path vertex at its goal, in order; several may lie there, so the
-        first with the stated word is taken."""
+        first with the stated word is taken. From then on the path runs through the goal itself, so
+        that words and lengths are those of exact places."""
+        name = "visits every goal in order"
         rays = self.problem.representative_points
         at = 0
         word: Word = ()
+        stops: list[tuple[int, Floats]] = []
         if self.out:  # goals that the tether passes at the start are not visited by that
             at = self.out
             word = reduce(crossings(self.path[: at + 1], rays))
+        here = self.path[at]
         for visit in self.solution.tour:
+            label = self.problem.goal_label(visit.goal)
             target = self.problem.points[visit.goal + 1]
+            if visit.position is not None and (
+                np.linalg.norm(np.array(visit.position) - target) > self.place
+            ):
+                return Check(name, False, f"{label} is not at {list(visit.position)}, as stated")
             gaps = np.linalg.norm(self.path[at:] - target, axis=1)
             candidates = at + np.flatnonzero(gaps <= self.place)
             if len(candidates) == 0:
-                label = self.problem.goal_label(visit.goal)
                 return Check(
-                    "visits every goal in order",
-                    False,
+                    name, False,
                     f"no path point at {label} after point {at}; nearest misses by "
                     f"{gaps.min():.3g}",
-                )
-            words = [concatenate(word, crossings(self.path[at : k + 1], rays)) for k in candidates]
+                )  # fmt: skip
+            words = [
+                concatenate(word, crossings(np.vstack([here, self.path[at + 1 : k], target]), rays))
+                for k in candidates
+            ]
             pick = next((i for i, w in enumerate(words) if w == reduce(visit.signature)), 0)
-            at, word = int(candidates[pick]), words[pick]
-            self.visits.append(at)
-        return Check("visits every goal in order", True, f"{len(self.path)} path points")
+            at, word, here = int(candidates[pick]), words[pick], target
+            stops.append((at, target))
+        self._run_through(stops)
+        return Check(name, True, f"{len(self.path)} path points")
+
+    def _run_through(self, stops: list[tuple[int, Floats]]) -> None:
+        """Put goals in place of the path vertices that are within the tolerance of them."""
+        ends = {0, len(self.path) - 1, self.out}
+        rows: list[Floats] = []
+        waiting = deque(stops)
+        for k, point in enumerate(self.path):
+            here = [] if waiting and waiting[0][0] == k and k not in ends else [point]
+            if k == len(self.path) - 1:
+                here = []
+            while waiting and waiting[0][0] == k:
+                here.append(waiting.popleft()[1])
+                self.visits.append(len(rows) + len(here) - 1)
+            if k == len(self.path) - 1:
+                here.append(point)
+            rows += here
+        self.path = np.array(rows)
 
     def _clear(self) -> Check:
         name = "enters no obstacle"
@@ -291,9 +346,11 @@ class _Judge:
                 return Check(name, False, f"enters {label} {how}")
             if room < nearest:
                 nearest, where = room, label
-        for i, j, ends in bridges(self.problem, self.puller.solids, self.problem.tolerance):
-            if line.intersects(shapely.LineString(ends)):
-                one, other = self.problem.obstacle_label(i), self.problem.obstacle_label(j)
+        for bridge in bridges(self.problem, self.puller.solids, self.puller.origin, self.place):
+            if line.dwithin(shapely.LineString(bridge.line), self.place) and passes(
+                bridge, self.path[:, :2] - self.puller.origin, AT_CONTACT * self.place
+            ):
+                one, other = map(self.problem.obstacle_label, (bridge.first, bridge.second))
                 return Check(name, False, f"passes between {one} and {other}, which touch")
         if not where:
             return Check(name, True, "there is none")
@@ -366,6 +423,7 @@ class _Judge:
         limit = self.problem.tether_length
         puller = self.puller
         pieces = puller.crossings(self.path)
+        known: dict[int, float] = {len(self.path) - 1: 0.0}
         points = self.problem.points
         # the tether that is out at the start is no leg
         sleeve: list[tuple[int, bool]] = reduce_sleeve(
@@ -395,23 +453,24 @@ class _Judge:
             low, high = np.hypot(tether.low, dz), np.hypot(tether.high, dz)
             label = self.problem.goal_label(point - 1)
             fits = max(fits, (float(low), label))
+            known[stop] = float(high)
             turns = max(turns, (tether.turning, label))
             stated = self.solution.tour[k].tether_length
             slack = TAUT_TOLERANCE * limit + self.tiny
             wrong = max(wrong, (float(max(low - stated, stated - high) - slack), label))
         self.pulled_total = pulled_total
         excess = fits[0] - limit
+        fit = excess <= 1e-9 * limit + self.tiny
+        longest = f"longest {fits[0]:.6g} of {limit:g}, at {fits[1]}"
         return [
             Check(
                 "contractible over triangles",
                 not sleeve,
                 "the tour shrinks to the base" if not sleeve else f"{len(sleeve)} edges remain",
             ),
-            Check(
-                "taut tether fits",
-                excess <= 1e-9 * limit + self.tiny,
-                f"longest {fits[0]:.6g} of {limit:g}, at {fits[1]}",
-            ),
+            self._along(pieces, known, longest)
+            if fit and not sleeve
+            else Check("taut tether fits", fit, longest),
             Check(
                 "taut lengths as stated",
                 wrong[0] <= 0.0,
@@ -421,6 +480,38 @@ class _Judge:
             ),
             *self._tension(*turns),
         ]
+
+    def _along(
+        self, pieces: list[list[tuple[int, bool]]], known: dict[int, float], longest: str
+    ) -> Check:
+        """Check that the tether, which fits at the goals, fits between them, too."""
+        name, limit = "taut tether fits", self.problem.tether_length
+        found = first_overstretch(
+            self.puller, self.path, pieces, limit * (1.0 + 1e-9) + self.tiny, known,
+            self._proud, self.out,
+        )  # fmt: skip
+        if found is None:
+            return Check(name, True, longest)
+        x, y, z = self.path[found.vertex]
+        at = f"({x:.6g}, {y:.6g})" if z == self.problem.base[2] else f"({x:.6g}, {y:.6g}, {z:.6g})"
+        return Check(name, False, f"{found.length:.6g} of {limit:g} on the way, at {at}")
+
+    def _proud(self, point: Floats) -> float:
+        """Return how far a point of a path stands out from an arc that is drawn circumscribed.
+
+        On the arc itself the tether fits, for it is part of a taut leg. The corner of a drawing
+        stands out from it, straight away from the disk, and the tether there is that much longer.
+        A drawing that is longer than its arc by the share `LENGTH_TOLERANCE` at most has corners
+        that stand out by 1.5 times that share of the radius at most: for the tangent of half an
+        arc's turn x is x (1 + x²/3 + …), and its secant 1 + x²/2 + ….
+        """
+        disks = self.puller.disks
+        if not len(disks):
+            return 0.0
+        centre = disks[:, :2] + self.puller.origin
+        out = np.hypot(*(point[:2] - centre).T) - disks[:, 2]
+        on_arc = out <= 1.5 * LENGTH_TOLERANCE * disks[:, 2]
+        return max(float(out[on_arc].max(initial=0.0)), 0.0)
 
     def _tension(self, turning: float, label: str) -> list[Check]:
         """What friction does to the tension (capstan), where that has a limit."""

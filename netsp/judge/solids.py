@@ -4,7 +4,8 @@ A path may touch an obstacle, and rounding may put it a hair inside. So what mus
 an *inset* obstacle: each circle's radius, and each corner of a polygon, is drawn in by the judge's
 tolerance, or by a fifth of the room that there is at that place, if that is less. A wall thinner
 than the tolerance keeps three fifths of its thickness, so nothing passes through it. Where two
-obstacles touch, their insets do not, and a *bridge* shuts the gap.
+obstacles touch, their insets do not, and a *bridge* shuts the gap. A path may reach a place where
+obstacles touch, and stand there, but not come from one side of it and leave on the other.
 """
 
 from __future__ import annotations
@@ -31,6 +32,14 @@ rounding themselves."""
 
 PHASE = 0.2371
 """Of a side: a phase no drawing has, so that symmetric worlds give no degenerate triangles."""
+
+
+TOUCHING = 2e-10
+"""Gap between two obstacles, as a share of the problem's size, up to which they touch: the free
+space of the theory is that among obstacles grown by half of it."""
+
+Outline = tuple[shapely.Geometry, float]
+"""A polygon and 0, or the centre of a circle and its radius."""
 
 
 @dataclass(frozen=True)
@@ -109,45 +118,97 @@ def _inward(v: Floats) -> Floats:
     return np.asarray(out / np.maximum(np.hypot(*out.T), 1e-300)[:, None])
 
 
-def bridges(problem: Problem, insets: list[Inset], gap: float) -> list[tuple[int, int, Floats]]:
-    """Pairs of obstacles that touch, to within a gap, with the (2, 2) segment between their insets
-    that no path may cross."""
+@dataclass(frozen=True)
+class Bridge:
+    """A place where two obstacles touch, and the line between their insets that shuts it.
+
+    Attributes
+    ----------
+    first, second
+        Indices of the obstacles.
+    contact
+        (2,) where they touch.
+    line
+        (k, 2) from inside the one inset, by way of the contact, to inside the other.
+    """
+
+    first: int
+    second: int
+    contact: Floats
+    line: Floats
+
+
+def bridges(problem: Problem, insets: list[Inset], origin: Floats, place: float) -> list[Bridge]:
+    """Return the places where obstacles touch, grown by the clearance; two may touch in several."""
     if len(insets) < 2:
         return []
-    shapes = np.array([s.shape for s in insets])
-    # a circle's polygon stands back from it by its sagitta, whichever obstacle it is
-    back = [s.depth + _sagitta(s) for s in insets]
-    pairs = shapely.STRtree(shapes).query(shapes, predicate="dwithin", distance=gap + 2 * max(back))
+    outlines = [_outline(o, origin) for o in problem.obstacles]
+    shapes = np.array([o if isinstance(o, shapely.Polygon) else o.buffer(r) for o, r in outlines])
+    reach = 2.0 * problem.clearance + TOUCHING * problem.scale + 2.0 * place
+    # the polygon of a circle stands back from it
+    back = max(r for _, r in outlines) * (1.0 - np.cos(np.pi / 32.0))
+    pairs = shapely.STRtree(shapes).query(shapes, predicate="dwithin", distance=reach + 2.0 * back)
+
+    def _inside(i: int, point: Floats) -> Floats:
+        """Return a point of the inset, which the straight line from a point of the obstacle reaches
+        without leaving the obstacle."""
+        outline, radius = outlines[i]
+        if radius:
+            return np.asarray(shapely.get_coordinates(outline)[0])
+        line = shapely.shortest_line(shapely.Point(point), insets[i].shape)
+        return np.asarray(shapely.get_coordinates(line)[-1])
+
     out = []
     for i, j in sorted({(min(a, b), max(a, b)) for a, b in pairs.T.tolist() if a != b}):
-        if shapes[i].intersects(shapes[j]):
-            continue
-        if _apart(problem, i, j) > gap:
-            continue
-        ends = shapely.get_coordinates(shapely.shortest_line(shapes[i], shapes[j]))
-        if all(isinstance(problem.obstacles[k], Circle) for k in (i, j)):
-            ends = np.array([insets[i].disks[0, :2], insets[j].disks[0, :2]])
-        out.append((i, j, ends))
+        for one, other in _contacts(outlines[i], outlines[j], problem, place):
+            line = [_inside(i, one), one, other, _inside(j, other)]
+            out.append(Bridge(i, j, 0.5 * (one + other), np.array(line)))
     return out
 
 
-def _sagitta(solid: Inset) -> float:
-    return float(solid.disks[:, 2].max() * (1.0 - np.cos(np.pi / SIDES)))
+def _outline(obstacle: Circle | Polygon, origin: Floats) -> Outline:
+    if isinstance(obstacle, Circle):
+        return shapely.Point(np.array(obstacle.center) - origin), obstacle.radius
+    return shapely.Polygon(np.array(obstacle.polygon) - origin), 0.0
 
 
-def _apart(problem: Problem, i: int, j: int) -> float:
-    """How far two grown obstacles are from each other."""
-    a, b = problem.obstacles[i], problem.obstacles[j]
-    if isinstance(a, Circle) and isinstance(b, Circle):
-        d = float(np.hypot(*(np.array(a.center) - b.center))) - a.radius - b.radius
-    elif isinstance(a, Polygon) and isinstance(b, Polygon):
-        d = float(shapely.Polygon(a.polygon).distance(shapely.Polygon(b.polygon)))
-    else:
-        circle, other = (a, b) if isinstance(a, Circle) else (b, a)
-        assert isinstance(circle, Circle)
-        assert isinstance(other, Polygon)
-        d = float(other.signed_distance(np.array([circle.center]))[0]) - circle.radius
-    return d - 2.0 * problem.clearance
+def _contacts(
+    a: Outline, b: Outline, problem: Problem, place: float
+) -> list[tuple[Floats, Floats]]:
+    """Return where two obstacles touch: a point (2,) of the one and one of the other for each."""
+    gap = 2.0 * problem.clearance + TOUCHING * problem.scale
+    (one, r), (other, q) = a, b
+    if r and q:
+        p, c = shapely.get_coordinates([one, other])
+        far = float(np.hypot(*(c - p)))
+        if far - r - q > gap or far <= abs(r - q):  # apart, or one within the other
+            return []
+        return [(p + r / far * (c - p), c + q / far * (p - c))]
+    if r or q:
+        circle, polygon, radius = (one, other, r) if r else (other, one, q)
+        centre = shapely.get_coordinates(circle)[0]
+        v = shapely.get_coordinates(polygon)
+        step = np.diff(v, axis=0)
+        along = ((centre - v[:-1]) * step).sum(1) / np.maximum((step * step).sum(1), 1e-300)
+        feet = v[:-1] + np.clip(along, 0.0, 1.0)[:, None] * step
+        far = np.hypot(*(feet - centre).T)
+        out = []
+        for foot in np.unique(feet[(far - radius <= gap) & (far > 0.0)], axis=0):
+            rim = centre + radius / np.hypot(*(foot - centre)) * (foot - centre)
+            out.append((rim, foot) if r else (foot, rim))
+        return out
+    if one.distance(other) > gap:
+        return []
+    # one contact in each part of the plane that is near to both
+    wide = 0.5 * gap + place
+    out = []
+    for part in shapely.get_parts(one.buffer(wide).intersection(other.buffer(wide))):
+        here = part.buffer(place)
+        p, c = one.intersection(here), other.intersection(here)
+        if not p.is_empty and not c.is_empty and p.distance(c) <= gap:
+            ends = shapely.get_coordinates(shapely.shortest_line(p, c))
+            out.append((ends[0], ends[1]))
+    return out
 
 
 def _unit_ring() -> Floats:

@@ -6,19 +6,30 @@ the *reduced* sequence, which is the path's homotopy class; the shortest path th
 edges is found with the funnel algorithm (Lee & Preparata 1984; Chazelle 1982; Hershberger &
 Snoeyink 1994). Its corners tell which disks the taut path touches, and with that its exact length
 (`netsp.judge.chain`).
+
+Degenerate positions are no exception here. Every side is decided by exact orientation
+(`netsp.judge.orientation`), and where a point of a path lies on the line of an edge, or a segment
+runs through the end of one, it is decided as if the whole path were moved by (-δ², δ) for an
+infinitesimal δ > 0 (Edelsbrunner & Mücke 1990, "Simulation of simplicity"). The moved path lies in
+general position, so its sequence of edges is a walk from triangle to triangle: the same for a
+segment and, reversed, for the segment run backwards. Start and end of a path lie in the closed
+first and last triangle of its walk, which is all that the funnel needs.
 """
 
 from __future__ import annotations
 
 import math
+from collections import deque
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 import shapely
 
-from netsp.arrays import Floats
+from netsp.arrays import Bools, Floats, Ints
 from netsp.judge.chain import contacts_of, exact_length
+from netsp.judge.orientation import Point, orientation, orientations
 from netsp.judge.solids import SIDES, inset
 from netsp.problem import Problem
 
@@ -47,9 +58,17 @@ class StringPuller:
         How far from base, goals and obstacles a path may go.
     place
         The judge's tolerance.
+    path
+        Points (n, 2 or more) that the triangles must cover, too.
     """
 
-    def __init__(self, problem: Problem, reach: float, place: float | None = None) -> None:
+    def __init__(
+        self,
+        problem: Problem,
+        reach: float,
+        place: float | None = None,
+        path: Floats | None = None,
+    ) -> None:
         self.problem = problem
         self.place = PLACE_TOLERANCE * problem.scale if place is None else place
         self.origin = np.array(problem.base[:2])
@@ -66,22 +85,36 @@ class StringPuller:
             (float(s.disks[:, 2].max()) * (1.0 - math.cos(math.pi / SIDES)) + s.depth
              for s in self.solids), default=0.0,
         )  # fmt: skip
+        triangles = shapely.get_parts(
+            shapely.constrained_delaunay_triangles(self._free(reach, path, shapes))
+        )
+        self._edges, self._beside = _interior_edges(triangles)
+        self._ends: list[tuple[Point, Point]] = [
+            ((a, b), (c, d)) for a, b, c, d in self._edges.tolist()
+        ]
+        self._tree = shapely.STRtree(shapely.linestrings(self._edges.reshape(-1, 2, 2)))
+
+    def _free(
+        self, reach: float, path: Floats | None, shapes: list[shapely.Polygon]
+    ) -> shapely.Geometry:
+        """Return the free space: a box with the obstacles taken out."""
+        problem = self.problem
         if problem.bounds is not None:
             bounds = np.array(problem.bounds) - np.tile(self.origin, 2)
-            box = shapely.box(*bounds).buffer(self.place, join_style="mitre")
+            # twice the tolerance, so that no point of a path within bounds lies on the outline
+            box = shapely.box(*bounds).buffer(2.0 * self.place, join_style="mitre")
         else:
-            box = shapely.MultiPoint(problem.points[:, :2] - self.origin)
+            points = problem.points[:, :2]
+            if path is not None:
+                points = np.vstack([points, path[:, :2]])
+            box = shapely.MultiPoint(points - self.origin)
             box = shapely.union_all([box, *shapes]).envelope.buffer(2.0 * reach, join_style="mitre")
-        free = box.difference(shapely.union_all(shapes)) if shapes else box
-        triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(free))
-        self._edges = _interior_edges(triangles)
-        self._tree = shapely.STRtree(shapely.linestrings(self._edges.reshape(-1, 2, 2)))
+        return box.difference(shapely.union_all(shapes)) if shapes else box
 
     def crossings(self, path: npt.ArrayLike) -> list[list[tuple[int, bool]]]:
         """Per segment of a polyline, the triangle edges crossed, in order, with the side come from.
 
-        Sides of vertices are half-open, as for rays, so that the sequence of a whole path is the
-        sequences of its parts put together.
+        The sequence of a whole path is the sequences of its parts put together.
         """
         xy = np.asarray(path, dtype=float)[:, :2] - self.origin
         out: list[list[tuple[int, bool]]] = [[] for _ in range(len(xy) - 1)]
@@ -89,15 +122,45 @@ class StringPuller:
         seg, edge = self._tree.query(segments, predicate=None)
         e = self._edges[edge]
         p, q, u, v = xy[seg], xy[seg + 1], e[:, :2], e[:, 2:]
-        p_left, q_left = _orient(u, v, p) >= 0.0, _orient(u, v, q) >= 0.0
-        u_side, v_side = _orient(p, q, u), _orient(p, q, v)
-        hit = (p_left != q_left) & ((u_side > 0.0) != (v_side > 0.0))
+        p_left, q_left = _left_of_edge(u, v, p), _left_of_edge(u, v, q)
+        apart = p_left != q_left
+        seg, edge, p_left = seg[apart], edge[apart], p_left[apart]
+        p, q, u, v = p[apart], q[apart], u[apart], v[apart]
+        hit = _left_of_segment(p, q, u) != _left_of_segment(p, q, v)
         seg, edge, p_left = seg[hit], edge[hit], p_left[hit]
-        a, b = _orient(u, v, p)[hit], _orient(u, v, q)[hit]
-        t = a / (a - b)
-        for k in np.lexsort((t, seg)):
-            out[seg[k]].append((int(edge[k]), bool(p_left[k])))
+        p, q, u, v = p[hit], q[hit], u[hit], v[hit]
+        a, b = _cross(u, v, p), _cross(u, v, q)
+        apart_by = np.where(a == b, 1.0, a - b)
+        # near the end of an edge rounding may swap crossings, and triangles tell their order
+        order = np.lexsort((a / apart_by, seg))
+        bounds = np.flatnonzero(np.diff(seg[order])) + 1
+        for group in np.split(order, bounds) if len(order) else []:
+            hits = list(zip(edge[group].tolist(), p_left[group].tolist(), strict=True))
+            out[seg[group[0]]] = self._as_walk(hits) if len(hits) > 1 else hits
         return out
+
+    def _as_walk(self, hits: list[tuple[int, bool]]) -> list[tuple[int, bool]]:
+        """Return the crossings of a segment so that each leaves the triangle that the one before
+        it entered; a segment through an obstacle has several such runs, in the order given."""
+        enters = {self._to(h) for h in hits}
+        leaves = {self._from(h): h for h in hits}
+        walk: list[tuple[int, bool]] = []
+        for first in hits:
+            if self._from(first) in enters:
+                continue
+            step: tuple[int, bool] | None = first
+            while step is not None:
+                walk.append(step)
+                step = leaves.pop(self._to(step), None)
+        return walk
+
+    def _from(self, crossing: tuple[int, bool]) -> int:
+        edge, from_left = crossing
+        return int(self._beside[edge, 0 if from_left else 1])
+
+    def _to(self, crossing: tuple[int, bool]) -> int:
+        edge, from_left = crossing
+        return int(self._beside[edge, 1 if from_left else 0])
 
     def pull(
         self, start: npt.ArrayLike, end: npt.ArrayLike, sleeve: list[tuple[int, bool]]
@@ -106,10 +169,10 @@ class StringPuller:
         a, b = (np.asarray(p, dtype=float)[:2] - self.origin for p in (start, end))
         portals = []
         for edge, from_left in sleeve:
-            u, v = self._edges[edge, :2], self._edges[edge, 2:]
+            u, v = self._ends[edge]
             # coming from the left of u→v, v lies on the left hand
             portals.append((v, u) if from_left else (u, v))
-        corners = _funnel(a, b, portals)
+        corners = _funnel((float(a[0]), float(a[1])), (float(b[0]), float(b[1])), portals)
         own = [(float(x), float(y)) for x, y in corners[1:-1]]
         contacts = contacts_of(corners, [self._disk_at.get(p, (*p, 0.0)) for p in own])
         exact = exact_length(a, b, contacts, self.disks, 1e-3 * self.place)
@@ -137,55 +200,80 @@ def reduce_sleeve(crossings: list[tuple[int, bool]]) -> list[tuple[int, bool]]:
     return out
 
 
-def _interior_edges(triangles: npt.NDArray[np.object_]) -> Floats:
-    """(k, 4) edges shared by two triangles."""
-    xy = shapely.get_coordinates(triangles).reshape(-1, 4, 2)
-    a, b = xy[:, :3].reshape(-1, 2), xy[:, 1:].reshape(-1, 2)
+def _interior_edges(triangles: npt.NDArray[np.object_]) -> tuple[Floats, Ints]:
+    """Return the edges (k, 4) shared by two triangles, from the end with the smaller x (then y) to
+    the other, and the triangles (k, 2) on their left and right."""
+    ring = shapely.get_coordinates(triangles).reshape(-1, 4, 2)[:, :3]
+    turned = orientations(ring[:, 0], ring[:, 1], ring[:, 2])
+    ring = np.where((turned < 0)[:, None, None], ring[:, ::-1], ring)
+    a, b = ring.reshape(-1, 2), np.roll(ring, -1, axis=1).reshape(-1, 2)
+    triangle = np.repeat(np.arange(len(ring)), 3)
     swap = (a[:, 0] > b[:, 0]) | ((a[:, 0] == b[:, 0]) & (a[:, 1] > b[:, 1]))
-    edges = np.where(swap[:, None], np.hstack([b, a]), np.hstack([a, b]))
-    unique, count = np.unique(edges, axis=0, return_counts=True)
-    return np.asarray(unique[count == 2])
+    ends = np.where(swap[:, None], np.hstack([b, a]), np.hstack([a, b]))
+    # a counter-clockwise triangle lies on the left of its edges
+    order = np.lexsort((swap, *ends.T[::-1]))
+    ends, triangle = ends[order], triangle[order]
+    shared = np.flatnonzero((ends[1:] == ends[:-1]).all(axis=1))
+    return ends[shared], np.column_stack([triangle[shared], triangle[shared + 1]])
 
 
-def _orient(a: Floats, b: Floats, c: Floats) -> Floats:
+def _left_of_edge(u: Floats, v: Floats, p: Floats) -> Bools:
+    """Return where p lies left of the edge from u to v. On its line it does: moved by (-δ², δ) it
+    lies left of any edge that runs to the right or, if neither way, up."""
+    return np.asarray(orientations(u, v, p) >= 0)
+
+
+def _left_of_segment(p: Floats, q: Floats, u: Floats) -> Bools:
+    """Return where u lies left of the segment from p to q. On its line it lies right of a segment
+    that runs to the right (or up), which moves to its left, and left of one that runs back."""
+    onward = (p[:, 0] < q[:, 0]) | ((p[:, 0] == q[:, 0]) & (p[:, 1] < q[:, 1]))
+    side = orientations(p, q, u)
+    return np.asarray((side > 0) | ((side == 0) & ~onward))
+
+
+def _cross(a: Floats, b: Floats, c: Floats) -> Floats:
     return np.asarray(
         (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
     )
 
 
-def _cross(o: Floats, a: Floats, b: Floats) -> float:
-    return float((a[0] - o[0]) * (b[1] - o[1]) - (a[1] - o[1]) * (b[0] - o[0]))
+def _funnel(a: Point, b: Point, portals: list[tuple[Point, Point]]) -> Floats:
+    """Return the corners of the shortest path from a to b through portals (left end, right end).
 
-
-def _funnel(a: Floats, b: Floats, portals: list[tuple[Floats, Floats]]) -> Floats:
-    """Corners of the shortest path from a to b through portals (left end, right end)."""
-    gates = [*portals, (b, b)]
+    The funnel of Lee & Preparata: shortest paths from the last corner to both ends of the portal,
+    the left one turning left only and the right one right only.
+    """
     corners = [a]
-    apex, left, right = a, a, a
-    left_at = right_at = -1
-    k = 0
-    while k < len(gates):
-        new_left, new_right = gates[k]
-        if _cross(apex, right, new_right) >= 0.0:
-            if (apex == right).all() or _cross(apex, left, new_right) < 0.0:
-                right, right_at = new_right, k
-            else:
-                corners.append(left)
-                apex, k = left, left_at
-                left = right = apex
-                right_at = left_at
-                k += 1
-                continue
-        if _cross(apex, left, new_left) <= 0.0:
-            if (apex == left).all() or _cross(apex, right, new_left) > 0.0:
-                left, left_at = new_left, k
-            else:
-                corners.append(right)
-                apex, k = right, right_at
-                left = right = apex
-                left_at = right_at
-                k += 1
-                continue
-        k += 1
-    corners.append(b)
-    return np.array(corners)
+    left: deque[Point] = deque()
+    right: deque[Point] = deque()
+
+    def narrow(side: deque[Point], other: deque[Point], p: Point, sense: int) -> None:
+        """Take p as the new end of one side; `sense` is 1 for the left one."""
+        while side:
+            before = side[-2] if len(side) > 1 else corners[-1]
+            if sense * orientation(before, side[-1], p) > 0:
+                break
+            side.pop()
+        if not side:
+            while other:
+                turn = sense * orientation(corners[-1], other[0], p)
+                if turn > 0 or (turn == 0 and not _beyond(corners[-1], other[0], p)):
+                    break
+                corners.append(other.popleft())
+        side.append(p)
+
+    last: tuple[Point | None, Point | None] = (None, None)
+    for portal in portals:
+        if portal[0] != last[0]:
+            narrow(left, right, portal[0], 1)
+        if portal[1] != last[1]:
+            narrow(right, left, portal[1], -1)
+        last = portal
+    narrow(left, right, b, 1)
+    out = [*corners, *left]
+    return np.array([out[0], *(q for p, q in pairwise(out) if p != q or q is out[-1])])
+
+
+def _beyond(a: Point, b: Point, c: Point) -> bool:
+    """Return whether c, on the line through a and b, does not lie before b."""
+    return (c[0] - b[0]) * (b[0] - a[0]) + (c[1] - b[1]) * (b[1] - a[1]) >= 0.0

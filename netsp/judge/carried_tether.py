@@ -1,0 +1,122 @@
+"""The taut tether as a robot carries it along a path: nowhere on the way may it be too long.
+
+Lemma. Let T(s) be the length of the taut tether at the point s of a path, in the class that the
+path gives it. Between two neighbouring vertices of the path T is nowhere longer than at the worse
+of the two. So T keeps a limit along the whole path when it keeps it at every vertex.
+
+Proof. A point of the cover is a position together with the class of the tether there, and T is the
+distance in the cover from the base with no tether out. In the plane the cover is CAT(0), and with
+heights it is the product of that and a line, which is CAT(0), too (docs/theory.md, facts 1 and 4).
+In a CAT(0) space the distance to a fixed point is convex along geodesics. A straight segment in
+free space lifts to a geodesic, so T is convex along it, and a convex function on an interval is
+largest at an end. ∎
+
+Not every vertex is pulled taut: T grows by no more than the way, so T at a vertex is at most T at
+the last place where it is known plus the way from there, and at most T at the next goal plus the
+way to it. Where the lesser of the two keeps the limit, so does T.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from netsp.arrays import Floats
+from netsp.judge.stringpull import StringPuller
+
+
+@dataclass(frozen=True)
+class Overstretch:
+    """The vertex of a path at which the tether exceeds its limit.
+
+    Attributes
+    ----------
+    vertex
+        Index in the path.
+    length
+        Of the taut tether there.
+    """
+
+    vertex: int
+    length: float
+
+
+def first_overstretch(
+    puller: StringPuller,
+    path: Floats,
+    pieces: list[list[tuple[int, bool]]],
+    limit: float,
+    known: dict[int, float],
+    allowance: Callable[[Floats], float],
+    start: int = 0,
+) -> Overstretch | None:
+    """Return the first vertex of a path at which the taut tether is too long, None if it fits.
+
+    A tether that is too long at the start may be so until it fits, but may not grow meanwhile.
+
+    Parameters
+    ----------
+    puller
+        Triangles of the free space.
+    path
+        Points (n, 3), from the base.
+    pieces
+        Edges of triangles that each segment of the path crosses.
+    limit
+        Length of the tether.
+    known
+        Tether at some vertices, the last one among them, none of them too long.
+    allowance
+        Called with a point (3,) of the path, returns what the tether may exceed the limit by.
+    start
+        The vertex from which on the robot moves; what is before it is the tether out at the start.
+    """
+    steps: Floats = np.linalg.norm(np.diff(path, axis=0), axis=1)
+    sleeve: list[tuple[int, bool]] = []
+    for piece in pieces[:start]:
+        _carry(sleeve, piece)
+
+    def pulled(k: int) -> float:
+        planar = puller.pull(path[0], path[k], sleeve).low
+        return float(np.hypot(planar, path[k, 2] - path[0, 2]))
+
+    most = pulled(start)
+    ceiling = max(limit, most)
+    homeward = _homeward(steps, known)
+    for k in range(start + 1, len(path)):
+        _carry(sleeve, pieces[k - 1])
+        if k in known:
+            most = known[k]
+            ceiling = limit
+            continue
+        most = min(most + float(steps[k - 1]), float(homeward[k]))
+        if most <= limit:
+            ceiling = limit
+            continue
+        most = pulled(k)
+        if most > ceiling and most > ceiling + allowance(path[k]):
+            return Overstretch(k, most)
+        ceiling = max(limit, min(ceiling, most))
+    return None
+
+
+def _carry(sleeve: list[tuple[int, bool]], piece: list[tuple[int, bool]]) -> None:
+    """Append crossings to a reduced sequence, in place, and cancel edges crossed back at once."""
+    for crossing in piece:
+        if sleeve and sleeve[-1][0] == crossing[0]:
+            sleeve.pop()
+        else:
+            sleeve.append(crossing)
+
+
+def _homeward(steps: Floats, known: dict[int, float]) -> Floats:
+    """Return for each vertex the tether at the next one where it is known, plus the way there."""
+    out = np.full(len(steps) + 1, np.inf)
+    for k in range(len(steps), -1, -1):
+        if k in known:
+            out[k] = known[k]
+        elif k < len(steps):
+            out[k] = out[k + 1] + steps[k]
+    return out
