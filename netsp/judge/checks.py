@@ -19,7 +19,7 @@ import shapely
 from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.hsignature import Word, concatenate, crossings, entangled, reduce
-from netsp.judge.carried_tether import first_overstretch
+from netsp.judge.overstretch import first_overstretch
 from netsp.judge.passage import passes
 from netsp.judge.solids import Inset, bridges
 from netsp.judge.stringpull import PLACE_TOLERANCE, StringPuller, reduce_sleeve

@@ -139,7 +139,10 @@ class Bridge:
 
 
 def bridges(problem: Problem, insets: list[Inset], origin: Floats, place: float) -> list[Bridge]:
-    """Return the places where obstacles touch, grown by the clearance; two may touch in several."""
+    """Return the places where obstacles touch, grown by the clearance, but their insets do not.
+
+    Two obstacles may touch in several places.
+    """
     if len(insets) < 2:
         return []
     outlines = [_outline(o, origin) for o in problem.obstacles]
@@ -160,7 +163,7 @@ def bridges(problem: Problem, insets: list[Inset], origin: Floats, place: float)
 
     out = []
     for i, j in sorted({(min(a, b), max(a, b)) for a, b in pairs.T.tolist() if a != b}):
-        for one, other in _contacts(outlines[i], outlines[j], problem, place):
+        for one, other in _contacts(problem, outlines[i], outlines[j], insets[i], insets[j], place):
             line = [_inside(i, one), one, other, _inside(j, other)]
             out.append(Bridge(i, j, 0.5 * (one + other), np.array(line)))
     return out
@@ -173,7 +176,7 @@ def _outline(obstacle: Circle | Polygon, origin: Floats) -> Outline:
 
 
 def _contacts(
-    a: Outline, b: Outline, problem: Problem, place: float
+    problem: Problem, a: Outline, b: Outline, inset_a: Inset, inset_b: Inset, place: float
 ) -> list[tuple[Floats, Floats]]:
     """Return where two obstacles touch: a point (2,) of the one and one of the other for each."""
     gap = 2.0 * problem.clearance + TOUCHING * problem.scale
@@ -193,7 +196,9 @@ def _contacts(
         feet = v[:-1] + np.clip(along, 0.0, 1.0)[:, None] * step
         far = np.hypot(*(feet - centre).T)
         out = []
-        for foot in np.unique(feet[(far - radius <= gap) & (far > 0.0)], axis=0):
+        # deeper in the circle the insets overlap, too
+        touched = (far - radius <= gap) & (far - radius >= -4.0 * place)
+        for foot in np.unique(feet[touched], axis=0):
             rim = centre + radius / np.hypot(*(foot - centre)) * (foot - centre)
             out.append((rim, foot) if r else (foot, rim))
         return out
@@ -201,8 +206,11 @@ def _contacts(
         return []
     # one contact in each part of the plane that is near to both
     wide = 0.5 * gap + place
+    shut = inset_a.shape.intersection(inset_b.shape)
     out = []
     for part in shapely.get_parts(one.buffer(wide).intersection(other.buffer(wide))):
+        if part.intersects(shut):
+            continue
         here = part.buffer(place)
         p, c = one.intersection(here), other.intersection(here)
         if not p.is_empty and not c.is_empty and p.distance(c) <= gap:

@@ -102,9 +102,11 @@ class FreeSpace:
             s.shape.buffer(INSET_SHARE * s.depth, join_style="mitre") if s.depth else s.shape
             for s in puller.solids
         ]
-        self._bridges = bridges(problem, puller.solids, problem.tolerance)
-        for _, _, ends in self._bridges:
-            shapes.append(shapely.LineString(ends).buffer(INSET_SHARE * self.place))
+        self._bridges = bridges(problem, puller.solids, self.origin, self.place)
+        shapes += [
+            shapely.LineString(bridge.line).buffer(INSET_SHARE * self.place)
+            for bridge in self._bridges
+        ]
         if problem.bounds is not None:
             box = shapely.box(*(np.array(problem.bounds) - np.tile(self.origin, 2)))
         else:
@@ -280,12 +282,12 @@ class FreeSpace:
         """Return the places where a path slips between obstacles that touch."""
         out = []
         line = shapely.LineString(xy - self.origin)
-        for i, j, ends in self._bridges:
-            meeting = line.intersection(shapely.LineString(ends))
+        for bridge in self._bridges:
+            meeting = line.intersection(shapely.LineString(bridge.line))
             for point in shapely.get_parts(shapely.centroid(shapely.get_parts(meeting))):
                 s = float(np.interp(line.project(point), polylines.along(xy), along))
                 place = (float(point.x + self.origin[0]), float(point.y + self.origin[1]))
-                out.append(Stretch("touching", (i, j), s, s, 0.0, place))
+                out.append(Stretch("touching", (bridge.first, bridge.second), s, s, 0.0, place))
         return out
 
 
