@@ -18,7 +18,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from netsp import Circle, Problem, solve
+from netsp import Circle, Polygon, Problem, solve
 from netsp.geometry import polylines
 from netsp.hsignature.rays import crossings, signature
 from netsp.pictures import style
@@ -122,29 +122,37 @@ def limit() -> Any:
 
 
 def pending() -> Any:
-    """A letter that a path writes and takes back, and one that it keeps."""
-    problem = Problem(
+    """A letter that a path writes and takes back, one that it keeps, and one that it takes back
+    around a hook that reaches across the ray from the path's own side."""
+    over = Problem(
         base=(-3.5, 1.2), goals=[(-3.5, 5.2), (3.5, 2.0)], tether_length=14,
         obstacles=[Circle(center=(0, 0), radius=0.4), Circle(center=(-0.6, 3.2), radius=1.3)],
     )  # fmt: skip
-    paths = TautPaths(problem)
-    figure, axes = panels(2, 9.0, 5.0)
-    for ax, (goal, word, title) in zip(
-        axes,
-        ((0, (-2,), "+1 is pending until −1 takes it back"), (1, (1,), "+1 is final")),
-        strict=True,
+    room = [(2, 2), (8, 2), (8, 8), (5, 8), (5, 7), (7, 7), (7, 3), (3, 3), (3, 7), (4, 7),
+            (4, 8), (2, 8)]  # fmt: skip
+    hooked = Problem(
+        base=(6.6, 4.2), goals=[(9, 7)], tether_length=14,
+        obstacles=[Circle(center=(6, 5.3), radius=0.5), Polygon(polygon=room)],
+    )  # fmt: skip
+    figure, axes = panels(3, 12.0, 4.6)
+    wide, tall = (-4.2, 4.2, -1.2, 6.6), (1.4, 9.8, 1.4, 9.4)
+    for ax, problem, goal, word, again, title, box in (
+        (axes[0], over, 0, (-2,), True, "+1 is pending until −1 takes it back", wide),
+        (axes[1], over, 1, (1,), False, "+1 is final", wide),
+        (axes[2], hooked, 0, (), True, "−1 is pending around the hook of 2", tall),
     ):
+        paths = TautPaths(problem)
         draw_obstacles(ax, problem)
-        draw_rays(ax, problem, 6.6)
+        draw_rays(ax, problem, box[3])
         path = paths.tether(goal, word)
         letters = crossings(path, problem.representative_points)
         assert 1 in letters
-        assert (-1 in letters) == (goal == 0)
+        assert (-1 in letters) == again
         ax.plot(*path.T[:2], color=style.TETHER, lw=1.6, zorder=5)
         draw_letters(ax, path, problem.representative_points)
         ax.plot(*problem.base[:2], "*", color=style.BASE, ms=11, zorder=6)
         ax.plot(*problem.goals[goal].position[:2], "o", color=style.GOAL, mec=style.PATH, zorder=6)
-        finish(ax, f"letters {told(letters)}, word {told(word)}:\n{title}", (-4.2, 4.2, -1.2, 6.6))
+        finish(ax, f"letters {told(letters)}, word {told(word)}:\n{title}", box)
     return figure
 
 

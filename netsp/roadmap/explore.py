@@ -8,9 +8,8 @@ trie's *core*. Each taut path is generated once, and in its class it is the only
 
 A ray that passes through another obstacle can be crossed and crossed back by one taut path, so the
 word of its beginnings may leave the core for a while. Such *pending* letters are followed exactly
-as long as they can still be cancelled: the obstacle that interrupts the ray lies on the other side
-of it, no pending letter repeats, and the robot stays on the side it crossed to (the lemma on
-pending letters).
+as long as they can still be cancelled: the path stays in the hull of the ray and of what the ray
+cuts off other obstacles (the lemma on pending letters).
 """
 
 from __future__ import annotations
@@ -26,6 +25,7 @@ from netsp.clock import NEVER, Flag
 from netsp.compiled.growing import longer, more_int_rows, more_rows
 from netsp.compiled.kernel import kernel
 from netsp.compiled.slots import rehashed
+from netsp.roadmap.pending_letters import MAX_PENDING, XMAX, XMIN, YMAX, YMIN
 from netsp.roadmap.tangents import TangentGraph
 from netsp.roadmap.trie import CORE, LETTER, PARENT, Trie, add_child, trie_child
 
@@ -122,11 +122,14 @@ def _may_wait(node: int, x: float, y: float, trie: Ints, pending: Floats) -> boo
         a = trie[v, LETTER]
         if not _in_box(a, x, y, pending):
             return False
+        count = 1.0
         u = trie[v, PARENT]
         while trie[u, CORE] == 0:
             if trie[u, LETTER] == a:
-                return False
+                count += 1.0
             u = trie[u, PARENT]
+        if count > pending[0 if a > 0 else 1, abs(a) - 1, MAX_PENDING]:
+            return False
         v = trie[v, PARENT]
     return True
 
@@ -136,10 +139,10 @@ def _in_box(a: int, x: float, y: float, pending: Floats) -> bool:
     side = 0 if a > 0 else 1
     i = abs(a) - 1
     return bool(
-        x >= pending[side, i, 0]
-        and y >= pending[side, i, 1]
-        and x <= pending[side, i, 2]
-        and y <= pending[side, i, 3]
+        x >= pending[side, i, XMIN]
+        and y >= pending[side, i, YMIN]
+        and x <= pending[side, i, XMAX]
+        and y <= pending[side, i, YMAX]
     )
 
 
@@ -181,7 +184,7 @@ def _walk(
         c = trie_child(node, a, trie)
         if c < 0:
             joins = _joins(node, a, rule, trie)
-            if not joins and pending[0 if a > 0 else 1, abs(a) - 1, 0] == np.inf:
+            if not joins and pending[0 if a > 0 else 1, abs(a) - 1, XMIN] == np.inf:
                 return -1, size
             c = size
             add_child(node, a, 1 if joins else 0, c, trie)
@@ -392,7 +395,7 @@ def run_explore(
         graph.segment_row, graph.arrival_row, graph.gap_row, graph.radius, 2 * len(graph.arcs),
         graph.longest_step,
     )  # fmt: skip
-    wide = graph.pending + margin * np.array([-1.0, -1.0, 1.0, 1.0])
+    wide = graph.pending + margin * np.array([-1.0, -1.0, 1.0, 1.0, 0.0])
     words = Words(graph.letters, wide, rule, SAME * margin)
     ask = Ask(
         keep, no_limit if cap is None else cap, rest, aim,

@@ -71,7 +71,7 @@ def arc_letters(
     boundary = math.floor(sign * start / quarter) + 1.0
     while True:
         nxt = sign * boundary * quarter
-        last = sign * (end - nxt) <= 0.0
+        last = not sign * (end - nxt) > 0.0  # ends, too, if an angle is NaN
         if last:
             x1, stop = bx, end
         else:

@@ -23,6 +23,7 @@ from netsp.compiled.tiers import choose
 from netsp.geometry.kernels import TWO_PI, Blockers, segment_blocked
 from netsp.roadmap.letters import arc_letters, segment_letters
 from netsp.roadmap.outline import Outline
+from netsp.roadmap.pending_letters import pending_boxes
 
 ARC_STEP = math.radians(3.0)
 """Arcs are drawn as circumscribed chords of at most this turn: 0.023 % longer than the arc."""
@@ -67,7 +68,7 @@ class TangentGraph:
     rays
         (n, 2) representative points.
     pending
-        (2, n, 4) boxes of `_pending_boxes`.
+        (2, n, 5) boxes of `netsp.roadmap.pending_letters`.
     """
 
     arcs: Floats
@@ -182,6 +183,8 @@ def assembled(
     first, turn, gap, letters, segment_row, arrival_row, gap_row = (clock or Clock()).finish(
         WRITING, steps, written
     )
+    blockers = outline.blockers
+    boxes = choose(pending_boxes, len(outline.rays) * (len(blockers.box) + len(blockers.edges)))
     radius = np.zeros(node_count)
     radius[: 2 * len(arcs)] = np.repeat(arcs[:, 2], 2)
     return TangentGraph(
@@ -202,7 +205,7 @@ def assembled(
         gap_row,
         radius,
         outline.rays,
-        _pending_boxes(outline),
+        boxes(outline.rays, blockers),
     )
 
 
@@ -248,35 +251,6 @@ def _merge_contacts(
     ends[:, :2], ends[:, 2:] = xy[:edges], xy[edges:]
 
 
-def _pending_boxes(outline: Outline) -> Floats:
-    """(2, n, 4) box in which a taut path must bend while letter +i / -i waits to be cancelled.
-
-    A taut path that crosses ray i and later crosses it back without going round obstacle i does so
-    around an obstacle that interrupts the ray further up and whose representative point lies on the
-    side the path came from. In between it is the shortest path homotopic to the piece of the ray,
-    pushed aside by what protrudes there, so it stays in the hull of the piece and the protrusions:
-    above point i, and no farther out than they are (lemma on pending letters in docs/theory.md).
-    The box is empty (xmin > xmax) when nothing protrudes, so that the letter is final. Rays of
-    equal x count as ordered by their numbers.
-    """
-    rays, box = outline.rays, outline.blockers.box
-    n = len(rays)
-    out = np.tile([np.inf, np.inf, -np.inf, -np.inf], (2, n, 1))
-    number = np.arange(n)
-    for i in range(n):
-        x, y = rays[i]
-        over = (box[:, 0] <= x) & (box[:, 2] >= x) & (box[:, 3] >= y)
-        before = (rays[:, 0] < x) | ((rays[:, 0] == x) & (number < i))
-        own = (number == i) & (outline.blockers.circles[:, 2] < 0.0)
-        for side, which in ((0, over & (before | own)), (1, over & (~before | own))):
-            which[i] = own[i]
-            if which.any():
-                b = box[which]
-                low, high = (x, b[:, 2].max()) if side == 0 else (b[:, 0].min(), x)
-                out[side, i] = (low, y, high, np.inf)
-    return out
-
-
 @kernel
 def _key(theta: float, sense: int, start: float, end: float, full: bool) -> float:
     """How far along the directed arc a contact angle lies; NaN if not on the arc."""
@@ -292,6 +266,15 @@ def _key(theta: float, sense: int, start: float, end: float, full: bool) -> floa
     if key < -ANGLE_TOLERANCE:
         return np.nan
     return key
+
+
+@kernel
+def _reverse_key(key: float, start: float, end: float, full: bool) -> float:
+    """How far along the arc run in the other sense the same contact lies. Found from the key, so
+    that rounding never puts a contact on an arc in one sense and off it in the other."""
+    if full:
+        return (TWO_PI - key) % TWO_PI
+    return end - start - key
 
 
 @kernel
@@ -349,12 +332,12 @@ def _tangents(
                     back_i, back_j = 0.0, 0.0
                     if i < a_count:
                         key_i = _key(theta_i, sense_i, si, ei, full[i])
-                        back_i = _key(theta_i, -sense_i, si, ei, full[i])
+                        back_i = _reverse_key(key_i, si, ei, full[i])
                         if math.isnan(key_i):
                             continue
                     if j < a_count:
                         key_j = _key(theta_j, sense_j, sj, ej, full[j])
-                        back_j = _key(theta_j, -sense_j, sj, ej, full[j])
+                        back_j = _reverse_key(key_j, sj, ej, full[j])
                         if math.isnan(key_j):
                             continue
                     ax, ay = xi + sense_i * ri * uy, yi - sense_i * ri * ux
