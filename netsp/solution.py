@@ -279,6 +279,8 @@ class Solution(Drawn, FileModel):
         (length - lower_bound) / length.
     classes : {"all", "non-looping", "shortest"} or None
         Which homotopy classes the roadmap held; `shortest` is the shortest of every goal.
+    legs_left_out : tuple of (int, int)
+        Pairs of goals (from 0), one for each leg whose taut path was not found.
     entangled : tuple of int
         Obstacles (from 0) that the path is wrapped around; only an `invalid` tour has any.
     """
@@ -355,6 +357,14 @@ class Solution(Drawn, FileModel):
     path: Annotated[
         tuple[PathPoint, ...],
         Field(description="closed polyline from base to base, in the problem's units"),
+    ] = ()
+    legs_left_out: Annotated[
+        tuple[tuple[int, int], ...],
+        Field(
+            description="pairs of goals, numbered from 0, one for each leg whose taut path was not "
+            "found: in its place stands the way back to the base and out again; lower_bound "
+            "holds for tours along such legs, too"
+        ),
     ] = ()
     start_tether: Annotated[
         tuple[PathPoint, ...],
@@ -447,8 +457,9 @@ class Solution(Drawn, FileModel):
         """
         data = self.model_dump(mode="json")
         path = data.pop("path")
-        if not self.start_tether:
-            del data["start_tether"]
+        for name in ("start_tether", "legs_left_out"):
+            if not data[name]:
+                del data[name]
         if self.classes is None:
             del data["classes"]
         if self.lower_bound_of is None:

@@ -6,6 +6,7 @@ import threading
 import time
 from typing import Protocol, TextIO
 
+from netsp.errors import counted
 from netsp.problem import Problem
 from netsp.solution import Solution, Status
 from netsp.travel.result import Progress
@@ -153,6 +154,8 @@ def summary(
     ]
     if solution.entangled:
         lines.insert(1, f"wraps    {len(solution.entangled)} obstacles: {wrapped}")
+    if solution.legs_left_out:
+        lines.insert(1, _left_out(problem, solution))
     if output:
         lines.append(f"solution {output}")
     if picture:
@@ -160,3 +163,20 @@ def summary(
     if trace:
         lines.append(f"trace    {trace}")
     return "\n".join(lines)
+
+
+MAX_NAMED_LEGS = 3
+"""Legs left out that the summary names; of more it says how many."""
+
+
+def _left_out(problem: Problem, solution: Solution) -> str:
+    """Return the line that says which legs were left out."""
+    legs = [
+        f"{problem.goal_name(a)} to {problem.goal_name(b)}" for a, b in solution.legs_left_out
+    ]  # fmt: skip
+    more = f" and {len(legs) - MAX_NAMED_LEGS} more" if len(legs) > MAX_NAMED_LEGS else ""
+    named = ", ".join(legs[:MAX_NAMED_LEGS]) + more
+    return (
+        f"left out {counted(len(legs), 'leg')} whose taut path was not found ({named}); the bound "
+        "holds for tours along them, too"
+    )

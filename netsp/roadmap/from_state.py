@@ -11,6 +11,7 @@ shortest tour has the free edge, and is the shortest path and twice the surcharg
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable, Iterator
 from functools import partial
 from itertools import pairwise
@@ -22,7 +23,7 @@ from netsp.arrays import Bools, Floats, Ints
 from netsp.clock import Clock, TimeLimit
 from netsp.errors import InputError, NetspError
 from netsp.hsignature import reduce
-from netsp.lower_bound import OPTIMALITY_TOLERANCE, LowerBound
+from netsp.lower_bound import OPTIMALITY_TOLERANCE, LowerBound, Scope
 from netsp.problem import Goal, Problem
 from netsp.roadmap.legs import TautLegs
 from netsp.roadmap.paths import TautPaths
@@ -130,6 +131,8 @@ class GraphFromState(TravelGraph):
         status = result.status
         if status.is_optimal:
             # proven to a millionth of the surcharged length, which is some lengths of the path
+            if own is not None and self.legs_left_out:
+                own = dataclasses.replace(own, scope=Scope.PART)
             closed = [b for b in (low, own) if b is not None and b.gap(length) <= ENOUGH]
             status = Status.optimal_of(closed[0].scope) if closed else Status.FEASIBLE
         return dataclasses.replace(
@@ -143,6 +146,13 @@ class GraphFromState(TravelGraph):
         if bound is None:
             return None
         return dataclasses.replace(bound, length=max(0.0, bound.length - 2.0 * self.surcharge))
+
+    def least_along_left_out(self) -> float:
+        """No path along one of the legs left out is shorter than the leg and the way home; the
+        surcharge counts as in every tour."""
+        first, leg, second = self.bounds_of_left_out().T
+        least = float((leg + np.minimum(first, second)).min(initial=math.inf))
+        return least + 2.0 * self.surcharge
 
     def least_by_way_of(self, tether: float) -> float:
         """No path by way of a class with so long a tether is shorter than the way home from there;
@@ -194,6 +204,13 @@ class _OpenedLegs:
 
     def __init__(self, within: TravelGraph, start: int, surcharge: float) -> None:
         self.within, self.start, self.surcharge = within, start, surcharge
+
+    @property
+    def left_out(self) -> set[tuple[int, int]]:
+        return set(self.within.legs_left_out)
+
+    def bounds_of_left_out(self) -> Floats:
+        return self.within.bounds_of_left_out()
 
     def _charged(self, table: Floats, rows: Ints, columns: Ints) -> Floats:
         return charged(table, rows, columns, self.start, self.surcharge)

@@ -15,7 +15,7 @@ from netsp.errors import LimitReachedError
 from netsp.hsignature import Word, concatenate, invert
 from netsp.memory import ask
 from netsp.roadmap.branches import OPEN, Branches, Lengths, branches_of, fill, spread
-from netsp.roadmap.paths import TautPaths
+from netsp.roadmap.paths import TautPaths, UnknownPathError
 from netsp.roadmap.pulled import Path, path_along, pull_each
 from netsp.roadmap.slits import Ends, flattened, slit_lengths
 from netsp.roadmap.tethertree import GrowingTree, TetherTree
@@ -50,6 +50,12 @@ class TautLegs:
     cluster, signatures, planar
         Goal (0 is the base), word and planar taut tether length of each vertex; the first is the
         base.
+
+    Attributes
+    ----------
+    left_out
+        Legs (u, v), u < v, whose taut path was not found. In their place stands the way back along
+        the tether of u and out along that of v, which is a leg of the same class, but no shorter.
     """
 
     def __init__(
@@ -59,6 +65,7 @@ class TautLegs:
         self.signatures = list(signatures)
         self._z = paths.problem.points[:, 2]
         self._tree: TetherTree | None = None
+        self.left_out: set[tuple[int, int]] = set()
 
     at_once = True
 
@@ -161,16 +168,43 @@ class TautLegs:
             if i >= len(vertices) or stop[0]:
                 return
             u, v = branches.order[sorted((i, j))].tolist()
-            length, path = self._searched(int(vertices[u]), int(vertices[v]), stop)
+            found = self._searched(int(vertices[u]), int(vertices[v]), stop)
+            if found is None:
+                around = share * self._by_way_of_base(int(vertices[u]), int(vertices[v]))
+                for x, y in ((u, v), (v, u)):
+                    if row[branches.rank[x]] >= 0:
+                        out[row[branches.rank[x]], y] = around
+                continue
+            length, path = found
             spread(u, v, length, len(path.whole) - 1, path.whole, path.real, branches, lengths)
 
-    def _searched(self, u: int, v: int, stop: Flag) -> tuple[float, Path]:
+    def _searched(self, u: int, v: int, stop: Flag) -> tuple[float, Path] | None:
         """Search for a leg that could not be pulled, and return its planar length and its path;
-        LimitReachedError when the flag is set before it is found."""
+        None if it is not found. LimitReachedError when the flag is set before."""
         a, b = int(self.cluster[u]), int(self.cluster[v])
         word, longest = self.relative_word(u, v), self._longest(u, v)
-        length, pieces = self.paths.pieces(a, b, word, longest, stop)
+        try:
+            length, pieces = self.paths.pieces(a, b, word, longest, stop)
+        except UnknownPathError:
+            return None
         return length, path_along(a, pieces, self.paths.tangents.target, self.paths.arcs)
+
+    def _by_way_of_base(self, u: int, v: int) -> float:
+        """3D length of the way back along one tether and out along another, for a leg whose taut
+        path was not found."""
+        self.left_out.add((min(u, v), max(u, v)))
+        tethers = self.to_base()
+        return float(tethers[u] + tethers[v])
+
+    def bounds_of_left_out(self) -> Floats:
+        """(k, 3) lower bounds for each of `left_out`: the tether at one end, the leg, the tether at
+        the other end, in 3D."""
+        tethers = self.to_base()
+        rows = [
+            (tethers[u], self.lower_bounds(np.array([u, v]))[0, 1], tethers[v])
+            for u, v in sorted(self.left_out)
+        ]
+        return np.array(rows).reshape(-1, 3)
 
     def _grown(self, stop: Flag) -> TetherTree:
         """Where the tethers part, found out once; unfinished when the flag is set."""
@@ -185,8 +219,12 @@ class TautLegs:
         for v in missing:
             if stop[0]:
                 break
-            path = known[v] if v in known else self._searched(0, v, stop)[1]
-            growing.add(v, path, paths.arcs)
+            path = known.get(v)
+            if path is None and (found := self._searched(0, v, stop)) is not None:
+                path = found[1]
+            # else nothing is known of it but its length, and no leg is shared beyond the base
+            if path is not None:
+                growing.add(v, path, paths.arcs)
         tree = growing.tree()
         if not stop[0]:
             self._tree = tree
@@ -257,7 +295,12 @@ class TautLegs:
         if u > v:  # searched once for both senses
             return self.path(v, u)[::-1].copy()
         word, longest = self.relative_word(u, v), self._longest(u, v)
-        return self.paths.path(int(self.cluster[u]), int(self.cluster[v]), word, longest)
+        try:
+            return self.paths.path(int(self.cluster[u]), int(self.cluster[v]), word, longest)
+        except UnknownPathError:
+            if 0 in (u, v):
+                raise
+            return np.vstack([self.path(u, 0), self.path(0, v)[1:]])
 
     def _longest(self, u: int, v: int) -> float:
         """More than the planar length of a leg: back along one tether to where the other parts, as
@@ -278,13 +321,23 @@ class TautLegs:
     def pairs(self, us: Ints, vs: Ints) -> Floats:
         """(k,) 3D lengths of legs between vertices of different goals."""
         planar = self._each(us, vs)
+        around: dict[int, float] = {}
         for k in np.flatnonzero(planar < 0.0).tolist():
             u, v = int(us[k]), int(vs[k])
+            if 0 in (u, v):
+                planar[k] = self.planar[max(u, v)]
+                continue
             a, b = int(self.cluster[u]), int(self.cluster[v])
-            planar[k] = self.paths.planar_length(
-                a, b, self.relative_word(u, v), self._longest(u, v)
-            )
-        return np.asarray(np.hypot(planar, self._z[self.cluster[us]] - self._z[self.cluster[vs]]))
+            try:
+                planar[k] = self.paths.planar_length(
+                    a, b, self.relative_word(u, v), self._longest(u, v)
+                )
+            except UnknownPathError:
+                around[k] = self._by_way_of_base(u, v)
+        out = np.hypot(planar, self._z[self.cluster[us]] - self._z[self.cluster[vs]])
+        for k, length in around.items():
+            out[k] = length
+        return np.asarray(out)
 
     def _each(self, us: Ints, vs: Ints) -> Floats:
         """(k,) planar lengths of legs, negative where they could not be pulled."""

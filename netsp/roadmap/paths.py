@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -14,7 +14,7 @@ from netsp.errors import InputError, LimitReachedError, NetspError
 from netsp.hsignature import Word
 from netsp.problem import Problem
 from netsp.roadmap.arcs import Arcs, arcs_of
-from netsp.roadmap.explore import run_explore
+from netsp.roadmap.explore import ALL, Found, run_explore
 from netsp.roadmap.outline import Outline, build_outline, is_free
 from netsp.roadmap.pulled import pull_each, pull_one
 from netsp.roadmap.shortest import ContactGraph
@@ -30,6 +30,10 @@ MOST_KNOWN = 5000
 """Paths that are remembered."""
 
 
+class UnknownPathError(NetspError):
+    """No taut path of a word was found."""
+
+
 class TautPaths:
     """Taut paths between the base (point 0) and the goals (points 1 …) of a problem.
 
@@ -40,6 +44,9 @@ class TautPaths:
         then only what the tether can touch is looked at.
     clock
         The clock of the run; without one, nothing here ends before it is done.
+    max_states
+        Most departures that the search among the paths of all words looks at for one path. It is
+        the last resort, where the search for the word finds none; a million take half a second.
 
     Raises
     ------
@@ -48,9 +55,11 @@ class TautPaths:
     """
 
     def __init__(
-        self, problem: Problem, longest: float | None = None, clock: Clock | None = None
-    ) -> None:
+        self, problem: Problem, longest: float | None = None, clock: Clock | None = None,
+        max_states: int = 1_000_000,
+    ) -> None:  # fmt: skip
         self.problem = problem
+        self.max_states = max_states
         self.outline: Outline = build_outline(problem, clock)
         reach = problem.tether_length if longest is None else longest
         self.tangents: TangentGraph = build_tangents(self.outline, reach, clock)
@@ -106,7 +115,7 @@ class TautPaths:
 
         Raises
         ------
-        NetspError
+        UnknownPathError
             A word without a path within the longest that this was made for.
         """
         from_, to = np.asarray(a, dtype=np.int64), np.asarray(b, dtype=np.int64)
@@ -218,8 +227,10 @@ class TautPaths:
         self, a: int, b: int, word: Word, longest: float | None, stop: Flag
     ) -> tuple[float, list[tuple[int, float]]]:
         found = self._sought(a, b, word, longest, stop)
+        if found is None and self._knows(word):
+            found = self._searched_among_all(a, b, word, longest, stop)
         if found is None:
-            raise NetspError(f"internal: no taut path of word {word} from {a} to {b}")
+            raise UnknownPathError(f"internal: no taut path of word {word} from {a} to {b}")
         return found
 
     def _sought(
@@ -236,24 +247,48 @@ class TautPaths:
     def _searched(
         self, a: int, b: int, word: Word, longest: float | None = None, stop: Flag = NEVER
     ) -> tuple[float, list[tuple[int, float]]] | None:
-        """As `_sought`, by a search."""
-        most = (self._longest if longest is None else longest) + self.margin
-        apart = math.dist(self.outline.points[a], self.outline.points[b])
-        # a search costs far more the longer the paths may be, and no class has two taut paths
-        limit, step = min(FIRST * apart + self.margin, most), FIRST
-        while True:
+        """As `_sought`, by a search for the word."""
+        for limit in self._limits(a, b, longest):
             trie = Trie.of_word(word, limit)
             found = run_explore(
                 self.tangents, a, trie, keep=True, margin=self.outline.margin, stop=stop
             )
-            wanted = np.flatnonzero((found.goal == b) & (found.word == len(word)))
-            if len(wanted):
-                best = int(wanted[np.argmin(found.length[wanted])])
-                return float(found.length[best]), found.pieces(best)
-            if stop[0]:
-                raise LimitReachedError(f"time limit reached while pulling a leg of word {word}")
-            if limit >= most:
+            best = _shortest(found, b, len(word))
+            if best is not None:
+                return best
+            _check(stop, word)
+        return None
+
+    def _searched_among_all(
+        self, a: int, b: int, word: Word, longest: float | None = None, stop: Flag = NEVER
+    ) -> tuple[float, list[tuple[int, float]]] | None:
+        """As `_sought`, by a search among the paths of all words: it drops no letter that is
+        pending. None, too, where it would take more than `max_states`."""
+        rest = self.contacts.rest(b).to_end
+        for limit in self._limits(a, b, longest):
+            trie = Trie.root(limit)
+            found = run_explore(
+                self.tangents, a, trie, keep=True, margin=self.outline.margin, rule=ALL,
+                toward=(b, rest), cap=self.max_states, stop=stop,
+            )  # fmt: skip
+            for w in np.unique(found.word[found.goal == b]).tolist():
+                if trie.word(w) == tuple(word):
+                    return _shortest(found, b, w)
+            _check(stop, word)
+            if found.capped:
                 return None
+        return None
+
+    def _limits(self, a: int, b: int, longest: float | None) -> Iterator[float]:
+        """Lengths up to which a path is sought, one after the other: a search costs far more the
+        longer the paths may be, and no class has two taut paths."""
+        most = (self._longest if longest is None else longest) + self.margin
+        apart = math.dist(self.outline.points[a], self.outline.points[b])
+        limit, step = min(FIRST * apart + self.margin, most), FIRST
+        while True:
+            yield limit
+            if limit >= most:
+                return
             step = min(step**2, DEEPEST)
             limit = min(max(step * limit, LEAST * most), most)
 
@@ -329,3 +364,21 @@ class TautPaths:
         keep = np.concatenate([[True], np.any(np.diff(xy, axis=0) != 0.0, axis=1)])
         keep[-1] = True
         return np.asarray(xy[keep] if keep.sum() > 1 else xy[[0, -1]])
+
+
+def _shortest(
+    found: Found, goal: int, word: int
+) -> tuple[float, list[tuple[int, float]]] | None:  # fmt: skip
+    """Return the length and the pieces of the shortest hit of a goal with the word of a trie's
+    node; None if there is none."""
+    wanted = np.flatnonzero((found.goal == goal) & (found.word == word))
+    if not len(wanted):
+        return None
+    best = int(wanted[np.argmin(found.length[wanted])])
+    return float(found.length[best]), found.pieces(best)
+
+
+def _check(stop: Flag, word: Word) -> None:
+    """LimitReachedError if the flag of a clock is set."""
+    if stop[0]:
+        raise LimitReachedError(f"time limit reached while pulling a leg of word {word}")

@@ -49,6 +49,11 @@ def to_solution(
         tour=visits,
         path=tuple((float(x), float(y), float(z)) for x, y, z in path),
         start_tether=tuple((float(x), float(y), float(z)) for x, y, z in graph.start_tether),
+        legs_left_out=tuple(
+            (int(graph.goal[u]) - 1, int(graph.goal[v]) - 1)
+            for u, v in graph.legs_left_out
+            if graph.start not in (u, v)
+        ),
         timings=timings or Timings(),
         versions=versions(),
     )

@@ -48,6 +48,14 @@ class _LegsOfChoices:
         self.graph, self.cluster = graph, cluster
 
     @property
+    def left_out(self) -> set[tuple[int, int]]:
+        """As beneath."""
+        return set(self.graph.legs_left_out)
+
+    def bounds_of_left_out(self) -> Floats:
+        return self.graph.bounds_of_left_out()
+
+    @property
     def quick(self) -> bool:
         """As beneath."""
         return self.graph.quick_legs

@@ -796,6 +796,8 @@ class TravelGraph(Drawn):
         if result.bound is None and (result.tour is None or not self.bound_in_any_class):
             return result
         bound = self.bound_as_asked(result.bound, anywhere=result.tour is not None)
+        if self.legs_left_out:
+            result = replace(result, lower_bound_of=Scope.PART)
         return result if bound is None else with_bound(result, bound)
 
     def bound_as_asked(
@@ -817,6 +819,11 @@ class TravelGraph(Drawn):
         """
         own = self.scope if bound is None else bound.scope
         whole = self._with_classes_left_out(own)
+        if bound is not None and self.legs_left_out:
+            bound = bound.or_elsewhere(
+                self.least_along_left_out(), own,
+                "a tour along a leg left out comes from the base and goes home",
+            )  # fmt: skip
         if bound is not None and whole is not own:
             bound = bound.or_elsewhere(
                 self.least_by_way_of(self.least_left_out), whole,
@@ -835,6 +842,33 @@ class TravelGraph(Drawn):
             return own
         larger = {Scope.KEPT_CLASSES: Scope.ALL_TOURS, Scope.KEPT_IN_ORDER: Scope.GIVEN_ORDER}
         return larger.get(own, own)
+
+    @property
+    def legs_left_out(self) -> list[tuple[int, int]]:
+        """Legs whose taut path was not found, as pairs of vertices. Their costs are those of the
+        way back to the base and out again."""
+        return sorted(getattr(self._legs, "left_out", ()))
+
+    def bounds_of_left_out(self) -> Floats:
+        """Lower bounds for the legs left out.
+
+        Returns
+        -------
+        ndarray, shape (k, 3)
+            The tether at one end, the leg, and the tether at the other end.
+        """
+        bounds = getattr(self._legs, "bounds_of_left_out", None)
+        return np.zeros((0, 3)) if bounds is None else np.asarray(bounds())
+
+    def least_along_left_out(self) -> float:
+        """No tour along one of the legs left out is shorter: it comes from the base and goes home.
+
+        Returns
+        -------
+        float
+            The bound; inf if none is left out.
+        """
+        return float(self.bounds_of_left_out().sum(axis=1).min(initial=math.inf))
 
     def least_by_way_of(self, tether: float) -> float:
         """No tour by way of a class with so long a tether is shorter: it goes there and back.
@@ -882,6 +916,16 @@ class _PartOfLegs:
 
     def __init__(self, graph: TravelGraph, chosen: Ints) -> None:
         self.graph, self.chosen = graph, chosen
+
+    @property
+    def left_out(self) -> set[tuple[int, int]]:
+        place = {int(v): k for k, v in enumerate(self.chosen)}
+        return {
+            (place[u], place[v]) for u, v in self.graph.legs_left_out if u in place and v in place
+        }
+
+    def bounds_of_left_out(self) -> Floats:
+        return self.graph.bounds_of_left_out()
 
     def lengths(
         self, vertices: Ints, asked: Bools | None = None, clock: Clock | None = None
