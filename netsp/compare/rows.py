@@ -102,6 +102,7 @@ _WORLD: dict[str, tuple[type, ...]] = {
 }  # fmt: skip
 _VALUES: dict[str, tuple[type, ...]] = {
     "length": _MAYBE, "lower_bound": _MAYBE, "gap": _MAYBE, "total_s": _MAYBE,
+    "cpu_s": _MAYBE,
     "roadmap_s": _MAYBE, "matrix_s": _MAYBE, "solve_s": _MAYBE, "longest_tether": _MAYBE,
     "entangled": (int, type(None)), "redrawn": (int, type(None)),
     "problem_sha256": (str, type(None)), "versions": (dict, type(None)),

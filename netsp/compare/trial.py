@@ -56,11 +56,11 @@ def run(trial: Trial) -> TrialRow:
         if not history or (p.incumbent, bound) != history[-1][1:]:
             history.append((round(p.time, 4), p.incumbent, bound))
 
-    begin = time.perf_counter()
+    begin, cpu_begin = time.perf_counter(), _cpu_s()
     try:
         problem, row["redrawn"] = world_of(trial)
         row["problem_sha256"] = problem.sha256
-        begin = time.perf_counter()
+        begin, cpu_begin = time.perf_counter(), _cpu_s()
         solution = solve(
             problem,
             trial.solver["name"],
@@ -96,7 +96,14 @@ def run(trial: Trial) -> TrialRow:
             "versions": solution.versions,
         }
     row.setdefault("total_s", round(time.perf_counter() - begin, 6))
+    row["cpu_s"] = round(_cpu_s() - cpu_begin, 6)
     return row
+
+
+def _cpu_s() -> float:
+    """Return the CPU seconds so far of this process and of the programs that it has run."""
+    t = os.times()
+    return t.user + t.system + t.children_user + t.children_system
 
 
 def thinned(history: list[Any]) -> list[Any]:
