@@ -14,13 +14,18 @@ import json
 import statistics
 import sys
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from table import ROOT, head, row, source
 
+from netsp.compare.path_comparison import PathComparison, compare_paths
+from netsp.compare.path_study import PathStudy
+from netsp.problem import Problem
 from netsp.report.stats import is_proven
+from netsp.site.path_file import read_paths
 
 KEPT = ROOT / "studies" / "results"
 POINTS = 12
@@ -35,6 +40,8 @@ TABLE_ONE = (
     ("16.20", 9), ("40.08", 2), ("0.80", 1), ("65.57", 1),
 )  # fmt: skip
 """McCammon & Hollinger 2017, Table I, by goals, then tether: median seconds, worlds proven."""
+
+TABLE_TWO = ROOT / "studies" / "paths" / "icra2017-table2.toml"
 
 FIG_FIVE = {
     "mip": "0, up to 12,000 s",
@@ -194,7 +201,33 @@ def fig_four() -> None:
             f"{sum(b > 0 for b in blind)} of {len(blind)}", mean("greedy-2016"))  # fmt: skip
 
 
-TABLES: tuple[Callable[[], None], ...] = (table_one, fig_five, fig_three, fig_four)
+def compared_paths() -> PathComparison:
+    """Compare the paths of the study of Table II, as `netsp compare-path` does."""
+    study, place = PathStudy.load(TABLE_TWO), TABLE_TWO.parent
+    problem = Problem.load(place / study.problem)
+    paths = [
+        replace(read_paths(place / p.file, problem)[0], name=p.label) for p in study.paths
+    ]  # fmt: skip
+    return compare_paths(problem, paths)
+
+
+def table_two() -> None:
+    """Print McCammon & Hollinger 2017, Table II, beside ours."""
+    study, found = PathStudy.load(TABLE_TWO), compared_paths()
+    published = {p.label: (p.published, study.published_percent(k))
+                 for k, p in enumerate(study.paths)}  # fmt: skip
+    published["planned tour"] = (study.published_tour, 0.0)
+    head("path", "paper m", "% over its tour", "ours m", "% over our tour", "tether m of 20",
+         "home", "order at best m", "order: % over our tour", name="icra2017-table2")  # fmt: skip
+    for r in found.rows():
+        length, percent = published[r["path"]]
+        row(r["path"], f"{length:.1f}", f"{percent:.1f}", f"{r['length']:.2f}",
+            f"{r['longer_by_percent']:.1f}", f"{r['longest_tether']:.2f}",
+            "free" if r["free"] else "entangled", f"{r['order_length']:.2f}",
+            f"{r['order_longer_by_percent']:.1f}")  # fmt: skip
+
+
+TABLES: tuple[Callable[[], None], ...] = (table_one, table_two, fig_five, fig_three, fig_four)
 
 
 def main() -> None:

@@ -163,6 +163,21 @@ def studies_again() -> tuple[str, bool]:
     return f"{same} of {same + len(differs)}" + (f": {differs[0]}" if differs else ""), not differs
 
 
+def systematic_paths() -> tuple[str, bool]:
+    """Compare the systematic paths of the wharf again, as published."""
+    import studies
+
+    rows = {r["path"]: r for r in studies.compared_paths().rows()}
+    held = all(
+        f"{rows[r['path']]['length']:.2f}" == r["ours m"]
+        and f"{rows[r['path']]['order_length']:.2f}" == r["order at best m"]
+        and (rows[r["path"]]["free"] == (r["home"] == "free"))
+        for r in published("icra2017-table2")
+    )
+    shown = ", ".join(f"{r['longer_by_percent']:.1f} %" for r in rows.values())
+    return shown, held
+
+
 def proven_within(goals: int, tether: float, limit: float) -> tuple[str, bool]:
     """Whether the first world of a cell is proven within a limit."""
     import frontier
@@ -403,5 +418,6 @@ def claims() -> Iterator[Claim]:
     yield Claim("heuristics without a clock", "as published", deterministic)
     yield Claim("PRM* over the exact optimum", "as published", convergence)
     yield Claim("the papers' studies, trials without a clock", "as published", studies_again)
+    yield Claim("systematic paths of the wharf over the tour", "as published", systematic_paths)
     yield Claim("false tours accepted, right ones refused", "none", judged)
     yield Claim("same seed, same bytes", "all pairs", repeatable)
