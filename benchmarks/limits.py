@@ -1,20 +1,28 @@
 """How far runs go over their time limit, whatever the size of the problem.
 
     python benchmarks/limits.py [--limit 1]
+    python benchmarks/limits.py --corners
+    python benchmarks/limits.py --sites [MISSION …]
 
 Problems that are too large for what is asked: 200 goals at tether 500 (some 20,000 classes are kept
 of many more), 67 turbines with 13 km of tether (millions of classes); for the solvers that bound,
 200 goals at tether 400 for three times as long; and for `auto` two of the library with some 20,000
 classes of few goals, for twice as long: one where many tethers are only found by a search, and one
 whose legs are a matrix that takes longer than there is time.
+
+`--corners` prints the same for islands of a thousand to 66,672 corners. `--sites` looks for loops
+that do not hear the clock: it has the time be up at each call site where the clock is asked, at the
+first and at the last time, and prints how long the run goes on from there.
 """
 
 from __future__ import annotations
 
 import argparse
 import os
+import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import numpy as np
 from library_worlds import FOLDER
@@ -113,11 +121,96 @@ def worst(limit: float) -> tuple[float, str, int, int]:
     return over, f"{solver}, {name}", silent, sum(UNBOUNDED in r for *_, r in found)
 
 
+def islands(corners: int, count: int = 20) -> Problem:
+    """A problem of islands of many corners, and of ten goals between them."""
+    rng, side = np.random.default_rng(0), int(np.ceil(np.sqrt(count)))
+    obstacles = []
+    for k in range(count):
+        angle = np.sort(rng.uniform(0.0, 2.0 * np.pi, corners // count))
+        radius = 35.0 * (1.0 + 0.2 * rng.uniform(-1.0, 1.0, len(angle)))
+        x, y = 100.0 * (k % side) + 50.0, 100.0 * (k // side) + 50.0
+        outline = np.column_stack([x + radius * np.cos(angle), y + radius * np.sin(angle)])
+        obstacles.append({"polygon": outline.tolist()})
+    goals = [(100.0 * (k % side), 100.0 * (k // side + 1)) for k in range(10)]
+    return Problem(base=(0, 0), goals=goals, obstacles=obstacles, tether_length=120.0 * side)
+
+
+CORNERS = (1000, 5000, 20_000, 66_672)
+
+
+def corners(limit: float) -> Iterator[tuple[int, float, float, str]]:
+    """(corners, seconds until the file is read and checked, seconds over the limit, status)."""
+    solve(islands(200), time_limit=2.0)  # compiled before it counts
+    for count in CORNERS:
+        text = islands(count).to_json()
+        begin = time.process_time()
+        problem = Problem.from_json(text)
+        read = time.process_time() - begin
+        yield count, read, *over(problem, "auto", limit)
+
+
+def sites(missions: list[str]) -> Iterator[tuple[str, int, float, str, str]]:
+    """(run, call sites, most CPU seconds that it went on after its time was up, where, the worst
+    answer) for every solver on a small problem, and for missions."""
+    sys.path.insert(0, str(Path(__file__).parents[1]))
+    from netsp import verify
+    from netsp.online.mission import Mission
+    from netsp.space.solve import solve_mission
+    from tests.clock_sites import watched
+
+    problem = random_world(3, goals=10, tether_length=300.0)
+
+    def planned(name: str) -> Callable[[], bool]:
+        return lambda: bool(verify(problem, solve(problem, name, time_limit=20.0)))
+
+    runs = {name: planned(name) for name, s in SOLVERS.items() if not s.geometric}
+    for name in missions:
+        mission = Mission.load(name)
+        scene = mission.load_scene()
+        field = scene.field()
+
+        def flown(mission: Mission = mission, scene: object = scene, field: object = field) -> bool:
+            found = solve_mission(mission, scene=scene, field=field, time_limit=60.0)  # type: ignore[arg-type]
+            return not found.left_out
+
+        runs[name] = flown
+    for name, run in runs.items():
+        run()
+        with watched() as recorded:
+            run()
+        worst, where, answer = 0.0, "", "as it should be"
+        for site, count in recorded.asked.items():
+            for times in {1, count}:
+                with watched(site, times) as fired:
+                    try:
+                        if not run():
+                            answer = f"not good after {site}"
+                    except NetspError as error:
+                        answer = str(error)
+                if fired.fired is not None and fired.overtime > worst:
+                    worst, where = fired.overtime, f"{site[0]}:{site[1]}"
+        yield name, len(recorded.asked), worst, where, answer
+
+
 def main() -> None:
     """Print one row a run."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--limit", type=float, default=1.0)
+    parser.add_argument("--corners", action="store_true")
+    parser.add_argument("--sites", nargs="*", metavar="MISSION")
     args = parser.parse_args()
+    if args.corners:
+        heading(f"Many corners ({args.limit:g} s)")
+        head("corners", "read s", "over s", "status", name="limits corners")
+        for count, read, beyond, status in corners(args.limit):
+            row(count, f"{read:.2f}", f"{beyond:.2f}", status)
+        return
+    if args.sites is not None:
+        heading("A clock that fires wherever it is asked")
+        head("run", "call sites", "over CPU s", "where", "answer", name="limits sites")
+        for name, number, beyond, where, answer in sites(args.sites):
+            row(name, number, f"{beyond:.2f}", where, answer)
+        return
     heading(f"Time limits ({args.limit:g} s)")
     head("solver", "problem", "over s", "status", name="limits")
     for solver, name, over, status in runs(args.limit):

@@ -21,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.arrays import Floats
-from netsp.clock import Clock
+from netsp.clock import Clock, until_interrupt
 from netsp.drawn import Drawn
 from netsp.errors import InfeasibleError, InputError, LimitReachedError
 from netsp.files import cell, write_text
@@ -218,7 +218,7 @@ def best_base(
     every : bool
         Solve from every candidate, also where its bound proves it worse.
     time_limit : float, optional
-        Seconds for all; the best known by then is returned.
+        Seconds for all; the best known by then, or at Ctrl-C, is returned.
     seed : int
         Of all that is random.
     on_candidate : callable, optional
@@ -237,8 +237,16 @@ def best_base(
     if problem.state is not None:
         raise InputError("state: a base is chosen before the robot is out; expected none")
     places = _places(problem, candidates)
-    clock = Clock(time_limit)
-    rated = _rated(problem, places, names, clock, seed)
+    with until_interrupt(time_limit) as clock:
+        rated = _rated(problem, places, names, clock, seed)
+        return _solved(problem, rated, clock, every=every, seed=seed, on_candidate=on_candidate)
+
+
+def _solved(
+    problem: Problem, rated: list[Candidate], clock: Clock, *, every: bool, seed: int,
+    on_candidate: Callable[[Candidate, int], None] | None,
+) -> BaseSearch:  # fmt: skip
+    """Solve from the candidates, the most promising first, until none can be better."""
     order = sorted(range(len(rated)), key=lambda k: (rated[k].lower_bound, k))
     best: Solution | None = None
     for n, k in enumerate(order):
@@ -248,7 +256,7 @@ def best_base(
         if clock.up or (best is not None and not every and _worse(candidate, best)):
             continue
         try:
-            found = solve(_at(problem, candidate.position), time_limit=_left(clock), seed=seed)
+            found = solve(_at(problem, candidate.position), time_limit=clock, seed=seed)
         except InfeasibleError as error:
             rated[k] = replace(candidate, status=Status.INFEASIBLE, why=str(error))
             continue
@@ -273,10 +281,6 @@ def best_base(
         _worse(c, best) for c in ranking if c.possible and c.length != best.length
     ) and ranking[0].status is Status.OPTIMAL  # fmt: skip
     return BaseSearch(problem, tuple(ranking), best, proven)
-
-
-def _left(clock: Clock) -> float | None:
-    return None if clock.limit is None else max(clock.left, 1e-3)
 
 
 def _worse(candidate: Candidate, best: Solution | None) -> bool:

@@ -27,7 +27,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from netsp.arrays import Floats
-from netsp.clock import Clock
+from netsp.clock import Clock, until_interrupt
 from netsp.drawn import Drawn
 from netsp.errors import InputError, LimitReachedError
 from netsp.fields import checked_argument
@@ -234,7 +234,7 @@ def tether_curve(
     solver : str
         Solves every step.
     time_limit : float, optional
-        Seconds for all; the steps found so far are returned when it is up.
+        Seconds for all; the steps found so far are returned when it is up, or at Ctrl-C.
     seed : int
         Of all that is random.
     on_step : callable, optional
@@ -259,7 +259,14 @@ def tether_curve(
     if longest is not None:
         longest = checked_argument("longest", longest, 1e-9)
         problem = problem.model_copy(update={"tether_length": longest})
-    clock = Clock(time_limit)
+    with until_interrupt(time_limit) as clock:
+        return _staircase(problem, solver, clock, seed, on_step)
+
+
+def _staircase(
+    problem: Problem, solver: str, clock: Clock, seed: int, on_step: Callable[[Step], None] | None
+) -> TetherCurve:
+    """Solve for shorter and shorter tethers, until the time is up or no tour is left."""
     shortest = _of_choices(problem, shortest_tethers(problem))
     useful = _useful(problem, float(shortest.max()), solver, clock, seed)
     graph = travel_graph(problem.model_copy(update={"tether_length": useful}), time_limit=clock)

@@ -450,7 +450,7 @@ def _planned(
     board.take(growth.legs, clock.part(WAYS_OUT))
     if lacking := set(range(len(mission.waypoints))) - board.reached:
         tell("ways with room for the robot")
-        states_with_room(states, lacking, effort.words)
+        states_with_room(states, lacking, effort.words, clock.part(STARTING))
         board.take(growth.legs, clock.part(WAYS_OUT))
     growth.go_on(0, clock.part(PLANTING), tell)
     taut = clock.part(TAUT)

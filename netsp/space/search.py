@@ -63,9 +63,9 @@ class Found(NamedTuple):
 @kernel
 def shortest_words(
     flags: Flags, room: Bools, open_: Bools, labels: Labels, table: Table, rules: Rules,
-    root: Ints, first: Ints, last: Ints, most: int, targets: Ints, limits: Ints,
+    root: Ints, first: Ints, last: Ints, most: int, targets: Ints, limits: Ints, stop: Ints,
 ) -> tuple[Found, Table]:  # fmt: skip
-    """The `most` soonest words of the cells of a box that are on the way to some targets.
+    """Return the `most` soonest words of the cells of a box that are on the way to some targets.
 
     About an open cell everything is free and of one class, so only those steps are taken that lead
     further on (`netsp.online.paths.tree`): the other cells beside it are reached as soon around it.
@@ -88,6 +88,9 @@ def shortest_words(
         (t, 3) cells; with none, all cells are sought.
     limits
         (t,) or, with no targets, (1,): hundredths of a cell; paths to each are no longer.
+    stop
+        Flag of a clock. From when it is set on, cells that have a word get no others: each cell
+        that can be reached has its soonest one all the same.
     """
     _, ny, nz = flags.shape
     sx, sy, sz = last[0] - first[0] + 1, last[1] - first[1] + 1, last[2] - first[2] + 1
@@ -118,6 +121,8 @@ def shortest_words(
         n, cell = at % most, at // most
         i, j, k = cell // (sy * sz), cell // sz % sy, cell % sz
         if done[i, j, k, n] or far[i, j, k, n] != now:
+            continue
+        if stop[0] != 0 and done[i, j, k].any():
             continue
         done[i, j, k, n] = True
         here = word[i, j, k, n]

@@ -286,13 +286,14 @@ def first_states(
         states.add(places.begin, number, water.present)
     anchor = np.asarray(water.mission.anchor, dtype=float)[None]
     root = int(np.ravel_multi_index(tuple(words.root), words.cells.flags.shape))
-    found = water.search(False, root, effort.words, limit)
+    flag = clock.flag
+    found = clock.interruptible(lambda: water.search(False, root, effort.words, limit, flag))
     for n in range(len(places)):
         _take(states, n, found, anchor, 1 if clock.up else effort.words)
     return states
 
 
-def states_with_room(states: States, lacking: set[int], words: int) -> None:
+def states_with_room(states: States, lacking: set[int], words: int, clock: Clock) -> None:
     """More states, along the robot's own shortest ways from the start: where it does not fit
     through the gaps that the shortest tethers go through.
 
@@ -304,14 +305,17 @@ def states_with_room(states: States, lacking: set[int], words: int) -> None:
         Waypoints that these are for.
     words : int
         Shortest words of a waypoint that make states.
+    clock : Clock
+        When it is up, there is only the soonest of each.
     """
     water = states.water
     start = water.words.held(water.laid.robot)
     if start is None:
         return
-    found = water.search(True, start, words, LONGER * states.limit)
+    flag, limit = clock.flag, LONGER * states.limit
+    found = clock.interruptible(lambda: water.search(True, start, words, limit, flag))
     for n in np.flatnonzero(np.isin(states.places.waypoint, list(lacking))):
-        _take(states, int(n), found, water.laid.nodes, words)
+        _take(states, int(n), found, water.laid.nodes, 1 if clock.up else words)
 
 
 def _take(states: States, n: int, found: Found, begin: Floats, most: int) -> None:

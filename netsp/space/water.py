@@ -10,6 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from netsp.arrays import Bools, Floats
+from netsp.clock import NEVER, Flag
 from netsp.geometry import polylines
 from netsp.online.laid import first_tether, present_tether
 from netsp.online.mission import Mission
@@ -169,8 +170,9 @@ class Water:
         return both[0], both[1]
 
     def search(
-        self, robot: bool, cell: int, most: int, within: float | Mapping[int, float]
-    ) -> Found:
+        self, robot: bool, cell: int, most: int, within: float | Mapping[int, float],
+        stop: Flag = NEVER,
+    ) -> Found:  # fmt: skip
         """The soonest words of cells, from one of them on.
 
         Parameters
@@ -184,6 +186,8 @@ class Water:
         within : float or mapping of int to float
             Metres: all cells that paths no longer than that lead to when pulled taut; or the cells
             that are sought, and how long the paths to each may be.
+        stop : ndarray
+            Flag of a clock; from when it is set on, only the soonest word of a cell is sought.
 
         Returns
         -------
@@ -207,7 +211,7 @@ class Water:
         room = self.room if robot else self.everywhere
         found, table = shortest_words(
             cells.flags, room, self.open[robot], words.labels, words.table, words.rules, root,
-            first, last, most, targets, limits,
+            first, last, most, targets, limits, stop,
         )  # fmt: skip
         words.keep(table)
         return Found(*found)
