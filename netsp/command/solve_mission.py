@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING, Any
 from netsp.command import told
 from netsp.command.types import check_writable
 from netsp.errors import EXIT_NOT_ALL, InputError, counted
+from netsp.lower_bound import LowerBound, Scope
+from netsp.solution import Status
 
 if TYPE_CHECKING:
     from netsp.online.mission import Mission
@@ -143,13 +145,16 @@ def summary(
     from netsp.space.plan import AS_GIVEN, OUT_AND_BACK, PLANE
     from netsp.space.solve import GOING_ON, seconds_until_home
 
-    tour, status = found.tour, found.tour.status.value
+    tour = found.tour
     legs = f"{counted(tour.legs, 'leg')} between {counted(tour.states, 'state')}"
-    if status == "optimal":
-        verdict = f"the shortest along {legs} of the tether"
+    if tour.status is Status.OPTIMAL:
+        verdict = "no tour to these waypoints is shorter"
+    elif tour.status is Status.OPTIMAL_OF_STATES:
+        verdict = f"the shortest along {legs} of the tether that were found, not of all tours"
     elif tour.lower_bound is not None:
-        verdict = f"bound {tour.lower_bound:.6g} along {legs} of the tether"
-        if tour.gap is not None and tour.gap <= 1e-6:
+        bound = LowerBound(tour.lower_bound, Scope.STATES)
+        verdict = f"{bound.says(tour.length, units)}: {legs}"
+        if bound.proves(tour.length):
             verdict = f"the shortest along {legs} of the tether; there was no time for all legs"
     elif tour.solver == AS_GIVEN:
         verdict = "in the order given, for no better one was found"
@@ -163,9 +168,11 @@ def summary(
         verdict = f"along {legs} of the tether, with detours past what it would hang on"
     lines = [f"tour     {tour.length:.6g} {units}, {verdict}"]
     if tour.bound_of_all is not None:
+        of_all = LowerBound(tour.bound_of_all, Scope.ALL_TOURS)
+        to = "to the waypoints themselves" + (", without those left out" if found.left_out else "")
         lines.append(
-            f"bound    {tour.bound_of_all:.6g} {units} of all tours to the waypoints themselves: "
-            f"gap {100 * (tour.gap_to_all or 0.0):.1f} %"
+            f"bound    {of_all.length:.6g} {units} on {of_all.scope.tours} {to}: gap "
+            f"{of_all.percent(tour.length, 1)}"
         )
     names = [f"#{n}" for n in found.order[: len(tour.stops)]]
     if len(names) > MOST_NAMED:
@@ -184,22 +191,49 @@ def summary(
         lines.append(f"flown    not: {'interrupted' if found.interrupted else 'the time was up'}")
     if not tour.exact:
         lines.append(
-            "words    the scene's group is not completed: other words may be of the same class, "
-            "too; an empty one still is that of a free tether"
+            "words    the group of the cells is not completed: other words may be of the same "
+            "class, too; an empty one still is that of a free tether"
         )
     if found.left_out:
         named = ", ".join(f"#{n}" for n in found.left_out[:MOST_NAMED])
         more = len(found.left_out) - MOST_NAMED
         lines.append(
             f"left out {named}{f' and {more} more' if more > 0 else ''}: not reached by any tether "
-            "within the limit that was found"
+            f"within the limit that was found{_perhaps(found)}"
         )
+    lines += _gap_lines(found, units)
     lines.append(f"time     {seconds:.1f} s{', interrupted' if found.interrupted else ''}")
     if output:
         lines.append(f"mission  {output}")
     if plot:
         lines.append(f"picture  {plot}")
     return "\n".join(lines)
+
+
+def _perhaps(found: SolvedMission) -> str:
+    """Say of waypoints left out that they may lie behind a gap that the cells do not show."""
+    gaps, cells = found.tour.unresolved_gaps, found.cells
+    if not gaps or cells is None:
+        return ""
+    more = f" or {counted(len(gaps) - 1, 'other')}" if len(gaps) > 1 else ""
+    return (
+        f"; perhaps through the gap of {gaps[0]}{more}, which cells of {cells.cell:.3g} do not "
+        "show: give the mission a finer `cell`"
+    )
+
+
+def _gap_lines(found: SolvedMission, units: str) -> list[str]:
+    """Say which gaps a finer cell shows, and which no cell does."""
+    if found.cells is None:
+        return []
+    cell = f"{found.cells.cell:.3g} {units}"
+    lines = [f"gap      {gap}: shown by cells of {cell}, taken for it" for gap in found.cells.shown]
+    lines += [
+        f"gap      {gap}: wide enough for the robot, but cells of {cell} do not show it, and no "
+        "tour through it was looked at; give the mission a finer `cell`"
+        for gap in found.tour.unresolved_gaps
+    ]
+    return lines
 
 
 def _as_given(found: SolvedMission) -> str:

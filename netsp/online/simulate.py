@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from netsp.arrays import Floats
 from netsp.errors import InputError, interrupted
 from netsp.online.coverage import Coverage, patches_of
 from netsp.online.laid import first_tether, present_tether
@@ -66,6 +67,32 @@ def grid_of(mission: Mission, scene: Scene, field: DistanceField) -> Grid:
     InputError
         It would take too much memory; says which cell would not. A cell larger than the site.
     """
+    low, high, cell = grid_box(mission, scene)
+    return Grid(field, low, high, cell, mission.clearance)
+
+
+def grid_box(mission: Mission, scene: Scene) -> tuple[Floats, Floats, float]:
+    """Return the box of the grid that paths are sought on, and the size of its cells.
+
+    Parameters
+    ----------
+    mission : Mission
+        Its cell, waypoints and clearance count.
+    scene : Scene
+        Its bounds count.
+
+    Returns
+    -------
+    low, high : ndarray, shape (3,)
+        Corners of the box, metres.
+    cell : float
+        Metres.
+
+    Raises
+    ------
+    InputError
+        A cell larger than the site.
+    """
     cell = mission.cell or CELL
     if scene.bounds is not None:
         low, high = np.array(scene.bounds[:3]), np.array(scene.bounds[3:])
@@ -79,7 +106,7 @@ def grid_of(mission: Mission, scene: Scene, field: DistanceField) -> Grid:
         )
     if mission.cell is None:
         cell = max(CELL, float(np.prod(np.maximum(high - low, CELL)) / MOST_CELLS) ** (1.0 / 3.0))
-    return Grid(field, low, high, cell, mission.clearance)
+    return low, high, cell
 
 
 def simulate(

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from netsp.arrays import Floats
 from netsp.fields import Name, NonNegative, Point3
 from netsp.geometry import polylines
+from netsp.lower_bound import OPTIMALITY_TOLERANCE
 from netsp.models import Model
 from netsp.solution import Status
 
@@ -43,6 +44,30 @@ class PlannedStop(Model):
     ] = None
 
 
+class UnresolvedGap(Model):
+    """A passage with room for the robot that the cells of a mission do not show.
+
+    Attributes
+    ----------
+    position : (x, y, z)
+        In the middle of it, metres.
+    width : float
+        Twice the distance from solids there, metres.
+    """
+
+    position: Annotated[Point3, Field(description="(x, y, z) in the middle of it, m")]
+    width: Annotated[NonNegative, Field(description="twice the distance from solids there, m")]
+
+    def __str__(self) -> str:
+        """Name width and place, as in "0.24 m at (0, 1.5, -2)"."""
+        return f"{self.width:.2g} m at ({', '.join(f'{v:.3g}' for v in self.position)})"
+
+
+def _within(gap: Any) -> bool:
+    """Say whether a gap from a file proves a tour the shortest."""
+    return isinstance(gap, int | float) and gap <= OPTIMALITY_TOLERANCE
+
+
 class PlannedTour(Model):
     """A tour through the first waypoints of a mission, and what is known of it.
 
@@ -54,7 +79,8 @@ class PlannedTour(Model):
     home : tuple of (x, y, z)
         From the last stop back to the start, metres.
     status : Status
-        `optimal` and `feasible` speak of the states and legs that were found.
+        `optimal`: no tour to these waypoints is shorter, whatever the tether's class (by
+        `bound_of_all`). `optimal_of_states`: none is along the states and legs that were found.
     solver : str
         Name of the solver.
     seed : int
@@ -66,7 +92,8 @@ class PlannedTour(Model):
     gap : float or None
         (length - lower_bound) / length.
     bound_of_all : float or None
-        Of all tours whatever the tether's classes: of the shortest paths between waypoints.
+        No tour to these waypoints is shorter, whatever the tether's classes; certified
+        (`netsp.space.bound`).
     gap_to_all : float or None
         (length - bound_of_all) / length.
     states : int
@@ -74,7 +101,11 @@ class PlannedTour(Model):
     legs : int
         How many legs between these were driven.
     exact : bool
-        Whether words that differ are of different classes.
+        Whether words that differ are of different classes of paths through the mission's cells; it
+        says nothing of gaps that the cells do not show, nor of the tour's length.
+    unresolved_gaps : tuple of UnresolvedGap
+        Passages with room for the robot that the cells do not show: tours through them were not
+        looked at, though `bound_of_all` holds for them, too.
     """
 
     stops: Annotated[
@@ -83,7 +114,11 @@ class PlannedTour(Model):
     ]
     home: Annotated[PathField, Field(description="from the last stop to the start, m")]
     status: Annotated[
-        Status, Field(description="optimal: shortest along the states and legs that were found")
+        Status,
+        Field(
+            description="optimal: no tour is shorter, by bound_of_all; optimal_of_states: none "
+            "along the states and legs that were found"
+        ),
     ]
     solver: Annotated[Name, Field(description="name of the solver")]
     seed: Annotated[int, Field(description="of all that was random")] = 0
@@ -95,7 +130,7 @@ class PlannedTour(Model):
     gap: Annotated[NonNegative | None, Field(description="(length - lower_bound) / length")] = None
     bound_of_all: Annotated[
         NonNegative | None,
-        Field(description="of all tours: from the shortest paths between waypoints, m"),
+        Field(description="no tour to these waypoints is shorter, in any class of the tether, m"),
     ] = None
     gap_to_all: Annotated[
         NonNegative | None, Field(description="(length - bound_of_all) / length")
@@ -108,8 +143,23 @@ class PlannedTour(Model):
         Annotated[int, Field(ge=0)], Field(description="legs between these that were driven")
     ] = 0
     exact: Annotated[
-        bool, Field(description="whether words that differ are of different classes")
+        bool,
+        Field(description="whether words that differ are of different classes among the cells"),
     ] = True
+    unresolved_gaps: Annotated[
+        tuple[UnresolvedGap, ...],
+        Field(description="passages with room for the robot that the cells do not show"),
+    ] = ()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _older(cls, data: Any) -> Any:
+        """Read `optimal` of files that said so of the states that were found as what it was."""
+        if isinstance(data, dict) and data.get("status") == Status.OPTIMAL.value:
+            of_all, of_states = data.get("gap_to_all"), data.get("gap")
+            if not _within(of_all) and _within(of_states):
+                return {**data, "status": Status.OPTIMAL_OF_STATES.value}
+        return data
 
     def leg(self, index: int) -> Floats | None:
         """How the robot gets to a waypoint.

@@ -163,6 +163,12 @@ def _planned(tour: PlannedTour, mission: Mission, unit: str) -> str:
     if tour.bound_of_all is not None:
         of_all = LowerBound(tour.bound_of_all, Scope.ALL_TOURS)
         all_of = f", and {above_shortest(tour.length, of_all)}"
+    if tour.unresolved_gaps:
+        named = "; ".join(str(gap) for gap in tour.unresolved_gaps)
+        all_of += (
+            f". Gaps that the robot may fit through, but the cells do not show, so that no tour "
+            f"through them was looked at: {html.escape(named)}"
+        )
     return (
         f"The tour is {tour.length:.5g} {unit} long: {proof} (solver {html.escape(tour.solver)})"
         f"{all_of}. At {mission.speed:g} m/s it takes {tour.length / mission.speed:.0f} s, stops "

@@ -17,6 +17,7 @@ from netsp.arrays import Floats
 from netsp.errors import InputError, counted
 from netsp.geometry import polylines
 from netsp.judge import Check, Verification
+from netsp.lower_bound import OPTIMALITY_TOLERANCE
 from netsp.online.limits import check_bounds, check_size
 from netsp.online.mission import Mission
 from netsp.online.paths.tree import ShortestTree
@@ -109,6 +110,10 @@ def checked_mission(mission: Mission, scene: Scene, field: DistanceField) -> Non
     failed = [c for c in verify_mission(mission, scene=scene, field=field).checks if not c.passed]
     if failed:
         raise InputError(f"tour: fails its check {failed[0].name!r}: {failed[0].detail}")
+
+
+def _proven(gap: float | None) -> bool:
+    return gap is not None and gap <= OPTIMALITY_TOLERANCE
 
 
 def _shown(point: Floats) -> str:
@@ -303,9 +308,15 @@ class _Judge:
             right = relative_gap(tour.length, bound)
             if (right is None) != (gap is None) or abs((right or 0.0) - (gap or 0.0)) > 1e-6:
                 faults.append(f"the gap of {name} is {right}, stated {gap}")
-        proven = tour.gap is not None and tour.gap <= ROUNDING
-        if tour.status is Status.OPTIMAL and not proven:
-            faults.append(f"status optimal with a gap of {tour.gap}")
-        if tour.status not in (Status.OPTIMAL, Status.FEASIBLE):
-            faults.append(f"status {tour.status.value}; expected optimal or feasible")
+        left = len(self.mission.waypoints) - len(tour.stops)
+        if tour.status is Status.OPTIMAL and not _proven(tour.gap_to_all):
+            faults.append(f"status optimal with a gap of {tour.gap_to_all} to all tours")
+        elif tour.status is Status.OPTIMAL and left:
+            faults.append(f"status optimal with {counted(left, 'waypoint')} left out")
+        elif tour.status is Status.OPTIMAL_OF_STATES and not _proven(tour.gap):
+            faults.append(f"status optimal_of_states with a gap of {tour.gap}")
+        elif tour.status not in (Status.OPTIMAL, Status.OPTIMAL_OF_STATES, Status.FEASIBLE):
+            faults.append(
+                f"status {tour.status.value}; expected optimal, optimal_of_states or feasible"
+            )
         return Check("bounds and status", not faults, faults[0] if faults else tour.status.value)

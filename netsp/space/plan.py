@@ -10,7 +10,8 @@ state that was meant is forbidden, and the graph is solved again: no tour is bel
 driven without fault.
 
 Status and bound of the result are about these states and legs, less those forbidden, and not about
-all tours there are.
+all tours there are: a tour that is the shortest along them is `optimal_of_states`. It is `optimal`
+only where a bound on all tours (`netsp.space.bound`) proves it.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ import numpy as np
 from netsp.arrays import Floats
 from netsp.clock import Clock, TimeLimit, until_interrupt
 from netsp.errors import InputError, LimitReachedError, counted
+from netsp.lower_bound import LowerBound, Scope
 from netsp.online.limits import check_bounds, check_size, check_tether
 from netsp.online.mission import Mission
 from netsp.online.paths.tree import Grid
@@ -153,6 +155,14 @@ class SpacePlan:
         known = self.kind == TAUT_LEGS and other.kind == PLANE
         return self.length < other.length * (1.0 + (SAVED if known else 0.0))
 
+    def _status(self, bound: float | None) -> Status:
+        """Return what is proven of the tour: `optimal` is for one that no tour to all waypoints is
+        shorter than."""
+        if bound is None or self.unreached:
+            return self.result.status
+        proven = LowerBound(bound, Scope.ALL_TOURS).proves(self.length)
+        return Status.OPTIMAL if proven else self.result.status
+
     def planned(self, solver: str = "auto", seed: int = 0, bound: float | None = None) -> Mission:
         """The mission with its waypoints in the order of the tour, and the tour; waypoints that no
         tether reaches come last.
@@ -183,7 +193,7 @@ class SpacePlan:
                 )
                 for stop in self.stops
             ),
-            home=in_file(self.home), status=result.status,
+            home=in_file(self.home), status=self._status(bound),
             solver=solver if self.kind in (TAUT_LEGS, DETOURS) else self.kind, seed=seed,
             length=self.length, lower_bound=result.lower_bound,
             gap=relative_gap(self.length, result.lower_bound),
@@ -483,8 +493,10 @@ def _planned(
     along_taut = None
     if best is not None:
         result, driven = best
-        if not complete and result.status is Status.OPTIMAL:
-            result = replace(result, status=Status.FEASIBLE)  # there are more legs within reach
+        if result.status is Status.OPTIMAL:
+            # of the graph; where it is not complete, there are more legs within reach
+            of_states = Status.OPTIMAL_OF_STATES if complete else Status.FEASIBLE
+            result = replace(result, status=of_states)
         along_taut = planned(result, driven, TAUT_LEGS)
     if shorter is not None:
         # what the solver knew of its graph says nothing of legs that are not in it

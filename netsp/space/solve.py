@@ -20,6 +20,7 @@ import numpy as np
 
 from netsp.clock import Clock, TimeLimit, until_interrupt
 from netsp.errors import InputError, LimitReachedError
+from netsp.lower_bound import LowerBound, Scope
 from netsp.online.limits import check_bounds, check_size, check_tether
 from netsp.online.log import LogRow, Run
 from netsp.online.mission import Mission
@@ -27,13 +28,14 @@ from netsp.online.planner import PlannerOptions
 from netsp.online.scene.field import DistanceField
 from netsp.online.scene.scene import Scene
 from netsp.online.simulate import simulate
-from netsp.online.tour import PlannedStop, PlannedTour, in_file
+from netsp.online.tour import PlannedStop, PlannedTour, UnresolvedGap, in_file
 from netsp.solution import Status
 from netsp.solvers.solve import SolverLike
 from netsp.space.bound import bound_of_all
 from netsp.space.detours import SAVED
 from netsp.space.judge import verify_mission
 from netsp.space.order import order_by_going_on
+from netsp.space.passages import Resolved, resolved
 from netsp.space.places import Places
 from netsp.space.plan import (
     AS_GIVEN,
@@ -83,6 +85,8 @@ class SolvedMission:
         The tour of states and legs, whether it was kept or not; None where none was found.
     interrupted : bool
         Whether Ctrl-C ended it.
+    cells : Resolved, optional
+        The cells that were planned in, and the gaps that they show and do not show.
     """
 
     mission: Mission
@@ -91,6 +95,7 @@ class SolvedMission:
     given: Run | None
     plan: SpacePlan | None
     interrupted: bool = False
+    cells: Resolved | None = None
 
     @property
     def tour(self) -> PlannedTour:
@@ -342,6 +347,9 @@ def solve_mission(
         check_bounds(mission, scene)
         field = field or scene.field()
         mission = mission.checked_waypoints(field)
+        tell("gaps that cells do not show")
+        cells = resolved(mission, scene, field)
+        mission = cells.mission
         Places.of(mission, field)  # before words are sought, which takes longest
         tell("words of the scene")
         water = Water.of(mission, scene, field)
@@ -363,7 +371,36 @@ def solve_mission(
         found.fly_best()
         _offer_given_flight(found, seed)
         best = _with_bound(found.best, planned, searched.bound)
-        return replace(best, given=found.given, plan=planned, interrupted=clock.stopped)
+        best = replace(best, mission=with_gaps(best.mission, cells))
+        return replace(
+            best, given=found.given, plan=planned, interrupted=clock.stopped, cells=cells
+        )
+
+
+def with_gaps(mission: Mission, cells: Resolved) -> Mission:
+    """Return a planned mission whose tour names the gaps that its cells do not show.
+
+    Parameters
+    ----------
+    mission : Mission
+        With a tour.
+    cells : Resolved
+        The gaps.
+
+    Returns
+    -------
+    Mission
+        The same mission otherwise.
+    """
+    assert mission.tour is not None
+    gaps = tuple(
+        UnresolvedGap(position=(x, y, z), width=gap.width)
+        for gap in cells.left
+        for x, y, z in [gap.place.tolist()]
+    )
+    return mission.model_copy(
+        update={"tour": mission.tour.model_copy(update={"unresolved_gaps": gaps})}
+    )
 
 
 @dataclass
@@ -468,9 +505,14 @@ def _with_bound(
     )
     off = 2.0 * off + float(np.linalg.norm(np.subtract(tour.home[-1], mission.start)))
     bound = min(tour.length, max(0.0, bound - (off if off > ROUNDING else 0.0)))
+    whole = len(tour.stops) == len(mission.waypoints)
+    proven = whole and LowerBound(bound, Scope.ALL_TOURS).proves(tour.length)
     tour = tour.model_copy(
-        update={"bound_of_all": bound, "gap_to_all": relative_gap(tour.length, bound)}
-    )
+        update={
+            "bound_of_all": bound, "gap_to_all": relative_gap(tour.length, bound),
+            "status": Status.OPTIMAL if proven else tour.status,
+        }
+    )  # fmt: skip
     return replace(best, mission=mission.model_copy(update={"tour": tour}))
 
 

@@ -1,0 +1,467 @@
+"""Gaps that a grid's cells do not show: where they are, how wide, and which cell would show them.
+
+A cell counts as free by its middle, so a slot that is wide enough for the robot may be closed on
+the grid. Between the cells that are free, finer points are looked at: two neighbours with enough
+room whose nearest free cells do not hang together around them stand in such a gap.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from netsp.arrays import Bools, Floats, Ints
+from netsp.errors import InputError
+from netsp.online.mission import Mission
+from netsp.online.scene.field import DistanceField
+from netsp.online.scene.scene import Scene
+from netsp.online.simulate import grid_box
+from netsp.space.cells import LEAST_ROOM
+from netsp.space.potential import possibly_free, steepness
+
+
+@dataclass(frozen=True)
+class GapParams:
+    """Effort of the search for gaps, and of the choice of a cell that shows them.
+
+    Attributes
+    ----------
+    max_points : int
+        Fine points that are looked at; with more cells in question there are fewer for each.
+    finest : int
+        Fine points along a side of a cell, at most.
+    around : int
+        Cells around a gap in which its two sides may hang together: then it saves no way.
+    max_gaps : int
+        Gaps that are told; the widest.
+    max_pairs : int
+        Pairs of free cells whose connection is asked for.
+    max_cells : int
+        Cells of a finer grid, at most: planning takes as much longer as there are more.
+    smallest : float
+        Least share of the cell that a finer one may have.
+    step : float
+        Factor from one cell size that is tried to the next.
+    """
+
+    max_points: int = 4_000_000
+    finest: int = 8
+    around: int = 3
+    max_gaps: int = 5
+    max_pairs: int = 2_000
+    max_cells: int = 1_000_000
+    smallest: float = 0.25
+    step: float = 0.985
+
+    def __post_init__(self) -> None:
+        for name in ("max_points", "finest", "around", "max_gaps", "max_pairs", "max_cells"):
+            if getattr(self, name) < 1:
+                raise InputError(f"{name}: {getattr(self, name)}; expected 1 or more")
+        for name in ("smallest", "step"):
+            if not 0.0 < getattr(self, name) < 1.0:
+                raise InputError(f"{name}: {getattr(self, name)}; expected between 0 and 1")
+
+
+@dataclass(frozen=True)
+class Gap:
+    """A passage that the cells of a grid do not show.
+
+    Parameters
+    ----------
+    place : ndarray, shape (3,)
+        In the middle of it, metres.
+    width : float
+        Twice the distance from solids there, metres.
+    sides : ndarray, shape (2, 3)
+        Middles of free cells on either side, metres.
+    """
+
+    place: Floats
+    width: float
+    sides: Floats
+
+    def __str__(self) -> str:
+        """Name width and place, as in "0.24 m at (0, 1.5, -2)"."""
+        return f"{self.width:.2g} m at ({', '.join(f'{v:.3g}' for v in self.place)})"
+
+
+@dataclass(frozen=True)
+class GapGrid:
+    """The cells of a grid by their middles.
+
+    Parameters
+    ----------
+    field : DistanceField
+        The scene.
+    low, high : ndarray, shape (3,)
+        Corners of the box, metres.
+    cell : float
+        Metres.
+    clearance : float
+        That the robot keeps, metres.
+    """
+
+    field: DistanceField
+    low: Floats
+    high: Floats
+    cell: float
+    clearance: float
+
+    @classmethod
+    def of(
+        cls, field: DistanceField, box: tuple[Floats, Floats, float], clearance: float
+    ) -> GapGrid:
+        """Return the cells of a grid (`netsp.online.simulate.grid_box`).
+
+        Parameters
+        ----------
+        field : DistanceField
+            The scene.
+        box : tuple of (ndarray, ndarray, float)
+            Corners of the box and size of a cell, metres.
+        clearance : float
+            That the robot keeps, metres.
+
+        Returns
+        -------
+        GapGrid
+            The cells.
+        """
+        low, high, cell = box
+        counts = np.maximum(1.0, np.round((high - low) / cell))  # as of `Grid`
+        return cls(field, low, low + cell * counts, cell, clearance)
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Numbers of cells, as of `netsp.space.cells.Cells`."""
+        nx, ny, nz = (max(1, int(n)) for n in np.ceil((self.high - self.low) / self.cell - 1e-9))
+        return nx, ny, nz
+
+    @property
+    def least(self) -> float:
+        """Distance from solids from which on a cell's middle counts as free, metres."""
+        return max(self.clearance, LEAST_ROOM * self.cell)
+
+    def free(self, first: Ints, shape: tuple[int, ...]) -> Bools:
+        """Return which cells of a part are free.
+
+        Parameters
+        ----------
+        first : ndarray of int, shape (3,)
+            Its first cell.
+        shape : tuple of int
+            Numbers of its cells.
+
+        Returns
+        -------
+        ndarray of bool
+            Of that shape.
+        """
+        axes = [self.low[k] + (first[k] + np.arange(shape[k]) + 0.5) * self.cell for k in range(3)]
+        points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+        return np.asarray(self.field.distance(points) >= self.least)
+
+    def joins(self, gap: Gap, around: int) -> bool:
+        """Say whether free cells join the two sides of a gap near it.
+
+        Parameters
+        ----------
+        gap : Gap
+            The gap.
+        around : int
+            Cells around it that may be passed.
+
+        Returns
+        -------
+        bool
+            Whether they do.
+        """
+        from scipy.ndimage import label
+
+        at = np.floor((gap.sides - self.low) / self.cell).astype(np.int64)
+        at = np.clip(at, 0, np.array(self.shape) - 1)
+        first = np.maximum(at.min(0) - around, 0)
+        last = np.minimum(at.max(0) + around, np.array(self.shape) - 1)
+        free = self.free(first, tuple(last - first + 1))
+        parts, _ = label(free, np.ones((3, 3, 3)))
+        one, other = (_near(parts, place - first) for place in at)
+        return bool(one & other)
+
+
+def _near(parts: Ints, at: Ints) -> set[int]:
+    """Return the parts that a cell or those beside it are of."""
+    box = tuple(slice(max(0, k - 1), k + 2) for k in at)
+    return set(np.unique(parts[box]).tolist()) - {0}
+
+
+def unresolved_gaps(grid: GapGrid, params: GapParams | None = None) -> list[Gap]:
+    """Return the gaps that have room for the robot but no free cells through them.
+
+    Parameters
+    ----------
+    grid : GapGrid
+        The cells.
+    params : GapParams, optional
+        Effort.
+
+    Returns
+    -------
+    list of Gap
+        The widest first, at most as many as are told.
+    """
+    from scipy.ndimage import distance_transform_edt
+
+    params = params or GapParams()
+    shape = grid.shape
+    free = grid.free(np.zeros(3, dtype=np.int64), shape)
+    if free.all() or not free.any():
+        return []
+    middle, whole = 0.5 * (grid.low + grid.high), float(np.linalg.norm(grid.high - grid.low))
+    possible = possibly_free(
+        grid.field.arrays, grid.low, grid.high, grid.cell, shape, grid.clearance,
+        steepness(grid.field), middle, middle, 4.0 * whole, middle, 2.0 * whole, 2,
+    )  # fmt: skip
+    nearest = np.moveaxis(
+        distance_transform_edt(~free, return_distances=False, return_indices=True), 0, -1
+    )
+    between = possible & ~free
+    cells = np.argwhere(_parting(between, nearest))
+    if not len(cells):
+        return []
+    side = int(np.clip((params.max_points / len(cells)) ** (1.0 / 3.0), 2, params.finest))
+    ends, places, room = _links(grid, cells, nearest, side)
+    ends, places, room = _not_joined(free, ends, places, room, params)
+    return _grouped(grid, ends, places, room, params)
+
+
+def _parting(between: Bools, nearest: Ints) -> Bools:
+    """Return the cells between free ones, and those beside them, whose nearest free cells are three
+    or more apart."""
+    out = np.zeros(between.shape, dtype=np.bool_)
+    for step in _HALF_STEPS:
+        here, there = _shifted(between.shape, step)
+        apart = np.abs(nearest[here] - nearest[there]).max(axis=-1) >= 3
+        found = between[here] & between[there] & apart
+        out[here] |= found
+        out[there] |= found
+    return out
+
+
+_HALF_STEPS = [s for s in np.ndindex(3, 3, 3) if s > (1, 1, 1)]
+"""Thirteen of the 26 steps to a neighbour, one of each pair of opposites; 1 stands for staying."""
+
+
+def _shifted(
+    shape: tuple[int, ...], step: tuple[int, ...]
+) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
+    """Return the slices of cells and of their neighbours by a step."""
+    here, there = [], []
+    for n, s in zip(shape, step, strict=True):
+        d = s - 1
+        here.append(slice(max(0, -d), n - max(0, d)))
+        there.append(slice(max(0, d), n - max(0, -d)))
+    return tuple(here), tuple(there)
+
+
+def _links(grid: GapGrid, cells: Ints, nearest: Ints, side: int) -> tuple[Ints, Floats, Floats]:
+    """Return pairs (n, 2, 3) of free cells that neighbouring fine points with enough room are
+    nearest to, three cells or more apart, the places (n, 3) of the points and their room."""
+    spacing = grid.cell / side
+    inner = np.stack(np.meshgrid(*[np.arange(side)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+    fine = (side * cells[:, None] + inner[None]).reshape(-1, 3)
+    points = grid.low + (fine + 0.5) * spacing
+    room = grid.field.distance(points)
+    wide = (room >= grid.clearance - 0.5 * spacing) & (points <= grid.high).all(axis=1)
+    fine, points, room = fine[wide], points[wide], room[wide]
+    extent = side * np.array(grid.shape, dtype=np.int64) + 2
+    key = (fine[:, 0] * extent[1] + fine[:, 1]) * extent[2] + fine[:, 2]
+    order = np.argsort(key)
+    fine, points, room, key = fine[order], points[order], room[order], key[order]
+    ends, places, rooms = [], [], []
+    for axis in range(3):
+        step = (extent[1] * extent[2], extent[2], 1)[axis]
+        at = np.searchsorted(key, key + step)
+        known = at < len(key)
+        known[known] = key[at[known]] == key[known] + step
+        one, other = np.flatnonzero(known), at[known]
+        pair = np.stack([nearest[tuple((fine[k] // side).T)] for k in (one, other)], axis=1)
+        far = np.abs(pair[:, 0] - pair[:, 1]).max(axis=1) >= 3
+        ends.append(pair[far])
+        places.append(0.5 * (points[one] + points[other])[far])
+        rooms.append(np.minimum(room[one], room[other])[far])
+    return np.concatenate(ends), np.concatenate(places), np.concatenate(rooms)
+
+
+def _not_joined(
+    free: Bools, ends: Ints, places: Floats, room: Floats, params: GapParams
+) -> tuple[Ints, Floats, Floats]:
+    """Return those links whose two free cells do not hang together around them."""
+    from scipy.ndimage import label
+
+    order = np.argsort(-room, kind="stable")
+    ends, places, room = ends[order], places[order], room[order]
+    told: dict[tuple[int, ...], bool] = {}
+    keep = np.zeros(len(ends), dtype=np.bool_)
+    for n, pair in enumerate(ends):
+        name = tuple(pair.ravel().tolist())
+        if name not in told:
+            if len(told) >= params.max_pairs:
+                continue
+            first = np.maximum(pair.min(0) - params.around, 0)
+            last = pair.max(0) + params.around + 1
+            box = tuple(slice(a, b) for a, b in zip(first, last, strict=True))
+            parts, _ = label(free[box], np.ones((3, 3, 3)))
+            told[name] = bool(parts[tuple(pair[0] - first)] != parts[tuple(pair[1] - first)])
+        keep[n] = told[name]
+    return ends[keep], places[keep], room[keep]
+
+
+def _grouped(
+    grid: GapGrid, ends: Ints, places: Floats, room: Floats, params: GapParams
+) -> list[Gap]:
+    """Return one gap for links near one another, at the place with the most room."""
+    from scipy.ndimage import label
+
+    if not len(places):
+        return []
+    at = np.clip(((places - grid.low) / grid.cell).astype(np.int64), 0, np.array(grid.shape) - 1)
+    first = at.min(0)
+    marked = np.zeros(tuple((at.max(0) - first) // 2 + 1), dtype=np.bool_)
+    coarse = (at - first) // 2  # cells of twice the size: links with a cell between them are one
+    marked[tuple(coarse.T)] = True
+    parts, count = label(marked, np.ones((3, 3, 3)))
+    of = parts[tuple(coarse.T)]
+    gaps = []
+    for part in range(1, count + 1):
+        own = np.flatnonzero(of == part)
+        widest = own[room[own] >= room[own].max() - 1e-9]
+        middle = places[widest].mean(axis=0)
+        n = widest[int(np.linalg.norm(places[widest] - middle, axis=1).argmin())]
+        sides = grid.low + (ends[n] + 0.5) * grid.cell
+        place = _widest(grid, places[n], sides[1] - sides[0])
+        width = 2.0 * float(grid.field.distance(place))
+        if width >= 2.0 * grid.clearance:
+            gaps.append(Gap(np.round(place, 3) + 0.0, width, sides))
+    gaps.sort(key=lambda gap: -gap.width)
+    return gaps[: params.max_gaps]
+
+
+def _widest(grid: GapGrid, place: Floats, through: Floats) -> Floats:
+    """Return the place with the most room within half a cell across a passage."""
+    along = through / max(float(np.linalg.norm(through)), 1e-300)
+    _, _, across = np.linalg.svd(along[None])
+    reach = 0.5 * grid.cell
+    while reach > 1e-3 * grid.cell:
+        u, v = np.meshgrid(np.linspace(-reach, reach, 7), np.linspace(-reach, reach, 7))
+        points = place + u.reshape(-1, 1) * across[1] + v.reshape(-1, 1) * across[2]
+        room = grid.field.distance(points)
+        # the place itself, unless another one has more: it is the 25th of 49
+        best = int(room.argmax())
+        if room[best] > room[24] + 1e-9:
+            place = points[best]
+        reach *= 0.4
+    return place
+
+
+def resolving_cell(
+    grid: GapGrid, gaps: list[Gap], box_of: Callable[[float], tuple[Floats, Floats, float]],
+    params: GapParams | None = None,
+) -> float | None:  # fmt: skip
+    """Return the largest cell whose grid shows the most of some gaps.
+
+    Parameters
+    ----------
+    grid : GapGrid
+        That does not show them.
+    gaps : list of Gap
+        Of `unresolved_gaps`.
+    box_of : callable
+        Takes the size of a cell; returns the corners of that grid's box and the cell, metres.
+    params : GapParams, optional
+        How small it may be.
+
+    Returns
+    -------
+    float or None
+        Metres; None where no cell that may be taken shows any.
+    """
+    params = params or GapParams()
+    best, shown, cell = None, 0, grid.cell
+    limit = max(params.max_cells, 1.1 * float(np.prod(grid.shape)))
+    while shown < len(gaps) and cell * params.step >= params.smallest * grid.cell:
+        cell *= params.step
+        finer = GapGrid.of(grid.field, box_of(cell), grid.clearance)
+        if float(np.prod(finer.shape)) > limit:
+            break
+        around = int(np.ceil(params.around * grid.cell / cell))
+        count = sum(finer.joins(gap, around) for gap in gaps)
+        if count > shown:
+            best, shown = cell, count
+    return best
+
+
+@dataclass(frozen=True)
+class Resolved:
+    """A mission with cells that show what they can.
+
+    Parameters
+    ----------
+    mission : Mission
+        With another cell, if that shows gaps that its own did not.
+    cell : float
+        Of its grid, metres.
+    shown : tuple of Gap
+        Gaps that the other cell shows.
+    left : tuple of Gap
+        Gaps that no cell shows that could be taken.
+    """
+
+    mission: Mission
+    cell: float
+    shown: tuple[Gap, ...] = ()
+    left: tuple[Gap, ...] = ()
+
+
+def resolved(
+    mission: Mission, scene: Scene, field: DistanceField, params: GapParams | None = None
+) -> Resolved:
+    """Return a mission whose cells show the gaps of its scene, as far as a cell can be taken.
+
+    A cell that the mission states is kept, and so is that of a mission with a tour, whose words are
+    of its cells: their gaps are only told.
+
+    Parameters
+    ----------
+    mission : Mission
+        The mission.
+    scene : Scene
+        Its scene.
+    field : DistanceField
+        The scene's field.
+    params : GapParams, optional
+        Effort.
+
+    Returns
+    -------
+    Resolved
+        The mission, and what its cells show.
+    """
+
+    def box_of(cell: float) -> tuple[Floats, Floats, float]:
+        return grid_box(mission.model_copy(update={"cell": cell}), scene)
+
+    box = grid_box(mission, scene)
+    grid = GapGrid.of(field, box, mission.clearance)
+    gaps = unresolved_gaps(grid, params)
+    if not gaps or mission.cell is not None or mission.tour is not None:
+        return Resolved(mission, box[2], (), tuple(gaps))
+    cell = resolving_cell(grid, gaps, box_of, params)
+    if cell is None:
+        return Resolved(mission, box[2], (), tuple(gaps))
+    finer = GapGrid.of(field, box_of(cell), mission.clearance)
+    left = unresolved_gaps(finer, params)
+    far = 2.0 * grid.cell
+    shown = [g for g in gaps if all(np.linalg.norm(g.place - k.place) > far for k in left)]
+    return Resolved(mission.model_copy(update={"cell": cell}), cell, tuple(shown), tuple(left))
