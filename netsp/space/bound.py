@@ -38,6 +38,9 @@ FARTHER = 2.2
 CLOSE = 2e-3
 """Share of a leg's known length by which its bound may be less and count as final."""
 
+LEAST_SOLVING = 0.3
+"""Seconds for the first bound, where the time is up."""
+
 SECONDS_PER_CELL = 8e-6
 """Time that a potential takes per cell, s, by which a finer grid is left out for lack of time."""
 
@@ -196,7 +199,9 @@ def _of_robot(legs: LegBounds, clock: Clock, seed: int) -> float | None:
         graph = TravelGraph.from_costs(legs.costs, cluster)
         if begin is not None:
             graph = from_state(graph, begin)
-        result = solve_graph(graph, "auto", time_limit=clock, seed=seed)
+        # straight lengths alone give a bound, however little time there is
+        solving = Clock(LEAST_SOLVING) if clock.up else clock
+        result = solve_graph(graph, "auto", time_limit=solving, seed=seed)
         best = max(best, result.lower_bound or 0.0)
         if clock.up or result.tour is None:
             return best or None
