@@ -6,14 +6,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from netsp import Circle, InputError, Polygon, Problem, solve
+from netsp import Circle, InputError, Polygon, Problem, Solution, solve
 from netsp.command.main import main
 from netsp.export import Projection, export, waypoints_of
 from netsp.hsignature import reduce, signature
 from netsp.site.read import read_site
+from netsp.solution import ProblemReference, Status, Visit
 
 pytest.importorskip("pyproj")
 
@@ -323,3 +325,56 @@ def test_a_mission_file_is_in_metres_and_heights_above_the_water_are_told(tmp_pa
     solve(metric).save(tmp_path / "s.json")
     assert main(told) == 0
     assert "1 goal above the water (#0)" in capsys.readouterr().err
+
+
+def drawn_tour(problem, there, back):
+    """The tour to the only goal and home along two polylines."""
+    line = np.array([*there, *back[1:]], dtype=float)
+    word = signature(np.array(there), problem.representative_points)
+    return Solution(
+        problem=ProblemReference(name="x", sha256=problem.sha256), solver="drawn", roadmap="drawn",
+        status=Status.FEASIBLE, length=float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum()),
+        lower_bound=None, gap=None, path=tuple((x, y, 0.0) for x, y in line.tolist()),
+        tour=(Visit(goal=0, signature=word, tether_length=1.0),),
+    )  # fmt: skip
+
+
+CORNER = [(0, 0), (10, 0), (10, 10)]
+
+
+@pytest.mark.parametrize("post", [(8.5, 1.2), (9.4, 2.2), (7.0, 0.6), (8.1, 1.8)])
+def test_all_of_the_triangle_at_a_corner_is_kept_free(post):
+    """A post between the corner and the line that joins the points a radius before and after it."""
+    radius = 4.0
+    problem = Problem(
+        base=(0, 0), goals=[(10, 10)], tether_length=30, obstacles=[Circle(center=post, radius=0.1)]
+    )
+    points = waypoints_of(problem, drawn_tour(problem, CORNER, CORNER[::-1]), radius)
+    line = np.array([problem.base, *(p.position for p in points)])[:, :2]
+    assert tuple(line[1]) != CORNER[1]
+    for a, b, c in zip(line[:-2], line[1:-1], line[2:], strict=True):
+        if np.hypot(*(a - c)) > 1e-9:  # at the goal it turns back
+            ends = [b + (q - b) * min(1.0, radius / np.hypot(*(q - b))) for q in (a, c)]
+            triangle = shapely.Polygon([ends[0], b, ends[1]])
+            assert triangle.distance(shapely.Point(post)) > 0.1
+
+
+def test_lines_of_another_class_than_the_plans_are_refused():
+    """At the goal, and on the way home: each is looked at."""
+    pile = [Circle(center=(5, 5), radius=1)]
+    problem = Problem(base=(0, 0), goals=[(10, 10)], tether_length=30, obstacles=pile)
+    over = [(0, 0), (0, 10), (10, 10)]
+    right = drawn_tour(problem, CORNER, CORNER[::-1])
+    assert waypoints_of(problem, right)
+    entangled = drawn_tour(problem, CORNER, over[::-1])
+    with pytest.raises(InputError, match="not of the plan's homotopy class"):
+        waypoints_of(problem, entangled)
+    # a corner is moved outward because of the first post, and beyond the second
+    posts = [Circle(center=(8.5, 1.2), radius=0.1), Circle(center=(11, -1), radius=0.1)]
+    problem = Problem(base=(0, 0), goals=[(10, 10)], tether_length=30, obstacles=posts)
+    with pytest.raises(InputError, match="not of the plan's homotopy class"):
+        waypoints_of(problem, drawn_tour(problem, CORNER, CORNER[::-1]), 4.0)
+    problem = Problem(base=(0, 0), goals=[(10, 10)], tether_length=30, obstacles=pile)
+    through = drawn_tour(problem, [(0, 0), (10, 10)], [(10, 10), (0, 0)])
+    with pytest.raises(InputError, match="enter an obstacle"):
+        waypoints_of(problem, through)

@@ -20,7 +20,10 @@ from netsp import (
     travel_graph,
     verify,
 )
+from netsp.command.main import main
+from netsp.errors import EXIT_NOT_VERIFIED, VerificationError
 from netsp.hsignature import signature
+from netsp.judge import checked
 from netsp.judge.orientation import orientation, orientations
 from netsp.judge.stringpull import StringPuller, reduce_sleeve
 from netsp.roadmap.taut import TautRoadmap
@@ -382,3 +385,19 @@ def test_a_path_run_backwards_crosses_the_same_edges(corners):
 
 
 PULLERS = {}
+
+
+def test_a_tour_that_fails_its_check_is_not_written(pair, tmp_path, monkeypatch, capsys):
+    """Whatever finds it, a plug-in's roadmap say: here one that overstates its length."""
+    problem, solution = pair
+    wrong = edit(solution, length=2.0 * solution.length, lower_bound=None, gap=None,
+                 status=Status.FEASIBLE)  # fmt: skip
+    with pytest.raises(VerificationError, match="length is right"):
+        checked(problem, wrong)
+    assert checked(problem, solution) is solution
+    monkeypatch.setattr("netsp.solvers.solve.solve", lambda *_, **__: wrong)
+    file, output = tmp_path / "problem.json", tmp_path / "tour.json"
+    problem.save(file)
+    assert main(["solve", str(file), "--quiet", "-o", str(output)]) == EXIT_NOT_VERIFIED
+    assert "fails its check 'length is right'" in capsys.readouterr().err
+    assert not output.exists()

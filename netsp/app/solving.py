@@ -116,6 +116,7 @@ def _solve(
     from netsp.app.facts import facts
     from netsp.clock import Clock
     from netsp.errors import InfeasibleError, InputError, NetspError
+    from netsp.judge import checked
     from netsp.problem import Problem
     from netsp.solution import Status
     from netsp.solvers.answer import to_solution
@@ -172,7 +173,7 @@ def _solve(
         if result.tour is None:
             connection.send({"version": version, "stage": "done", "error": result.status.value})
             return None
-        found = to_solution(problem, graph, result, SOLVER, 0)
+        found = checked(problem, to_solution(problem, graph, result, SOLVER, 0))
         connection.send({
             "version": version, "stage": "done", "status": result.status.value,
             "length": result.length, **told_bound(result.status, result.length, result.bound),

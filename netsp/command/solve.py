@@ -160,7 +160,8 @@ def run(args: argparse.Namespace) -> int:
     from netsp.solution import Solution
 
     told.check_stdout(args)
-    from netsp.clock import Clock
+    from netsp.clock import Clock, whole_or_interrupted
+    from netsp.judge import checked
     from netsp.solvers import warm as warm_starts
     from netsp.solvers.solve import solve
 
@@ -217,11 +218,13 @@ def run(args: argparse.Namespace) -> int:
             if args.json:
                 told.tell(told.of_infeasible(problem, error))
             raise
-    if args.output:
-        write_text(args.output, solution.to_json())
-    else:
-        sys.stdout.write(solution.to_json())
-        sys.stdout.flush()
+    with whole_or_interrupted():  # Ctrl-C loses no tour
+        text = checked(problem, solution).to_json()
+        if args.output:
+            write_text(args.output, text)
+        else:
+            sys.stdout.write(text)
+            sys.stdout.flush()
     if args.plot:
         plotting.save(problem, solution, args.plot)
     if args.plot_trace:

@@ -1,5 +1,5 @@
 """Independent verification of solutions."""
 
-from netsp.judge.checks import Check, Verification, verify
+from netsp.judge.checks import Check, Verification, checked, verify
 
-__all__ = ["Check", "Verification", "verify"]
+__all__ = ["Check", "Verification", "checked", "verify"]

@@ -17,7 +17,7 @@ import numpy as np
 import shapely
 
 from netsp.arrays import Floats
-from netsp.errors import InputError
+from netsp.errors import InputError, VerificationError
 from netsp.hsignature import Word, concatenate, crossings, entangled, reduce
 from netsp.judge.overstretch import first_overstretch
 from netsp.judge.passage import passes
@@ -127,6 +127,39 @@ def verify(problem: Problem, solution: Solution) -> Verification:
     # copies of a model may hold what its validation would have turned into a status
     solution = solution.model_copy(update={"status": Status(solution.status)})
     return Verification(tuple(_Judge(problem, solution).run()))
+
+
+def checked(problem: Problem, solution: Solution) -> Solution:
+    """Return a solution that passes the judge, to be written or handed on.
+
+    Solutions without a tour pass, and so do those that say that they are invalid.
+
+    Parameters
+    ----------
+    problem : Problem
+        What was to be solved.
+    solution : Solution
+        What was found.
+
+    Returns
+    -------
+    Solution
+        The same.
+
+    Raises
+    ------
+    VerificationError
+        A check fails.
+    """
+    if solution.length is None or solution.status is Status.INVALID:
+        return solution
+    failed = [c for c in verify(problem, solution).checks if not c.passed]
+    if failed:
+        raise VerificationError(
+            f"the tour that was found fails its check {failed[0].name!r}: {failed[0].detail}; "
+            "it is not kept. Please report the problem file, or the package whose roadmap it is"
+        )
+    return solution
 
 
 TURNING_TOLERANCE = 1e-6
