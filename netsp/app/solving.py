@@ -150,9 +150,12 @@ def _solve(
         if row.incumbent == told[1] or time.monotonic() < told[0] + TELL:
             return
         told[:] = time.monotonic(), row.incumbent
+        said = told_bound(Status.FEASIBLE, row.incumbent, row.bound)
+        if not said["lower_bound"]:
+            said["proof"] = "searching"  # a bound may still come
         connection.send({
             "version": version, "stage": "searching", "length": row.incumbent,
-            **told_bound(Status.FEASIBLE, row.incumbent, row.bound), **drawn(graph, row.tour),
+            **said, **drawn(graph, row.tour),
         })  # fmt: skip
 
     start: Solution | None = None
