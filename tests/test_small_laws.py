@@ -16,7 +16,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from netsp import Circle, InputError, Polygon, Problem
+from netsp import Circle, InputError, Polygon, Problem, solve, verify
 from netsp.clock import Clock
 from netsp.cover.choose import greedy, pruned, simple_bound
 from netsp.errors import LimitReachedError
@@ -872,3 +872,130 @@ def test_a_plan_file_is_json_with_every_obstacle_fenced_out(posts, tmp_path):
     assert [i["doJumpId"] for i in items] == [1, 2, 3]
     assert items[2]["Altitude"] == -2
     assert items[2]["params"][0] == 5
+
+
+# the judge
+
+
+@pytest.fixture(scope="module")
+def toured():
+    """A problem with a tour around a post and a block, the path of which bends at both."""
+    problem = Problem(
+        base=(0, 0), goals=[(6, 0.5, -1), (6, -0.5, -2), (3, 4)], tether_length=7.2,
+        clearance=0.1, bounds=(-2, -3, 8, 6),
+        obstacles=[
+            Circle(center=(4, 0), radius=1),
+            Polygon(polygon=[(1, 2), (2, 2), (2, 3), (1, 3)]),
+        ],
+    )  # fmt: skip
+    return problem, solve(problem)
+
+
+def bent(solution, k, by):
+    """A solution with one vertex of its path moved."""
+    path = np.array(solution.path)
+    path[k] += by
+    return solution.model_copy(update={"path": tuple(map(tuple, path.tolist()))})
+
+
+def with_path(solution, path):
+    return solution.model_copy(update={"path": tuple(map(tuple, np.array(path).tolist()))})
+
+
+def revisit(solution, k, **change):
+    """A solution with one visit changed."""
+    visits = list(solution.tour)
+    visits[k] = visits[k].model_copy(update=change)
+    return solution.model_copy(update={"tour": tuple(visits)})
+
+
+def failed(problem, solution):
+    return {c.name for c in verify(problem, solution).checks if not c.passed}
+
+
+def test_the_judge_accepts_the_tour(toured):
+    assert failed(*toured) == set()
+
+
+def test_the_judge_sees_a_path_a_centimetre_inside_an_obstacle(toured):
+    """The bend that lies on the post is moved towards its centre."""
+    problem, solution = toured
+    path = np.array(solution.path)
+    rim = np.hypot(path[:, 0] - 4, path[:, 1]) - 1.1
+    k = int(np.argmin(np.where(rim < 0.02, path[:, 0], np.inf)))
+    inward = np.array([4.0 - path[k, 0], -path[k, 1], 0.0])
+    inward *= 0.011 / np.linalg.norm(inward)
+    assert "enters no obstacle" in failed(problem, bent(solution, k, inward + rim[k] * inward))
+
+
+def test_the_judge_sees_a_path_through_the_edge_of_a_block(toured):
+    problem, solution = toured
+    path = np.array(solution.path)
+    home = len(path) - 1
+    detour = [path[home], [0.9, 2.5, 0.0], [1.05, 2.5, 0.0], [0.9, 2.5, 0.0], path[home]]
+    assert "enters no obstacle" in failed(problem, with_path(solution, [*path[:home], *detour]))
+
+
+@pytest.mark.parametrize(
+    ("name", "change"),
+    [
+        ("starts and ends at the base", lambda s: bent(s, 0, (0.01, 0, 0))),
+        ("starts and ends at the base", lambda s: bent(s, -1, (0, 0.01, 0))),
+        ("names every goal once", lambda s: s.model_copy(update={"tour": s.tour[:-1]})),
+        ("names every goal once", lambda s: revisit(s, 0, goal=s.tour[1].goal, position=None)),
+        ("visits every goal in order", lambda s: s.model_copy(update={"tour": s.tour[::-1]})),
+        ("visits every goal in order", lambda s: revisit(s, 0, position=(5.9, 0.5, -1.0))),
+        ("tether word at every goal", lambda s: revisit(s, 0, signature=(1, 2))),
+        ("taut lengths as stated", lambda s: revisit(s, 1, tether_length=0.9
+                                                     * s.tour[1].tether_length)),
+        ("taut lengths as stated", lambda s: revisit(s, 1, tether_length=1.01
+                                                     * s.tour[1].tether_length)),
+        ("length is right", lambda s: s.model_copy(update={"length": 0.99 * s.length})),
+        ("length is right", lambda s: s.model_copy(update={"length": 1.01 * s.length})),
+        ("stays within bounds", lambda s: with_path(s, [*s.path[:-1], (-2.1, 0.0, 0.0),
+                                                        s.path[-1]])),
+        ("bound, gap and status agree", lambda s: s.model_copy(update={"lower_bound": 1.1
+                                                                       * s.length})),
+        ("bound, gap and status agree", lambda s: s.model_copy(update={"gap": 0.2})),
+        ("bound, gap and status agree", lambda s: s.model_copy(
+            update={"lower_bound": 0.5 * s.length, "gap": 0.5})),
+        ("bound, gap and status agree", lambda s: s.model_copy(
+            update={"status": Status.INFEASIBLE})),
+    ],
+)  # fmt: skip
+def test_the_judge_names_what_is_wrong(toured, name, change):
+    problem, solution = toured
+    assert name in failed(problem, change(solution))
+
+
+def test_the_judge_sees_a_tether_that_is_too_short_at_a_goal(toured):
+    problem, solution = toured
+    longest = max(v.tether_length for v in solution.tour)
+    short = problem.model_copy(update={"tether_length": longest - 1e-3})
+    claimed = solution.model_copy(
+        update={"problem": solution.problem.model_copy(update={"sha256": short.sha256})}
+    )
+    assert failed(short, claimed) == {"taut tether fits"}
+
+
+def test_the_judge_sees_a_tether_that_is_too_short_between_goals(toured):
+    """A spur out to the corner (7.9, -2.9) needs 8.4 m of 7.2; at the goals nothing changes."""
+    problem, solution = toured
+    path = np.array(solution.path)
+    k = 1 + int(np.argmin(np.linalg.norm(path - problem.points[2], axis=1)))
+    there = [[7.9, -2.9, -2.0], path[k - 1]]
+    spur = with_path(solution, [*path[:k], *there, *path[k:]])
+    assert "taut tether fits" in failed(problem, spur)
+
+
+def test_the_judge_sees_a_path_that_comes_home_wound(toured):
+    """A lap around the block at the end leaves its letter."""
+    problem, solution = toured
+    lap = [(0.5, 1.5, 0), (2.5, 1.5, 0), (2.5, 3.5, 0), (0.5, 3.5, 0), (0.5, 1.5, 0), (0, 0, 0)]
+    assert "total word is empty" in failed(problem, with_path(solution, [*solution.path, *lap]))
+
+
+def test_the_judge_takes_no_other_problem(toured):
+    problem, solution = toured
+    other = problem.model_copy(update={"tether_length": 9.0})
+    assert "belongs to the problem" in failed(other, solution)
