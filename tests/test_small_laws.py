@@ -8,6 +8,8 @@ import itertools
 import json
 import math
 import time
+import tomllib
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -999,3 +1001,13 @@ def test_the_judge_takes_no_other_problem(toured):
     problem, solution = toured
     other = problem.model_copy(update={"tether_length": 9.0})
     assert "belongs to the problem" in failed(other, solution)
+
+
+def test_every_mutant_of_the_list_still_applies():
+    """`benchmarks/mutants.py` replaces text that stands exactly once in its file."""
+    root = Path(__file__).parent.parent
+    rows = tomllib.loads((root / "benchmarks" / "mutants.toml").read_text())["mutant"]
+    assert len(rows) >= 68
+    stale = [r["name"] for r in rows if (root / r["file"]).read_text().count(r["old"]) != 1]
+    assert stale == []
+    assert len({(r["file"], r["new"], r["old"]) for r in rows}) == len(rows)

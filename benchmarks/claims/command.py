@@ -43,6 +43,24 @@ def killed() -> tuple[str, bool]:
     return f"{len(set(ids))} of 40 trials, {before} before the kill", held
 
 
+SAMPLE = 12
+"""One mutant in twelve is tried in the gate; the whole list takes minutes."""
+
+
+def sabotaged() -> tuple[str, bool]:
+    """Mutants of `benchmarks/mutants.toml` that the related tests notice."""
+    command = [sys.executable, str(ROOT / "benchmarks" / "mutants.py"), "--every", str(SAMPLE)]
+    done = subprocess.run(command, capture_output=True, text=True)
+    lines = (done.stdout or done.stderr).strip().splitlines() or ["nothing was printed"]
+    return f"{lines[-1]}, of {mutants_listed()} on the list", done.returncode == 0
+
+
+def mutants_listed() -> int:
+    """Return how many mutants there are."""
+    text = (ROOT / "benchmarks" / "mutants.toml").read_text(encoding="utf-8")
+    return text.count("[[mutant]]")
+
+
 def cold_start() -> tuple[str, bool]:
     """CPU seconds of the first solve on a machine, its cache of compiled code empty."""
     with tempfile.TemporaryDirectory() as folder:
@@ -110,3 +128,4 @@ def running() -> Iterator[Claim]:
         if any(True for _ in pages.blocks(name)):
             yield page(name)
     yield Claim("comparison killed and continued", "every trial once", killed)
+    yield Claim("sabotages that the tests notice", "every one of a sample", sabotaged)
