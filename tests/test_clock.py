@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from netsp import Problem, Status, solve, solve_graph, travel_graph, verify
-from netsp.clock import NEVER, Clock
-from netsp.errors import LimitReachedError, MemoryLimitError
+from netsp.clock import NEVER, Clock, TimingPolicy
+from netsp.errors import InputError, LimitReachedError, MemoryLimitError
 from netsp.memory import ask, available
 from netsp.mip.cutpool import IDLE, CutPool
 from netsp.mip.cuts import Cut
@@ -154,6 +154,16 @@ def test_one_that_never_stops_changes_nothing():
     plain = solve(problem, "mip")
     asked = solve(problem, "mip", should_stop=lambda: False)
     assert (asked.length, asked.tour, asked.path) == (plain.length, plain.tour, plain.path)
+
+
+def test_little_work_is_done_whatever_the_time_and_more_of_it_is_not():
+    late, few = Clock(1e-9), Clock.policy.untimed_steps
+    assert late.finish("adding", few, lambda stop: 7 + stop[0]) == 7
+    assert Clock().finish("adding", 1e300, lambda stop: 7 + stop[0]) == 7
+    with pytest.raises(LimitReachedError, match="time limit reached while adding"):
+        late.finish("adding", few + 1, lambda stop: 7)
+    with pytest.raises(InputError, match=r"untimed_steps: expected .* got -1"):
+        TimingPolicy(-1)
 
 
 def _in_order(problem):

@@ -6,11 +6,16 @@ import math
 import jsonschema
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from netsp import Circle, InputError, Polygon, Problem, Solution
+from netsp.geometry.polygons import (
+    counterclockwise,
+    polygon_interior_point,
+    polygon_signed_distance,
+)
 
 GOOD = {
     "schema_version": 1,
@@ -229,3 +234,46 @@ def test_a_copy_with_other_values_keeps_nothing_that_was_computed_of_the_old(x, 
     fresh = Problem(base=(0, 0), goals=[(1, 0)], tether_length=300.0, obstacles=moved["obstacles"])
     assert copy == fresh
     assert copy.scale == fresh.scale
+
+
+def _star(rng, corners, flatness):
+    """A simple polygon of random corners about the origin."""
+    angle = np.sort(rng.uniform(0.0, 2.0 * np.pi, corners))
+    radius = 1.0 + 0.9 * rng.uniform(-1.0, 1.0, corners)
+    return np.column_stack([radius * np.cos(angle), flatness * radius * np.sin(angle)])
+
+
+@given(st.integers(0, 10_000), st.integers(3, 9), st.floats(0.1, 3.0))
+@settings(max_examples=30)
+def test_corners_in_the_middle_of_edges_change_no_polygon(seed, corners, flatness):
+    rng = np.random.default_rng(seed)
+    outline = counterclockwise(_star(rng, corners, flatness))
+    pieces = rng.integers(1, 6, len(outline))
+    dense = [
+        a + (b - a) * k / n
+        for a, b, n in zip(outline, np.roll(outline, -1, axis=0), pieces, strict=True)
+        for k in range(n)
+    ]
+    kept = counterclockwise(np.roll(dense, int(rng.integers(len(dense))), axis=0))
+    assert {tuple(p) for p in kept} == {tuple(p) for p in outline}
+
+
+@given(st.integers(0, 10_000), st.integers(3, 150), st.floats(0.1, 3.0))
+def test_a_tenth_of_the_deepest_middle_of_a_chord_is_the_least_depth_inside(
+    seed, corners, flatness
+):
+    """Chords too short to win are not measured; none of them may be the one."""
+    outline = _star(np.random.default_rng(seed), corners, flatness)
+    own = -polygon_signed_distance(outline, polygon_interior_point(outline))
+    low, high = outline[:, 1].min(), outline[:, 1].max()
+    for k in range(1, 16):
+        height = float(low + (high - low) * k / 16)
+        crossings = np.sort([
+            a[0] + (height - a[1]) / (b[1] - a[1]) * (b[0] - a[0])
+            for a, b in zip(outline, np.roll(outline, -1, axis=0), strict=True)
+            if (a[1] > height) != (b[1] > height)
+        ])  # fmt: skip
+        middles = np.column_stack([
+            (crossings[::2] + crossings[1::2]) / 2, np.full(len(crossings) // 2, height)
+        ])  # fmt: skip
+        assert own >= 0.1 * np.max(-polygon_signed_distance(outline, middles)) - 1e-12
