@@ -1,10 +1,11 @@
 """Words and tours in space.
 
-    python benchmarks/space.py [--only words|loops|prisms|frames|missions]
+    python benchmarks/space.py [--only words|loops|prisms|given|frames|missions]
                                [--missions jacket …] [--keep]
 
 Words: what groups scenes have, and what they take. Loops: random ones, beside a second invariant.
-Prisms: tours in space of problems whose shortest tour is proven in the plane. Frames: random ones,
+Prisms: tours in space of problems whose shortest tour is proven in the plane. Given: missions in a
+good order, solved again within short limits. Frames: random ones,
 with the gap to the bound of all tours. Missions: the shipped
 ones, and the sites of `benchmarks/sites.py`, solved, and flown by `predictive` as they were planned
 and in the order that they were given.
@@ -36,10 +37,11 @@ from netsp.online.mission import Mission
 from netsp.online.scene.field import DistanceField
 from netsp.online.scene.scene import scene_of
 from netsp.online.simulate import grid_of, simulate
+from netsp.roadmap.reach import shortest_tethers
 from netsp.solvers.solve import solve_graph
-from netsp.space.bound import bound_of_all
+from netsp.space.judge import verify_mission
 from netsp.space.order import order_by_going_on
-from netsp.space.plan import AS_GIVEN, OUT_AND_BACK, PLANE, plan
+from netsp.space.plan import AS_GIVEN, OUT_AND_BACK, PLANE
 from netsp.space.signature import SpaceSignature
 from netsp.space.solve import GOING_ON, SolvedMission, seconds_until_home, solve_mission
 from netsp.space.water import SHARE, Water, along, straight
@@ -239,27 +241,92 @@ def prism_worlds() -> Iterator[tuple[str, Problem]]:
         yield f"random {seed}", problem
 
 
-def beside_plane(problem: Problem) -> tuple[float, float, float, str, float]:
+def posts_world(seed: int) -> tuple[Problem, Mission, Scene]:
+    """Return posts of any size with 5 to 8 goals about them: in the plane, and as a mission with
+    the same clearance and the same tether, which is up to a third longer than the farthest goal
+    needs."""
+    rng = np.random.default_rng(seed)
+    clearance, base = 0.05, (-9.0, 0.0, 0.0)
+    posts: list[tuple[np.ndarray, float]] = []
+    while len(posts) < 5 + seed % 4:
+        centre, radius = rng.uniform(-8.0, 8.0, 2), float(rng.uniform(0.2, 1.6))
+        if np.linalg.norm(centre - base[:2]) > radius + 0.5 and all(
+            np.linalg.norm(centre - c) > r + radius + 0.6 for c, r in posts
+        ):
+            posts.append((centre, radius))
+    goals: list[tuple[float, float, float]] = []
+    while len(goals) < 5 + seed % 4:
+        p = rng.uniform(-9.0, 9.0, 2)
+        if all(np.linalg.norm(p - c) > r + 0.2 for c, r in posts):
+            goals.append((float(p[0]), float(p[1]), 0.0))
+    problem = Problem.model_validate({
+        "base": base, "goals": goals, "clearance": clearance, "bounds": [-10, -10, 10, 10],
+        "obstacles": [{"center": c.tolist(), "radius": r} for c, r in posts],
+        "tether_length": 60.0,
+    })  # fmt: skip
+    needed = float(shortest_tethers(problem).max())
+    problem = problem.model_copy(update={"tether_length": needed * rng.uniform(1.02, 1.33)})
+    scene = Scene(
+        solids=[{"post": {"center": c.tolist(), "radius": r}} for c, r in posts],
+        bounds=[-10, -10, -1, 10, 10, 1],
+    )
+    mission = Mission(
+        scene="-", anchor=base, start=base, waypoints=goals, clearance=clearance, cell=0.25,
+        tether_length=problem.tether_length,
+    )  # fmt: skip
+    return problem, mission, scene
+
+
+def beside_plane(
+    problem: Problem, mission: Mission | None = None, scene: Scene | None = None
+) -> tuple[float, float, float, str, float]:
     """Tour in space, its bound, tour in the plane, status of that, and seconds of the first."""
     with tempfile.TemporaryDirectory() as folder:
-        mission = in_space(problem, Path(folder))
+        mission = mission or in_space(problem, Path(folder))
+        scene = scene or mission.load_scene()
         begin = time.perf_counter()
-        found = plan(mission, time_limit=60.0)
+        found = solve_mission(mission, scene=scene)
         took = time.perf_counter() - begin
-    bound = bound_of_all(found.ways, sorted(found.order), Clock(60.0)) or 0.0
+    if len(found.tour.stops) < len(mission.waypoints):
+        return float("nan"), 0.0, 1.0, "left out", took
     best = solve(problem, time_limit=60.0)
     assert best.length is not None
-    return found.length, bound, best.length, best.status.value, took
+    bound = found.tour.bound_of_all or 0.0
+    return found.tour.length, bound, best.length, best.status.value, took
 
 
-def prisms() -> None:
+def prisms(worlds: int) -> None:
     head("problem", "goals", "in space m", "in the plane m", "status there", "longer by %",
          "bound of all tours m", "gap %", "s", name="space-prisms")  # fmt: skip
-    for name, problem in prism_worlds():
-        length, bound, best, status, took = beside_plane(problem)
+    posts = ((f"posts {seed}", *posts_world(seed)) for seed in range(worlds))
+    others = ((name, problem, None, None) for name, problem in prism_worlds())
+    for name, problem, mission, scene in itertools.chain(others, posts):
+        length, bound, best, status, took = beside_plane(problem, mission, scene)
         row(name, len(problem.goals), f"{length:.3f}", f"{best:.3f}", status,
             f"{100 * (length / best - 1):.2f}", f"{bound:.3f}",
             f"{100 * max(0.0, 1 - bound / length):.1f}", f"{took:.0f}")  # fmt: skip
+    print()
+
+
+def beside_given(names: list[str], limits: list[float]) -> None:
+    """Missions in a good order, solved within short limits: what comes of it beside that order."""
+    head("mission", "waypoints", "limit s", "as given m", "as given, home after s", "solved m",
+         "home after s", "found by", "verified", "CPU s", name="space-given")  # fmt: skip
+    for name in names:
+        mission, scene = mission_of(name) if name in SITES else shipped(name)
+        ordered = solve_mission(mission, scene=scene).mission
+        mission = ordered.model_copy(update={"tour": None})
+        given = seconds_until_home(simulate(mission, scene=scene))
+        for limit in limits:
+            begin = time.process_time()
+            found = solve_mission(mission, scene=scene, time_limit=limit)
+            took = time.process_time() - begin
+            run = simulate(found.mission, scene=scene)
+            verdict = verify_mission(found.mission, scene=scene)
+            row(name, len(mission.waypoints), f"{limit:g}", f"{ordered.tour.length:.1f}",
+                f"{given:.1f}", f"{found.tour.length:.1f}", f"{seconds_until_home(run):.1f}",
+                WAYS.get(found.tour.solver, "states and legs"), "yes" if verdict else "no",
+                f"{took:.0f}")  # fmt: skip
     print()
 
 
@@ -410,13 +477,17 @@ def missions(names: list[str]) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser()
-    parser.add_argument("--only", choices=("words", "loops", "prisms", "frames", "missions"))
+    parser.add_argument(
+        "--only", choices=("words", "loops", "prisms", "frames", "missions", "given")
+    )
     parser.add_argument(
         "--missions",
         nargs="*",
         default=[*MISSIONS, *SITES, LONGER_PEN],
         help="names of missions and sites",
     )
+    parser.add_argument("--worlds", type=int, default=10, help="random worlds of posts")
+    parser.add_argument("--given", nargs="*", default=["basin", "ring", "jacket"])
     parser.add_argument("--loops", type=int, default=10_000)
     parser.add_argument("--group", help=argparse.SUPPRESS)
     args = parser.parse_args()
@@ -425,7 +496,9 @@ def main() -> None:
         return
     heading("In space")
     for name, measure in (
-        ("words", words), ("loops", lambda: loops(args.loops)), ("prisms", prisms),
+        ("words", words), ("loops", lambda: loops(args.loops)),
+        ("prisms", lambda: prisms(args.worlds)),
+        ("given", lambda: beside_given(args.given, [2.0, 30.0])),
         ("frames", frames), ("missions", lambda: missions(args.missions)),
     ):  # fmt: skip
         if args.only in (None, name):
