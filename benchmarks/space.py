@@ -278,14 +278,15 @@ def posts_world(seed: int) -> tuple[Problem, Mission, Scene]:
 
 
 def beside_plane(
-    problem: Problem, mission: Mission | None = None, scene: Scene | None = None
-) -> tuple[float, float, float, str, float]:
+    problem: Problem, mission: Mission | None = None, scene: Scene | None = None,
+    limit: float = 60.0,
+) -> tuple[float, float, float, str, float]:  # fmt: skip
     """Tour in space, its bound, tour in the plane, status of that, and seconds of the first."""
     with tempfile.TemporaryDirectory() as folder:
         mission = mission or in_space(problem, Path(folder))
         scene = scene or mission.load_scene()
         begin = time.perf_counter()
-        found = solve_mission(mission, scene=scene)
+        found = solve_mission(mission, scene=scene, time_limit=limit)
         took = time.perf_counter() - begin
     if len(found.tour.stops) < len(mission.waypoints):
         return float("nan"), 0.0, 1.0, "left out", took

@@ -426,7 +426,7 @@ def _begin_as_given(found: _Incumbents, flying: Clock, seed: int) -> None:
     if not taken:
         water = replace(flights.water, mission=mission.model_copy(update={"tour": None}))
         driven = given_plan(water)
-        if driven is not None:
+        if driven is not None and driven.stops:
             found.take_first(_of_plan(driven, AS_GIVEN, seed))
     given, _ = flights.of(mission, "the order as given", clock=flying)
     found.take_given(given)
@@ -445,7 +445,7 @@ def _offer_given_flight(found: _Incumbents, seed: int) -> None:
     order = tuple(range(len(mission.waypoints)))
     water = found.flights.water
     kept = tour_of_flight(mission, order, given, water.field, water, None, seed, AS_GIVEN)
-    if kept is None:
+    if kept is None or not kept.tour.stops:
         return
     if best is None:
         found.take_first(kept)
