@@ -65,7 +65,7 @@ milli = st.integers(-6000, 6000).map(lambda v: v / 1000.0)
 points = st.tuples(milli, milli)
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.filter_too_much])
+@settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.filter_too_much])
 @given(st.lists(points, min_size=1, max_size=5))
 def test_the_tether_of_any_free_path_is_that_of_its_word_by_another_method(inner):
     """Tethers are pulled over a triangulation here, and found over bitangents by `Tethers`."""
@@ -141,6 +141,30 @@ def test_a_part_through_an_obstacle_is_named_and_goes_round_on_the_shorter_side(
     assert over.entangled == (0,)  # above the pile, and home below it
     under = measure_path(PILE, [(-4, 0), (-4, -0.5), (4, -0.5), (4, -3), (-4, -3), (-4, 0)])
     assert under.is_free
+
+
+def test_a_path_between_obstacles_that_touch_is_named_and_does_not_count_as_between_them():
+    boxes = [[(2, 0), (4, 0), (4, 2), (2, 2)], [(2, 2), (4, 2), (4, 4), (2, 4)]]
+    problem = Problem(base=(0, 2), goals=[(6, 2)], tether_length=20,
+                      obstacles=[{"polygon": b} for b in boxes])  # fmt: skip
+    m = measure_path(problem, [(0, 2), (6, 2), (6, 5), (0, 5), (0, 2)])
+    assert ("touching", (0, 1)) in [(s.kind, s.obstacles) for s in m.stretches]
+    assert not m.is_inside
+    assert m.word == () or m.entangled == (0, 1)  # round both, on either side of both
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.lists(st.tuples(st.integers(-3, 6), st.integers(-3, 6)), min_size=1, max_size=6))
+def test_a_path_through_anything_and_its_reverse_are_led_round_the_same_way(corners):
+    """Whole numbers: corners on outlines, parts along walls, two ways round that are as long."""
+    boxes = [[(1, 0), (3, 0), (3, 2), (1, 2)], [(1, 2), (2, 2), (2, 4), (1, 4)],
+             [(4, 1), (5, 1), (5, 3), (4, 3)]]  # fmt: skip
+    problem = Problem(base=(0, 0), goals=[(6, 6)], tether_length=40,
+                      obstacles=[{"polygon": b} for b in boxes])  # fmt: skip
+    path = np.array([(0, 0), *corners, (7, 7), (0, 0)], dtype=float)
+    there, back = measure_path(problem, path), measure_path(problem, path[::-1])
+    assert there.word == invert(back.word)
+    assert there.is_free == (there.end_tether < 1e-6)
 
 
 def test_a_part_within_the_clearance_keeps_its_side():

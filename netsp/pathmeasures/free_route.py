@@ -20,6 +20,8 @@ import shapely
 from netsp.arrays import Floats
 from netsp.geometry import polylines
 from netsp.hsignature.measures import winding_numbers
+from netsp.judge.checks import AT_CONTACT
+from netsp.judge.passage import passes
 from netsp.judge.solids import bridges
 from netsp.judge.stringpull import StringPuller
 from netsp.problem import Circle, Polygon
@@ -194,9 +196,14 @@ class FreeSpace:
         others = [i for i in range(len(self.problem.obstacles)) if i not in pierced]
         rays = self.problem.representative_points[others].reshape(-1, 2) - self.origin
 
-        def rank(way: Floats) -> tuple[int, float]:
+        def rank(way: Floats) -> tuple[int, int, float, float]:
+            """Order ways; a path and its reverse take the same one, also of two equal ones."""
             turns = winding_numbers(np.vstack([part, way[::-1], part[:1]]), rays)
-            return int(np.count_nonzero(np.round(turns))), polylines.length(way)
+            middle = shapely.LineString(way).centroid
+            return (
+                int(np.count_nonzero(np.round(turns))),
+                round(polylines.length(way) / self.place), middle.x, middle.y,
+            )  # fmt: skip
 
         return min((forward, back), key=rank)
 
@@ -281,13 +288,17 @@ class FreeSpace:
     def _between_touching(self, xy: Floats, along: Floats) -> list[Stretch]:
         """Return the places where a path slips between obstacles that touch."""
         out = []
-        line = shapely.LineString(xy - self.origin)
+        path = xy - self.origin
+        line = shapely.LineString(path)
         for bridge in self._bridges:
-            meeting = line.intersection(shapely.LineString(bridge.line))
-            for point in shapely.get_parts(shapely.centroid(shapely.get_parts(meeting))):
-                s = float(np.interp(line.project(point), polylines.along(xy), along))
-                place = (float(point.x + self.origin[0]), float(point.y + self.origin[1]))
-                out.append(Stretch("touching", (bridge.first, bridge.second), s, s, 0.0, place))
+            gate = shapely.LineString(bridge.line)
+            near = line.dwithin(gate, self.place)
+            if not near or not passes(bridge, path, AT_CONTACT * self.place):
+                continue
+            at = shapely.Point(bridge.contact)
+            s = float(np.interp(line.project(at), polylines.along(xy), along))
+            x, y = (bridge.contact + self.origin).tolist()
+            out.append(Stretch("touching", (bridge.first, bridge.second), s, s, 0.0, (x, y)))
         return out
 
 
