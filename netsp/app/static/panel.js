@@ -78,18 +78,25 @@ export function fill(page) {
   panel.replaceChildren(...parts);
 }
 
+/** @param {string} text @param {boolean} disabled */
+function button(text, disabled) {
+  const e = document.createElement("button");
+  e.append(text);
+  e.disabled = disabled;
+  return e;
+}
+
 /** A path drawn by hand, beside the tour. @param {any} page */
 function drawn(page) {
   const path = page.drawn;
   if (!path?.points.length && page.tool !== "path") return [];
-  const back = element("button", "Take back"), none = element("button", "Clear"), save = element("button", "Download");
+  const back = button("Take back", !path.points.length), none = button("Clear", !path.points.length);
+  const save = button("Download", !path.any);
   back.title = "the last stroke (Ctrl+Z)";
   save.title = "as GeoJSON, which netsp compare-path reads";
   back.addEventListener("click", () => path.undo());
   none.addEventListener("click", () => path.clear());
   save.addEventListener("click", () => page.download("drawn.geojson"));
-  back.disabled = none.disabled = !path.points.length;
-  save.disabled = !path.any;
   const rows = path.rows().map(([name, value, bad]) => {
     const cell = element("td", value);
     if (bad) cell.className = "bad";
