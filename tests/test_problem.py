@@ -244,7 +244,7 @@ def _star(rng, corners, flatness):
 
 
 @given(st.integers(0, 10_000), st.integers(3, 9), st.floats(0.1, 3.0))
-@settings(max_examples=30)
+@settings(max_examples=30, deadline=None)
 def test_corners_in_the_middle_of_edges_change_no_polygon(seed, corners, flatness):
     rng = np.random.default_rng(seed)
     outline = counterclockwise(_star(rng, corners, flatness))
@@ -259,9 +259,8 @@ def test_corners_in_the_middle_of_edges_change_no_polygon(seed, corners, flatnes
 
 
 @given(st.integers(0, 10_000), st.integers(3, 150), st.floats(0.1, 3.0))
-def test_a_tenth_of_the_deepest_middle_of_a_chord_is_the_least_depth_inside(
-    seed, corners, flatness
-):
+@settings(max_examples=20, deadline=None)
+def test_the_interior_point_is_a_tenth_as_deep_as_any_middle_of_a_chord(seed, corners, flatness):
     """Chords too short to win are not measured; none of them may be the one."""
     outline = _star(np.random.default_rng(seed), corners, flatness)
     own = -polygon_signed_distance(outline, polygon_interior_point(outline))
