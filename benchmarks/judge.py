@@ -1,6 +1,7 @@
 """The judge against false tours, over hostile worlds.
 
     python benchmarks/judge.py [--worlds 1000]
+    python benchmarks/judge.py --by-kind 150     kinds of worlds and of false tours (false_tours.py)
 
 Every world is solved; its tour must be accepted, and every falsification of it refused: paths
 through walls, a wrong word, wrong lengths, obstacles stated as entangled where nothing is, a tether
@@ -14,8 +15,10 @@ from __future__ import annotations
 import argparse
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 
 import numpy as np
+from false_tours import KINDS, WORLDS
 from table import head, heading, row
 
 from netsp import Circle, Polygon, Problem, Solution, Status, solve, verify
@@ -178,12 +181,96 @@ def count(worlds: int, first: int = 0) -> tuple[int, int, list[str], list[str]]:
     return right, false, refused, accepted
 
 
+@dataclass
+class Tally:
+    """What the judge said of the worlds of one kind."""
+
+    worlds: int = 0
+    refused: list[str] = field(default_factory=list)
+    false: Counter[str] = field(default_factory=Counter)
+    accepted: list[str] = field(default_factory=list)
+
+
+def tally(worlds: int, per_world: int, first: int = 0) -> dict[str, Tally]:
+    """Judge right tours of so many worlds of each kind, and some false ones of each, which take
+    turns through all kinds of `false_tours`."""
+    out = {name: Tally() for name in WORLDS}
+    turn = 0
+    names = list(KINDS)
+    for name, draw in WORLDS.items():
+        mine, seed = out[name], first
+        while mine.worlds < worlds:
+            rng = np.random.default_rng(seed)
+            seed += 1
+            problem = draw(rng)
+            if problem is None:
+                continue
+            try:
+                solution = solve(problem, roadmap_options=FEW, time_limit=10.0)
+            except NetspError:
+                continue
+            mine.worlds += 1
+            verdict = verify(problem, solution)
+            if not verdict:
+                bad = next(c for c in verdict.checks if not c.passed)
+                mine.refused.append(f"{name} {seed - 1}: {bad.name}: {bad.detail}")
+            made = 0
+            for _ in range(len(names)):
+                if made == per_world:
+                    break
+                turn += 1
+                what = names[turn % len(names)]
+                lie = KINDS[what](problem, solution, rng)
+                if lie is None:
+                    continue
+                made += 1
+                mine.false[what] += 1
+                if _accepts(*lie):
+                    mine.accepted.append(f"{name} {seed - 1}: {what}")
+    return out
+
+
+def _accepts(problem: Problem, solution: Solution) -> bool:
+    try:
+        return bool(verify(problem, solution))
+    except InputError:
+        return False
+
+
+def by_kind(worlds: int, per_world: int) -> None:
+    """Print tables by kind of world and of falsehood, and name what went wrong."""
+    found = tally(worlds, per_world)
+    head("worlds", "right ones", "refused", "false ones", "accepted", name="judge-worlds")
+    for name, t in found.items():
+        row(name, t.worlds, len(t.refused), t.false.total(), len(t.accepted))
+    false: Counter[str] = sum((t.false for t in found.values()), Counter())
+    accepted = Counter(line.split(": ")[1] for t in found.values() for line in t.accepted)
+    print()
+    head("false by", "tours", "accepted", name="judge-kinds")
+    for name in KINDS:
+        row(name, false[name], accepted[name])
+    print()
+    for t in found.values():
+        for line in (*t.refused, *t.accepted):
+            print(f"- {line}")
+
+
 def main() -> None:
     """Count, and name what went wrong."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--worlds", type=int, default=1000)
+    parser.add_argument(
+        "--by-kind", type=int, default=0, metavar="N",
+        help="instead, right and false tours of N worlds of each kind of false_tours.py",
+    )  # fmt: skip
+    parser.add_argument(
+        "--false", type=int, default=8, metavar="M", help="false tours of each such world"
+    )
     args = parser.parse_args()
     heading("The judge")
+    if args.by_kind:
+        by_kind(args.by_kind, args.false)
+        return
     right, false, refused, accepted = count(args.worlds)
     head("worlds", "right ones accepted", "right ones refused", "false ones refused",
          "false ones accepted", name="judge")  # fmt: skip

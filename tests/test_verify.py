@@ -1,7 +1,9 @@
 """The judge passes what is right and fails every single thing that can be wrong."""
 
+import importlib
 import math
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -401,3 +403,12 @@ def test_a_tour_that_fails_its_check_is_not_written(pair, tmp_path, monkeypatch,
     assert main(["solve", str(file), "--quiet", "-o", str(output)]) == EXIT_NOT_VERIFIED
     assert "fails its check 'length is right'" in capsys.readouterr().err
     assert not output.exists()
+
+
+def test_false_tours_of_forty_kinds_are_refused_and_right_ones_are_not(monkeypatch):
+    """A sample of `python benchmarks/judge.py --by-kind`, over all its kinds of worlds."""
+    monkeypatch.syspath_prepend(str(Path(__file__).parent.parent / "benchmarks"))
+    judge = importlib.import_module("judge")
+    found = judge.tally(1, 9).values()
+    assert [line for t in found for line in (*t.refused, *t.accepted)] == []
+    assert len({name for t in found for name in t.false}) >= 40

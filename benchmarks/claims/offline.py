@@ -91,6 +91,19 @@ def judged() -> tuple[str, bool]:
     return f"{len(accepted)} of {false} accepted, {len(refused)} of {right} refused", held
 
 
+def judged_by_kind() -> tuple[str, bool]:
+    """Right and false tours in whole-number worlds, touching boxes, rooms and others."""
+    import judge
+
+    found = judge.tally(4, 12).values()
+    refused = sum(len(t.refused) for t in found)
+    accepted = sum(len(t.accepted) for t in found)
+    kinds = len({name for t in found for name in t.false})
+    right, false = sum(t.worlds for t in found), sum(t.false.total() for t in found)
+    text = f"{accepted} of {false} of {kinds} kinds accepted, {refused} of {right} refused"
+    return text, not refused and not accepted and kinds >= 40
+
+
 def repeatable() -> tuple[str, bool]:
     """Pairs of runs in new processes, with other hash seeds and numbers of threads, to the byte."""
     import repeat
@@ -420,4 +433,8 @@ def claims() -> Iterator[Claim]:
     yield Claim("the papers' studies, trials without a clock", "as published", studies_again)
     yield Claim("systematic paths of the wharf over the tour", "as published", systematic_paths)
     yield Claim("false tours accepted, right ones refused", "none", judged)
+    yield Claim(
+        "false tours of 40 kinds accepted, right ones refused, in degenerate worlds", "none",
+        judged_by_kind,
+    )  # fmt: skip
     yield Claim("same seed, same bytes", "all pairs", repeatable)
