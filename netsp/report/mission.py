@@ -25,6 +25,7 @@ from netsp.pictures import style
 from netsp.pictures.scene import Stops, figure_of
 from netsp.report import briefing, log
 from netsp.report.page import STYLE
+from netsp.solution import Status
 from netsp.space.judge import verify_mission
 
 
@@ -149,9 +150,11 @@ def _summary(mission: Mission, scene: Scene, summary: dict[str, Any]) -> str:
 
 
 def _planned(tour: PlannedTour, mission: Mission, unit: str) -> str:
-    """What is known of a tour: what is proven is about the states and legs that were found."""
+    """Say what is proven of a tour: among all tours, or those between the states found."""
     proof = "found"
-    if tour.lower_bound is not None:
+    if tour.status is Status.OPTIMAL:
+        proof = f"{tour.status.verdict} among {Scope.ALL_TOURS.tours} to its waypoints"
+    elif tour.lower_bound is not None:
         searched = f"{counted(tour.legs, 'leg')}, {counted(tour.states, 'state')} of the tether"
         of_states = LowerBound(tour.lower_bound, Scope.STATES)
         optimal = tour.status.is_optimal
@@ -160,7 +163,7 @@ def _planned(tour: PlannedTour, mission: Mission, unit: str) -> str:
             f"({searched})"
         )
     all_of = ""
-    if tour.bound_of_all is not None:
+    if tour.bound_of_all is not None and tour.status is not Status.OPTIMAL:
         of_all = LowerBound(tour.bound_of_all, Scope.ALL_TOURS)
         all_of = f", and {above_shortest(tour.length, of_all)}"
     if tour.unresolved_gaps:
