@@ -14,7 +14,6 @@ import os
 from table import head, heading, row
 
 from netsp import TravelGraph, solve_graph
-from netsp.solution import Status
 from netsp.solvers.solve import travel_graph
 from netsp.worlds import reachable_world
 
@@ -55,7 +54,7 @@ def main() -> None:
             _ = graph.costs  # measured for both
             ours, our_s = outcome(graph, "mip", args.limit)
             theirs, their_s = outcome(graph, "mip-2017", args.limit)
-            optimum = ours.length if ours.status is Status.OPTIMAL else None
+            optimum = ours.length if ours.status.is_optimal else None
             bound = "" if optimum is None else f"{100 * (theirs.lower_bound or 0) / optimum:.2f}"
             row(
                 goals, f"{tether:g}", len(world.obstacles), len(graph),

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import textwrap
 import time
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -242,6 +243,8 @@ def test_solvers_that_crash_hang_or_eat_cost_one_row_each(tmp_path, monkeypatch)
             "roadmap",
         ),
         (("[worlds]", "[[roadmaps]]\nname = 'prm'\noptions = {sample = 1}\n[worlds]"), "sample"),
+        (("obstacles = 6", "obstacles = [9, 6]"), "expected minimum <= maximum, got 9 and 6"),
+        (("obstacles = 6", "obstacles = [1, 2, 3]"), "obstacles"),
     ],
 )
 def test_bad_studies_are_told_with_key_and_line(change, said, tmp_path, capsys):
@@ -252,6 +255,17 @@ def test_bad_studies_are_told_with_key_and_line(change, said, tmp_path, capsys):
     assert said in err
     assert err.count("\n") == 1
     assert not out.exists()
+
+
+def test_a_study_draws_its_obstacles_from_a_range_and_rows_tell_seconds_of_cpu():
+    changed = TOML.replace("obstacles = 6", "obstacles = [1, 4]")
+    changed = changed.replace("time_limit = 20", "time_limit = 300")
+    changed = changed.replace('name = "greedy"', 'name = "mip-2017"')
+    (trial, *_) = Study.checked(tomllib.loads(changed), "test").trials()
+    assert 1 <= len(world_of(trial)[0].obstacles) <= 4
+    row = run(trial)
+    assert row["status"] == "optimal"
+    assert 0.0 < row["cpu_s"] < 60.0
 
 
 def test_results_of_another_study_or_kind_are_refused_and_kept(study, tmp_path):
