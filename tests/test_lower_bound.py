@@ -221,7 +221,6 @@ SHOWN = {"lower_bound", "gap", "bound_of_all", "gap_to_all"}
 ELSEWHERE = {
     "netsp/lower_bound.py": "the type itself",
     "netsp/space/judge.py": "quotes what a file states wrongly",
-    "netsp/command/solve_mission.py": "says after each bound of a mission what it holds for",
     "netsp/library/records.py": "a record is updated; it holds bounds on all tours only",
 }
 
