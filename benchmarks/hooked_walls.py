@@ -1,12 +1,13 @@
 """Classes and legs among walls with hooks, against a brute force that prunes no word.
 
-    python benchmarks/hooked_walls.py [--worlds 240] [--seed 0]
+    python benchmarks/hooked_walls.py [--worlds 240] [--seed 0] [--no-brute-force]
 
 Rooms, spirals, combs, hooks, harbours with moles, and slanted bars, with posts between them, in any
 orientation. A visibility graph is searched with words (tests/brute.py), without any rule of what a
 taut path may do. It must find the same classes, and each leg as long as the search for its word
 does. Whole-number worlds follow, with base and goals on corners and edges of boxes and on rays;
-theirs is a brute force in whole numbers, so that no rounding decides a word.
+theirs is a brute force in whole numbers, so that no rounding decides a word. Without the brute
+force every leg must be found by the search, and be as long as in the matrix.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ sys.path.insert(0, str(Path(__file__).parent.parent))
 
 from netsp import Circle, Polygon, Problem
 from netsp.errors import InfeasibleError, InputError, NetspError
+from netsp.hsignature import Word
 from netsp.roadmap.taut import TautRoadmap
 from tests.brute import BruteForce
 from tests.whole_numbers import WholeNumbers, whole_number_world
@@ -221,8 +223,8 @@ def roadmap_of(problem: Problem) -> TautRoadmap | None:
     return None
 
 
-def compared(roadmap: TautRoadmap, brute: BruteForce | WholeNumbers) -> Outcome:
-    """Compare all classes, and all legs, with those of a brute force."""
+def compared(roadmap: TautRoadmap, brute: BruteForce | WholeNumbers | None) -> Outcome:
+    """Compare all classes, and all legs, with those of a brute force, if there is one."""
     out = Outcome()
     limit = roadmap.problem.tether_length
     slack = TOLERANCE * max(1.0, roadmap.problem.scale / 10.0)
@@ -231,8 +233,10 @@ def compared(roadmap: TautRoadmap, brute: BruteForce | WholeNumbers) -> Outcome:
         for g, w, d in zip(roadmap.cluster, roadmap.signatures, roadmap.planar, strict=True)
         if g > 0
     }
-    found = {k: d for k, d in brute.lengths(0, limit + slack, MAX_REPEATS).items() if k[0] > 0}
     out.classes = len(exact)
+    found = exact
+    if brute is not None:
+        found = {k: d for k, d in brute.lengths(0, limit + slack, MAX_REPEATS).items() if k[0]}
     for k, d in exact.items():
         if k not in found or abs(found[k] - d) > slack:
             out.wrong = f"class {k}: {d} and by brute force {found.get(k)}"
@@ -249,14 +253,16 @@ def compared(roadmap: TautRoadmap, brute: BruteForce | WholeNumbers) -> Outcome:
         sought = roadmap.paths._searched(1, 2, word, most)
         legs[u, v] = None if sought is None else sought[0]
         worst = max(worst, most if sought is None else sought[0])
-    true = brute.lengths(1, worst + slack, MAX_REPEATS)
+    true: dict[tuple[int, Word], float] = {}
+    if brute is not None:
+        true = brute.lengths(1, worst + slack, MAX_REPEATS)
     for (u, v), length in legs.items():
         out.legs += 1
         want = true.get((2, roadmap.legs.relative_word(u, v)))
         if length is None:
             out.wrong = f"no leg of {roadmap.legs.relative_word(u, v)}; by brute force {want}"
             return out
-        if want is None or abs(want - length) > slack:
+        if brute is not None and (want is None or abs(want - length) > slack):
             out.wrong = f"leg {roadmap.legs.relative_word(u, v)}: {length}, by brute force {want}"
             return out
     try:
@@ -270,7 +276,7 @@ def compared(roadmap: TautRoadmap, brute: BruteForce | WholeNumbers) -> Outcome:
     return out
 
 
-def trials(worlds: int, seed: int) -> Iterator[tuple[str, int, Outcome]]:
+def trials(worlds: int, seed: int, brute: bool) -> Iterator[tuple[str, int, Outcome]]:
     """Family, seed and outcome of each world."""
     for family in FAMILIES:
         for k in range(seed, seed + -(-worlds // len(FAMILIES))):
@@ -280,12 +286,14 @@ def trials(worlds: int, seed: int) -> Iterator[tuple[str, int, Outcome]]:
                 continue
             roadmap = None if problem is None else roadmap_of(problem)
             if roadmap is not None:
-                yield family, k, compared(roadmap, BruteForce(roadmap.problem))
+                force = BruteForce(roadmap.problem) if brute else None
+                yield family, k, compared(roadmap, force)
     for k in range(seed, seed + worlds):
         problem = whole_number_world(k)
         roadmap = None if problem is None else roadmap_of(problem)
         if roadmap is not None:
-            yield "whole numbers", k, compared(roadmap, WholeNumbers(roadmap.problem))
+            force = WholeNumbers(roadmap.problem) if brute else None
+            yield "whole numbers", k, compared(roadmap, force)
 
 
 def main() -> None:
@@ -293,9 +301,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     parser.add_argument("--worlds", type=int, default=240, help="of each of both kinds")
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--no-brute-force", action="store_true")
     args = parser.parse_args()
     worlds, classes, legs, wrong = Counter(), Counter(), Counter(), Counter()
-    for family, seed, outcome in trials(args.worlds, args.seed):
+    for family, seed, outcome in trials(args.worlds, args.seed, not args.no_brute_force):
         worlds[family] += 1
         classes[family] += outcome.classes
         legs[family] += outcome.legs
