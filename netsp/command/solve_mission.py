@@ -15,8 +15,6 @@ from typing import TYPE_CHECKING, Any
 from netsp.command import told
 from netsp.command.types import check_writable
 from netsp.errors import EXIT_NOT_ALL, InputError, counted
-from netsp.lower_bound import LowerBound, Scope
-from netsp.solution import Status
 
 if TYPE_CHECKING:
     from netsp.online.mission import Mission
@@ -142,6 +140,8 @@ def summary(
     units: str,
 ) -> str:  # fmt: skip
     """What was found, in a few lines."""
+    from netsp.lower_bound import LowerBound, Scope
+    from netsp.solution import Status
     from netsp.space.plan import AS_GIVEN, OUT_AND_BACK, PLANE
     from netsp.space.solve import GOING_ON, seconds_until_home
 
