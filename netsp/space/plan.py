@@ -371,14 +371,18 @@ def given_plan(water: Water) -> SpacePlan | None:
     driven = drive_given_order(water)
     if driven is None:
         return None
-    mission, places = water.mission, Places.of(water.mission, water.field)
+    return _plan_of(water, Places.of(water.mission, water.field), driven, AS_GIVEN)
+
+
+def _plan_of(water: Water, places: Places, driven: Driven, kind: str) -> SpacePlan:
+    """Return a tour that was found without states and legs as a plan; its ways are not sought."""
     visited = {stop.waypoint for stop in driven.stops}
+    unreached = tuple(n for n in range(len(water.mission.waypoints)) if n not in visited)
     return SpacePlan(
-        mission, tuple(driven.stops), driven.home, driven.length,
+        water.mission, tuple(driven.stops), driven.home, driven.length,
         Result(None, driven.length, None, Status.FEASIBLE), len(driven.stops),
-        len(driven.stops) + 1,
-        tuple(n for n in range(len(mission.waypoints)) if n not in visited), driven.free, water,
-        Ways(water, places, Effort.of(len(places))), AS_GIVEN,
+        len(driven.stops) + 1, unreached, driven.free, water,
+        Ways(water, places, Effort.of(len(places))), kind,
     )  # fmt: skip
 
 
@@ -421,6 +425,11 @@ def _planned(
     # a robot that is farther out than the share may still come back
     limit = max(SHARE * mission.tether_length, water.present.length * (1.0 + ROUNDING))
     check_tether(mission, water.present.length)
+    if scene is not None:
+        for driven in tours_of_plan(
+            water, scene, places, clock.part(IN_PLANE), how["seed"], whole_tether=whole_tether
+        ):
+            yield _plan_of(water, places, driven, PLANE)
     tell("shortest tethers to each waypoint")
     effort = Effort.of(len(places))
     states = first_states(water, places, limit, effort, clock.part(STARTING))
@@ -449,11 +458,6 @@ def _planned(
             len(board.legs), unreached, driven.free, water, ways, kind,
         )  # fmt: skip
 
-    if scene is not None:
-        for driven in tours_of_plan(
-            water, scene, places, clock.part(IN_PLANE), how["seed"], whole_tether=whole_tether
-        ):
-            yield planned(Result(None, driven.length, None, Status.FEASIBLE), driven, PLANE)
     ways.prepare_all(clock, tell)
     tell("trees of legs")
     states_of_trees(states, ways, clock.part(PLANTING))
