@@ -1,11 +1,11 @@
 """`mip-2017`: the program of McCammon & Hollinger 2017, section IV-B, as published: a baseline.
 
-Equations (2) to (4) over all vertices and all legs, as an integer program that CBC solves where the
-paper has Gurobi. No tour to start from, no cut at fractional points, no elimination: subtours are
-looked for at integer points only. CBC takes no cuts while it runs, so each integer program is
-solved to its end, cut at its subtours, and solved again.
+The solver states equations (2) to (4) over all vertices and all legs as an integer program. CBC
+solves it; the paper used Gurobi. There is no warm start, no cut at fractional points and no
+elimination of legs: subtours are separated at integer points only. CBC accepts no cuts during a
+run, so each integer program is solved to its end, cut at its subtours, and solved again.
 
-What the paper prints, and what it must mean:
+Two constraints of the paper are read as follows:
 
 - (3) multiplies y by x and sums over a goal. Its text asks for degree 2 at a vertex that is visited
   and 0 at any other, with one class for the legs in and out: Σ y over the legs at v = 2 x_v.
@@ -17,9 +17,9 @@ What the paper prints, and what it must mean:
   subtour, the constraint disallows that one subtour and not the same in neighbouring classes:
   Σ y within S <= |S| - 1 ("vertices"), which takes more rounds.
 
-Limits, by the method: until the last round there is no tour to show, where Gurobi's callback would
-have one, so a run that is stopped has a bound and no tour. A bound is the optimum, or CBC's own
-bound, of a program that leaves subtours in; it is as right as CBC's arithmetic.
+Limits of the method: only the last round gives a tour, so a run that is stopped earlier has a bound
+and no tour; with Gurobi, a callback could return one earlier. The bound is the optimum, or CBC's
+bound, of a program that allows some subtours. It relies on CBC's floating-point arithmetic.
 """
 
 from __future__ import annotations
@@ -41,8 +41,8 @@ from netsp.travel.result import Result
 CUTS = ("goals", "vertices")
 
 BYTES_PER_LEG = 4000
-"""Memory of a leg in the program, bytes: PuLP's variable and its terms in objective, two degree
-rows and the file for CBC. Measured with 100,000 legs."""
+"""Estimated memory of a leg in the program, bytes: PuLP's variable, its terms in the objective and
+in two degree rows, and its share of the file for CBC."""
 
 
 @dataclass(frozen=True)
@@ -52,10 +52,10 @@ class Params:
     Attributes
     ----------
     cuts
-        Which constraint forbids a subtour: ``goals``, over all classes of its goals, or
-        ``vertices``, over its own vertices.
+        Constraint that forbids a subtour: ``goals``, over all classes of its goals, or
+        ``vertices``, over the vertices of the subtour.
     max_legs
-        Most legs that the program may have; 1 or more.
+        Largest number of legs in the program, at least 1.
     """
 
     cuts: str = "goals"
@@ -69,24 +69,24 @@ class Params:
 
 
 def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | None = None) -> Result:
-    """`mip-2017`: solve the published program, cut its subtours, and solve it again.
+    """Solve the published program, cut its subtours, and solve it again (`mip-2017`).
 
-    A warm start is not used: a baseline shows what it does by itself. An iteration is one integer
-    program solved. Source: McCammon & Hollinger 2017, section IV-B.
+    A warm start is ignored, so that the baseline shows what the method does alone. An iteration is
+    one solved integer program. Source: McCammon & Hollinger 2017, section IV-B.
 
     Parameters
     ----------
     graph : TravelGraph
-        What to solve.
+        Travel graph of the problem.
     params : Params, optional
-        See `Params`.
+        Options of the solver.
     limits : Limits, optional
-        Time, iterations, listener.
+        Limits of time and iterations, and the listener.
 
     Returns
     -------
     Result
-        The optimal tour; or, where a limit came first, a bound alone.
+        The optimal tour; only a bound if a limit is reached first.
 
     Raises
     ------
@@ -95,7 +95,7 @@ def solve(graph: TravelGraph, params: Params | None = None, limits: Limits | Non
     """
     chosen, limits = params or Params(), limits or Limits()
     run = SolverRun(graph, limits)
-    # blind: a run that is stopped before its first tour gets none from elsewhere
+    # blind: do not substitute a heuristic tour if the run stops before its first tour
     with run.until_stopped(blind=True):
         if not run.trivial():
             legs, costs = _all_legs(graph, chosen.max_legs)

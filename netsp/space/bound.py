@@ -1,14 +1,14 @@
 """A certified lower bound on every tour of a mission's waypoints.
 
-No tour is shorter than the shortest tour through lengths that no leg is shorter than. Those of legs
-are the straight distance, which is exact between places in sight of one another, or that of a
-potential over all cells that are not certain to be blocked (`netsp.space.potential`). A length that
-was measured along a path, pulled taut or not, only tells how far to look: paths found on a grid are
-no bound on the others.
+Each leg gets a certified least length: the straight distance, which is exact between places in
+sight of one another, or the bound of a potential over all cells that are not certain to be blocked
+(`netsp.space.potential`). The shortest tour by these lengths is a lower bound on every tour. The
+length of a path that was found, pulled taut or not, only says how far to look: a path found on a
+grid is no bound on other paths.
 
-These lengths leave the tether aside. Where a scene has upright solids, the plane's proof over all
-homotopy classes of the tether around them is a second bound (`netsp.space.upright`). The larger of
-the two counts.
+These lengths ignore the tether. Where a scene has upright solids, the plane's proof over all
+homotopy classes of the tether around them is a second bound (`netsp.space.upright`). The result is
+the larger of the two bounds.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ import numpy as np
 
 from netsp.arrays import Bools, Floats, Ints
 from netsp.clock import Clock
+from netsp.errors import InputError
 from netsp.roadmap.from_state import from_state
 from netsp.solvers.solve import solve_graph
 from netsp.space.legs import Ways
@@ -29,87 +30,119 @@ from netsp.space.upright import bound_of_upright
 from netsp.space.water import DEEPEST, ROOM_STEP, along, straight
 from netsp.travel.graph import TravelGraph
 
-UPRIGHT = 0.4
-"""Share of the time left that the bound among upright solids may take."""
 
-FARTHER = 2.2
-"""Factor of the straight distance up to which paths are looked at where none is known."""
+@dataclass(frozen=True)
+class BoundPolicy:
+    """Time and accuracy of a bound on all tours in space.
 
-CLOSE = 2e-3
-"""Share of a leg's known length by which its bound may be less and count as final."""
+    Attributes
+    ----------
+    upright_share : float
+        Share of the remaining time for the bound among upright solids, from 0 to 1.
+    max_detour_ratio : float
+        Longest path considered where no path is known, as a multiple of the straight distance;
+        more than 1.
+    max_leg_gap : float
+        Relative gap between the bound of a leg and its known length at which the bound is final,
+        from 0 to 1.
+    min_solve_s : float
+        Seconds for the solver if the time is up; more than 0, so that there is always a bound.
+    cell_s : float
+        Expected CPU seconds per cell of a potential; a grid that would exceed the remaining time is
+        skipped. At least 0.
+    """
 
-LEAST_SOLVING = 0.3
-"""Seconds for the first bound, where the time is up."""
+    upright_share: float = 0.4
+    max_detour_ratio: float = 2.2
+    max_leg_gap: float = 2e-3
+    min_solve_s: float = 0.3
+    cell_s: float = 8e-6
 
-SECONDS_PER_CELL = 8e-6
-"""Time that a potential takes per cell, s, by which a finer grid is left out for lack of time."""
+    def __post_init__(self) -> None:
+        """Refuse values out of range."""
+        for name in ("upright_share", "max_leg_gap"):
+            if not 0.0 <= getattr(self, name) <= 1.0:
+                raise InputError(f"{name}: {getattr(self, name)}; expected a number from 0 to 1")
+        if not self.max_detour_ratio > 1.0:
+            raise InputError(f"max_detour_ratio: {self.max_detour_ratio}; expected more than 1")
+        if not self.min_solve_s > 0.0:
+            raise InputError(f"min_solve_s: {self.min_solve_s}; expected more than 0")
+        if not self.cell_s >= 0.0:
+            raise InputError(f"cell_s: {self.cell_s}; expected 0 or more")
 
 
 def bound_of_all(
     ways: Ways, reached: list[int], clock: Clock | None, seed: int = 0,
-    params: PotentialParams | None = None,
+    params: PotentialParams | None = None, policy: BoundPolicy | None = None,
 ) -> float | None:  # fmt: skip
-    """Return a length that no tour through some waypoints is shorter than.
+    """Return a lower bound on the length of every tour through some waypoints.
 
-    It holds for tours that go to the waypoints themselves, keep the mission's clearance as the
-    judge has it (corners may be half of `delta` nearer), stay within the scene's bounds and no
-    farther from the anchor than the tether is long.
+    The bound holds for tours that go to the waypoints themselves, keep the mission's clearance as
+    the judge checks it (corners may be half of `delta` nearer), stay within the scene's bounds and
+    within the tether's length of the anchor.
 
     Parameters
     ----------
     ways : Ways
-        Of the robot between waypoints; their lengths only tell how far to look.
+        Known paths between waypoints; their lengths only say how far to look.
     reached : list of int
-        The waypoints of the tours.
+        Numbers of the waypoints that the tours visit.
     clock : Clock, optional
-        When it is up, the bound is what is proven by then.
+        Clock of the run; when it is up, the bound proven so far is returned.
     seed : int
-        Of the solver.
+        Random seed of the solver.
     params : PotentialParams, optional
         Effort for each leg.
+    policy : BoundPolicy, optional
+        Time and accuracy.
 
     Returns
     -------
     float or None
-        Metres; None if there was no time for any, or nothing is to be visited but the start.
+        Lower bound, metres; None if there was no time for one, or no waypoint besides the start.
     """
-    clock = clock or Clock()
+    clock, policy = clock or Clock(), policy or BoundPolicy()
     places, visited = ways.places, set(reached)
     some = [n for n in range(len(places)) if n == places.begin or places.waypoint[n] in visited]
     if not some:
         return None
-    upright = bound_of_upright(ways.water.mission, ways.water, some, places, clock.part(UPRIGHT))
-    legs = LegBounds(ways, some, params or PotentialParams())
+    upright = bound_of_upright(
+        ways.water.mission, ways.water, some, places, clock.part(policy.upright_share)
+    )
+    legs = LegBounds(ways, some, params or PotentialParams(), policy)
     of_robot = _of_robot(legs, clock, seed)
     return max(of_robot or 0.0, upright or 0.0) or None
 
 
 @dataclass
 class LegBounds:
-    """Certified least lengths of legs between the start and places.
+    """Certified least lengths of legs between the start and some places.
 
     Parameters
     ----------
     ways : Ways
-        Of the robot.
+        Known paths between waypoints.
     some : list of int
-        The places.
+        Numbers of the places, as in `ways.places`.
     params : PotentialParams
-        Effort.
+        Effort for each leg.
+    policy : BoundPolicy
+        Time and accuracy.
 
     Attributes
     ----------
     points : ndarray, shape (v, 3)
         The start, then the places, metres.
     costs : ndarray, shape (v, v)
-        Metres that legs are at least long.
+        Lower bound on the length of each leg, metres.
     final : ndarray of bool, shape (v, v)
-        Where more effort gives no more.
+        True where more effort cannot raise the bound.
     """
 
     ways: Ways
     some: list[int]
     params: PotentialParams
+    policy: BoundPolicy = field(default_factory=BoundPolicy)
     points: Floats = field(init=False)
     costs: Floats = field(init=False)
     final: Bools = field(init=False)
@@ -127,21 +160,21 @@ class LegBounds:
         self._room = water.field.distance(self.points)
 
     def raised(self, u: int, v: int, clock: Clock) -> bool:
-        """Prove more of a leg.
+        """Raise the bound of a leg on a finer grid.
 
         Parameters
         ----------
         u : int
-            Where it begins, as in `points`.
+            Begin of the leg, as in `points`.
         v : int
-            Where it ends.
+            End of the leg.
         clock : Clock
-            A grid for which there is no time is left out.
+            Clock of the run; a grid that would take longer than it allows is skipped.
 
         Returns
         -------
         bool
-            Whether its least length has grown.
+            True if the bound has grown.
         """
         if self.final[u, v]:
             return False
@@ -153,24 +186,25 @@ class LegBounds:
                 self.final[u, v] = self.final[v, u] = True
                 return False
         known = self._known(u, v)
-        longest = known if math.isfinite(known) else FARTHER * float(np.linalg.norm(b - a))
+        farthest = self.policy.max_detour_ratio * float(np.linalg.norm(b - a))
+        longest = known if math.isfinite(known) else farthest
         level = int(self._level[u, v]) + 1
         cells = cells_of(level, self.params)
-        if SECONDS_PER_CELL * cells > clock.left:
+        if self.policy.cell_s * cells > clock.left:
             self.final[u, v] = self.final[v, u] = True
             return False
         length = path_bound(water.field, a, b, self._region(u, v), longest, cells, self.params)
         self.costs[u, v] = self.costs[v, u] = max(before, length)
         self._level[u, v] = self._level[v, u] = level
-        if cells >= self.params.max_cells or length >= (1.0 - CLOSE) * longest:
+        if cells >= self.params.max_cells or length >= (1.0 - self.policy.max_leg_gap) * longest:
             self.final[u, v] = self.final[v, u] = True
         return bool(self.costs[u, v] > before * (1.0 + 1e-9) + 1e-9)
 
     def _region(self, u: int, v: int) -> Region:
-        """Return where a leg may run that the judge accepts (`netsp.space.water.has_room`)."""
+        """Return the region of all legs that the judge accepts (`netsp.space.water.has_room`)."""
         mission, water = self.ways.water.mission, self.ways.water
         room = min(mission.clearance, float(self._room[u]), float(self._room[v]))
-        # between two samples along a path its room may be half a step less
+        # between two samples of a path the distance from solids may be half a step less
         room = max(room - 0.5 * mission.delta - 2.0 * ROOM_STEP, -2.0 * DEEPEST)
         bounds = np.array([[-np.inf] * 3, [np.inf] * 3])
         if water.bounds is not None:
@@ -189,8 +223,11 @@ class LegBounds:
 
 
 def _of_robot(legs: LegBounds, clock: Clock, seed: int) -> float | None:
-    """Return the bound that is proven through least lengths of legs. Those of legs of the shortest
-    tour are raised, and it is sought again, until no more can be proven of any."""
+    """Return the bound that the least lengths of legs prove.
+
+    Solve for the shortest tour by these lengths, raise the bounds of its legs, and solve again,
+    until no bound of a leg can be raised or the time is up.
+    """
     places, best = legs.ways.places, 0.0
     point = np.array(legs.some)
     cluster: Ints = np.r_[0, 1 + np.unique(places.waypoint[point], return_inverse=True)[1]]
@@ -200,7 +237,7 @@ def _of_robot(legs: LegBounds, clock: Clock, seed: int) -> float | None:
         if begin is not None:
             graph = from_state(graph, begin)
         # straight lengths alone give a bound, however little time there is
-        solving = Clock(LEAST_SOLVING) if clock.up else clock
+        solving = Clock(legs.policy.min_solve_s) if clock.up else clock
         result = solve_graph(graph, "auto", time_limit=solving, seed=seed)
         best = max(best, result.lower_bound or 0.0)
         if clock.up or result.tour is None:

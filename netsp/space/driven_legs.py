@@ -1,4 +1,4 @@
-"""A tour that is given by its legs, driven: its words, its tethers, and whether it may be flown."""
+"""Drive the tether along the legs of a given tour, and check that it may be flown."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from netsp.space.water import Water, along, has_room
 
 @dataclass(frozen=True)
 class LegTo:
-    """A leg of a tour to one of its stops.
+    """Leg of a tour to a waypoint.
 
     Parameters
     ----------
     waypoint : int
-        Number of the waypoint that it leads to.
+        Number of the waypoint.
     choice : int
-        Which of the waypoint's alternatives, from 1 on; 0 for its own position.
+        Number of the alternative of the waypoint, from 1 on; 0 for the waypoint's position.
     path : ndarray, shape (k, 3)
-        From the stop before, metres.
+        Path from the waypoint before, metres.
     """
 
     waypoint: int

@@ -1,7 +1,7 @@
-"""The order in which a mission gives its waypoints, as a tour: the first one that a search has.
+"""Tour in the order in which the mission lists its waypoints: the first incumbent of a search.
 
-The planner `predictive` is asked at the stops only, and the tether is driven along its paths: what
-comes of that is its flight without the time that a flight takes to simulate.
+The planner `predictive` plans at the waypoints only, and the tether is driven along its paths. The
+tour is that of a simulated flight, without the time that a simulation takes.
 """
 
 from __future__ import annotations
@@ -16,8 +16,9 @@ from netsp.space.board import Driven
 from netsp.space.driven_legs import LegTo, drive_legs
 from netsp.space.water import Water
 
-MOST_STEPS = 8
-"""Paths that the planner may lay for each waypoint; more, and it does not get on."""
+MAX_PATHS = 8
+"""Largest number of paths of the planner per waypoint; a planner that needs more makes no
+progress."""
 
 
 def drive_given_order(water: Water) -> Driven | None:
@@ -26,13 +27,13 @@ def drive_given_order(water: Water) -> Driven | None:
     Parameters
     ----------
     water : Water
-        Of the mission; legs of its tour are taken where it has one.
+        Water of the mission; if the mission has a tour, the legs of that tour are driven.
 
     Returns
     -------
     Driven or None
-        The tour; None where the robot does not come home with the tether free, within its limit
-        and off the solids.
+        The tour; None if the robot does not come home with a free tether, exceeds the limit of the
+        tether, or comes too near to solids.
     """
     mission = water.mission
     if mission.tour is not None:
@@ -45,7 +46,7 @@ def drive_given_order(water: Water) -> Driven | None:
     planner.laid = water.laid
     robot, tether = np.array(mission.begin), water.present
     walked, legs = [robot], []
-    for _ in range(MOST_STEPS * (2 + len(mission.waypoints))):
+    for _ in range(MAX_PATHS * (2 + len(mission.waypoints))):
         before = len(planner.reached)
         command = planner.step(robot, tether)
         for k in planner.reached[before:]:

@@ -1,8 +1,8 @@
-"""Gaps that a grid's cells do not show: where they are, how wide, and which cell would show them.
+"""Gaps that the cells of a grid do not show: find them, and the cell size that shows them.
 
-A cell counts as free by its middle, so a slot that is wide enough for the robot may be closed on
-the grid. Between the cells that are free, finer points are looked at: two neighbours with enough
-room whose nearest free cells do not hang together around them stand in such a gap.
+A cell is free if its middle has enough room, so a slot that is wide enough for the robot may be
+closed on the grid. The search samples finer points between free cells. A gap lies where two
+neighbouring points have enough room but their nearest free cells are not connected nearby.
 """
 
 from __future__ import annotations
@@ -24,26 +24,27 @@ from netsp.space.potential import possibly_free, steepness
 
 @dataclass(frozen=True)
 class GapParams:
-    """Effort of the search for gaps, and of the choice of a cell that shows them.
+    """Effort of the search for gaps, and of the choice of a cell size that shows them.
 
     Attributes
     ----------
     max_points : int
-        Fine points that are looked at; with more cells in question there are fewer for each.
+        Largest number of fine points; the more cells may hold a gap, the fewer points each gets.
     finest : int
-        Fine points along a side of a cell, at most.
+        Largest number of fine points along a side of a cell.
     around : int
-        Cells around a gap in which its two sides may hang together: then it saves no way.
+        Cells around a gap in which its two sides may be connected; a gap with a connection that
+        close is ignored, because it saves no distance.
     max_gaps : int
-        Gaps that are told; the widest.
+        Largest number of gaps returned; the widest are kept.
     max_pairs : int
-        Pairs of free cells whose connection is asked for.
+        Largest number of pairs of free cells whose connection is checked.
     max_cells : int
-        Cells of a finer grid, at most: planning takes as much longer as there are more.
+        Largest number of cells of a finer grid; the time to plan grows in proportion.
     smallest : float
-        Least share of the cell that a finer one may have.
+        Smallest finer cell size, as a share of the cell size before.
     step : float
-        Factor from one cell size that is tried to the next.
+        Ratio of successive cell sizes that are tried.
     """
 
     max_points: int = 4_000_000
@@ -71,11 +72,11 @@ class Gap:
     Parameters
     ----------
     place : ndarray, shape (3,)
-        In the middle of it, metres.
+        Middle of the gap, metres.
     width : float
-        Twice the distance from solids there, metres.
+        Twice the distance of `place` from solids, metres.
     sides : ndarray, shape (2, 3)
-        Middles of free cells on either side, metres.
+        Middles of one free cell on each side, metres.
     """
 
     place: Floats
@@ -83,13 +84,13 @@ class Gap:
     sides: Floats
 
     def __str__(self) -> str:
-        """Name width and place, as in "0.24 m at (0, 1.5, -2)"."""
+        """Return width and place, as in "0.24 m at (0, 1.5, -2)"."""
         return f"{self.width:.2g} m at ({', '.join(f'{v:.3g}' for v in self.place)})"
 
 
 @dataclass(frozen=True)
 class GapGrid:
-    """The cells of a grid by their middles.
+    """Grid whose cells are free or not by the distance of their middles from solids.
 
     Parameters
     ----------
@@ -98,9 +99,9 @@ class GapGrid:
     low, high : ndarray, shape (3,)
         Corners of the box, metres.
     cell : float
-        Metres.
+        Cell size, metres.
     clearance : float
-        That the robot keeps, metres.
+        Clearance of the robot, metres.
     """
 
     field: DistanceField
@@ -120,9 +121,9 @@ class GapGrid:
         field : DistanceField
             The scene.
         box : tuple of (ndarray, ndarray, float)
-            Corners of the box and size of a cell, metres.
+            Corners of the box and cell size, metres.
         clearance : float
-            That the robot keeps, metres.
+            Clearance of the robot, metres.
 
         Returns
         -------
@@ -130,34 +131,34 @@ class GapGrid:
             The cells.
         """
         low, high, cell = box
-        counts = np.maximum(1.0, np.round((high - low) / cell))  # as of `Grid`
+        counts = np.maximum(1.0, np.round((high - low) / cell))  # as `Grid` counts
         return cls(field, low, low + cell * counts, cell, clearance)
 
     @property
     def shape(self) -> tuple[int, int, int]:
-        """Numbers of cells, as of `netsp.space.cells.Cells`."""
+        """Numbers of cells along x, y and z, as `netsp.space.cells.Cells` counts them."""
         nx, ny, nz = (max(1, int(n)) for n in np.ceil((self.high - self.low) / self.cell - 1e-9))
         return nx, ny, nz
 
     @property
     def least(self) -> float:
-        """Distance from solids from which on a cell's middle counts as free, metres."""
+        """Least distance of the middle of a free cell from solids, metres."""
         return max(self.clearance, LEAST_ROOM * self.cell)
 
     def free(self, first: Ints, shape: tuple[int, ...]) -> Bools:
-        """Return which cells of a part are free.
+        """Return the mask of free cells in a block of cells.
 
         Parameters
         ----------
         first : ndarray of int, shape (3,)
-            Its first cell.
+            First cell of the block.
         shape : tuple of int
-            Numbers of its cells.
+            Numbers of cells of the block along x, y and z.
 
         Returns
         -------
         ndarray of bool
-            Of that shape.
+            Mask of the given shape.
         """
         axes = [self.low[k] + (first[k] + np.arange(shape[k]) + 0.5) * self.cell for k in range(3)]
         points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
@@ -171,12 +172,12 @@ class GapGrid:
         gap : Gap
             The gap.
         around : int
-            Cells around it that may be passed.
+            Number of cells around the gap in which the sides may be connected.
 
         Returns
         -------
         bool
-            Whether they do.
+            True if they are connected.
         """
         from scipy.ndimage import label
 
@@ -191,7 +192,7 @@ class GapGrid:
 
 
 def _near(parts: Ints, at: Ints) -> set[int]:
-    """Return the parts that a cell or those beside it are of."""
+    """Return the labels of the connected parts at a cell and its neighbours."""
     box = tuple(slice(max(0, k - 1), k + 2) for k in at)
     return set(np.unique(parts[box]).tolist()) - {0}
 
@@ -209,7 +210,7 @@ def unresolved_gaps(grid: GapGrid, params: GapParams | None = None) -> list[Gap]
     Returns
     -------
     list of Gap
-        The widest first, at most as many as are told.
+        At most `params.max_gaps` gaps, the widest first.
     """
     from scipy.ndimage import distance_transform_edt
 
@@ -237,8 +238,8 @@ def unresolved_gaps(grid: GapGrid, params: GapParams | None = None) -> list[Gap]
 
 
 def _parting(between: Bools, nearest: Ints) -> Bools:
-    """Return the cells between free ones, and those beside them, whose nearest free cells are three
-    or more apart."""
+    """Return the mask of cells in `between` that have a neighbour in `between` whose nearest free
+    cell is three or more cells away from their own."""
     out = np.zeros(between.shape, dtype=np.bool_)
     for step in _HALF_STEPS:
         here, there = _shifted(between.shape, step)
@@ -250,7 +251,7 @@ def _parting(between: Bools, nearest: Ints) -> Bools:
 
 
 _HALF_STEPS = [s for s in np.ndindex(3, 3, 3) if s > (1, 1, 1)]
-"""Thirteen of the 26 steps to a neighbour, one of each pair of opposites; 1 stands for staying."""
+"""Steps to 13 of the 26 neighbours, one of each opposite pair; 1 along an axis means no step."""
 
 
 def _shifted(
@@ -266,8 +267,12 @@ def _shifted(
 
 
 def _links(grid: GapGrid, cells: Ints, nearest: Ints, side: int) -> tuple[Ints, Floats, Floats]:
-    """Return pairs (n, 2, 3) of free cells that neighbouring fine points with enough room are
-    nearest to, three cells or more apart, the places (n, 3) of the points and their room."""
+    """Return the links across possible gaps.
+
+    A link joins two neighbouring fine points that have enough room, and whose nearest free cells
+    are three or more cells apart. Returned are these pairs (n, 2, 3) of free cells, the places
+    (n, 3) of the links, and their distances (n,) from solids.
+    """
     spacing = grid.cell / side
     inner = np.stack(np.meshgrid(*[np.arange(side)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
     fine = (side * cells[:, None] + inner[None]).reshape(-1, 3)
@@ -297,31 +302,31 @@ def _links(grid: GapGrid, cells: Ints, nearest: Ints, side: int) -> tuple[Ints, 
 def _not_joined(
     free: Bools, ends: Ints, places: Floats, room: Floats, params: GapParams
 ) -> tuple[Ints, Floats, Floats]:
-    """Return those links whose two free cells do not hang together around them."""
+    """Return the links whose two free cells are not connected nearby."""
     from scipy.ndimage import label
 
     order = np.argsort(-room, kind="stable")
     ends, places, room = ends[order], places[order], room[order]
-    told: dict[tuple[int, ...], bool] = {}
+    is_apart: dict[tuple[int, ...], bool] = {}
     keep = np.zeros(len(ends), dtype=np.bool_)
     for n, pair in enumerate(ends):
         name = tuple(pair.ravel().tolist())
-        if name not in told:
-            if len(told) >= params.max_pairs:
+        if name not in is_apart:
+            if len(is_apart) >= params.max_pairs:
                 continue
             first = np.maximum(pair.min(0) - params.around, 0)
             last = pair.max(0) + params.around + 1
             box = tuple(slice(a, b) for a, b in zip(first, last, strict=True))
             parts, _ = label(free[box], np.ones((3, 3, 3)))
-            told[name] = bool(parts[tuple(pair[0] - first)] != parts[tuple(pair[1] - first)])
-        keep[n] = told[name]
+            is_apart[name] = bool(parts[tuple(pair[0] - first)] != parts[tuple(pair[1] - first)])
+        keep[n] = is_apart[name]
     return ends[keep], places[keep], room[keep]
 
 
 def _grouped(
     grid: GapGrid, ends: Ints, places: Floats, room: Floats, params: GapParams
 ) -> list[Gap]:
-    """Return one gap for links near one another, at the place with the most room."""
+    """Return one gap for each group of links near one another, at the place with the most room."""
     from scipy.ndimage import label
 
     if not len(places):
@@ -329,14 +334,14 @@ def _grouped(
     at = np.clip(((places - grid.low) / grid.cell).astype(np.int64), 0, np.array(grid.shape) - 1)
     first = at.min(0)
     marked = np.zeros(tuple((at.max(0) - first) // 2 + 1), dtype=np.bool_)
-    coarse = (at - first) // 2  # cells of twice the size: links with a cell between them are one
+    coarse = (at - first) // 2  # cells of twice the size, so that links one cell apart form a group
     marked[tuple(coarse.T)] = True
     parts, count = label(marked, np.ones((3, 3, 3)))
-    of = parts[tuple(coarse.T)]
+    group = parts[tuple(coarse.T)]
     gaps = []
     for part in range(1, count + 1):
-        own = np.flatnonzero(of == part)
-        widest = own[room[own] >= room[own].max() - 1e-9]
+        members = np.flatnonzero(group == part)
+        widest = members[room[members] >= room[members].max() - 1e-9]
         middle = places[widest].mean(axis=0)
         n = widest[int(np.linalg.norm(places[widest] - middle, axis=1).argmin())]
         sides = grid.low + (ends[n] + 0.5) * grid.cell
@@ -349,7 +354,7 @@ def _grouped(
 
 
 def _widest(grid: GapGrid, place: Floats, through: Floats) -> Floats:
-    """Return the place with the most room within half a cell across a passage."""
+    """Return the place with the most room within half a cell of a place, across the passage."""
     along = through / max(float(np.linalg.norm(through)), 1e-300)
     _, _, across = np.linalg.svd(along[None])
     reach = 0.5 * grid.cell
@@ -357,7 +362,7 @@ def _widest(grid: GapGrid, place: Floats, through: Floats) -> Floats:
         u, v = np.meshgrid(np.linspace(-reach, reach, 7), np.linspace(-reach, reach, 7))
         points = place + u.reshape(-1, 1) * across[1] + v.reshape(-1, 1) * across[2]
         room = grid.field.distance(points)
-        # the place itself, unless another one has more: it is the 25th of 49
+        # move only to a point with more room than `place`, which is the 25th of the 49 points
         best = int(room.argmax())
         if room[best] > room[24] + 1e-9:
             place = points[best]
@@ -369,23 +374,23 @@ def resolving_cell(
     grid: GapGrid, gaps: list[Gap], box_of: Callable[[float], tuple[Floats, Floats, float]],
     params: GapParams | None = None,
 ) -> float | None:  # fmt: skip
-    """Return the largest cell whose grid shows the most of some gaps.
+    """Return the largest cell size whose grid shows as many of the gaps as possible.
 
     Parameters
     ----------
     grid : GapGrid
-        That does not show them.
+        Grid that shows none of the gaps.
     gaps : list of Gap
-        Of `unresolved_gaps`.
+        Gaps from `unresolved_gaps`.
     box_of : callable
-        Takes the size of a cell; returns the corners of that grid's box and the cell, metres.
+        Takes a cell size; returns the corners of the box of such a grid and the cell size, metres.
     params : GapParams, optional
-        How small it may be.
+        Limits of the cell size.
 
     Returns
     -------
     float or None
-        Metres; None where no cell that may be taken shows any.
+        Cell size, metres; None if no size within the limits shows a gap.
     """
     params = params or GapParams()
     best, shown, cell = None, 0, grid.cell
@@ -404,18 +409,18 @@ def resolving_cell(
 
 @dataclass(frozen=True)
 class Resolved:
-    """A mission with cells that show what they can.
+    """Mission with the cell size that shows the gaps of its scene, as far as possible.
 
     Parameters
     ----------
     mission : Mission
-        With another cell, if that shows gaps that its own did not.
+        The mission, with a finer cell if that shows more gaps.
     cell : float
-        Of its grid, metres.
+        Cell size of its grid, metres.
     shown : tuple of Gap
-        Gaps that the other cell shows.
+        Gaps that only the finer cell shows.
     left : tuple of Gap
-        Gaps that no cell shows that could be taken.
+        Gaps that stay hidden.
     """
 
     mission: Mission
@@ -427,10 +432,10 @@ class Resolved:
 def resolved(
     mission: Mission, scene: Scene, field: DistanceField, params: GapParams | None = None
 ) -> Resolved:
-    """Return a mission whose cells show the gaps of its scene, as far as a cell can be taken.
+    """Return a mission whose cells show the gaps of its scene, as far as possible.
 
-    A cell that the mission states is kept, and so is that of a mission with a tour, whose words are
-    of its cells: their gaps are only told.
+    A cell size that the mission states is kept, and its gaps are only reported. The same holds for
+    a mission with a tour, because the words of the tour refer to its cells.
 
     Parameters
     ----------
@@ -446,7 +451,7 @@ def resolved(
     Returns
     -------
     Resolved
-        The mission, and what its cells show.
+        Mission, cell size and gaps.
     """
 
     def box_of(cell: float) -> tuple[Floats, Floats, float]:

@@ -1,11 +1,11 @@
 """Certified lower bounds on the length of the robot's paths between two points.
 
-A function on the water that rises along no path by more than the path's length is a *potential*:
-between two points no path is shorter than the potential's difference. Here it is trilinear in the
-cells of a grid, over all cells that are not certain to be blocked, so nothing is taken for closed
-that might be open. It is made by fast marching (Sethian 1996), which overshoots a little, and then
-lowered until its steepest slope, which a trilinear function has in a corner of a cell, is one. The
-proof is in docs/theory.md.
+A *potential* is a function on the water that rises along no path by more than the path's length, so
+no path between two points is shorter than the difference of the potential at them. The potential
+here is trilinear in each cell of a grid, and covers all cells that are not certain to be blocked: a
+passage that may be open is never closed. Fast marching (Sethian 1996) makes it, and overshoots a
+little; then its values are lowered until its steepest slope is one. The slope of a trilinear
+function is steepest in a corner of a cell. The proof is in docs/theory.md.
 """
 
 from __future__ import annotations
@@ -25,14 +25,15 @@ from netsp.online.scene.field import DistanceField
 from netsp.online.scene.sampling import Field, distance
 
 ROUNDING = 1e-9
-"""Share of a length that is taken off each bound, so that rounding never lifts it."""
+"""Relative reduction of each bound, which covers the rounding of lengths."""
 
 SLOPE_TOLERANCE = 1e-3
-"""Excess of a slope over one that is left: the bound is divided by the steepest slope, so it costs
-that share of the bound and no correctness."""
+"""Largest excess of the steepest slope over one. The bound is divided by the steepest slope, so the
+excess weakens the bound by the same share and leaves it correct."""
 
 BUCKET = 0.25
-"""Width of the buckets of the marching's queue, in cells: narrower ones order it better."""
+"""Width of a bucket in the queue of fast marching, in cells; narrower buckets order corners
+better."""
 
 
 @dataclass(frozen=True)
@@ -42,16 +43,16 @@ class PotentialParams:
     Attributes
     ----------
     min_cells : int
-        Cells of the grid of a leg at first; more make the bound stronger and take longer, some 5 µs
-        of CPU each.
+        Number of cells of the first grid of a leg; more cells make a stronger bound, and take about
+        5 µs of CPU each.
     max_cells : int
-        Cells of the finest grid of a leg; each takes 40 bytes.
+        Number of cells of the finest grid of a leg; a cell takes 40 bytes.
     growth : int
-        Factor from one grid to the next finer one; 8 halves the cells.
+        Ratio of the numbers of cells of two successive grids; 8 halves the size of a cell.
     halvings : int
-        Times that a cell is divided where its middle does not tell whether it is blocked.
+        How often a cell is divided if its middle does not decide whether it is blocked.
     rounds : int
-        Times that cells with too steep a slope are slowed before the rest is lowered.
+        How often cells with too steep a slope are slowed before the remaining excess is lowered.
     """
 
     min_cells: int = 15_000
@@ -71,18 +72,18 @@ class PotentialParams:
 
 
 class Region(NamedTuple):
-    """Where paths that count may run.
+    """Region that holds all paths a bound is for.
 
     Attributes
     ----------
     room
-        Least distance from solids along them, metres.
+        Least distance of the paths from solids, metres.
     bounds
-        (2, 3) corners of a box that they do not leave, metres; infinite where there is none.
+        (2, 3) corners of the box around the paths, metres; infinite if there is none.
     anchor
-        (3,) the tether's, metres.
+        (3,) anchor of the tether, metres.
     reach
-        Metres from the anchor that they go at most; infinite without a tether.
+        Greatest distance of the paths from the anchor, metres; infinite without a tether.
     """
 
     room: float
@@ -95,7 +96,7 @@ def path_bound(
     field: DistanceField, a: Floats, b: Floats, region: Region, longest: float, cells: int,
     params: PotentialParams | None = None,
 ) -> float:  # fmt: skip
-    """Return a length that no path between two points is shorter than.
+    """Return a lower bound on the length of paths between two points.
 
     Parameters
     ----------
@@ -106,19 +107,19 @@ def path_bound(
     b : ndarray, shape (3,)
         The other end, metres.
     region : Region
-        Where paths may run; the ends are in it.
+        Region of the paths; both ends are in it.
     longest : float
-        Longer paths are not looked at: the bound is never more. They leave the ellipsoid about the
-        two ends that the grid covers.
+        Upper limit of the bound, metres. The grid covers the ellipsoid about the two ends that
+        holds all paths up to this length.
     cells : int
-        Number of cells of the grid, about.
+        Approximate number of cells of the grid.
     params : PotentialParams, optional
         Effort.
 
     Returns
     -------
     float
-        Metres; the straight distance at least.
+        Lower bound, metres; at least the straight distance.
     """
     params = params or PotentialParams()
     straight = float(np.linalg.norm(b - a))
@@ -142,7 +143,7 @@ def path_bound(
 
 
 def steepness(field: DistanceField) -> float:
-    """Return the most that a field changes over a metre.
+    """Return the largest change of a field over a metre.
 
     Parameters
     ----------
@@ -159,8 +160,8 @@ def steepness(field: DistanceField) -> float:
 
 
 def _steepest_voxels(field: DistanceField) -> float:
-    """Return the largest difference between neighbours of a grid over their distance; sweeps may
-    leave a point's distance a little above what its neighbour's allows."""
+    """Return the steepest slope between neighbours of a voxel grid. It may exceed one a little,
+    because the sweeps that fill the grid stop early."""
     grid = field.voxels
     assert grid is not None
     n = int(np.prod(grid.counts))
@@ -194,13 +195,14 @@ def _through(
     """Return the bound of the potential about one end over possibly free cells."""
     straight = float(np.linalg.norm(b - a))
     from_a, from_b = (distances_of_cells(possible.shape, low, cell, end) for end in (a, b))
-    # balls in which nothing stands cost nothing: a path crosses their surfaces
+    # start from the largest balls around the ends that hold no blocked cell: distances in them are
+    # straight
     around = [float(far[~possible].min(initial=straight)) for far in (from_a, from_b)]
     share = min(1.0, max(0.0, straight - 2.0 * cell) / max(sum(around), 1e-300))
     ball_a, ball_b = share * around[0], share * around[1]
     start = _corners(from_a <= ball_a)
-    # the steepest corner of a cone's cell is steeper by half a cell over its distance, so to begin
-    # with is slowed by that
+    # near `a` the potential is a cone; in a cell at distance d its steepest corner exceeds a slope
+    # of one by about half a cell over d, so the cell is slowed by that share from the start
     far = distances_of_corners(possible.shape, low, cell, a)
     begin = (1.0 / (1.0 + 0.5 * cell / np.maximum(far, max(ball_a, cell)))).astype(np.float32)
     most = longest - ball_a
@@ -218,7 +220,7 @@ def _through(
             for turn in range(8):
                 lower(u, possible, cell, turn, SLOPE_TOLERANCE)
             slope = steepest(u, possible, cell)
-        # each is a potential once it is divided by its steepest slope
+        # after each round, u divided by its steepest slope is a potential
         slope = max(1.0, slope)
         there = max(_value(u, low, cell, b) / slope, ball_b + float(u[before_b].min()) / slope)
         best = max(best, ball_a + there)
@@ -304,18 +306,19 @@ def _hypot3(parts: list[Floats]) -> Floats:
 def has_room(
     field: Field, centre: Floats, halves: Floats, room: float, steep: float, halvings: int
 ) -> bool:
-    """Whether a point of a box may have some room: false only where it is certain that none has.
+    """Return whether some point of a box may be as far from solids as `room`; false only if it is
+    certain that no point is.
 
     Parameters
     ----------
     centre
-        (3,) of the box, metres.
+        (3,) centre of the box, metres.
     halves
-        (3,) halves of its sides, metres.
+        (3,) half lengths of its sides, metres.
     steep
-        Most that the field changes over a metre.
+        Largest change of the field over a metre.
     halvings
-        Times that the box is divided at most.
+        Largest number of times that the box is divided.
     """
     parts, left = np.empty((7 * halvings + 8, 5)), 1
     for axis in range(3):
@@ -347,9 +350,11 @@ def possibly_free(
     field: Field, low: Floats, high: Floats, cell: float, shape: tuple[int, int, int], room: float,
     steep: float, a: Floats, b: Floats, longest: float, anchor: Floats, reach: float, halvings: int,
 ) -> Bools:  # fmt: skip
-    """Which cells paths from `a` to `b` may pass: all but those that are certain to have no point
-    with enough room within the box to `high`, the ellipsoid about both ends and the tether's
-    reach."""
+    """Return the mask of the cells that paths from `a` to `b` may pass.
+
+    A cell is left out if it is certain that none of its points has enough room and lies within the
+    box up to `high`, the ellipsoid about both ends and the reach of the tether.
+    """
     nx, ny, nz = shape
     out = np.zeros((nx, ny, nz), dtype=np.bool_)
     centre, halves, at = np.empty(3), np.empty(3), np.empty(3, dtype=np.int64)
@@ -377,8 +382,8 @@ def possibly_free(
 
 @kernel
 def edges_of(possible: Bools) -> npt.NDArray[np.uint8]:
-    """Bits of each corner: whether the edges from it upwards along x, y, z are those of a cell that
-    is possibly free."""
+    """Return three bits for each corner: whether its edge in positive direction along x, y, z
+    belongs to a cell that is possibly free."""
     nx, ny, nz = possible.shape
     out = np.zeros((nx + 1, ny + 1, nz + 1), dtype=np.uint8)
     for i in range(nx):
@@ -395,7 +400,7 @@ def edges_of(possible: Bools) -> npt.NDArray[np.uint8]:
 
 @kernel
 def arrival(u: Floats, edges: npt.NDArray[np.uint8], p: int, q: int, r: int, step: float) -> float:
-    """The value of a corner by those of its neighbours, upwind (Godunov's scheme)."""
+    """Return the value of a corner from its neighbours' values, upwind (Godunov's scheme)."""
     x, y, z = math.inf, math.inf, math.inf
     here = edges[p, q, r]
     if here & 1:
@@ -430,7 +435,8 @@ def arrival(u: Floats, edges: npt.NDArray[np.uint8], p: int, q: int, r: int, ste
 def marched(
     edges: npt.NDArray[np.uint8], start: Bools, cell: float, slow: Singles, most: float
 ) -> Floats:
-    """Fast marching from some corners, as far as `most`, with a queue of buckets."""
+    """Return the distances of corners from `start` by fast marching, up to `most`, with a queue of
+    buckets."""
     nx, ny, nz = edges.shape
     u, done = np.full((nx, ny, nz), np.inf), np.zeros((nx, ny, nz), dtype=np.bool_)
     width = BUCKET * cell
@@ -486,7 +492,7 @@ def marched(
 
 @kernel
 def sweep(u: Floats, edges: npt.NDArray[np.uint8], cell: float, slow: Singles, turn: int) -> None:
-    """Lower all values to what their neighbours' give, in one of eight diagonal orders (fast
+    """Lower each value to the one that its neighbours give, in one of eight diagonal orders (fast
     sweeping, Zhao 2004)."""
     nx, ny, nz = u.shape
     for a in range(nx):
@@ -502,8 +508,8 @@ def sweep(u: Floats, edges: npt.NDArray[np.uint8], cell: float, slow: Singles, t
 
 @kernel
 def slope_of(u: Floats, i: int, j: int, k: int, cell: float) -> float:
-    """The steepest slope of the trilinear function of a cell. Its gradient's square is convex along
-    each axis, so it is the largest in a corner, where it is that along three edges."""
+    """Return the steepest slope of the trilinear function of a cell. The square of its gradient is
+    convex along each axis, so it is largest in a corner, where three edges give the gradient."""
     most = 0.0
     for n in range(8):
         p, q, r = n & 1, n >> 1 & 1, n >> 2
@@ -519,7 +525,7 @@ def slope_of(u: Floats, i: int, j: int, k: int, cell: float) -> float:
 
 @kernel
 def steepest(u: Floats, possible: Bools, cell: float) -> float:
-    """The steepest slope in any cell that is possibly free."""
+    """Return the steepest slope in any cell that is possibly free."""
     nx, ny, nz = possible.shape
     most = 0.0
     for i in range(nx):
@@ -534,7 +540,7 @@ def steepest(u: Floats, possible: Bools, cell: float) -> float:
 def slowed(
     u: Floats, possible: Bools, cell: float, slow_cells: Singles, begin: Singles, slow: Singles
 ) -> float:
-    """Slow the corners of cells with too steep a slope; the steepest slope."""
+    """Slow the corners of cells with too steep a slope, and return the steepest slope."""
     nx, ny, nz = possible.shape
     most = 0.0
     for i in range(nx):
@@ -545,7 +551,7 @@ def slowed(
                 slope = slope_of(u, i, j, k, cell)
                 most = max(most, slope)
                 if slope > 1.0:
-                    # a little more than needed, or it would take many rounds
+                    # slow a little more than needed, because exact steps would take many rounds
                     slow_cells[i, j, k] /= slope * (1.0 + 3.0 * SLOPE_TOLERANCE)
                 factor = slow_cells[i, j, k]
                 if factor < 1.0:
@@ -557,7 +563,8 @@ def slowed(
 
 @kernel
 def lower(u: Floats, possible: Bools, cell: float, turn: int, tolerance: float) -> None:
-    """Lower values until no corner of a cell has too steep a slope, in one of eight orders."""
+    """Lower values in one sweep over all cells, in one of eight orders, so that no corner of a cell
+    has too steep a slope."""
     nx, ny, nz = possible.shape
     limit = cell * cell
     for a in range(nx):
@@ -573,7 +580,8 @@ def lower(u: Floats, possible: Bools, cell: float, turn: int, tolerance: float) 
 
 @kernel
 def lower_corner(u: Floats, i: int, j: int, k: int, n: int, limit: float, tolerance: float) -> None:
-    """Lower a corner of a cell, or its three neighbours in it, to a slope of one."""
+    """Lower a corner of a cell or its three neighbours in the cell, so that the slope there is at
+    most one."""
     p, q, r = n & 1, n >> 1 & 1, n >> 2
     places = np.empty((3, 3), dtype=np.int64)
     for axis in range(3):
@@ -605,18 +613,18 @@ def lower_corner(u: Floats, i: int, j: int, k: int, n: int, limit: float, tolera
 
 
 def cells_of(level: int, params: PotentialParams) -> int:
-    """Return how many cells the grid of a level has.
+    """Return the number of cells of the grid of a level.
 
     Parameters
     ----------
     level : int
-        From 1 on.
+        Level, from 1 on; each has `growth` times the cells of the one before.
     params : PotentialParams
         Effort.
 
     Returns
     -------
     int
-        Number of cells, at most.
+        Number of cells, at most `max_cells`.
     """
     return min(params.max_cells, params.min_cells * int(params.growth ** (level - 1)))

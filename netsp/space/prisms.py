@@ -1,9 +1,9 @@
-"""Tours of scenes whose solids all are upright prisms, from the exact roadmap of the plane.
+"""Tours of scenes whose solids are all upright prisms, from the exact roadmap of the plane.
 
-Among upright prisms the water is the product of a plane and an interval, and a class of paths is a
-class of the plane (docs/theory.md, fact 4). So the taut roadmap knows all classes of such a scene,
-and the solvers find the shortest tour through them. What comes of it is one more tour to be driven
-and judged in space: nothing is taken on trust.
+Among upright prisms the water is the product of a plane and an interval, so the homotopy classes of
+paths are those of the plane (docs/theory.md, fact 4). The taut roadmap therefore knows all classes
+of such a scene, and the solvers find the shortest tour over them. This tour is a candidate: it is
+driven and judged in space like any other.
 """
 
 from __future__ import annotations
@@ -41,37 +41,38 @@ from netsp.space.places import Places
 from netsp.space.water import SHARE, Water
 from netsp.travel.graph import TravelGraph
 
-UPRIGHT = 1e-9
-"""How far the cosine between an axis and the vertical may be from 1: rounding in files."""
+UPRIGHT_TOLERANCE = 1e-9
+"""Largest difference from 1 of the cosine between an upright axis and the vertical. The tolerance
+covers rounding in files."""
 
 CORNER_SEGMENTS = 4
-"""Segments of a quarter circle about the corners of a prism that is grown by more than others."""
+"""Segments of a quarter circle around the corners of a prism that grows by more than the others."""
 
 Corner = tuple[float, float]
 
-WALL = 4.0
-"""Width and depth of the polygon in place of a half-space, in tether lengths: all that a tour can
-meet of it."""
+WALL_RATIO = 4.0
+"""Half width and depth of the polygon that stands for a half-space, in tether lengths. No tour gets
+around a polygon of more than one tether length."""
 
 
 @dataclass(frozen=True)
 class PlaneParams:
-    """How much work the tours of the plane may be.
+    """Budget of the tours of the plane.
 
     Parameters
     ----------
     max_classes : int
-        Augmented goals that are kept, at least 1: where a long tether has more classes, its
-        shortest are kept, of which good tours are made.
+        Largest number of augmented goals, at least 1; if there are more, those with the shortest
+        tethers are kept.
     max_s : float
-        Seconds for each tour, more than 0, also where a run has no time limit.
+        Seconds for each tour, more than 0; the limit also holds for runs without a time limit.
     """
 
     max_classes: int = 1000
     max_s: float = 15.0
 
     def __post_init__(self) -> None:
-        """Refuse what is out of range."""
+        """Refuse values out of range."""
         if self.max_classes < 1:
             raise InputError(f"max_classes: expected 1 or more, got {self.max_classes}")
         if not self.max_s > 0.0:
@@ -80,14 +81,14 @@ class PlaneParams:
 
 @dataclass(frozen=True)
 class FloorPlan:
-    """The plan of a scene of upright prisms.
+    """Floor plan of a scene of upright prisms.
 
     Parameters
     ----------
     circles : tuple of ((x, y), radius)
-        Metres.
+        Round solids, metres.
     polygons : tuple of (corners, growth)
-        Corners (x, y), and by how much each is grown, metres.
+        Corners (x, y) of each polygon, and the distance by which it grows, metres.
     """
 
     circles: tuple[tuple[Corner, float], ...]
@@ -99,9 +100,9 @@ class FloorPlan:
         Returns
         -------
         obstacles : tuple of Circle or Polygon
-            Smaller than the solids by the clearance.
+            Obstacles, smaller than the solids by the clearance.
         clearance : float
-            The least growth of a polygon, metres.
+            Least growth of a solid, metres.
         """
         growth = min((g for _, g in self.polygons), default=0.0)
         growth = min([growth, *(0.5 * r for _, r in self.circles)])
@@ -123,20 +124,20 @@ class FloorPlan:
 
 
 def floor_plan(scene: Scene, mission: Mission) -> FloorPlan | None:
-    """Return the plan of a scene, if each solid that a tour can meet is an upright prism through
-    all depths that the tether reaches.
+    """Return the floor plan of a scene if every solid in reach of the tether is an upright prism
+    that spans all depths in its reach.
 
     Parameters
     ----------
     scene : Scene
         The scene.
     mission : Mission
-        Its anchor and tether count.
+        Mission with the anchor and the tether.
 
     Returns
     -------
     FloorPlan or None
-        None for other scenes.
+        The plan; None for other scenes.
     """
     if scene.mesh is not None or scene.cloud is not None or scene.floor is not None:
         return None
@@ -158,7 +159,7 @@ def floor_plan(scene: Scene, mission: Mission) -> FloorPlan | None:
         if isinstance(shape, HalfSpace):
             if _along_z(shape.normal):
                 continue
-            if abs(shape.normal[2]) > UPRIGHT * math.hypot(*shape.normal):
+            if abs(shape.normal[2]) > UPRIGHT_TOLERANCE * math.hypot(*shape.normal):
                 return None
             polygons.append((_wall(shape, anchor, far), scene.tether_radius))
             continue
@@ -178,11 +179,11 @@ def floor_plan(scene: Scene, mission: Mission) -> FloorPlan | None:
 
 def _along_z(direction: tuple[float, float, float]) -> bool:
     """Return whether a direction is vertical."""
-    return abs(direction[2]) >= (1.0 - UPRIGHT) * math.hypot(*direction)
+    return abs(direction[2]) >= (1.0 - UPRIGHT_TOLERANCE) * math.hypot(*direction)
 
 
 def _circle_of(shape: Shape, low: float, high: float) -> tuple[Corner, float] | None:
-    """Return centre and radius of an upright round solid through all depths between two."""
+    """Return centre and radius of an upright round solid that spans the depths from low to high."""
     if isinstance(shape, Post):
         return shape.center, shape.radius
     if isinstance(shape, Cylinder | Capsule):
@@ -195,7 +196,7 @@ def _circle_of(shape: Shape, low: float, high: float) -> tuple[Corner, float] | 
 
 
 def _polygon_of(shape: Shape, low: float, high: float) -> tuple[tuple[Corner, ...], float] | None:
-    """Return corners and growth of an upright prism through all depths between two."""
+    """Return corners and growth of an upright prism that spans the depths from low to high."""
     if isinstance(shape, Prism):
         return shape.polygon, shape.grow
     if isinstance(shape, Box):
@@ -203,7 +204,7 @@ def _polygon_of(shape: Shape, low: float, high: float) -> tuple[tuple[Corner, ..
         up = int(np.abs(axes[:, 2]).argmax())
         half = 0.5 * np.array(shape.size)
         through = shape.center[2] - half[up] <= low and shape.center[2] + half[up] >= high
-        if through and abs(axes[up, 2]) >= 1.0 - UPRIGHT:
+        if through and abs(axes[up, 2]) >= 1.0 - UPRIGHT_TOLERANCE:
             a, b = (axes[k, :2] * half[k] for k in range(3) if k != up)
             middle = np.array(shape.center[:2])
             corners = (middle + a + b, middle - a + b, middle - a - b, middle + a - b)
@@ -212,12 +213,13 @@ def _polygon_of(shape: Shape, low: float, high: float) -> tuple[tuple[Corner, ..
 
 
 def _wall(shape: HalfSpace, anchor: Floats, far: float) -> tuple[Corner, ...]:
-    """Return the corners of the part of an upright half-space that a tour can meet."""
+    """Return the corners of a rectangle that stands for an upright half-space within the reach of
+    the tether."""
     normal = np.array(shape.normal[:2]) / math.hypot(*shape.normal[:2])
     along = np.array([-normal[1], normal[0]])
     point = np.array(shape.point[:2])
     foot = point + ((anchor[:2] - point) @ along) * along
-    wide, deep = WALL * far * along, WALL * far * normal
+    wide, deep = WALL_RATIO * far * along, WALL_RATIO * far * normal
     corners = (foot + wide, foot - wide, foot - wide - deep, foot + wide - deep)
     return tuple((float(x), float(y)) for x, y in corners)
 
@@ -231,25 +233,26 @@ def tours_of_plan(
     Parameters
     ----------
     water : Water
-        Of the mission.
+        Water of the mission.
     scene : Scene
-        Its scene.
+        Scene of the mission.
     places : Places
-        Where a tour may stop.
+        Places of the waypoints.
     clock : Clock
-        When it is up, the best tours by then are driven.
+        Clock of the run; when it is up, the best tours so far are driven.
     seed : int
-        Of the solver.
+        Random seed of the solver.
     params : PlaneParams, optional
-        How much work they may be.
+        Budget.
     whole_tether : bool
-        Whether tours may need all of the tether, for a caller that flies them.
+        Whether tours may need the whole tether, for a caller that flies them.
 
     Yields
     ------
     Driven
-        The shortest tour for the whole tether, if that is asked for, then that for the share of it
-        that plans may use; none in other scenes, and where the tether in space does not keep to it.
+        First, if `whole_tether`, the shortest tour for the whole tether; then the shortest tour for
+        the share of the tether that plans may use. Nothing in other scenes. A tour is skipped if
+        the tether in space exceeds its limit.
     """
     plan, params = floor_plan(scene, water.mission), params or PlaneParams()
     if plan is None:
@@ -272,7 +275,7 @@ def tours_of_plan(
 
 @dataclass(frozen=True)
 class _PlaneTour:
-    """A mission among upright prisms, as a problem of the plane."""
+    """Mission among upright prisms, as a problem of the plane."""
 
     water: Water
     scene: Scene
@@ -281,12 +284,12 @@ class _PlaneTour:
     params: PlaneParams
 
     def sought(self, share: float, clock: Clock, seed: int) -> tuple[list[LegTo], Floats] | None:
-        """Return the legs of the shortest tour for a share of the tether, and the way home."""
+        """Return the legs of the shortest tour for a share of the tether, and the path home."""
         water, places = self.water, self.places
         mission = water.mission
-        start = len(places)  # the goal that is the start, where that is not the anchor
+        start = len(places)  # number of the goal at the start, used if the start is not the anchor
         points = np.vstack([places.points, mission.start])
-        away = math.dist(mission.start, mission.anchor) > UPRIGHT
+        away = math.dist(mission.start, mission.anchor) > UPRIGHT_TOLERANCE
         goals = np.arange(len(points) if away else start)
         goals = goals[self._in_reach(points, goals, share)]
         needed = {places.begin} if places.begin is not None else set()
@@ -325,12 +328,13 @@ class _PlaneTour:
             base=mission.anchor, obstacles=obstacles,
             goals=tuple(Goal(position=(x, y, z)) for x, y, z in goals.tolist()),
             tether_length=share * mission.tether_length,
-            clearance=growth + max(0.0, min(mission.clearance, (1.0 - UPRIGHT) * room)),
+            clearance=growth
+            + max(0.0, min(mission.clearance, (1.0 - UPRIGHT_TOLERANCE) * room)),
             bounds=None if bounds is None else (bounds[0], bounds[1], bounds[3], bounds[4]),
         )  # fmt: skip
 
     def _in_reach(self, points: Floats, goals: Ints, share: float) -> Ints:
-        """Return which goals a tether reaches in some class."""
+        """Return the indices of the goals that the tether reaches in some class."""
         needed = shortest_tethers(self._problem(points[goals], share))
         return np.flatnonzero(needed <= share * self.water.mission.tether_length)
 
@@ -347,7 +351,8 @@ def _solved(
     graph: TravelGraph, place: Ints, places: Places, home: int, begin: int | None, clock: Clock,
     seed: int,
 ) -> list[int] | None:  # fmt: skip
-    """Return the vertices of the shortest tour from one vertex, or from another, home to it."""
+    """Return the vertices of the shortest tour that ends at `home` and begins at `begin`, or at
+    `home` if `begin` is None."""
     count = len(places)
     if home == 0 and begin is None and not places.choice.any():
         result = solve_graph(graph, "auto", time_limit=clock, seed=seed)

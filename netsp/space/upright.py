@@ -1,9 +1,9 @@
 """The plane's proof as a bound in space, where solids go from the floor to the surface.
 
-Take away all solids but the upright ones, and shrink these a little: no path, and no tether, gets
-longer, so the shortest tour that is left is a bound on all tours. It is that of a problem in the
-plane with heights (docs/theory.md, fact 4), which the exact roadmap and its solvers bound, classes
-of the tether and all.
+Remove all solids but the upright ones, and shrink the upright ones a little. No path and no tether
+gets longer by that, so the shortest tour of the reduced scene bounds all tours. The reduced scene
+is a problem in the plane with heights (docs/theory.md, fact 4). The exact roadmap and its solvers
+bound its tours over all homotopy classes of the tether.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from netsp.space.places import Places
 from netsp.space.water import DEEPEST, DIP, Water
 
 ROUNDING = 1e-9
-"""Share of a length that is taken off the bound, so that rounding never lifts it."""
+"""Relative reduction of the bound, which covers the rounding of lengths."""
 
 
 def bound_of_upright(
@@ -37,41 +37,43 @@ def bound_of_upright(
     Parameters
     ----------
     mission : Mission
-        Whose tether counts.
+        Mission with the tether.
     water : Water
-        The scene, and how the tether lies at the start.
+        Scene, and tether at the start.
     some : list of int
-        The places that tours go to.
+        Numbers of the places that tours visit.
     places : Places
         All places.
     clock : Clock
-        When it is up, the bound is what is proven by then.
+        Clock of the run; when it is up, the bound proven so far is returned.
 
     Returns
     -------
     float or None
-        Metres; None where there are no upright solids, the mission begins in the middle, a waypoint
-        has alternatives, or there was no time.
+        Lower bound, metres; None if there are no upright solids, the mission begins under way, a
+        waypoint has alternatives, or there was no time.
     """
     if places.begin is not None or len(set(places.waypoint[some].tolist())) < len(some):
         return None
-    # a path may dip into solids by what the judge allows, a tether between its nodes by more: among
-    # obstacles shrunk by that both are free, and the taut tether is no longer than its model
+    # the judge lets a path dip into solids a little, and a tether between its nodes a little more:
+    # among obstacles shrunk by the larger depth both are free, and the taut tether is no longer
+    # than its model
     dip = max(2.0 * DEEPEST, DIP * mission.delta)
     obstacles = upright_obstacles(water, dip)
     if not obstacles or clock.up:
         return None
-    # the tether as it is laid, and then the robot's way backwards: from the start on
+    # the problem begins at the start: a tether there is at most the tether from the anchor and the
+    # tether laid from the anchor to the start
     laid = float(polylines.length(water.laid.nodes))
-    most = mission.tether_length * (1.0 + 1e-6) + laid
+    max_length = mission.tether_length * (1.0 + 1e-6) + laid
     try:
         problem = Problem(
             base=mission.start, goals=places.points[some].tolist(), obstacles=tuple(obstacles),
-            tether_length=most,
+            tether_length=max_length,
         )  # fmt: skip
         bound = solve(problem, time_limit=None if math.isinf(clock.left) else clock.left).bound
     except NetspError:
-        return None  # what cannot be said of the plane says nothing of space
+        return None  # no bound in the plane, so none in space
     if bound is None or bound.scope is not Scope.ALL_TOURS:
         return None
     return bound.length * (1.0 - ROUNDING)
@@ -85,12 +87,12 @@ def upright_obstacles(water: Water, dip: float) -> list[Circle | Polygon]:
     water : Water
         The scene.
     dip : float
-        Metres that they are shrunk by.
+        Distance by which the obstacles are shrunk, metres.
 
     Returns
     -------
     list of Circle or Polygon
-        One for each post and prism that is thick enough.
+        One for each post and prism that is thicker than twice `dip`.
     """
     arrays = water.field.arrays
     data, offset = arrays.data, float(arrays.offset)
@@ -113,23 +115,23 @@ def upright_obstacles(water: Water, dip: float) -> list[Circle | Polygon]:
 
 
 def grown_within(corners: Floats, by: float) -> Floats | None:
-    """Return a simple polygon within another one that was grown, or shrunk.
+    """Return a simple polygon within a polygon that was grown or shrunk.
 
     Parameters
     ----------
     corners : ndarray, shape (n, 2)
-        Of the other one.
+        Corners of the polygon before.
     by : float
-        Metres that it is grown by; negative to shrink it.
+        Growth, metres; negative to shrink.
 
     Returns
     -------
     ndarray, shape (m, 2), or None
-        None where nothing is left, or not in one piece.
+        Corners; None if nothing or more than one piece is left.
     """
     from shapely.geometry import Polygon as Shape
 
-    # arcs become chords, on the outer side of a hollow when it is shrunk: by a thousandth of it
+    # arcs become chords, which lie outside of a hollow that is shrunk by up to a thousandth of `by`
     shape = Shape(corners).buffer(by if by >= 0.0 else 1.002 * by, quad_segs=16)
     if shape.is_empty or shape.geom_type != "Polygon" or len(shape.interiors):
         return None
