@@ -147,9 +147,8 @@ class Board:
         return whole
 
     def _own_way(self, v: int) -> Floats | None:
-        """Return the path from the start along a state's own tether, pulled taut in its class;
-        None where the robot has no room on it: a tether goes through gaps that a robot does
-        not."""
+        """Return the path from the start along a state's tether, pulled taut in its class; None if
+        the robot has no room on it, because a tether fits through narrower gaps."""
         tether = self.states.all[v].tether
         line = np.vstack([self.water.laid.nodes[::-1], tether.nodes[1:]])
         return self.water.taut_beside(line)
@@ -321,19 +320,19 @@ class Board:
         return result, [some[int(k) - 1] for k in result.tour[len(first) :]]
 
     def out_and_back(self) -> Driven | None:
-        """Drive a tour that goes out to each waypoint along a taut tether, and back the same way.
+        """Drive a tour that goes out to each waypoint along a taut tether, and back the same path.
 
-        It needs no legs between states, so there is one wherever each waypoint can be reached.
+        The tour needs no legs between states, so it exists whenever each waypoint can be reached.
 
         Returns
         -------
         Driven or None
-            What came of it, in the order of the waypoints; None where no waypoint has a way out
-            and back on which the tether keeps to its limit and comes free, or where the mission
-            does not begin at the start and its tether does not come free there.
+            The tour, in the order of the waypoints. None if no waypoint has such a path with the
+            tether within its limit and free at the end, or if the mission begins under way and its
+            tether does not come free at the start.
         """
         first: dict[int, int] = {}
-        # when there was no time for it, only the first state of each waypoint has a way out
+        # if the time ran out, only the first state of each waypoint has a path out
         for v, state in enumerate(self.states.all):
             if (
                 self._out[v] is None
@@ -350,13 +349,13 @@ class Board:
         if not first:
             return None
         by_the_start = replace(self, legs={}, _one_way={})
-        # where a way out leads by way of other states, its legs are those of this board
+        # a path out through other states follows the legs of this board
         by_the_start._out = [self.way_out(v) for v in range(len(self._out))]
         driven = by_the_start._driven([first[n] for n in sorted(first)])
         return driven if driven.fault is None else None
 
     def _comes_back(self, v: int) -> bool:
-        """Whether the tether keeps to its limit out to a state and back, and comes free."""
+        """Return whether the tether keeps its limit out to a state and back, and comes free."""
         water, way = self.water, self._way_out(v)
         there, longest = water.driven(water.laid, way, fine=True)
         back, most = water.driven(there, way[::-1], fine=True)
@@ -411,8 +410,8 @@ class Board:
             writes = water.number(path)
             word = None if word is None or writes is None else water.words.times(word, writes)
             as_meant = word == (at_home if state < 0 else states.all[state].word)
-            # since which leg the tether hangs otherwise than in its state, or is of another class;
-            # it does no harm if all ends well
+            # first leg after which the tether lies otherwise than in its state, or in another
+            # class; no fault if the tether comes free in the end
             astray = None if as_meant and alike(tether, meant, delta) else astray or pair
             if fault is None and (longest > states.limit or word is None):
                 fault = astray or pair

@@ -9,9 +9,9 @@ tether gets too long on the way, or is not free at the end, the first leg that d
 state that was meant is forbidden, and the graph is solved again: no tour is believed that was not
 driven without fault.
 
-Status and bound of the result are about these states and legs, less those forbidden, and not about
-all tours there are: a tour that is the shortest along them is `optimal_of_states`. It is `optimal`
-only where a bound on all tours (`netsp.space.bound`) proves it.
+Status and bound of the result hold for tours along these states and legs, without the forbidden
+ones, and not for all tours: the shortest tour along them is `optimal_of_states`. It is `optimal`
+only if a bound on all tours (`netsp.space.bound`) proves it.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ from netsp.space.given_order import drive_given_order
 from netsp.space.judge import verify_mission
 from netsp.space.legs import Growth, Ways
 from netsp.space.places import Places
-from netsp.space.prisms import tours_of_plan
+from netsp.space.prisms import PlaneParams, tours_of_plan
 from netsp.space.states import Effort, first_states, states_with_room
 from netsp.space.trees import states_of_trees
 from netsp.space.water import SHARE, Water
@@ -67,13 +67,20 @@ EARLY = 0.1
 """Of the time left, what the solver may take while there are more states to come: its tour is then
 where the next search starts."""
 
-IN_PLANE = 0.3
-"""Share of the time left for the tours of the plane, where all solids are upright prisms."""
+TAUT_LEGS = "taut"
+"""Kind of a plan along states and their taut legs."""
 
-TAUT_LEGS, DETOURS, PLANE = "taut", "detours", "plane"
-OUT_AND_BACK, AS_GIVEN = "out-and-back", "as-given"
-"""Kinds of plans: along states and legs, with detours, of the plane of a scene of upright prisms,
-out along a taut tether to each waypoint and back, and in the order of the file."""
+DETOURS = "detours"
+"""Kind of a plan along states and legs with detours."""
+
+PLANE = "plane"
+"""Kind of a plan from the tour of the plane, in a scene of upright prisms."""
+
+OUT_AND_BACK = "out-and-back"
+"""Kind of a plan that goes out to each waypoint along a taut tether, and back the same way."""
+
+AS_GIVEN = "as-given"
+"""Kind of a plan in the order of the mission file."""
 
 LEAST_GROWING, LEAST_SOLVING = 1.0, 0.5
 """Seconds that legs and the solver get even if the time is up: there would be no tour, or one by
@@ -109,7 +116,7 @@ class SpacePlan:
     ways : Ways
         Of the robot between waypoints.
     kind : str
-        `TAUT_LEGS`, `DETOURS`, `PLANE`, `OUT_AND_BACK` or `AS_GIVEN`.
+        How the tour was found: `TAUT_LEGS`, `DETOURS`, `PLANE`, `OUT_AND_BACK` or `AS_GIVEN`.
     """
 
     mission: Mission
@@ -137,7 +144,7 @@ class SpacePlan:
         return (*self.order, *sorted(rest))
 
     def replaces(self, other: SpacePlan) -> bool:
-        """Return whether this plan is to be taken instead of another that has passed the judge.
+        """Return whether this plan is better than another that has passed the judge.
 
         Parameters
         ----------
@@ -147,8 +154,9 @@ class SpacePlan:
         Returns
         -------
         bool
-            It visits more waypoints, or as many and is shorter. A tour along states and legs may
-            be longer than one of the plane by `SAVED`, for more is known of it.
+            True if it visits more waypoints, or as many and is shorter. A tour along states and
+            legs may be longer than a tour of the plane by the share `SAVED`, because it has a
+            bound.
         """
         if len(self.stops) != len(other.stops):
             return len(self.stops) > len(other.stops)
@@ -156,8 +164,8 @@ class SpacePlan:
         return self.length < other.length * (1.0 + (SAVED if known else 0.0))
 
     def _status(self, bound: float | None) -> Status:
-        """Return what is proven of the tour: `optimal` is for one that no tour to all waypoints is
-        shorter than."""
+        """Return the status of the tour: `optimal` if a bound on all tours to all waypoints proves
+        it, else that of the tour along states and legs."""
         if bound is None or self.unreached:
             return self.result.status
         proven = LowerBound(bound, Scope.ALL_TOURS).proves(self.length)
@@ -295,47 +303,46 @@ def plans(
     whole_tether: bool = False,
     on_progress: Callable[[str], None] | None = None,
 ) -> Iterator[SpacePlan]:
-    """Find tours of a mission's waypoints, the best first, which nobody has judged yet.
+    """Find candidate tours of a mission's waypoints, which the judge has not checked yet.
 
     Parameters
     ----------
     mission : Mission
-        As of `plan`, as are all others.
+        The mission; the order of its waypoints is ignored.
     scene : Scene, optional
-        Its scene.
+        Scene of the mission; loaded if needed.
     field : DistanceField, optional
-        The scene's field.
+        Distance field of the scene; computed if needed.
     grid : Grid, optional
-        That paths are sought on.
+        Grid for paths; made if needed.
     water : Water, optional
-        Of the mission, when its words are at hand.
+        Water of the mission with its words; if given, `field` and `grid` are not used.
     solver : str or callable
-        As of `netsp.solvers.solve.solve_graph`.
+        Solver, as in `netsp.solvers.solve.solve_graph`.
     params : mapping, optional
         Options of the solver.
     clock : Clock
-        When it is up, the best tours by then come.
+        Clock of the run; when it is up, the best tours so far are yielded.
     iteration_limit : int, optional
-        Iterations of the solver.
+        Largest number of iterations of the solver.
     seed : int
-        Of the solver.
+        Random seed of the solver.
     whole_tether : bool
-        Whether tours of the plane may need all of the tether, for a caller that flies them.
+        Whether tours of the plane may need the whole tether, for a caller that flies them.
     on_progress : callable, optional
-        Called with a line of text now and then.
+        Called with a line of text at each stage.
 
     Yields
     ------
     SpacePlan
-        The tour of the plane, where all solids are upright prisms, before anything else is sought;
-        the tour with detours, if it is shorter than the next; the tour along taut ways; the tour
-        out along a taut tether to each waypoint and back, which is sought only when it is asked
-        for.
+        First, among upright prisms, the tours of the plane; then the tour with detours, if it is
+        shorter than the tour along taut legs; then the tour along taut legs; last the tour out and
+        back to each waypoint, which is computed only if the caller asks for it.
 
     Raises
     ------
     InputError
-        As of `plan`.
+        A moving anchor; waypoints in solids; no tether that reaches any waypoint.
     """
     check_plannable(mission, solver, params, seed)
     how = {
@@ -349,24 +356,24 @@ def plans(
             field = field or scene.field()
             grid = grid_of(mission, scene, field)
         mission = mission.checked_waypoints(field)
-        Places.of(mission, field)  # before words are sought, which takes longest
+        Places.of(mission, field)  # refuse bad waypoints before the long search for words
         (on_progress or _silent)("words of the scene")
         water = Water.within(mission, field, grid, None if scene is None else scene.bounds)
     yield from _planned(water, scene, clock, on_progress or _silent, how, whole_tether)
 
 
 def given_plan(water: Water) -> SpacePlan | None:
-    """Drive a mission in the order of its file, as the plan that others have to be better than.
+    """Drive a mission in the order of its file: the first incumbent.
 
     Parameters
     ----------
     water : Water
-        Of the mission.
+        Water of the mission.
 
     Returns
     -------
     SpacePlan or None
-        As of `netsp.space.given_order.drive_given_order`; its ways are not sought.
+        The plan, without known paths between waypoints; None if that order cannot be driven.
     """
     driven = drive_given_order(water)
     if driven is None:
@@ -375,7 +382,8 @@ def given_plan(water: Water) -> SpacePlan | None:
 
 
 def _plan_of(water: Water, places: Places, driven: Driven, kind: str) -> SpacePlan:
-    """Return a tour that was found without states and legs as a plan; its ways are not sought."""
+    """Return a tour that was found without states and legs as a plan, without known paths between
+    waypoints."""
     visited = {stop.waypoint for stop in driven.stops}
     unreached = tuple(n for n in range(len(water.mission.waypoints)) if n not in visited)
     return SpacePlan(
@@ -389,18 +397,18 @@ def _plan_of(water: Water, places: Places, driven: Driven, kind: str) -> SpacePl
 def check_plannable(
     mission: Mission, solver: SolverLike, params: Mapping[str, Any] | None, seed: int
 ) -> None:
-    """Refuse what can be told to be wrong before anything is sought.
+    """Refuse arguments that are wrong, before the search begins.
 
     Parameters
     ----------
     mission : Mission
         The mission.
     solver : str or callable
-        As of `netsp.solvers.solve.solve_graph`.
+        Solver, as in `netsp.solvers.solve.solve_graph`.
     params : mapping, optional
         Options of the solver.
     seed : int
-        Of the solver.
+        Random seed of the solver.
 
     Raises
     ------
@@ -413,7 +421,7 @@ def check_plannable(
 
 
 def _silent(_: str) -> None:
-    """Tell nobody."""
+    """Ignore a line of progress."""
 
 
 def _planned(
@@ -426,8 +434,9 @@ def _planned(
     limit = max(SHARE * mission.tether_length, water.present.length * (1.0 + ROUNDING))
     check_tether(mission, water.present.length)
     if scene is not None:
+        plane = PlaneParams()
         for driven in tours_of_plan(
-            water, scene, places, clock.part(IN_PLANE), how["seed"], whole_tether=whole_tether
+            water, scene, places, clock.part(plane.time_share), how["seed"], plane, whole_tether
         ):
             yield _plan_of(water, places, driven, PLANE)
     tell("shortest tethers to each waypoint")
@@ -498,12 +507,12 @@ def _planned(
     if best is not None:
         result, driven = best
         if result.status is Status.OPTIMAL:
-            # of the graph; where it is not complete, there are more legs within reach
+            # optimal over the graph only; an incomplete graph lacks legs within reach
             of_states = Status.OPTIMAL_OF_STATES if complete else Status.FEASIBLE
             result = replace(result, status=of_states)
         along_taut = planned(result, driven, TAUT_LEGS)
     if shorter is not None:
-        # what the solver knew of its graph says nothing of legs that are not in it
+        # the solver's bound does not hold for the detours, which are not in its graph
         yield planned(Result(None, shorter.length, None, Status.FEASIBLE), shorter, DETOURS)
     if along_taut is not None:
         yield along_taut

@@ -66,10 +66,13 @@ class PlaneParams:
         tethers are kept.
     max_s : float
         Seconds for each tour, more than 0; the limit also holds for runs without a time limit.
+    time_share : float
+        Share of the remaining time for all tours of the plane, from 0 to 1.
     """
 
     max_classes: int = 1000
     max_s: float = 15.0
+    time_share: float = 0.3
 
     def __post_init__(self) -> None:
         """Refuse values out of range."""
@@ -77,6 +80,8 @@ class PlaneParams:
             raise InputError(f"max_classes: expected 1 or more, got {self.max_classes}")
         if not self.max_s > 0.0:
             raise InputError(f"max_s: expected more than 0, got {self.max_s:g}")
+        if not 0.0 <= self.time_share <= 1.0:
+            raise InputError(f"time_share: expected a number from 0 to 1, got {self.time_share:g}")
 
 
 @dataclass(frozen=True)

@@ -1,18 +1,17 @@
 """From a mission to the same mission planned: order, legs, and a flight that proves them.
 
-The order in which the mission gives its waypoints comes first: it is driven and judged before
-anything is sought, and whatever is found later has to be better. Then come the tour of the plane
-where all solids are upright prisms (`netsp.space.prisms`), the tour of states and legs
-(`netsp.space.plan`), and the order by going straight on (`netsp.space.order`), which is better for
-some bodies with many free ends. What counts is the time until the robot is home, of a flight by
-`predictive`, and the length where there is no time to fly. One place takes tours in
-(`_Incumbents`), and it takes none that the judge refuses.
+The order of the mission file is driven and judged first, before any search, and is the first
+incumbent. Three searches follow: tours of the plane if all solids are upright prisms
+(`netsp.space.prisms`), tours along states and legs (`netsp.space.plan`), and the order by going
+straight on (`netsp.space.order`), which is better for some bodies with many free ends. Tours are
+compared by the time until the robot is home, in a flight by `predictive`, or by length if there is
+no time to fly. All tours go through `_Incumbents`, which accepts none that the judge refuses.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from itertools import pairwise
 from typing import Any
 
@@ -51,25 +50,47 @@ from netsp.space.plan import (
 from netsp.space.water import SHARE, Water, along, has_room
 from netsp.travel.result import relative_gap
 
-FLYING = 0.25
-"""Share of the time that the flight of the mission as it was given may take before anything is
-sought. Where that is not enough it is flown last, and compared by its length until then."""
-
-PLANNING, BOUNDING, ORDERING = 0.7, 0.3, 0.3
-"""Shares of the time left: what the tour of states and legs may take, then the bound, then the
-order by going straight on; the rest is for flights."""
-
-WORTH = 0.005
-"""Share of its time that a flight by going straight on must save to be taken instead of a tour of
-which more is known; what is saved by stopping within reach of the start is less."""
-
 GOING_ON = "going-straight-on"
-"""Name of the older way, where tours tell their solver."""
+"""Value of `solver` in tours that were found by going straight on."""
+
+
+@dataclass(frozen=True)
+class MissionPolicy:
+    """Division of the time of `solve_mission` among its stages.
+
+    Parameters
+    ----------
+    given_share : float
+        Share of the time for the flight in the order of the file, before the search. If it is too
+        short, that order is compared by its length and flown last.
+    planning_share : float
+        Share of the remaining time for tours of the plane and along states and legs.
+    bound_share : float
+        Share of the remaining time for the bound on all tours.
+    going_on_share : float
+        Share of the remaining time for the order by going straight on.
+    min_saving : float
+        Share of the time until home that a flight by going straight on must save to replace a tour
+        with a bound. Stopping within reach of the start saves less than the default.
+    """
+
+    given_share: float = 0.25
+    planning_share: float = 0.7
+    bound_share: float = 0.3
+    going_on_share: float = 0.3
+    min_saving: float = 0.005
+
+    def __post_init__(self) -> None:
+        """Refuse values out of range."""
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if not 0.0 <= value <= 1.0:
+                raise InputError(f"{field.name}: expected a number from 0 to 1, got {value:g}")
 
 
 @dataclass(frozen=True)
 class SolvedMission:
-    """A mission, planned; its tour has passed the judge.
+    """Planned mission, whose tour has passed the judge.
 
     Parameters
     ----------
@@ -86,7 +107,7 @@ class SolvedMission:
     interrupted : bool
         Whether Ctrl-C ended it.
     cells : Resolved, optional
-        The cells that were planned in, and the gaps that they show and do not show.
+        Cell size of the plan, and the gaps that its grid shows and does not show.
     """
 
     mission: Mission
@@ -118,6 +139,7 @@ class _Flights:
     water: Water
     clock: Clock
     tell: Callable[[str], None]
+    policy: MissionPolicy
 
     def of(
         self, mission: Mission, name: str, worth: float = np.inf, clock: Clock | None = None
@@ -127,20 +149,20 @@ class _Flights:
         Parameters
         ----------
         mission : Mission
-            What is flown.
+            The mission.
         name : str
-            What it is called in progress.
+            Name of the tour in progress messages.
         worth : float
-            Seconds of the best flight so far: one that takes longer is cut short.
+            Seconds after which the flight is cut short, because a better one is known.
         clock : Clock, optional
-            When it is up, the flight is cut short; by default that of all.
+            Clock of the flight; when it is up, the flight is cut short. By default that of the run.
 
         Returns
         -------
         run : Run or None
-            None where it was cut short.
+            The flight; None if it was cut short.
         slower : bool
-            Whether that was because it took longer than the best.
+            True if it was cut short because it took longer than `worth`.
         """
         clock = clock or self.clock
         if clock.up:
@@ -165,25 +187,26 @@ class _Flights:
         return (None, slower) if run.summary["status"] == "interrupted" else (run, False)
 
     def judged(self, mission: Mission) -> bool:
-        """Return whether the judge finds no fault with a tour."""
+        """Return whether a tour passes the judge."""
         self.tell("judging the tour")
         return bool(verify_mission(mission, scene=self.scene, water=self.water))
 
 
 @dataclass
 class _Incumbents:
-    """The best tour so far. All tours come in here, and none that the judge refuses.
+    """Incumbent of a run. It accepts no tour that the judge refuses.
 
     Parameters
     ----------
     flights : _Flights
-        Of the mission.
+        Flights of the mission.
     first : SolvedMission or None
-        The order of the file, if it may be flown: no tour that is longer, or home later, is taken.
+        Tour in the order of the file, if it passes the judge. A tour that is longer, or home later,
+        is not accepted.
     given : Run or None
-        The mission as it was given, flown.
+        Flight of the mission as it was given.
     best : SolvedMission or None
-        The best so far.
+        The incumbent.
     """
 
     flights: _Flights
@@ -192,18 +215,18 @@ class _Incumbents:
     best: SolvedMission | None = None
 
     def take_first(self, found: SolvedMission) -> bool:
-        """Take the order of the file, unless the judge refuses it; return whether it does not."""
+        """Accept the order of the file if it passes the judge; return whether it does."""
         if not self.flights.judged(found.mission):
             return False
         self.first = self.best = found
         return True
 
     def take_given(self, run: Run | None) -> None:
-        """Take the flight of the mission as it was given."""
+        """Keep the flight of the mission as it was given, unless it was cut short."""
         self.given = run or self.given
 
     def offer(self, found: SolvedMission, name: str) -> None:
-        """Take a tour if it passes the judge and is better than the best so far."""
+        """Accept a tour if it passes the judge and is better than the incumbent."""
         best = self.best
         if best is not None and (
             len(found.tour.stops) < len(best.tour.stops)
@@ -220,14 +243,14 @@ class _Incumbents:
             self.best = found
 
     def _needs_flight(self, found: SolvedMission) -> bool:
-        """Return whether only a flight can tell that a tour is good: it needs what plans spare of
-        the tether for how the robot is steered."""
+        """Return whether a tour counts only with a flight: it needs the part of the tether that
+        plans reserve for steering."""
         limit = SHARE * self.flights.mission.tether_length
         in_plane = found.plan is not None and found.plan.kind == PLANE
         return in_plane and found.tour.longest_tether > limit
 
     def fly_best(self) -> None:
-        """Fly the best tour as it will be written, if it has not been flown."""
+        """Fly the incumbent as it will be written, if it has not been flown."""
         best = self.best
         if best is not None and best.run is None:
             run, _ = self.flights.of(best.mission, "it as it will be written")
@@ -235,8 +258,8 @@ class _Incumbents:
             self.first = self.best if best is self.first else self.first
 
     def _seconds(self, found: SolvedMission) -> float | None:
-        """Return the seconds until home of a tour that was flown; the order of the file has been
-        flown as it was given."""
+        """Return the seconds until home of a tour, None if it was not flown. For the order of the
+        file, the flight as given counts."""
         if found.run is not None:
             return seconds_until_home(found.run)
         if found is self.first and self.given is not None and _good(self.given):
@@ -244,12 +267,12 @@ class _Incumbents:
         return None
 
     def _worth(self) -> float:
-        """Return the seconds after which a flight is not worth going on with."""
+        """Return the seconds after which a flight cannot replace the incumbent."""
         seconds = None if self.best is None else self._seconds(self.best)
         return np.inf if seconds is None else (1.0 + SAVED) * seconds
 
     def _may_be_better(self, found: SolvedMission) -> bool:
-        """Return whether a tour through as many waypoints may be better than the best so far."""
+        """Return whether a tour through as many waypoints may be better than the incumbent."""
         assert self.best is not None
         seconds, mission = self._seconds(self.best), self.flights.mission
         if seconds is None:
@@ -259,16 +282,17 @@ class _Incumbents:
         return (found.tour.length - saved) / mission.speed < (1.0 + SAVED) * seconds
 
     def _allowed(self, found: SolvedMission, best: SolvedMission) -> float:
-        """Return the factor by which a tour may be longer than the best: one along states and
-        legs, of which more is known, a little; one by going straight on must be shorter."""
-        old_way = (GOING_ON, AS_GIVEN)
-        if found.tour.solver == GOING_ON and best.tour.solver not in old_way:
-            return 1.0 - WORTH
+        """Return the largest ratio of a tour to the incumbent at which it is accepted: a little
+        more than 1 for a tour along states and legs, because it has a bound, and less than 1 for
+        one by going straight on."""
+        without_bound = (GOING_ON, AS_GIVEN)
+        if found.tour.solver == GOING_ON and best.tour.solver not in without_bound:
+            return 1.0 - self.flights.policy.min_saving
         known = found.plan is not None and found.plan.kind == TAUT_LEGS
         return 1.0 + SAVED if known and best.tour.solver == PLANE else 1.0
 
     def _is_better(self, found: SolvedMission, best: SolvedMission) -> bool:
-        """Return whether a tour that passed the judge is to be taken instead of the best."""
+        """Return whether a tour that passed the judge replaces the incumbent."""
         if found.run is not None and not _good(found.run):
             return False
         if len(found.tour.stops) > len(best.tour.stops):
@@ -302,6 +326,7 @@ def solve_mission(
     iteration_limit: int | None = None,
     seed: int = 0,
     on_progress: Callable[[str], None] | None = None,
+    policy: MissionPolicy | None = None,
 ) -> SolvedMission:
     """Plan a mission: the shortest tour through its waypoints that leaves the tether free.
 
@@ -325,6 +350,8 @@ def solve_mission(
         Of the solver.
     on_progress : callable, optional
         Called with a line of text now and then.
+    policy : MissionPolicy, optional
+        Division of the time among the stages.
 
     Returns
     -------
@@ -338,7 +365,7 @@ def solve_mission(
     LimitReachedError
         No tour was found on which the tether stays within its limit.
     """
-    tell = on_progress or (lambda _: None)
+    tell, policy = on_progress or (lambda _: None), policy or MissionPolicy()
     name = solver if isinstance(solver, str) else getattr(solver, "__name__", "solver")
     with until_interrupt(time_limit) as clock:
         check_plannable(mission, solver, params, seed)
@@ -347,16 +374,16 @@ def solve_mission(
         check_bounds(mission, scene)
         field = field or scene.field()
         mission = mission.checked_waypoints(field)
-        tell("gaps that cells do not show")
+        tell("gaps that the cells do not show")
         cells = resolved(mission, scene, field)
         mission = cells.mission
-        Places.of(mission, field)  # before words are sought, which takes longest
+        Places.of(mission, field)  # refuse bad waypoints before the long search for words
         tell("words of the scene")
         water = Water.of(mission, scene, field)
         check_tether(mission, water.present.length)
-        flights = _Flights(mission, scene, water, clock, tell)
+        flights = _Flights(mission, scene, water, clock, tell, policy)
         found = _Incumbents(flights)
-        _begin_as_given(found, clock.part(FLYING), seed)
+        _begin_as_given(found, clock.part(policy.given_share), seed)
         searched = _search(found, clock, name, solver, params, iteration_limit, seed)
         planned = searched.plan
         if found.given is None:
@@ -383,14 +410,14 @@ def with_gaps(mission: Mission, cells: Resolved) -> Mission:
     Parameters
     ----------
     mission : Mission
-        With a tour.
+        Mission with a tour.
     cells : Resolved
-        The gaps.
+        Gaps of its scene.
 
     Returns
     -------
     Mission
-        The same mission otherwise.
+        The mission with `tour.unresolved_gaps`.
     """
     assert mission.tour is not None
     gaps = tuple(
@@ -405,8 +432,7 @@ def with_gaps(mission: Mission, cells: Resolved) -> Mission:
 
 @dataclass
 class _Searched:
-    """What the search of states and legs has come to: its plan, the bound on all tours, and why
-    there is none."""
+    """Result of the search: the plan, the bound on all tours, and the error if there is no plan."""
 
     plan: SpacePlan | None = None
     bound: float | None = None
@@ -414,8 +440,8 @@ class _Searched:
 
 
 def _begin_as_given(found: _Incumbents, flying: Clock, seed: int) -> None:
-    """Take the mission as it was given, first of all, whatever the time: its own tour, if it has
-    one that passes the judge, else its order. It is flown as long as the clock lasts."""
+    """Accept the mission as it was given, whatever the time: its tour if that passes the judge,
+    else the tour in its order. Then fly it as long as the clock allows."""
     flights = found.flights
     mission, tell = flights.mission, flights.tell
     order = tuple(range(len(mission.waypoints)))
@@ -434,8 +460,8 @@ def _begin_as_given(found: _Incumbents, flying: Clock, seed: int) -> None:
 
 
 def _offer_given_flight(found: _Incumbents, seed: int) -> None:
-    """Offer the flight of the mission as it was given as a tour, where it is home earlier than the
-    best."""
+    """Offer the flight of the mission as it was given as a tour, if it is home earlier than the
+    incumbent."""
     given, best, mission = found.given, found.best, found.flights.mission
     if given is None or not _good(given) or (best is not None and best.run is None):
         return
@@ -457,22 +483,23 @@ def _search(
     found: _Incumbents, clock: Clock, name: str, solver: SolverLike,
     params: Mapping[str, Any] | None, iteration_limit: int | None, seed: int,
 ) -> _Searched:  # fmt: skip
-    """Offer the tours that are found in the plane and of states and legs."""
+    """Offer the tours of the plane and along states and legs."""
     flights, out = found.flights, _Searched()
     if clock.up and found.best is not None:
-        return out  # what comes before the first plan is not cut short
+        return out  # the stages before the first plan would overrun the limit
     candidates = plans(
         flights.mission, scene=flights.scene, water=flights.water, solver=solver, params=params,
-        clock=clock.part(PLANNING), iteration_limit=iteration_limit, seed=seed,
+        clock=clock.part(flights.policy.planning_share), iteration_limit=iteration_limit, seed=seed,
         whole_tether=True, on_progress=flights.tell,
     )  # fmt: skip
     try:
         for plan in candidates:
             if plan.kind == PLANE and found.best is not None and found.best.tour.solver == PLANE:
-                continue  # that for all of the tether is no longer
+                continue  # the accepted tour, for the whole tether, is at most as long
             if plan.kind != PLANE and out.bound is None:
                 flights.tell("bound on all tours")
-                out.bound = bound_of_all(plan.ways, sorted(plan.order), clock.part(BOUNDING), seed)
+                part = clock.part(flights.policy.bound_share)
+                out.bound = bound_of_all(plan.ways, sorted(plan.order), part, seed)
             out.plan = out.plan if out.plan is not None and plan.kind == OUT_AND_BACK else plan
             found.offer(_of_plan(plan, name, seed), f"the tour ({plan.kind})")
             if plan.kind == TAUT_LEGS and found.best is not None:
@@ -492,9 +519,11 @@ def _of_plan(planned: SpacePlan, solver: str, seed: int) -> SolvedMission:
 def _with_bound(
     best: SolvedMission, planned: SpacePlan | None, bound: float | None
 ) -> SolvedMission:
-    """Return a tour with the bound on all tours, where that is about the same waypoints. A robot
-    that turns back a bit before them goes less, by twice as much as it stays away, and once at
-    home."""
+    """Return a tour with the bound on all tours, if the bound is for the same waypoints.
+
+    A robot may turn back before it is at a waypoint. So the bound is reduced by twice the distance
+    that remains at each waypoint, and once at home.
+    """
     reached = set() if planned is None else set(planned.order)
     if bound is None or reached != set(best.order[: len(best.tour.stops)]):
         return best
@@ -521,13 +550,14 @@ def _offer_going_on(found: _Incumbents, seed: int) -> None:
     flights = found.flights
     mission, clock = flights.mission.model_copy(update={"tour": None}), flights.clock
     if clock.up or mission.state is not None:
-        return  # that way begins at the start
+        return  # going straight on begins at the start
     flights.tell("order by going straight on")
     water = flights.water
     try:
         tour = order_by_going_on(
-            mission, water.field, water.grid, clock=clock.part(ORDERING), seed=seed
-        )
+            mission, water.field, water.grid,
+            clock=clock.part(flights.policy.going_on_share), seed=seed,
+        )  # fmt: skip
     except (InputError, LimitReachedError):
         return
     rest = tuple(n for n in range(len(mission.waypoints)) if n not in tour)

@@ -63,8 +63,8 @@ class Water:
     model : GeodesicTether
         The tether.
     bounds : tuple of float, optional
-        The scene's (xmin, ymin, zmin, xmax, ymax, zmax), metres; None where it has none, or where
-        the scene was not at hand.
+        Bounds (xmin, ymin, zmin, xmax, ymax, zmax) of the scene, metres; None if it has none or is
+        not known.
     """
 
     mission: Mission
@@ -115,7 +115,7 @@ class Water:
         grid : Grid
             The box and the size of cells.
         bounds : tuple of float, optional
-            The scene's, where they are known, metres.
+            Bounds of the scene, if known, metres.
 
         Returns
         -------
@@ -187,7 +187,7 @@ class Water:
             Metres: all cells that paths no longer than that lead to when pulled taut; or the cells
             that are sought, and how long the paths to each may be.
         stop : ndarray
-            Flag of a clock; from when it is set on, only the soonest word of a cell is sought.
+            Flag of a clock; once it is set, only the soonest word of a cell is sought.
 
         Returns
         -------
@@ -265,20 +265,20 @@ class Water:
     def taut_beside(self, line: Floats) -> Floats | None:
         """Pull a tether's line taut as a path of the robot, in the line's class.
 
-        A tether rests on surfaces, so its line lies nearer to them than the clearance. Between
-        solids that are grown by the clearance such a line has no class: to pull it may take it
-        across a bar. So a path of another word is not taken, and the line is moved off the
-        surfaces before it is pulled once more.
+        A tether rests on surfaces, so its line is nearer to them than the clearance, and has no
+        class among solids grown by the clearance. Pulling it there may move it across a bar. So a
+        path with another word is rejected; the line is then moved off the surfaces and pulled
+        again.
 
         Parameters
         ----------
         line : ndarray, shape (k, 3)
-            Free or on surfaces, metres.
+            Line that is free or lies on surfaces, metres.
 
         Returns
         -------
         ndarray, shape (m, 3), or None
-            Metres; None where no path with room was found in the line's class.
+            The path, metres; None if no path with room was found in the line's class.
         """
         word = self.number(line)
         if word is None:
