@@ -29,7 +29,7 @@ def test_with_either_cut_it_ends_at_the_optimum(cuts, seed):
     assert result.status is Status.OPTIMAL
     assert result.length == pytest.approx(brute_tour(graph), rel=1e-6)
     assert result.lower_bound <= brute_tour(graph) * (1 + 1e-9)
-    bounds = [row.bound for row in result.trace]
+    bounds = [row.bound.length for row in result.trace]
     assert bounds == sorted(bounds)
 
 
