@@ -1,9 +1,9 @@
 """Lower bounds on tours, each with the tours that it holds for, and the words that say so.
 
-A bound over the homotopy classes that a roadmap kept is no bound on all tours, one along a sampled
-roadmap is none in the continuous world, and one between the states that were found is none for a
-mission. So a bound is never a bare number where people see it: `LowerBound` carries its `Scope`,
-and every page, table, message and file takes its words from here.
+A bound over the homotopy classes that a roadmap kept is no bound on all tours. A bound along a
+sampled roadmap does not hold in the continuous world, and a bound between the states that were
+found does not hold for the mission. So `LowerBound` carries its `Scope`, the set of tours that it
+holds for. Every page, table, message and file takes the words for a bound from this module.
 
 Scopes are ordered by inclusion. A bound of a scope also holds for each part of that scope
 (`LowerBound.for_part`). The reverse needs a bound on all other tours (`LowerBound.or_elsewhere`).
@@ -17,8 +17,8 @@ from enum import StrEnum
 from types import MappingProxyType
 
 OPTIMALITY_TOLERANCE = 1e-6
-"""Largest gap of a tour that is called optimal, as a share of its length. Bounds are computed in
-floating point from dual values; their rounding is orders of magnitude smaller."""
+"""Largest relative gap of a tour that is called optimal. Bounds come from dual values in floating
+point, whose rounding errors are orders of magnitude smaller."""
 
 
 class Scope(StrEnum):
@@ -29,19 +29,19 @@ class Scope(StrEnum):
     ALL_TOURS
         All admissible tours of the continuous world, in every homotopy class.
     KEPT_CLASSES
-        Tours over the homotopy classes that are in the travel graph, where others were left out.
+        Tours over the homotopy classes in the travel graph, if other classes were left out.
     ROADMAP
-        Tours along a sampled roadmap (PRM*), or that of another package.
+        Tours along a sampled roadmap (PRM*), or along a roadmap of another package.
     STATES
-        Tours along the legs that were found between the states of the tether that were found.
+        Tours along the legs that were found between the known states of the tether.
     GIVEN_ORDER
         Tours that visit the goals in the order given.
     KEPT_IN_ORDER, ROADMAP_IN_ORDER, STATES_IN_ORDER
-        Those of the classes kept, of the roadmap, of the states, in the order given.
+        Tours of `KEPT_CLASSES`, `ROADMAP` and `STATES` that keep the order given.
     TRAVEL_GRAPH
-        Tours of a travel graph that was given as such, a generalised TSP.
+        Tours of a travel graph without a world, a generalised TSP.
     PART
-        Tours over some vertices of a travel graph; a step on the way to a bound on all of it.
+        Tours over some vertices of a travel graph, before their bound is extended to all vertices.
     """
 
     ALL_TOURS = "all_tours"
@@ -62,31 +62,31 @@ class Scope(StrEnum):
 
     @property
     def shortest(self) -> str:
-        """Noun phrase for the shortest of them, as in "1 % above the shortest tour"."""
+        """Noun phrase for the shortest tour of the scope, as in "1 % above the shortest tour"."""
         return "the shortest tour" + _TOURS[self].removeprefix("all tours").removeprefix("tours")
 
     @property
     def column(self) -> str:
-        """Short form for a column of a table."""
+        """Short name for a column of a table."""
         return _COLUMN[self]
 
     @property
     def in_order(self) -> Scope:
-        """Scope of those of its tours that visit the goals in the order given."""
+        """Scope of the tours of this scope that visit the goals in the order given."""
         return _of_limits(_LIMITS[self] | {"order"})
 
     @property
     def keeps_order(self) -> bool:
-        """Whether its tours visit the goals in the order given."""
+        """True if all tours of the scope visit the goals in the order given."""
         return "order" in _LIMITS[self]
 
     def includes(self, other: Scope) -> bool:
-        """Say whether every tour of another scope of the same problem is one of this scope.
+        """Return whether every tour of another scope of the same problem is in this scope.
 
         Parameters
         ----------
         other : Scope
-            The other one.
+            The other scope.
 
         Returns
         -------
@@ -105,11 +105,11 @@ _LIMITS: Mapping[Scope, frozenset[str]] = MappingProxyType({
     Scope.KEPT_IN_ORDER: frozenset({"kept", "order"}),
     Scope.ROADMAP_IN_ORDER: frozenset({"roadmap", "order"}),
     Scope.STATES_IN_ORDER: frozenset({"states", "order"}),
-    # a travel graph that was given has no world around it
+    # a travel graph without a world is no part of all tours of a world
     Scope.TRAVEL_GRAPH: frozenset({"graph"}),
     Scope.PART: frozenset({"part"}),
 })  # fmt: skip
-"""What limits each scope: fewer limits, more tours."""
+"""Restrictions of each scope. A scope with a subset of the restrictions of another includes it."""
 
 _TOURS: Mapping[Scope, str] = MappingProxyType({
     Scope.ALL_TOURS: "all tours",
@@ -147,16 +147,16 @@ def _of_limits(limits: frozenset[str]) -> Scope:
 
 @dataclass(frozen=True)
 class LowerBound:
-    """Proven lower bound, with the tours that it holds for.
+    """Proven lower bound on the length of tours, with the scope that it holds for.
 
     Parameters
     ----------
     length : float
-        No tour of the scope is shorter; in the problem's units.
+        The bound, in the problem's units.
     scope : Scope
-        Tours that it holds for.
+        Tours that the bound holds for.
     because : str
-        Reason why it holds there, if it was derived for another scope; no part of equality.
+        Reason why the bound holds for the scope, if it was derived for another; not compared.
 
     Raises
     ------
@@ -197,7 +197,7 @@ class LowerBound:
         return max(0.0, (length - self.length) / length) if length > 0.0 else 0.0
 
     def proves(self, length: float) -> bool:
-        """Say whether the bound proves a tour the shortest of its scope.
+        """Return whether the bound proves that a tour is the shortest of its scope.
 
         Parameters
         ----------
@@ -207,12 +207,12 @@ class LowerBound:
         Returns
         -------
         bool
-            True if bound and length differ by no more than rounding.
+            True if the gap is at most `OPTIMALITY_TOLERANCE`.
         """
         return length - self.length <= OPTIMALITY_TOLERANCE * max(length, 1e-300)
 
     def at_most(self, length: float) -> LowerBound:
-        """Return the bound, cut down to the length of a tour: rounding may lift it above.
+        """Return the bound, reduced to the length of a tour if rounding lifted it above.
 
         Parameters
         ----------
@@ -222,29 +222,29 @@ class LowerBound:
         Returns
         -------
         LowerBound
-            Of the same scope.
+            Bound of the same scope.
         """
         return LowerBound(min(self.length, length), self.scope, self.because)
 
     def for_part(self, scope: Scope, because: str) -> LowerBound:
-        """Return the bound as one on a part of its tours.
+        """Return the same bound for a smaller scope.
 
         Parameters
         ----------
         scope : Scope
-            The part.
+            Scope whose tours are all in the scope of this bound.
         because : str
-            Reason why those tours are among the tours of this bound.
+            Reason why these tours are in the scope of this bound.
 
         Returns
         -------
         LowerBound
-            Of the same length.
+            Bound of the same length.
 
         Raises
         ------
         ValueError
-            A scope with tours that this bound does not hold for; no reason.
+            The scope has tours that this bound does not hold for, or the reason is empty.
         """
         _check_reason(because)
         if not self.scope.includes(scope):
@@ -254,12 +254,12 @@ class LowerBound:
         return LowerBound(self.length, scope, because)
 
     def or_elsewhere(self, least: float, scope: Scope, because: str) -> LowerBound:
-        """Return a bound on a larger set of tours: those of this scope, and all others of it.
+        """Return a bound for a larger scope, given a bound on its other tours.
 
         Parameters
         ----------
         least : float
-            No tour of the larger scope that is not one of this bound's is shorter.
+            Lower bound on the tours of the larger scope that are not in the scope of this bound.
         scope : Scope
             The larger scope.
         because : str
@@ -268,18 +268,18 @@ class LowerBound:
         Returns
         -------
         LowerBound
-            The lesser of the two.
+            The smaller of both bounds, for the larger scope.
 
         Raises
         ------
         ValueError
-            No reason.
+            The reason is empty.
         """
         _check_reason(because)
         return LowerBound(min(self.length, max(least, 0.0)), scope, because)
 
     def above(self, length: float) -> str:
-        """Say how far above the shortest tour of the scope a tour may be.
+        """Return in words how far above the shortest tour of the scope a tour may be.
 
         Parameters
         ----------
@@ -297,14 +297,14 @@ class LowerBound:
         return f"at most {100.0 * gap / (1.0 - gap):.3g} % above {self.scope.shortest}"
 
     def says(self, length: float | None = None, units: str = "", digits: int = 6) -> str:
-        """Say the bound, and the gap of a tour.
+        """Return the bound and the gap of a tour in words.
 
         Parameters
         ----------
         length : float, optional
             Length of a tour.
         units : str
-            Of lengths.
+            Unit of lengths, such as "m".
         digits : int
             Significant digits of the bound.
 
@@ -324,7 +324,7 @@ class LowerBound:
         length : float
             Length of a tour.
         decimals : int
-            Decimals.
+            Number of decimals.
 
         Returns
         -------
@@ -342,7 +342,7 @@ def gap_of(length: float | None, bound: LowerBound | None) -> float | None:
     length : float, optional
         Length of a tour.
     bound : LowerBound, optional
-        Lower bound on tours of a scope that is named beside the gap.
+        Lower bound; name its scope wherever the gap is shown.
 
     Returns
     -------
@@ -358,12 +358,12 @@ def strongest(*bounds: LowerBound | None) -> LowerBound | None:
     Parameters
     ----------
     *bounds : LowerBound or None
-        Those of another scope are brought into the same one first (`LowerBound.for_part`).
+        Bounds of one scope; derive them for the same scope first (`LowerBound.for_part`).
 
     Returns
     -------
     LowerBound or None
-        None if there is none.
+        The largest bound; None if all are None.
 
     Raises
     ------
@@ -374,24 +374,27 @@ def strongest(*bounds: LowerBound | None) -> LowerBound | None:
     scopes = {b.scope for b in known}
     if len(scopes) > 1:
         names = " and ".join(sorted(s.tours for s in scopes))
-        raise ValueError(f"lower bounds: one on {names}; say first why each holds for the same")
+        raise ValueError(
+            f"lower bounds: one on {names}; say first why each holds for the same (for_part)"
+        )
     return max(known, key=lambda b: b.length, default=None)
 
 
 def above_shortest(length: float | None, bound: LowerBound | None) -> str:
-    """Say how far above the shortest tour of the bound's scope a tour may be.
+    """Return in words how far above the shortest tour of the bound's scope a tour may be.
 
     Parameters
     ----------
     length : float or None
         Length of a tour.
     bound : LowerBound or None
-        None where nothing is known.
+        Lower bound; None if nothing is known.
 
     Returns
     -------
     str
-        "no bound" where either is missing, or the bound is 0.
+        As in "at most 3.8 % above the shortest tour"; "no bound" if either is missing or the bound
+        is 0.
     """
     if length is None or bound is None or bound.length == 0.0 < length:
         return "no bound"
@@ -400,4 +403,4 @@ def above_shortest(length: float | None, bound: LowerBound | None) -> str:
 
 def _check_reason(because: str) -> None:
     if not because.strip():
-        raise ValueError("lower bound: a bound changes its scope for a reason; expected one")
+        raise ValueError("because: expected the reason why the bound holds for the scope, got none")

@@ -1,5 +1,5 @@
-"""Paths that somebody made, beside the planned tour of the same problem (McCammon & Hollinger 2017,
-Table II)."""
+"""Compare paths made by hand or recorded with the planned tour of the same problem (McCammon &
+Hollinger 2017, Table II)."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from netsp.solvers.solve import solve
 from netsp.travel.result import OnProgress
 
 ORDER_SHARE = 0.2
-"""Share of the time limit that each path's order may take beyond what the tour has left of it."""
+"""Least share of the time limit for each path's order, even if the tour has used all of it."""
 
 COLUMNS = (
     "path", "length", "longer_by", "longer_by_percent", "time_s", "time_from", "goals_visited",
@@ -37,21 +37,21 @@ COLUMNS = (
 
 @dataclass(frozen=True)
 class ComparedPath:
-    """One path beside the tour. Lengths are in the problem's units.
+    """Path with what it is compared with. Lengths are in the problem's units.
 
     Parameters
     ----------
     name : str
-        Of the path.
+        Name of the path.
     measures : PathMeasures
-        Its figures.
+        Figures of the path.
     order_length : float, optional
         Length of the shortest tour that visits the same goals in the order of their first visits;
         None if there is none.
     order_note : str
-        What `order_length` is, or why there is none.
+        Words for what `order_length` is, or why it is None.
     visited_length : float, optional
-        Length of the shortest tour of the goals that the path visits, where it does not visit all.
+        Length of the shortest tour found of the goals that the path visits, if it misses some.
     """
 
     name: str
@@ -63,20 +63,20 @@ class ComparedPath:
 
 @dataclass(frozen=True)
 class PathComparison:
-    """Paths beside the planned tour.
+    """Comparison of paths with the planned tour.
 
     Parameters
     ----------
     problem : Problem
-        Where they run.
+        The problem.
     paths : tuple of ComparedPath
-        In the order given.
+        Paths in the order given.
     tour : Solution, optional
         The planned tour; None if there is none.
     tour_note : str
-        Why there is none.
+        Reason why there is no planned tour.
     speed : float
-        Of the tour and of paths without time stamps, in the problem's units per second.
+        Speed of the tour and of paths without time stamps, in the problem's units per second.
     is_infeasible : bool
         Whether it is proven that there is no tour.
     """
@@ -90,7 +90,7 @@ class PathComparison:
 
     @property
     def proof(self) -> str:
-        """How short the tour is proven to be, in words."""
+        """Words for what is proven of the tour's length."""
         if self.tour is None:
             return self.tour_note
         status = self.tour.status
@@ -105,17 +105,17 @@ class PathComparison:
         return None if self.tour is None else self.tour.length
 
     def longer_by(self, length: float | None) -> float | None:
-        """Return by how much a length exceeds that of the tour; None if either is unknown."""
+        """Return the difference of a length and that of the tour; None if either is unknown."""
         tour = self.tour_length
         return None if length is None or tour is None else length - tour
 
     def percent(self, length: float | None) -> float | None:
-        """Return by how many percent a length exceeds that of the tour."""
+        """Return the difference of a length and that of the tour in percent of the tour's."""
         more, tour = self.longer_by(length), self.tour_length
         return None if more is None or not tour else 100.0 * more / tour
 
     def rows(self) -> list[dict[str, Any]]:
-        """Return a row of figures for the tour, and one for each path; columns as in `COLUMNS`."""
+        """Return a row for the tour and a row for each path, with the keys `COLUMNS`."""
         out = [] if self.tour is None else [self._tour_row(self.tour)]
         return out + [self._path_row(path) for path in self.paths]
 
@@ -155,7 +155,7 @@ class PathComparison:
         }  # fmt: skip
 
     def to_csv(self) -> str:
-        """Return the rows as a table: semicolons between the items of a list, truths 1 and 0."""
+        """Return the rows as CSV; lists are joined by semicolons, booleans are 1 and 0."""
         out = io.StringIO()
         table = csv.writer(out, lineterminator="\n")
         table.writerow(COLUMNS)
@@ -230,33 +230,33 @@ def compare_paths(
     on_progress: OnProgress | None = None,
     on_stage: Callable[[str], None] = lambda text: None,
 ) -> PathComparison:
-    """Measure paths, and set them beside the planned tour.
+    """Measure paths, and compare them with the planned tour.
 
     Parameters
     ----------
     problem : Problem
-        Where they run.
+        The problem.
     paths : sequence of FoundPath
-        As of `netsp.site.path_file.read_paths`.
+        Paths, as read by `netsp.site.path_file.read_paths`.
     solution : Solution, optional
-        The planned tour; solved on the spot if None.
+        The planned tour; solved here if None.
     speed : float
-        Of the tour and of paths without time stamps, in the problem's units per second.
+        Speed of the tour and of paths without time stamps, in the problem's units per second.
     policy : PathPolicy, optional
-        When a goal counts as visited.
+        Rules of when a goal counts as visited.
     time_limit : float, optional
-        Seconds for the tour; the orders of the paths come after it.
+        Seconds for the tour; the orders of the paths are solved after it.
     seed : int
-        Of the solver.
+        Random seed of the solver.
     on_progress : callable, optional
         Called with the progress of the tour's solver.
     on_stage : callable
-        Called with what is done next.
+        Called with the name of the next stage.
 
     Returns
     -------
     PathComparison
-        The paths in their order.
+        The comparison, with the paths in the order given.
 
     Raises
     ------
@@ -297,7 +297,7 @@ def compare_paths(
             note, is_infeasible = str(error), isinstance(error, InfeasibleError)
 
     def left() -> float | None:
-        """Return the seconds for one more solve: an order is brief, and has a share of its own."""
+        """Return the seconds for one more solve, at least the share `ORDER_SHARE`."""
         return None if time_limit is None else max(clock.left, ORDER_SHARE * time_limit)
 
     known: dict[tuple[int, ...], tuple[float | None, str]] = {}
@@ -314,7 +314,8 @@ def compare_paths(
 
 
 def _laid_tether(problem: Problem) -> Floats | None:
-    """Return how the tether lies where the problem says that the robot is out already."""
+    """Return the line of the tether out if the problem begins with the robot under way, else
+    None."""
     if problem.state is None:
         return None
     x, y, z = problem.state.position
@@ -325,7 +326,7 @@ def _laid_tether(problem: Problem) -> Floats | None:
 
 
 def _goals_in_order(problem: Problem, order: Sequence[int]) -> Problem:
-    """Return the problem with these goals only, in this order, free of what ties them together."""
+    """Return the problem with some goals in an order, without choices and precedences."""
     free: Mapping[str, Any] = {"after": (), "choice": None}
     goals: tuple[Goal, ...] = tuple(problem.goals[g].model_copy(update=free) for g in order)
     return problem.model_copy(update={"goals": goals})
@@ -339,16 +340,16 @@ def order_length(
     Parameters
     ----------
     problem : Problem
-        Of the goals.
+        Problem with the goals.
     order : sequence of int
-        Indices of some of its goals, none twice.
+        Indices of some of its goals, without repetition.
     time_limit : float, optional
-        Seconds.
+        Time limit, s.
 
     Returns
     -------
     (float or None, str)
-        The length in the problem's units, and what it is; None, and why there is none.
+        The length in the problem's units, and words for what it is; or None, and the reason.
     """
     if not order:
         return None, "no goal is visited"
@@ -372,7 +373,7 @@ def order_length(
 def _visited_length(
     problem: Problem, order: tuple[int, ...], *, time_limit: float | None, seed: int
 ) -> float | None:
-    """Return the length of the shortest tour of some of the goals that was found."""
+    """Return the length of the shortest tour found of some of the goals; None if none was found."""
     if problem.state is not None or len(problem.precedences):
         return None
     try:

@@ -1,4 +1,4 @@
-"""Studies of paths: which files are compared on which problem, and what others published."""
+"""Study files: paths to compare on a problem, with the lengths that others published."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from netsp.models import Model, explain
 
 
 class StudyPath(Model):
-    """A path of a study."""
+    """Path of a study."""
 
     file: Annotated[Name, Field(description="file with the path, relative to the study")]
     label: Annotated[Name, Field(description="in tables; the path's own name if empty")] = ""
@@ -25,7 +25,7 @@ class StudyPath(Model):
 
 
 class PathStudy(Model):
-    """Paths beside the planned tour of one problem."""
+    """Study of paths that are compared with the planned tour of one problem."""
 
     schema_version: Annotated[Literal[1], Field(description="of the file format")] = 1
     name: Annotated[Annotated[Name, Field(min_length=1)], Field(description="of the study")]
@@ -53,7 +53,7 @@ class PathStudy(Model):
         Parameters
         ----------
         path : str or Path
-            TOML.
+            TOML file.
 
         Returns
         -------
@@ -63,7 +63,7 @@ class PathStudy(Model):
         Raises
         ------
         InputError
-            Not such a file, in one line.
+            Not a study file; the message is one line.
         """
         text = read_text(path)
         try:
@@ -76,7 +76,7 @@ class PathStudy(Model):
             raise InputError(f"{path}: {explain(error)}") from None
 
     def published_percent(self, k: int) -> float | None:
-        """Return by how many percent the published path exceeds the published tour.
+        """Return the percentage by which the published path exceeds the published tour.
 
         Parameters
         ----------
@@ -86,7 +86,7 @@ class PathStudy(Model):
         Returns
         -------
         float or None
-            None if either length is not given.
+            Percentage; None if either length is not given.
         """
         published = self.paths[k].published
         if published is None or self.published_tour is None:

@@ -30,11 +30,11 @@ STAND_OFF_ALLOWANCE = 3e-8
 """As a share of the problem's size, what standing off from a boundary may add to a length."""
 
 MAX_GAP_ERROR = 1e-6
-"""Largest difference of a stated gap from that of the stated lengths; files round both."""
+"""Largest difference between a stated gap and the gap of the stated lengths; files round both."""
 
 MAX_CLOSED_GAP = 1e-5
-"""Largest gap of a tour that may be called the shortest: a path from the robot's state is proven to
-that share of its length."""
+"""Largest gap of a tour with an optimal status; tours from a robot's state are proven to this
+accuracy only."""
 
 LENGTH_TOLERANCE = 1e-3
 """How much longer than the stated length the drawn path may be (arcs are circumscribed)."""
@@ -130,26 +130,26 @@ def verify(problem: Problem, solution: Solution) -> Verification:
 
 
 def checked(problem: Problem, solution: Solution) -> Solution:
-    """Return a solution that passes the judge, to be written or handed on.
+    """Return a solution if it passes the judge, else raise.
 
-    Solutions without a tour pass, and so do those that say that they are invalid.
+    Solutions without a tour pass, as do solutions with the status `invalid`.
 
     Parameters
     ----------
     problem : Problem
-        What was to be solved.
+        The problem.
     solution : Solution
-        What was found.
+        Its solution.
 
     Returns
     -------
     Solution
-        The same.
+        The same solution.
 
     Raises
     ------
     VerificationError
-        A check fails.
+        The tour fails a check.
     """
     if solution.length is None or solution.status is Status.INVALID:
         return solution
@@ -166,7 +166,8 @@ TURNING_TOLERANCE = 1e-6
 """Radians; contacts with obstacles are found exactly."""
 
 AT_CONTACT = 8.0
-"""In tolerances: how far beyond a contact of two obstacles a path may reach and come back."""
+"""Distance, in place tolerances, by which a path may reach beyond a contact of two obstacles if it
+comes back."""
 
 
 class _Judge:
@@ -233,7 +234,7 @@ class _Judge:
         )
 
     def _is_finite(self) -> bool:
-        """Return whether all numbers are finite; copies of a model may hold others."""
+        """Return whether all numbers are finite; copies of a model are not validated."""
         s = self.solution
         numbers = [s.length, s.lower_bound, s.gap, *(v.tether_length for v in s.tour)]
         return bool(np.isfinite(self.path).all()) and all(
@@ -348,7 +349,7 @@ class _Judge:
         return Check(name, True, f"{len(self.path)} path points")
 
     def _run_through(self, stops: list[tuple[int, Floats]]) -> None:
-        """Put goals in place of the path vertices that are within the tolerance of them."""
+        """Replace each path vertex within the tolerance of its goal by the goal."""
         ends = {0, len(self.path) - 1, self.out}
         rows: list[Floats] = []
         waiting = deque(stops)
@@ -517,7 +518,7 @@ class _Judge:
     def _along(
         self, pieces: list[list[tuple[int, bool]]], known: dict[int, float], longest: str
     ) -> Check:
-        """Check that the tether, which fits at the goals, fits between them, too."""
+        """Check that the tether, which fits at the goals, also fits between them."""
         name, limit = "taut tether fits", self.problem.tether_length
         found = first_overstretch(
             self.puller, self.path, pieces, limit * (1.0 + 1e-9) + self.tiny, known,
@@ -530,13 +531,14 @@ class _Judge:
         return Check(name, False, f"{found.length:.6g} of {limit:g} on the way, at {at}")
 
     def _proud(self, point: Floats) -> float:
-        """Return how far a point of a path stands out from an arc that is drawn circumscribed.
+        """Return the distance of a point of a path from the arc around which it is circumscribed.
 
-        On the arc itself the tether fits, for it is part of a taut leg. The corner of a drawing
-        stands out from it, straight away from the disk, and the tether there is that much longer.
-        A drawing that is longer than its arc by the share `LENGTH_TOLERANCE` at most has corners
-        that stand out by 1.5 times that share of the radius at most: for the tangent of half an
-        arc's turn x is x (1 + x²/3 + …), and its secant 1 + x²/2 + ….
+        The tether fits on the arc itself, which is part of a taut leg. A corner of the
+        circumscribed polyline lies outside of the arc, straight away from the disk, and the tether
+        there is longer by that distance. The polyline is longer than its arc by the share
+        `LENGTH_TOLERANCE` at most. So its corners lie outside by at most 1.5 times that share of
+        the radius: for half the angle x between two contacts, tan x = x (1 + x²/3 + …) and sec x =
+        1 + x²/2 + ….
         """
         disks = self.puller.disks
         if not len(disks):
@@ -584,7 +586,7 @@ class _Judge:
         )
 
     def _fault_of_bound(self) -> str | None:
-        """Return what is wrong with what the solution says of its bound; None for nothing."""
+        """Return the fault in the bound, gap and status that the solution states; None if none."""
         s = self.solution
         length, gap, status = float(s.length or 0.0), s.gap, s.status
         if status in (Status.INFEASIBLE, Status.NO_SOLUTION_FOUND):

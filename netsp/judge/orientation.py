@@ -18,10 +18,10 @@ from netsp.arrays import Floats, Ints
 Point = tuple[float, float]
 
 ERROR_BOUND = (3.0 + 16.0 * 2.0**-53) * 2.0**-53
-"""Rounding error of the cross product, as a share of the sum of the sizes of its two products."""
+"""Largest rounding error of the cross product, relative to the sum of its two absolute products."""
 
 UNDERFLOW = 1e-280
-"""Sum of the two products below which they may have lost digits to underflow."""
+"""Sum of the two absolute products below which digits may be lost to underflow."""
 
 
 def orientation(a: Point, b: Point, c: Point) -> int:

@@ -1,8 +1,8 @@
-"""The taut tether as a robot carries it along a path: nowhere on the way may it be too long.
+"""Check that the taut tether of a robot keeps its limit everywhere along a path.
 
 Lemma. Let T(s) be the length of the taut tether at the point s of a path, in the class that the
-path gives it. Between two neighbouring vertices of the path T is nowhere longer than at the worse
-of the two. So T keeps a limit along the whole path when it keeps it at every vertex.
+path gives it. Between two neighbouring vertices of the path T is at most the larger of its values
+at the two. So T keeps a limit along the whole path if it keeps the limit at every vertex.
 
 Proof. A point of the cover is a position together with the class of the tether there, and T is the
 distance in the cover from the base with no tether out. In the plane the cover is CAT(0), and with
@@ -11,9 +11,9 @@ In a CAT(0) space the distance to a fixed point is convex along geodesics. A str
 free space lifts to a geodesic, so T is convex along it, and a convex function on an interval is
 largest at an end. ∎
 
-Not every vertex is pulled taut: T grows by no more than the way, so T at a vertex is at most T at
-the last place where it is known plus the way from there, and at most T at the next goal plus the
-way to it. Where the lesser of the two keeps the limit, so does T.
+Many vertices need no string pulling, because T changes by at most the distance travelled. T at a
+vertex is at most T at the last known vertex plus the distance from there, and at most T at the next
+goal plus the distance to it. If the smaller of the two keeps the limit, so does T.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ from netsp.judge.stringpull import StringPuller
 
 @dataclass(frozen=True)
 class Overstretch:
-    """The vertex of a path at which the tether exceeds its limit.
+    """Vertex of a path at which the tether exceeds its limit.
 
     Attributes
     ----------
     vertex
         Index in the path.
     length
-        Of the taut tether there.
+        Length of the taut tether there.
     """
 
     vertex: int
@@ -54,7 +54,7 @@ def first_overstretch(
 ) -> Overstretch | None:
     """Return the first vertex of a path at which the taut tether is too long, None if it fits.
 
-    A tether that is too long at the start may be so until it fits, but may not grow meanwhile.
+    A tether that is too long at the start may stay so until it fits, but may not grow meanwhile.
 
     Parameters
     ----------
@@ -67,11 +67,11 @@ def first_overstretch(
     limit
         Length of the tether.
     known
-        Tether at some vertices, the last one among them, none of them too long.
+        Tether length at some vertices, the last vertex included; none exceeds the limit.
     allowance
-        Called with a point (3,) of the path, returns what the tether may exceed the limit by.
+        Takes a point (3,) of the path and returns the allowed excess of the tether there.
     start
-        The vertex from which on the robot moves; what is before it is the tether out at the start.
+        Vertex at which the robot begins to move; the part before it is the tether out at the start.
     """
     steps: Floats = np.linalg.norm(np.diff(path, axis=0), axis=1)
     sleeve: list[tuple[int, bool]] = []
@@ -112,7 +112,7 @@ def _carry(sleeve: list[tuple[int, bool]], piece: list[tuple[int, bool]]) -> Non
 
 
 def _homeward(steps: Floats, known: dict[int, float]) -> Floats:
-    """Return for each vertex the tether at the next one where it is known, plus the way there."""
+    """Return for each vertex the tether length at the next known vertex plus the distance there."""
     out = np.full(len(steps) + 1, np.inf)
     for k in range(len(steps), -1, -1):
         if k in known:

@@ -12,10 +12,11 @@ from netsp.judge.solids import Bridge
 
 
 def passes(bridge: Bridge, path: Floats, reach: float) -> bool:
-    """Return whether a path comes from one side of a bridge and goes on at the other.
+    """Return whether a path passes a bridge from one side to the other.
 
     The path is cut where it crosses the bridge, and sides alternate from piece to piece. A piece
-    that stays at the contact does not count: it stands there, or is beyond by rounding.
+    that stays within `reach` of the contact is ignored: the robot stands there, or rounding put it
+    on the other side.
 
     Parameters
     ----------
@@ -24,7 +25,7 @@ def passes(bridge: Bridge, path: Floats, reach: float) -> bool:
     path
         Points (n, 2).
     reach
-        How far from the contact a piece stays there.
+        Distance from the contact within which a piece is ignored.
     """
     cuts = _cuts(bridge.line, path)
     if not cuts:

@@ -4,8 +4,8 @@ A path may touch an obstacle, and rounding may put it a hair inside. So what mus
 an *inset* obstacle: each circle's radius, and each corner of a polygon, is drawn in by the judge's
 tolerance, or by a fifth of the room that there is at that place, if that is less. A wall thinner
 than the tolerance keeps three fifths of its thickness, so nothing passes through it. Where two
-obstacles touch, their insets do not, and a *bridge* shuts the gap. A path may reach a place where
-obstacles touch, and stand there, but not come from one side of it and leave on the other.
+obstacles touch, their insets do not, and a *bridge* closes the gap. A path may reach the contact of
+two obstacles and stop there, but not pass from one side of it to the other.
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ PHASE = 0.2371
 
 
 TOUCHING = 2e-10
-"""Gap between two obstacles, as a share of the problem's size, up to which they touch: the free
-space of the theory is that among obstacles grown by half of it."""
+"""Largest gap between two obstacles that touch, as a share of the problem's size. The free space of
+the theory is that among obstacles grown by half of this gap."""
 
 Outline = tuple[shapely.Geometry, float]
-"""A polygon and 0, or the centre of a circle and its radius."""
+"""Polygon with radius 0, or centre of a circle with its radius."""
 
 
 @dataclass(frozen=True)
@@ -120,16 +120,16 @@ def _inward(v: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Bridge:
-    """A place where two obstacles touch, and the line between their insets that shuts it.
+    """Contact of two obstacles, and the line between their insets that closes it.
 
     Attributes
     ----------
     first, second
         Indices of the obstacles.
     contact
-        (2,) where they touch.
+        (2,) place where they touch.
     line
-        (k, 2) from inside the one inset, by way of the contact, to inside the other.
+        (k, 2) from inside one inset, through the contact, to inside the other.
     """
 
     first: int
@@ -139,22 +139,21 @@ class Bridge:
 
 
 def bridges(problem: Problem, insets: list[Inset], origin: Floats, place: float) -> list[Bridge]:
-    """Return the places where obstacles touch, grown by the clearance, but their insets do not.
+    """Return the contacts of obstacles that are grown by the clearance.
 
-    Two obstacles may touch in several places.
+    Two obstacles may touch in several places. Where the insets touch, too, no bridge is needed.
     """
     if len(insets) < 2:
         return []
     outlines = [_outline(o, origin) for o in problem.obstacles]
     shapes = np.array([o if isinstance(o, shapely.Polygon) else o.buffer(r) for o, r in outlines])
     reach = 2.0 * problem.clearance + TOUCHING * problem.scale + 2.0 * place
-    # the polygon of a circle stands back from it
+    # the polygon in place of a circle lies inside of it by this distance
     back = max(r for _, r in outlines) * (1.0 - np.cos(np.pi / 32.0))
     pairs = shapely.STRtree(shapes).query(shapes, predicate="dwithin", distance=reach + 2.0 * back)
 
     def _inside(i: int, point: Floats) -> Floats:
-        """Return a point of the inset, which the straight line from a point of the obstacle reaches
-        without leaving the obstacle."""
+        """Return a point of the inset that a straight line within the obstacle joins to `point`."""
         outline, radius = outlines[i]
         if radius:
             return np.asarray(shapely.get_coordinates(outline)[0])

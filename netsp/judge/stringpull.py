@@ -7,9 +7,9 @@ edges is found with the funnel algorithm (Lee & Preparata 1984; Chazelle 1982; H
 Snoeyink 1994). Its corners tell which disks the taut path touches, and with that its exact length
 (`netsp.judge.chain`).
 
-Degenerate positions are no exception here. Every side is decided by exact orientation
-(`netsp.judge.orientation`), and where a point of a path lies on the line of an edge, or a segment
-runs through the end of one, it is decided as if the whole path were moved by (-δ², δ) for an
+Degenerate positions need no special case. Every side is decided by exact orientation
+(`netsp.judge.orientation`). If a point of a path lies on the line of an edge, or a segment runs
+through the end of an edge, the side is that of the whole path moved by (-δ², δ) for an
 infinitesimal δ > 0 (Edelsbrunner & Mücke 1990, "Simulation of simplicity"). The moved path lies in
 general position, so its sequence of edges is a walk from triangle to triangle: the same for a
 segment and, reversed, for the segment run backwards. Start and end of a path lie in the closed
@@ -59,7 +59,7 @@ class StringPuller:
     place
         The judge's tolerance.
     path
-        Points (n, 2 or more) that the triangles must cover, too.
+        Points (n, 2 or more) that the triangles must also cover.
     """
 
     def __init__(
@@ -218,14 +218,20 @@ def _interior_edges(triangles: npt.NDArray[np.object_]) -> tuple[Floats, Ints]:
 
 
 def _left_of_edge(u: Floats, v: Floats, p: Floats) -> Bools:
-    """Return where p lies left of the edge from u to v. On its line it does: moved by (-δ², δ) it
-    lies left of any edge that runs to the right or, if neither way, up."""
+    """Return the mask of rows in which p lies left of the edge from u to v.
+
+    A point on the line of the edge counts as left: moved by (-δ², δ), it lies left of any edge that
+    runs to the right or, if vertical, up.
+    """
     return np.asarray(orientations(u, v, p) >= 0)
 
 
 def _left_of_segment(p: Floats, q: Floats, u: Floats) -> Bools:
-    """Return where u lies left of the segment from p to q. On its line it lies right of a segment
-    that runs to the right (or up), which moves to its left, and left of one that runs back."""
+    """Return the mask of rows in which u lies left of the segment from p to q.
+
+    A point on the line of the segment lies right of a segment that runs to the right (or up), which
+    moves to its left, and left of a segment in the opposite direction.
+    """
     onward = (p[:, 0] < q[:, 0]) | ((p[:, 0] == q[:, 0]) & (p[:, 1] < q[:, 1]))
     side = orientations(p, q, u)
     return np.asarray((side > 0) | ((side == 0) & ~onward))

@@ -1,10 +1,9 @@
-"""The taut tether that a robot carries along a path.
+"""Taut tether that a robot carries along a path.
 
-Between two points of a free path, straight lines lift to geodesics of the covering space, whose
-distance function is convex (docs/theory.md): the tether is nowhere longer than at the worse end of
-the segment. So its greatest length is that at one of the points. It changes between two points by
-no more than the path between them is long; points that cannot beat the longest found so far are
-left out.
+The straight segments of a free path lift to geodesics of the covering space, whose distance
+function is convex (docs/theory.md). So the tether is longest at one of the points of the path.
+Between two points its length changes by at most the length of the path between them, so points that
+cannot beat the longest tether found so far need no string pulling.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ class CarriedTether:
     Parameters
     ----------
     puller : StringPuller
-        Of the judge; it pulls each tether taut.
+        String puller of the judge.
     route : ndarray, shape (n, 3)
         The path.
 
@@ -42,7 +41,7 @@ class CarriedTether:
 
     def __init__(self, puller: StringPuller, route: Floats) -> None:
         self._puller, self._route = puller, route
-        # reduced sequences of crossed edges as a tree: its parent and last edge for each node
+        # tree of reduced sequences of crossed edges: each node has its parent and its last edge
         self._parent, self._edge = [-1], [(-1, False)]
         self._node = [0]
         for piece in puller.crossings(route[:, :2]):
@@ -53,7 +52,7 @@ class CarriedTether:
         self._known: dict[int, float] = {}
 
     def _after(self, node: int, edge: int, side: bool) -> int:
-        """Return the node after an edge is crossed; one crossed back at once cancels."""
+        """Return the node after crossing an edge; crossing back at once cancels."""
         if node and self._edge[node][0] == edge:
             return self._parent[node]
         self._parent.append(node)
@@ -69,7 +68,7 @@ class CarriedTether:
 
     @property
     def is_contractible(self) -> bool:
-        """Whether the path crosses every edge back again, so that it can be pulled to a point."""
+        """True if the path crosses every edge back again, so that it can be pulled to a point."""
         return self._node[-1] == 0
 
     def length(self, k: int) -> float:
@@ -97,7 +96,7 @@ class CarriedTether:
         k : int
             Index of the point.
         place : ndarray, shape (3,)
-            Where the robot goes from there, straight.
+            Place to which the robot goes straight from the point.
 
         Returns
         -------
@@ -116,14 +115,14 @@ class CarriedTether:
         return math.hypot(planar, float(place[2] - start[2]))
 
     def longest(self, error: float, first: int = 0) -> tuple[int, float]:
-        """Return where the tether is longest, and how long it is there.
+        """Return the point at which the tether is longest, and its length there.
 
         Parameters
         ----------
         error : float
-            By how much a point that is left out may exceed it.
+            Largest amount by which another point may exceed the returned length.
         first : int
-            Index of the first point that counts.
+            Index of the first point considered.
 
         Returns
         -------
@@ -155,12 +154,12 @@ class CarriedTether:
         return best, self.length(best)
 
     def profile(self, count: int) -> Floats:
-        """Return the tether along the path.
+        """Return the length of the tether along the path.
 
         Parameters
         ----------
         count : int
-            Places, evenly along the path in the plan.
+            Number of places, evenly along the path in the plan.
 
         Returns
         -------

@@ -1,12 +1,12 @@
-"""Lead a path round what it runs through, so that its homotopy class is defined.
+"""Lead a path round obstacles and bounds, so that its homotopy class is defined.
 
 A recorded or drawn path may cut a corner of an obstacle, come closer than the clearance or leave
-the bounds. Each such part is replaced by a part of the outline of free space between the same two
-ends. Of the two ways along the outline, the one that passes every obstacle on the side of the path
-is taken; where the path runs through the obstacle itself, the shorter one. The parts are reported.
+the bounds. Each such part is reported, and replaced by a part of the outline of free space with the
+same two ends. There are two such parts of the outline. The one that passes every other obstacle on
+the same side as the path is chosen; if both do, the shorter one.
 
-Free space is that of the judge (`netsp.judge.solids`): obstacles drawn in by its tolerance, so a
-path that only touches an obstacle stays as it is.
+Free space is that of the judge (`netsp.judge.solids`): obstacles shrink by its tolerance, so a path
+that only touches an obstacle stays as it is.
 """
 
 from __future__ import annotations
@@ -27,23 +27,24 @@ from netsp.judge.stringpull import StringPuller
 from netsp.problem import Circle, Polygon
 
 INSET_SHARE = 0.25
-"""Share of the judge's inset by which an obstacle is grown back: a path led along its outline then
-clears the judge's obstacles, and a path along the true outline is not touched."""
+"""Growth of the judge's shrunk obstacles, as a share of the distance by which they shrank. It lies
+between 0 and 1, so that a path along the outline clears the judge's obstacles, and a path along the
+true outline stays as it is."""
 
 SAME_PLACE = 1e-9
-"""Two places on a path, as shares of a segment, that count as one."""
+"""Largest distance between two places on a path that count as one, in segments."""
 
 DEPTH_SAMPLES = 64
-"""Places on a part of a path at which its depth in an obstacle is measured, besides its corners."""
+"""Number of places, besides corners, at which the depth of a part in an obstacle is measured."""
 
 BOX_SHARE = 1.5
-"""Room around everything where there are no bounds, in reaches; the judge triangulates twice the
-reach."""
+"""Margin of the box around all points and obstacles if there are no bounds, in reaches of the path.
+At most 2, because the judge triangulates that far."""
 
 
 @dataclass(frozen=True)
 class Stretch:
-    """A part of a path that no robot should go.
+    """Part of a path in an obstacle, within its clearance, or out of bounds.
 
     Parameters
     ----------
@@ -54,9 +55,9 @@ class Stretch:
     start, end : float
         Lengths along the path, in the plan.
     depth : float
-        How far it reaches in, in the problem's units.
+        Greatest depth of the part, in the problem's units.
     place : (float, float)
-        Where it begins.
+        Place at which the part begins.
     """
 
     kind: str
@@ -69,16 +70,16 @@ class Stretch:
 
 @dataclass(frozen=True)
 class Route:
-    """A path that has been led round everything.
+    """Path that has been led round all obstacles.
 
     Parameters
     ----------
     xy : ndarray, shape (n, 2)
-        Its points, in the problem's frame.
+        Points of the route, in the problem's frame.
     along : ndarray, shape (n,)
-        Length along the path as it was given, at each of them.
+        Length along the given path at each point.
     shut_in : float
-        Length from which on no free way leads to the path; infinite if there is one throughout.
+        Length along the given path from which on it cannot be reached; infinite if all of it can.
     """
 
     xy: Floats
@@ -92,9 +93,9 @@ class FreeSpace:
     Parameters
     ----------
     puller : StringPuller
-        Of the judge.
+        String puller of the judge.
     reach : float
-        How far from the base paths go.
+        Greatest distance of the path from the base.
     """
 
     def __init__(self, puller: StringPuller, reach: float) -> None:
@@ -127,19 +128,19 @@ class FreeSpace:
         return bool(shapely.covers(self.shape, shapely.LineString([a, b] - self.origin)))
 
     def route(self, xy: Floats, along: Floats) -> Route:
-        """Lead a path round everything.
+        """Lead a path round all obstacles.
 
         Parameters
         ----------
         xy : ndarray, shape (n, 2)
-            The path; consecutive points differ.
+            Points of the path; consecutive points differ.
         along : ndarray, shape (n,)
-            Length along it.
+            Length along the path at each point.
 
         Returns
         -------
         Route
-            The same path with every part outside of free space replaced.
+            The path with every part outside of free space replaced.
         """
         line = xy - self.origin
         shut_in = np.inf
@@ -181,8 +182,8 @@ class FreeSpace:
         return _merged(parts)
 
     def _round(self, part: Floats) -> Floats | None:
-        """Return the way along the outline that takes the place of a part; None if there is
-        none."""
+        """Return the part of the outline that replaces a part of the path; None if its ends lie on
+        different outlines."""
         ends = [shapely.Point(p) for p in part[[0, -1]]]
         near = [[ring.distance(p) for ring in self._rings] for p in ends]
         which = [int(np.argmin(d)) for d in near]
@@ -197,7 +198,8 @@ class FreeSpace:
         rays = self.problem.representative_points[others].reshape(-1, 2) - self.origin
 
         def rank(way: Floats) -> tuple[int, int, float, float]:
-            """Order ways; a path and its reverse take the same one, also of two equal ones."""
+            """Return a key to compare both parts of the outline; a path and its reverse get the
+            same part, even if both are as long."""
             turns = winding_numbers(np.vstack([part, way[::-1], part[:1]]), rays)
             middle = shapely.LineString(way).centroid
             return (
@@ -216,19 +218,19 @@ class FreeSpace:
         ]  # fmt: skip
 
     def stretches(self, xy: Floats, along: Floats) -> tuple[Stretch, ...]:
-        """List the parts of a path in obstacles, within their clearance and out of bounds.
+        """Return the parts of a path in obstacles, within their clearance and out of bounds.
 
         Parameters
         ----------
         xy : ndarray, shape (n, 2)
             The path.
         along : ndarray, shape (n,)
-            Length along it.
+            Length along the path at each point.
 
         Returns
         -------
         tuple of Stretch
-            In their order along the path; nothing shallower than the judge's tolerance.
+            Parts deeper than the judge's tolerance, in their order along the path.
         """
         if len(xy) < 2:
             return ()
@@ -286,7 +288,7 @@ class FreeSpace:
         return out
 
     def _between_touching(self, xy: Floats, along: Floats) -> list[Stretch]:
-        """Return the places where a path slips between obstacles that touch."""
+        """Return the places where a path runs between obstacles that touch."""
         out = []
         path = xy - self.origin
         line = shapely.LineString(path)
@@ -341,7 +343,7 @@ def _part(line: Floats, start: float, end: float) -> Floats:
 
 
 def _along_ring(ring: shapely.LinearRing, a: float, b: float) -> Floats:
-    """Return a closed line from one length along it forward to another."""
+    """Return the part of a closed line between two lengths along it, forward."""
     corners = shapely.get_coordinates(ring)
     s = polylines.along(corners)
     ends = [shapely.get_coordinates(ring.interpolate(v)) for v in (a, b)]
@@ -353,7 +355,7 @@ def _along_ring(ring: shapely.LinearRing, a: float, b: float) -> Floats:
 
 
 def _depth(part: Floats, obstacle: Circle | Polygon) -> float:
-    """Return how far inside an obstacle a part of a path gets."""
+    """Return the greatest depth of a part of a path in an obstacle."""
     every = polylines.points_along(part, max(polylines.length(part) / DEPTH_SAMPLES, 1e-300))
     return float(-np.min(obstacle.signed_distance(np.vstack([part, every]))))
 

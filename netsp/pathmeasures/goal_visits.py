@@ -1,4 +1,4 @@
-"""Find which goals a path visits, in which order, and which it comes back to."""
+"""Find the visits of a path to goals, in their order."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from netsp.arrays import Floats
 
 @dataclass(frozen=True)
 class Passing:
-    """One time that a path comes to a goal.
+    """Passing of a path within the radius of a goal.
 
     Parameters
     ----------
     goal : int
         Index of the goal.
     place : float
-        Where the path is nearest to it, in segments from its beginning.
+        Place at which the path is nearest to the goal, in segments from its beginning.
     miss : float
-        How far from the goal it is there.
+        Distance from the goal at that place.
     """
 
     goal: int
@@ -29,7 +29,7 @@ class Passing:
 
 
 def passings(path: Floats, goals: Floats, radius: float, leave: float) -> list[Passing]:
-    """List the times that a path comes within a radius of goals.
+    """Return the passings of a path within a radius of goals.
 
     Parameters
     ----------
@@ -40,12 +40,12 @@ def passings(path: Floats, goals: Floats, radius: float, leave: float) -> list[P
     radius : float
         Distance at which a goal counts as visited.
     leave : float
-        Distance that the path has to get away before it can come back.
+        Distance to which the path must leave a goal before another passing counts.
 
     Returns
     -------
     list of Passing
-        In their order along the path.
+        Passings in their order along the path.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Measure a path in the plane of a problem, whoever made it: length, time, goals, tether, word.
+"""Measure a path in the plane of a problem: length, time, goals, tether and word.
 
 One function computes the figures that `netsp compare-path`, `netsp verify --measures` and the map
 show.
@@ -25,12 +25,13 @@ from netsp.pathmeasures.goal_visits import Passing, passings
 from netsp.problem import Problem
 
 SPEED = 0.5
-"""Speed of a path without time stamps, in the problem's units per second, as of `netsp execute`."""
+"""Default speed of a path without time stamps, in the problem's units per second; the default of
+`netsp execute`, too."""
 
 
 @dataclass(frozen=True)
 class PathPolicy:
-    """When a goal counts as visited, and how exactly tethers are measured.
+    """Rules of when a goal counts as visited, and the accuracy of tether lengths.
 
     Parameters
     ----------
@@ -40,10 +41,10 @@ class PathPolicy:
     radius_share : float
         Default radius as a share of the problem's size.
     leave_ratio : float
-        Radii that a path must get away from a goal before it can visit it again; above 1, so that
-        noise of the positions makes no visits.
+        Distance to which a path must leave a goal before it can visit it again, in radii; above 1,
+        so that noise of the positions makes no visits.
     tether_error : float
-        Share of the tether's length by which the longest tether may be missed between two points.
+        Largest error of the longest tether along the path, as a share of the problem's tether.
     """
 
     radius: float | None = None
@@ -64,7 +65,7 @@ class PathPolicy:
         Parameters
         ----------
         problem : Problem
-            Its size counts where no radius is given.
+            The problem; its size gives the default radius.
 
         Returns
         -------
@@ -78,24 +79,25 @@ class PathPolicy:
 
 @dataclass(frozen=True)
 class GoalVisit:
-    """One time that a path comes to a goal.
+    """Visit of a path to a goal.
 
     Parameters
     ----------
     goal : int
         Index of the goal.
     is_first : bool
-        Whether the path has not been there, nor at an alternative of it, before.
+        Whether this is the first visit to the goal or to one of its alternatives.
     along : float
-        Length of the path up to there.
+        Length of the path up to the visit.
     time_s : float
-        Seconds since it began.
+        Seconds from the beginning of the path to the visit.
     miss : float
-        Distance from the goal.
+        Distance of the path from the goal.
     tether : float, optional
-        Taut tether at the goal, in 3D; None where no free way leads along the path.
+        Length of the taut tether at the goal, in 3D; None if no free path follows the path up to
+        the goal.
     word : Word
-        Word of the tether there.
+        Word of the tether at the goal.
     """
 
     goal: int
@@ -114,51 +116,52 @@ class PathMeasures:
     Parameters
     ----------
     problem : Problem
-        Where it runs.
+        Problem in whose plane the path runs.
     length : float
-        In 3D.
+        Length in 3D.
     duration_s : float
-        Seconds.
+        Duration, s.
     is_timed : bool
-        Whether the seconds are those of time stamps; else those of `speed`.
+        Whether the duration comes from time stamps; else it comes from `speed`.
     speed : float
-        Mean speed, or the speed that was given.
+        Mean speed, or the given speed of a path without time stamps.
     has_heights : bool
-        Whether the heights are the path's own; else they rise evenly between the goals it visits.
+        Whether the path was given with heights; else heights rise evenly between visited goals.
     radius : float
         Distance at which a goal counts as visited.
     visits : tuple of GoalVisit
-        In their order along the path.
+        Visits in their order along the path.
     start_gap, end_gap : float
         Distance from the base, or from the end of the tether that was laid, at the beginning, and
         from the base at the end.
     is_closed : bool
-        Whether both are within the radius.
+        Whether both gaps are within the radius.
     longest_tether : float, optional
-        Greatest length of the taut tether of the class that is carried along, at any place of the
-        path; None where no free way leads along the path.
+        Greatest length of the taut tether anywhere along the path, in the class that the path gives
+        it; None if no free path follows the path to its end.
     longest_at : float
-        Length along the path where it is that long.
+        Length along the path at which the tether is longest.
     longest_place : (float, float)
-        That place.
+        Place at which the tether is longest.
     end_tether : float, optional
-        Taut tether at the end.
+        Length of the taut tether at the end.
     end_word : Word
         Word of the tether at the end.
     word : Word
         Word of the path, closed by the straight line to the base.
     entangled : tuple of int
-        Obstacles that the path is wrapped around, so closed.
+        Obstacles that the closed path is wrapped around.
     stretches : tuple of Stretch
-        Parts that run through obstacles, within their clearance, or out of bounds.
+        Parts of the path in obstacles, within their clearance, or out of bounds.
     route : ndarray, shape (n, 3)
-        The path led round these, from the base and back to it, as words and tethers have it.
+        The path led round these parts, from the base and back; words and tethers are measured
+        along it.
     route_end : int
         Index of the point of `route` at which the path ends.
     route_lengths : ndarray, shape (route_end + 1,)
         Length along the path at the points of `route`.
     points : ndarray, shape (k, 3)
-        The path.
+        The path with heights.
     carried : CarriedTether
         Tethers at the points of `route` up to the end of the path.
     """
@@ -195,7 +198,7 @@ class PathMeasures:
 
     @property
     def revisits(self) -> dict[int, int]:
-        """How often the path comes back to each goal that it comes back to."""
+        """Number of further visits to each goal that is visited more than once."""
         out: dict[int, int] = {}
         for v in self.visits:
             if not v.is_first:
@@ -204,36 +207,36 @@ class PathMeasures:
 
     @cached_property
     def missing(self) -> tuple[int, ...]:
-        """Goals that the path does not visit, nor an alternative of them."""
-        own = self.problem.clusters
-        seen = {int(own[v.goal]) for v in self.visits}
-        return tuple(g for g in range(len(self.problem.goals)) if int(own[g]) not in seen)
+        """Goals that the path misses, and whose alternatives it misses, too."""
+        cluster = self.problem.clusters
+        seen = {int(cluster[v.goal]) for v in self.visits}
+        return tuple(g for g in range(len(self.problem.goals)) if int(cluster[g]) not in seen)
 
     @property
     def is_free(self) -> bool:
-        """Whether the path comes home, and its tether with it."""
+        """True if the path comes home and its tether is free there."""
         return self.is_closed and not self.word and self.longest_tether is not None
 
     @property
     def fits(self) -> bool:
-        """Whether the tether is long enough everywhere."""
+        """True if the tether is long enough everywhere along the path."""
         if self.longest_tether is None:
             return False
         limit = self.problem.tether_length
         return self.longest_tether <= limit * (1.0 + 1e-7) + 1e-9 * self.problem.scale
 
     def tether_profile(self, count: int = 200) -> Floats:
-        """Return the tether along the path.
+        """Return the length of the tether along the path.
 
         Parameters
         ----------
         count : int
-            Places, evenly along the route in the plan.
+            Number of places, evenly along the route in the plan.
 
         Returns
         -------
         ndarray, shape (count, 2)
-            Length along the path, and taut tether; no rows where the tether is unknown.
+            Length along the path, and length of the taut tether; no rows if the tether is unknown.
         """
         if self.longest_tether is None:
             return np.zeros((0, 2))
@@ -244,7 +247,7 @@ class PathMeasures:
 
     @property
     def is_inside(self) -> bool:
-        """Whether the path runs through no obstacle and within the bounds."""
+        """True if the path avoids all obstacles and stays within the bounds."""
         return all(s.kind == "clearance" for s in self.stretches)
 
 
@@ -259,36 +262,37 @@ def measure_path(
 ) -> PathMeasures:
     """Measure a path among a problem's obstacles.
 
-    A part through an obstacle, within its clearance or out of bounds is named, and led round for
-    words and tethers (`netsp.pathmeasures.free_route`). A path that begins away from the base has
-    its tether laid straight to there; one that ends away from it is closed by a straight line for
-    `word` and `entangled`.
+    Parts in an obstacle, within its clearance or out of bounds are reported; for words and tethers
+    they are replaced by a free path round the obstacle (`netsp.pathmeasures.free_route`). If the
+    path begins away from the base, its tether lies straight from the base to the beginning. If it
+    ends away from the base, a straight line closes it for `word` and `entangled`.
 
     Parameters
     ----------
     problem : Problem
-        Base, goals, obstacles, bounds and tether count.
+        Problem with base, goals, obstacles, bounds and tether.
     path : array_like, shape (n, 2) or (n, 3)
-        The path. Without heights it takes those of the goals that it visits, rising evenly between
-        them, as the legs of a tour do.
+        The path. Without heights, its heights rise evenly between those of the visited goals, as
+        along the legs of a tour.
     times : array_like, shape (n,), optional
-        Seconds at its points, never falling.
+        Time stamps of the points, s, in ascending order.
     speed : float
-        For a path without times, in the problem's units per second.
+        Speed of a path without time stamps, in the problem's units per second.
     policy : PathPolicy, optional
-        When a goal counts as visited.
+        Rules of when a goal counts as visited.
     tether : array_like, shape (k, 2) or (k, 3), optional
-        How the tether lies at the beginning, from the base on; by default straight.
+        Line of the tether at the beginning, from the base on; by default straight.
 
     Returns
     -------
     PathMeasures
-        Its figures.
+        Figures of the path.
 
     Raises
     ------
     InputError
-        No path of two finite points or more; times that fall, or are not as many.
+        Fewer than two points, or points that are not finite; times in descending order, or another
+        number of times than points.
 
     Examples
     --------
@@ -329,17 +333,17 @@ def measure_path(
     route = led.lifted(heights)
     carried = CarriedTether(led.puller, route[: led.last + 1])
     place = np.arange(len(given))
-    own, before, visits = problem.clusters, set[int](), []
+    cluster, before, visits = problem.clusters, set[int](), []
     for p in seen:
         k, goal = led.index(p.place), goals[p.goal]
         visits.append(GoalVisit(
-            goal=p.goal, is_first=int(own[p.goal]) not in before,
+            goal=p.goal, is_first=int(cluster[p.goal]) not in before,
             along=float(np.interp(p.place, place, travelled)),
             time_s=float(np.interp(p.place, place, seconds)), miss=p.miss,
             tether=carried.length_to(k, goal) if led.is_reached(k) else None,
             word=led.word(k, goal),
         ))  # fmt: skip
-        before.add(int(own[p.goal]))
+        before.add(int(cluster[p.goal]))
     is_reached = led.is_reached(led.last)
     error = policy.tether_error * problem.tether_length
     at, longest = carried.longest(error, led.first) if is_reached else (led.first, 0.0)
@@ -356,16 +360,16 @@ def measure_path(
         entangled=tuple(k - 1 for k in entangled(word)),
         stretches=led.space.stretches(given[:, :2], led.flat), route=route, route_end=led.last,
         route_lengths=np.interp(led.route.along[: led.last + 1], led.flat, travelled),
-        points=points,        carried=carried,
+        points=points, carried=carried,
     )  # fmt: skip
 
 
 class _Led:
-    """A path with its tether at the beginning and the straight line home at its end, led round
-    everything.
+    """Route of a path: the tether at the beginning, the path, and the straight line home, led round
+    all obstacles.
 
-    Places on the path are in segments from its beginning; lengths along it in the plan, negative
-    on the tether at the beginning and beyond the path's length on the line home.
+    Places on the path are counted in segments from its beginning. Lengths along the path are in the
+    plan; they are negative on the tether, and exceed the path's length on the line home.
     """
 
     def __init__(
@@ -399,7 +403,7 @@ class _Led:
         self._letters = [letter for step in steps for letter in step]
 
     def index(self, place: float) -> int:
-        """Return the point of the route that stands for a place on the path."""
+        """Return the index of the point of the route for a place on the path."""
         s = float(np.interp(place, self._place, self.flat))
         return int(np.argmin(np.abs(self.route.along - s)))
 
@@ -408,7 +412,7 @@ class _Led:
         return self.space.sees(self.route.xy[self.index(passing.place)], goal[:2])
 
     def is_reached(self, k: int) -> bool:
-        """Return whether a free way leads along the path to a point of the route."""
+        """Return whether a free path follows the path to a point of the route."""
         return bool(self.route.along[k] <= self.route.shut_in)
 
     def word(self, k: int, place: Floats | None = None) -> Word:

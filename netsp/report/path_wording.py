@@ -1,4 +1,4 @@
-"""Figures of paths in words, as the command line and the page tell them."""
+"""Words for the figures of paths, as the command line and the page show them."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from netsp.pathmeasures import PathMeasures
 from netsp.pathmeasures.free_route import Stretch
 from netsp.problem import Problem
 
-LEAST_PERCENT = 0.005
-"""Difference of two lengths, in percent, below which they count as the same: arcs of drawn tours
-are circumscribed."""
+MIN_PERCENT = 0.005
+"""Smallest difference of two lengths that is shown, in percent. Smaller ones come from drawing:
+arcs of drawn tours are circumscribed."""
 
 
 def path_rows(m: PathMeasures) -> list[tuple[str, str]]:
-    """Return the figures of a path, by what they are called.
+    """Return the figures of a path with their names.
 
     Parameters
     ----------
     m : PathMeasures
-        The figures.
+        Figures of the path.
 
     Returns
     -------
@@ -67,7 +67,7 @@ def _time(m: PathMeasures) -> str:
 def _longest(m: PathMeasures) -> str:
     limit, u = m.problem.tether_length, m.problem.units
     if m.longest_tether is None:
-        return "unknown: the path leads to a place that is shut in"
+        return "unknown: obstacles enclose a part of the path"
     x, y = m.longest_place
     over = "" if m.fits else f", {m.longest_tether - limit:.4g} {u} too long"
     return (
@@ -92,7 +92,7 @@ def _home(m: PathMeasures) -> str:
 
 
 def _stretches(problem: Problem, found: list[Stretch]) -> str:
-    """Return in words where a path runs that no robot should."""
+    """Return in words where a path is in obstacles, within their clearance, or out of bounds."""
     u, out = problem.units, []
     for key in dict.fromkeys(s.obstacles for s in found):
         own = [s for s in found if s.obstacles == key]
@@ -122,18 +122,18 @@ def _entangled(problem: Problem, m: PathMeasures) -> str:
 
 
 def beside_tour(found: PathComparison, length: float | None) -> str:
-    """Return in words how much longer a path is than the tour."""
+    """Return in words how much longer than the tour a path is."""
     more, percent = found.longer_by(length), found.percent(length)
     if more is None or percent is None:
         return "no tour to compare with"
-    if abs(percent) < LEAST_PERCENT:
+    if abs(percent) < MIN_PERCENT:
         return "as long"
     word = "longer" if more >= 0.0 else "shorter"
     return f"{abs(more):.4g} {found.problem.units} ({abs(percent):.3g} %) {word}"
 
 
 def order_in_words(found: PathComparison, path: ComparedPath) -> str:
-    """Return in words what the order of a path is worth with the best classes."""
+    """Return in words how long the shortest tour in the order of a path is."""
     if path.order_length is None:
         return path.order_note
     return (
@@ -143,14 +143,14 @@ def order_in_words(found: PathComparison, path: ComparedPath) -> str:
 
 
 def figures_of(found: PathComparison, path: ComparedPath) -> list[tuple[str, str]]:
-    """Return the figures of a path as text, with those beside the tour.
+    """Return the figures of a path and its comparison with the tour as text.
 
     Parameters
     ----------
     found : PathComparison
         The comparison.
     path : ComparedPath
-        One of its paths.
+        A path of the comparison.
 
     Returns
     -------
