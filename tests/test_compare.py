@@ -86,7 +86,7 @@ def here(trials):
 
 def without_clock(rows):
     """Rows by trial, without what differs between two runs."""
-    clock = {"roadmap_s", "matrix_s", "solve_s", "total_s", "history", "finished"}
+    clock = {"roadmap_s", "matrix_s", "solve_s", "total_s", "cpu_s", "history", "finished"}
     return {r["trial"]: {k: v for k, v in r.items() if k not in clock} for r in rows}
 
 

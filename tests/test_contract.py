@@ -37,10 +37,14 @@ def graph(roadmap):
     return travel_graph(world(), roadmap, **({"seed": SEED} if roadmap == "prm" else {}))
 
 
+PROVEN = {"taut": Status.OPTIMAL, "prm": Status.OPTIMAL_OF_ROADMAP}
+"""Status of a shortest tour, by roadmap: a sampled one holds not all tours."""
+
+
 @functools.cache
 def optimum(roadmap):
     result = solve_graph(graph(roadmap), "mip")
-    assert result.status is Status.OPTIMAL
+    assert result.status is PROVEN[roadmap]
     return result
 
 
@@ -216,7 +220,7 @@ def test_one_goal_and_two_goal_problems(solver, roadmap, goals):
     solution = solve(p, solver, roadmap=roadmap, iteration_limit=ITERATIONS.get(solver))
     assert verify(p, solution) or (solver in BLIND and solution.status is Status.INVALID)
     if goals < 2:
-        assert solution.status is Status.OPTIMAL
+        assert solution.status is PROVEN[roadmap]
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
