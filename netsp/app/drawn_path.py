@@ -1,4 +1,4 @@
-"""A path that is drawn by hand on the map: its figures while it grows, and as a file."""
+"""Path drawn by hand on the map: its figures while it grows, and its file."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from netsp.roadmap.tethers import Tethers
 from netsp.site.path_file import path_to_geojson
 
 MAX_POINTS = 5000
-"""Points of a drawn path that the server takes: a message of them has 0.2 MB."""
+"""Largest number of points of a drawn path; a message with so many has 0.2 MB."""
 
 ORDER_LIMIT_S = 20.0
-"""Seconds in which the shortest tour of a drawn order is sought."""
+"""Time limit for the shortest tour in a drawn order, s."""
 
 
 def drawn_points(value: object) -> list[list[float]]:
@@ -29,12 +29,12 @@ def drawn_points(value: object) -> list[list[float]]:
     Parameters
     ----------
     value : object
-        Of a message.
+        Value of a message.
 
     Returns
     -------
     list of [x, y]
-        Finite numbers.
+        Points with finite coordinates.
 
     Raises
     ------
@@ -57,14 +57,14 @@ def drawn_figures(problem: Problem, points: list[list[float]]) -> dict[str, Any]
     Parameters
     ----------
     problem : Problem
-        Where it is drawn.
+        Problem on the map.
     points : list of [x, y]
-        As of `drawn_points`.
+        Points from `drawn_points`.
 
     Returns
     -------
     dict or None
-        Figures as of `netsp compare-path`; None for fewer than two points that differ.
+        Figures, as of `netsp compare-path`; None for fewer than two distinct points.
     """
     line = np.array(points, dtype=float).reshape(-1, 2)
     if len(np.unique(line, axis=0)) < 2:
@@ -90,21 +90,21 @@ def drawn_figures(problem: Problem, points: list[list[float]]) -> dict[str, Any]
 def end_tether(
     tethers: Tethers, points: list[list[float]], figures: dict[str, Any]
 ) -> list[list[float]]:
-    """Return the taut tether at the end of a path, to be drawn.
+    """Return the line of the taut tether at the end of a path.
 
     Parameters
     ----------
     tethers : Tethers
-        Of the problem.
+        Tethers of the problem.
     points : list of [x, y]
         The path.
     figures : dict
-        As of `drawn_figures`.
+        Figures from `drawn_figures`.
 
     Returns
     -------
     list of [x, y]
-        Empty where it is longer than the tether or ends in an obstacle.
+        Points of the line; empty if it is longer than the tether or ends in an obstacle.
     """
     x, y = points[-1]
     found = tethers.to(x, y, tuple(figures["end_word"]), figures["end_z"])
@@ -117,19 +117,19 @@ def worth_of_order(problem: Problem, value: object) -> dict[str, Any]:
     Parameters
     ----------
     problem : Problem
-        Of the goals.
+        Problem with the goals.
     value : object
-        Of a message: indices of goals, none twice.
+        Value of a message: indices of goals, without repetition.
 
     Returns
     -------
     dict
-        ``order``, its ``length`` (None if there is no tour), and a ``note``.
+        ``order``, ``length`` (None if there is no tour), and ``note`` in words.
 
     Raises
     ------
     InputError
-        Not such indices.
+        The value is no such list.
     """
     good = isinstance(value, list) and len(set(map(str, value))) == len(value)
     if not isinstance(value, list) or not good or not all(
@@ -146,19 +146,19 @@ def drawn_file(problem: Problem, points: list[list[float]]) -> str:
     Parameters
     ----------
     problem : Problem
-        Where it is drawn.
+        Problem on the map.
     points : list of [x, y]
         The path.
 
     Returns
     -------
     str
-        Text of the file, with the heights that its figures are for.
+        Text of the file, with the heights for which its figures are computed.
 
     Raises
     ------
     InputError
-        Fewer than two points that differ.
+        Fewer than two distinct points.
     """
     line: Floats = np.array(points, dtype=float).reshape(-1, 2)
     if len(np.unique(line, axis=0)) < 2:

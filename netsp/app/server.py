@@ -42,10 +42,10 @@ MOST_BYTES = 4 * 2**20
 """Of one message."""
 
 MAX_PAGE_NAME = 40
-"""Letters by which a page calls itself when it has drawn."""
+"""Largest number of letters of the name by which a page signs its drawings."""
 
 MAX_MESSAGE_ID = 2**53 - 1
-"""Largest number of a message: JavaScript's largest whole number that is exact."""
+"""Largest id of a message, the largest whole number that JavaScript holds exactly."""
 
 POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; "
@@ -132,7 +132,7 @@ class Session:
         return None if answer is None and number is None else {"id": number, **(answer or {})}
 
     def do(self, message: Mapping[str, Any]) -> dict[str, Any] | None:
-        """Do what a message asks for.
+        """Carry out a message.
 
         Parameters
         ----------
@@ -143,12 +143,12 @@ class Session:
         Returns
         -------
         dict or None
-            The answer to whoever asks; None where the pages are told instead.
+            Answer to the sender; None if all pages get the result instead.
 
         Raises
         ------
         InputError
-            Not such a message, or its value is wrong; nothing is changed.
+            Unknown message or wrong value; nothing is changed.
         """
         document = self.document
         if self.shown is not None and any(k in message for k in ("edit", "undo", "redo", "save")):
@@ -191,14 +191,14 @@ class Session:
         return self.document.problem() if self.shown is None else self.shown.problem()
 
     def _figures_of_drawn(self, message: Mapping[str, Any]) -> dict[str, Any] | None:
-        """Keep the path that is drawn, and measure it: as it would be at the cursor, if that is
-        given."""
+        """Keep the drawn path and measure it; with a cursor, measure the path up to the cursor and
+        keep the path before."""
         points = drawn_points(message["drawn"])
         if message.get("cursor") is not None:
             points = [*points, _numbers(message["cursor"], 2)]
         else:
             self.drawn = points
-            # a page that goes on drawing must not be set back by the echo of what it said
+            # a page ignores the echo of its own drawing, which may be older than its present state
             self.tell({"drawn_points": points, "by": str(message.get("by"))[:MAX_PAGE_NAME]})
         figures = drawn_figures(self._problem(), points)
         if figures is not None and self._cursor is not None:
@@ -401,7 +401,7 @@ def application(session: Session, token: str, port: int) -> Any:
                     await socket.send_text(await queue.get())
 
         async def solve_order(message: dict[str, Any]) -> None:
-            """Answer what takes seconds at times, while other messages are answered."""
+            """Answer a message that may take seconds, while other messages are answered."""
             queue.put_nowait(json.dumps(await asyncio.to_thread(session.asked, message)))
 
         later: set[asyncio.Task[None]] = set()
@@ -495,7 +495,8 @@ def _numbers(values: object, count: int) -> list[float]:
 
 
 def _parsed(text: str | None) -> dict[str, Any] | str:
-    """Return a message, or in one line what is wrong with it; None stands for bytes."""
+    """Return a parsed message, or one line that says what is wrong with it; `text` is None for
+    bytes."""
     if text is None:
         return "message: expected text, got bytes"
     try:

@@ -200,8 +200,7 @@ def _solve(
 
 
 def told_bound(status: Status, length: float | None, bound: LowerBound | None) -> dict[str, Any]:
-    """Return what the page is told of a tour's bound: its length, the tours that it holds for, and
-    the words that it shows."""
+    """Return the fields of a tour's bound for the page: length, scope and the words shown."""
     from netsp.solution import proof
 
     return {

@@ -208,8 +208,8 @@ class Document:
         return True
 
     def _keep(self, data: dict[str, Any]) -> None:
-        """Write a version beside the file before it becomes the present one; InputError, and no
-        version is changed, where the disk does not take it."""
+        """Write a version beside the file before it becomes the present one; raise InputError, and
+        change no version, if the disk refuses it."""
         if self._aside is not None:
             write_text(self._aside, json.dumps(data, allow_nan=False))
 
@@ -251,15 +251,15 @@ def _list(data: dict[str, Any], name: object) -> list[Any]:
 
 
 def _check_fields(data: dict[str, Any]) -> None:
-    """InputError where a version has a field that no problem has."""
+    """Raise InputError if a version has an unknown field."""
     for name in data:
         if name not in Problem.model_fields:
             raise InputError(f"edit: unknown field {shown(name)}")
 
 
 def _check_lists(data: dict[str, Any]) -> None:
-    """InputError unless goals and obstacles are lists of objects or positions, as the page draws
-    them; their values may be wrong while somebody is at it."""
+    """Raise InputError unless goals and obstacles are lists of objects or positions, as the page
+    draws them; values may be wrong while somebody edits them."""
     for name in LISTS:
         items = data.get(name, [])
         if not isinstance(items, list):

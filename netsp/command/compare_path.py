@@ -1,4 +1,4 @@
-"""`netsp compare-path`: paths that somebody made, beside the planned tour."""
+"""`netsp compare-path`: compare paths made by hand or recorded with the planned tour."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Compare, tell, write what is asked for, and return the exit code."""
+    """Compare the paths, print and write the results, and return the exit code."""
     from netsp.compare.path_comparison import compare_paths
     from netsp.files import STANDARD, write_text
     from netsp.pathmeasures import PathPolicy
@@ -141,8 +141,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _inputs(args: argparse.Namespace) -> tuple[Problem, list[FoundPath]]:
-    """Return the problem and the paths, those of a study among them; a study's settings become
-    arguments where these are not given."""
+    """Return the problem and the paths, including those of a study; settings of a study replace
+    arguments that are not given."""
     from dataclasses import replace
 
     from netsp.compare.path_study import PathStudy

@@ -163,7 +163,7 @@ def summary(
     elif tour.solver == PLANE:
         verdict = "the shortest found in the plane: all solids are upright prisms"
     elif tour.solver == OUT_AND_BACK:
-        verdict = "out along the tether to each waypoint and back, for no shorter one was found"
+        verdict = "out along the tether to each waypoint and back: no shorter tour was found"
     else:
         verdict = f"along {legs} of the tether, with detours past what it would hang on"
     lines = [f"tour     {tour.length:.6g} {units}, {verdict}"]
@@ -211,7 +211,7 @@ def summary(
 
 
 def _perhaps(found: SolvedMission) -> str:
-    """Say of waypoints left out that they may lie behind a gap that the cells do not show."""
+    """Return words for waypoints that may be left out because of a gap that the grid hides."""
     gaps, cells = found.tour.unresolved_gaps, found.cells
     if not gaps or cells is None:
         return ""
@@ -223,7 +223,7 @@ def _perhaps(found: SolvedMission) -> str:
 
 
 def _gap_lines(found: SolvedMission, units: str) -> list[str]:
-    """Say which gaps a finer cell shows, and which no cell does."""
+    """Return lines about the gaps that a finer cell shows, and those that stay hidden."""
     if found.cells is None:
         return []
     cell = f"{found.cells.cell:.3g} {units}"

@@ -133,7 +133,7 @@ def polygon_interior_point(vertices: Vertices) -> tuple[float, float]:
 
 
 AT_ONCE = 64
-"""Points whose distance to an outline is measured at a time; more take more memory."""
+"""Number of points whose distance to an outline is computed at once; bounds the memory."""
 
 
 def _depths(

@@ -6,9 +6,9 @@ tether length, again and again, and retraces its path after the last one (`greed
 The 2016 workshop paper has one sentence: the planner "also travels to the closest goal, but then
 retraces its path back to the start position, ensuring no entanglements". It has two readings:
 
-- *out and back*: the robot returns after every goal, so the closest goal is the closest to the base
-  each time (`greedy-2016`, and what its published figures are of);
-- *retrace once*: the robot goes from goal to goal, as the Greedy-TSP of the sentence before, and
+- *out and back*: the robot returns after every goal, so each time the goal closest to the base is
+  next. This is `greedy-2016`, and its published figures are for this reading.
+- *retrace once*: the robot goes from goal to goal, like the Greedy-TSP of the sentence before, and
   retraces its whole path from the last (`greedy-2016` with `retrace=end`). This is the reading of
   the 2017 paper, so the tour is that of `greedy`.
 
@@ -132,8 +132,8 @@ class Params2016:
     Attributes
     ----------
     retrace
-        When the robot retraces its path: ``goal``, after every goal, or ``end``, after the last one
-        only. The paper's sentence can be read either way.
+        Time at which the robot retraces its path: ``goal``, after every goal, or ``end``, after the
+        last goal only. The paper's sentence can be read either way.
     """
 
     retrace: str = "goal"

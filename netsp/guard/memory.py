@@ -22,7 +22,8 @@ from netsp.models import Model
 from netsp.online.tether import Tether
 
 MAX_LETTERS = 10_000
-"""Letters of a word in a state file; a damaged file may hold a word that takes hours to read."""
+"""Largest number of letters of a word in a state file. A damaged file may hold a longer word, which
+would take hours to process."""
 
 LONGEST_S = 600.0
 """Seconds without us after which the robot may be anywhere: then the memory is of no use."""

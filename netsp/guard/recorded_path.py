@@ -1,4 +1,4 @@
-"""Paths of files of any kind, recorded flights among them."""
+"""Read paths from files of any kind, including recorded flights."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from netsp.problem import Problem
 from netsp.site.path_file import FoundPath, read_paths
 
 RECORDINGS = (".tlog", ".bin")
-"""Endings of logs of ground stations and of vehicles."""
+"""File endings of logs of ground stations and vehicles."""
 
 
 def read_any_paths(
@@ -31,26 +31,26 @@ def read_any_paths(
     Parameters
     ----------
     file : str or Path
-        As of `netsp.site.path_file.read_paths`, or as of `netsp guard --replay`.
+        File that `netsp.site.path_file.read_paths` or `netsp guard --replay` reads.
     problem : Problem
-        Whose plane they are brought to.
+        Problem in whose plane the points are returned.
     frame : str, optional
-        "local" or "global": how recordings and GeoJSON are read.
+        Frame of recordings and GeoJSON: "local" or "global".
     system : int, optional
         System id of the vehicle in a telemetry log; by default the first heard.
     noise : float
-        Points within this distance of a simpler path are left out (Douglas & Peucker 1973), in the
-        problem's units: noise of positions lengthens a path.
+        Largest distance of a point that is left out from the simplified path (Douglas & Peucker
+        1973), in the problem's units. Noise of the positions would lengthen the path.
 
     Returns
     -------
     list of FoundPath
-        In the order of the file.
+        Paths in the order of the file.
 
     Raises
     ------
     InputError
-        As of the readers.
+        The file cannot be read, or holds no path.
     """
     lower = str(file).lower()
     if lower.endswith(RECORDINGS) or (lower.endswith(".csv") and _has_north_and_east(file)):

@@ -20,11 +20,11 @@ RANKED = 60
 """Neighbours of a cluster that are taken out with it."""
 
 MIN_GAIN = 1e-9
-"""Share of the tour's length that a move must save to count, where costs are not whole numbers:
-lengths of legs are no more exact."""
+"""Least relative saving of an accepted move, if costs are not whole numbers. Lengths of legs are
+accurate to about this share."""
 
 EXACT = 2.0**53
-"""Whole numbers below it are added without rounding in double precision."""
+"""Limit below which double precision adds whole numbers without rounding."""
 
 
 class Instance:
@@ -62,15 +62,15 @@ class Instance:
 
     @cached_property
     def min_gain(self) -> float:
-        """Share of a tour's length that a move must save to count; 0 where lengths are exact."""
+        """Least relative saving of an accepted move; 0 if lengths are exact."""
         sums = (self.clusters + 1) * self._largest_cost
         exact = sums < EXACT and bool((self.costs == np.rint(self.costs)).all())
         return 0.0 if exact else MIN_GAIN
 
     @property
     def rounding(self) -> float:
-        """Gain that rounding may feign in the tables of `netsp.lns.links`, through which each leg
-        may go, that of the highest cost too: `EVEN` of it at each cluster, ahead and behind."""
+        """Largest gain that rounding may cause in the tables of `netsp.lns.links`: the share `EVEN`
+        of the highest cost for each cluster, ahead and behind."""
         return 2.0 * (self.clusters + 1) * EVEN * self._largest_cost
 
     @classmethod

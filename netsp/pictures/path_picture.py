@@ -149,7 +149,7 @@ def draw_tether_along(m: PathMeasures, *, ax: Any = None) -> Any:
                 )  # fmt: skip
     if not len(rows):
         ax.annotate(
-            "the path leads to a place that is shut in", (0.5, 0.5), xycoords="axes fraction",
+            "unknown: obstacles enclose a part of the path", (0.5, 0.5), xycoords="axes fraction",
             ha="center", fontsize=9,
         )  # fmt: skip
     ax.set(

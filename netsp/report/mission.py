@@ -150,7 +150,8 @@ def _summary(mission: Mission, scene: Scene, summary: dict[str, Any]) -> str:
 
 
 def _planned(tour: PlannedTour, mission: Mission, unit: str) -> str:
-    """Say what is proven of a tour: among all tours, or those between the states found."""
+    """Return in words what is proven of a tour, among all tours or among those between the states
+    found."""
     proof = "found"
     if tour.status is Status.OPTIMAL:
         proof = f"{tour.status.verdict} among {Scope.ALL_TOURS.tours} to its waypoints"
@@ -169,8 +170,8 @@ def _planned(tour: PlannedTour, mission: Mission, unit: str) -> str:
     if tour.unresolved_gaps:
         named = "; ".join(str(gap) for gap in tour.unresolved_gaps)
         all_of += (
-            f". Gaps that the robot may fit through, but the cells do not show, so that no tour "
-            f"through them was looked at: {html.escape(named)}"
+            f". The robot may fit through gaps that the grid does not show, and no tour through "
+            f"them was considered; a finer cell may show them: {html.escape(named)}"
         )
     return (
         f"The tour is {tour.length:.5g} {unit} long: {proof} (solver {html.escape(tour.solver)})"

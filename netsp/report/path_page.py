@@ -1,4 +1,4 @@
-"""One self-contained page about paths beside the planned tour."""
+"""Self-contained HTML page that compares paths with the planned tour."""
 
 from __future__ import annotations
 

@@ -12,25 +12,25 @@ from netsp.errors import InputError
 from netsp.files import read_bytes
 from netsp.models import shown
 
-FARTHEST_HEIGHT = 12_000.0
-"""Metres above or below the sea that no place on the earth exceeds."""
+MAX_HEIGHT = 12_000.0
+"""Largest height or depth in a file, metres; no place on the earth exceeds it."""
 
 FORBIDDEN = (b"<!DOCTYPE", b"<!ENTITY")
-"""Declarations that a GPX file has no use for, and that can be made to expand without end."""
+"""XML declarations that are refused: GPX needs none, and entities can expand without end."""
 
 
 @dataclass(frozen=True)
 class GpxPoint:
-    """One point of a track or a route.
+    """Point of a track or a route.
 
     Parameters
     ----------
     latitude, longitude : float
-        Degrees.
+        Position, degrees.
     height : float, optional
-        Metres.
+        Height, metres.
     time_s : float, optional
-        Seconds since 1970.
+        Time, seconds since 1970.
     """
 
     latitude: float
@@ -41,14 +41,14 @@ class GpxPoint:
 
 @dataclass(frozen=True)
 class GpxLine:
-    """A track, its segments one after the other, or a route.
+    """Track, with its segments joined, or route.
 
     Parameters
     ----------
     name : str
-        Empty if it has none.
+        Name; empty if it has none.
     points : tuple of GpxPoint
-        Two or more.
+        Two points or more.
     """
 
     name: str
@@ -123,7 +123,7 @@ def _point(element: ElementTree.Element, where: str) -> GpxPoint:
     return GpxPoint(
         latitude, longitude,
         None if height is None or not height.strip()
-        else _number(height, FARTHEST_HEIGHT, f"{where}: ele"),
+        else _number(height, MAX_HEIGHT, f"{where}: ele"),
         None if time is None or not time.strip() else seconds_of(time, f"{where}: time"),
     )  # fmt: skip
 
@@ -139,19 +139,19 @@ def _number(text: str | None, most: float, where: str) -> float:
 
 
 def seconds_of(text: str, where: str) -> float:
-    """Return the seconds since 1970 of a time as ISO 8601 has it; without a zone it is UTC.
+    """Return the seconds since 1970 of an ISO 8601 time; without a time zone it is UTC.
 
     Parameters
     ----------
     text : str
         The time.
     where : str
-        What messages call it.
+        Name of the value in messages.
 
     Returns
     -------
     float
-        Seconds.
+        Seconds since 1970.
 
     Raises
     ------

@@ -1,7 +1,7 @@
-"""Paths that somebody made: tables, GeoJSON, GPX and solutions, in the frame of a problem.
+"""Read paths from tables, GeoJSON, GPX and solutions, in the frame of a problem.
 
-Positions in degrees are brought into the problem's plane by its origin; those in metres are taken
-as they are.
+Positions in degrees are projected into the problem's plane with its origin; positions in metres
+stay as they are.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ COLUMNS = {
     "longitude": "lon", "lat": "lat", "latitude": "lat", "t": "t", "time": "t", "seconds": "t",
     "time_s": "t",
 }  # fmt: skip
-"""Names of columns, in small letters, and what each holds; a depth is a negative z."""
+"""Names of columns in lower case, with the quantity that each holds; a depth is a negative z."""
 
 ENDINGS = (".csv", ".csv.gz", ".txt", ".json", ".geojson", ".gpx")
 """Endings of files with paths."""
@@ -42,16 +42,16 @@ FRAMES = ("local", "global")
 
 @dataclass(frozen=True)
 class FoundPath:
-    """A path of a file.
+    """Path from a file.
 
     Parameters
     ----------
     name : str
-        Its own, or that of the file.
+        Name of the path in the file, or the name of the file.
     points : ndarray, shape (k, 2) or (k, 3)
-        In the frame of the problem.
+        Points in the frame of the problem.
     times : ndarray, shape (k,), optional
-        Seconds.
+        Time stamps of the points, s.
     """
 
     name: str
@@ -68,15 +68,15 @@ def read_paths(file: str | Path, problem: Problem, frame: str | None = None) -> 
         A table (x, y and perhaps z or depth; or lon, lat; perhaps t), GeoJSON with lines, GPX with
         tracks or routes, a solution, or a JSON list of points.
     problem : Problem
-        Whose plane they are brought to.
+        Problem in whose plane the points are returned.
     frame : str, optional
-        "local" (metres of the problem's plane) or "global" (degrees), for GeoJSON; by default what
-        the file says, else global where the problem has an origin.
+        Frame of GeoJSON: "local" (metres of the problem's plane) or "global" (degrees). By default
+        the frame that the file states, else global if the problem has an origin.
 
     Returns
     -------
     list of FoundPath
-        In the order of the file.
+        Paths in the order of the file.
 
     Raises
     ------
@@ -229,7 +229,7 @@ def _of_json(
 
         solution = Solution.from_json(text, source=str(file))
         if len(solution.path) < 2:
-            raise InputError(f"{file}: the solution has no path")
+            raise InputError(f"{file}: the solution has no path; expected one with a tour")
         return [FoundPath(stem, np.array(solution.path, dtype=float))]
     return _of_geojson(file, data, problem, stem, frame)
 
@@ -270,8 +270,8 @@ def _of_geojson(
 
 
 def _times_of(properties: Mapping[str, Any], count: int, where: str) -> Floats | None:
-    """Return the times of a line, from the property `coordTimes` or `times` that converters
-    write; None if it has none for each point."""
+    """Return the times of a line from its property `coordTimes` or `times`; None unless there is
+    one for each point."""
     given = properties.get("coordTimes", properties.get("times"))
     if not isinstance(given, list) or len(given) != count:
         return None
@@ -279,7 +279,7 @@ def _times_of(properties: Mapping[str, Any], count: int, where: str) -> Floats |
 
 
 def _lines(data: Any, file: str, where: str, properties: Mapping[str, Any], depth: int = 0) -> Any:
-    """Yield the lines of GeoJSON: where each stands, its positions, its properties."""
+    """Yield each line of GeoJSON: its place in the file, its positions and its properties."""
     here = f"{file}: {where}" if where else file
     if not isinstance(data, Mapping) or depth > 8:
         raise InputError(f"{here}: expected a GeoJSON object, got {shown(data)}")
@@ -325,16 +325,16 @@ def _positions(coordinates: Any, where: str) -> list[list[float]]:
 
 
 def path_to_geojson(name: str, points: Floats, problem: Problem) -> str:
-    """Return a path as GeoJSON: degrees where the problem has an origin, else its own metres.
+    """Return a path as GeoJSON, in degrees if the problem has an origin, else in its plane.
 
     Parameters
     ----------
     name : str
-        Of the path.
+        Name of the path.
     points : ndarray, shape (k, 2) or (k, 3)
-        In the problem's frame.
+        Points in the problem's frame.
     problem : Problem
-        Its origin counts.
+        The problem.
 
     Returns
     -------

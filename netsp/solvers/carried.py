@@ -60,7 +60,7 @@ class Carried:
 
 
 OnGraph = Callable[[TravelGraph], None]
-"""Hears the travel graph that the tours of all later rows of progress are of."""
+"""Callback with a new travel graph, to which the tours of later progress rows refer."""
 
 
 def with_carried(
@@ -81,7 +81,7 @@ def with_carried(
     on_progress : callable, optional
         Told the best tour after each search.
     on_graph : callable, optional
-        Told the graph before each of these rows: it grows from search to search.
+        Called with the graph before each of these rows; it grows from search to search.
     start : sequence of int, optional
         A tour to start from, as vertices of the graph.
 

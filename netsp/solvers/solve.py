@@ -396,28 +396,28 @@ def solve_over(
     Parameters
     ----------
     problem : Problem
-        What to solve.
+        The problem.
     graph : TravelGraph
-        Of the problem.
+        Travel graph of the problem.
     solver : str or callable
-        As of `solve_graph`.
+        Solver, as in `solve_graph`.
     clock : Clock
-        Of the run.
+        Clock of the run.
     iteration_limit, seed, params, warm_start : int, int, mapping, Solution
-        As of `solve`.
+        As in `solve`.
     on_progress : callable, optional
-        Called with a `netsp.travel.result.Progress` now and then.
+        Called with a `netsp.travel.result.Progress` at each report of the solver.
     on_graph : callable, optional
-        Told the graph that the tours of later rows are of, whenever that is another one.
+        Called with each new graph; tours of later progress rows refer to it.
 
     Returns
     -------
     graph : TravelGraph
-        With more classes than before, where the roadmap had to leave some out.
+        The graph, with more classes if the roadmap left some out.
     result : Result
-        Its tour is one of that graph.
+        Result whose tour refers to the returned graph.
     """
-    # what is too large for its time takes long to draw, too
+    # keep time to draw a tour of a problem that is too large for its limit
     spare = 0.0 if graph.complete else min(SPARE * (clock.limit or 0.0), 1.0)
     start: Sequence[int] | None = None
     if warm_start is not None:

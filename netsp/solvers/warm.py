@@ -115,23 +115,23 @@ def _nearest(problem: Problem, place: Floats, taken: set[int]) -> int:
 def with_old_classes(
     problem: Problem, solution: Solution, graph: TravelGraph, clock: Clock
 ) -> TravelGraph:
-    """Return the graph with the classes of an old tour, where its roadmap had to leave some out.
+    """Return the graph with the classes of an old tour, if its roadmap left some out.
 
     Parameters
     ----------
     problem : Problem
-        That there is now.
+        The problem as it is now.
     solution : Solution
-        Of this problem, or of one that it was edited from.
+        Solution of the problem, or of an earlier version.
     graph : TravelGraph
-        Of the problem.
+        Travel graph of the problem.
     clock : Clock
-        When it is up, the rest of the classes stay left out.
+        Clock of the run; when it is up, no further class is added.
 
     Returns
     -------
     TravelGraph
-        The same graph where no class was left out.
+        Graph with these classes; the same graph if it is complete.
 
     Raises
     ------

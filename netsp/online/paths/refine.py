@@ -4,15 +4,15 @@
 `gradient`: ours; it moves points up the distance field only, so no point's clearance gets smaller,
 and keeps the ends where they are.
 
-What the paper does not say: how long its segments are, how far points are moved, how many trials a
-point has (all in `RefineParams`), and that moving points away from the path's centroid pushes those
+The paper does not say how long its segments are, how far points are moved, how many trials a point
+has (all in `RefineParams`), nor that moving points away from the path's centroid pushes those
 between centroid and structure *into* the structure. The ends are kept, or the path would not lead
 from the robot to the waypoint.
 
-What a perturbation keeps: "only those that are collision-free are accepted", says the paper, and in
-the next sentence that this is "to locally increase clearance". By the first sentence any free move
-is kept (`RefineParams.keeps` "free"); by the second, one that takes the point farther from solids
-("farther").
+The paper says two things about the perturbations that are kept: "only those that are collision-free
+are accepted", and in the next sentence that this is "to locally increase clearance". By the first
+sentence any free move is kept (`RefineParams.keeps` "free"); by the second, one that takes the
+point farther from solids ("farther").
 """
 
 from __future__ import annotations
@@ -34,23 +34,24 @@ PERTURBATIONS = ("free", "farther")
 
 @dataclass(frozen=True)
 class RefineParams:
-    """How the paper's three steps are carried out.
+    """Options of the paper's three steps of refinement.
 
     Parameters
     ----------
     keeps : {"free", "farther"}
-        Which random moves of a point are kept: the first that is free, or every one that takes the
+        Rule for the random moves of a point: keep the first free one, or every one that takes the
         point farther from solids.
     max_trials : int
-        Random directions tried for each point; 1 or more.
+        Number of random directions tried for each point; 1 or more.
     step_share : float
         Length of a random move, as a share of the clearance; more than 0.
     segment : int
-        Points of a segment that one cubic is fitted to; 5 or more.
+        Number of points of a segment to which one cubic is fitted; 5 or more.
     overlap : int
-        Points that two segments in a row have in common; fewer than a segment's.
+        Number of points that successive segments share; fewer than `segment`.
     max_rounds : int
-        Repetitions of the three steps before the path is left as it was; 1 or more.
+        Largest number of repetitions of the three steps before the path is left as it was; 1 or
+        more.
     """
 
     keeps: str = "free"
@@ -76,7 +77,7 @@ def refined(
     name: str, field: DistanceField, path: Floats, clearance: float, rng: np.random.Generator,
     params: RefineParams | None = None,
 ) -> Floats:  # fmt: skip
-    """Refine a path (k, 3); return it as it was if what came of it is not free."""
+    """Return a path (k, 3) refined, or unchanged if the refined path is not free."""
     params = params or RefineParams()
     if name == "none" or len(path) < 3:
         return path
@@ -98,7 +99,7 @@ def stepped(
     field: DistanceField, path: Floats, clearance: float, rng: np.random.Generator,
     params: RefineParams,
 ) -> Floats:  # fmt: skip
-    """Carry out the paper's three steps once; what comes of them need not be free."""
+    """Carry out the paper's three steps once; the result need not be free."""
     moved = offset(path, clearance)
     moved = perturbed(field, moved, params.step_share * clearance, rng, params)
     return smoothed(moved, params)
@@ -116,7 +117,8 @@ def offset(path: Floats, by: float) -> Floats:
 def perturbed(
     field: DistanceField, path: Floats, by: float, rng: np.random.Generator, params: RefineParams
 ) -> Floats:
-    """Move every point but the ends in random directions, as far as such moves are kept."""
+    """Move every point but the ends in random directions, and keep the moves that the rule
+    accepts."""
     out = path.copy()
     waits = np.ones(len(path) - 2, dtype=bool)
     for _ in range(params.max_trials):

@@ -74,10 +74,10 @@ class PlannerOptions:
     seed : int
         Of what is random in either.
     refine_params : RefineParams
-        How the paper's refinement is carried out.
+        Options of the paper's refinement.
     pivot_spacing : float, optional
-        Distance between the pivots along a tether that the paper's planners try, metres; more than
-        0; by default 0.25 m, or a cell where that is more.
+        Distance between pivots along a tether for the paper's planners, metres; more than 0. By
+        default 0.25 m, or one cell if a cell is larger.
     looks : int
         How often `predictive` simulates the tether ahead for one plan; then the best path so far is
         taken, and the first if there is none yet.
@@ -594,14 +594,14 @@ class Planner:
         return refined(name, self.scene, even, self.mission.clearance, rng, params)
 
     def refined_once(self, path: Floats, number: int) -> Floats:
-        """Refine a path once, free or not; any refinement but the paper's is as in `refined`.
+        """Refine a path once, even if the result is not free; only `paper` differs from `refined`.
 
         Parameters
         ----------
         path : ndarray, shape (k, 3)
             The path, metres.
         number : int
-            Of the path, for the random moves: another one moves otherwise.
+            Number of the path, which seeds the random moves.
 
         Returns
         -------

@@ -14,15 +14,15 @@ from netsp.online.tether import Tether
 class Pivots:
     """Points along a tether, each with its shortest path to the waypoint and the tether after it.
 
-    Paths and tethers are computed when they are first asked for, and kept: a search that stops
-    at an early pivot pays for no later one.
+    Paths and tethers are computed on demand and cached, so a search that stops at an early pivot
+    computes no later one.
 
     Parameters
     ----------
     planner : Planner
-        Its waypoint, scene, tether model and path search count.
+        Planner with the waypoint, scene, tether model and path search.
     tether : Tether
-        The tether now, as the planner believes it.
+        Present tether, as the planner believes it.
 
     Attributes
     ----------
@@ -50,8 +50,8 @@ class Pivots:
         return pushed_out(planner.scene, self.points[: n + 1], planner.mission.clearance)
 
     def length(self, n: int) -> float:
-        """Return the length (m) of the tether after its part from the anchor to a pivot and the
-        path on from there; inf where no path leads on."""
+        """Return the length (m) of the tether after the robot has gone from a pivot on to the
+        waypoint; inf if there is no path to the waypoint."""
         if n not in self._lengths:
             self._lengths[n] = self._simulated(n)
         return self._lengths[n]

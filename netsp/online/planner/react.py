@@ -1,6 +1,6 @@
 """`react`: Algorithms 2 and 3 of Amer et al. 2025, "REACT".
 
-Where the paper would not run as it stands, or leaves a choice:
+The paper would not run as it stands, or leaves a choice, at these points:
 
 - Algorithm 2 sets mode, k and the recovery path anew at every call; they are kept here.
 - It ends recovery at the end of P_safe but follows P_recovery; one path, the refined one, is both
@@ -8,7 +8,7 @@ Where the paper would not run as it stands, or leaves a choice:
 - Its trigger is L > L_max, so the limit is exceeded before anything happens. Kept: this is the
   paper's planner.
 - Algorithm 3 looks at the tether at the end of a recovery path, not at its longest on the path, and
-  takes the first pivot that will do, not the cheapest. Kept, with the stop at that pivot.
+  accepts the first feasible pivot, not the cheapest. Kept; the search stops at that pivot.
 - Its pivots are the nodes of a tether of resolution δ; here they are `PlannerOptions.pivot_spacing`
   apart, because our tether has nodes only where it bends.
 - After a recovery path that was the fallback (the limit as a soft one) the tether is still too
@@ -29,7 +29,7 @@ from netsp.online.tether import Tether
 
 @dataclass
 class ReactPlanner(Planner):
-    """The paper's planner: turns back once the tether is over the limit."""
+    """Planner of the paper, which turns back once the tether is over the limit."""
 
     _soft: int = field(default=-1)
 
@@ -51,7 +51,7 @@ class ReactPlanner(Planner):
         return False if len(self.path) else self.go_on(robot)
 
     def plan_home(self, robot: Floats, tether: Tether) -> bool:
-        """Go back along the whole tether: tether recovery as the paper means it."""
+        """Go back along the whole tether (the paper's tether recovery)."""
         del robot
         if len(self.path):
             return False
@@ -65,18 +65,18 @@ class ReactPlanner(Planner):
         self._soft = -1
 
     def recovery(self, pivots: Pivots) -> Floats:
-        """Search pivots backwards along the tether; stop at the first that will do (Algorithm 3).
+        """Search pivots backwards along the tether; stop at the first feasible one (Algorithm 3).
 
         Parameters
         ----------
         pivots : Pivots
-            Along the tether as it is now.
+            Pivots along the present tether.
 
         Returns
         -------
         ndarray, shape (k, 3)
-            The refined recovery path without the robot's position, metres; without such a pivot
-            the shortest path to the waypoint, whatever the tether.
+            Refined recovery path without the robot's position, metres; the shortest path to the
+            waypoint, whatever the tether, if no pivot is feasible.
         """
         limit = self.mission.tether_length
         n = next((n for n in range(len(pivots)) if pivots.length(n) <= limit), None)

@@ -1,31 +1,33 @@
 """`react-draft`: the planner of the draft of Amer et al. 2025, as its three algorithms list it;
 `react-thresholds`: `react` with the acceptance rule of that draft.
 
-What the listing of the draft says, though its text or common sense would have it otherwise:
+The planner follows the listing of the draft where its text, or common sense, differs:
 
 - Algorithm 2 compares a pivot i with the candidate of the pivot i - 3 that the round *before* has
   computed. That round was of i + 1, so the neighbour is two nodes nearer to the anchor than i,
-  where the text says three. The first pivot is compared with nothing.
+  where the text says three. The first pivot has no neighbour.
 - Pivots run from i = |P| - 3 down to 3, so neither the robot's last two nodes nor the anchor's
   first three are tried.
-- A pivot that will do ends in a path back to i + 2 only. For the first pivot that is the robot's
-  own position: nothing is followed, and the robot goes on to the waypoint for one step.
+- An accepted pivot i gives a path back to i + 2 only. For the first pivot that is the position of
+  the robot: there is no path to follow, and the robot goes on to the waypoint for one step.
 - The robot then goes on to the waypoint in normal mode, which may well lead along the old path
   over the limit again. Nothing in the listing ends such a cycle; a mission gives the waypoint up
   after `netsp.online.simulate.STUCK` seconds.
 - Every recovery path is refined once, the fallback too. One that is then not free is not followed:
   the robot goes on to the waypoint, and the search begins anew at the next step.
 
-What the listing leaves open:
+Three points are open in the listing, and are read as follows:
 
-- How long a candidate is. The text speaks of the "candidate alternative tether configuration", so
+- Length of a candidate. The text speaks of the "candidate alternative tether configuration", so
   it is the length that the tether model gives, as in the paper.
-- P are nodes of a tether of resolution δ; here they are `PlannerOptions.pivot_spacing` apart.
-- A recovery path that ends at the waypoint ends in normal mode with the tether over the limit, and
-  the waypoint would never count as reached. By the text normal operation goes on with the next
-  waypoint "that has not yet been reached", so it counts.
-- Nodes of a taut tether lie on surfaces; the path back is pushed off them, because a robot has a
-  size.
+- Nodes P. In the draft they are the nodes of a tether of resolution δ; here they are
+  `PlannerOptions.pivot_spacing` apart.
+- End of recovery. A recovery path to the waypoint ends in normal mode with the tether over the
+  limit, and the waypoint would never count as reached. By the text normal operation goes on with
+  the next waypoint "that has not yet been reached", so it counts.
+
+Nodes of a taut tether lie on surfaces. The path back is pushed off them, because the robot needs
+room.
 """
 
 from __future__ import annotations
@@ -45,19 +47,17 @@ from netsp.online.tether import Tether
 
 @dataclass(frozen=True)
 class DraftRule:
-    """When the draft accepts a pivot.
+    """Rule by which the draft accepts a pivot.
 
     Parameters
     ----------
     max_share : float
-        The tether after the candidate is shorter than this share of the limit; more than 0, at
-        most 1.
+        Largest tether after the candidate, as a share of the limit; more than 0, at most 1.
     max_gain : float
-        It is shorter than this share of the tether after a neighbouring candidate; more than 0, at
-        most 1.
+        Largest tether after the candidate, as a share of the tether after the neighbour's
+        candidate; more than 0, at most 1.
     neighbour : int
-        Nodes from a pivot to the one, nearer to the anchor, that is stored for the comparison; at
-        least 1.
+        Number of nodes from a pivot towards the anchor to its neighbour; at least 1.
     """
 
     max_share: float = 0.7
@@ -73,28 +73,28 @@ class DraftRule:
             raise InputError(f"neighbour: expected 1 or more, got {self.neighbour!r}")
 
     def accepts(self, length: float, neighbour: float, limit: float) -> bool:
-        """Return whether a pivot will do.
+        """Return whether a pivot is accepted.
 
         Parameters
         ----------
         length : float
-            Of the tether after its candidate, metres.
+            Length of the tether after the pivot's candidate, metres.
         neighbour : float
-            Of the tether after the neighbour's candidate, metres; inf for none.
+            Length of the tether after the neighbour's candidate, metres; inf without a neighbour.
         limit : float
-            Of the tether, metres.
+            Limit of the tether, metres.
 
         Returns
         -------
         bool
-            Whether both conditions hold.
+            True if both lengths of the rule are kept.
         """
         return length < self.max_share * limit and length < self.max_gain * neighbour
 
 
 @dataclass
 class ReactDraftPlanner(ReactPlanner):
-    """The draft's planner, by its listing."""
+    """Planner of the draft, by its listing."""
 
     rule: DraftRule = field(default_factory=DraftRule)
     _searches: int = field(default=0)
@@ -124,8 +124,8 @@ class ReactDraftPlanner(ReactPlanner):
         Returns
         -------
         ndarray, shape (k, 3)
-            Points, metres; none where the refined path is not free, or where the way back ends at
-            the robot.
+            Points, metres; none if the refined path is not free, or the path back ends at the
+            robot.
         """
         self._searches += 1
         path = self.found(pivots)
@@ -140,13 +140,14 @@ class ReactDraftPlanner(ReactPlanner):
         Parameters
         ----------
         pivots : Pivots
-            Along the tether as it is now; number n of them is node i = |P| - 1 - n of the listing.
+            Pivots along the present tether; number n of them is node i = |P| - 1 - n of the
+            listing.
 
         Returns
         -------
         ndarray, shape (k, 3)
-            From the robot back to two nodes before the pivot, metres; without a pivot that will do
-            the shortest path to the waypoint.
+            Path from the robot back to two nodes before the accepted pivot, metres; the shortest
+            path to the waypoint if no pivot is accepted.
         """
         limit, neighbour = self.mission.tether_length, np.inf
         for n in range(2, len(pivots) - 3):
@@ -161,8 +162,11 @@ class ReactDraftPlanner(ReactPlanner):
 
 @dataclass
 class ReactThresholdsPlanner(ReactPlanner):
-    """`react` with the acceptance rule of the draft: pivots to the anchor, each compared with the
-    one three nodes nearer to it, and a path back to two nodes before the pivot, not refined."""
+    """Planner `react` with the acceptance rule of the draft.
+
+    Pivots run to the anchor, and each is compared with the pivot three nodes nearer to the anchor.
+    The path back ends two nodes before the accepted pivot, and is not refined.
+    """
 
     rule: DraftRule = field(default_factory=DraftRule)
 
