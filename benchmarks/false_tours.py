@@ -23,7 +23,8 @@ Kind = Callable[[Problem, Solution, np.random.Generator], Pair | None]
 KINDS: dict[str, Kind] = {}
 
 OFF = 1e-5
-"""By what a place is missed or a length misstated, as a share of the size: a hundred tolerances."""
+"""Distance by which a place is missed or a length misstated, as a share of the size: a hundred
+tolerances."""
 
 
 def kind(name: str) -> Callable[[Kind], Kind]:

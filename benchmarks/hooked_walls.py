@@ -34,14 +34,15 @@ from tests.brute import BruteForce
 from tests.whole_numbers import WholeNumbers, whole_number_world
 
 TOLERANCE = 1e-5
-"""Lengths that differ by more are different, in units of worlds some ten units wide."""
+"""Largest difference of two equal lengths, in units of worlds about ten units wide."""
 
 MAX_CLASSES = 25
-"""Worlds with more classes are drawn with a shorter tether, so that the brute force comes to an
-end."""
+"""Largest number of classes of a world; a world with more gets a shorter tether, so that the brute
+force ends."""
 
 MAX_REPEATS = 40
-"""Turns about an obstacle that the brute force follows: more than the tethers here can take."""
+"""Largest number of turns about an obstacle in the brute force, more than the tethers here
+allow."""
 
 Ring = list[tuple[float, float]]
 
@@ -126,7 +127,8 @@ def harbour(rng: np.random.Generator) -> list[Ring]:
 
 
 def bars(rng: np.random.Generator) -> list[Ring]:
-    """Long slanted bars and triangles: convex, but what a ray cuts off reaches far below."""
+    """Return long slanted bars and triangles: convex, but the part beyond a ray reaches far
+    below."""
     rings: list[Ring] = []
     for _ in range(int(rng.integers(2, 5))):
         x, y = rng.uniform(1, 9, 2)
@@ -189,7 +191,7 @@ def hooked_world(family: str, seed: int) -> Problem | None:
 
 @dataclass
 class Outcome:
-    """What came of a world.
+    """Result for a world.
 
     Attributes
     ----------

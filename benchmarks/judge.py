@@ -183,7 +183,7 @@ def count(worlds: int, first: int = 0) -> tuple[int, int, list[str], list[str]]:
 
 @dataclass
 class Tally:
-    """What the judge said of the worlds of one kind."""
+    """Verdicts of the judge on the worlds of one kind."""
 
     worlds: int = 0
     refused: list[str] = field(default_factory=list)
@@ -192,8 +192,8 @@ class Tally:
 
 
 def tally(worlds: int, per_world: int, first: int = 0) -> dict[str, Tally]:
-    """Judge right tours of so many worlds of each kind, and some false ones of each, which take
-    turns through all kinds of `false_tours`."""
+    """Judge right tours of several worlds of each kind, and some false tours in each world, which
+    go through all kinds of `false_tours` in turn."""
     out = {name: Tally() for name in WORLDS}
     turn = 0
     names = list(KINDS)
@@ -238,7 +238,7 @@ def _accepts(problem: Problem, solution: Solution) -> bool:
 
 
 def by_kind(worlds: int, per_world: int) -> None:
-    """Print tables by kind of world and of falsehood, and name what went wrong."""
+    """Print tables by kind of world and kind of false tour, and name the wrong verdicts."""
     found = tally(worlds, per_world)
     head("worlds", "right ones", "refused", "false ones", "accepted", name="judge-worlds")
     for name, t in found.items():

@@ -126,7 +126,7 @@ def worst(limit: float) -> tuple[float, str, int, int]:
 
 
 def islands(corners: int, count: int = 20) -> Problem:
-    """A problem of islands of many corners, and of ten goals between them."""
+    """Return a problem with islands of many corners and ten goals between them."""
     rng, side = np.random.default_rng(0), int(np.ceil(np.sqrt(count)))
     obstacles = []
     for k in range(count):
@@ -143,7 +143,8 @@ CORNERS = (1000, 5000, 20_000, 66_672)
 
 
 def corners(limit: float) -> Iterator[tuple[int, float, float, str]]:
-    """(corners, seconds until the file is read and checked, seconds over the limit, status)."""
+    """Yield corners, seconds until the file is read and checked, seconds over the limit, and
+    status."""
     solve(islands(200), time_limit=2.0)  # compiled before it counts
     for count in CORNERS:
         text = islands(count).to_json()

@@ -1,4 +1,4 @@
-"""Small sabotages of the code, and whether its tests notice them.
+"""Mutation tests: break the code in one place at a time, and list the faults that no test notices.
 
     python benchmarks/mutants.py                  # all of `benchmarks/mutants.toml`, minutes
     python benchmarks/mutants.py --only guard     # those whose name contains a word
@@ -35,7 +35,7 @@ SURVIVED, NOTICED, STALE = 0, 1, 2
 
 @dataclass(frozen=True)
 class Mutant:
-    """One sabotage.
+    """Fault put into one file.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ class Mutant:
 
     @property
     def text(self) -> str:
-        """The mutated file; ValueError where the old text is not there exactly once."""
+        """Text of the mutated file; ValueError unless the old text occurs exactly once."""
         source = (ROOT / self.file).read_text(encoding="utf-8")
         if source.count(self.old) != 1:
             raise ValueError(
@@ -76,13 +76,13 @@ def mutants(only: str = "", every: int = 1) -> list[Mutant]:
 
 
 class _Replaced(importlib.abc.MetaPathFinder):
-    """Imports the mutated text of one file."""
+    """Importer of the mutated text of one file."""
 
     def __init__(self, mutant: Mutant) -> None:
         self.file, self.text = ROOT / mutant.file, mutant.text
 
     def find_spec(self, name: str, path: object, target: object = None) -> object:
-        """As `importlib.abc.MetaPathFinder.find_spec`."""
+        """Return the spec of a module, as `importlib.abc.MetaPathFinder.find_spec` does."""
         if not name.startswith("netsp"):
             return None
         spec = importlib.machinery.PathFinder.find_spec(name, path)  # type: ignore[arg-type]
@@ -99,7 +99,7 @@ class _Replaced(importlib.abc.MetaPathFinder):
 
 
 def outcome(mutant: Mutant | None, tests: tuple[str, ...], seconds: int) -> tuple[int, str]:
-    """Return what tests say of a mutant, or of the code as it is, in a process of its own.
+    """Return the result of tests on a mutant, or on the unchanged code, in a separate process.
 
     Parameters
     ----------
@@ -153,7 +153,7 @@ def outcome(mutant: Mutant | None, tests: tuple[str, ...], seconds: int) -> tupl
 
 
 def _import_libraries() -> None:
-    """Import what every child needs and no mutant changes, once for all of them."""
+    """Import the libraries that every child needs, once for all children."""
     import numba  # noqa: F401
     import pydantic  # noqa: F401
     import scipy.sparse.csgraph
@@ -162,8 +162,8 @@ def _import_libraries() -> None:
 
 
 def examined(chosen: list[Mutant], seconds: int = 120) -> Iterator[tuple[Mutant, int, str, float]]:
-    """Yield each mutant with its outcome, what its tests printed, and seconds; the tests are run
-    on the code as it is first."""
+    """Yield each mutant with its outcome, the output of its tests, and seconds. The tests run on
+    the unchanged code first."""
     _import_libraries()
     files = dict.fromkeys(name for m in chosen for name in m.tests if name.endswith(".py"))
     code, said = outcome(None, tuple(files), 10 * seconds)
@@ -175,7 +175,7 @@ def examined(chosen: list[Mutant], seconds: int = 120) -> Iterator[tuple[Mutant,
 
 
 def main() -> None:
-    """Print a line for each mutant, and how many were noticed."""
+    """Print a line for each mutant, and the number of mutants noticed."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])  # type: ignore[union-attr]
     parser.add_argument("--only", default="", metavar="TEXT", help="those whose name contains it")
     parser.add_argument("--every", type=int, default=1, metavar="N", help="every N-th of them")

@@ -1,4 +1,4 @@
-"""`mip-2017`, the program as the 2017 paper has it, beside `mip`, on the same travel graphs.
+"""Compare `mip-2017`, the program as published in 2017, with `mip` on the same travel graphs.
 
     python benchmarks/published_program.py [--worlds 2] [--limit 60] [--keep]
 

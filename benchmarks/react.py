@@ -22,7 +22,7 @@ from netsp.online.simulate import simulate
 
 HERE = Path(__file__).parent.parent / "missions"
 PLANNERS = ("none", "react", "react-draft", "react-thresholds", "predictive")
-FARTHER = RefineParams(keeps="farther")
+FARTHER_MOVES = RefineParams(keeps="farther")
 CURRENT, GUSTS = (0.08, 0.05, 0.0), 0.04
 
 
@@ -53,7 +53,7 @@ as long to come back as to inspect."""
 VARIANTS = (
     *((p, {}) for p in PLANNERS),
     ("react, unrefined", {"refine": "none"}),
-    ("react, farther moves only", {"refine_params": FARTHER}),
+    ("react, farther moves only", {"refine_params": FARTHER_MOVES}),
     ("predictive, BIT*", {"paths": "bitstar"}),
 )
 """Planners, and what is different about them."""

@@ -33,7 +33,7 @@ CLEARANCE, THICK, END = 0.1, 0.2, 4.0
 
 
 def slot_scene(rng: np.random.Generator) -> tuple[Mission, Scene, float]:
-    """Return a mission on both sides of a wall, its scene, and a tour's length that exists."""
+    """Return a mission on both sides of a wall, its scene, and the length of a known tour."""
     y, width = rng.uniform(-2.0, 2.0), rng.uniform(0.21, 0.4)
     angle = rng.choice([0.0, rng.uniform(-20.0, 20.0)])
     c, s = math.cos(math.radians(angle)), math.sin(math.radians(angle))
@@ -85,7 +85,7 @@ def _leg(a: Floats, b: Floats, y: float, width: float) -> float:
 
 
 def bound_only(mission: Mission, scene: Scene, seconds: float = 4.0) -> float:
-    """Return the bound where all that was found goes round the wall."""
+    """Return the bound if all paths found go round the wall."""
     water = Water.of(mission, scene, scene.field())
     places = Places.of(mission, water.field)
     ways = Ways(water, places, Effort.of(len(places)))

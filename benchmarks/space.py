@@ -310,7 +310,7 @@ def prisms(worlds: int) -> None:
 
 
 def beside_given(names: list[str], limits: list[float]) -> None:
-    """Missions in a good order, solved within short limits: what comes of it beside that order."""
+    """Solve missions given in a good order within short limits, and print both tours."""
     head("mission", "waypoints", "limit s", "as given m", "as given, home after s", "solved m",
          "home after s", "found by", "verified", "CPU s", name="space-given")  # fmt: skip
     for name in names:

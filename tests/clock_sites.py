@@ -1,7 +1,7 @@
-"""A clock that records where in the code it is asked, and whose time is up there if told so.
+"""Clock that records the call sites which ask it, and whose time can be up at a chosen site.
 
-A run that is asked in every loop ends soon, wherever its time is up; a run that takes long to end
-after its time was up at one of its call sites has a loop behind it that does not ask.
+A run that asks its clock in every loop ends soon, wherever its time is up. If a run takes long to
+end after its time was up at some call site, a later loop does not ask the clock.
 """
 
 from __future__ import annotations

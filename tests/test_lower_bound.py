@@ -1,4 +1,4 @@
-"""A lower bound is never shown without the tours that it holds for, nor taken for another's."""
+"""A lower bound is never shown without the tours that it holds for, nor used for other tours."""
 
 import ast
 import csv

@@ -1,4 +1,4 @@
-"""Paths that somebody made: their measures by closed forms and against the planned tour."""
+"""Measures of given paths, by closed forms and against the planned tour."""
 
 import json
 import math

@@ -14,7 +14,8 @@ from tests.test_contract import random_graph
 
 
 def two_groups():
-    """Two far groups of three goals with two classes each: subtours in either are cheap."""
+    """Return a graph of two distant groups of three goals with two classes each, in which subtours
+    are cheap."""
     rng = np.random.default_rng(1)
     at = np.vstack([[0, 0], *(c + rng.uniform(0, 1, (6, 2)) for c in ((20, 0), (-20, 0)))])
     costs = np.linalg.norm(at[:, None] - at[None, :], axis=2)

@@ -44,7 +44,7 @@ def killed() -> tuple[str, bool]:
 
 
 SAMPLE = 12
-"""One mutant in twelve is tried in the gate; the whole list takes minutes."""
+"""Step through the list of mutants in the gate, which tries every twelfth; all take minutes."""
 
 
 def sabotaged() -> tuple[str, bool]:

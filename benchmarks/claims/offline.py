@@ -46,8 +46,8 @@ def bounds() -> tuple[str, bool]:
 
 
 def restricted_bounds() -> tuple[str, bool]:
-    """Progress rows of runs over few classes, whose bounds on all tours must not exceed the optimum
-    over all classes, though the optimum over the classes kept does."""
+    """Check that bounds on all tours in progress rows of runs over few classes do not exceed the
+    optimum over all classes, although the optimum over the classes kept does."""
     from netsp import solve, solve_graph, travel_graph
     from netsp.lower_bound import LowerBound, Scope
     from netsp.worlds import reachable_world
