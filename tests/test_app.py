@@ -441,6 +441,12 @@ MALFORMED = (
     '{"id": 1, "save": 3}', '{"id": 1, "space": null}', '{"id": 1, "id": 2}',
     '{"id": ' + "1" * 5001 + "}", "[" * 100_000,
     '{"id": 1, "edit": ' + "[" * 2000 + "]" * 2000 + "}",
+    *(
+        '{"id": 1, "edit": {' + edit + "[" * 700 + "]" * 700 + "}" * edit.count("{") + "}}"
+        for edit in (  # they can be read, but not copied
+            '"set": ["name"], "value": ', '"add": "goals", "value": ', '"replace": {"goals": ',
+        )
+    ),
 )  # fmt: skip
 """Messages that a page may not send, each wrong in its own way."""
 

@@ -116,6 +116,24 @@ class Document:
         """
         if not isinstance(edit, Mapping):
             raise InputError(f"edit: expected an object, got {shown(edit)}")
+        try:
+            data = self._edited(edit)
+            json.dumps(data, allow_nan=False)
+            key = json.dumps([edit.get("set"), edit["merge"]]) if edit.get("merge") else None
+        except (TypeError, ValueError):
+            raise InputError("edit: expected finite numbers") from None
+        except RecursionError:  # of copying too: it takes more of the stack than reading does
+            raise InputError("edit: nested too deeply") from None
+        if key is not None and key == self._merging:
+            self._keep(data)
+            self._versions[self._at] = data
+            self.version += 1
+        else:
+            self._push(data)
+        self._merging = key
+
+    def _edited(self, edit: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the present version with an edit done."""
         data = dict(self.data)  # what an edit changes is copied on the way to it
         value = copy.deepcopy(edit.get("value"))
         if "set" in edit:
@@ -130,20 +148,7 @@ class Document:
         else:
             raise InputError(f"edit: expected set, add, delete or replace, got {shown(edit)}")
         _check_lists(data)
-        try:
-            json.dumps(data, allow_nan=False)
-            key = json.dumps([edit.get("set"), edit["merge"]]) if edit.get("merge") else None
-        except (TypeError, ValueError):
-            raise InputError("edit: expected finite numbers") from None
-        except RecursionError:
-            raise InputError("edit: nested too deeply") from None
-        if key is not None and key == self._merging:
-            self._keep(data)
-            self._versions[self._at] = data
-            self.version += 1
-        else:
-            self._push(data)
-        self._merging = key
+        return data
 
     @property
     def can_undo(self) -> bool:
