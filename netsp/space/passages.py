@@ -212,7 +212,7 @@ def unresolved_gaps(grid: GapGrid, params: GapParams | None = None) -> list[Gap]
     list of Gap
         At most `params.max_gaps` gaps, the widest first.
     """
-    from scipy.ndimage import distance_transform_edt
+    from scipy.ndimage import binary_dilation
 
     params = params or GapParams()
     shape = grid.shape
@@ -224,17 +224,64 @@ def unresolved_gaps(grid: GapGrid, params: GapParams | None = None) -> list[Gap]
         grid.field.arrays, grid.low, grid.high, grid.cell, shape, grid.clearance,
         steepness(grid.field), middle, middle, 4.0 * whole, middle, 2.0 * whole, 2,
     )  # fmt: skip
+    gaps = _gaps_between(grid, free, free, possible, params)
+    layers = _single_layers(free) & possible
+    if layers.any():
+        # the nearest free cells on its two sides are too near to be told apart
+        apart = free & ~binary_dilation(layers, np.ones((3, 3, 3)))
+        far = 2.0 * grid.cell
+        gaps += [
+            gap for gap in _gaps_between(grid, free, apart, possible, params)
+            if all(np.linalg.norm(gap.place - known.place) > far for known in gaps)
+            and _is_open(grid, gap, params)
+        ]  # fmt: skip
+    gaps.sort(key=lambda gap: -gap.width)
+    return gaps[: params.max_gaps]
+
+
+def _single_layers(free: Bools) -> Bools:
+    """Return the cells that are not free between two that are, along an axis."""
+    out = np.zeros(free.shape, dtype=np.bool_)
+    for axis in range(3):
+        rows, found = np.moveaxis(free, axis, 0), np.moveaxis(out, axis, 0)
+        found[1:-1] |= rows[:-2] & ~rows[1:-1] & rows[2:]
+    return out
+
+
+def _gaps_between(
+    grid: GapGrid, free: Bools, ends_of: Bools, possible: Bools, params: GapParams
+) -> list[Gap]:
+    """Return the gaps between some of the free cells, `ends_of`."""
+    from scipy.ndimage import distance_transform_edt
+
+    if not ends_of.any():
+        return []
     nearest = np.moveaxis(
-        distance_transform_edt(~free, return_distances=False, return_indices=True), 0, -1
+        distance_transform_edt(~ends_of, return_distances=False, return_indices=True), 0, -1
     )
-    between = possible & ~free
-    cells = np.argwhere(_parting(between, nearest))
+    cells = np.argwhere(_parting(possible & ~ends_of, nearest))
     if not len(cells):
         return []
     side = int(np.clip((params.max_points / len(cells)) ** (1.0 / 3.0), 2, params.finest))
     ends, places, room = _links(grid, cells, nearest, side)
     ends, places, room = _not_joined(free, ends, places, room, params)
     return _grouped(grid, ends, places, room, params)
+
+
+def _is_open(grid: GapGrid, gap: Gap, params: GapParams) -> bool:
+    """Return whether fine points with room for the robot join the two sides of a gap."""
+    from scipy.ndimage import label
+
+    low = np.maximum(gap.sides.min(axis=0) - grid.cell, grid.low)
+    high = np.minimum(gap.sides.max(axis=0) + grid.cell, grid.high)
+    spacing = grid.cell / params.finest
+    counts = np.maximum(2, np.ceil((high - low) / spacing).astype(np.int64) + 1)
+    axes = [np.linspace(low[k], high[k], counts[k]) for k in range(3)]
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+    parts, _ = label(grid.field.distance(points) >= grid.clearance - 0.5 * spacing)
+    at = np.rint((gap.sides - low) / (high - low) * (counts - 1)).astype(np.int64)
+    one, other = (_near(parts, place) for place in at)
+    return bool(one & other)
 
 
 def _parting(between: Bools, nearest: Ints) -> Bools:
@@ -345,12 +392,15 @@ def _grouped(
         middle = places[widest].mean(axis=0)
         n = widest[int(np.linalg.norm(places[widest] - middle, axis=1).argmin())]
         sides = grid.low + (ends[n] + 0.5) * grid.cell
-        place = _widest(grid, places[n], sides[1] - sides[0])
-        width = 2.0 * float(grid.field.distance(place))
-        if width >= 2.0 * grid.clearance:
-            gaps.append(Gap(np.round(place, 3) + 0.0, width, sides))
-    gaps.sort(key=lambda gap: -gap.width)
-    return gaps[: params.max_gaps]
+        through = sides[1] - sides[0]
+        along = (0.5 * (sides[0] + sides[1]) - places[n]) @ through / (through @ through)
+        for start in (places[n] + along * through, places[n]):  # halfway through, if that is free
+            place = _widest(grid, start, through)
+            width = 2.0 * float(grid.field.distance(place))
+            if width >= 2.0 * grid.clearance:
+                gaps.append(Gap(np.round(place, 3) + 0.0, width, sides))
+                break
+    return gaps
 
 
 def _widest(grid: GapGrid, place: Floats, through: Floats) -> Floats:
@@ -361,6 +411,7 @@ def _widest(grid: GapGrid, place: Floats, through: Floats) -> Floats:
     while reach > 1e-3 * grid.cell:
         u, v = np.meshgrid(np.linspace(-reach, reach, 7), np.linspace(-reach, reach, 7))
         points = place + u.reshape(-1, 1) * across[1] + v.reshape(-1, 1) * across[2]
+        points = np.clip(points, grid.low, grid.high)
         room = grid.field.distance(points)
         # move only to a point with more room than `place`, which is the 25th of the 49 points
         best = int(room.argmax())

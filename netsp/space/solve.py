@@ -610,7 +610,7 @@ def tour_of_flight(
     -------
     SolvedMission or None
         The mission with the tour; None where the robot did not come home free or went where it has
-        not its clearance, or the tether was over the limit.
+        not its clearance or through a gap that no cell shows, or the tether was over the limit.
     """
     if not _good(run):
         return None
@@ -625,7 +625,10 @@ def tour_of_flight(
     water = water or Water.of(mission, mission.load_scene(), field)
     planned_stops = []
     for k, stop in enumerate(stops):
-        word = water.words.word(np.vstack([water.present.nodes, *legs[: k + 1]]))
+        way = np.vstack([water.present.nodes, *legs[: k + 1]])
+        word, broken = water.words.word_until(way)
+        if broken is not None:
+            return None
         planned_stops.append(
             PlannedStop(
                 path=in_file(legs[k]), signature=word, tether_length=stop["tether"],
