@@ -35,14 +35,14 @@ NEVER: Flag = np.zeros(1, dtype=np.int64)
 
 @dataclass(frozen=True)
 class TimingPolicy:
-    """How clocks are heard.
+    """Policy of when a clock may end work.
 
     Parameters
     ----------
     untimed_steps : int
-        Work of at most so many steps of a compiled innermost loop is done whatever the time. The
-        default takes about a tenth of a second; less leaves more problems without any tour when the
-        limit is short, more makes runs end later.
+        Largest number of steps of a compiled innermost loop that run to the end even if the time is
+        up; at least 0. The default takes about a tenth of a second. A smaller number leaves more
+        problems without any tour when the limit is short; a larger one makes runs end later.
     """
 
     untimed_steps: int = 100_000_000
@@ -84,7 +84,7 @@ class Clock:
         self._flag: Flag | None = None
 
     def __reduce__(self) -> tuple[type[Clock], tuple[()]]:
-        """Pickle as a clock without a limit: the time of a run ends in its own process."""
+        """Pickle as a clock without a limit, because a time limit belongs to one process."""
         return Clock, ()
 
     @classmethod
@@ -161,22 +161,22 @@ class Clock:
             )
 
     def finish(self, doing: str, steps: float, call: Callable[[Flag], T]) -> T:
-        """Make a call that hears a flag, as `interruptible` does, and return what it returns.
-        Little work is done whatever the time (`TimingPolicy`).
+        """Call a function that stops at a flag, as `interruptible` does, and return its result.
+        Small work runs to the end whatever the time (`TimingPolicy`).
 
         Parameters
         ----------
         doing : str
-            What is being done, for the message.
+            Name of the work in messages.
         steps : float
-            Most steps of the innermost loop.
+            Largest number of steps of the innermost loop.
         call : callable
-            The work, given the flag; it returns anything when the flag is set.
+            The work; it takes the flag, and may return an incomplete result once the flag is set.
 
         Raises
         ------
         LimitReachedError
-            The time was up before or meanwhile, so what was returned is incomplete.
+            The time was up before the work was complete.
         """
         if steps <= self.policy.untimed_steps:
             return call(NEVER)
@@ -295,8 +295,8 @@ def interrupts_remembered() -> Iterator[Callable[[], None]]:
 
 
 INTERRUPTS = (signal.SIGINT, signal.SIGTERM)
-"""Signals that ask a command for its end. Python raises KeyboardInterrupt at the first; at the
-second it does so where `netsp.command.interrupts` had it."""
+"""Signals that end a command. Python raises KeyboardInterrupt at SIGINT, and
+`netsp.command.interrupts` makes it do so at SIGTERM."""
 
 
 def _is_default(handler: object) -> bool:
@@ -305,8 +305,8 @@ def _is_default(handler: object) -> bool:
 
 
 def _interrupts(hears: Callable[[object], bool] = _is_default) -> dict[signal.Signals, Any]:
-    """Return the handlers of those `INTERRUPTS` whose handler is one that `hears` accepts; none in
-    threads, where no handler can be set."""
+    """Return the handlers of `INTERRUPTS` that `hears` accepts; none in threads, where no handler
+    can be set."""
     if threading.current_thread() is not threading.main_thread():
         return {}
     handlers = {number: signal.getsignal(number) for number in INTERRUPTS}
@@ -322,11 +322,11 @@ def _on_interrupt(
     Parameters
     ----------
     press : callable
-        What is called.
+        Function called at the signal.
     hears : callable
-        Whether a handler is one to be replaced.
+        Returns whether a handler is to be replaced.
     once : bool
-        Whether the second signal does what it did before.
+        Whether the old handlers are restored at the first signal, for the second.
     """
     before = _interrupts(hears)
 

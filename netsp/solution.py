@@ -61,7 +61,7 @@ class Status(StrEnum):
 
     @property
     def is_optimal(self) -> bool:
-        """Whether the tour is proven the shortest of some set of tours, which the status names."""
+        """True if the tour is proven the shortest of the set of tours that the status names."""
         return self.value.startswith("optimal")
 
     @property
@@ -195,15 +195,15 @@ def scope_of(roadmap: str, classes: KeptClasses | None, *, kept_order: bool = Fa
     roadmap : str
         Name of the roadmap.
     classes : {"all", "non-looping", "shortest"} or None
-        Which homotopy classes it held. Where it held the shortest only, bounds include what the
-        classes left out may bring; where a rule excluded classes, they do not.
+        Homotopy classes of the roadmap. With the shortest classes only, bounds include the classes
+        left out; if a rule excluded classes, they do not.
     kept_order : bool
-        The order of the goals was given.
+        Whether the order of the goals was given.
 
     Returns
     -------
     Scope
-        The tours.
+        Scope of its bounds.
     """
     if roadmap not in EXACT_ROADMAPS:
         scope = Scope.ROADMAP
@@ -273,8 +273,8 @@ class Solution(Drawn, FileModel):
     lower_bound : float or None
         Proven lower bound on the tours that `lower_bound_of` names.
     lower_bound_of : Scope or None
-        Tours that `lower_bound` holds for; None without a bound. Files of older versions lack it
-        and are read as what they held: along `prm` it was a bound on the tours of the roadmap.
+        Tours that `lower_bound` holds for; None without a bound. For older files, which lack it, it
+        follows from roadmap and classes: along `prm`, the tours of the roadmap.
     gap : float or None
         (length - lower_bound) / length.
     classes : {"all", "non-looping", "shortest"} or None
@@ -381,15 +381,14 @@ class Solution(Drawn, FileModel):
     @model_validator(mode="before")
     @classmethod
     def _name_scope(cls, data: Any) -> Any:
-        """Fill in what older files do not say: which tours the bound holds for, and `optimal` of
-        which tours."""
+        """Fill in the scope of the bound, and the scope of `optimal`, in data of older files."""
         if not isinstance(data, Mapping) or data.get("lower_bound") is None:
             return data
         if data.get("lower_bound_of") is not None:
             return data
         roadmap, classes = data.get("roadmap"), data.get("classes")
         if not isinstance(roadmap, str):
-            return data  # the field's own check complains
+            return data  # the check of the field reports it
         scope = scope_of(roadmap, classes, kept_order=data.get("kept_order") is True)
         out = {**data, "lower_bound_of": scope}
         if data.get("status") == Status.OPTIMAL:
@@ -444,7 +443,7 @@ class Solution(Drawn, FileModel):
 
     @property
     def proof(self) -> str:
-        """What is proven of the tour, in words."""
+        """Words for what is proven of the tour."""
         return proof(self.status, self.length, self.bound)
 
     def to_json(self) -> str:

@@ -43,7 +43,7 @@ def taut_detours(
     check
         May raise to stop.
     clock
-        The clock of the run; LimitReachedError when it is up.
+        The clock of the run; when it is up, LimitReachedError is raised.
     """
     places, side = sub_goals(problem, with_sub_goals)
     check()

@@ -130,7 +130,8 @@ class GraphFromState(TravelGraph):
         length = sum(self.within.walk_length([u, v]) for u, v in legs)
         status = result.status
         if status.is_optimal:
-            # proven to a millionth of the surcharged length, which is some lengths of the path
+            # the solver proves a millionth of the length with surcharge, several lengths of the
+            # path
             if own is not None and self.legs_left_out:
                 own = dataclasses.replace(own, scope=Scope.PART)
             closed = [b for b in (low, own) if b is not None and b.gap(length) <= ENOUGH]
@@ -141,15 +142,15 @@ class GraphFromState(TravelGraph):
         )  # fmt: skip
 
     def _of_path(self, bound: LowerBound | None) -> LowerBound | None:
-        """Return a bound on closed tours, which pay the surcharge twice, as one on paths from the
-        state."""
+        """Return a bound on paths from the state, given one on closed tours, which include the
+        surcharge twice."""
         if bound is None:
             return None
         return dataclasses.replace(bound, length=max(0.0, bound.length - 2.0 * self.surcharge))
 
     def least_along_left_out(self) -> float:
-        """No path along one of the legs left out is shorter than the leg and the way home; the
-        surcharge counts as in every tour."""
+        """Return a lower bound on paths along a leg left out: the leg and the path home, with the
+        surcharge of every tour."""
         first, leg, second = self.bounds_of_left_out().T
         least = float((leg + np.minimum(first, second)).min(initial=math.inf))
         return least + 2.0 * self.surcharge
@@ -160,7 +161,7 @@ class GraphFromState(TravelGraph):
         return tether + 2.0 * self.surcharge
 
     def progress_listener(self, listener: OnProgress | None) -> OnProgress | None:
-        """Return a listener that is told about the path instead of the tour."""
+        """Return a listener that receives progress of the path instead of the tour."""
         if listener is None:
             return None
         return lambda row: listener(self._row_of_path(row))

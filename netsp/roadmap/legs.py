@@ -54,8 +54,9 @@ class TautLegs:
     Attributes
     ----------
     left_out
-        Legs (u, v), u < v, whose taut path was not found. In their place stands the way back along
-        the tether of u and out along that of v, which is a leg of the same class, but no shorter.
+        Legs (u, v), u < v, whose taut path was not found. Such a leg is replaced by the path back
+        along the tether of u and out along the tether of v, which has the same class and is at
+        least as long.
     """
 
     def __init__(
@@ -179,8 +180,8 @@ class TautLegs:
             spread(u, v, length, len(path.whole) - 1, path.whole, path.real, branches, lengths)
 
     def _searched(self, u: int, v: int, stop: Flag) -> tuple[float, Path] | None:
-        """Search for a leg that could not be pulled, and return its planar length and its path;
-        None if it is not found. LimitReachedError when the flag is set before."""
+        """Search for a leg that could not be pulled. Return its planar length and its path, or None
+        if it is not found; raise LimitReachedError if the flag is set first."""
         a, b = int(self.cluster[u]), int(self.cluster[v])
         word, longest = self.relative_word(u, v), self._longest(u, v)
         try:
@@ -190,15 +191,15 @@ class TautLegs:
         return length, path_along(a, pieces, self.paths.tangents.target, self.paths.arcs)
 
     def _by_way_of_base(self, u: int, v: int) -> float:
-        """3D length of the way back along one tether and out along another, for a leg whose taut
-        path was not found."""
+        """Return the 3D length of the path back along one tether and out along another, and record
+        the leg as left out."""
         self.left_out.add((min(u, v), max(u, v)))
         tethers = self.to_base()
         return float(tethers[u] + tethers[v])
 
     def bounds_of_left_out(self) -> Floats:
-        """(k, 3) lower bounds for each of `left_out`: the tether at one end, the leg, the tether at
-        the other end, in 3D."""
+        """Return lower bounds (k, 3) in 3D for each leg of `left_out`: on the tether at one end,
+        the leg, and the tether at the other end."""
         tethers = self.to_base()
         rows = [
             (tethers[u], self.lower_bounds(np.array([u, v]))[0, 1], tethers[v])
@@ -222,7 +223,7 @@ class TautLegs:
             path = known.get(v)
             if path is None and (found := self._searched(0, v, stop)) is not None:
                 path = found[1]
-            # else nothing is known of it but its length, and no leg is shared beyond the base
+            # a leg left out has no taut path, so it shares no part with other legs
             if path is not None:
                 growing.add(v, path, paths.arcs)
         tree = growing.tree()

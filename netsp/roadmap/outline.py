@@ -40,7 +40,7 @@ from netsp.problem import Circle, Problem
 MARGIN = 1e-10
 EPSILON = 1e-12
 OUTLINING = "outlining the obstacles"
-"""Work that a clock may end, as its message calls it."""
+"""Name of the stage in messages about the time limit."""
 
 STAND_OFF = 1e-8
 """How far from a grown boundary a point is kept, as a fraction of the size: far enough that its

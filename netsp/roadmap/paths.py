@@ -31,7 +31,7 @@ MOST_KNOWN = 5000
 
 
 class UnknownPathError(NetspError):
-    """No taut path of a word was found."""
+    """Error: no taut path of a word was found."""
 
 
 class TautPaths:
@@ -43,10 +43,11 @@ class TautPaths:
         Limit on their planar length; by default that of a leg between two admissible classes, and
         then only what the tether can touch is looked at.
     clock
-        The clock of the run; without one, nothing here ends before it is done.
+        The clock of the run; without a clock, no work is cut short.
     max_states
-        Most departures that the search among the paths of all words looks at for one path. It is
-        the last resort, where the search for the word finds none; a million take half a second.
+        Largest number of departures expanded for one path in the search among the paths of all
+        words. This search is the last resort, if the search for the word finds no path; a million
+        departures take about half a second.
 
     Raises
     ------
@@ -80,7 +81,7 @@ class TautPaths:
         Parameters
         ----------
         up : callable
-            Whether the time is up; straight distances stand for pairs not looked at by then.
+            Returns whether the time is up; the remaining pairs then get straight distances.
         """
         return self.contacts.between(self._z, up)
 
@@ -247,7 +248,7 @@ class TautPaths:
     def _searched(
         self, a: int, b: int, word: Word, longest: float | None = None, stop: Flag = NEVER
     ) -> tuple[float, list[tuple[int, float]]] | None:
-        """As `_sought`, by a search for the word."""
+        """Search for the path of a word, as `_sought`, by following the word."""
         for limit in self._limits(a, b, longest):
             trie = Trie.of_word(word, limit)
             found = run_explore(
@@ -262,8 +263,11 @@ class TautPaths:
     def _searched_among_all(
         self, a: int, b: int, word: Word, longest: float | None = None, stop: Flag = NEVER
     ) -> tuple[float, list[tuple[int, float]]] | None:
-        """As `_sought`, by a search among the paths of all words: it drops no letter that is
-        pending. None, too, where it would take more than `max_states`."""
+        """Search for the path of a word, as `_sought`, among the paths of all words.
+
+        The search prunes no pending letter. It also returns None if it needs more than
+        `max_states`.
+        """
         rest = self.contacts.rest(b).to_end
         for limit in self._limits(a, b, longest):
             trie = Trie.root(limit)
@@ -280,8 +284,8 @@ class TautPaths:
         return None
 
     def _limits(self, a: int, b: int, longest: float | None) -> Iterator[float]:
-        """Lengths up to which a path is sought, one after the other: a search costs far more the
-        longer the paths may be, and no class has two taut paths."""
+        """Yield growing limits of length for the search for a path. A search with a smaller limit
+        is far cheaper, and a class has only one taut path."""
         most = (self._longest if longest is None else longest) + self.margin
         apart = math.dist(self.outline.points[a], self.outline.points[b])
         limit, step = min(FIRST * apart + self.margin, most), FIRST
@@ -379,6 +383,6 @@ def _shortest(
 
 
 def _check(stop: Flag, word: Word) -> None:
-    """LimitReachedError if the flag of a clock is set."""
+    """Raise LimitReachedError if the flag of a clock is set."""
     if stop[0]:
         raise LimitReachedError(f"time limit reached while pulling a leg of word {word}")

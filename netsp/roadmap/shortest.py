@@ -23,7 +23,7 @@ AT_ONCE = 16
 """Sources of shortest paths between two looks at the clock."""
 
 ARCS_AT_ONCE = 1024
-"""Arcs whose contacts are joined between two looks at the clock, some tens of milliseconds."""
+"""Number of arcs whose contacts are joined between two checks of the clock."""
 
 
 def _limits(straight: float) -> list[float]:

@@ -764,7 +764,7 @@ class TravelGraph(Drawn):
 
     @property
     def scope(self) -> Scope:
-        """Tours that this graph holds: a bound that a solver proves over it is one on those."""
+        """Scope of the tours in this graph, and of the bounds that a solver proves over it."""
         if self.declared_scope is not None:
             return self.declared_scope
         if self.roadmap == "custom":
@@ -775,7 +775,7 @@ class TravelGraph(Drawn):
         return Scope.ALL_TOURS if whole else Scope.KEPT_CLASSES
 
     def as_asked(self, result: Result) -> Result:
-        """Return a solver's result as callers are to see it.
+        """Return a solver's result with the bound that holds for the problem.
 
         Parameters
         ----------
@@ -785,7 +785,7 @@ class TravelGraph(Drawn):
         Returns
         -------
         Result
-            The same, with a bound that holds for the classes that were left out, too, unless a rule
+            The same result, with a bound that also holds for classes left out, unless a rule
             excluded them.
         """
         trace = tuple(
@@ -803,19 +803,19 @@ class TravelGraph(Drawn):
     def bound_as_asked(
         self, bound: LowerBound | None, *, anywhere: bool = True
     ) -> LowerBound | None:
-        """Return what a bound on the tours of this graph proves of the tours that were asked for.
+        """Return the bound on the tours of the problem that a bound on this graph's tours proves.
 
         Parameters
         ----------
         bound : LowerBound or None
-            On the tours of this graph, all or those in the order given.
+            Bound on the tours of this graph, or on those in the order given.
         anywhere : bool
-            Use the bound on the tours in any class as well, where it is better.
+            Whether to use the bound on tours in any class as well, if it is better.
 
         Returns
         -------
         LowerBound or None
-            On all tours, if the classes left out are known to have long tethers.
+            Bound on all tours, if the classes left out are known to have long tethers.
         """
         own = self.scope if bound is None else bound.scope
         whole = self._with_classes_left_out(own)
@@ -836,8 +836,7 @@ class TravelGraph(Drawn):
         return strongest(bound, free.for_part(whole, "it holds in any class, in any order"))
 
     def _with_classes_left_out(self, own: Scope) -> Scope:
-        """Return the scope that a bound of this graph can be one on, the classes left out
-        included."""
+        """Return the scope of a bound of this graph once it includes the classes left out."""
         if self.excluded_by_rule:
             return own
         larger = {Scope.KEPT_CLASSES: Scope.ALL_TOURS, Scope.KEPT_IN_ORDER: Scope.GIVEN_ORDER}
@@ -845,8 +844,8 @@ class TravelGraph(Drawn):
 
     @property
     def legs_left_out(self) -> list[tuple[int, int]]:
-        """Legs whose taut path was not found, as pairs of vertices. Their costs are those of the
-        way back to the base and out again."""
+        """Legs whose taut path was not found, as pairs of vertices. Their cost is the length of the
+        path back to the base and out again."""
         return sorted(getattr(self._legs, "left_out", ()))
 
     def bounds_of_left_out(self) -> Floats:
@@ -855,13 +854,13 @@ class TravelGraph(Drawn):
         Returns
         -------
         ndarray, shape (k, 3)
-            The tether at one end, the leg, and the tether at the other end.
+            Bounds on the tether at one end, the leg, and the tether at the other end.
         """
         bounds = getattr(self._legs, "bounds_of_left_out", None)
         return np.zeros((0, 3)) if bounds is None else np.asarray(bounds())
 
     def least_along_left_out(self) -> float:
-        """No tour along one of the legs left out is shorter: it comes from the base and goes home.
+        """Return a lower bound on tours along a leg left out, which come from the base and go home.
 
         Returns
         -------
@@ -886,7 +885,7 @@ class TravelGraph(Drawn):
         return 2.0 * tether
 
     def progress_listener(self, listener: OnProgress | None) -> OnProgress | None:
-        """Return a listener to a solver's progress that is told what callers are to see.
+        """Return a listener to a solver's progress, with the bounds that hold for the problem.
 
         Parameters
         ----------

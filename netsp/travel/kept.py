@@ -1,4 +1,4 @@
-"""What is proven of all classes when a travel graph holds only some of them."""
+"""Extend bounds over the classes of a travel graph to the classes that were left out."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ def with_bound(result: Result, bound: LowerBound) -> Result:
     Parameters
     ----------
     result : Result
-        Of a solver.
+        Result of a solver.
     bound : LowerBound
-        Bound that is stated instead of the result's own.
+        Bound that replaces the bound of the result.
 
     Returns
     -------
     Result
-        The same tour: optimal of the bound's scope if the bound proves it; if only the old bound
-        did, optimal of the old scope.
+        The same tour. It is optimal in the scope of the new bound if that proves it, or in the old
+        scope if only the old bound proves it.
     """
     if result.length is None:
         return dataclasses.replace(result, lower_bound=bound.length, lower_bound_of=bound.scope)
@@ -38,16 +38,16 @@ def with_bound(result: Result, bound: LowerBound) -> Result:
 
 
 def with_classes_left_out(result: Result, least: float, scope: Scope, because: str) -> Result:
-    """Return a result over some classes as one about a scope that includes the others.
+    """Return a result over some classes with a bound for a scope that includes the others.
 
     Parameters
     ----------
     result : Result
-        Over the classes kept.
+        Result over the classes kept.
     least : float
-        No tour that uses a class left out is shorter.
+        Lower bound on tours that use a class left out.
     scope : Scope
-        What the classes are together.
+        Scope of all classes together.
     because : str
         Reason why no such tour is shorter.
 

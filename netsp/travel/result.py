@@ -68,7 +68,7 @@ OnProgress = Callable[[Progress], None]
 
 
 BoundOfWhole = Callable[[LowerBound | None], LowerBound | None]
-"""What a bound on the tours over a part of a travel graph proves of all of it."""
+"""Callback that turns a bound on the tours over a part of a travel graph into one on all of it."""
 
 
 def of_part(
@@ -88,7 +88,7 @@ def of_part(
     Returns
     -------
     callable or None
-        Tells tours by the vertices of the whole graph, and bounds that hold for all of it.
+        Listener that passes on tours as vertices of the whole graph, and bounds for all of it.
     """
     if listener is None:
         return None
@@ -203,7 +203,7 @@ class Result:
 
 
 def relative_gap(length: float | None, bound: float | None) -> float | None:
-    """Return the gap of a tour by a bound whose tours the name of its field says, as
+    """Return the gap of a tour by a bound whose field name states the scope, such as
     ``bound_of_all`` of a mission.
 
     Parameters
