@@ -61,8 +61,8 @@ class Model(BaseModel):
 
 
 def _signature(model: type[BaseModel]) -> inspect.Signature:
-    """Return the signature that `inspect.signature` and help show of a model's constructor."""
-    types = get_type_hints(model)  # without Annotated, in which the checks of fields stand
+    """Return the signature of a model's constructor for `inspect.signature` and help."""
+    types = get_type_hints(model)  # without Annotated, which holds the checks of fields
     return inspect.Signature(
         [
             inspect.Parameter(
@@ -125,7 +125,7 @@ def parse_json(text: str | bytes, source: str) -> Any:
     Returns
     -------
     object
-        As `json.loads` gives it.
+        Value, as from `json.loads`.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Ctrl-C is heard wherever it comes, and SIGTERM does what Ctrl-C does.
+"""Interrupts: Ctrl-C ends a command wherever it comes, and SIGTERM does the same.
 
 What is raised where nobody can catch it (finalizers, callbacks of weak references, hooks of a fork)
 Python reports and forgets, KeyboardInterrupt too: the work would go on as if nobody had asked.
@@ -22,8 +22,8 @@ AGAIN = 0.05
 
 @contextmanager
 def interrupts_are_heard() -> Iterator[None]:
-    """Have SIGTERM raise KeyboardInterrupt, as Ctrl-C does, and an interrupt that was raised where
-    nobody can catch it come again a moment later."""
+    """Make SIGTERM raise KeyboardInterrupt, as Ctrl-C does, and repeat an interrupt a moment later
+    if it was raised where nobody can catch it."""
     before = sys.unraisablehook
     hears_sigterm = (
         threading.current_thread() is threading.main_thread()
@@ -50,8 +50,8 @@ def interrupts_are_heard() -> Iterator[None]:
 
 
 def _interrupt() -> None:
-    """Interrupt the main thread, which also wakes it up where there are real signals. What a shell
-    starts in the background ignores SIGINT; the interrupt that was lost was SIGTERM then."""
+    """Interrupt the main thread, by a signal where possible, because that also wakes it up. A
+    process that a shell starts in the background ignores SIGINT, so it gets SIGTERM."""
     main = threading.main_thread().ident
     if hasattr(signal, "pthread_kill") and main is not None:
         is_ignored = signal.getsignal(signal.SIGINT) is signal.SIG_IGN

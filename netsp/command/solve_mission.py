@@ -150,14 +150,14 @@ def summary(
     if tour.status is Status.OPTIMAL:
         verdict = "no tour to these waypoints is shorter"
     elif tour.status is Status.OPTIMAL_OF_STATES:
-        verdict = f"the shortest along {legs} of the tether that were found, not of all tours"
+        verdict = f"the shortest along {legs} of the tether found; other tours may be shorter"
     elif tour.lower_bound is not None:
         bound = LowerBound(tour.lower_bound, Scope.STATES)
         verdict = f"{bound.says(tour.length, units)}: {legs}"
         if bound.proves(tour.length):
             verdict = f"the shortest along {legs} of the tether; there was no time for all legs"
     elif tour.solver == AS_GIVEN:
-        verdict = "in the order given, for no better one was found"
+        verdict = "in the order given: no better order was found"
     elif tour.solver == GOING_ON:
         verdict = "found by going straight on"
     elif tour.solver == PLANE:
@@ -227,10 +227,10 @@ def _gap_lines(found: SolvedMission, units: str) -> list[str]:
     if found.cells is None:
         return []
     cell = f"{found.cells.cell:.3g} {units}"
-    lines = [f"gap      {gap}: shown by cells of {cell}, taken for it" for gap in found.cells.shown]
+    lines = [f"gap      {gap}: shown by cells of {cell}, now in use" for gap in found.cells.shown]
     lines += [
         f"gap      {gap}: wide enough for the robot, but cells of {cell} do not show it, and no "
-        "tour through it was looked at; give the mission a finer `cell`"
+        "tour through it was considered; give the mission a finer `cell`"
         for gap in found.tour.unresolved_gaps
     ]
     return lines

@@ -57,8 +57,11 @@ def counterclockwise(vertices: npt.ArrayLike) -> npt.NDArray[np.float64]:
 
 
 def _every_other(flat: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
-    """Choose flat corners of a ring to leave out together: of neighbours every other one, because
-    whether a corner is flat depends on its neighbours; at least one, and at most all but three."""
+    """Return the mask of flat corners of a ring that can be left out together.
+
+    Of neighbouring flat corners every other one is chosen, because a corner is flat or not by its
+    neighbours. At least one corner is chosen, and at least three remain.
+    """
     k = len(flat)
     number = np.arange(k)
     last_other = np.maximum.accumulate(np.where(flat, -1, number))
@@ -139,8 +142,8 @@ AT_ONCE = 64
 def _depths(
     vertices: Vertices, points: npt.NDArray[np.float64], most: npt.NDArray[np.float64]
 ) -> npt.NDArray[np.float64]:
-    """Return how deep points (n, 2) lie in a polygon, given what each depth cannot exceed; -inf
-    where that alone shows that another point lies deeper."""
+    """Return the depths of points (n, 2) in a polygon, given an upper bound `most` on each; -inf
+    for a point whose bound shows that another point lies deeper."""
     out = np.full(len(points), -np.inf)
     order = np.argsort(-most, kind="stable")
     for first in range(0, len(order), AT_ONCE):

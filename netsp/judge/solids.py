@@ -177,7 +177,8 @@ def _outline(obstacle: Circle | Polygon, origin: Floats) -> Outline:
 def _contacts(
     problem: Problem, a: Outline, b: Outline, inset_a: Inset, inset_b: Inset, place: float
 ) -> list[tuple[Floats, Floats]]:
-    """Return where two obstacles touch: a point (2,) of the one and one of the other for each."""
+    """Return the contacts of two obstacles, each as a point (2,) of the one and one of the
+    other."""
     gap = 2.0 * problem.clearance + TOUCHING * problem.scale
     (one, r), (other, q) = a, b
     if r and q:

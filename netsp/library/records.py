@@ -29,7 +29,7 @@ SAME = 1e-6
 
 
 class Record(Model):
-    """The best tour that is known of a problem, and a lower bound on all tours."""
+    """Best known tour of a problem, with a lower bound on all tours."""
 
     problem: Annotated[Name, Field(description="name of the problem, and of its file")]
     sha256: Annotated[str, Field(description="of what its answer depends on")]
@@ -51,7 +51,7 @@ class Record(Model):
 
     @property
     def bound(self) -> LowerBound | None:
-        """The lower bound, on all tours; None where nothing is known."""
+        """Lower bound on all tours; None if nothing is known."""
         return None if self.lower_bound is None else LowerBound(self.lower_bound, Scope.ALL_TOURS)
 
     @property
@@ -216,8 +216,8 @@ class Library:
         commit : str
             Of the solver, where it is netsp.
         bound : LowerBound, optional
-            Proven by a solver that is trusted, on all tours: a bound cannot be judged, so the one
-            that a contribution states is not taken.
+            Bound on all tours from a trusted solver. The judge cannot check a bound, so the bound
+            that a contribution states is ignored.
 
         Returns
         -------

@@ -72,21 +72,21 @@ def grid_of(mission: Mission, scene: Scene, field: DistanceField) -> Grid:
 
 
 def grid_box(mission: Mission, scene: Scene) -> tuple[Floats, Floats, float]:
-    """Return the box of the grid that paths are sought on, and the size of its cells.
+    """Return the box of the grid for paths, and the size of its cells.
 
     Parameters
     ----------
     mission : Mission
-        Its cell, waypoints and clearance count.
+        Mission with cell, waypoints and clearance.
     scene : Scene
-        Its bounds count.
+        Scene with bounds.
 
     Returns
     -------
     low, high : ndarray, shape (3,)
         Corners of the box, metres.
     cell : float
-        Metres.
+        Cell size, metres.
 
     Raises
     ------

@@ -45,26 +45,26 @@ class PlannedStop(Model):
 
 
 class UnresolvedGap(Model):
-    """A passage with room for the robot that the cells of a mission do not show.
+    """Passage that the robot fits through but the grid of a mission does not show.
 
     Attributes
     ----------
     position : (x, y, z)
-        In the middle of it, metres.
+        Middle of the passage, metres.
     width : float
-        Twice the distance from solids there, metres.
+        Twice the distance of `position` from solids, metres.
     """
 
     position: Annotated[Point3, Field(description="(x, y, z) in the middle of it, m")]
     width: Annotated[NonNegative, Field(description="twice the distance from solids there, m")]
 
     def __str__(self) -> str:
-        """Name width and place, as in "0.24 m at (0, 1.5, -2)"."""
+        """Return width and place, as in "0.24 m at (0, 1.5, -2)"."""
         return f"{self.width:.2g} m at ({', '.join(f'{v:.3g}' for v in self.position)})"
 
 
 def _within(gap: Any) -> bool:
-    """Say whether a gap from a file proves a tour the shortest."""
+    """Return whether a gap from a file proves that a tour is the shortest."""
     return isinstance(gap, int | float) and gap <= OPTIMALITY_TOLERANCE
 
 
@@ -79,8 +79,9 @@ class PlannedTour(Model):
     home : tuple of (x, y, z)
         From the last stop back to the start, metres.
     status : Status
-        `optimal`: no tour to these waypoints is shorter, whatever the tether's class (by
-        `bound_of_all`). `optimal_of_states`: none is along the states and legs that were found.
+        `optimal` if `bound_of_all` proves that no tour to these waypoints is shorter, in any class
+        of the tether; `optimal_of_states` if the tour is the shortest along the states and legs
+        that were found.
     solver : str
         Name of the solver.
     seed : int
@@ -92,7 +93,7 @@ class PlannedTour(Model):
     gap : float or None
         (length - lower_bound) / length.
     bound_of_all : float or None
-        No tour to these waypoints is shorter, whatever the tether's classes; certified
+        Certified lower bound on all tours to these waypoints, in any class of the tether
         (`netsp.space.bound`).
     gap_to_all : float or None
         (length - bound_of_all) / length.
@@ -101,11 +102,11 @@ class PlannedTour(Model):
     legs : int
         How many legs between these were driven.
     exact : bool
-        Whether words that differ are of different classes of paths through the mission's cells; it
-        says nothing of gaps that the cells do not show, nor of the tour's length.
+        Whether different words always belong to different classes of paths through the mission's
+        cells. It does not cover gaps that the grid does not show, nor the tour's length.
     unresolved_gaps : tuple of UnresolvedGap
-        Passages with room for the robot that the cells do not show: tours through them were not
-        looked at, though `bound_of_all` holds for them, too.
+        Passages that the robot fits through but the grid does not show. No tour through them was
+        considered; `bound_of_all` also holds for such tours.
     """
 
     stops: Annotated[
@@ -154,7 +155,7 @@ class PlannedTour(Model):
     @model_validator(mode="before")
     @classmethod
     def _older(cls, data: Any) -> Any:
-        """Read `optimal` of files that said so of the states that were found as what it was."""
+        """Read `optimal` of older files as `optimal_of_states` if only the states prove it."""
         if isinstance(data, dict) and data.get("status") == Status.OPTIMAL.value:
             of_all, of_states = data.get("gap_to_all"), data.get("gap")
             if not _within(of_all) and _within(of_states):

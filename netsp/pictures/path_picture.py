@@ -1,4 +1,4 @@
-"""Paths beside the planned tour: for each a map, and the tether along it."""
+"""Pictures that compare paths with the planned tour: a map and the tether along each path."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from netsp.pictures import style
 from netsp.pictures.problem import draw_obstacles
 
 ROW_HEIGHT = 4.6
-"""Inches of one path; a map and a curve stand side by side."""
+"""Height of the row of one path, with a map and a curve side by side, inches."""
 
 MAX_TITLE = 150
-"""Letters of the title that fit the width of the picture."""
+"""Largest number of letters of the title that fit the width of the picture."""
 
 MAX_NAMES = 40
-"""Goals or obstacles up to which names are written: more would cover one another."""
+"""Largest number of goals or obstacles with names in the picture; more names would overlap."""
 
 
 def draw_comparison(found: PathComparison) -> Any:
-    """Draw paths and tour.
+    """Draw paths with the planned tour.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def draw_comparison(found: PathComparison) -> Any:
     Returns
     -------
     matplotlib.figure.Figure
-        A row for each path.
+        Figure with a row for each path.
     """
     from matplotlib.figure import Figure
 

@@ -95,18 +95,18 @@ def _stretches(problem: Problem, found: list[Stretch]) -> str:
     """Return in words where a path is in obstacles, within their clearance, or out of bounds."""
     u, out = problem.units, []
     for key in dict.fromkeys(s.obstacles for s in found):
-        own = [s for s in found if s.obstacles == key]
+        parts = [s for s in found if s.obstacles == key]
         names = " and ".join(problem.obstacle_name(k) for k in key)
-        size = sum(s.end - s.start for s in own)
-        depth = max(s.depth for s in own)
-        times = f", {counted(len(own), 'time')}" if len(own) > 1 else ""
-        x, y = own[0].place
-        if own[0].kind == "touching":
+        size = sum(s.end - s.start for s in parts)
+        depth = max(s.depth for s in parts)
+        times = f", {counted(len(parts), 'time')}" if len(parts) > 1 else ""
+        x, y = parts[0].place
+        if parts[0].kind == "touching":
             out.append(f"{names} at ({x:.4g}, {y:.4g}){times}")
             continue
         by = {
             "obstacle": "deep", "clearance": f"of {problem.clearance:g} short", "bounds": "out",
-        }[own[0].kind]  # fmt: skip
+        }[parts[0].kind]  # fmt: skip
         begin = f"{names} " if names else ""
         out.append(
             f"{begin}for {size:.3g} {u} from ({x:.4g}, {y:.4g}) on, {depth:.3g} {u} {by}{times}"

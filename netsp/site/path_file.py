@@ -130,8 +130,8 @@ def _of_gpx(file: str | Path, problem: Problem, stem: str) -> list[FoundPath]:
         points = np.column_stack([xy, np.array(heights, dtype=float)]) if known else xy
         stamps = [p.time_s for p in line.points]
         times = None if None in stamps else np.array(stamps, dtype=float)
-        own = line.name or (stem if len(lines) == 1 else f"{stem} {k + 1}")
-        out.append(FoundPath(own, points, times))
+        name = line.name or (stem if len(lines) == 1 else f"{stem} {k + 1}")
+        out.append(FoundPath(name, points, times))
     return out
 
 
@@ -243,8 +243,8 @@ def _of_geojson(
             f"{file}: expected GeoJSON with a LineString or MultiLineString, got "
             f"{shown(data.get('type'))} without one"
         )
-    own = data.get("frame")
-    is_global = (frame or (own if own in FRAMES else None) or (
+    stated = data.get("frame")
+    is_global = (frame or (stated if stated in FRAMES else None) or (
         "global" if problem.origin is not None else "local"
     )) == "global"  # fmt: skip
     out = []

@@ -64,7 +64,8 @@ def verify_mission(
     field : DistanceField, optional
         The scene's field, when it is at hand.
     water : Water, optional
-        Of the mission, when its words are at hand: they depend on field, box and cell alone.
+        Water of the mission, if it is already computed; its words depend on field, box and cell
+        only.
 
     Returns
     -------

@@ -227,7 +227,7 @@ def unresolved_gaps(grid: GapGrid, params: GapParams | None = None) -> list[Gap]
     gaps = _gaps_between(grid, free, free, possible, params)
     layers = _single_layers(free) & possible
     if layers.any():
-        # the nearest free cells on its two sides are too near to be told apart
+        # the free cells on both sides of a single layer are only two cells apart, so leave them out
         apart = free & ~binary_dilation(layers, np.ones((3, 3, 3)))
         far = 2.0 * grid.cell
         gaps += [
@@ -240,7 +240,7 @@ def unresolved_gaps(grid: GapGrid, params: GapParams | None = None) -> list[Gap]
 
 
 def _single_layers(free: Bools) -> Bools:
-    """Return the cells that are not free between two that are, along an axis."""
+    """Return the mask of blocked cells between two free cells along an axis."""
     out = np.zeros(free.shape, dtype=np.bool_)
     for axis in range(3):
         rows, found = np.moveaxis(free, axis, 0), np.moveaxis(out, axis, 0)
@@ -251,7 +251,7 @@ def _single_layers(free: Bools) -> Bools:
 def _gaps_between(
     grid: GapGrid, free: Bools, ends_of: Bools, possible: Bools, params: GapParams
 ) -> list[Gap]:
-    """Return the gaps between some of the free cells, `ends_of`."""
+    """Return the gaps between the free cells `ends_of`."""
     from scipy.ndimage import distance_transform_edt
 
     if not ends_of.any():

@@ -114,9 +114,9 @@ class FloorPlan:
         out: list[Circle | Polygon] = [
             Circle(center=center, radius=radius - growth) for center, radius in self.circles
         ]
-        for corners, own in self.polygons:
+        for corners, polygon_growth in self.polygons:
             polygon = Polygon(polygon=corners)
-            more = own - growth
+            more = polygon_growth - growth
             if more > 0.0:
                 import shapely
 
@@ -267,7 +267,7 @@ def tours_of_plan(
         if clock.up:
             return
         try:
-            found = plane.sought(share, Clock(params.max_s, within=clock.part(0.5)), seed)
+            found = plane.shortest_legs(share, Clock(params.max_s, within=clock.part(0.5)), seed)
         except (InputError, InfeasibleError, LimitReachedError):
             continue
         if found is not None:
@@ -288,7 +288,9 @@ class _PlaneTour:
     plan: FloorPlan
     params: PlaneParams
 
-    def sought(self, share: float, clock: Clock, seed: int) -> tuple[list[LegTo], Floats] | None:
+    def shortest_legs(
+        self, share: float, clock: Clock, seed: int
+    ) -> tuple[list[LegTo], Floats] | None:
         """Return the legs of the shortest tour for a share of the tether, and the path home."""
         water, places = self.water, self.places
         mission = water.mission

@@ -141,7 +141,7 @@ class _Flights:
     tell: Callable[[str], None]
     policy: MissionPolicy
 
-    def of(
+    def fly(
         self, mission: Mission, name: str, worth: float = np.inf, clock: Clock | None = None
     ) -> tuple[Run | None, bool]:
         """Fly a mission to its end.
@@ -235,7 +235,7 @@ class _Incumbents:
             return
         if not self.flights.judged(found.mission):
             return
-        run, slower = self.flights.of(found.mission, name, self._worth())
+        run, slower = self.flights.fly(found.mission, name, self._worth())
         found = replace(found, run=run)
         if self._needs_flight(found) and (found.run is None or not _good(found.run)):
             return
@@ -253,7 +253,7 @@ class _Incumbents:
         """Fly the incumbent as it will be written, if it has not been flown."""
         best = self.best
         if best is not None and best.run is None:
-            run, _ = self.flights.of(best.mission, "it as it will be written")
+            run, _ = self.flights.fly(best.mission, "it as it will be written")
             self.best = replace(best, run=run)
             self.first = self.best if best is self.first else self.first
 
@@ -387,7 +387,7 @@ def solve_mission(
         searched = _search(found, clock, name, solver, params, iteration_limit, seed)
         planned = searched.plan
         if found.given is None:
-            given, _ = flights.of(mission, "the order as given")
+            given, _ = flights.fly(mission, "the order as given")
             found.take_given(given)
             _offer_given_flight(found, seed)
         _offer_going_on(found, seed)
@@ -454,7 +454,7 @@ def _begin_as_given(found: _Incumbents, flying: Clock, seed: int) -> None:
         driven = given_plan(water)
         if driven is not None and driven.stops:
             found.take_first(_of_plan(driven, AS_GIVEN, seed))
-    given, _ = flights.of(mission, "the order as given", clock=flying)
+    given, _ = flights.fly(mission, "the order as given", clock=flying)
     found.take_given(given)
     _offer_given_flight(found, seed)
 
@@ -565,7 +565,7 @@ def _offer_going_on(found: _Incumbents, seed: int) -> None:
         order = (*there, *rest)
         waypoints = tuple(mission.waypoints[n] for n in order)
         ordered = mission.model_copy(update={"waypoints": waypoints})
-        run, slower = flights.of(ordered, f"that order {direction}", found._worth())
+        run, slower = flights.fly(ordered, f"that order {direction}", found._worth())
         if slower:
             continue
         if run is None:
