@@ -218,3 +218,24 @@ def test_many_corners_end_in_time_and_say_where_it_was_up():
     with pytest.raises(LimitReachedError, match=r"time limit reached while (outlining|finding)"):
         solve(problem, time_limit=0.3)
     assert time.process_time() - begin < 1.3
+
+
+def _comb(teeth):
+    """A wall with so many slanted teeth, all within its box, and goals around it."""
+    w = 100.0 / teeth
+    ring = [(0.0, 0.0), (100.0, 0.0)]
+    for k in reversed(range(1, teeth)):
+        x = k * w
+        ring += [(x + 0.6 * w, 10.0), (x + 0.1 * w, 10.0), (x + 0.05 * w, 1.0), (x - 0.3 * w, 1.0)]
+    ring += [(0.6 * w, 10.0), (0.0, 10.0)]
+    goals = [(105, 5), (50, 12), (50, -3)]
+    return Problem(base=(-5, 5), goals=goals, obstacles=[{"polygon": ring}], tether_length=160)
+
+
+def test_a_polygon_of_many_edges_is_not_little_work_because_it_is_one_obstacle():
+    """Tangents of a comb with 3,000 corners took 225 s of 5: each is held against every edge."""
+    solve(_comb(25), time_limit=5.0)  # compiled code is read before time counts
+    begin = time.process_time()
+    with pytest.raises(LimitReachedError, match="time limit reached while finding tangents"):
+        solve(_comb(300), time_limit=0.3)
+    assert time.process_time() - begin < 1.3

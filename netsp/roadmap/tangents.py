@@ -118,8 +118,9 @@ def build_tangents(outline: Outline, reach: float, clock: Clock | None = None) -
         arcs, full = outline.arcs[near], outline.full[near]
     else:
         arcs, full = outline.arcs, outline.full
-    boxes = len(outline.blockers.box)
-    steps = 2.0 * (len(arcs) + len(outline.points)) ** 2 * (4 + boxes)
+    # a segment within the box of a polygon is held against each of its edges
+    parts = len(outline.blockers.box) + len(outline.blockers.edges)
+    steps = 2.0 * (len(arcs) + len(outline.points)) ** 2 * (4 + parts)
     rows = (clock or Clock()).finish(
         JOINING, steps, lambda stop: tangent_rows(outline, arcs, full, reach, stop=stop)
     )
