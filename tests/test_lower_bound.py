@@ -405,7 +405,7 @@ def test_no_place_claims_more_of_a_tour_over_few_classes(restricted):
 
 
 def told_to_the_page(problem, time_limit, monkeypatch):
-    """What the app's worker tells of tours, over a roadmap of few classes."""
+    """Return the messages of the app's worker about tours, over a roadmap of few classes."""
     whole = by_name.travel_graph
     monkeypatch.setattr(
         by_name, "travel_graph", lambda p, *name, **o: whole(p, *name, **{"max_classes": 4, **o})

@@ -28,7 +28,7 @@ LONG_NUMBER = "1" * 5001
 
 @pytest.fixture
 def posts():
-    """Two posts, four goals; a tour takes milliseconds."""
+    """Return a problem with two posts and four goals, which takes milliseconds to solve."""
     return Problem(
         base=(0, 0), goals=[(6, 1), (6, -1), (9, 2), (3, 3)], tether_length=14,
         obstacles=[Circle(center=(4, 0), radius=1), Circle(center=(7, 2), radius=0.5)],

@@ -240,7 +240,8 @@ def test_a_bound_proves_the_status_of_its_scope():
 @settings(max_examples=60, deadline=None)
 @given(st.integers(0, 10_000))
 def test_pruning_keeps_what_is_needed_and_takes_the_least_useful_first(seed):
-    """What stays sees enough, and none of it can go; the best viewpoint outlives a useless one."""
+    """The chosen viewpoints see enough, none is superfluous, and the best outlives a useless
+    one."""
     rng = np.random.default_rng(seed)
     matrix = rng.random((6, 9)) < 0.4
     weights = rng.uniform(0.1, 1.0, 9)
@@ -594,7 +595,7 @@ def test_velocity_and_turn_are_those_of_the_motion():
 
 
 class Vehicle:
-    """As much of a session as is asked before a flight; it says all at once."""
+    """The part of a session that is used before a flight; it answers everything at once."""
 
     system, others, silent_s, unplaced_s, broken = 1, (), 0.0, 0.0, None
 
@@ -603,10 +604,10 @@ class Vehicle:
         self.now = SimpleNamespace(**{**kept, "time": 0.0, "heading": None, **told})
 
     def ask_for_positions(self):
-        """Nothing to be sent."""
+        """Send nothing."""
 
     def sleep(self, seconds):
-        """No time passes."""
+        """Return without delay."""
 
     def command(self, *_):
         return True

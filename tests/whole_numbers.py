@@ -64,13 +64,14 @@ class WholeNumbers:
         return [q for q in around if not self.inside(q)]
 
     def pinched(self, k: int) -> bool:
-        """Whether a place lies between two boxes that touch in it, so that it is on two sides."""
+        """Return whether a place lies between two boxes that touch there, so that it has two
+        sides."""
         p = self.points[k]
         free = [not self.inside((p[0] + i, p[1] + j)) for i, j in AROUND]
         return sum(free[j] and not free[j - 1] for j in range(8)) > 1
 
     def sees(self, p: Point, q: Point) -> bool:
-        """Whether the segment meets the inside of no box."""
+        """Return whether the segment avoids the inside of all boxes."""
         for a, b, c, d in self.boxes:
             if max(p[0], q[0]) <= a or min(p[0], q[0]) >= c:
                 continue

@@ -604,13 +604,13 @@ def tour_of_flight(
     seed : int
         Of what found the order.
     name : str
-        Of what found it.
+        Random seed of the search.
 
     Returns
     -------
     SolvedMission or None
-        The mission with the tour; None where the robot did not come home free or went where it has
-        not its clearance or through a gap that no cell shows, or the tether was over the limit.
+        The mission with the tour. None if the robot did not come home free, went through a gap that
+        the grid does not show, lost its clearance, or the tether was over the limit.
     """
     if not _good(run):
         return None

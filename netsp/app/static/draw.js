@@ -144,7 +144,7 @@ export class DrawnPath {
       ["goals", `${f.order.length} of ${f.order.length + f.missing.length} within ${f.radius} m: ${f.order.map(goal).join(" → ")}`],
     ];
     if (f.revisits.length) rows.push(["again", f.revisits.map(goal).join(", ")]);
-    rows.push(["longest tether", f.longest_tether === null ? "unknown: it leads where none reaches"
+    rows.push(["longest tether", f.longest_tether === null ? "unknown: obstacles enclose a part of the path"
       : `${f.longest_tether.toFixed(2)} of ${data.tether_length} m`, !f.fits]);
     rows.push(["tether here", f.end_tether === null ? "unknown" : `${f.end_tether.toFixed(2)} m, ${said(data, f.end_word)}`]);
     const held = f.entangled.map(obstacle).join(", ");

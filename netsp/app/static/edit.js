@@ -31,7 +31,7 @@ export function edits(page, link) {
     goal: "click where the goals are; with keys: arrows move the cross, Space puts a goal there",
     circle: "drag from the centre, or click; with keys: arrows move the cross, Space puts a circle there",
     polygon: "click its corners, the first again to finish; with keys: arrows, Space, then Enter",
-    path: "click the points of a path, or hold and draw; Ctrl+Z takes a stroke back; it ends at the base",
+    path: "click the points of a path, or hold and draw; end the path at the base; Ctrl+Z removes the last stroke",
     bounds: "drag a rectangle",
   };
   /** @param {[number, number]} p @param {MouseEvent} event @returns {[number, number]} */

@@ -92,8 +92,8 @@ function drawn(page) {
   if (!path?.points.length && page.tool !== "path") return [];
   const back = button("Take back", !path.points.length), none = button("Clear", !path.points.length);
   const save = button("Download", !path.any);
-  back.title = "the last stroke (Ctrl+Z)";
-  save.title = "as GeoJSON, which netsp compare-path reads";
+  back.title = "Remove the last stroke (Ctrl+Z)";
+  save.title = "Download as GeoJSON, which netsp compare-path reads";
   back.addEventListener("click", () => path.undo());
   none.addEventListener("click", () => path.clear());
   save.addEventListener("click", () => page.download("drawn.geojson"));
