@@ -25,8 +25,8 @@ from netsp.compiled.chance import uniform
 from netsp.compiled.kernel import kernel
 
 EVEN = 1e-13
-"""Share of a length up to which two differences are the same. Each table may be off by so much of
-the largest number in it at every cluster on the way (`netsp.lns.layers.Instance.rounding`)."""
+"""Relative difference up to which two lengths are equal. Each table may be off by this share of its
+largest number at every cluster along the tour (`netsp.lns.layers.Instance.rounding`)."""
 
 
 class Tables(NamedTuple):

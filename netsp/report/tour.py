@@ -119,7 +119,7 @@ def page(what: Opened) -> str:
 
 
 def _proof(solution: Solution) -> str:
-    """What is proven of a tour; its status comes first where that is no proof."""
+    """Return words for what is proven of a tour, with the status first if that is no proof."""
     status = solution.status
     return solution.proof if status.is_optimal else f"{status.value}, {solution.proof}"
 

@@ -271,8 +271,8 @@ def _key(theta: float, sense: int, start: float, end: float, full: bool) -> floa
 
 @kernel
 def _reverse_key(key: float, start: float, end: float, full: bool) -> float:
-    """How far along the arc run in the other sense the same contact lies. Found from the key, so
-    that rounding never puts a contact on an arc in one sense and off it in the other."""
+    """Return the position of a contact along its arc in the other sense. It is computed from the
+    key, so that rounding never puts a contact on an arc in one sense and off it in the other."""
     if full:
         return (TWO_PI - key) % TWO_PI
     return end - start - key
