@@ -963,13 +963,18 @@ def test_the_judge_sees_a_path_through_the_edge_of_a_block(toured, clearance):
                                                      * s.tour[1].tether_length)),
         ("taut lengths as stated", lambda s: revisit(s, 1, tether_length=1.01
                                                      * s.tour[1].tether_length)),
-        ("length is right", lambda s: s.model_copy(update={"length": 0.99 * s.length})),
+        ("length is right", lambda s: s.model_copy(update={"length": 0.9995 * s.length})),
+        ("length is right", lambda s: with_path(
+            s, [s.path[0], (-0.2, 0.0, 0.0), *s.path])),
         ("length is right", lambda s: s.model_copy(update={"length": 1.01 * s.length})),
         ("stays within bounds", lambda s: with_path(s, [*s.path[:-1], (-2.1, 0.0, 0.0),
                                                         s.path[-1]])),
         ("bound, gap and status agree", lambda s: s.model_copy(update={"lower_bound": 1.1
                                                                        * s.length})),
-        ("bound, gap and status agree", lambda s: s.model_copy(update={"gap": 0.2})),
+        ("bound, gap and status agree", lambda s: s.model_copy(
+            update={"status": Status.FEASIBLE, "lower_bound": 0.9 * s.length, "gap": 0.05})),
+        ("bound, gap and status agree", lambda s: s.model_copy(
+            update={"lower_bound_of": Scope.TRAVEL_GRAPH})),
         ("bound, gap and status agree", lambda s: s.model_copy(
             update={"lower_bound": 0.5 * s.length, "gap": 0.5})),
         ("bound, gap and status agree", lambda s: s.model_copy(

@@ -23,6 +23,7 @@ from netsp.judge.overstretch import first_overstretch
 from netsp.judge.passage import passes
 from netsp.judge.solids import Inset, bridges
 from netsp.judge.stringpull import PLACE_TOLERANCE, StringPuller, reduce_sleeve
+from netsp.lower_bound import Scope
 from netsp.problem import Circle, Problem
 from netsp.solution import Solution, Status, scope_of, tension_ratio
 
@@ -161,6 +162,9 @@ def checked(problem: Problem, solution: Solution) -> Solution:
         )
     return solution
 
+
+NOT_OF_PROBLEMS = frozenset({Scope.TRAVEL_GRAPH, Scope.PART, Scope.STATES, Scope.STATES_IN_ORDER})
+"""Scopes of bounds on travel graphs, on parts of them and on missions in space."""
 
 TURNING_TOLERANCE = 1e-6
 """Radians; contacts with obstacles are found exactly."""
@@ -596,6 +600,8 @@ class _Judge:
         if s.bound is None:
             return f"{status.value}, but there is no bound" if status.is_optimal else None
         bound, scope = s.bound.length, s.bound.scope
+        if scope in NOT_OF_PROBLEMS:
+            return f"a bound on {scope.tours}, which no solution of a problem has"
         if bound > length + 1e-9 * max(length, self.problem.scale):
             return f"bound {bound:g} above length {length:g}"
         if gap is None or abs(gap - s.bound.gap(length)) > MAX_GAP_ERROR:
