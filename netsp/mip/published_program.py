@@ -59,7 +59,7 @@ class Params:
     """
 
     cuts: str = "goals"
-    max_legs: int = 500_000
+    max_legs: int = 50_000
 
     def __post_init__(self) -> None:
         if self.cuts not in CUTS:
