@@ -221,7 +221,7 @@ def test_many_corners_end_in_time_and_say_where_it_was_up():
 
 
 def _comb(teeth):
-    """A wall with so many slanted teeth, all within its box, and goals around it."""
+    """Return a wall with slanted teeth, all within its box, and goals around it."""
     w = 100.0 / teeth
     ring = [(0.0, 0.0), (100.0, 0.0)]
     for k in reversed(range(1, teeth)):

@@ -101,7 +101,7 @@ def test_a_cell_is_chosen_that_shows_a_slot_the_default_does_not(y):
     assert cells.left == ()
     assert len(cells.shown) == 1
     assert cells.mission.cell == cells.cell < 0.2
-    # a cell that was asked for is kept, and the gap is told
+    # a cell that was asked for is kept, and the gap is named
     asked = resolved(mission_of(cell=0.2), scene, scene.field())
     assert asked.mission.cell == 0.2
     assert len(asked.left) == 1

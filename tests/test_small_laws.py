@@ -934,8 +934,8 @@ def test_the_judge_sees_a_path_a_centimetre_inside_an_obstacle(toured):
 
 @pytest.mark.parametrize("clearance", [0.0, 0.1])
 def test_the_judge_sees_a_path_through_the_edge_of_a_block(toured, clearance):
-    """Of a polygon without clearance, distances tell nothing: a path inside is as near as one on
-    its edge."""
+    """The distance to a polygon without clearance is 0 inside it as on its edge, so the judge has
+    to look for paths inside it by other means."""
     problem, solution = toured
     if clearance != problem.clearance:
         problem = problem.model_copy(update={"clearance": clearance})

@@ -17,7 +17,7 @@ from netsp.roadmap.tethers import Tethers
 from netsp.site.path_file import path_to_geojson
 
 MAX_POINTS = 5000
-"""Largest number of points of a drawn path; a message with so many has 0.2 MB."""
+"""Largest number of points of a drawn path; a message with 5000 points has 0.2 MB."""
 
 ORDER_LIMIT_S = 20.0
 """Time limit for the shortest tour in a drawn order, s."""
