@@ -69,13 +69,15 @@ def steps() -> Iterator[tuple[str, Callable[[], object]]]:
 
     problem = random_world(1, goals=9, tether_length=450.0)
     polygons = random_world(1, family="harbour", goals=4, tether_length=250.0)
+    fewer, fewest = (problem.model_copy(update={"goals": problem.goals[:k]}) for k in (6, 3))
     for solver in SOLVERS:
+        # the published program refuses the many legs of the larger problem
+        world = fewest if solver == "mip-2017" else problem
         # on a busy machine a time limit alone would leave kernels out
         yield (
             f"solver {solver}",
-            partial(solve, problem, solver, iteration_limit=20_000, time_limit=60.0),
+            partial(solve, world, solver, iteration_limit=20_000, time_limit=60.0),
         )
-    fewer = problem.model_copy(update={"goals": problem.goals[:6]})
     for solver in ("dp", "mip"):
         yield f"solver {solver}, measured legs", partial(solve, fewer, solver, iteration_limit=4)
     yield (
