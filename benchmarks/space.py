@@ -1,12 +1,13 @@
 """Words and tours in space.
 
-    python benchmarks/space.py [--only words|loops|prisms|given|frames|missions]
+    python benchmarks/space.py [--only words|loops|prisms|prism-kinds|given|frames|missions]
                                [--missions jacket …] [--keep]
 
 Words: what groups scenes have, and what they take. Loops: random ones, beside a second invariant.
-Prisms: tours in space of problems whose shortest tour is proven in the plane. Given: missions in a
-good order, solved again within short limits. Frames: random ones,
-with the gap to the bound of all tours. Missions: the shipped
+Prisms: tours in space of problems whose shortest tour is proven in the plane. Prism kinds: random
+scenes of posts, boxes and polygons, close together, many, near the surface, with goals at different
+depths, beside the plane within two limits. Given: missions in a good order, solved again within
+short limits. Frames: random ones, with the gap to the bound of all tours. Missions: the shipped
 ones, and the sites of `benchmarks/sites.py`, solved, and flown by `predictive` as they were planned
 and in the order that they were given.
 """
@@ -22,6 +23,7 @@ import tempfile
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from peak import highest
@@ -277,6 +279,114 @@ def posts_world(seed: int) -> tuple[Problem, Mission, Scene]:
     return problem, mission, scene
 
 
+PRISM_KINDS = ("circles", "boxes", "polygons", "close pairs", "many", "near the surface", "depths")
+"""Kinds of random scenes of upright prisms."""
+
+
+def prism_world(kind: str, seed: int) -> tuple[Problem, Mission, Scene]:
+    """Return a random scene of upright prisms of a kind in `PRISM_KINDS`: in the plane, and as a
+    mission with the same clearance and tether. The tether is up to a third longer than the farthest
+    goal needs."""
+    import shapely
+
+    rng = np.random.default_rng([PRISM_KINDS.index(kind), seed])
+    clearance, base = 0.1, (-9.0, 0.0, -0.5 if kind == "near the surface" else -3.0)
+    count = 14 if kind == "many" else 6
+    apart = 0.9 if kind == "many" else 1.2
+    shapes: list[tuple[dict, dict, shapely.Geometry]] = []
+    around = shapely.Point(base[:2])
+
+    def add(centre: np.ndarray) -> bool:
+        of = kind if kind in ("circles", "boxes", "polygons") else str(
+            rng.choice(["circles", "boxes", "polygons"])
+        )  # fmt: skip
+        size = float(rng.uniform(0.3, 0.9 if kind in ("many", "close pairs") else 1.6))
+        obstacle, solid, shape = upright(of, centre, size, rng)
+        if shape.distance(around) < 0.8 or any(shape.distance(s) < apart for *_, s in shapes):
+            return False
+        shapes.append((obstacle, solid, shape))
+        return True
+
+    while len(shapes) < count:
+        if add(rng.uniform(-7.5, 7.5, 2)) and kind == "close pairs":
+            near, spare = shapes[-1][2], float(rng.uniform(0.3, 0.6))
+            angle = rng.uniform(-np.pi, np.pi)
+            way = np.array([np.cos(angle), np.sin(angle)])
+            radius = float(rng.uniform(0.3, 0.9))
+            start = np.array(near.centroid.coords[0])
+            for far in np.arange(0.5, 6.0, 0.02):
+                obstacle, solid, shape = upright("circles", start + far * way, radius, rng)
+                if shape.distance(near) >= spare:
+                    if all(shape.distance(s) >= spare for *_, s in shapes):
+                        shapes.append((obstacle, solid, shape))
+                    break
+    goals: list[tuple[float, float, float]] = []
+    while len(goals) < 6 + seed % 3:
+        p = rng.uniform(-9.0, 9.0, 2)
+        if all(shapely.Point(p).distance(s) > 0.25 for *_, s in shapes):
+            z = {"depths": rng.uniform(-5.6, -0.4), "near the surface": rng.uniform(-0.5, -0.15)}
+            goals.append((float(p[0]), float(p[1]), float(z.get(kind, base[2]))))
+    problem = Problem.model_validate({
+        "base": base, "goals": goals, "clearance": clearance, "bounds": [-10, -10, 10, 10],
+        "obstacles": [obstacle for obstacle, *_ in shapes], "tether_length": 80.0,
+    })  # fmt: skip
+    needed = float(shortest_tethers(problem).max())
+    problem = problem.model_copy(update={"tether_length": needed * rng.uniform(1.02, 1.33)})
+    scene = Scene(solids=[solid for _, solid, _ in shapes], bounds=[-10, -10, -6, 10, 10, 0])
+    mission = Mission(
+        scene="-", anchor=base, start=base, waypoints=goals, clearance=clearance,
+        tether_length=problem.tether_length,
+    )  # fmt: skip
+    return problem, mission, scene
+
+
+def upright(
+    kind: str, centre: np.ndarray, size: float, rng: np.random.Generator
+) -> tuple[dict, dict, Any]:
+    """Return a random upright prism as an obstacle, a solid and a shape."""
+    import shapely
+
+    x, y = (float(v) for v in centre)
+    if kind == "circles":
+        return (
+            {"center": [x, y], "radius": size}, {"post": {"center": [x, y], "radius": size}},
+            shapely.Point(x, y).buffer(size, quad_segs=32),
+        )  # fmt: skip
+    turn = float(rng.uniform(0.0, 90.0))
+    if kind == "boxes":
+        a, b = size, float(size * rng.uniform(0.3, 1.0))
+        c, s = np.cos(np.radians(turn)), np.sin(np.radians(turn))
+        corners = [
+            [x + c * u - s * v, y + s * u + c * v] for u, v in ((-a, -b), (a, -b), (a, b), (-a, b))
+        ]
+        solid = {"box": {
+            "center": [x, y, -3.0], "size": [2 * a, 2 * b, 8.0], "rotation": [0, 0, turn]
+        }}  # fmt: skip
+        return {"polygon": corners}, solid, shapely.Polygon(corners)
+    angles = np.radians(turn + np.linspace(0.0, 360.0, 7)[:-1])
+    radii = size * rng.uniform(0.4, 1.0, 6)
+    corners = (centre + np.c_[radii * np.cos(angles), radii * np.sin(angles)]).tolist()
+    return {"polygon": corners}, {"prism": {"polygon": corners}}, shapely.Polygon(corners)
+
+
+def prism_kinds(worlds: int, limits: list[float]) -> None:
+    """Solve random scenes of upright prisms of each kind, within each limit."""
+    head("kind", "world", "solids", "goals", "in the plane m", "status there",
+         *(f"longer by %, {limit:g} s" for limit in limits),
+         *(f"gap to all tours %, {limit:g} s" for limit in limits), "CPU s",
+         name="space-prism-kinds")  # fmt: skip
+    for seed, kind in itertools.product(range(worlds), PRISM_KINDS):
+        problem, mission, scene = prism_world(kind, seed)
+        begin, longer, gaps = time.process_time(), [], []
+        for limit in limits:
+            length, bound, best, status, _ = beside_plane(problem, mission, scene, limit)
+            longer.append(f"{100 * (length / best - 1) + 0.0:.2f}")
+            gaps.append(f"{100 * max(0.0, 1 - bound / length):.1f}")
+        row(kind, seed, len(scene.solids), len(problem.goals), f"{best:.3f}", status, *longer,
+            *gaps, f"{time.process_time() - begin:.0f}")  # fmt: skip
+    print()
+
+
 def beside_plane(
     problem: Problem, mission: Mission | None = None, scene: Scene | None = None,
     limit: float = 60.0,
@@ -479,7 +589,8 @@ def missions(names: list[str]) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument(
-        "--only", choices=("words", "loops", "prisms", "frames", "missions", "given")
+        "--only",
+        choices=("words", "loops", "prisms", "prism-kinds", "frames", "missions", "given"),
     )
     parser.add_argument(
         "--missions",
@@ -488,6 +599,8 @@ def main() -> None:
         help="names of missions and sites",
     )
     parser.add_argument("--worlds", type=int, default=10, help="random worlds of posts")
+    parser.add_argument("--kinds-worlds", type=int, default=3, help="random worlds of each kind")
+    parser.add_argument("--limits", type=float, nargs="*", default=[20.0, 60.0], help="seconds")
     parser.add_argument("--given", nargs="*", default=["basin", "ring", "jacket"])
     parser.add_argument("--loops", type=int, default=10_000)
     parser.add_argument("--group", help=argparse.SUPPRESS)
@@ -499,6 +612,7 @@ def main() -> None:
     for name, measure in (
         ("words", words), ("loops", lambda: loops(args.loops)),
         ("prisms", lambda: prisms(args.worlds)),
+        ("prism-kinds", lambda: prism_kinds(args.kinds_worlds, args.limits)),
         ("given", lambda: beside_given(args.given, [2.0, 30.0])),
         ("frames", frames), ("missions", lambda: missions(args.missions)),
     ):  # fmt: skip

@@ -9,13 +9,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from netsp.clock import Clock
 from netsp.command.main import main
+from netsp.command.solve_mission import summary
 from netsp.errors import InputError
 from netsp.online import Scene
 from netsp.online.mission import Mission
-from netsp.online.simulate import grid_box
+from netsp.online.simulate import grid_box, grid_of
 from netsp.online.tour import PlannedTour
 from netsp.space.passages import GapGrid, GapParams, resolved, unresolved_gaps
+from netsp.space.plan import given_plan, plans, water_of
+from netsp.space.repair import _gaps_named
+from netsp.space.solve import solve_mission
 
 BOUNDS = [-3, -4, -1.5, 3, 4, 1.5]
 CLEARANCE = 0.1
@@ -109,6 +114,33 @@ def test_a_cell_is_chosen_that_shows_a_slot_the_default_does_not(y):
     few = resolved(mission, scene, scene.field(), GapParams(smallest=0.99))
     assert few.mission.cell is None
     assert len(few.left) == 1
+
+
+def test_every_way_to_a_plan_names_the_gaps_that_its_cells_do_not_show():
+    """Plans of the library and plans on a given grid, as repairs make, name them like a run."""
+    scene = scene_of(0.0, 0.24)
+    field, asked = scene.field(), mission_of(cell=0.2)
+    grid = grid_of(asked, scene, field)
+    first = next(plans(asked, scene=scene, clock=Clock(5.0)))
+    on_grid = given_plan(water_of(asked, Clock(), field=field, grid=grid))
+    for tour in (first.planned().tour, on_grid.planned().tour):
+        (gap,) = tour.unresolved_gaps
+        assert gap.width == pytest.approx(0.24, abs=0.005)
+    assert "0.24 m at (0, 0, " in _gaps_named(on_grid)
+    # and a library's plan takes the cell that shows the gap, like a run
+    finer = water_of(mission_of(), Clock(), scene=scene)
+    assert finer.mission.cell == finer.grid.cell < 0.2
+    assert finer.unresolved_gaps == ()
+
+
+def test_a_search_for_gaps_without_time_does_not_say_that_there_are_none(tmp_path, capsys):
+    scene, mission = scene_of(0.0, 0.24), mission_of(waypoints=[(-2, 1, 0)])
+    cells = resolved(mission, scene, scene.field(), clock=Clock(0.0))
+    assert cells.left is None
+    solved = solve_mission(mission, scene=scene, time_limit=1e-6)
+    assert solved.tour.unresolved_gaps is None
+    told = summary(mission, solved, 0.0, None, None, "m")
+    assert "the search for gaps that cells of 0.2 m do not show was not completed" in told
 
 
 def test_a_waypoint_behind_a_gap_that_no_cell_shows_is_said_to_lie_there(tmp_path, capsys):

@@ -1,15 +1,18 @@
 """Bounds on tours in space: no tour is shorter than they say."""
 
 import math
+import time
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from netsp.clock import NEVER, Clock
 from netsp.errors import InputError
 from netsp.online import Scene
 from netsp.online.mission import Mission
+from netsp.solvers.solve import solve
 from netsp.space.bound import LegBounds, bound_of_all
 from netsp.space.legs import Ways
 from netsp.space.places import Places
@@ -23,6 +26,7 @@ from netsp.space.potential import (
     steepest,
 )  # fmt: skip
 from netsp.space.states import Effort
+from netsp.space.upright import bound_of_upright
 from netsp.space.water import Water
 
 BOUNDS = [-3, -4, -1.5, 3, 4, 1.5]
@@ -132,7 +136,7 @@ def test_marching_without_correction_overshoots_and_is_no_bound():
     start = np.zeros((9, 9, 9), dtype=bool)
     start[0, 0, 0] = True
     slow = np.ones((9, 9, 9), dtype=np.float32)
-    u = marched(edges_of(possible), start, 1.0, slow, 100.0)
+    u = marched(edges_of(possible), start, 1.0, slow, 100.0, NEVER)
     assert u[8, 8, 8] > math.sqrt(3.0) * 8.0
     assert steepest(u, possible, 1.0) > 1.05
 
@@ -172,11 +176,37 @@ def test_a_path_that_was_measured_does_not_raise_the_bound(tmp_path):
     straight = np.linalg.norm(legs.points[0] - legs.points[1])
     assert legs.costs[0, 1] == pytest.approx(straight)
     ways.tethers[0] = [np.array([[-2, 0, 0], [0, 3.5, 0], [2, 0.5, 0]], dtype=float)]
-    from netsp.clock import Clock
-
     while legs.raised(0, 1, Clock()):
         pass
     assert legs.costs[0, 1] <= through((-2, 0, 0), (2, 0.5, 0), 0.0, 0.3, 0.4, 0.1)
+
+
+def test_a_bound_ends_with_its_clock_and_what_is_proven_by_then_is_a_bound():
+    a, b = np.array([-2.0, 0.2, -0.5]), np.array([2.0, -0.4, 0.5])
+    field = wall(-4.0, 0.0, thick=0.8).field()
+    region = Region(0.05, np.array(BOUNDS, dtype=float).reshape(2, 3), a, math.inf)
+    around = round_the_end(a, b, 0.8, 0.05)
+    begin = time.process_time()
+    for seconds in (0.0, 0.05):
+        bound = path_bound(field, a, b, region, 1.1 * around, 2_000_000, clock=Clock(seconds))
+        assert np.linalg.norm(b - a) <= bound <= around
+    assert time.process_time() - begin < 1.0
+
+
+def test_the_bound_among_upright_solids_ends_with_the_clock_of_the_run(monkeypatch):
+    mission, scene = mission_by_a_slot(0.3, None)
+    scene = Scene(bounds=BOUNDS, solids=[{"post": {"center": [0, 0], "radius": 0.5}}])
+    water = Water.of(mission, scene, scene.field())
+    places, clock, heard = Places.of(mission, water.field), Clock(), []
+
+    def solve_until_stopped(problem, time_limit):
+        clock.end()  # as Ctrl-C and SIGTERM do
+        heard.append(time_limit.up and bool(time_limit.flag[0]))
+        return solve(problem, time_limit=time_limit)
+
+    monkeypatch.setattr("netsp.space.upright.solve", solve_until_stopped)
+    bound_of_upright(mission, water, [0, 1], places, clock.part(0.5))
+    assert heard == [True]
 
 
 def test_parameters_out_of_range_are_refused():

@@ -231,8 +231,13 @@ def _gap_lines(found: SolvedMission, units: str) -> list[str]:
     lines += [
         f"gap      {gap}: wide enough for the robot, but cells of {cell} do not show it, and no "
         "tour through it was considered; give the mission a finer `cell`"
-        for gap in found.tour.unresolved_gaps
+        for gap in found.tour.unresolved_gaps or ()
     ]
+    if found.tour.unresolved_gaps is None:
+        lines.append(
+            f"gap      the search for gaps that cells of {cell} do not show was not completed; "
+            "allow more time"
+        )
     return lines
 
 

@@ -72,7 +72,9 @@ def of_mission(mission: Mission, found: SolvedMission, units: str) -> dict[str, 
         "mission": mission.name, "units": units, "status": tour.status.value,
         "length": tour.length, "lower_bound": tour.lower_bound, "gap": tour.gap,
         "bound_of_all": tour.bound_of_all, "gap_to_all": tour.gap_to_all,
-        "unresolved_gaps": [gap.model_dump(mode="json") for gap in tour.unresolved_gaps],
+        "unresolved_gaps": None if tour.unresolved_gaps is None else [
+            gap.model_dump(mode="json") for gap in tour.unresolved_gaps
+        ],
         "cell": None if found.cells is None else found.cells.cell,
         "order": list(found.order[: len(tour.stops)]), "left_out": list(found.left_out),
         "longest_tether": tour.longest_tether, "tether_length": mission.tether_length,

@@ -104,9 +104,10 @@ class PlannedTour(Model):
     exact : bool
         Whether different words always belong to different classes of paths through the mission's
         cells. It does not cover gaps that the grid does not show, nor the tour's length.
-    unresolved_gaps : tuple of UnresolvedGap
+    unresolved_gaps : tuple of UnresolvedGap, or None
         Passages that the robot fits through but the grid does not show. No tour through them was
-        considered; `bound_of_all` also holds for such tours.
+        considered; `bound_of_all` also holds for such tours. None if there was no time to search
+        for them.
     """
 
     stops: Annotated[
@@ -148,9 +149,12 @@ class PlannedTour(Model):
         Field(description="whether words that differ are of different classes among the cells"),
     ] = True
     unresolved_gaps: Annotated[
-        tuple[UnresolvedGap, ...],
-        Field(description="passages with room for the robot that the cells do not show"),
-    ] = ()
+        tuple[UnresolvedGap, ...] | None,
+        Field(
+            description="passages with room for the robot that the cells do not show; missing if "
+            "they were not searched for"
+        ),
+    ] = None
 
     @model_validator(mode="before")
     @classmethod

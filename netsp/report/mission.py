@@ -173,6 +173,10 @@ def _planned(tour: PlannedTour, mission: Mission, unit: str) -> str:
             f". The robot may fit through gaps that the grid does not show, and no tour through "
             f"them was considered; a finer cell may show them: {html.escape(named)}"
         )
+    elif tour.unresolved_gaps is None:
+        all_of += (
+            ". Gaps that the robot fits through but the grid does not show were not searched for"
+        )
     return (
         f"The tour is {tour.length:.5g} {unit} long: {proof} (solver {html.escape(tour.solver)})"
         f"{all_of}. At {mission.speed:g} m/s it takes {tour.length / mission.speed:.0f} s, stops "

@@ -193,7 +193,9 @@ class LegBounds:
         if self.policy.cell_s * cells > clock.left:
             self.final[u, v] = self.final[v, u] = True
             return False
-        length = path_bound(water.field, a, b, self._region(u, v), longest, cells, self.params)
+        length = path_bound(
+            water.field, a, b, self._region(u, v), longest, cells, self.params, clock
+        )
         self.costs[u, v] = self.costs[v, u] = max(before, length)
         self._level[u, v] = self._level[v, u] = level
         if cells >= self.params.max_cells or length >= (1.0 - self.policy.max_leg_gap) * longest:

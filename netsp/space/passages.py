@@ -3,6 +3,7 @@
 A cell is free if its middle has enough room, so a slot that is wide enough for the robot may be
 closed on the grid. The search samples finer points between free cells. A gap lies where two
 neighbouring points have enough room but their nearest free cells are not connected nearby.
+Every plan of a mission begins with this search (`netsp.space.plan.water_of`).
 """
 
 from __future__ import annotations
@@ -13,11 +14,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from netsp.arrays import Bools, Floats, Ints
-from netsp.errors import InputError
+from netsp.clock import Clock
+from netsp.errors import InputError, LimitReachedError
 from netsp.online.mission import Mission
+from netsp.online.paths.tree import Grid
 from netsp.online.scene.field import DistanceField
 from netsp.online.scene.scene import Scene
 from netsp.online.simulate import grid_box
+from netsp.online.tour import UnresolvedGap
 from netsp.space.cells import LEAST_ROOM
 from netsp.space.potential import possibly_free, steepness
 
@@ -45,6 +49,8 @@ class GapParams:
         Smallest finer cell size, as a share of the cell size before.
     step : float
         Ratio of successive cell sizes that are tried.
+    time_share : float
+        Share of the remaining time for the search, more than 0 and at most 1.
     """
 
     max_points: int = 4_000_000
@@ -55,6 +61,7 @@ class GapParams:
     max_cells: int = 1_000_000
     smallest: float = 0.25
     step: float = 0.985
+    time_share: float = 0.5
 
     def __post_init__(self) -> None:
         for name in ("max_points", "finest", "around", "max_gaps", "max_pairs", "max_cells"):
@@ -63,6 +70,8 @@ class GapParams:
         for name in ("smallest", "step"):
             if not 0.0 < getattr(self, name) < 1.0:
                 raise InputError(f"{name}: {getattr(self, name)}; expected between 0 and 1")
+        if not 0.0 < self.time_share <= 1.0:
+            raise InputError(f"time_share: {self.time_share}; expected more than 0 and at most 1")
 
 
 @dataclass(frozen=True)
@@ -134,6 +143,25 @@ class GapGrid:
         counts = np.maximum(1.0, np.round((high - low) / cell))  # as `Grid` counts
         return cls(field, low, low + cell * counts, cell, clearance)
 
+    @classmethod
+    def of_grid(cls, grid: Grid, clearance: float) -> GapGrid:
+        """Return the cells of a grid for paths.
+
+        Parameters
+        ----------
+        grid : Grid
+            The grid.
+        clearance : float
+            Clearance of the robot, metres.
+
+        Returns
+        -------
+        GapGrid
+            The cells.
+        """
+        high = grid.low + grid.cell * np.array(grid.free.shape)
+        return cls(grid.field, grid.low, high, grid.cell, clearance)
+
     @property
     def shape(self) -> tuple[int, int, int]:
         """Numbers of cells along x, y and z, as `netsp.space.cells.Cells` counts them."""
@@ -191,13 +219,19 @@ class GapGrid:
         return bool(one & other)
 
 
+SEARCHING = "searching for gaps that the cells do not show"
+"""Name of the search in messages."""
+
+
 def _near(parts: Ints, at: Ints) -> set[int]:
     """Return the labels of the connected parts at a cell and its neighbours."""
     box = tuple(slice(max(0, k - 1), k + 2) for k in at)
     return set(np.unique(parts[box]).tolist()) - {0}
 
 
-def unresolved_gaps(grid: GapGrid, params: GapParams | None = None) -> list[Gap]:
+def unresolved_gaps(
+    grid: GapGrid, params: GapParams | None = None, clock: Clock | None = None
+) -> list[Gap]:
     """Return the gaps that have room for the robot but no free cells through them.
 
     Parameters
@@ -206,32 +240,41 @@ def unresolved_gaps(grid: GapGrid, params: GapParams | None = None) -> list[Gap]
         The cells.
     params : GapParams, optional
         Effort.
+    clock : Clock, optional
+        Clock of the search.
 
     Returns
     -------
     list of Gap
         At most `params.max_gaps` gaps, the widest first.
+
+    Raises
+    ------
+    LimitReachedError
+        The time was up before the search was complete.
     """
     from scipy.ndimage import binary_dilation
 
-    params = params or GapParams()
+    params, clock = params or GapParams(), clock or Clock()
     shape = grid.shape
     free = grid.free(np.zeros(3, dtype=np.int64), shape)
     if free.all() or not free.any():
         return []
     middle, whole = 0.5 * (grid.low + grid.high), float(np.linalg.norm(grid.high - grid.low))
-    possible = possibly_free(
+    clock.check(SEARCHING)
+    flag, steep = clock.flag, steepness(grid.field)
+    possible = clock.interruptible(lambda: possibly_free(
         grid.field.arrays, grid.low, grid.high, grid.cell, shape, grid.clearance,
-        steepness(grid.field), middle, middle, 4.0 * whole, middle, 2.0 * whole, 2,
-    )  # fmt: skip
-    gaps = _gaps_between(grid, free, free, possible, params)
+        steep, middle, middle, 4.0 * whole, middle, 2.0 * whole, 2, flag,
+    ))  # fmt: skip
+    gaps = _gaps_between(grid, free, free, possible, params, clock)
     layers = _single_layers(free) & possible
     if layers.any():
         # the free cells on both sides of a single layer are only two cells apart, so leave them out
         apart = free & ~binary_dilation(layers, np.ones((3, 3, 3)))
         far = 2.0 * grid.cell
         gaps += [
-            gap for gap in _gaps_between(grid, free, apart, possible, params)
+            gap for gap in _gaps_between(grid, free, apart, possible, params, clock)
             if all(np.linalg.norm(gap.place - known.place) > far for known in gaps)
             and _is_open(grid, gap, params)
         ]  # fmt: skip
@@ -249,11 +292,12 @@ def _single_layers(free: Bools) -> Bools:
 
 
 def _gaps_between(
-    grid: GapGrid, free: Bools, ends_of: Bools, possible: Bools, params: GapParams
+    grid: GapGrid, free: Bools, ends_of: Bools, possible: Bools, params: GapParams, clock: Clock
 ) -> list[Gap]:
     """Return the gaps between the free cells `ends_of`."""
     from scipy.ndimage import distance_transform_edt
 
+    clock.check(SEARCHING)
     if not ends_of.any():
         return []
     nearest = np.moveaxis(
@@ -264,7 +308,7 @@ def _gaps_between(
         return []
     side = int(np.clip((params.max_points / len(cells)) ** (1.0 / 3.0), 2, params.finest))
     ends, places, room = _links(grid, cells, nearest, side)
-    ends, places, room = _not_joined(free, ends, places, room, params)
+    ends, places, room = _not_joined(free, ends, places, room, params, clock)
     return _grouped(grid, ends, places, room, params)
 
 
@@ -347,7 +391,7 @@ def _links(grid: GapGrid, cells: Ints, nearest: Ints, side: int) -> tuple[Ints, 
 
 
 def _not_joined(
-    free: Bools, ends: Ints, places: Floats, room: Floats, params: GapParams
+    free: Bools, ends: Ints, places: Floats, room: Floats, params: GapParams, clock: Clock
 ) -> tuple[Ints, Floats, Floats]:
     """Return the links whose two free cells are not connected nearby."""
     from scipy.ndimage import label
@@ -361,6 +405,7 @@ def _not_joined(
         if name not in is_apart:
             if len(is_apart) >= params.max_pairs:
                 continue
+            clock.check(SEARCHING)
             first = np.maximum(pair.min(0) - params.around, 0)
             last = pair.max(0) + params.around + 1
             box = tuple(slice(a, b) for a, b in zip(first, last, strict=True))
@@ -423,7 +468,7 @@ def _widest(grid: GapGrid, place: Floats, through: Floats) -> Floats:
 
 def resolving_cell(
     grid: GapGrid, gaps: list[Gap], box_of: Callable[[float], tuple[Floats, Floats, float]],
-    params: GapParams | None = None,
+    params: GapParams | None = None, clock: Clock | None = None,
 ) -> float | None:  # fmt: skip
     """Return the largest cell size whose grid shows as many of the gaps as possible.
 
@@ -437,16 +482,24 @@ def resolving_cell(
         Takes a cell size; returns the corners of the box of such a grid and the cell size, metres.
     params : GapParams, optional
         Limits of the cell size.
+    clock : Clock, optional
+        Clock of the search.
 
     Returns
     -------
     float or None
         Cell size, metres; None if no size within the limits shows a gap.
+
+    Raises
+    ------
+    LimitReachedError
+        The time was up before a cell size was found.
     """
-    params = params or GapParams()
+    params, clock = params or GapParams(), clock or Clock()
     best, shown, cell = None, 0, grid.cell
     limit = max(params.max_cells, 1.1 * float(np.prod(grid.shape)))
     while shown < len(gaps) and cell * params.step >= params.smallest * grid.cell:
+        clock.check(SEARCHING)
         cell *= params.step
         finer = GapGrid.of(grid.field, box_of(cell), grid.clearance)
         if float(np.prod(finer.shape)) > limit:
@@ -470,19 +523,62 @@ class Resolved:
         Cell size of its grid, metres.
     shown : tuple of Gap
         Gaps that only the finer cell shows.
-    left : tuple of Gap
-        Gaps that stay hidden.
+    left : tuple of Gap or None
+        Gaps that stay hidden; None if the time was up before they were found.
     """
 
     mission: Mission
     cell: float
     shown: tuple[Gap, ...] = ()
-    left: tuple[Gap, ...] = ()
+    left: tuple[Gap, ...] | None = ()
+
+    @property
+    def in_file(self) -> tuple[UnresolvedGap, ...] | None:
+        """Return the gaps that stay hidden, as in a tour's `unresolved_gaps`."""
+        if self.left is None:
+            return None
+        return tuple(
+            UnresolvedGap(position=(x, y, z), width=gap.width)
+            for gap in self.left
+            for x, y, z in [gap.place.tolist()]
+        )
+
+
+def resolved_on(
+    mission: Mission, grid: Grid, params: GapParams | None = None, clock: Clock | None = None
+) -> Resolved:
+    """Find the gaps that a given grid does not show. Its cell size is kept.
+
+    Parameters
+    ----------
+    mission : Mission
+        The mission.
+    grid : Grid
+        Grid for paths.
+    params : GapParams, optional
+        Effort.
+    clock : Clock, optional
+        Clock of the run.
+
+    Returns
+    -------
+    Resolved
+        The mission, unchanged, the cell size and the gaps.
+    """
+    params, clock = params or GapParams(), clock or Clock()
+    try:
+        gaps = unresolved_gaps(
+            GapGrid.of_grid(grid, mission.clearance), params, clock.part(params.time_share)
+        )
+    except LimitReachedError:
+        return Resolved(mission, grid.cell, (), None)
+    return Resolved(mission, grid.cell, (), tuple(gaps))
 
 
 def resolved(
-    mission: Mission, scene: Scene, field: DistanceField, params: GapParams | None = None
-) -> Resolved:
+    mission: Mission, scene: Scene, field: DistanceField, params: GapParams | None = None,
+    clock: Clock | None = None,
+) -> Resolved:  # fmt: skip
     """Return a mission whose cells show the gaps of its scene, as far as possible.
 
     A cell size that the mission states is kept, and its gaps are only reported. The same holds for
@@ -498,26 +594,36 @@ def resolved(
         The scene's field.
     params : GapParams, optional
         Effort.
+    clock : Clock, optional
+        Clock of the run.
 
     Returns
     -------
     Resolved
         Mission, cell size and gaps.
     """
+    params = params or GapParams()
+    searching = (clock or Clock()).part(params.time_share)
 
     def box_of(cell: float) -> tuple[Floats, Floats, float]:
         return grid_box(mission.model_copy(update={"cell": cell}), scene)
 
     box = grid_box(mission, scene)
     grid = GapGrid.of(field, box, mission.clearance)
-    gaps = unresolved_gaps(grid, params)
+    try:
+        gaps = unresolved_gaps(grid, params, searching)
+    except LimitReachedError:
+        return Resolved(mission, box[2], (), None)
     if not gaps or mission.cell is not None or mission.tour is not None:
         return Resolved(mission, box[2], (), tuple(gaps))
-    cell = resolving_cell(grid, gaps, box_of, params)
-    if cell is None:
+    try:
+        cell = resolving_cell(grid, gaps, box_of, params, searching)
+        if cell is None:
+            return Resolved(mission, box[2], (), tuple(gaps))
+        finer = GapGrid.of(field, box_of(cell), mission.clearance)
+        left = unresolved_gaps(finer, params, searching)
+    except LimitReachedError:
         return Resolved(mission, box[2], (), tuple(gaps))
-    finer = GapGrid.of(field, box_of(cell), mission.clearance)
-    left = unresolved_gaps(finer, params)
     far = 2.0 * grid.cell
     shown = [g for g in gaps if all(np.linalg.norm(g.place - k.place) > far for k in left)]
     return Resolved(mission.model_copy(update={"cell": cell}), cell, tuple(shown), tuple(left))

@@ -41,6 +41,7 @@ from netsp.space.detours import SAVED, Detours
 from netsp.space.given_order import drive_given_order
 from netsp.space.judge import verify_mission
 from netsp.space.legs import Growth, Ways
+from netsp.space.passages import resolved, resolved_on
 from netsp.space.places import Places
 from netsp.space.prisms import PlaneParams, tours_of_plan
 from netsp.space.states import Effort, first_states, states_with_room
@@ -207,6 +208,7 @@ class SpacePlan:
             gap=relative_gap(self.length, result.lower_bound),
             bound_of_all=bound, gap_to_all=relative_gap(self.length, bound),
             states=self.states, legs=self.legs, exact=self.water.words.exact,
+            unresolved_gaps=self.water.unresolved_gaps,
         )  # fmt: skip
         all_of = self.mission.waypoints
         waypoints = (
@@ -349,17 +351,65 @@ def plans(
         "solver": solver, "seed": seed, "params": params, "iteration_limit": iteration_limit
     }  # fmt: skip
     if water is None:
-        check_size(mission)
         if field is None or grid is None:
             scene = scene or mission.load_scene()
-            check_bounds(mission, scene)
-            field = field or scene.field()
-            grid = grid_of(mission, scene, field)
-        mission = mission.checked_waypoints(field)
-        Places.of(mission, field)  # refuse bad waypoints before the long search for words
-        (on_progress or _silent)("words of the scene")
-        water = Water.within(mission, field, grid, None if scene is None else scene.bounds)
+        water = water_of(mission, clock, scene=scene, field=field, grid=grid, tell=on_progress)
     yield from _planned(water, scene, clock, on_progress or _silent, how, whole_tether)
+
+
+def water_of(
+    mission: Mission, clock: Clock, *, scene: Scene | None = None,
+    field: DistanceField | None = None, grid: Grid | None = None,
+    tell: Callable[[str], None] | None = None,
+) -> Water:  # fmt: skip
+    """Make the water of a mission for a plan: check the mission, find the gaps that its grid does
+    not show, refine the grid where that shows them, and find the words of the scene.
+
+    Parameters
+    ----------
+    mission : Mission
+        The mission.
+    clock : Clock
+        Clock of the run; the search for gaps takes a share of it (`GapParams`).
+    scene : Scene, optional
+        Scene of the mission; needed unless `field` and `grid` are given.
+    field : DistanceField, optional
+        Distance field of the scene; computed if needed.
+    grid : Grid, optional
+        Grid for paths. If both `field` and `grid` are given, the grid is kept and its gaps are only
+        named.
+    tell : callable, optional
+        Called with a line of text at each stage.
+
+    Returns
+    -------
+    Water
+        The water, with `cells`. Its mission has the cell size of the grid.
+
+    Raises
+    ------
+    InputError
+        Waypoints in solids, a mission too large, or bounds that do not hold it.
+    """
+    tell = tell or _silent
+    check_size(mission)
+    if field is None or grid is None:
+        scene = scene or mission.load_scene()
+        check_bounds(mission, scene)
+        field, grid = field or scene.field(), None
+    mission = mission.checked_waypoints(field)
+    tell("gaps that the cells do not show")
+    if grid is None:
+        assert scene is not None
+        cells = resolved(mission, scene, field, clock=clock)
+        mission = cells.mission
+        grid = grid_of(mission, scene, field)
+    else:
+        cells = resolved_on(mission, grid, clock=clock)
+    Places.of(mission, field)  # refuse bad waypoints before the long search for words
+    tell("words of the scene")
+    water = Water.within(mission, field, grid, None if scene is None else scene.bounds)
+    return replace(water, cells=cells)
 
 
 def given_plan(water: Water) -> SpacePlan | None:

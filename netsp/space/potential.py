@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.arrays import Bools, Floats, Singles
+from netsp.clock import Clock, Flag
 from netsp.compiled.growing import more_int_rows
 from netsp.compiled.kernel import kernel
 from netsp.errors import InputError
@@ -94,7 +95,7 @@ class Region(NamedTuple):
 
 def path_bound(
     field: DistanceField, a: Floats, b: Floats, region: Region, longest: float, cells: int,
-    params: PotentialParams | None = None,
+    params: PotentialParams | None = None, clock: Clock | None = None,
 ) -> float:  # fmt: skip
     """Return a lower bound on the length of paths between two points.
 
@@ -115,13 +116,15 @@ def path_bound(
         Approximate number of cells of the grid.
     params : PotentialParams, optional
         Effort.
+    clock : Clock, optional
+        Clock of the run; when it is up, the bound proven so far is returned.
 
     Returns
     -------
     float
         Lower bound, metres; at least the straight distance.
     """
-    params = params or PotentialParams()
+    params, clock = params or PotentialParams(), clock or Clock()
     straight = float(np.linalg.norm(b - a))
     if not straight < longest < math.inf:
         return straight
@@ -132,14 +135,20 @@ def path_bound(
     cell = max(cell, float(size.max()) / 4096.0)
     nx, ny, nz = (max(1, math.ceil(s / cell - 1e-9)) for s in size)
     high = low + size
-    possible = possibly_free(
-        field.arrays, low, high, cell, (nx, ny, nz), region.room, steepness(field), a, b, longest,
-        region.anchor, region.reach, params.halvings,
-    )  # fmt: skip
+    flag, steep = clock.flag, steepness(field)
+    possible = clock.interruptible(lambda: possibly_free(
+        field.arrays, low, high, cell, (nx, ny, nz), region.room, steep, a, b, longest,
+        region.anchor, region.reach, params.halvings, flag,
+    ))  # fmt: skip
     for end in (a, b):
         at = np.clip(((end - low) / cell).astype(np.int64), 0, np.array(possible.shape) - 1)
         possible[tuple(at)] = True
-    return max(straight, _through(possible, low, cell, a, b, longest, params))
+    if clock.up:
+        return straight
+    return max(
+        straight,
+        clock.interruptible(lambda: _through(possible, low, cell, a, b, longest, params, flag)),
+    )
 
 
 def steepness(field: DistanceField) -> float:
@@ -190,9 +199,10 @@ def _box_of_ellipsoid(a: Floats, b: Floats, longest: float) -> tuple[Floats, Flo
 
 def _through(
     possible: Bools, low: Floats, cell: float, a: Floats, b: Floats, longest: float,
-    params: PotentialParams,
+    params: PotentialParams, stop: Flag,
 ) -> float:  # fmt: skip
-    """Return the bound of the potential about one end over possibly free cells."""
+    """Return the bound of the potential about one end over possibly free cells; 0 if the flag was
+    set before one was proven."""
     straight = float(np.linalg.norm(b - a))
     from_a, from_b = (distances_of_cells(possible.shape, low, cell, end) for end in (a, b))
     # start from the largest balls around the ends that hold no blocked cell: distances in them are
@@ -208,16 +218,20 @@ def _through(
     most = longest - ball_a
     edges = edges_of(possible)
     slow, slow_cells = begin.copy(), np.ones(possible.shape, dtype=np.float32)
-    u = marched(edges, start, cell, slow, most)
+    u = marched(edges, start, cell, slow, most, stop)
     before_b = _corners((from_b <= ball_b) & possible)
     best = 0.0
     for k in range(2 * params.rounds):
         if k < params.rounds:
             for turn in range(16 if k == 0 else 8):
+                if stop[0]:
+                    return best
                 sweep(u, edges, cell, slow, turn)
             slope = slowed(u, possible, cell, slow_cells, begin, slow)
         else:
             for turn in range(8):
+                if stop[0]:
+                    return best
                 lower(u, possible, cell, turn, SLOPE_TOLERANCE)
             slope = steepest(u, possible, cell)
         # after each round, u divided by its steepest slope is a potential
@@ -349,17 +363,23 @@ def has_room(
 def possibly_free(
     field: Field, low: Floats, high: Floats, cell: float, shape: tuple[int, int, int], room: float,
     steep: float, a: Floats, b: Floats, longest: float, anchor: Floats, reach: float, halvings: int,
+    stop: Flag,
 ) -> Bools:  # fmt: skip
     """Return the mask of the cells that paths from `a` to `b` may pass.
 
     A cell is left out if it is certain that none of its points has enough room and lies within the
-    box up to `high`, the ellipsoid about both ends and the reach of the tether.
+    box up to `high`, the ellipsoid about both ends and the reach of the tether. Once the flag
+    `stop` is set, the remaining cells count as possibly free.
     """
     nx, ny, nz = shape
     out = np.zeros((nx, ny, nz), dtype=np.bool_)
     centre, halves, at = np.empty(3), np.empty(3), np.empty(3, dtype=np.int64)
     for i in range(nx):
         for j in range(ny):
+            if stop[0]:
+                out[i, j:] = True
+                out[i + 1 :] = True
+                return out
             for k in range(nz):
                 at[0], at[1], at[2] = i, j, k
                 from_a, from_b, from_anchor, diagonal = 0.0, 0.0, 0.0, 0.0
@@ -433,10 +453,11 @@ def arrival(u: Floats, edges: npt.NDArray[np.uint8], p: int, q: int, r: int, ste
 
 @kernel
 def marched(
-    edges: npt.NDArray[np.uint8], start: Bools, cell: float, slow: Singles, most: float
-) -> Floats:
+    edges: npt.NDArray[np.uint8], start: Bools, cell: float, slow: Singles, most: float,
+    stop: Flag,
+) -> Floats:  # fmt: skip
     """Return the distances of corners from `start` by fast marching, up to `most`, with a queue of
-    buckets."""
+    buckets. Once the flag `stop` is set, the distances are incomplete."""
     nx, ny, nz = edges.shape
     u, done = np.full((nx, ny, nz), np.inf), np.zeros((nx, ny, nz), dtype=np.bool_)
     width = BUCKET * cell
@@ -454,7 +475,7 @@ def marched(
                     first[0] = count
                     count += 1
     now = 0
-    while now < buckets:
+    while now < buckets and not stop[0]:
         entry = first[now]
         if entry < 0:
             now += 1

@@ -63,6 +63,15 @@ class Repair:
     planning_s: float
 
 
+def _gaps_named(found: SpacePlan) -> str:
+    """Return words for the gaps that the grid of a plan does not show."""
+    gaps = found.water.unresolved_gaps
+    if not gaps:
+        return ""
+    named = ", ".join(str(gap) for gap in gaps)
+    return f"; no tour through gaps that the cells do not show was considered: {named}"
+
+
 @dataclass
 class _Rest:
     """What is left of a tour: its legs with the tether's length at their ends, the way home last;
@@ -187,7 +196,7 @@ class RepairPlanner(PredictivePlanner):
             found = self._planned_anew(robot, tether, rest, added)
         if found is not None:
             self._take(found)
-            self._note(REPLANNED, rest.reason, found.length, begin)
+            self._note(REPLANNED, f"{rest.reason}{_gaps_named(found)}", found.length, begin)
         elif rest.whole:
             self._go_on_along(rest)
             self._note(LOCAL, rest.reason, rest.length, begin)

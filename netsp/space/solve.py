@@ -20,22 +20,21 @@ import numpy as np
 from netsp.clock import Clock, TimeLimit, until_interrupt
 from netsp.errors import InputError, LimitReachedError
 from netsp.lower_bound import LowerBound, Scope
-from netsp.online.limits import check_bounds, check_size, check_tether
+from netsp.online.limits import check_tether
 from netsp.online.log import LogRow, Run
 from netsp.online.mission import Mission
 from netsp.online.planner import PlannerOptions
 from netsp.online.scene.field import DistanceField
 from netsp.online.scene.scene import Scene
 from netsp.online.simulate import simulate
-from netsp.online.tour import PlannedStop, PlannedTour, UnresolvedGap, in_file
+from netsp.online.tour import PlannedStop, PlannedTour, in_file
 from netsp.solution import Status
 from netsp.solvers.solve import SolverLike
 from netsp.space.bound import bound_of_all
 from netsp.space.detours import SAVED
 from netsp.space.judge import verify_mission
 from netsp.space.order import order_by_going_on
-from netsp.space.passages import Resolved, resolved
-from netsp.space.places import Places
+from netsp.space.passages import Resolved
 from netsp.space.plan import (
     AS_GIVEN,
     OUT_AND_BACK,
@@ -46,6 +45,7 @@ from netsp.space.plan import (
     check_plannable,
     given_plan,
     plans,
+    water_of,
 )
 from netsp.space.water import SHARE, Water, along, has_room
 from netsp.travel.result import relative_gap
@@ -369,17 +369,9 @@ def solve_mission(
     name = solver if isinstance(solver, str) else getattr(solver, "__name__", "solver")
     with until_interrupt(time_limit) as clock:
         check_plannable(mission, solver, params, seed)
-        check_size(mission)
         scene = scene or mission.load_scene()
-        check_bounds(mission, scene)
-        field = field or scene.field()
-        mission = mission.checked_waypoints(field)
-        tell("gaps that the cells do not show")
-        cells = resolved(mission, scene, field)
-        mission = cells.mission
-        Places.of(mission, field)  # refuse bad waypoints before the long search for words
-        tell("words of the scene")
-        water = Water.of(mission, scene, field)
+        water = water_of(mission, clock, scene=scene, field=field, tell=tell)
+        mission, cells = water.mission, water.cells
         check_tether(mission, water.present.length)
         flights = _Flights(mission, scene, water, clock, tell, policy)
         found = _Incumbents(flights)
@@ -398,21 +390,21 @@ def solve_mission(
         found.fly_best()
         _offer_given_flight(found, seed)
         best = _with_bound(found.best, planned, searched.bound)
-        best = replace(best, mission=with_gaps(best.mission, cells))
+        best = replace(best, mission=with_gaps(best.mission, water))
         return replace(
             best, given=found.given, plan=planned, interrupted=clock.stopped, cells=cells
         )
 
 
-def with_gaps(mission: Mission, cells: Resolved) -> Mission:
+def with_gaps(mission: Mission, water: Water) -> Mission:
     """Return a planned mission whose tour names the gaps that its cells do not show.
 
     Parameters
     ----------
     mission : Mission
         Mission with a tour.
-    cells : Resolved
-        Gaps of its scene.
+    water : Water
+        Water with the gaps.
 
     Returns
     -------
@@ -420,14 +412,8 @@ def with_gaps(mission: Mission, cells: Resolved) -> Mission:
         The mission with `tour.unresolved_gaps`.
     """
     assert mission.tour is not None
-    gaps = tuple(
-        UnresolvedGap(position=(x, y, z), width=gap.width)
-        for gap in cells.left
-        for x, y, z in [gap.place.tolist()]
-    )
-    return mission.model_copy(
-        update={"tour": mission.tour.model_copy(update={"unresolved_gaps": gaps})}
-    )
+    gaps = {"unresolved_gaps": water.unresolved_gaps}
+    return mission.model_copy(update={"tour": mission.tour.model_copy(update=gaps)})
 
 
 @dataclass
@@ -646,7 +632,7 @@ def tour_of_flight(
         stops=tuple(planned_stops), home=in_file(legs[-1]), status=Status.FEASIBLE, solver=name,
         seed=seed, length=length, bound_of_all=bound, gap_to_all=relative_gap(length, bound),
         states=len(visited), legs=len(legs),
-        exact=water.words.exact,
+        exact=water.words.exact, unresolved_gaps=water.unresolved_gaps,
     )  # fmt: skip
     chosen = [*visited, *left]
     there = mission.model_copy(

@@ -8,8 +8,6 @@ bound its tours over all homotopy classes of the tether.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from netsp.arrays import Floats
@@ -71,7 +69,7 @@ def bound_of_upright(
             base=mission.start, goals=places.points[some].tolist(), obstacles=tuple(obstacles),
             tether_length=max_length,
         )  # fmt: skip
-        bound = solve(problem, time_limit=None if math.isinf(clock.left) else clock.left).bound
+        bound = solve(problem, time_limit=clock).bound
     except NetspError:
         return None  # no bound in the plane, so none in space
     if bound is None or bound.scope is not Scope.ALL_TOURS:

@@ -22,7 +22,9 @@ from netsp.online.scene.scene import Scene
 from netsp.online.simulate import grid_of
 from netsp.online.tether import GeodesicTether, Tether
 from netsp.online.tether.resolution import THINNEST
+from netsp.online.tour import UnresolvedGap
 from netsp.space.cells import FREE, OPEN
+from netsp.space.passages import Resolved
 from netsp.space.search import NONE, Found, shortest_words, way_back
 from netsp.space.signature import SpaceSignature
 
@@ -65,6 +67,8 @@ class Water:
     bounds : tuple of float, optional
         Bounds (xmin, ymin, zmin, xmax, ymax, zmax) of the scene, metres; None if it has none or is
         not known.
+    cells : Resolved, optional
+        Cell size, and the gaps that the grid does not show; None if they were not searched for.
     """
 
     mission: Mission
@@ -73,6 +77,7 @@ class Water:
     words: SpaceSignature
     model: GeodesicTether
     bounds: tuple[float, ...] | None = None
+    cells: Resolved | None = None
 
     @classmethod
     def of(cls, mission: Mission, scene: Scene, field: DistanceField) -> Water:
@@ -132,6 +137,11 @@ class Water:
             field, grid.low, high, grid.cell, mission.anchor, tolerance=DIP * mission.delta
         )
         return cls(mission, field, grid, words, GeodesicTether(field, mission.delta), bounds)
+
+    @property
+    def unresolved_gaps(self) -> tuple[UnresolvedGap, ...] | None:
+        """Return the gaps that the grid does not show, as in a tour; None if not searched for."""
+        return None if self.cells is None else self.cells.in_file
 
     @cached_property
     def laid(self) -> Tether:
