@@ -227,6 +227,8 @@ def _(problem, solution, rng):
 
 @kind("tether stated as 0")
 def _(problem, solution, rng):
+    if solution.tour[0].tether_length == 0.0:  # a goal at the base
+        return None
     return problem, visit(solution, 0, tether_length=0.0)
 
 
@@ -238,12 +240,16 @@ def _(problem, solution, rng):
 @kind("a tether that is too short by a hundred-thousandth")
 def _(problem, solution, rng):
     longest = max(v.tether_length for v in solution.tour)
+    if longest == 0.0:  # every goal is at the base
+        return None
     return of_problem(problem, solution, tether_length=longest * (1.0 - OFF))
 
 
 @kind("slack that does not fit")
 def _(problem, solution, rng):
     longest = max(v.tether_length for v in solution.tour)
+    if longest == 0.0:
+        return None
     slack = problem.tether_length / longest - 1.0 + 1e-3
     return (problem, edit(solution, slack=slack)) if slack <= 1.0 else None
 
@@ -320,6 +326,8 @@ def _(problem, solution, rng):
 
 @kind("path cut short")
 def _(problem, solution, rng):
+    if solution.path[-2] == solution.path[-1]:  # every goal is at the base, and the tour is a point
+        return None
     return problem, drawn(solution, np.array(solution.path[:-1]))
 
 
