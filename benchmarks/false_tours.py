@@ -357,12 +357,17 @@ moved_kind("passes above a goal", at_first_goal, [0, 0, 1])
 
 @kind("length overstated")
 def _(problem, solution, rng):
-    return problem, edit(drawn(solution, np.array(solution.path)), length=1.002 * solution.length)
+    more = 1.002 * solution.length
+    if more == solution.length:  # of a tour that stands still
+        return None
+    return problem, edit(drawn(solution, np.array(solution.path)), length=more)
 
 
 @kind("length understated")
 def _(problem, solution, rng):
     less = (1.0 - OFF) * solution.length
+    if less == solution.length:
+        return None
     return problem, edit(drawn(solution, np.array(solution.path)), length=less)
 
 

@@ -412,3 +412,18 @@ def test_false_tours_of_forty_kinds_are_refused_and_right_ones_are_not(monkeypat
     found = judge.tally(1, 9).values()
     assert [line for t in found for line in (*t.refused, *t.accepted)] == []
     assert len({name for t in found for name in t.false}) >= 40
+
+
+def test_every_false_tour_of_a_problem_whose_goal_is_the_base_is_false(monkeypatch):
+    """A tour that stands still has tethers and a length of 0, and no path to cut short."""
+    monkeypatch.syspath_prepend(str(Path(__file__).parent.parent / "benchmarks"))
+    judge = importlib.import_module("judge")
+    problem = Problem(
+        base=(0, 0), goals=[(0, 0)], obstacles=[Circle(center=(3, 0), radius=1)], tether_length=9
+    )
+    solution = solve(problem)
+    rng = np.random.default_rng(0)
+    made = [(name, make(problem, solution, rng)) for name, make in judge.KINDS.items()]
+    lies = [(name, lie) for name, lie in made if lie is not None]
+    assert len(lies) > 30
+    assert [name for name, lie in lies if judge._accepts(*lie)] == []
