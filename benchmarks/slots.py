@@ -1,6 +1,6 @@
 """Walls with slots of random place, width and angle: no bound on all tours is above a known tour.
 
-    python benchmarks/slots.py [--scenes 30] [--bounds-only] [--seed 0]
+    python benchmarks/slots.py [--scenes 30] [--bounds-only] [--seed 0] [--keep]
 
 The shortest tour that exists is known from above in closed form: through the slot, or round a
 free end of the wall, from corner to corner with square corners at the clearance. `--bounds-only`
@@ -104,7 +104,8 @@ def main() -> None:
     parser.add_argument("--time-limit", type=float, default=60.0)
     args = parser.parse_args()
     rng, above = np.random.default_rng(args.seed), 0
-    head("scene", "a tour that exists m", "tour m", "bound m", "above it", "status", "gaps told")
+    head("scene", "a tour that exists m", "tour m", "bound m", "above it", "status", "gaps told",
+         name=None if args.bounds_only else "space-slots")  # fmt: skip
     for k in range(args.scenes):
         mission, scene, exists = slot_scene(rng)
         if args.bounds_only:

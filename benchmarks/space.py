@@ -511,12 +511,12 @@ def without_tether(found: SolvedMission) -> tuple[float, str]:
     return float(result.length or 0.0), told
 
 
-def frames() -> None:
+def frames(count: int) -> None:
     head("frame", "members", "group", "tour m", "status", "bound of all tours m", "gap %",
          "without a tether m", "tether left at the end of that", "solved in s", "home after s",
          "as given s", "over s", "visited",
          name="space-frames")  # fmt: skip
-    for seed in range(10):
+    for seed in range(count):
         mission, scene = random_frame(seed)
         begin = time.perf_counter()
         found = solve_mission(mission, scene=scene)
@@ -602,6 +602,7 @@ def main() -> None:
     parser.add_argument("--kinds-worlds", type=int, default=3, help="random worlds of each kind")
     parser.add_argument("--limits", type=float, nargs="*", default=[20.0, 60.0], help="seconds")
     parser.add_argument("--given", nargs="*", default=["basin", "ring", "jacket"])
+    parser.add_argument("--frames", type=int, default=10, help="random frames")
     parser.add_argument("--loops", type=int, default=10_000)
     parser.add_argument("--group", help=argparse.SUPPRESS)
     args = parser.parse_args()
@@ -614,7 +615,7 @@ def main() -> None:
         ("prisms", lambda: prisms(args.worlds)),
         ("prism-kinds", lambda: prism_kinds(args.kinds_worlds, args.limits)),
         ("given", lambda: beside_given(args.given, [2.0, 30.0])),
-        ("frames", frames), ("missions", lambda: missions(args.missions)),
+        ("frames", lambda: frames(args.frames)), ("missions", lambda: missions(args.missions)),
     ):  # fmt: skip
         if args.only in (None, name):
             measure()

@@ -72,7 +72,7 @@ class PlaneParams:
 
     max_classes: int = 1000
     max_s: float = 15.0
-    time_share: float = 0.3
+    time_share: float = 0.6
 
     def __post_init__(self) -> None:
         """Refuse values out of range."""
@@ -166,7 +166,9 @@ def floor_plan(scene: Scene, mission: Mission) -> FloorPlan | None:
                 continue
             if abs(shape.normal[2]) > UPRIGHT_TOLERANCE * math.hypot(*shape.normal):
                 return None
-            polygons.append((_wall(shape, anchor, far), scene.tether_radius))
+            normal = np.array(shape.normal[:2]) / math.hypot(*shape.normal[:2])
+            wall = wall_corners(np.array(shape.point[:2]), normal, anchor, far)
+            polygons.append((wall, scene.tether_radius))
             continue
         if not isinstance(shape, Post | Prism):
             box = np.asarray(shape.box()) + scene.tether_radius * np.array([[-1.0], [1.0]])
@@ -217,12 +219,27 @@ def _polygon_of(shape: Shape, low: float, high: float) -> tuple[tuple[Corner, ..
     return None
 
 
-def _wall(shape: HalfSpace, anchor: Floats, far: float) -> tuple[Corner, ...]:
+def wall_corners(point: Floats, normal: Floats, anchor: Floats, far: float) -> tuple[Corner, ...]:
     """Return the corners of a rectangle that stands for an upright half-space within the reach of
-    the tether."""
-    normal = np.array(shape.normal[:2]) / math.hypot(*shape.normal[:2])
+    the tether.
+
+    Parameters
+    ----------
+    point : ndarray, shape (2,)
+        Point on the face, metres.
+    normal : ndarray, shape (2,)
+        Unit normal out of the solid.
+    anchor : ndarray, shape (2,) or (3,)
+        Anchor of the tether, metres.
+    far : float
+        Length of the tether, metres.
+
+    Returns
+    -------
+    tuple of (x, y)
+        Corners, metres.
+    """
     along = np.array([-normal[1], normal[0]])
-    point = np.array(shape.point[:2])
     foot = point + ((anchor[:2] - point) @ along) * along
     wide, deep = WALL_RATIO * far * along, WALL_RATIO * far * normal
     corners = (foot + wide, foot - wide, foot - wide - deep, foot + wide - deep)

@@ -11,7 +11,7 @@ no time to fly. All tours go through `_Incumbents`, which accepts none that the 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from itertools import pairwise
 from typing import Any
 
@@ -47,6 +47,7 @@ from netsp.space.plan import (
     plans,
     water_of,
 )
+from netsp.space.upright import bound_of_upright
 from netsp.space.water import SHARE, Water, along, has_room
 from netsp.travel.result import relative_gap
 
@@ -82,10 +83,10 @@ class MissionPolicy:
 
     def __post_init__(self) -> None:
         """Refuse values out of range."""
-        for field in fields(self):
-            value = getattr(self, field.name)
+        for item in fields(self):
+            value = getattr(self, item.name)
             if not 0.0 <= value <= 1.0:
-                raise InputError(f"{field.name}: expected a number from 0 to 1, got {value:g}")
+                raise InputError(f"{item.name}: expected a number from 0 to 1, got {value:g}")
 
 
 @dataclass(frozen=True)
@@ -389,7 +390,7 @@ def solve_mission(
             )
         found.fly_best()
         _offer_given_flight(found, seed)
-        best = _with_bound(found.best, planned, searched.bound)
+        best = _with_bound(found.best, searched.bounds)
         best = replace(best, mission=with_gaps(best.mission, water))
         return replace(
             best, given=found.given, plan=planned, interrupted=clock.stopped, cells=cells
@@ -418,11 +419,24 @@ def with_gaps(mission: Mission, water: Water) -> Mission:
 
 @dataclass
 class _Searched:
-    """Result of the search: the plan, the bound on all tours, and the error if there is no plan."""
+    """Result of the search.
+
+    Parameters
+    ----------
+    plan : SpacePlan or None
+        The plan; None if there is none.
+    bounds : dict
+        Bounds on all tours through a set of waypoints, metres, by the set.
+    failure : InputError, LimitReachedError or None
+        Error that ended the search.
+    has_all_bounds : bool
+        Whether all kinds of bounds have been computed.
+    """
 
     plan: SpacePlan | None = None
-    bound: float | None = None
+    bounds: dict[frozenset[int], float] = field(default_factory=dict)
     failure: InputError | LimitReachedError | None = None
+    has_all_bounds: bool = False
 
 
 def _begin_as_given(found: _Incumbents, flying: Clock, seed: int) -> None:
@@ -482,10 +496,7 @@ def _search(
         for plan in candidates:
             if plan.kind == PLANE and found.best is not None and found.best.tour.solver == PLANE:
                 continue  # the accepted tour, for the whole tether, is at most as long
-            if plan.kind != PLANE and out.bound is None:
-                flights.tell("bound on all tours")
-                part = clock.part(flights.policy.bound_share)
-                out.bound = bound_of_all(plan.ways, sorted(plan.order), part, seed)
+            _raise_bound(out, plan, flights, clock, seed)
             out.plan = out.plan if out.plan is not None and plan.kind == OUT_AND_BACK else plan
             found.offer(_of_plan(plan, name, seed), f"the tour ({plan.kind})")
             if plan.kind == TAUT_LEGS and found.best is not None:
@@ -497,21 +508,41 @@ def _search(
     return out
 
 
+def _raise_bound(
+    out: _Searched, plan: SpacePlan, flights: _Flights, clock: Clock, seed: int
+) -> None:
+    """Bound all tours to the waypoints of a plan: at the tour of the plane by the upright solids
+    alone, which takes little time, and once paths between waypoints are known by all bounds."""
+    visited, part = frozenset(plan.order), clock.part(flights.policy.bound_share)
+    before = out.bounds.get(visited)
+    if plan.kind == PLANE and before is None:
+        flights.tell("bound on all tours by the plane")
+        places = plan.ways.places
+        some = [n for n in range(len(places)) if places.waypoint[n] in visited]
+        bound = bound_of_upright(flights.mission, flights.water, some, places, part)
+    elif plan.kind != PLANE and not out.has_all_bounds:
+        flights.tell("bound on all tours")
+        bound = bound_of_all(plan.ways, sorted(visited), part, seed)
+        out.has_all_bounds = True
+    else:
+        return
+    if bound is not None:
+        out.bounds[visited] = max(bound, before or 0.0)
+
+
 def _of_plan(planned: SpacePlan, solver: str, seed: int) -> SolvedMission:
     mission = planned.planned(solver, seed)
     return SolvedMission(mission, planned.every_waypoint, None, None, planned)
 
 
-def _with_bound(
-    best: SolvedMission, planned: SpacePlan | None, bound: float | None
-) -> SolvedMission:
-    """Return a tour with the bound on all tours, if the bound is for the same waypoints.
+def _with_bound(best: SolvedMission, bounds: Mapping[frozenset[int], float]) -> SolvedMission:
+    """Return a tour with the bound on all tours to the same waypoints, if there is one.
 
     A robot may turn back before it is at a waypoint. So the bound is reduced by twice the distance
     that remains at each waypoint, and once at home.
     """
-    reached = set() if planned is None else set(planned.order)
-    if bound is None or reached != set(best.order[: len(best.tour.stops)]):
+    bound = bounds.get(frozenset(best.order[: len(best.tour.stops)]))
+    if bound is None:
         return best
     tour, mission = best.tour, best.mission
     off = sum(

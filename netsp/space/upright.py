@@ -1,25 +1,24 @@
-"""The plane's proof as a bound in space, where solids go from the floor to the surface.
+"""The plane's proof as a bound in space, for solids that stand through all depths of the tours.
 
-Remove all solids but the upright ones, and shrink the upright ones a little. No path and no tether
-gets longer by that, so the shortest tour of the reduced scene bounds all tours. The reduced scene
-is a problem in the plane with heights (docs/theory.md, fact 4). The exact roadmap and its solvers
-bound its tours over all homotopy classes of the tether.
+Remove all other solids, and shrink these a little. No path and no tether gets longer by that, and a
+free tether stays free, so the shortest tour of the reduced scene bounds all tours. The reduced
+scene is a problem in the plane with heights. The exact roadmap and its solvers bound its tours over
+all homotopy classes of the tether. The proof, and which solids stand through all depths, is in
+docs/theory.md ("Upright solids").
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from netsp.arrays import Floats
 from netsp.clock import Clock
 from netsp.errors import NetspError
 from netsp.geometry import polylines
 from netsp.lower_bound import Scope
 from netsp.online.mission import Mission
-from netsp.online.scene import solids
-from netsp.online.scene.packing import COUNT, ROW, ROWS
 from netsp.problem import Circle, Polygon, Problem
 from netsp.solvers.solve import solve
+from netsp.space.cross_sections import Depths, cross_sections, level_range
 from netsp.space.places import Places
 from netsp.space.water import DEEPEST, DIP, Water
 
@@ -80,57 +79,33 @@ def bound_of_upright(
 def upright_obstacles(water: Water, dip: float) -> list[Circle | Polygon]:
     """Return obstacles of the plane that lie within a scene's upright solids.
 
+    A solid must stand through all heights in which tethers lie or words tell classes apart. If all
+    solids are upright, these are the heights of the scene's bounds. If not, a tether may be led out
+    of the bounds over another solid, and these are all heights in its reach, too.
+
     Parameters
     ----------
     water : Water
         The scene.
     dip : float
-        Distance by which the obstacles are shrunk, metres.
+        Depth to which paths and tethers may enter solids, metres.
 
     Returns
     -------
     list of Circle or Polygon
-        One for each post and prism that is thicker than twice `dip`.
+        One for each upright solid that is thicker than twice `dip`.
     """
-    arrays = water.field.arrays
-    data, offset = arrays.data, float(arrays.offset)
-    found: list[Circle | Polygon] = []
-    for n in range(int(data[COUNT])):
-        at = ROWS + ROW * n
-        kind = int(data[at])
-        if kind == solids.POST:
-            radius = float(data[at + 3]) + offset - dip
-            if radius > 0.0:
-                found.append(
-                    Circle(center=(float(data[at + 1]), float(data[at + 2])), radius=radius)
-                )
-        elif kind == solids.PRISM:
-            begin, end, grow = int(data[at + 1]), int(data[at + 2]), float(data[at + 3]) + offset
-            shrunk = grown_within(data[begin:end].reshape(-1, 2), grow - dip)
-            if shrunk is not None:
-                found.append(Polygon(polygon=tuple((float(x), float(y)) for x, y in shrunk)))
-    return found
-
-
-def grown_within(corners: Floats, by: float) -> Floats | None:
-    """Return a simple polygon within a polygon that was grown or shrunk.
-
-    Parameters
-    ----------
-    corners : ndarray, shape (n, 2)
-        Corners of the polygon before.
-    by : float
-        Growth, metres; negative to shrink.
-
-    Returns
-    -------
-    ndarray, shape (m, 2), or None
-        Corners; None if nothing or more than one piece is left.
-    """
-    from shapely.geometry import Polygon as Shape
-
-    # arcs become chords, which lie outside of a hollow that is shrunk by up to a thousandth of `by`
-    shape = Shape(corners).buffer(by if by >= 0.0 else 1.002 * by, quad_segs=16)
-    if shape.is_empty or shape.geom_type != "Polygon" or len(shape.interiors):
-        return None
-    return np.asarray(shape.exterior.coords)[:-1]
+    field, grid = water.field, water.grid
+    anchor = np.asarray(water.mission.anchor, dtype=float)
+    reach = water.mission.tether_length * (1.0 + 1e-6) + dip
+    floor, ceiling = level_range(field, dip)
+    heights = [float(grid.low[2]), float(grid.low[2]) + grid.cell * grid.free.shape[2]]
+    if water.bounds is not None:
+        heights += [water.bounds[2], water.bounds[5], *water.laid.nodes[:, 2].tolist()]
+        in_bounds = Depths(max(floor, min(heights)), min(ceiling, max(heights)), anchor, reach)
+        obstacles, all_upright = cross_sections(field, in_bounds, dip)
+        if all_upright:
+            return obstacles
+    heights += [anchor[2] - reach, anchor[2] + reach]
+    in_reach = Depths(max(floor, min(heights)), min(ceiling, max(heights)), anchor, reach)
+    return cross_sections(field, in_reach, dip)[0]
