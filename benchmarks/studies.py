@@ -39,7 +39,7 @@ TABLE_ONE = (
     ("8.07", 8), ("4.69", 2), ("186.48", 3), ("115.28", 3),
     ("16.20", 9), ("40.08", 2), ("0.80", 1), ("65.57", 1),
 )  # fmt: skip
-"""McCammon & Hollinger 2017, Table I, by goals, then tether: median seconds, worlds proven."""
+"""McCammon & Hollinger 2017, Table I, by goals, then tether: mean seconds, worlds proven."""
 
 TABLE_TWO = ROOT / "studies" / "paths" / "icra2017-table2.toml"
 
