@@ -13,6 +13,7 @@ import numpy as np
 
 from netsp.arrays import Floats, Ints
 from netsp.compiled.kernel import kernel
+from netsp.geometry.box_tree import BoxTree, build_box_tree, spatial_order
 
 TWO_PI = 2.0 * math.pi
 
@@ -30,6 +31,13 @@ class Blockers(NamedTuple):
         (n, 4) bounding boxes.
     eps
         What goes no deeper touches.
+    part
+        (parts, 2) obstacle and edge, -1 for a circle: all circles and edges, those of one polygon
+        in a row and in order.
+    part_box
+        (parts, 4) their grown boxes.
+    tree
+        `BoxTree` over the parts.
     """
 
     circles: Floats
@@ -38,6 +46,29 @@ class Blockers(NamedTuple):
     grow: Floats
     box: Floats
     eps: float
+    part: Ints
+    part_box: Floats
+    tree: BoxTree
+
+
+def make_blockers(
+    circles: Floats, edges: Floats, edge_start: Ints, grow: Floats, box: Floats, eps: float
+) -> Blockers:
+    """Return blockers with the tree over their parts."""
+    count = np.maximum(np.diff(edge_start), 1)
+    order = spatial_order(box)
+    owner = np.repeat(order, count[order])
+    within = np.arange(len(owner)) - np.repeat(np.cumsum(count[order]) - count[order], count[order])
+    edge = np.where(circles[owner, 2] < 0.0, edge_start[owner] + within, -1)
+    part_box = box[owner]
+    of_polygon = edge >= 0
+    e, growth = edges[edge[of_polygon]], grow[owner[of_polygon]][:, None]
+    part_box[of_polygon, :2] = np.minimum(e[:, :2], e[:, 2:]) - growth
+    part_box[of_polygon, 2:] = np.maximum(e[:, :2], e[:, 2:]) + growth
+    part = np.ascontiguousarray(np.column_stack([owner, edge]).astype(np.int64))
+    return Blockers(
+        circles, edges, edge_start, grow, box, eps, part, part_box, build_box_tree(part_box)
+    )
 
 
 @kernel
@@ -110,17 +141,6 @@ def depth_in_obstacle(px: float, py: float, o: int, blockers: Blockers) -> float
 
 
 @kernel
-def enters_obstacle(ax: float, ay: float, bx: float, by: float, o: int, blockers: Blockers) -> bool:
-    """Whether a segment enters obstacle `o` deeper than eps."""
-    circles, edges, edge_start = blockers.circles, blockers.edges, blockers.edge_start
-    if circles[o, 2] >= 0.0:
-        d = point_segment_distance(circles[o, 0], circles[o, 1], ax, ay, bx, by)
-        return bool(d < circles[o, 2] - blockers.eps)
-    growth = blockers.grow[o] - blockers.eps
-    return enters_polygon(ax, ay, bx, by, edges, edge_start[o], edge_start[o + 1], growth)
-
-
-@kernel
 def enters_polygon(
     ax: float, ay: float, bx: float, by: float, edges: Floats, start: int, stop: int, growth: float
 ) -> bool:
@@ -137,15 +157,110 @@ def enters_polygon(
 
 @kernel
 def segment_blocked(ax: float, ay: float, bx: float, by: float, blockers: Blockers) -> bool:
-    """Whether the segment ab enters any of the blockers by more than eps."""
-    box = blockers.box
+    """Return whether the segment ab enters any of the blockers by more than eps."""
+    skip, box, first, stop = (
+        blockers.tree.skip, blockers.tree.box, blockers.tree.first, blockers.tree.stop
+    )  # fmt: skip
+    part, part_box, edges, eps = blockers.part, blockers.part_box, blockers.edges, blockers.eps
     left, right, low, high = min(ax, bx), max(ax, bx), min(ay, by), max(ay, by)
-    for o in range(len(box)):
-        if right < box[o, 0] or left > box[o, 2] or high < box[o, 1] or low > box[o, 3]:
+    dx, dy = bx - ax, by - ay
+    node = int(np.int64(0))  # no literal: callees are compiled once
+    while node < len(skip):
+        x0, y0, x1, y1 = box[node, 0], box[node, 1], box[node, 2], box[node, 3]
+        apart = right < x0 or left > x1 or high < y0 or low > y1
+        if not apart:
+            # the line of the segment passes the box by
+            side = dx * (0.5 * (y0 + y1) - ay) - dy * (0.5 * (x0 + x1) - ax)
+            apart = 2.0 * abs(side) > abs(dx) * (y1 - y0) + abs(dy) * (x1 - x0)
+        if apart:
+            node = skip[node]
             continue
-        if enters_obstacle(ax, ay, bx, by, o, blockers):
-            return True
-    return False
+        node += 1
+        if skip[node - 1] > node:
+            continue
+        for k in range(first[node - 1], stop[node - 1]):
+            if (
+                right < part_box[k, 0] or left > part_box[k, 2]
+                or high < part_box[k, 1] or low > part_box[k, 3]
+            ):  # fmt: skip
+                continue
+            o, e = part[k, 0], part[k, 1]
+            if e < 0:
+                d = point_segment_distance(
+                    blockers.circles[o, 0], blockers.circles[o, 1], ax, ay, bx, by
+                )
+                if d < blockers.circles[o, 2] - eps:
+                    return True
+            else:
+                d = segment_segment_distance(
+                    ax, ay, bx, by, edges[e, 0], edges[e, 1], edges[e, 2], edges[e, 3]
+                )
+                if d < blockers.grow[o] - eps:
+                    return True
+    return in_polygon_of(ax, ay, blockers)
+
+
+@kernel
+def in_polygon_of(px: float, py: float, blockers: Blockers) -> bool:
+    """Return whether a point lies in any polygon, not grown, of the blockers."""
+    skip, box, first, stop = (
+        blockers.tree.skip, blockers.tree.box, blockers.tree.first, blockers.tree.stop
+    )  # fmt: skip
+    part, edges = blockers.part, blockers.edges
+    obstacle = int(np.int64(-1))  # no literal: callees are compiled once
+    inside = False
+    node = int(np.int64(0))
+    while node < len(skip):
+        if box[node, 1] > py or box[node, 3] < py or box[node, 2] < px:
+            node = skip[node]
+            continue
+        node += 1
+        if skip[node - 1] > node:
+            continue
+        for k in range(first[node - 1], stop[node - 1]):
+            e = part[k, 1]
+            if e < 0:
+                continue
+            if part[k, 0] != obstacle:
+                if inside:
+                    return True
+                obstacle = part[k, 0]
+            ay, by = edges[e, 1], edges[e, 3]
+            if (ay > py) != (by > py):
+                x = edges[e, 0] + (py - ay) / (by - ay) * (edges[e, 2] - edges[e, 0])
+                if px < x:
+                    inside = not inside
+    return inside
+
+
+@kernel
+def is_covered(px: float, py: float, blockers: Blockers) -> bool:
+    """Return whether a point lies in any of the blockers by more than eps."""
+    skip, box, first, stop = (
+        blockers.tree.skip, blockers.tree.box, blockers.tree.first, blockers.tree.stop
+    )  # fmt: skip
+    part, edges, eps = blockers.part, blockers.edges, blockers.eps
+    node = int(np.int64(0))  # no literal: callees are compiled once
+    while node < len(skip):
+        if px < box[node, 0] or px > box[node, 2] or py < box[node, 1] or py > box[node, 3]:
+            node = skip[node]
+            continue
+        node += 1
+        if skip[node - 1] > node:
+            continue
+        for k in range(first[node - 1], stop[node - 1]):
+            o, e = part[k, 0], part[k, 1]
+            if e < 0:
+                d = math.hypot(px - blockers.circles[o, 0], py - blockers.circles[o, 1])
+                if blockers.circles[o, 2] - d > eps:
+                    return True
+            else:
+                d = point_segment_distance(
+                    px, py, edges[e, 0], edges[e, 1], edges[e, 2], edges[e, 3]
+                )
+                if blockers.grow[o] - d > eps:
+                    return True
+    return in_polygon_of(px, py, blockers)
 
 
 @kernel

@@ -22,7 +22,7 @@ import numpy.typing as npt
 
 from netsp.arrays import Floats, Ints
 from netsp.clock import Clock
-from netsp.compiled.growing import more_rows, sort_in_place
+from netsp.compiled.growing import longer, more_rows, sort_in_place
 from netsp.compiled.kernel import kernel
 from netsp.compiled.tiers import choose
 from netsp.geometry.kernels import (
@@ -31,6 +31,8 @@ from netsp.geometry.kernels import (
     circle_circle_angles,
     circle_line_angles,
     depth_in_obstacle,
+    is_covered,
+    make_blockers,
     point_in_polygon,
     segment_blocked,
 )
@@ -152,7 +154,7 @@ def _grow(problem: Problem, origin: Floats, growth: float, eps: float) -> tuple[
             disks.extend(_vertex_disks(v, growth))
         edge_start.append(len(edges))
     unique = list(dict.fromkeys(disks))
-    blockers = Blockers(
+    blockers = make_blockers(
         np.array(circles, dtype=float).reshape(-1, 3),
         np.array(edges, dtype=float).reshape(-1, 4),
         np.array(edge_start, dtype=np.int64),
@@ -215,57 +217,68 @@ def _push_out_of_polygon(p: Floats, o: int, blockers: Blockers, stand_off: float
 
 @kernel
 def _covered(x: float, y: float, blockers: Blockers, bounds: Floats) -> bool:
-    box, eps = blockers.box, blockers.eps
+    eps = blockers.eps
     if x < bounds[0] - eps or x > bounds[2] + eps or y < bounds[1] - eps or y > bounds[3] + eps:
         return True
-    for o in range(len(box)):
-        if (
-            box[o, 0] <= x <= box[o, 2]
-            and box[o, 1] <= y <= box[o, 3]
-            and depth_in_obstacle(x, y, o, blockers) > eps
-        ):
-            return True
-    return False
+    return is_covered(x, y, blockers)
+
+
+@kernel
+def apart(cx: float, cy: float, r: float, boxes: Floats, k: int) -> bool:
+    """Return whether the box of a disk and box k have no point in common."""
+    return bool(
+        boxes[k, 0] > cx + r or boxes[k, 2] < cx - r or boxes[k, 1] > cy + r or boxes[k, 3] < cy - r
+    )
 
 
 @kernel
 def _visible_arcs(disks: Floats, blockers: Blockers, bounds: Floats, stop: Ints) -> Floats:
     """Return the parts of each disk's cone that no other obstacle covers and that lie within
     bounds; some are missing when the flag of a clock is set."""
-    circles, edges, edge_start = blockers.circles, blockers.edges, blockers.edge_start
-    grow, box, eps = blockers.grow, blockers.box, blockers.eps
+    circles, edges, grow, eps = blockers.circles, blockers.edges, blockers.grow, blockers.eps
+    part, part_box, skip = blockers.part, blockers.part_box, blockers.tree.skip
+    tree_box, tree_first, tree_stop = blockers.tree.box, blockers.tree.first, blockers.tree.stop
     arcs = np.empty((16, 6))  # the sixth column tells a whole circle
     zero = int(np.int64(0))  # no literal: numba would compile every callee for it once more
     count = zero
-    room = 2 * len(circles) + 6 * len(edges) + 16
-    cuts = np.empty(room)
-    inside = np.empty(room + 2)
+    cuts = np.empty(64)
+    inside = np.empty(64)
     for k in range(len(disks)):
         if stop[0] != 0:
             break
         cx, cy, r = disks[k, 0], disks[k, 1], disks[k, 2]
         start, end = disks[k, 3], disks[k, 4]
         n = zero
-        for o in range(len(circles)):
-            if box[o, 0] > cx + r or box[o, 2] < cx - r or box[o, 1] > cy + r or box[o, 3] < cy - r:
+        node = zero
+        while node < len(skip):
+            if apart(cx, cy, r, tree_box, node):
+                node = skip[node]
                 continue
-            if circles[o, 2] >= 0.0:
-                n = circle_circle_angles(
-                    cx, cy, r, circles[o, 0], circles[o, 1], circles[o, 2] - eps, cuts, n
-                )
-            for e in range(edge_start[o], edge_start[o + 1]):
-                ax, ay, bx, by = edges[e, 0], edges[e, 1], edges[e, 2], edges[e, 3]
-                if (
-                    min(ax, bx) - grow[o] > cx + r or max(ax, bx) + grow[o] < cx - r
-                    or min(ay, by) - grow[o] > cy + r or max(ay, by) + grow[o] < cy - r
-                ):  # fmt: skip
+            node += 1
+            if skip[node - 1] > node:
+                continue
+            for p in range(tree_first[node - 1], tree_stop[node - 1]):
+                if apart(cx, cy, r, part_box, p):
                     continue
+                o, e = part[p, 0], part[p, 1]
+                if n + 6 > len(cuts):
+                    cuts = longer(cuts)
+                if e < 0:
+                    n = circle_circle_angles(
+                        cx, cy, r, circles[o, 0], circles[o, 1], circles[o, 2] - eps, cuts, n
+                    )
+                    continue
+                ax, ay, bx, by = edges[e, 0], edges[e, 1], edges[e, 2], edges[e, 3]
                 n = circle_circle_angles(cx, cy, r, ax, ay, grow[o] - eps, cuts, n)
                 length = math.hypot(bx - ax, by - ay)
                 ux = (by - ay) / length * (grow[o] - eps)
                 uy = -(bx - ax) / length * (grow[o] - eps)
                 n = circle_line_angles(cx, cy, r, ax + ux, ay + uy, bx + ux, by + uy, cuts, n)
                 n = circle_line_angles(cx, cy, r, ax, ay, bx, by, cuts, n)
+        if n + 8 > len(cuts):
+            cuts = longer(cuts)
+        if n + 10 > len(inside):
+            inside = np.empty(2 * n + 10)
         for side in range(4):
             b = bounds[side]
             if math.isinf(b):

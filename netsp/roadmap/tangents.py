@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.arrays import Bools, Floats, Ints
-from netsp.clock import NEVER, Clock, Flag
+from netsp.clock import Clock, Flag
 from netsp.compiled.growing import more_rows
 from netsp.compiled.kernel import kernel
 from netsp.compiled.tiers import choose
@@ -24,6 +24,13 @@ from netsp.geometry.kernels import TWO_PI, Blockers, segment_blocked
 from netsp.roadmap.letters import arc_letters, segment_letters
 from netsp.roadmap.outline import Outline
 from netsp.roadmap.pending_letters import pending_boxes
+from netsp.roadmap.sight import (
+    SightPolicy,
+    empty_horizons,
+    find_horizons,
+    make_targets,
+    pairs_in_sight,
+)
 
 ARC_STEP = math.radians(3.0)
 """Arcs are drawn as circumscribed chords of at most this turn: 0.023 % longer than the arc."""
@@ -101,7 +108,9 @@ class TangentGraph:
         return 2 * len(self.arcs) + p
 
 
-def build_tangents(outline: Outline, reach: float, clock: Clock | None = None) -> TangentGraph:
+def build_tangents(
+    outline: Outline, reach: float, clock: Clock | None = None, policy: SightPolicy | None = None
+) -> TangentGraph:
     """Return all free tangents whose ends lie within `reach` of the base (inf for all).
 
     Nothing farther from the base than the tether is ever touched: a leg between two admissible
@@ -118,17 +127,18 @@ def build_tangents(outline: Outline, reach: float, clock: Clock | None = None) -
         arcs, full = outline.arcs[near], outline.full[near]
     else:
         arcs, full = outline.arcs, outline.full
-    # a segment within the box of a polygon is held against each of its edges
-    parts = len(outline.blockers.box) + len(outline.blockers.edges)
-    steps = 2.0 * (len(arcs) + len(outline.points)) ** 2 * (4 + parts)
-    rows = (clock or Clock()).finish(
-        JOINING, steps, lambda stop: tangent_rows(outline, arcs, full, reach, stop=stop)
-    )
+    rows = tangent_rows(outline, arcs, full, reach, clock=clock, policy=policy)
     return assembled(outline, arcs, full, rows, clock)
 
 
 def tangent_rows(
-    outline: Outline, arcs: Floats, full: Bools, reach: float, since: int = 0, stop: Flag = NEVER
+    outline: Outline,
+    arcs: Floats,
+    full: Bools,
+    reach: float,
+    since: int = 0,
+    clock: Clock | None = None,
+    policy: SightPolicy | None = None,
 ) -> Floats:
     """Rows of `_tangents` between arcs and the outline's points.
 
@@ -136,19 +146,60 @@ def tangent_rows(
     ----------
     since
         Only those with an end at point `since` or a later one, of all if 0.
-    stop
-        Flag of a clock; some rows are missing when it is set.
+    policy
+        Policy of how pairs are ruled out in advance; by default `SightPolicy()`.
+
+    Raises
+    ------
+    LimitReachedError
+        The clock was up before all were found.
     """
+    policy, clock = policy or SightPolicy(), clock or Clock()
+    blockers = outline.blockers
     place = np.zeros((len(arcs) + len(outline.points), 5))
     place[: len(arcs)] = arcs
     place[len(arcs) :, :2] = outline.points
-    first = len(arcs) + since if since else 0
-    steps = 2 * len(place) * (len(place) - first) * (1 + len(outline.blockers.box))
-    return np.asarray(
-        choose(_tangents, steps)(
-            place, len(arcs), full, outline.points[0], reach, outline.blockers, first, stop
-        )
-    )
+    total, first = len(place), len(arcs) + since if since else 0
+
+    def rows_of(pairs: Ints) -> Floats:
+        # most segments are blocked by one of few parts, and the tree finds it
+        steps = 4 * len(pairs) * (1 + len(blockers.tree.skip))
+        kernel = choose(_tangents, steps)
+        return clock.finish(
+            JOINING, steps,
+            lambda stop: kernel(
+                place, len(arcs), full, outline.points[0], reach, blockers, pairs, stop
+            ),
+        )  # fmt: skip
+
+    if since or total * (total - 1) // 2 < policy.min_pairs:
+        j = np.arange(first, total)
+        one, other = np.triu_indices(total, 1) if not since else _pairs_with(j)
+        return rows_of(np.column_stack([one, other]).astype(np.int64))
+    targets = make_targets(place)
+    horizons = empty_horizons(place, len(arcs), full, policy.sectors)
+    steps = len(horizons.low) * policy.sectors * 8
+    find, pair = choose(find_horizons, steps), choose(pairs_in_sight, steps)
+    clock.finish(JOINING, steps, lambda stop: find(place, len(arcs), blockers, horizons, stop))
+    rows = []
+    for begin in range(0, total, policy.block):
+        end = min(begin + policy.block, total)
+        pairs = clock.finish(
+            JOINING, steps,
+            lambda stop, begin=begin, end=end: pair(  # type: ignore[misc]
+                place, len(arcs), targets, horizons, begin, end, stop
+            ),
+        )  # fmt: skip
+        rows.append(rows_of(pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]))
+    return np.concatenate(rows)
+
+
+def _pairs_with(numbers: Ints) -> tuple[Ints, Ints]:
+    """Return all pairs (i, j), i < j, of which j is one of ascending numbers, ordered by i."""
+    other = np.repeat(numbers, numbers)
+    one = np.concatenate([np.arange(j) for j in numbers] or [np.zeros(0, dtype=np.int64)])
+    order = np.lexsort((other, one))
+    return one[order], other[order]
 
 
 def assembled(
@@ -286,84 +337,81 @@ def _tangents(
     base: Floats,
     reach: float,
     blockers: Blockers,
-    first: int,
+    pairs: Ints,
     stop: Ints,
 ) -> Floats:
-    """All free directed segments between arcs and points, unsorted: rows of source, target, key,
-    arrival key, length, ends (4), angles (2).
+    """Free directed segments between pairs of arcs and points, unsorted: rows of source, target,
+    key, arrival key, length, ends (4), angles (2).
 
     Parameters
     ----------
     place
         Arcs, then points as arcs of radius 0.
-    first
-        Only those with an end at this place or a later one.
+    pairs
+        (n, 2) places i < j.
     """
     eps = blockers.eps
     out = np.empty((256, 11))
     n = 0
-    total = len(place)
-    for i in range(total):
+    for pair in range(len(pairs)):
         if stop[0] != 0:
             break
-        for j in range(max(i + 1, first), total):
-            if stop[0] != 0:
-                break
-            xi, yi, ri, si, ei = place[i, 0], place[i, 1], place[i, 2], place[i, 3], place[i, 4]
-            xj, yj, rj, sj, ej = place[j, 0], place[j, 1], place[j, 2], place[j, 3], place[j, 4]
-            dx, dy = xj - xi, yj - yi
-            distance = math.hypot(dx, dy)
-            heading = math.atan2(dy, dx)
-            for ti in range(1 if i >= a_count else 2):
-                for tj in range(1 if j >= a_count else 2):
-                    sense_i = 1 - 2 * ti
-                    sense_j = 1 - 2 * tj
-                    k = sense_j * rj - sense_i * ri
-                    gap = distance - abs(k)
-                    if gap < -eps or (distance == 0.0 and i < a_count):
+        i, j = pairs[pair, 0], pairs[pair, 1]
+        xi, yi, ri, si, ei = place[i, 0], place[i, 1], place[i, 2], place[i, 3], place[i, 4]
+        xj, yj, rj, sj, ej = place[j, 0], place[j, 1], place[j, 2], place[j, 3], place[j, 4]
+        dx, dy = xj - xi, yj - yi
+        distance = math.hypot(dx, dy)
+        heading = math.atan2(dy, dx)
+        for ti in range(1 if i >= a_count else 2):
+            for tj in range(1 if j >= a_count else 2):
+                sense_i = 1 - 2 * ti
+                sense_j = 1 - 2 * tj
+                k = sense_j * rj - sense_i * ri
+                gap = distance - abs(k)
+                if gap < -eps or (distance == 0.0 and i < a_count):
+                    continue
+                # a point on a disk, or disks that touch from inside: the tangent has no length.
+                # Its true length, a root of rounding, would blur angles and lengths to 1e-8
+                length = 0.0 if gap <= eps else math.sqrt(gap * (distance + abs(k)))
+                direction = heading - math.atan2(k, length)
+                ux, uy = math.cos(direction), math.sin(direction)
+                theta_i = direction - sense_i * 0.5 * math.pi
+                theta_j = direction - sense_j * 0.5 * math.pi
+                key_i, key_j = 0.0, 0.0
+                back_i, back_j = 0.0, 0.0
+                if i < a_count:
+                    key_i = _key(theta_i, sense_i, si, ei, full[i])
+                    back_i = _reverse_key(key_i, si, ei, full[i])
+                    if math.isnan(key_i):
                         continue
-                    # a point on a disk, or disks that touch from inside: the tangent has no length.
-                    # Its true length, a root of rounding, would blur angles and lengths to 1e-8
-                    length = 0.0 if gap <= eps else math.sqrt(gap * (distance + abs(k)))
-                    direction = heading - math.atan2(k, length)
-                    ux, uy = math.cos(direction), math.sin(direction)
-                    theta_i = direction - sense_i * 0.5 * math.pi
-                    theta_j = direction - sense_j * 0.5 * math.pi
-                    key_i, key_j = 0.0, 0.0
-                    back_i, back_j = 0.0, 0.0
-                    if i < a_count:
-                        key_i = _key(theta_i, sense_i, si, ei, full[i])
-                        back_i = _reverse_key(key_i, si, ei, full[i])
-                        if math.isnan(key_i):
-                            continue
-                    if j < a_count:
-                        key_j = _key(theta_j, sense_j, sj, ej, full[j])
-                        back_j = _reverse_key(key_j, sj, ej, full[j])
-                        if math.isnan(key_j):
-                            continue
-                    ax, ay = xi + sense_i * ri * uy, yi - sense_i * ri * ux
-                    bx, by = xj + sense_j * rj * uy, yj - sense_j * rj * ux
-                    if (
-                        math.hypot(ax - base[0], ay - base[1]) > reach
-                        or math.hypot(bx - base[0], by - base[1]) > reach
-                    ):
+                if j < a_count:
+                    key_j = _key(theta_j, sense_j, sj, ej, full[j])
+                    back_j = _reverse_key(key_j, sj, ej, full[j])
+                    if math.isnan(key_j):
                         continue
-                    if segment_blocked(ax, ay, bx, by, blockers):
-                        continue
-                    node_i = 2 * i + ti if i < a_count else a_count + i
-                    node_j = 2 * j + tj if j < a_count else a_count + j
-                    rev_i = node_i ^ 1 if i < a_count else node_i
-                    rev_j = node_j ^ 1 if j < a_count else node_j
-                    if n + 2 > len(out):
-                        out = more_rows(out)
-                    out[n, 0], out[n, 1], out[n, 2], out[n, 3] = node_i, node_j, key_i, key_j
-                    out[n, 4], out[n, 5], out[n, 6] = length, ax, ay
-                    out[n, 7], out[n, 8], out[n, 9], out[n, 10] = bx, by, theta_i, theta_j
-                    n += 1
-                    out[n, 0], out[n, 1], out[n, 2], out[n, 3] = rev_j, rev_i, back_j, back_i
-                    out[n, 4], out[n, 5], out[n, 6] = length, bx, by
-                    out[n, 7], out[n, 8], out[n, 9], out[n, 10] = ax, ay, theta_j, theta_i
-                    n += 1
+                ax, ay = xi + sense_i * ri * uy, yi - sense_i * ri * ux
+                bx, by = xj + sense_j * rj * uy, yj - sense_j * rj * ux
+                if (
+                    math.hypot(ax - base[0], ay - base[1]) > reach
+                    or math.hypot(bx - base[0], by - base[1]) > reach
+                ):
+                    continue
+                if segment_blocked(ax, ay, bx, by, blockers):
+                    continue
+                node_i = 2 * i + ti if i < a_count else a_count + i
+                node_j = 2 * j + tj if j < a_count else a_count + j
+                rev_i = node_i ^ 1 if i < a_count else node_i
+                rev_j = node_j ^ 1 if j < a_count else node_j
+                if n + 2 > len(out):
+                    out = more_rows(out)
+                out[n, 0], out[n, 1], out[n, 2], out[n, 3] = node_i, node_j, key_i, key_j
+                out[n, 4], out[n, 5], out[n, 6] = length, ax, ay
+                out[n, 7], out[n, 8], out[n, 9], out[n, 10] = bx, by, theta_i, theta_j
+                n += 1
+                out[n, 0], out[n, 1], out[n, 2], out[n, 3] = rev_j, rev_i, back_j, back_i
+                out[n, 4], out[n, 5], out[n, 6] = length, bx, by
+                out[n, 7], out[n, 8], out[n, 9], out[n, 10] = ax, ay, theta_j, theta_i
+                n += 1
     return out[:n]
 
 

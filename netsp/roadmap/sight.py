@@ -1,0 +1,378 @@
+"""Pairs of arcs and points that may see each other, in worlds with too many to try all pairs.
+
+The directed tangents that leave an arc in one sense sweep the plane outside its disk once, by their
+direction. Their *pencil* is cut into sectors, and the horizon of a sector is a distance beyond
+which something blocks all of its tangents: a circle, an edge, or a connected run of edges between
+whose ends the sector lies. A pair whose common tangent ends beyond the horizon of either pencil is
+left out. Nearly all pairs are, most of them many at once, by the boxes around them. Horizons only
+rule out: who stays is tested exactly (`netsp.roadmap.tangents`).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from netsp.arrays import Bools, Floats, Ints, Singles
+from netsp.compiled.growing import more_int_rows
+from netsp.compiled.kernel import kernel
+from netsp.errors import InputError
+from netsp.geometry.box_tree import BoxTree, build_box_tree, spatial_order
+from netsp.geometry.kernels import TWO_PI, Blockers, point_segment_distance
+
+SLACK = 1e-6
+"""Angle (radians) by which a pencil reaches beyond its arc, and relative length by which horizons
+are put farther: more than tolerances and single precision can amount to."""
+
+TOUCHING = 4.0
+"""Disks nearer than this multiple of the sum of their radii are always tested exactly."""
+
+SEPARATE = 1.1
+"""A blocker must stay clear of a disk by this factor to give it a horizon: the directions to what
+is nearly touched are ill-conditioned."""
+
+CHORD = 1.05
+"""No less than asin(x) / x for x up to 1/2."""
+
+NARROW = 0.05
+"""Fraction of a sector. What the radius of a disk shifts directions by less is bounded instead of
+computed."""
+
+
+@dataclass(frozen=True)
+class SightPolicy:
+    """Policy of how pairs that cannot see each other are ruled out.
+
+    Parameters
+    ----------
+    sectors : int
+        Number of sectors of each pencil; at least 8. More rule out more pairs and take more memory
+        and time themselves: 8 bytes for each arc and sector.
+    min_pairs : int
+        From this many pairs on, horizons are computed; at least 0. Fewer pairs are all tested.
+    block : int
+        Number of arcs whose pairs are held in memory at one time; at least 1.
+    """
+
+    sectors: int = 64
+    min_pairs: int = 100_000
+    block: int = 1024
+
+    def __post_init__(self) -> None:
+        for name, least in (("sectors", 8), ("min_pairs", 0), ("block", 1)):
+            value = getattr(self, name)
+            if value < least:
+                raise InputError(f"{name}: expected at least {least}, got {value}")
+
+
+class Horizons(NamedTuple):
+    """What the pencils of all arcs (2 each, counter-clockwise first) and points see.
+
+    Attributes
+    ----------
+    farthest
+        (pencils, sectors) length beyond which no tangent of the sector is free.
+    low
+        (pencils,) direction in which the first sector begins.
+    width
+        (pencils,) angle of a sector.
+    """
+
+    farthest: Singles
+    low: Floats
+    width: Floats
+
+
+class Targets(NamedTuple):
+    """Arcs and points in spatial order, with the tree over the boxes of their disks, and the
+    greatest number in each subtree."""
+
+    order: Ints
+    tree: BoxTree
+    last: Ints
+
+
+def make_targets(place: Floats) -> Targets:
+    """Return the targets of arcs and points (n, 5), which are numbered as they stand there."""
+    r = place[:, 2:3]
+    boxes = np.hstack([place[:, :2] - r, place[:, :2] + r])
+    order = spatial_order(boxes)
+    tree = build_box_tree(boxes[order])
+    last = np.zeros(len(tree.skip), dtype=np.int64)
+    leaf = tree.skip == np.arange(len(last)) + 1
+    for k in range(len(last) - 1, -1, -1):
+        if leaf[k]:
+            last[k] = order[tree.first[k] : tree.stop[k]].max()
+        else:
+            last[k] = max(last[k + 1], last[tree.skip[k + 1]])
+    return Targets(order, tree, last)
+
+
+def empty_horizons(place: Floats, arc_count: int, full: Bools, sectors: int) -> Horizons:
+    """Return horizons at infinity."""
+    start, span = np.zeros(len(place)), np.full(len(place), TWO_PI)
+    part = np.flatnonzero(~full)
+    start[part] = place[part, 3]
+    span[part] = place[part, 4] - place[part, 3]
+    whole = span + 2.0 * SLACK >= TWO_PI
+    start, span = np.where(whole, 0.0, start - SLACK), np.where(whole, TWO_PI, span + 2.0 * SLACK)
+    turned = np.column_stack([start + 0.5 * math.pi, start - 0.5 * math.pi])
+    low = np.concatenate([turned[:arc_count].ravel(), start[arc_count:]])
+    width = np.concatenate([np.repeat(span[:arc_count], 2), span[arc_count:]]) / sectors
+    return Horizons(np.full((len(low), sectors), np.inf, dtype=np.float32), low, width)
+
+
+@kernel
+def _lower(
+    begin: float, angle: float, far: float, pencil: int, farthest: Singles, width: float
+) -> None:
+    """Put the horizon of all sectors wholly within an angle, which begins so far after the first
+    sector, no farther than a length."""
+    sectors = farthest.shape[1]
+    far *= 1.0 + SLACK
+    begin %= TWO_PI
+    end = begin + angle
+    for k in range(math.ceil(begin / width), min(sectors, math.floor(end / width))):
+        farthest[pencil, k] = min(farthest[pencil, k], far)
+    # the angle may reach once round
+    for k in range(min(sectors, math.floor((end - TWO_PI) / width))):
+        farthest[pencil, k] = min(farthest[pencil, k], far)
+
+
+@kernel
+def _is_hidden(
+    begin: float, angle: float, near: float, pencil: int, farthest: Singles, width: float
+) -> bool:
+    """Return whether the horizon of all sectors that meet an angle is nearer than a length."""
+    sectors = farthest.shape[1]
+    begin %= TWO_PI
+    end = begin + angle
+    for k in range(math.floor(begin / width), min(sectors, math.floor(end / width) + 1)):
+        if farthest[pencil, k] >= near:
+            return False
+    if end >= TWO_PI:
+        for k in range(min(sectors, math.floor((end - TWO_PI) / width) + 1)):
+            if farthest[pencil, k] >= near:
+                return False
+    return True
+
+
+@kernel
+def _block(
+    cx: float, cy: float, offset: float, p: Floats, q: Floats, radius: float, far: float,
+    pencil: int, farthest: Singles, low: float, width: float,
+) -> None:  # fmt: skip
+    """Lower horizons to what a connected set blocks that has the disks of a radius about p and q in
+    it and stays clear of the pencil's own disk.
+
+    Parameters
+    ----------
+    offset
+        Radius of the pencil's disk times its sense.
+    far
+        Longest tangent to the set.
+    """
+    ux, uy, vx, vy = p[0] - cx, p[1] - cy, q[0] - cx, q[1] - cy
+    a, b = math.hypot(ux, uy), math.hypot(vx, vy)
+    near = min(a, b)
+    cross, dot = ux * vy - uy * vx, ux * vx + uy * vy
+    is_slim = abs(offset) + radius < NARROW * width * near
+    if is_slim and dot > 0.0 and abs(cross) < 0.5 * width * a * b:
+        return  # most edges subtend less than a sector
+    first = math.atan2(uy, ux)
+    # the set subtends less than half a turn
+    turn = math.atan2(cross, dot)
+    if is_slim:
+        shift = CHORD * abs(offset) / near
+        begin = first + min(turn, 0.0) + shift
+        end = first + max(turn, 0.0) - shift
+    else:
+        begin = first + min(
+            -math.asin((radius - offset) / a), turn - math.asin((radius - offset) / b)
+        )
+        end = first + max(math.asin((radius + offset) / a), turn + math.asin((radius + offset) / b))
+    if end - begin >= width:
+        _lower(begin - low, end - begin, far, pencil, farthest, width)
+
+
+@kernel
+def find_horizons(
+    place: Floats, a_count: int, blockers: Blockers, horizons: Horizons, stop: Ints
+) -> None:
+    """Lower the horizons of all pencils to what blocks them; some stay too far when the flag of a
+    clock is set."""
+    farthest, lows, widths = horizons.farthest, horizons.low, horizons.width
+    box, skip = blockers.tree.box, blockers.tree.skip
+    tree_first, tree_stop, part = blockers.tree.first, blockers.tree.stop, blockers.part
+    edges, circles, grow, eps = blockers.edges, blockers.circles, blockers.grow, blockers.eps
+    stack = np.empty(256, dtype=np.int64)
+    for pencil in range(len(lows) if len(skip) else 0):
+        if stop[0] != 0:
+            break
+        i = pencil // 2 if pencil < 2 * a_count else pencil - a_count
+        cx, cy, r = place[i, 0], place[i, 1], place[i, 2]
+        offset = r if pencil % 2 == 0 else -r
+        low, width = lows[pencil], widths[pencil]
+        stack[0] = 0
+        top = 1
+        while top > 0:
+            top -= 1
+            node = stack[top]
+            near = _distance(cx, cy, box, node)
+            if near > 2.0 * r:
+                begin, angle = _subtended(cx, cy, box, node)
+                shift = CHORD * r / near
+                if angle + 2.0 * shift < width:
+                    continue
+                begin -= low + shift
+                if _is_hidden(begin, angle + 2.0 * shift, near, pencil, farthest, width):
+                    continue
+                first, last = tree_first[node], tree_stop[node] - 1
+                o, e = part[first, 0], part[first, 1]
+                if e >= 0 and part[last, 0] == o:
+                    far = math.hypot(
+                        max(box[node, 2] - cx, cx - box[node, 0]),
+                        max(box[node, 3] - cy, cy - box[node, 1]),
+                    )
+                    _block(
+                        cx, cy, offset, edges[e, :2], edges[part[last, 1], 2:],
+                        grow[o] - 2.0 * eps, far, pencil, farthest, low, width,
+                    )  # fmt: skip
+            if skip[node] > node + 1:
+                one, other = node + 1, skip[node + 1]
+                if _distance(cx, cy, box, one) < _distance(cx, cy, box, other):
+                    one, other = other, one
+                stack[top], stack[top + 1] = one, other
+                top += 2
+                continue
+            for k in range(tree_first[node], tree_stop[node]):
+                o, e = part[k, 0], part[k, 1]
+                if e < 0:
+                    d = math.hypot(circles[o, 0] - cx, circles[o, 1] - cy)
+                    radius = circles[o, 2] - 2.0 * eps
+                    if radius > 0.0 and d > SEPARATE * (r + radius):
+                        _block(
+                            cx, cy, offset, circles[o, :2], circles[o, :2], radius, d, pencil,
+                            farthest, low, width,
+                        )  # fmt: skip
+                    continue
+                radius = grow[o] - 2.0 * eps
+                ux, uy = edges[e, 0] - cx, edges[e, 1] - cy
+                vx, vy = edges[e, 2] - cx, edges[e, 3] - cy
+                far = math.hypot(max(abs(ux), abs(vx)), max(abs(uy), abs(vy)))
+                if (abs(ux * vy - uy * vx) + radius * far) < 0.2 * width * (ux * vx + uy * vy):
+                    continue  # most edges subtend less than a sector
+                d = point_segment_distance(
+                    cx, cy, edges[e, 0], edges[e, 1], edges[e, 2], edges[e, 3]
+                )
+                if d > SEPARATE * (r + radius):
+                    far = max(math.hypot(ux, uy), math.hypot(vx, vy))
+                    _block(
+                        cx, cy, offset, edges[e, :2], edges[e, 2:], radius, far, pencil,
+                        farthest, low, width,
+                    )  # fmt: skip
+
+
+@kernel
+def _distance(cx: float, cy: float, box: Floats, k: int) -> float:
+    """Return the distance from a point to a box; 0 inside."""
+    dx = max(box[k, 0] - cx, cx - box[k, 2], 0.0)
+    dy = max(box[k, 1] - cy, cy - box[k, 3], 0.0)
+    return math.hypot(dx, dy)
+
+
+@kernel
+def _subtended(cx: float, cy: float, box: Floats, k: int) -> tuple[float, float]:
+    """Return the direction in which a box begins, counter-clockwise, seen from a point outside, and
+    the angle that it subtends."""
+    x0, y0, x1, y1 = box[k, 0] - cx, box[k, 1] - cy, box[k, 2] - cx, box[k, 3] - cy
+    # corners of the silhouette: begin (ax, ay), end (bx, by)
+    ax = x1 if y0 > 0.0 else x0
+    bx = x0 if y0 > 0.0 else x1
+    ay = y1 if x1 < 0.0 else y0
+    by = y0 if x1 < 0.0 else y1
+    if y0 <= 0.0 <= y1:
+        ax = bx = x0 if x0 > 0.0 else x1
+    if x0 <= 0.0 <= x1:
+        ay = by = y0 if y0 > 0.0 else y1
+    return math.atan2(ay, ax), math.atan2(ax * by - ay * bx, ax * bx + ay * by)
+
+
+@kernel
+def _may_see(direction: float, length: float, pencil: int, horizons: Horizons) -> bool:
+    """Return whether the horizon of a pencil is no nearer than a length in some direction."""
+    width = horizons.width[pencil]
+    k = math.floor(((direction - horizons.low[pencil]) % TWO_PI) / width)
+    sectors = horizons.farthest.shape[1]
+    if k >= sectors:
+        # rounding may put the first direction last
+        whole = abs(width * sectors - TWO_PI) < SLACK
+        return bool(whole and horizons.farthest[pencil, 0] >= length)
+    return bool(horizons.farthest[pencil, k] >= length)
+
+
+@kernel
+def pairs_in_sight(
+    place: Floats, a_count: int, targets: Targets, horizons: Horizons, begin: int, end: int,
+    stop: Ints,
+) -> Ints:  # fmt: skip
+    """Return the pairs (n, 2) of places i < j, i from `begin` to `end` - 1, that horizons do not
+    rule out, without order; some are missing when the flag of a clock is set."""
+    order, last = targets.order, targets.last
+    box, skip = targets.tree.box, targets.tree.skip
+    tree_first, tree_stop = targets.tree.first, targets.tree.stop
+    out = np.empty((1024, 2), dtype=np.int64)
+    n = int(np.int64(0))  # no literal: callees are compiled once
+    seen = np.full(len(place), -1, dtype=np.int64)
+    for i in range(begin, end):
+        cx, cy, r = place[i, 0], place[i, 1], place[i, 2]
+        for ti in range(1 if i >= a_count else 2):
+            if stop[0] != 0:
+                break
+            pencil = 2 * i + ti if i < a_count else a_count + i
+            low, width = horizons.low[pencil], horizons.width[pencil]
+            node = int(np.int64(0))
+            while node < len(skip):
+                if last[node] <= i:
+                    node = skip[node]
+                    continue
+                near = _distance(cx, cy, box, node)
+                if near > 2.0 * r:
+                    away, angle = _subtended(cx, cy, box, node)
+                    shift = CHORD * r / near
+                    if _is_hidden(
+                        away - low - shift, angle + 2.0 * shift, near - r, pencil,
+                        horizons.farthest, width,
+                    ):  # fmt: skip
+                        node = skip[node]
+                        continue
+                node += 1
+                if skip[node - 1] > node:
+                    continue
+                for k in range(tree_first[node - 1], tree_stop[node - 1]):
+                    j = order[k]
+                    if j <= i or seen[j] == i:
+                        continue
+                    dx, dy, rj = place[j, 0] - cx, place[j, 1] - cy, place[j, 2]
+                    d = math.hypot(dx, dy)
+                    visible = d <= TOUCHING * (r + rj)
+                    for tj in range(1 if j >= a_count else 2):
+                        if visible:
+                            break
+                        offset = (1 - 2 * tj) * rj - (1 - 2 * ti) * r
+                        direction = math.atan2(dy, dx) - math.asin(offset / d)
+                        length = math.sqrt(d * d - offset * offset)
+                        back = 2 * j + 1 - tj if j < a_count else a_count + j
+                        visible = _may_see(direction, length, pencil, horizons) and _may_see(
+                            direction + math.pi, length, back, horizons
+                        )
+                    if visible:
+                        seen[j] = i
+                        if n == len(out):
+                            out = more_int_rows(out)
+                        out[n, 0], out[n, 1] = i, j
+                        n += 1
+    return out[:n]
