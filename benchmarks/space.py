@@ -43,7 +43,7 @@ from netsp.roadmap.reach import shortest_tethers
 from netsp.solvers.solve import solve_graph
 from netsp.space.judge import verify_mission
 from netsp.space.order import order_by_going_on
-from netsp.space.plan import AS_GIVEN, OUT_AND_BACK, PLANE
+from netsp.space.plan import AS_GIVEN, OUT_AND_BACK, PLANE, SHORT_ORDER
 from netsp.space.signature import SpaceSignature
 from netsp.space.solve import GOING_ON, SolvedMission, seconds_until_home, solve_mission
 from netsp.space.water import SHARE, Water, along, straight
@@ -56,7 +56,7 @@ LONGER_PEN = "net pen, 24 m of tether"
 
 WAYS = {
     GOING_ON: "going straight on", AS_GIVEN: "the order given", PLANE: "the plane",
-    OUT_AND_BACK: "out and back",
+    OUT_AND_BACK: "out and back", SHORT_ORDER: "a short order",
 }  # fmt: skip
 
 LOW, HIGH, ANCHOR = [-5.0] * 3, [5.0] * 3, [4.0, 0.3, 3.0]

@@ -142,7 +142,7 @@ def summary(
     """What was found, in a few lines."""
     from netsp.lower_bound import LowerBound, Scope
     from netsp.solution import Status
-    from netsp.space.plan import AS_GIVEN, OUT_AND_BACK, PLANE
+    from netsp.space.plan import AS_GIVEN, OUT_AND_BACK, PLANE, SHORT_ORDER
     from netsp.space.solve import GOING_ON, seconds_until_home
 
     tour = found.tour
@@ -160,6 +160,8 @@ def summary(
         verdict = "in the order given: no better order was found"
     elif tour.solver == GOING_ON:
         verdict = "found by going straight on"
+    elif tour.solver == SHORT_ORDER:
+        verdict = "in an order that is short by straight distances; other tours may be shorter"
     elif tour.solver == PLANE:
         verdict = "the shortest found in the plane: all solids are upright prisms"
     elif tour.solver == OUT_AND_BACK:

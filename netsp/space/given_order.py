@@ -1,4 +1,4 @@
-"""Tour in the order in which the mission lists its waypoints: the first incumbent of a search.
+"""Tours in an order of waypoints: that of the mission file, the first incumbent, or another.
 
 The planner `predictive` plans at the waypoints only, and the tether is driven along its paths. The
 tour is that of a simulated flight, without the time that a simulation takes.
@@ -6,8 +6,11 @@ tour is that of a simulated flight, without the time that a simulation takes.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from netsp.clock import Clock
 from netsp.geometry import polylines
 from netsp.online.planner import PlannerOptions
 from netsp.online.planner.base import DONE
@@ -22,7 +25,7 @@ progress."""
 
 
 def drive_given_order(water: Water) -> Driven | None:
-    """Drive a mission in the order of its file.
+    """Drive a mission in the order of its file, whatever the time.
 
     Parameters
     ----------
@@ -40,18 +43,44 @@ def drive_given_order(water: Water) -> Driven | None:
         paths = [np.array(stop.path) for stop in mission.tour.stops]
         legs = [LegTo(k, 0, path) for k, path in enumerate(paths)]
         return drive_legs(water, legs, np.array(mission.tour.home))
+    return drive_order(water, [(k, 0) for k in range(len(mission.waypoints))], Clock())
+
+
+def drive_order(water: Water, order: Sequence[tuple[int, int]], clock: Clock) -> Driven | None:
+    """Drive a mission in some order of its waypoints.
+
+    Parameters
+    ----------
+    water : Water
+        Water of the mission.
+    order : sequence of (int, int)
+        Number of each waypoint, and of its alternative, from 1 on; 0 for the waypoint's position.
+    clock : Clock
+        Clock of the run; when it is up, there is no tour.
+
+    Returns
+    -------
+    Driven or None
+        The tour; None if the robot does not come home with a free tether, exceeds the limit of the
+        tether, or comes too near to solids.
+    """
+    mission = water.mission
+    waypoints = tuple(mission.waypoints[n].at(choice) for n, choice in order)
+    ordered = mission.model_copy(update={"waypoints": waypoints, "tour": None})
     planner = PredictivePlanner(
-        mission, water.field, water.model, water.grid, PlannerOptions(prepared=False)
+        ordered, water.field, water.model, water.grid, PlannerOptions(prepared=False)
     )
     planner.laid = water.laid
     robot, tether = np.array(mission.begin), water.present
     walked, legs = [robot], []
-    for _ in range(MAX_PATHS * (2 + len(mission.waypoints))):
+    for _ in range(MAX_PATHS * (2 + len(order))):
+        if clock.up:
+            return None
         before = len(planner.reached)
         command = planner.step(robot, tether)
         for k in planner.reached[before:]:
             path = np.array(walked if len(walked) > 1 else [robot, robot])
-            legs.append(LegTo(k, 0, path))
+            legs.append(LegTo(*order[k], path))
             walked = [robot]
         if command.mode == DONE:
             break

@@ -44,6 +44,7 @@ from netsp.space.legs import Growth, Ways
 from netsp.space.passages import resolved, resolved_on
 from netsp.space.places import Places
 from netsp.space.prisms import PlaneParams, tours_of_plan
+from netsp.space.short_orders import short_order_tour
 from netsp.space.states import Effort, first_states, states_with_room
 from netsp.space.trees import states_of_trees
 from netsp.space.water import SHARE, Water
@@ -76,6 +77,9 @@ DETOURS = "detours"
 
 PLANE = "plane"
 """Kind of a plan from the tour of the plane, in a scene of upright prisms."""
+
+SHORT_ORDER = "short-order"
+"""Kind of a plan in an order that is short by estimated distances."""
 
 OUT_AND_BACK = "out-and-back"
 """Kind of a plan that goes out to each waypoint along a taut tether, and back the same way."""
@@ -117,7 +121,8 @@ class SpacePlan:
     ways : Ways
         Of the robot between waypoints.
     kind : str
-        How the tour was found: `TAUT_LEGS`, `DETOURS`, `PLANE`, `OUT_AND_BACK` or `AS_GIVEN`.
+        How the tour was found: `TAUT_LEGS`, `DETOURS`, `PLANE`, `SHORT_ORDER`, `OUT_AND_BACK` or
+        `AS_GIVEN`.
     """
 
     mission: Mission
@@ -337,7 +342,8 @@ def plans(
     Yields
     ------
     SpacePlan
-        First, among upright prisms, the tours of the plane; then the tour with detours, if it is
+        First, among upright prisms, the tours of the plane, or if there are none, the tour in a
+        short order; then the tour with detours, if it is
         shorter than the tour along taut legs; then the tour along taut legs; last the tour out and
         back to each waypoint, which is computed only if the caller asks for it.
 
@@ -483,12 +489,19 @@ def _planned(
     # a robot that is farther out than the share may still come back
     limit = max(SHARE * mission.tether_length, water.present.length * (1.0 + ROUNDING))
     check_tether(mission, water.present.length)
+    in_plane = False
     if scene is not None:
         plane = PlaneParams()
         for driven in tours_of_plan(
             water, scene, places, clock.part(plane.time_share), how["seed"], plane, whole_tether
         ):
+            in_plane = True
             yield _plan_of(water, places, driven, PLANE)
+    if not in_plane:
+        tell("short orders")
+        driven_short = short_order_tour(water, places, clock, how["seed"])
+        if driven_short is not None and driven_short.stops:
+            yield _plan_of(water, places, driven_short, SHORT_ORDER)
     tell("shortest tethers to each waypoint")
     effort = Effort.of(len(places))
     states = first_states(water, places, limit, effort, clock.part(STARTING))

@@ -1,11 +1,12 @@
 """From a mission to the same mission planned: order, legs, and a flight that proves them.
 
 The order of the mission file is driven and judged first, before any search, and is the first
-incumbent. Three searches follow: tours of the plane if all solids are upright prisms
-(`netsp.space.prisms`), tours along states and legs (`netsp.space.plan`), and the order by going
-straight on (`netsp.space.order`), which is better for some bodies with many free ends. Tours are
-compared by the time until the robot is home, in a flight by `predictive`, or by length if there is
-no time to fly. All tours go through `_Incumbents`, which accepts none that the judge refuses.
+incumbent. Searches follow: tours of the plane if all solids are upright prisms
+(`netsp.space.prisms`), else tours in short orders (`netsp.space.short_orders`); tours along states
+and legs (`netsp.space.plan`); and the order by going straight on (`netsp.space.order`), which is
+better for some bodies with many free ends. Tours are compared by the time until the robot is home,
+in a flight by `predictive`, or by length if there is no time to fly. All tours go through
+`_Incumbents`, which accepts none that the judge refuses.
 """
 
 from __future__ import annotations
@@ -40,6 +41,7 @@ from netsp.space.plan import (
     OUT_AND_BACK,
     PLANE,
     ROUNDING,
+    SHORT_ORDER,
     TAUT_LEGS,
     SpacePlan,
     check_plannable,
@@ -286,7 +288,7 @@ class _Incumbents:
         """Return the largest ratio of a tour to the incumbent at which it is accepted: a little
         more than 1 for a tour along states and legs, because it has a bound, and less than 1 for
         one by going straight on."""
-        without_bound = (GOING_ON, AS_GIVEN)
+        without_bound = (GOING_ON, AS_GIVEN, SHORT_ORDER)
         if found.tour.solver == GOING_ON and best.tour.solver not in without_bound:
             return 1.0 - self.flights.policy.min_saving
         known = found.plan is not None and found.plan.kind == TAUT_LEGS
@@ -511,16 +513,16 @@ def _search(
 def _raise_bound(
     out: _Searched, plan: SpacePlan, flights: _Flights, clock: Clock, seed: int
 ) -> None:
-    """Bound all tours to the waypoints of a plan: at the tour of the plane by the upright solids
-    alone, which takes little time, and once paths between waypoints are known by all bounds."""
+    """Bound all tours to the waypoints of a plan: at the first plans by the upright solids alone,
+    which takes little time, and once paths between waypoints are known by all bounds."""
     visited, part = frozenset(plan.order), clock.part(flights.policy.bound_share)
     before = out.bounds.get(visited)
-    if plan.kind == PLANE and before is None:
-        flights.tell("bound on all tours by the plane")
+    if plan.kind in (PLANE, SHORT_ORDER) and before is None:
+        flights.tell("bound on all tours by upright solids")
         places = plan.ways.places
         some = [n for n in range(len(places)) if places.waypoint[n] in visited]
         bound = bound_of_upright(flights.mission, flights.water, some, places, part)
-    elif plan.kind != PLANE and not out.has_all_bounds:
+    elif plan.kind not in (PLANE, SHORT_ORDER) and not out.has_all_bounds:
         flights.tell("bound on all tours")
         bound = bound_of_all(plan.ways, sorted(visited), part, seed)
         out.has_all_bounds = True
