@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import warnings
 from collections.abc import Sequence
 
 EXIT_DEFECT, EXIT_BAD_INPUT, EXIT_INFEASIBLE = 1, 2, 3
@@ -142,6 +143,21 @@ class VerificationError(NetspError):
     """A solution failed its independent check."""
 
     exit_code = EXIT_NOT_VERIFIED
+
+
+class LeftOutWarning(UserWarning):
+    """Warning that a result lacks something because a taut path was not found; it says what."""
+
+
+def warn_left_out(what: str) -> None:
+    """Warn that something is left out of a result.
+
+    Parameters
+    ----------
+    what : str
+        One line: what is missing, and what stands in its place.
+    """
+    warnings.warn(what, LeftOutWarning, stacklevel=3)
 
 
 def interrupted(error: BaseException) -> bool:

@@ -42,7 +42,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         except SystemExit:  # after --help or --version
             sys.stdout.flush()
             raise
-        with interrupts_are_heard():
+        with interrupts_are_heard(), messages.warnings_in_one_line():
             code = int(args.run(args))
         sys.stdout.flush()
         return code

@@ -80,8 +80,11 @@ def describe_tethers(problem: Problem, solution: Solution) -> str:
     head = f"{'visit':>5}  {'goal':<12} {'tether':>10}  {'hull':<5} {'linear':<6} {'sight':<5} word"
     lines = [head]
     for k, visit in enumerate(solution.tour):
-        m = measure(problem, paths.tether(visit.goal, visit.signature))
-        free = ["free" if not getattr(m, field) else "no" for _, field in DEFINITIONS]
+        tether = paths.tether_if_found(visit.goal, visit.signature)
+        free = ["unknown"] * len(DEFINITIONS)
+        if tether is not None:
+            m = measure(problem, tether)
+            free = ["free" if not getattr(m, field) else "no" for _, field in DEFINITIONS]
         name = problem.goal_name(visit.goal)
         lines.append(
             f"{k + 1:>5}  {name:<12.12} {visit.tether_length:>10.6g}  {free[0]:<5} {free[1]:<6} "

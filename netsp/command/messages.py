@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
+import warnings
+from collections.abc import Iterator
+from typing import Any
+
+from netsp.errors import LeftOutWarning
 
 
 def error(text: str) -> None:
@@ -18,3 +24,22 @@ def warning(text: str) -> None:
 def note(text: str) -> None:
     """Of what was assumed or done that was not asked."""
     print(f"netsp: note: {text}", file=sys.stderr)
+
+
+@contextlib.contextmanager
+def warnings_in_one_line() -> Iterator[None]:
+    """Print each warning of something left out as a command says it, once."""
+    said: set[str] = set()
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", LeftOutWarning)
+        otherwise = warnings.showwarning
+
+        def show(message: Warning | str, category: type[Warning], *rest: Any) -> None:
+            if not issubclass(category, LeftOutWarning):
+                otherwise(message, category, *rest)
+            elif str(message) not in said:
+                said.add(str(message))
+                warning(str(message))
+
+        warnings.showwarning = show  # type: ignore[assignment]
+        yield

@@ -23,7 +23,7 @@ from netsp.geometry import polylines
 from netsp.hsignature import concatenate, crossings, signature
 from netsp.problem import Circle, Goal, Problem, State
 from netsp.roadmap.from_state import FAR, GraphFromState, graph_from_state
-from netsp.roadmap.paths import TautPaths
+from netsp.roadmap.paths import TautPaths, UnknownPathError
 from netsp.roadmap.reach import explain_unreached
 from netsp.solution import Status
 from netsp.solvers.answer import to_solution
@@ -140,8 +140,8 @@ def repair(
     state = State(position=outside(problem, robot), signature=word)
     order, left_out = reachable(problem, left)
     if not order:
-        legs = [_home(problem, state, FAR * max(problem.tether_length, polylines.length(tether)))]
-        return Repair("home", why, legs, tuple(left_out), legs[0].length, clock.elapsed)
+        home, reason = _home(problem, state, tether, why)
+        return Repair("home", reason, [home], tuple(left_out), home.length, clock.elapsed)
     rest = _rest(problem, order, state)
     graph = graph_from_state(
         rest, max_classes=MOST_CLASSES, time_limit=clock, limits_paths=False
@@ -238,11 +238,19 @@ def _in_free_water(problem: Problem, order: list[int]) -> tuple[list[int], list[
     return kept, gone
 
 
-def _home(problem: Problem, state: State, longest: float) -> Leg:
-    """Back along the tether, which is no longer than that, to the base."""
+def _home(problem: Problem, state: State, tether: Floats, why: str) -> tuple[Leg, str]:
+    """Return the leg back along the taut tether to the base, and the reason for the log.
+
+    Where the taut path is not found, the leg follows the tether as it lies.
+    """
     placed = problem.model_copy(update={"goals": (Goal(position=state.position),), "state": None})
-    back = TautPaths(placed, longest).path(0, 1, state.signature)[::-1]
-    return Leg(HOME, np.ascontiguousarray(back), (), 0.0)
+    longest = FAR * max(problem.tether_length, polylines.length(tether))
+    try:
+        back = TautPaths(placed, longest).path(0, 1, state.signature)[::-1]
+    except UnknownPathError:
+        back = tether[::-1]
+        why += "; no taut path of the tether was found, so back along the tether as it lies"
+    return Leg(HOME, np.ascontiguousarray(back), (), 0.0), why
 
 
 def _keeping_order(graph: GraphFromState, goals: int) -> Result:

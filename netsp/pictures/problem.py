@@ -68,8 +68,9 @@ def draw(problem: Problem, solution: Solution | None = None) -> Any:
             continue
         visit = visits[k]
         draw_obstacles(ax, problem)
-        tether = paths.tether(visit.goal, visit.signature)
-        ax.plot(tether[:, 0], tether[:, 1], color=style.TETHER, lw=1.3)
+        tether = paths.tether_if_found(visit.goal, visit.signature)
+        if tether is not None:
+            ax.plot(tether[:, 0], tether[:, 1], color=style.TETHER, lw=1.3)
         ax.plot(*problem.base[:2], marker="*", ms=8, color=style.BASE, mec="none")
         ax.plot(*problem.points[visit.goal + 1, :2], "o", ms=4, color=style.PATH)
         ax.set_title(f"{k + 1}: {visit.tether_length:.4g} {problem.units}", fontsize=7, pad=2)
@@ -177,8 +178,9 @@ def save_classes(problem: Problem, goal: int, path: str | Path) -> None:
             continue
         v = int(shown[k])
         draw_obstacles(ax, problem, label=_letter if len(problem.obstacles) <= 20 else None)
-        tether = roadmap.paths.path(0, goal + 1, roadmap.signatures[v])
-        ax.plot(tether[:, 0], tether[:, 1], color=style.TETHER, lw=1.4, zorder=3)
+        tether = roadmap.paths.tether_if_found(goal, roadmap.signatures[v])
+        if tether is not None:
+            ax.plot(tether[:, 0], tether[:, 1], color=style.TETHER, lw=1.4, zorder=3)
         ax.plot(*problem.base[:2], marker="*", ms=9, color=style.BASE, mec="none", zorder=4)
         ax.plot(*problem.points[goal + 1, :2], "o", ms=5, color=style.PATH, zorder=4)
         word = list(roadmap.signatures[v])
@@ -237,8 +239,9 @@ def draw_map(
             longest = max(v.tether_length for v in solution.tour)
             paths = TautPaths(problem, 2.0 * max(problem.tether_length, longest))
             for v in solution.tour:
-                line = paths.tether(v.goal, v.signature)
-                ax.plot(line[:, 0], line[:, 1], color=style.TETHER, lw=0.7, alpha=0.6, zorder=2)
+                line = paths.tether_if_found(v.goal, v.signature)
+                if line is not None:
+                    ax.plot(line[:, 0], line[:, 1], color=style.TETHER, lw=0.7, alpha=0.6, zorder=2)
         path = np.array(solution.path)
         ax.plot(path[:, 0], path[:, 1], color=style.PATH, lw=1.8, zorder=3, solid_joinstyle="round")
         _arrows(ax, path, len(solution.tour) + 1)

@@ -13,7 +13,7 @@ from netsp.errors import counted
 from netsp.execute.plan import legs_of
 from netsp.judge import Verification
 from netsp.problem import Problem
-from netsp.report.wording import back_from, bearing, listed, passages
+from netsp.report.wording import Passage, back_from, bearing, listed, passages
 from netsp.roadmap.paths import TautPaths
 from netsp.sizing.margins import Margins, margins
 from netsp.solution import Solution, Status
@@ -161,15 +161,17 @@ def tethers(problem: Problem, solution: Solution) -> str:
     """
     longest = max(v.tether_length for v in solution.tour)
     paths = TautPaths(problem, 2.0 * max(problem.tether_length, longest))
-    runs = [
-        passages(problem, paths.tether(v.goal, v.signature), v.signature) for v in solution.tour
-    ]
-    names = [problem.goal_name(v.goal) for v in solution.tour]
-    rows = [
-        [str(k + 1), names[k], listed(problem, run), back_from(problem, runs, names, k),
-         str(list(v.signature))]
-        for k, (v, run) in enumerate(zip(solution.tour, runs, strict=True))
-    ]  # fmt: skip
+    runs: list[list[Passage]] = []
+    names: list[str] = []
+    rows = []
+    for k, v in enumerate(solution.tour):
+        tether, name = paths.tether_if_found(v.goal, v.signature), problem.goal_name(v.goal)
+        passed = back = "unknown: the taut tether was not found"
+        if tether is not None:
+            runs.append(passages(problem, tether, v.signature))
+            names.append(name)
+            passed, back = listed(problem, runs[-1]), back_from(problem, runs, names, len(runs) - 1)
+        rows.append([str(k + 1), name, passed, back, str(list(v.signature))])
     return table(
         ["visit", "goal", "the tether passes", "if it snags here, or on the way on", "word"],
         rows, (1, 2, 3, 4),

@@ -10,7 +10,13 @@ import numpy as np
 
 from netsp.arrays import Floats, Ints
 from netsp.clock import NEVER, Clock, Flag
-from netsp.errors import InputError, LimitReachedError, NetspError
+from netsp.errors import (
+    InputError,
+    LimitReachedError,
+    NetspError,
+    counted,
+    warn_left_out,
+)
 from netsp.hsignature import Word
 from netsp.problem import Problem
 from netsp.roadmap.arcs import Arcs, arcs_of
@@ -112,18 +118,14 @@ class TautPaths:
         Returns
         -------
         ndarray, shape (k,)
-            In the problem's units.
-
-        Raises
-        ------
-        UnknownPathError
-            A word without a path within the longest that this was made for.
+            In the problem's units; inf, with a warning, for each path that was not found within the
+            longest that this was made for.
         """
         from_, to = np.asarray(a, dtype=np.int64), np.asarray(b, dtype=np.int64)
         ends_of = list(zip(from_.tolist(), to.tolist(), words, strict=True))
         for p, q, word in ends_of:
             if not self._knows(word):
-                self.planar_length(p, q, word)
+                raise UnknownPathError(f"no obstacle for every letter of word {word} ({p} to {q})")
         points = np.concatenate([from_, to])
         letters, row = flattened([*[()] * len(from_), *words])
         places = self.outline.places[points]
@@ -131,7 +133,12 @@ class TautPaths:
         out, pairs = np.empty(len(from_)), np.arange(len(from_))
         pull_each(pairs, pairs + len(pairs), ends, points, self.slits, self.arcs, out)
         for k in np.flatnonzero(out < 0.0).tolist():
-            out[k] = self.planar_length(*ends_of[k])
+            try:
+                out[k] = self.planar_length(*ends_of[k])
+            except UnknownPathError:
+                out[k] = np.inf
+        if missing := int(np.isinf(out).sum()):
+            warn_left_out(f"lengths of {counted(missing, 'taut path')} left out: no path was found")
         return np.asarray(np.hypot(out, self._z[to] - self._z[from_]))
 
     def planar_length(self, a: int, b: int, word: Word, longest: float | None = None) -> float:
@@ -203,6 +210,18 @@ class TautPaths:
         raise InputError(
             f"solution: tour: no taut tether to goal #{goal} has the word {list(word)}"
         )
+
+    def tether_if_found(self, goal: int, word: Word) -> Floats | None:
+        """Return the tether as `tether` does; None, with a warning, where the search for its path
+        fails."""
+        try:
+            return self.path(0, goal + 1, tuple(word))
+        except UnknownPathError:
+            if not self._knows(word):
+                return self.tether(goal, word)
+            label = self.problem.goal_label(goal)
+            warn_left_out(f"tether to {label} left out: no taut path of word {list(word)} found")
+            return None
 
     def pieces(
         self, a: int, b: int, word: Word, longest: float | None = None, stop: Flag = NEVER

@@ -20,7 +20,7 @@ import numpy as np
 from netsp.arrays import Bools, Floats, Ints
 from netsp.clock import Clock, TimeLimit
 from netsp.compiled.kernel import kernel
-from netsp.errors import InputError, LimitReachedError
+from netsp.errors import InputError, LimitReachedError, counted, warn_left_out
 from netsp.geometry.kernels import Blockers, depth_in_obstacle, segment_blocked
 from netsp.hsignature import Word
 from netsp.problem import Circle, Problem
@@ -29,7 +29,7 @@ from netsp.roadmap.detours import sub_goals, tabulate
 from netsp.roadmap.legs import TautLegs
 from netsp.roadmap.letters import segment_letters
 from netsp.roadmap.outline import Outline
-from netsp.roadmap.paths import TautPaths
+from netsp.roadmap.paths import TautPaths, UnknownPathError
 from netsp.roadmap.reach import unreached
 from netsp.roadmap.shortest import MilestoneGraph
 from netsp.travel.detours import Detours
@@ -137,23 +137,47 @@ class PrmRoadmap:
         )  # fmt: skip
 
     def _taut_lengths(self, clock: Clock) -> Floats:
-        """Planar length of the taut tether of every class; when the time is up, only the shortest
-        class of every goal stays."""
+        """Return the planar length of the taut tether of every class.
+
+        When the time is up, only the shortest class of every goal stays. Classes whose taut path is
+        not found are left out, with a warning.
+        """
         planar = np.zeros(len(self.cluster))
         for v in range(1, len(planar)):
             if clock.up:
                 first = np.unique(self.cluster, return_index=True)[1]
                 keep = np.union1d(np.arange(v), first)
-                self.complete = False
-                self.cluster, self._vertex = self.cluster[keep], self._vertex[keep]
-                self.signatures = [self.signatures[k] for k in keep]
-                rest = [
-                    self.paths.planar_length(0, int(self.cluster[k]), self.signatures[k])
-                    for k in range(v, len(keep))
-                ]
-                return np.concatenate([planar[:v], rest])
-            planar[v] = self.paths.planar_length(0, int(self.cluster[v]), self.signatures[v])
-        return planar
+                self._keep_classes(keep)
+                rest = [self._taut_length(k) for k in range(v, len(keep))]
+                planar = np.concatenate([planar[:v], rest])
+                break
+            planar[v] = self._taut_length(v)
+        found = np.isfinite(planar)
+        if found.all():
+            return planar
+        tethers = counted(int((~found).sum()), "state")
+        warn_left_out(f"{tethers} of the tether left out: the taut path was not found")
+        lost = sorted(set(self.cluster.tolist()) - set(self.cluster[found].tolist()))
+        if lost:
+            raise LimitReachedError(
+                f"no taut tether was found in any class that reaches "
+                f"{self.problem.goal_label(lost[0] - 1)}"
+            )
+        self._keep_classes(np.flatnonzero(found))
+        return planar[found]
+
+    def _keep_classes(self, chosen: Ints) -> None:
+        """Leave out all classes but the chosen ones."""
+        self.complete = False
+        self.cluster, self._vertex = self.cluster[chosen], self._vertex[chosen]
+        self.signatures = [self.signatures[k] for k in chosen]
+
+    def _taut_length(self, v: int) -> float:
+        """Return the planar length of the taut tether of a class; inf if its path is not found."""
+        try:
+            return self.paths.planar_length(0, int(self.cluster[v]), self.signatures[v])
+        except UnknownPathError:
+            return math.inf
 
     def _detours(
         self, with_sub_goals: bool, check: Callable[[], None], clock: Clock | None = None

@@ -57,7 +57,7 @@ class SightPolicy:
         Number of arcs whose pairs are held in memory at one time; at least 1.
     """
 
-    sectors: int = 64
+    sectors: int = 32
     min_pairs: int = 100_000
     block: int = 1024
 

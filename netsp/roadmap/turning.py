@@ -17,9 +17,10 @@ import math
 import numpy as np
 
 from netsp.arrays import Floats
-from netsp.errors import InfeasibleError
+from netsp.errors import InfeasibleError, LimitReachedError, counted, warn_left_out
+from netsp.lower_bound import Scope
 from netsp.problem import Problem
-from netsp.roadmap.paths import TautPaths
+from netsp.roadmap.paths import TautPaths, UnknownPathError
 from netsp.travel.graph import TravelGraph
 
 ROUNDING = 1e-9
@@ -40,6 +41,7 @@ def turnings(problem: Problem, graph: TravelGraph) -> Floats:
     -------
     ndarray, shape (V,)
         Sums of angles in the plan, radians: with depth a tether turns no farther than in the plan.
+        NaN, with a warning, where the taut path was not found.
 
     Raises
     ------
@@ -51,7 +53,13 @@ def turnings(problem: Problem, graph: TravelGraph) -> Floats:
     for v in range(1, len(graph)):
         if graph.clock is not None:
             graph.clock.check("measuring how far tethers turn")
-        out[v] = paths.turning(0, int(graph.goal[v]), graph.signatures[v])
+        try:
+            out[v] = paths.turning(0, int(graph.goal[v]), graph.signatures[v])
+        except UnknownPathError:
+            out[v] = np.nan
+    if missing := int(np.isnan(out).sum()):
+        states = counted(missing, "state")
+        warn_left_out(f"{states} of the tether left out: the taut path was not found")
     return out
 
 
@@ -70,14 +78,14 @@ def within_turning(problem: Problem, graph: TravelGraph, most: float) -> TravelG
     Returns
     -------
     TravelGraph
-        The same where there is no limit.
+        The same where there is no limit. Classes in which the turning is unknown are left out.
 
     Raises
     ------
     InfeasibleError
         A goal is reached in no class that is left.
     LimitReachedError
-        The clock was up.
+        The clock was up, or the turning is unknown in all classes of a goal that are left.
     """
     if math.isinf(most):
         return graph
@@ -86,10 +94,22 @@ def within_turning(problem: Problem, graph: TravelGraph, most: float) -> TravelG
     # the limit is the problem's: no class that breaks it is in an admissible tour
     part.declared_scope = graph.scope
     part.classes, part.least_left_out = graph.classes, graph.least_left_out
+    unknown = np.isnan(turning)
+    if unknown.any():
+        # classes of unknown turning may be admissible
+        if graph.scope is Scope.ALL_TOURS:
+            part.declared_scope = Scope.KEPT_CLASSES
+        part.classes = "shortest"
+        part.least_left_out = min(graph.least_left_out, float(graph.tethers[unknown].min()))
     part.excluded_by_rule = graph.excluded_by_rule
     lost = sorted(set(graph.cluster.tolist()) - set(part.cluster.tolist()))
     if lost:
         members = graph.members(lost[0])
+        if unknown[members].any():
+            raise LimitReachedError(
+                f"it is unknown how far the tether to {problem.goal_label(lost[0] - 1)} turns: the "
+                "taut path was not found"
+            )
         best = int(members[np.argmin(turning[members])])
         raise InfeasibleError(
             f"{problem.goal_label(int(graph.goal[best]) - 1)} is reached in no class in which the "

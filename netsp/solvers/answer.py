@@ -10,6 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from netsp.errors import warn_left_out
 from netsp.hsignature import Word, entangled
 from netsp.problem import Problem
 from netsp.solution import ProblemReference, Solution, Timings, Visit
@@ -75,15 +76,31 @@ def _visit(problem: Problem, goal: int, word: Word, tether: float) -> Visit:
 
 
 def _blind_visits(problem: Problem, walked: Trajectory) -> tuple[Visit, ...]:
-    """Visits of a blind baseline, with the taut tether that its path would need."""
-    from netsp.roadmap.paths import TautPaths
+    """Return the visits of a blind baseline, with the taut tether that its path would need.
+
+    Where that is not found, the length of the path up to the visit stands in its place, with a
+    warning: the tether that is out is no longer.
+    """
+    from netsp.roadmap.paths import TautPaths, UnknownPathError
 
     longest = float(np.hypot(*np.diff(walked.path[:, :2], axis=0).T).sum())
     paths = TautPaths(problem, longest * (1.0 + 1e-6))
-    return tuple(
-        _visit(problem, goal - 1, word, paths.length(0, goal, word))
-        for goal, word in zip(walked.order, walked.words, strict=True)
-    )
+    along = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(walked.path, axis=0), axis=1)))
+    visits, at = [], 0
+    for goal, word in zip(walked.order, walked.words, strict=True):
+        off = np.linalg.norm(walked.path[at:] - problem.points[goal], axis=1)
+        # the first place of the path that is at the goal
+        at += int(np.argmax(off <= off.min() + problem.tolerance))
+        try:
+            tether = paths.length(0, goal, word)
+        except UnknownPathError:
+            tether = float(along[at])
+            warn_left_out(
+                f"taut tether to {problem.goal_label(goal - 1)} not found; the length of the path "
+                "that leads there stands in its place"
+            )
+        visits.append(_visit(problem, goal - 1, word, tether))
+    return tuple(visits)
 
 
 def versions() -> dict[str, str]:
