@@ -4,7 +4,7 @@
     python benchmarks/react.py --missions jacket --only react "react, unrefined" --keep
 
 Kinematic vehicle once (nothing is random), the BlueROV2 in a current with gusts for every seed.
-With `--only` the kept rows of other planners and missions stay, and the commit names both runs.
+With `--only` the kept rows of other planners and missions stay, and the commit says which are new.
 """
 
 from __future__ import annotations
@@ -121,8 +121,10 @@ def write(
         return
     old = json.loads((RESULTS / f"{name}.json").read_text(encoding="utf-8"))
     table, names = old["rows"], [n for n, _ in (*VARIANTS, *OWN_TETHER)]
+    missions: list[str] = []
     for cells in rows:
         print("measured: " + ", ".join(cells), flush=True)
+        missions.append(cells[0].split(",")[0])
         same = [k for k, r in enumerate(table) if r[:2] == cells[:2]]
         if same:
             table[same[0]] = cells
@@ -132,7 +134,7 @@ def write(
             if r[0] == cells[0] and names.index(r[1]) < names.index(cells[1])
         ]  # fmt: skip
         table.insert(before[-1] + 1 if before else len(table), cells)
-    now = f"{source()['commit']} ({'; '.join(only)})"
+    now = f"{source()['commit']} ({', '.join(dict.fromkeys(missions))}: {'; '.join(only)})"
     head(*columns, name=name, date=source()["date"], commit=f"{old['commit']}, {now}")
     for cells in table:
         row(*cells)
