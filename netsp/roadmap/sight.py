@@ -54,7 +54,8 @@ class SightPolicy:
     min_pairs : int
         From this many pairs on, horizons are computed; at least 0. Fewer pairs are all tested.
     block : int
-        Number of arcs whose pairs are held in memory at one time; at least 1.
+        Number of arcs that a thread joins at one time, and whose pairs are then in memory; at
+        least 1.
     """
 
     sectors: int = 32
@@ -200,16 +201,17 @@ def _block(
 
 @kernel
 def find_horizons(
-    place: Floats, a_count: int, blockers: Blockers, horizons: Horizons, stop: Ints
-) -> None:
-    """Lower the horizons of all pencils to what blocks them; some stay too far when the flag of a
-    clock is set."""
+    place: Floats, a_count: int, blockers: Blockers, horizons: Horizons, begin: int, end: int,
+    stop: Ints,
+) -> None:  # fmt: skip
+    """Lower the horizons of pencils `begin` to `end` - 1 to what blocks them; some stay too far
+    when the flag of a clock is set."""
     farthest, lows, widths = horizons.farthest, horizons.low, horizons.width
     box, skip = blockers.tree.box, blockers.tree.skip
     tree_first, tree_stop, part = blockers.tree.first, blockers.tree.stop, blockers.part
     edges, circles, grow, eps = blockers.edges, blockers.circles, blockers.grow, blockers.eps
     stack = np.empty(256, dtype=np.int64)
-    for pencil in range(len(lows) if len(skip) else 0):
+    for pencil in range(begin, end if len(skip) else begin):
         if stop[0] != 0:
             break
         i = pencil // 2 if pencil < 2 * a_count else pencil - a_count
@@ -223,12 +225,12 @@ def find_horizons(
             node = stack[top]
             near = _distance(cx, cy, box, node)
             if near > 2.0 * r:
-                begin, angle = _subtended(cx, cy, box, node)
+                away, angle = _subtended(cx, cy, box, node)
                 shift = CHORD * r / near
                 if angle + 2.0 * shift < width:
                     continue
-                begin -= low + shift
-                if _is_hidden(begin, angle + 2.0 * shift, near, pencil, farthest, width):
+                away -= low + shift
+                if _is_hidden(away, angle + 2.0 * shift, near, pencil, farthest, width):
                     continue
                 first, last = tree_first[node], tree_stop[node] - 1
                 o, e = part[first, 0], part[first, 1]

@@ -8,6 +8,8 @@ in the same sense, depart. A taut path never uses anything else (docs/theory.md)
 from __future__ import annotations
 
 import math
+import os
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -161,37 +163,39 @@ def tangent_rows(
     place[len(arcs) :, :2] = outline.points
     total, first = len(place), len(arcs) + since if since else 0
 
-    def rows_of(pairs: Ints) -> Floats:
+    def rows_of(pairs: Ints, stop: Flag) -> Floats:
         # most segments are blocked by one of few parts, and the tree finds it
-        steps = 4 * len(pairs) * (1 + len(blockers.tree.skip))
-        kernel = choose(_tangents, steps)
-        return clock.finish(
-            JOINING, steps,
-            lambda stop: kernel(
-                place, len(arcs), full, outline.points[0], reach, blockers, pairs, stop
-            ),
-        )  # fmt: skip
+        find = choose(_tangents, 4 * len(pairs) * (1 + len(blockers.tree.skip)))
+        base = outline.points[0]
+        return np.asarray(find(place, len(arcs), full, base, reach, blockers, pairs, stop))
 
     if since or total * (total - 1) // 2 < policy.min_pairs:
         j = np.arange(first, total)
         one, other = np.triu_indices(total, 1) if not since else _pairs_with(j)
-        return rows_of(np.column_stack([one, other]).astype(np.int64))
+        pairs = np.column_stack([one, other]).astype(np.int64)
+        steps = 4 * len(pairs) * (1 + len(blockers.tree.skip))
+        return clock.finish(JOINING, steps, lambda stop: rows_of(pairs, stop))
     targets = make_targets(place)
     horizons = empty_horizons(place, len(arcs), full, policy.sectors)
-    steps = len(horizons.low) * policy.sectors * 8
-    find, pair = choose(find_horizons, steps), choose(pairs_in_sight, steps)
-    clock.finish(JOINING, steps, lambda stop: find(place, len(arcs), blockers, horizons, stop))
-    rows = []
-    for begin in range(0, total, policy.block):
-        end = min(begin + policy.block, total)
-        pairs = clock.finish(
-            JOINING, steps,
-            lambda stop, begin=begin, end=end: pair(  # type: ignore[misc]
-                place, len(arcs), targets, horizons, begin, end, stop
-            ),
-        )  # fmt: skip
-        rows.append(rows_of(pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]))
-    return np.concatenate(rows)
+    pencils = len(horizons.low)
+    steps = pencils * policy.sectors * 8
+    lower, pairs_of = choose(find_horizons, steps), choose(pairs_in_sight, steps)
+
+    def in_sight(stop: Flag) -> Floats:
+        def horizons_from(begin: int) -> None:
+            end = min(begin + policy.block, pencils)
+            lower(place, len(arcs), blockers, horizons, begin, end, stop)
+
+        def rows_from(begin: int) -> Floats:
+            end = min(begin + policy.block, total)
+            pairs = pairs_of(place, len(arcs), targets, horizons, begin, end, stop)
+            return rows_of(pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))], stop)
+
+        with ThreadPoolExecutor(os.cpu_count()) as pool:
+            list(pool.map(horizons_from, range(0, pencils, policy.block)))
+            return np.concatenate(list(pool.map(rows_from, range(0, total, policy.block))))
+
+    return clock.finish(JOINING, steps, in_sight)
 
 
 def _pairs_with(numbers: Ints) -> tuple[Ints, Ints]:
