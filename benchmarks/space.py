@@ -1,15 +1,15 @@
 """Words and tours in space.
 
-    python benchmarks/space.py [--only words|loops|prisms|prism-kinds|given|frames|missions]
-                               [--missions jacket …] [--keep]
+    python benchmarks/space.py [--only words|loops|prisms|prism-tours|prism-kinds|given|frames|
+                               missions] [--missions jacket …] [--keep] [--cpu-limits]
 
 Words: what groups scenes have, and what they take. Loops: random ones, beside a second invariant.
-Prisms: tours in space of problems whose shortest tour is proven in the plane. Prism kinds: random
-scenes of posts, boxes and polygons, close together, many, near the surface, with goals at different
-depths, beside the plane within two limits. Given: missions in a good order, solved again within
-short limits. Frames: random ones, with the gap to the bound of all tours. Missions: the shipped
-ones, and the sites of `benchmarks/sites.py`, solved, and flown by `predictive` as they were planned
-and in the order that they were given.
+Prisms: tours in space of problems whose shortest tour is proven in the plane. Prism tours and prism
+kinds: random scenes of posts, boxes and polygons, close together, many, near the surface, with
+goals at different depths: the tour of the plane driven in space, and whole runs within some limits.
+Given: missions in a good order, solved again within short limits. Frames: random ones, with the gap
+to the bound of all tours. Missions: the shipped ones, and the sites of `benchmarks/sites.py`,
+solved, and flown by `predictive` as they were planned and in the order that they were given.
 """
 
 from __future__ import annotations
@@ -43,9 +43,12 @@ from netsp.roadmap.reach import shortest_tethers
 from netsp.solvers.solve import solve_graph
 from netsp.space.judge import verify_mission
 from netsp.space.order import order_by_going_on
-from netsp.space.plan import AS_GIVEN, OUT_AND_BACK, PLANE, SHORT_ORDER
+from netsp.space.places import Places
+from netsp.space.plan import AS_GIVEN, OUT_AND_BACK, PLANE, SHORT_ORDER, water_of
+from netsp.space.prisms import tours_of_plan
 from netsp.space.signature import SpaceSignature
 from netsp.space.solve import GOING_ON, SolvedMission, seconds_until_home, solve_mission
+from netsp.space.upright import bound_of_upright
 from netsp.space.water import SHARE, Water, along, straight
 from netsp.travel.graph import TravelGraph
 from netsp.worlds import reachable_world
@@ -387,6 +390,33 @@ def prism_kinds(worlds: int, limits: list[float]) -> None:
     print()
 
 
+def prism_tours(worlds: int) -> None:
+    """Drive the tour of the plane in random scenes of each kind, and bound all tours, without the
+    rest of a run."""
+    head("kind", "world", "solids", "goals", "in the plane m", "status there", "in space m",
+         "longer by %", "bound of all tours m", "gap %", "CPU s",
+         name="space-prism-tours")  # fmt: skip
+    for seed, kind in itertools.product(range(worlds), PRISM_KINDS):
+        problem, mission, scene = prism_world(kind, seed)
+        best = solve(problem, time_limit=60.0)
+        water = water_of(mission, Clock(), scene=scene)
+        places = Places.of(water.mission, water.field)
+        begin = time.process_time()
+        lengths = [
+            tour.length for tour in tours_of_plan(
+                water, scene, places, Clock(60.0), whole_tether=True
+            )
+        ]  # fmt: skip
+        every = list(range(len(places)))
+        bound = bound_of_upright(water.mission, water, every, places, Clock(60.0)) or 0.0
+        took, length = time.process_time() - begin, min(lengths, default=np.inf)
+        assert best.length is not None
+        row(kind, seed, len(scene.solids), len(problem.goals), f"{best.length:.3f}",
+            best.status.value, f"{length:.3f}", f"{100 * (length / best.length - 1) + 0.0:.2f}",
+            f"{bound:.3f}", f"{100 * max(0.0, 1 - bound / length):.2f}", f"{took:.1f}")  # fmt: skip
+    print()
+
+
 def beside_plane(
     problem: Problem, mission: Mission | None = None, scene: Scene | None = None,
     limit: float = 60.0,
@@ -590,7 +620,16 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument(
         "--only",
-        choices=("words", "loops", "prisms", "prism-kinds", "frames", "missions", "given"),
+        choices=(
+            "words",
+            "loops",
+            "prisms",
+            "prism-tours",
+            "prism-kinds",
+            "frames",
+            "missions",
+            "given",
+        ),
     )
     parser.add_argument(
         "--missions",
@@ -613,6 +652,7 @@ def main() -> None:
     for name, measure in (
         ("words", words), ("loops", lambda: loops(args.loops)),
         ("prisms", lambda: prisms(args.worlds)),
+        ("prism-tours", lambda: prism_tours(args.kinds_worlds)),
         ("prism-kinds", lambda: prism_kinds(args.kinds_worlds, args.limits)),
         ("given", lambda: beside_given(args.given, [2.0, 30.0])),
         ("frames", lambda: frames(args.frames)), ("missions", lambda: missions(args.missions)),

@@ -34,6 +34,7 @@ from netsp.problem import Circle, Goal, Polygon, Problem
 from netsp.roadmap.from_state import from_state
 from netsp.roadmap.reach import shortest_tethers
 from netsp.roadmap.taut import TautRoadmap
+from netsp.solution import Status
 from netsp.solvers.solve import solve_graph
 from netsp.space.board import Driven
 from netsp.space.driven_legs import LegTo, drive_legs
@@ -288,10 +289,12 @@ def tours_of_plan(
         except (InputError, InfeasibleError, LimitReachedError):
             continue
         if found is not None:
-            driven = drive_legs(water, *found)
+            legs, home, is_optimal = found
+            driven = drive_legs(water, legs, home)
             if driven is not None:
                 yield driven
-                if max(stop.most for stop in driven.stops) <= SHARE * water.mission.tether_length:
+                longest = max(stop.most for stop in driven.stops)
+                if is_optimal and longest <= SHARE * water.mission.tether_length:
                     return
 
 
@@ -307,8 +310,9 @@ class _PlaneTour:
 
     def shortest_legs(
         self, share: float, clock: Clock, seed: int
-    ) -> tuple[list[LegTo], Floats] | None:
-        """Return the legs of the shortest tour for a share of the tether, and the path home."""
+    ) -> tuple[list[LegTo], Floats, bool] | None:
+        """Return the legs of the shortest tour for a share of the tether, the path home, and True
+        if the solver proved that it is the shortest of the plane."""
         water, places = self.water, self.places
         mission = water.mission
         start = len(places)  # number of the goal at the start, used if the start is not the anchor
@@ -332,16 +336,17 @@ class _PlaneTour:
             begin = self._vertex(roadmap, graph, place == places.begin, water.present.nodes)
         if home is None or (places.begin is not None and begin is None):
             return None
-        tour = _solved(graph, place, self.places, home, begin, clock, seed)
-        if tour is None:
+        found = _solved(graph, place, self.places, home, begin, clock, seed)
+        if found is None:
             return None
+        tour, is_optimal = found
         ends = [home if begin is None else begin, *tour, home]
         paths = [graph.path(u, v) for u, v in pairwise(ends)]
         legs = [
             LegTo(int(places.waypoint[place[v]]), int(places.choice[place[v]]), path)
             for v, path in zip(tour, paths, strict=False)
         ]
-        return legs, paths[-1]
+        return legs, paths[-1], is_optimal
 
     def _problem(self, goals: Floats, share: float) -> Problem:
         """Return the problem of the plane through some goals."""
@@ -374,13 +379,15 @@ class _PlaneTour:
 def _solved(
     graph: TravelGraph, place: Ints, places: Places, home: int, begin: int | None, clock: Clock,
     seed: int,
-) -> list[int] | None:  # fmt: skip
+) -> tuple[list[int], bool] | None:  # fmt: skip
     """Return the vertices of the shortest tour that ends at `home` and begins at `begin`, or at
-    `home` if `begin` is None."""
+    `home` if `begin` is None, and whether it is proven to be the shortest."""
     count = len(places)
     if home == 0 and begin is None and not places.choice.any():
         result = solve_graph(graph, "auto", time_limit=clock, seed=seed)
-        return None if result.tour is None else list(result.tour[1:])
+        if result.tour is None:
+            return None
+        return list(result.tour[1:]), result.status is Status.OPTIMAL
     others = [
         v for v in range(1, len(graph))
         if 0 <= place[v] < count and (place[v] != places.begin or v == begin)
@@ -393,4 +400,6 @@ def _solved(
     if begin is not None:
         part, first = from_state(part, 1 + others.index(begin)), 2
     result = solve_graph(part, "auto", time_limit=clock, seed=seed)
-    return None if result.tour is None else [int(rows[v]) for v in result.tour[first:]]
+    if result.tour is None:
+        return None
+    return [int(rows[v]) for v in result.tour[first:]], result.status is Status.OPTIMAL
