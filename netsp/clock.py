@@ -7,14 +7,17 @@ last look at it now and then and end with what they have.
 
 from __future__ import annotations
 
+import contextvars
 import heapq
 import itertools
 import math
 import signal
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -43,11 +46,27 @@ class TimingPolicy:
         Largest number of steps of a compiled innermost loop that run to the end even if the time is
         up; at least 0. The default takes about a tenth of a second. A smaller number leaves more
         problems without any tour when the limit is short; a larger one makes runs end later.
+    grace_s : float
+        CPU seconds for which a run may go on in all after its time was up, so that work that hears
+        the clock returns what it has; at least 0. Then the work is abandoned (`Clock.bounded`). A
+        smaller number leaves more missions without any tour when the limit is short; a larger one
+        makes runs end later.
+    stop_grace_s : float
+        CPU seconds more for work that makes a result of what it has, where the clock was stopped,
+        as by Ctrl-C; at least 0. A smaller number loses more of what was found; with a larger one
+        the user waits longer.
     """
 
     untimed_steps: int = 100_000_000
+    grace_s: float = 0.5
+    stop_grace_s: float = 5.0
 
     def __post_init__(self) -> None:
+        for name in ("grace_s", "stop_grace_s"):
+            if not getattr(self, name) >= 0.0:
+                raise InputError(
+                    f"{name}: expected a number that is not negative, got {getattr(self, name)}"
+                )
         if self.untimed_steps < 0:
             raise InputError(
                 f"untimed_steps: expected a number that is not negative, got {self.untimed_steps}"
@@ -156,9 +175,13 @@ class Clock:
     def check(self, doing: str) -> None:
         """Raise LimitReachedError, which says what was being done, when the time is up."""
         if self.up:
-            raise LimitReachedError(
-                f"{'stopped' if self.stopped else 'time limit reached'} while {doing}"
-            )
+            raise self._broken_off(doing)
+
+    def _broken_off(self, doing: str) -> LimitReachedError:
+        """Return the error that says which work the clock has broken off."""
+        return LimitReachedError(
+            f"{'stopped' if self.stopped else 'time limit reached'} while {doing}"
+        )
 
     def finish(self, doing: str, steps: float, call: Callable[[Flag], T]) -> T:
         """Call a function that stops at a flag, as `interruptible` does, and return its result.
@@ -186,6 +209,78 @@ class Clock:
         self.check(doing)
         return out
 
+    @property
+    def is_overdue(self) -> bool:
+        """Whether the time is up and the grace of `TimingPolicy` is used up, too."""
+        return self._overdue()
+
+    def _overdue(self, more: float = 0.0) -> bool:
+        """Return whether the time is up, and the grace and some more CPU seconds are used up.
+        Compiling does not count."""
+        if not self.up:
+            return False
+        family, now = self._family, time.process_time()
+        if not self.stopped and _is_compiling():
+            family.up_at = None  # else what is compiled would be lost, and compiled again next time
+            return False
+        if family.up_at is None:
+            family.up_at = now
+        return now - family.up_at > self.policy.grace_s + more
+
+    def bounded(self, doing: str, call: Callable[[], T], *, winds_down: bool = False) -> T:
+        """Return the result of a call, or abandon the call if the clock is overdue.
+
+        The call runs in a thread of its own. An abandoned thread ends at the next
+        `end_if_abandoned`, or with the process; so the caller may use nothing that it changes.
+
+        Parameters
+        ----------
+        doing : str
+            Name of the work in messages.
+        call : callable
+            The work.
+        winds_down : bool
+            Whether the work makes a result of what it has when the clock is stopped, as by Ctrl-C;
+            then it gets more time for it (`TimingPolicy`).
+
+        Raises
+        ------
+        LimitReachedError
+            The work was abandoned.
+        """
+        if self.deadline == math.inf and self._stop is None:
+            return call()
+        if self.is_overdue:
+            raise self._broken_off(doing)
+        outcome: list[T] = []
+        failure: list[BaseException] = []
+        abandoned: Flag = np.zeros(1, dtype=np.int64)
+        done = threading.Event()
+
+        def body() -> None:
+            _abandoned.set(abandoned)
+            try:
+                outcome.append(call())
+            except BaseException as error:
+                failure.append(error)
+            done.set()
+
+        context = contextvars.copy_context()
+        thread = threading.Thread(target=context.run, args=(body,), daemon=True, name=BOUNDED)
+        thread.start()
+        try:
+            while not done.wait(min(0.2, max(ASKED, self.left))):
+                more = self.policy.stop_grace_s if winds_down and self.stopped else 0.0
+                if self._overdue(more) or _abandoned.get()[0]:
+                    raise self._broken_off(doing)
+        except (KeyboardInterrupt, LimitReachedError):
+            abandoned[0] = 1
+            _ABANDONED.append(thread)
+            raise
+        if failure:
+            raise failure[0]
+        return outcome[0]
+
     def interruptible(self, call: Callable[[], T]) -> T:
         """Make a call that hears the flag, in a thread, so that Ctrl-C ends it at once."""
         outcome: list[T] = []
@@ -212,10 +307,62 @@ class Clock:
         return outcome[0]
 
 
+def abandoned_work_goes_on(wait: float = 0.0) -> bool:
+    """Return whether a thread that `Clock.bounded` has abandoned still runs.
+
+    Parameters
+    ----------
+    wait : float
+        Seconds to wait for its end.
+    """
+    until = time.monotonic() + wait
+    for thread in list(_ABANDONED):
+        thread.join(max(0.0, until - time.monotonic()))
+        if not thread.is_alive():
+            _ABANDONED.remove(thread)
+    return bool(_ABANDONED)
+
+
+_ABANDONED: list[threading.Thread] = []
+
+
+def _is_compiling() -> bool:
+    """Return whether numba compiles a kernel just now."""
+    lock = sys.modules.get("numba.core.compiler_lock")
+    return lock is not None and bool(lock.global_compiler_lock.is_locked())
+
+
+BOUNDED = "netsp-bounded"
+"""Name of the threads of `Clock.bounded`."""
+
+_abandoned: ContextVar[Flag] = ContextVar("abandoned", default=NEVER)
+
+
+def abandoned() -> Flag:
+    """Return the flag of the enclosing `Clock.bounded`, for compiled loops and other threads: 1
+    once the work is abandoned. It stays 0 outside of `Clock.bounded`."""
+    return _abandoned.get()
+
+
+def end_if_abandoned() -> None:
+    """Raise LimitReachedError if the enclosing `Clock.bounded` has abandoned this work."""
+    if _abandoned.get()[0]:
+        raise LimitReachedError("abandoned")
+
+
 class _Family:
-    """What clocks within one another share."""
+    """State that clocks within one another share.
+
+    Attributes
+    ----------
+    ended : bool
+        Whether `Clock.end` was called.
+    up_at : float or None
+        CPU seconds of the process when the time was first seen to be up.
+    """
 
     ended = False
+    up_at: float | None = None
 
 
 TimeLimit = float | Clock | None

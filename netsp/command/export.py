@@ -159,7 +159,7 @@ def _mission(args: argparse.Namespace) -> int:
     if args.problem is not None:
         raise InputError(f"--problem: {args.solution} is a mission; expected none")
     check_writable(args.output, inputs=(args.solution,))
-    from netsp.clock import whole_or_interrupted
+    from netsp.command.interrupts import until_interrupted
     from netsp.export.mission import export_mission
     from netsp.export.write import SHALLOWEST, Settings, format_of, predicted_s
     from netsp.online.mission import Mission
@@ -175,11 +175,13 @@ def _mission(args: argparse.Namespace) -> int:
         hold=args.hold, speed=mission.speed if args.speed is None else args.speed,
         max_waypoints=args.max_waypoints,
     )  # fmt: skip
-    with whole_or_interrupted():
-        done = export_mission(
+    done = until_interrupted(
+        "exporting the tour",
+        lambda: export_mission(
             mission, args.output, kind, projection, acceptance=args.acceptance, settings=settings,
             surface=args.surface,
-        )  # fmt: skip
+        ),
+    )  # fmt: skip
     stops = sum(p.goal is not None and p.goal >= 0 for p in done.points)
     print(
         f"{args.output}: {len(done.points)} waypoints, {stops} of them stops, all in the classes "

@@ -5,11 +5,13 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from netsp.command import told
 from netsp.command.types import check_writable
+from netsp.errors import LimitReachedError
 
 if TYPE_CHECKING:
     from netsp.clock import Clock
@@ -39,10 +41,15 @@ def fly(
         there = [str(Path(output) / name) for name in WRITTEN if (Path(output) / name).exists()]
         check_writable(*there, inputs=inputs)
     with until_interrupt(None) as clock:
-        runs = _flown(
-            mission, planners, clock, output=output, quiet=quiet, surprises=surprises,
-            source=source, check=check, **how,
-        )  # fmt: skip
+        try:
+            runs = _flown(
+                mission, planners, clock, output=output, quiet=quiet, surprises=surprises,
+                source=source, check=check, **how,
+            )  # fmt: skip
+        except LimitReachedError:
+            if clock.stopped:
+                raise KeyboardInterrupt from None
+            raise
     if output is None or as_json:
         told.tell(runs[0].summary)
     return runs
@@ -63,16 +70,18 @@ def _flown(
     runs: list[Run] = []
     messages = nullcontext() if quiet else compile_messages(sys.stderr)
     with output_folder(output), messages:
-        scene = mission.load_scene()
+        scene = clock.bounded("reading the scene", mission.load_scene)
         if surprises is not None:
             surprises.check(scene, source or "", len(mission.waypoints))
-        field = scene.field(on_progress=tell)
+        field = clock.bounded(
+            "measuring distances in the scene", lambda: scene.field(on_progress=tell)
+        )
         if surprises is not None:
             surprises.check_places(mission, scene, field, source or "")
         if check:
             from netsp.space.judge import checked_mission
 
-            checked_mission(mission, scene, field)
+            clock.bounded("judging the tour", lambda: checked_mission(mission, scene, field))
         if clock.stopped:
             raise KeyboardInterrupt
         if not quiet:
@@ -80,13 +89,12 @@ def _flown(
                 GeodesicTether(field, mission.delta), mission.delta, "lower the mission's delta"
             )
         for planner in planners:
-            run = simulate(
-                mission, planner, scene=scene, field=field, surprises=surprises,
-                on_step=until_stopped(
-                    clock, show_mission(mission, scene.units) if show else None
-                ),
-                **how,
+            on_step = until_stopped(clock, show_mission(mission, scene.units) if show else None)
+            fly_by = partial(
+                simulate, mission, planner, scene=scene, field=field, surprises=surprises,
+                on_step=on_step, **how,
             )  # fmt: skip
+            run = clock.bounded("flying", fly_by, winds_down=True)
             runs.append(run)
             if mission.tour is not None and not mission.track:
                 from netsp.space.flown import words_of_flight

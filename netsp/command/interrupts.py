@@ -10,11 +10,13 @@ import _thread
 import signal
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, TypeVar
 
 from netsp.errors import interrupted
+
+T = TypeVar("T")
 
 AGAIN = 0.05
 """Seconds until an interrupt that was lost is sent again."""
@@ -47,6 +49,33 @@ def interrupts_are_heard() -> Iterator[None]:
         sys.unraisablehook = before
         if hears_sigterm:
             signal.signal(signal.SIGTERM, signal.SIG_DFL)
+
+
+def until_interrupted(doing: str, call: Callable[[], T]) -> T:
+    """Return the result of a call, which Ctrl-C and SIGTERM break off wherever it is.
+
+    Parameters
+    ----------
+    doing : str
+        Name of the work in messages.
+    call : callable
+        The work (`netsp.clock.Clock.bounded`).
+
+    Raises
+    ------
+    KeyboardInterrupt
+        It was broken off.
+    """
+    from netsp.clock import until_interrupt
+    from netsp.errors import LimitReachedError
+
+    with until_interrupt(None) as clock:
+        try:
+            return clock.bounded(doing, call)
+        except LimitReachedError:
+            if clock.stopped:
+                raise KeyboardInterrupt from None
+            raise
 
 
 def _interrupt() -> None:

@@ -32,6 +32,31 @@ from netsp.errors import (
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
+    code = _main(argv)
+    if argv is None:
+        _end_abandoned_work(code)
+    return code
+
+
+LEAVE_S = 0.5
+"""Seconds that abandoned work gets to end by itself, and to end the processes that it started."""
+
+
+def _end_abandoned_work(code: int) -> None:
+    """End the process at once if work that was abandoned still runs in another language: Python
+    would end its thread in the middle of it, which aborts the process."""
+    clock = sys.modules.get("netsp.clock")
+    if clock is None or not clock.abandoned_work_goes_on(LEAVE_S):
+        return
+    with contextlib.suppress(OSError, ValueError):
+        sys.stdout.flush()
+    with contextlib.suppress(OSError, ValueError):
+        sys.stderr.flush()
+    os._exit(code)
+
+
+def _main(argv: Sequence[str] | None) -> int:
+    """Run the command line; return the exit code, whatever work goes on."""
     # both are None when they were closed before we began
     sys.stdout, sys.stderr = sys.stdout or _Closed(), sys.stderr or io.StringIO()
     try:

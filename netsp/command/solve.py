@@ -166,8 +166,10 @@ def run(args: argparse.Namespace) -> int:
     from netsp.solvers.solve import solve
 
     clock = Clock(args.time_limit)  # reading and checking the files counts
-    problem = Problem.load(args.problem)
-    warm = Solution.load(args.warm_start) if args.warm_start else None
+    problem = clock.bounded("reading the problem", lambda: Problem.load(args.problem))
+    warm = None
+    if args.warm_start:
+        warm = clock.bounded("reading --warm-start", lambda: Solution.load(args.warm_start))
     check_writable(args.output, args.plot, args.plot_trace, inputs=(args.problem, args.warm_start))
     if args.plot or args.plot_trace:
         from netsp.pictures import problem as plotting

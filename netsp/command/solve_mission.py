@@ -77,14 +77,17 @@ def solve(
 
     clock = Clock(time_limit or TIME_LIMIT)  # reading the mission and its scene counts
     begin = time.monotonic()
-    mission = Mission.load(file)
+    mission = clock.bounded("reading the mission", lambda: Mission.load(file))
     stages = None if quiet else Stages(sys.stderr, time_limit or TIME_LIMIT)
     compiling = contextlib.nullcontext() if quiet else compile_messages(sys.stderr)
     with stages or contextlib.nullcontext(), compiling:
-        scene = mission.load_scene()
+        scene = clock.bounded("reading the scene", mission.load_scene)
         from netsp.command.plot_scene import tell, warn_of_scene
 
-        field = scene.field(on_progress=None if quiet else tell)
+        field = clock.bounded(
+            "measuring distances in the scene",
+            lambda: scene.field(on_progress=None if quiet else tell),
+        )
         if not quiet:
             from netsp.online.tether import GeodesicTether
 

@@ -96,12 +96,14 @@ def _tell(args: argparse.Namespace, verdict: Verification) -> None:
 
 def _path_in_scene(args: argparse.Namespace) -> int:
     """Measure a path in a scene."""
+    from netsp.command.interrupts import until_interrupted
     from netsp.command.plot_scene import points_of
     from netsp.online.scene.scene import Scene
     from netsp.space.measures import measure_path
 
     scene = Scene.load(args.problem)
-    m = measure_path(scene, points_of(args.solution))
+    points = points_of(args.solution)
+    m = until_interrupted("measuring the path", lambda: measure_path(scene, points))
     if not args.quiet:
         kind = "loop" if m.closed else "path, its ends joined to its beginning by shortest ways"
         print(f"length    {m.length:.6g} {scene.units} ({kind})")
@@ -121,12 +123,13 @@ def _mission(args: argparse.Namespace) -> int:
     for name, flag in (("measures", "--measures"), ("margins", "--margins")):
         if getattr(args, name):
             raise InputError(f"{flag}: is for problems, and {args.problem} is a mission")
-    from netsp.clock import whole_or_interrupted
+    from netsp.command.interrupts import until_interrupted
     from netsp.online.mission import Mission
     from netsp.space.judge import verify_mission
 
-    with whole_or_interrupted():
-        verdict = verify_mission(Mission.load(args.problem))
+    verdict = until_interrupted(
+        "judging the tour", lambda: verify_mission(Mission.load(args.problem))
+    )
     _tell(args, verdict)
     return 0 if verdict else EXIT_NOT_VERIFIED
 

@@ -155,18 +155,24 @@ def cover(
             ),
             scene,
         )  # fmt: skip
-        field = scene.field()
+        field = clock.bounded("measuring distances in the scene", scene.field)
         base = field.free_point(anchor, "anchor")
         first = base if start is None else field.free_point(start, "start")
         tell("surface of the scene")
-        fine = patches_of(scene, field, camera.patch, np.array([anchor]), inspect)
+        fine = clock.bounded(
+            "covering the surface with patches",
+            lambda: patches_of(scene, field, camera.patch, np.array([anchor]), inspect),
+        )
         patches = coarser(fine, camera.patch)
         mission = Mission(
             scene="-", name=scene.name, anchor=anchor, start=tuple(first.tolist()),
             waypoints=(MissionWaypoint(position=anchor),), clearance=clearance, camera=camera,
             inspect=inspect, tether_length=tether_length or ENDLESS,
         )  # fmt: skip
-        reach = _Reach.of(mission, scene, field, patches, standoff)
+        reach = clock.bounded(
+            "finding where the robot gets to",
+            lambda: _Reach.of(mission, scene, field, patches, standoff),
+        )
         viewer = Viewer(
             field, patches, camera, standoff, clearance, math.radians(incidence), farthest,
             reach.allowed,

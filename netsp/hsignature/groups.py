@@ -17,6 +17,7 @@ from fractions import Fraction
 from functools import cached_property
 from itertools import product
 
+from netsp.clock import end_if_abandoned
 from netsp.hsignature.words import Word, cyclically_reduced, invert, reduce
 
 MOST_RULES = 100
@@ -143,6 +144,7 @@ def eliminated(rank: int, relators: Iterable[Word]) -> tuple[list[Word], int, tu
     left = list(_distinct(relators))
     meaning: dict[int, Word] = {g: (g,) for g in range(1, rank + 1)}
     while True:
+        end_if_abandoned()
         found = _lone_letter(left)
         if found is None:
             shorter = _shortened(left)
@@ -192,6 +194,7 @@ def _shortened(relators: Sequence[Word]) -> tuple[int, Word, list[Word]] | None:
     used = sorted({abs(x) for w in relators for x in w})
     now = sum(map(len, relators))
     for g, h in product(used, used):
+        end_if_abandoned()
         if g == h:
             continue
         for means in ((h, g), (-h, g), (g, h), (g, -h)):
@@ -255,6 +258,7 @@ def _completed(rank: int, relators: Sequence[Word]) -> tuple[tuple[tuple[Word, W
     pairs, exact, done = 0, True, 0
     while True:
         while equations:
+            end_if_abandoned()
             a, b = (_rewritten(w, rules) for w in equations.pop())
             if a == b:
                 continue
@@ -320,6 +324,7 @@ def _annihilators(rows: Sequence[Sequence[int]], n: int) -> tuple[tuple[int, ...
         table[r], table[pick] = table[pick], table[r]
         lead = table[r][column]
         table[r] = [x / lead for x in table[r]]
+        end_if_abandoned()
         for k in range(len(table)):
             if k != r and table[k][column]:
                 factor = table[k][column]

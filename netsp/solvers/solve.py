@@ -354,8 +354,16 @@ def solve(
         most = max_turning(friction, max_tension_ratio)
         with until_interrupt(clock) as rest:
             try:
-                graph = travel_graph(problem, roadmap, **{"time_limit": rest, **options})
-                graph = _within_turning(problem, graph, most, rest)
+                graph = rest.bounded(
+                    "making the roadmap",
+                    lambda: _within_turning(
+                        problem,
+                        travel_graph(problem, roadmap, **{"time_limit": rest, **options}),
+                        most,
+                        rest,
+                    ),
+                    winds_down=True,
+                )
             except LimitReachedError:
                 if rest.stopped and not clock.up:  # by Ctrl-C
                     raise KeyboardInterrupt from None

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.arrays import Floats, Ints
+from netsp.clock import Flag, abandoned, end_if_abandoned
 from netsp.compiled.kernel import kernel
 from netsp.errors import InputError
 from netsp.online.scene.field import DistanceField
@@ -96,7 +97,9 @@ class Cells:
                 f"{np.prod(shape) * 7e-8:.2g} GiB; expected {better:.2g} or more"
             )
         nx, ny, nz = (int(n) for n in shape)
-        return cls(field, low, cell, complex_of(field.arrays, low, cell, (nx, ny, nz)))
+        flags = complex_of(field.arrays, low, cell, (nx, ny, nz), abandoned())
+        end_if_abandoned()
+        return cls(field, low, cell, flags)
 
     @property
     def free_count(self) -> int:
@@ -115,13 +118,15 @@ class Cells:
 
 @kernel
 def complex_of(
-    field: Field, low: Floats, cell: float, shape: tuple[int, int, int]
+    field: Field, low: Floats, cell: float, shape: tuple[int, int, int], stop: Flag
 ) -> npt.NDArray[np.uint8]:
-    """Flags of all cells."""
+    """Return the flags of all cells. Ends early once `stop` is set."""
     nx, ny, nz = shape
     flags = np.zeros(shape, dtype=np.uint8)
     room = np.empty(shape, dtype=np.float32)
     for i in range(nx):
+        if stop[0] != 0:
+            break
         for j in range(ny):
             for k in range(nz):
                 d = distance(
@@ -134,6 +139,8 @@ def complex_of(
     last = np.array([nx, ny, nz]) - 1
     at, to, centre = np.empty(3, dtype=np.int64), np.empty(3, dtype=np.int64), np.empty(3)
     for i in range(nx):
+        if stop[0] != 0:
+            break
         for j in range(ny):
             for k in range(nz):
                 if flags[i, j, k] == 0:
@@ -158,6 +165,8 @@ def complex_of(
                             continue
                     flags[i, j, k] |= EDGE << axis
     for i in range(nx):
+        if stop[0] != 0:
+            break
         for j in range(ny):
             for k in range(nz):
                 if flags[i, j, k] == 0:

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.arrays import Bools, Ints
+from netsp.clock import Flag
 from netsp.compiled.growing import more_int_rows
 from netsp.compiled.kernel import kernel
 from netsp.hsignature.wordtable import Rules, Table, times, times_inverse, times_letter
@@ -94,8 +95,11 @@ def nth_axis(n: int, a: int, b: int, c: int, order: int, m: int) -> int:
 
 
 @kernel
-def distances(flags: Flags, root: Ints) -> tuple[npt.NDArray[np.int32], npt.NDArray[np.int32]]:
-    """How far all cells are from the root over 26 steps, and the cells in the order of that.
+def distances(
+    flags: Flags, root: Ints, stop: Flag
+) -> tuple[npt.NDArray[np.int32], npt.NDArray[np.int32]]:
+    """Return how far all cells are from the root over 26 steps, and the cells in the order of that.
+    Ends early once `stop` is set.
 
     A step across counts where edges lead there one after the other: then the cell before its last
     edge is nearer to the root than its end, and every cell has an edge to a nearer one.
@@ -117,7 +121,7 @@ def distances(flags: Flags, root: Ints) -> tuple[npt.NDArray[np.int32], npt.NDAr
     begin = (root[0] * ny + root[1]) * nz + root[2]
     far[begin], waiting[0, 0], waiting[0, 1] = 0, begin, -1
     first[0], empty, now = 0, 0, 0
-    while empty < BUCKETS:
+    while empty < BUCKETS and stop[0] == 0:
         entry = first[now % BUCKETS]
         if entry < 0:
             empty += 1
@@ -166,8 +170,10 @@ def labelled(
     order: npt.NDArray[np.int32],
     table: Table,
     rules: Rules,
+    stop: Flag,
 ) -> tuple[Labels, Table, int]:
-    """A label for every edge between cells that are reached, and how many generators there are.
+    """Return a label for every edge between cells that are reached, and how many generators there
+    are. Ends early once `stop` is set.
 
     Returns
     -------
@@ -200,9 +206,11 @@ def labelled(
         to_do[left] = best
         left += 1
     for cell in order:
+        if stop[0] != 0:
+            break
         i, j, k = cell // (ny * nz), cell // nz % ny, cell % nz
         for side in range(7):
-            while left > 0:
+            while left > 0 and stop[0] == 0:
                 left -= 1
                 edge = to_do[left]
                 for n in range(4):
@@ -319,13 +327,17 @@ def through(
 
 @kernel
 def relations(
-    flags: Flags, labels: Labels, order: npt.NDArray[np.int32], table: Table, rules: Rules
-) -> tuple[Ints, Table]:
-    """Numbers of the words around squares that are not the empty word, each once."""
+    flags: Flags, labels: Labels, order: npt.NDArray[np.int32], table: Table, rules: Rules,
+    stop: Flag,
+) -> tuple[Ints, Table]:  # fmt: skip
+    """Return the numbers of the words around squares that are not the empty word, each once. Ends
+    early once `stop` is set."""
     _nx, ny, nz = flags.shape
     seen: Bools = np.zeros(1024, dtype=np.bool_)
     out, count = np.empty(1024, dtype=np.int64), 0
     for cell in order:
+        if stop[0] != 0:
+            break
         i, j, k = cell // (ny * nz), cell // nz % ny, cell % nz
         for normal in range(3):
             if not flags[i, j, k] & (SQUARE << normal):

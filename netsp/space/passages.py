@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from netsp.arrays import Bools, Floats, Ints
-from netsp.clock import Clock
+from netsp.clock import Clock, end_if_abandoned
 from netsp.errors import InputError, LimitReachedError
 from netsp.online.mission import Mission
 from netsp.online.paths.tree import Grid
@@ -333,6 +333,7 @@ def _parting(between: Bools, nearest: Ints) -> Bools:
     cell is three or more cells away from their own."""
     out = np.zeros(between.shape, dtype=np.bool_)
     for step in _HALF_STEPS:
+        end_if_abandoned()
         here, there = _shifted(between.shape, step)
         apart = np.abs(nearest[here] - nearest[there]).max(axis=-1) >= 3
         found = between[here] & between[there] & apart
@@ -377,6 +378,7 @@ def _links(grid: GapGrid, cells: Ints, nearest: Ints, side: int) -> tuple[Ints, 
     fine, points, room, key = fine[order], points[order], room[order], key[order]
     ends, places, rooms = [], [], []
     for axis in range(3):
+        end_if_abandoned()
         step = (extent[1] * extent[2], extent[2], 1)[axis]
         at = np.searchsorted(key, key + step)
         known = at < len(key)
@@ -401,6 +403,7 @@ def _not_joined(
     is_apart: dict[tuple[int, ...], bool] = {}
     keep = np.zeros(len(ends), dtype=np.bool_)
     for n, pair in enumerate(ends):
+        end_if_abandoned()
         name = tuple(pair.ravel().tolist())
         if name not in is_apart:
             if len(is_apart) >= params.max_pairs:

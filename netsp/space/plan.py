@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -396,25 +397,34 @@ def water_of(
     ------
     InputError
         Waypoints in solids, a mission too large, or bounds that do not hold it.
+    LimitReachedError
+        The time was up before; says which work was broken off.
     """
     tell = tell or _silent
     check_size(mission)
     if field is None or grid is None:
-        scene = scene or mission.load_scene()
+        scene = scene or clock.bounded("reading the scene", mission.load_scene)
         check_bounds(mission, scene)
-        field, grid = field or scene.field(), None
+        field = field or clock.bounded("measuring distances in the scene", scene.field)
+        grid = None
     mission = mission.checked_waypoints(field)
     tell("gaps that the cells do not show")
     if grid is None:
         assert scene is not None
-        cells = resolved(mission, scene, field, clock=clock)
-        mission = cells.mission
-        grid = grid_of(mission, scene, field)
+        find_gaps = partial(resolved, mission, scene, field, clock=clock)
     else:
-        cells = resolved_on(mission, grid, clock=clock)
+        find_gaps = partial(resolved_on, mission, grid, clock=clock)
+    cells = clock.bounded("searching for gaps that the cells do not show", find_gaps)
+    mission = cells.mission
     Places.of(mission, field)  # refuse bad waypoints before the long search for words
+    if grid is None:
+        assert scene is not None
+        grid = clock.bounded("measuring the cells", partial(grid_of, mission, scene, field))
     tell("words of the scene")
-    water = Water.within(mission, field, grid, None if scene is None else scene.bounds)
+    bounds = None if scene is None else scene.bounds
+    water = clock.bounded(
+        "finding the words of the scene", partial(Water.within, mission, field, grid, bounds)
+    )
     return replace(water, cells=cells)
 
 

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.arrays import Floats, Ints
+from netsp.clock import abandoned, end_if_abandoned
 from netsp.errors import InputError
 from netsp.hsignature.groups import Group, eliminated
 from netsp.hsignature.words import Word, invert
@@ -160,15 +161,20 @@ class SpaceSignature:
                 "expected a point in the water, or a smaller cell"
             )
         begin = np.array(np.unravel_index(at, cells.flags.shape), dtype=np.int64)
-        far, order = distances(cells.flags, begin)
+        stop = abandoned()
+        far, order = distances(cells.flags, begin, stop)
         none = packed([])
-        labels, table, generators = labelled(cells.flags, far, order, empty_table(), none)
+        labels, table, generators = labelled(
+            cells.flags, far, order, empty_table(), none, stop
+        )  # fmt: skip
+        end_if_abandoned()
         if generators > MOST_GENERATORS:
             raise InputError(
                 f"cell: {cells.cell:g} m finds more than {MOST_GENERATORS} holes in the scene; "
                 "expected a larger cell"
             )
-        words, table = relations(cells.flags, labels, order, table, none)
+        words, table = relations(cells.flags, labels, order, table, none, stop)
+        end_if_abandoned()
         meaning, rank, relators = eliminated(
             generators, [word_of(table, int(number)) for number in words]
         )

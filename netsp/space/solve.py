@@ -13,12 +13,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from netsp.clock import Clock, TimeLimit, until_interrupt
+from netsp.clock import Clock, TimeLimit, end_if_abandoned, until_interrupt
 from netsp.errors import InputError, LimitReachedError
 from netsp.lower_bound import LowerBound, Scope
 from netsp.online.limits import check_tether
@@ -182,17 +183,32 @@ class _Flights:
         if all(w.heading is None for w in mission.waypoints):
             # what is seen takes most of the time of a flight, and changes nothing else of it
             mission = mission.model_copy(update={"camera": None})
-        run = simulate(
-            mission,
-            scene=self.scene, field=self.water.field, on_step=watch,
-            options=PlannerOptions(prepared=False, clock=clock),
-        )  # fmt: skip
+        try:
+            run = self.clock.bounded(
+                f"flying {name}",
+                lambda: simulate(
+                    mission,
+                    scene=self.scene, field=self.water.field, on_step=watch,
+                    options=PlannerOptions(prepared=False, clock=clock),
+                ),
+            )  # fmt: skip
+        except LimitReachedError:
+            return None, False
         return (None, slower) if run.summary["status"] == "interrupted" else (run, False)
 
     def judged(self, mission: Mission) -> bool:
-        """Return whether a tour passes the judge."""
+        """Return whether a tour passes the judge.
+
+        Raises
+        ------
+        LimitReachedError
+            The time was up before it was judged.
+        """
         self.tell("judging the tour")
-        return bool(verify_mission(mission, scene=self.scene, water=self.water))
+        return self.clock.bounded(
+            "judging the tour",
+            lambda: bool(verify_mission(mission, scene=self.scene, water=self.water)),
+        )
 
 
 @dataclass
@@ -236,7 +252,12 @@ class _Incumbents:
             or (len(found.tour.stops) == len(best.tour.stops) and not self._may_be_better(found))
         ):
             return
-        if not self.flights.judged(found.mission):
+        try:
+            if not self.flights.judged(found.mission):
+                return
+        except LimitReachedError:
+            if best is None:
+                raise
             return
         run, slower = self.flights.fly(found.mission, name, self._worth())
         found = replace(found, run=run)
@@ -368,17 +389,28 @@ def solve_mission(
     LimitReachedError
         No tour was found on which the tether stays within its limit.
     """
-    tell, policy = on_progress or (lambda _: None), policy or MissionPolicy()
+    policy = policy or MissionPolicy()
+
+    def tell(text: str) -> None:
+        end_if_abandoned()
+        if on_progress is not None:
+            on_progress(text)
+
     name = solver if isinstance(solver, str) else getattr(solver, "__name__", "solver")
     with until_interrupt(time_limit) as clock:
         check_plannable(mission, solver, params, seed)
-        scene = scene or mission.load_scene()
-        water = water_of(mission, clock, scene=scene, field=field, tell=tell)
-        mission, cells = water.mission, water.cells
-        check_tether(mission, water.present.length)
-        flights = _Flights(mission, scene, water, clock, tell, policy)
-        found = _Incumbents(flights)
-        _begin_as_given(found, clock.part(policy.given_share), seed)
+        try:
+            scene = scene or clock.bounded("reading the scene", mission.load_scene)
+            water = water_of(mission, clock, scene=scene, field=field, tell=tell)
+            mission, cells = water.mission, water.cells
+            check_tether(mission, clock.bounded("laying the tether", lambda: water.present).length)
+            flights = _Flights(mission, scene, water, clock, tell, policy)
+            found = _Incumbents(flights)
+            _begin_as_given(found, clock.part(policy.given_share), seed)
+        except LimitReachedError:
+            if clock.stopped and not (isinstance(time_limit, Clock) and time_limit.up):
+                raise KeyboardInterrupt from None
+            raise
         searched = _search(found, clock, name, solver, params, iteration_limit, seed)
         planned = searched.plan
         if found.given is None:
@@ -453,7 +485,7 @@ def _begin_as_given(found: _Incumbents, flying: Clock, seed: int) -> None:
     )
     if not taken:
         water = replace(flights.water, mission=mission.model_copy(update={"tour": None}))
-        driven = given_plan(water)
+        driven = flights.clock.bounded("driving the order as given", lambda: given_plan(water))
         if driven is not None and driven.stops:
             found.take_first(_of_plan(driven, AS_GIVEN, seed))
     given, _ = flights.fly(mission, "the order as given", clock=flying)
@@ -468,7 +500,7 @@ def _offer_given_flight(found: _Incumbents, seed: int) -> None:
     if given is None or not _good(given) or (best is not None and best.run is None):
         return
     worth = np.inf if best is None or best.run is None else seconds_until_home(best.run)
-    if seconds_until_home(given) >= worth:
+    if seconds_until_home(given) >= worth or found.flights.clock.is_overdue:
         return
     order = tuple(range(len(mission.waypoints)))
     water = found.flights.water
@@ -494,11 +526,17 @@ def _search(
         clock=clock.part(flights.policy.planning_share), iteration_limit=iteration_limit, seed=seed,
         whole_tether=True, on_progress=flights.tell,
     )  # fmt: skip
+
+    def next_plan() -> SpacePlan | None:
+        return clock.bounded("looking for tours", lambda: next(candidates, None), winds_down=True)
+
     try:
-        for plan in candidates:
+        while (plan := next_plan()) is not None:
             if plan.kind == PLANE and found.best is not None and found.best.tour.solver == PLANE:
                 continue  # the accepted tour, for the whole tether, is at most as long
-            _raise_bound(out, plan, flights, clock, seed)
+            clock.bounded(
+                "bounding all tours", partial(_raise_bound, out, plan, flights, clock, seed)
+            )
             out.plan = out.plan if out.plan is not None and plan.kind == OUT_AND_BACK else plan
             found.offer(_of_plan(plan, name, seed), f"the tour ({plan.kind})")
             if plan.kind == TAUT_LEGS and found.best is not None:
@@ -573,9 +611,12 @@ def _offer_going_on(found: _Incumbents, seed: int) -> None:
     flights.tell("order by going straight on")
     water = flights.water
     try:
-        tour = order_by_going_on(
-            mission, water.field, water.grid,
-            clock=clock.part(flights.policy.going_on_share), seed=seed,
+        tour = clock.bounded(
+            "ordering the waypoints by going straight on",
+            lambda: order_by_going_on(
+                mission, water.field, water.grid,
+                clock=clock.part(flights.policy.going_on_share), seed=seed,
+            ),
         )  # fmt: skip
     except (InputError, LimitReachedError):
         return
@@ -587,7 +628,7 @@ def _offer_going_on(found: _Incumbents, seed: int) -> None:
         run, slower = flights.fly(ordered, f"that order {direction}", found._worth())
         if slower:
             continue
-        if run is None:
+        if run is None or clock.is_overdue:
             break
         kept = tour_of_flight(ordered, order, run, water.field, water, None, seed)
         if kept is not None:

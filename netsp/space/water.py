@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from netsp.arrays import Bools, Floats
-from netsp.clock import NEVER, Flag
+from netsp.clock import NEVER, Flag, end_if_abandoned
 from netsp.geometry import polylines
 from netsp.online.laid import first_tether, present_tether
 from netsp.online.mission import Mission
@@ -159,8 +159,10 @@ class Water:
         c = self.words.cells
         nx, ny, nz = c.flags.shape
         return np.asarray(
-            free_cells(c.field.arrays, c.low, c.cell, (nx, ny, nz), self.mission.clearance)
-        )
+            free_cells(
+                c.field.arrays, c.low, c.cell, (nx, ny, nz), self.mission.clearance, NEVER
+            )
+        )  # fmt: skip
 
     @cached_property
     def everywhere(self) -> Bools:
@@ -204,6 +206,7 @@ class Water:
         Found
             The words, by their numbers in the table.
         """
+        end_if_abandoned()
         words, cells = self.words, self.words.cells
         shape = np.array(cells.flags.shape)
         root = np.array(np.unravel_index(cell, cells.flags.shape), dtype=np.int64)

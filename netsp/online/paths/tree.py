@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.arrays import Bools, Floats, Ints
+from netsp.clock import Flag, abandoned, end_if_abandoned
 from netsp.compiled.growing import more_int_rows
 from netsp.compiled.kernel import kernel
 from netsp.errors import InputError
@@ -76,8 +77,10 @@ class Grid:
                 "or more"
             )
         self.free = free_cells(
-            field.arrays, self.low, cell, (int(shape[0]), int(shape[1]), int(shape[2])), clearance
-        )
+            field.arrays, self.low, cell, (int(shape[0]), int(shape[1]), int(shape[2])), clearance,
+            abandoned(),
+        )  # fmt: skip
+        end_if_abandoned()
         self._states: npt.NDArray[np.uint8] | None = None
         self._kept: dict[tuple[int, ...], npt.NDArray[np.int8]] = {}
 
@@ -116,8 +119,10 @@ class Grid:
         new = copy(self)
         new.field, new.free, new._states = field, self.free.copy(), None
         new.free[tuple(slice(a, b) for a, b in zip(first, last, strict=True))] = free_cells(
-            field.arrays, self.low + self.cell * first, self.cell, (nx, ny, nz), self.clearance
-        )
+            field.arrays, self.low + self.cell * first, self.cell, (nx, ny, nz), self.clearance,
+            abandoned(),
+        )  # fmt: skip
+        end_if_abandoned()
         if (new.free & ~self.free).any():
             new._kept = {}  # there may be shorter paths now; else those that are still free are
         else:
@@ -220,11 +225,15 @@ BLOCKED, FREE, OPEN = range(3)
 
 @kernel
 def free_cells(
-    field: Field, low: Floats, cell: float, shape: tuple[int, int, int], clearance: float
-) -> Bools:
-    """Which cells of a grid have their centre at least the clearance from all solids."""
+    field: Field, low: Floats, cell: float, shape: tuple[int, int, int], clearance: float,
+    stop: Flag,
+) -> Bools:  # fmt: skip
+    """Return the mask of the cells of a grid whose centre is at least the clearance from all
+    solids. Ends early once `stop` is set."""
     out = np.zeros(shape, dtype=np.bool_)
     for i in range(shape[0]):
+        if stop[0] != 0:
+            break
         for j in range(shape[1]):
             for k in range(shape[2]):
                 out[i, j, k] = (

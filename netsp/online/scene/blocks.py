@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.arrays import Floats, Ints, Singles
+from netsp.clock import Flag
 from netsp.compiled.kernel import kernel
 from netsp.online.scene.closest import Owners, yz_crossing
 from netsp.online.scene.grid import SIDE
@@ -35,15 +36,17 @@ WATER, REACHED, SPREAD = 1, 2, 3
 @kernel
 def nearest_in_blocks(
     sites: Floats, which: Ints, place: Place, blocks: Blocks, table: Table,
-    distances: Singles, owner: Owners,
+    distances: Singles, owner: Owners, stop: Flag,
 ) -> None:  # fmt: skip
     """Measure some of the sites from the points around them, as far as these lie in blocks of a
-    slab; distances and owner are (n, 512)."""
+    slab; distances and owner are (n, 512). Ends early once `stop` is set."""
     origin, size, begin = place
     low, high = np.zeros(3, dtype=np.int64), np.zeros(3, dtype=np.int64)
     reach = (0.5 * math.sqrt(3.0) * SIDE + 4.0) * size
     half = 0.5 * (SIDE - 1) * size
     for s in which:
+        if stop[0] != 0:
+            return
         for a in range(3):
             least, most = extent(sites, s, a)
             low[a] = max(0, math.floor((least - origin[a]) / size) - 2)
@@ -105,14 +108,14 @@ def nearest_to_corners(
 @kernel
 def sweep_blocks(
     sites: Floats, place: Place, blocks: Blocks, table: Table, order: Ints,
-    distances: Singles, owner: Owners, turn: int, changed: Ints, asked: Ints,
+    distances: Singles, owner: Owners, turn: int, changed: Ints, asked: Ints, stop: Flag,
 ) -> None:  # fmt: skip
     """Pass through a slab's points in one of the eight diagonal directions, blocks in an order in
     which the three neighbours that a point asks were passed before it.
 
     `changed` (n,) is the turn, from 1 on, at which anything last changed in a block, and `asked`
     (n, 6) that at which it last asked in each direction: if neither block has changed since, there
-    is nothing new to hear.
+    is nothing new to hear. Ends early once `stop` is set.
     """
     origin, size, begin = place
     di = 1 if turn % 2 == 0 else -1
@@ -120,6 +123,8 @@ def sweep_blocks(
     dk = 1 if turn // 4 % 2 == 0 else -1
     nx, ny, nz = table.shape
     for b in order:
+        if stop[0] != 0:
+            return
         bi, bj, bk = blocks[b, 0], blocks[b, 1], blocks[b, 2]
         before_i = table[bi - di, bj, bk] - begin if 0 <= bi - di < nx else -1
         before_j = table[bi, bj - dj, bk] - begin if 0 <= bj - dj < ny else -1

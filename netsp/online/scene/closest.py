@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.arrays import Floats, Singles
+from netsp.clock import Flag
 from netsp.compiled.kernel import kernel
 from netsp.online.scene.sites import extent, site_distance
 
@@ -16,9 +17,9 @@ Owners = npt.NDArray[np.int32]
 
 @kernel
 def nearest_sites(
-    sites: Floats, origin: Floats, size: float, distances: Singles, owner: Owners
+    sites: Floats, origin: Floats, size: float, distances: Singles, owner: Owners, stop: Flag
 ) -> None:
-    """Measure each site from the grid points around it."""
+    """Measure each site from the grid points around it, until `stop` is set."""
     nx, ny, nz = distances.shape
     low, high = np.zeros(3, dtype=np.int64), np.zeros(3, dtype=np.int64)
     shape = (nx, ny, nz)
@@ -28,6 +29,8 @@ def nearest_sites(
             low[a] = max(0, math.floor((least - origin[a]) / size) - 2)
             high[a] = min(shape[a] - 1, math.ceil((most - origin[a]) / size) + 2)
         for i in range(low[0], high[0] + 1):
+            if stop[0] != 0:
+                return
             for j in range(low[1], high[1] + 1):
                 for k in range(low[2], high[2] + 1):
                     d = site_distance(
@@ -47,14 +50,18 @@ def sweep(
     distances: Singles,
     owner: Owners,
     turn: int,
+    stop: Flag,
 ) -> None:
     """Pass through the grid in one of the eight diagonal directions; each grid point measures the
-    nearest sites of the three neighbours that were passed before it."""
+    nearest sites of the three neighbours that were passed before it. Ends early once `stop` is
+    set."""
     nx, ny, nz = distances.shape
     di = 1 if turn % 2 == 0 else -1
     dj = 1 if turn // 2 % 2 == 0 else -1
     dk = 1 if turn // 4 % 2 == 0 else -1
     for a in range(nx):
+        if stop[0] != 0:
+            return
         i = a if di > 0 else nx - 1 - a
         for b in range(ny):
             j = b if dj > 0 else ny - 1 - b

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.arrays import Floats
+from netsp.clock import end_if_abandoned
 from netsp.errors import InputError
 from netsp.online.scene import packing
 from netsp.online.scene.grid import VoxelGrid
@@ -23,6 +24,9 @@ ASK_ALL = 6
 
 CELLS = 40
 """Cells along the longest side of the coarse grid that tells which solids may be nearest."""
+
+CHUNK = 1_000_000
+"""Points measured between two looks at whether the work is abandoned: about half a second."""
 
 FILE_VERSION = 4
 
@@ -139,7 +143,12 @@ class DistanceField:
             Metres.
         """
         p = self._points(points)
-        return np.asarray(sample_many(self.arrays, p.reshape(-1, 3))[:, 0].reshape(p.shape[:-1]))
+        rows, out = p.reshape(-1, 3), np.empty(p.shape[:-1])
+        for first in range(0, len(rows), CHUNK):
+            end_if_abandoned()
+            part = slice(first, first + CHUNK)
+            out.reshape(-1)[part] = sample_many(self.arrays, rows[part])[:, 0]
+        return out
 
     def gradient(self, points: npt.ArrayLike) -> Floats:
         """Unit gradients of the distance: the direction out, or away from the nearest solid.

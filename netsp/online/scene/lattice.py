@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.arrays import Bools, Floats, Ints, Singles
+from netsp.clock import Flag, abandoned, end_if_abandoned
 from netsp.online.scene import blocks as compiled
 from netsp.online.scene.blocks import REACHED, WATER
 from netsp.online.scene.closest import Owners, nearest_sites, sweep, windings
@@ -143,9 +144,10 @@ class Sparse:
         distances[: self.first] = far.ravel()
         owner[: self.first] = nearest.ravel()[: len(owner)]
         reach = compiled.along_x(sites)
+        stop = abandoned()  # the threads of the pool have no context
 
         def fill(slab: tuple[int, int]) -> int:
-            d, s, inner = self._slab(slab, sites, reach, nearest)
+            d, s, inner = self._slab(slab, sites, reach, nearest, stop)
             rows = slice(*np.searchsorted(self.blocks[:, 0], slab))
             self._parts(distances)[1][rows] = d[inner]
             if whose:
@@ -155,10 +157,12 @@ class Sparse:
         done, pool = 0, ThreadPoolExecutor(WORKERS)
         try:
             for count in pool.map(fill, self._slabs()):
+                end_if_abandoned()
                 done += count
                 tell(on_progress, "distances", done / (len(self.blocks) + 1))
         finally:
             pool.shutdown(cancel_futures=True)
+        end_if_abandoned()
         return distances, owner
 
     def _slabs(self) -> list[tuple[int, int]]:
@@ -170,7 +174,7 @@ class Sparse:
 
     def _slab(
         self, slab: tuple[int, int], sites: Floats, reach: tuple[Floats, Floats],
-        corners: Owners,
+        corners: Owners, stop: Flag,
     ) -> tuple[Singles, Owners, slice]:  # fmt: skip
         """Distances and owners of the blocks of a slab and around it, and which are its own."""
         low, high = slab
@@ -186,16 +190,15 @@ class Sparse:
         which = np.flatnonzero((reach[1] >= ends[0]) & (reach[0] <= ends[1]))
         place = (self.origin, self.size, begin)
         compiled.nearest_to_corners(sites, place, blocks, corners, distances, owner)
-        compiled.nearest_in_blocks(sites, which, place, blocks, self.table, distances, owner)
+        compiled.nearest_in_blocks(sites, which, place, blocks, self.table, distances, owner, stop)
         changed = np.zeros(len(blocks), dtype=np.int64)
         asked = np.full((len(blocks), 6), -1)
         for turn in range(8):
             signs = [1 if turn // s % 2 == 0 else -1 for s in (1, 2, 4)]
             i, j, k = (sign * row for sign, row in zip(signs, blocks.T, strict=True))
             order = np.lexsort((k, j, i)).astype(np.int64)
-            compiled.sweep_blocks(
-                sites, place, blocks, self.table, order, distances, owner, turn, changed, asked
-            )
+            state = (distances, owner, turn, changed, asked, stop)
+            compiled.sweep_blocks(sites, place, blocks, self.table, order, *state)
         return distances, owner, slice(first - begin, last - begin)
 
     def turn_inside(self, values: Singles, triangles: Floats) -> int:
@@ -315,8 +318,11 @@ def _closest(
     tell(on_progress, "distances", 0.0)
     distances = np.full(counts, np.float32(np.inf))
     owner = np.full(counts, -1, dtype=np.int32)
-    nearest_sites(sites, origin, size, distances, owner)
+    stop = abandoned()
+    nearest_sites(sites, origin, size, distances, owner, stop)
     for turn in range(8):
-        sweep(sites, origin, size, distances, owner, turn)
+        end_if_abandoned()
+        sweep(sites, origin, size, distances, owner, turn, stop)
         tell(on_progress, "distances", (turn + 1) / 9)
+    end_if_abandoned()
     return distances, owner

@@ -19,6 +19,7 @@ from shapely.geometry import LineString, Polygon, box
 from shapely.geometry.polygon import orient
 
 from netsp.arrays import Floats
+from netsp.clock import end_if_abandoned
 from netsp.online.scene.shapes import Box, Cylinder, HalfSpace, Prism, Shape
 
 GAP, OVERLAP = 1e-3, 0.1
@@ -91,6 +92,7 @@ def seam_boxes(shapes: Sequence[Shape]) -> list[tuple[int, list[float]]]:
     ends = np.array([_ends(shapes[k]) for k in flat]).reshape(-1, 2, 3)
     rows = []
     for n, a in enumerate(flat[:-1]):
+        end_if_abandoned()
         others = ends[n + 1 :]
         near = (others[:, 0] <= ends[n, 1] + GAP) & (others[:, 1] >= ends[n, 0] - GAP)
         for m in np.flatnonzero(near.all(1)):

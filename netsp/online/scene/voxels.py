@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.arrays import Floats
+from netsp.clock import end_if_abandoned
 from netsp.errors import InputError
 from netsp.online.scene.grid import SIDE, VoxelGrid
 from netsp.online.scene.lattice import Dense, Lattice, OnStage, sparse_near, tell
@@ -64,6 +65,7 @@ def of_mesh(
         `memory_limit` (GiB), or trimesh is not installed.
     """
     vertices, faces = read_mesh(path)
+    end_if_abandoned()
     return of_triangles(
         vertices * scale, faces, voxel=voxel, memory_limit=memory_limit,
         on_progress=on_progress, source=str(path),
@@ -117,6 +119,7 @@ def of_triangles(
         f, turned = _outward(f, v)
     triangles = v[f]
     low, high = triangles.min((0, 1)), triangles.max((0, 1))
+    end_if_abandoned()
     sites = triangle_sites(triangles)
     lattice = _lattice(
         low, high, voxel, memory_limit, source, sites,
@@ -143,6 +146,7 @@ def of_triangles(
             notes.append(f"{turned} parts are inside out, or cavities: taken as solid")
         elif most > 1:
             notes.append("parts of the mesh overlap: taken as their union")
+    end_if_abandoned()
     enclosed = lattice.unreached(values)
     if enclosed.any():
         values[enclosed] = -np.abs(values[enclosed])
@@ -214,6 +218,7 @@ def of_cloud(
     distances, owner = lattice.closest(sites, on_progress)
     tell(on_progress, "flood", 0.5)
     values = distances - np.float32(ball)
+    end_if_abandoned()
     filled = lattice.unreached(values) | (values <= 0.0)
     # the distance to the water's edge: balls about grid points in the water that just touch it
     edge = ~filled & (values <= 1.8 * size)

@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from netsp.arrays import Floats
+from netsp.clock import end_if_abandoned
 from netsp.errors import InputError
 from netsp.online.scene.field import DistanceField, finite_point
 from netsp.online.tether.drive import drive, follow
@@ -190,6 +191,7 @@ class GeodesicTether:
         return self._state(*self._pull(strand, rounds or self.rounds))
 
     def _pull(self, strand: Floats, rounds: int) -> tuple[Floats, int, float]:
+        end_if_abandoned()
         return pull(
             self.field.arrays, strand, len(strand), self._settings, rounds, 0,
             MOST_NUDGE if rounds >= MORE_ROUNDS else 1,
@@ -259,6 +261,7 @@ class GeodesicTether:
         lengths : ndarray, shape (k,)
             Length at each point, metres.
         """
+        end_if_abandoned()
         points = _points(path)
         strand, count, residual, lengths = drive(
             self.field.arrays, tether.strand.copy(), len(tether.strand), points, self._settings,
