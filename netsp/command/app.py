@@ -87,20 +87,20 @@ def run(args: argparse.Namespace) -> int:
         listening = socket.create_server(("127.0.0.1", args.port))
     except OSError as error:
         raise InputError(f"--port: {args.port} cannot be had: {error.strerror}") from None
-    port = listening.getsockname()[1]
-    token = secrets.token_urlsafe(24)
-    address = f"http://127.0.0.1:{port}/?token={token}"
-    session = Session(document, float(args.time_limit), looked_at)
-    print(f"the map is at {address}\nCtrl-C ends it", file=sys.stderr, flush=True)
-    if not args.no_browser:
-        threading.Timer(0.5, webbrowser.open, [address]).start()
-    config = uvicorn.Config(
-        application(session, token, port), log_level="warning", ws_max_size=MOST_BYTES,
-        access_log=False, server_header=False,
-    )  # fmt: skip
-    try:
-        uvicorn.Server(config).run(sockets=[listening])
-    finally:
-        session.close()
-        listening.close()
+    with listening:
+        port = listening.getsockname()[1]
+        token = secrets.token_urlsafe(24)
+        address = f"http://127.0.0.1:{port}/?token={token}"
+        session = Session(document, float(args.time_limit), looked_at)
+        print(f"the map is at {address}\nCtrl-C ends it", file=sys.stderr, flush=True)
+        if not args.no_browser:
+            threading.Timer(0.5, webbrowser.open, [address]).start()
+        config = uvicorn.Config(
+            application(session, token, port), log_level="warning", ws_max_size=MOST_BYTES,
+            access_log=False, server_header=False,
+        )  # fmt: skip
+        try:
+            uvicorn.Server(config).run(sockets=[listening])
+        finally:
+            session.close()
     return 0
