@@ -211,12 +211,16 @@ class Clock:
 
     @property
     def is_overdue(self) -> bool:
-        """Whether the time is up and the grace of `TimingPolicy` is used up, too."""
+        """Whether the time is up and the grace of `TimingPolicy` is used up, too, both in CPU
+        seconds."""
         return self._overdue()
 
     def _overdue(self, more: float = 0.0) -> bool:
         """Return whether the time is up, and the grace and some more CPU seconds are used up.
-        Compiling does not count."""
+
+        Compiling does not count. Nor does time in which the process got no CPU: on a busy machine
+        a run ends later rather than without a result.
+        """
         if not self.up:
             return False
         family, now = self._family, time.process_time()
@@ -225,7 +229,10 @@ class Clock:
             return False
         if family.up_at is None:
             family.up_at = now
-        return now - family.up_at > self.policy.grace_s + more
+        grace = self.policy.grace_s + more
+        if not self.stopped and now - family.begin_cpu <= self.deadline - family.begin + grace:
+            return False
+        return now - family.up_at > grace
 
     def bounded(self, doing: str, call: Callable[[], T], *, winds_down: bool = False) -> T:
         """Return the result of a call, or abandon the call if the clock is overdue.
@@ -316,11 +323,12 @@ def abandoned_work_goes_on(wait: float = 0.0) -> bool:
         Seconds to wait for its end.
     """
     until = time.monotonic() + wait
-    for thread in list(_ABANDONED):
-        thread.join(max(0.0, until - time.monotonic()))
-        if not thread.is_alive():
-            _ABANDONED.remove(thread)
-    return bool(_ABANDONED)
+    while _ABANDONED:
+        _ABANDONED[0].join(max(0.0, until - time.monotonic()))
+        if _ABANDONED[0].is_alive():
+            return True
+        del _ABANDONED[0]
+    return False
 
 
 _ABANDONED: list[threading.Thread] = []
@@ -357,12 +365,16 @@ class _Family:
     ----------
     ended : bool
         Whether `Clock.end` was called.
+    begin, begin_cpu : float
+        Time, and CPU seconds of the process, when the first of the clocks was made.
     up_at : float or None
         CPU seconds of the process when the time was first seen to be up.
     """
 
-    ended = False
-    up_at: float | None = None
+    def __init__(self) -> None:
+        self.ended = False
+        self.begin, self.begin_cpu = time.monotonic(), time.process_time()
+        self.up_at: float | None = None
 
 
 TimeLimit = float | Clock | None

@@ -7,11 +7,21 @@ import numpy as np
 import pytest
 
 from netsp import Problem, Status, solve, solve_graph, travel_graph, verify
-from netsp.clock import NEVER, Clock, TimingPolicy
+from netsp.clock import (
+    BOUNDED,
+    NEVER,
+    Clock,
+    TimingPolicy,
+    abandoned_work_goes_on,
+    end_if_abandoned,
+)
 from netsp.errors import InputError, LimitReachedError, MemoryLimitError
 from netsp.memory import ask, available
 from netsp.mip.cutpool import IDLE, CutPool
 from netsp.mip.cuts import Cut
+from netsp.online.mission import Mission
+from netsp.online.scene.scene import Scene
+from netsp.space.solve import solve_mission
 from netsp.worlds import random_world, reachable_world
 from tests.clock_sites import watched
 
@@ -239,3 +249,57 @@ def test_a_polygon_of_many_edges_is_not_little_work_because_it_is_one_obstacle()
     with pytest.raises(LimitReachedError, match="time limit reached while finding tangents"):
         solve(_comb(300), time_limit=0.3)
     assert time.process_time() - begin < 1.3
+
+
+def _never_ends():
+    while True:
+        end_if_abandoned()
+
+
+def test_work_that_does_not_hear_the_clock_is_abandoned_and_ends_where_it_looks():
+    begin = time.process_time()
+    with pytest.raises(LimitReachedError, match="time limit reached while counting"):
+        Clock(0.02).bounded("counting", _never_ends)
+    assert time.process_time() - begin < 1.0
+    assert not abandoned_work_goes_on(wait=20.0)
+
+
+def test_work_within_abandoned_work_is_abandoned_too():
+    inner = Clock(60.0)
+    with pytest.raises(LimitReachedError, match="while counting on"):
+        Clock(0.02).bounded("counting on", lambda: inner.bounded("counting", _never_ends))
+    assert not abandoned_work_goes_on(wait=20.0)
+    assert not [t for t in threading.enumerate() if t.name == BOUNDED]
+
+
+def test_work_that_ends_within_the_grace_is_not_abandoned():
+    clock = Clock(1e-9)
+    assert clock.bounded("adding", lambda: 7) == 7
+    assert not clock.is_overdue
+    with pytest.raises(ZeroDivisionError):
+        clock.bounded("dividing", lambda: 1 // 0)
+    with pytest.raises(InputError, match=r"grace_s: expected .* got -1"):
+        TimingPolicy(grace_s=-1.0)
+
+
+def test_without_a_limit_nothing_is_abandoned_and_no_thread_is_started():
+    assert Clock().bounded("looking", threading.current_thread) is threading.current_thread()
+
+
+def test_a_mission_ends_in_time_and_says_which_work_was_broken_off():
+    """Reading scenes and finding words knew no clock: a run of 5 s took 27 s of CPU."""
+    rings = [
+        {"torus": {"center": [x, y, 0], "axis": [0, 0, 1], "major_radius": 1, "minor_radius": 0.2}}
+        for x in (-4, 0, 4)
+        for y in (-4, 0, 4)
+    ]
+    scene = Scene.model_validate({"solids": rings, "bounds": [-8, -8, -4, 8, 8, 4]})
+    mission = Mission(
+        scene="-", anchor=(7, 7, 0), start=(7, 7, 0), waypoints=((-4, -4, 0),), tether_length=40.0,
+        cell=0.08,
+    )  # fmt: skip
+    begin = time.process_time()
+    with pytest.raises(LimitReachedError, match=r"time limit reached while \w+"):
+        solve_mission(mission, scene=scene, time_limit=0.3)
+    assert time.process_time() - begin < 1.3
+    assert not abandoned_work_goes_on(wait=20.0)

@@ -256,8 +256,7 @@ def plan(
     params : mapping, optional
         Options of the solver.
     time_limit : float or Clock, optional
-        Seconds for all; the best tour so far is returned when they are up. What comes before there
-        is any is not cut short: the words of the scene, and the first states.
+        Seconds for all; the best tour so far is returned when they are up.
     iteration_limit : int, optional
         Iterations of the solver.
     seed : int
@@ -276,7 +275,8 @@ def plan(
         A moving anchor; waypoints in solids; no tether that reaches any of them; as of
         `netsp.space.signature.SpaceSignature`.
     LimitReachedError
-        No tour was found whose tether stays within its limit all along.
+        No tour was found whose tether stays within its limit all along, or the time was up before
+        the words of the scene were found.
     """
     kept: SpacePlan | None = None
     with until_interrupt(time_limit) as clock:
