@@ -226,7 +226,7 @@ def test_a_tether_too_short_for_the_start_is_told_before_anything_is_sought():
         update={"start": (5.0, 0.0, 0.0), "tether_length": 6.0}
     )
     with pytest.raises(InputError, match="tether_length: 6 is shorter than the path"):
-        plan(mission, scene=BOX, time_limit=1)
+        plan(mission, scene=BOX, time_limit=20)
 
 
 def test_surprises_that_cannot_be_are_refused_before_the_flight():
