@@ -201,12 +201,18 @@ class Clock:
         LimitReachedError
             The time was up before the work was complete.
         """
+        family = self._family
         if steps <= self.policy.untimed_steps:
-            return call(NEVER)
+            family.doing = doing
+            out = call(abandoned())
+            end_if_abandoned()
+            family.doing = None
+            return out
         self.check(doing)
-        flag = self.flag
+        flag, family.doing = self.flag, doing
         out = self.interruptible(lambda: call(flag))
         self.check(doing)
+        family.doing = None
         return out
 
     @property
@@ -279,7 +285,7 @@ class Clock:
             while not done.wait(min(0.2, max(ASKED, self.left))):
                 more = self.policy.stop_grace_s if winds_down and self.stopped else 0.0
                 if self._overdue(more) or _abandoned.get()[0]:
-                    raise self._broken_off(doing)
+                    raise self._broken_off(self._family.doing or doing)
         except (KeyboardInterrupt, LimitReachedError):
             abandoned[0] = 1
             _ABANDONED.append(thread)
@@ -369,12 +375,15 @@ class _Family:
         Time, and CPU seconds of the process, when the first of the clocks was made.
     up_at : float or None
         CPU seconds of the process when the time was first seen to be up.
+    doing : str or None
+        Name of the long compiled work under way, for messages.
     """
 
     def __init__(self) -> None:
         self.ended = False
         self.begin, self.begin_cpu = time.monotonic(), time.process_time()
         self.up_at: float | None = None
+        self.doing: str | None = None
 
 
 TimeLimit = float | Clock | None
