@@ -227,6 +227,7 @@ class Clock:
         Compiling does not count. Nor does time in which the process got no CPU: on a busy machine
         a run ends later rather than without a result.
         """
+        self._family.count_compiling()
         if not self.up:
             return False
         family, now = self._family, time.process_time()
@@ -236,9 +237,28 @@ class Clock:
         if family.up_at is None:
             family.up_at = now
         grace = self.policy.grace_s + more
-        if not self.stopped and now - family.begin_cpu <= self.deadline - family.begin + grace:
+        due = max(self.deadline - family.begin, family.min_cpu_s) + grace
+        if not self.stopped and now - family.begin_cpu - family.compiling_s <= due:
             return False
         return now - family.up_at > grace
+
+    @contextmanager
+    def at_least(self, cpu_s: float) -> Iterator[None]:
+        """Abandon no work of a block before it has had some CPU time, however short the limit is.
+
+        Compiling does not count. Ctrl-C abandons work all the same.
+
+        Parameters
+        ----------
+        cpu_s : float
+            CPU seconds since the start of the clock.
+        """
+        family = self._family
+        before, family.min_cpu_s = family.min_cpu_s, cpu_s
+        try:
+            yield
+        finally:
+            family.min_cpu_s = before
 
     def bounded(self, doing: str, call: Callable[[], T], *, winds_down: bool = False) -> T:
         """Return the result of a call, or abandon the call if the clock is overdue.
@@ -377,9 +397,24 @@ class _Family:
         CPU seconds of the process when the time was first seen to be up.
     doing : str or None
         Name of the long compiled work under way, for messages.
+    min_cpu_s : float
+        CPU seconds before which no work is abandoned (`Clock.at_least`).
+    compiling_s : float
+        CPU seconds spent compiling, as far as it was seen.
     """
 
+    min_cpu_s = 0.0
+    compiling_s = 0.0
+
+    def count_compiling(self) -> None:
+        """Count the CPU time since the last call as compiling if something is compiled now."""
+        now = time.process_time()
+        if _is_compiling():
+            self.compiling_s += now - self._looked_at
+        self._looked_at = now
+
     def __init__(self) -> None:
+        self._looked_at = time.process_time()
         self.ended = False
         self.begin, self.begin_cpu = time.monotonic(), time.process_time()
         self.up_at: float | None = None

@@ -21,7 +21,7 @@ from netsp.mip.cutpool import IDLE, CutPool
 from netsp.mip.cuts import Cut
 from netsp.online.mission import Mission
 from netsp.online.scene.scene import Scene
-from netsp.space.solve import solve_mission
+from netsp.space.solve import MissionPolicy, solve_mission
 from netsp.worlds import random_world, reachable_world
 from tests.clock_sites import watched
 
@@ -282,6 +282,21 @@ def test_work_that_ends_within_the_grace_is_not_abandoned():
         TimingPolicy(grace_s=-1.0)
 
 
+def test_work_of_a_first_result_gets_its_time_whatever_the_limit():
+    def counts() -> int:
+        begin = time.process_time()
+        while time.process_time() - begin < 0.9:
+            end_if_abandoned()
+        return 7
+
+    clock = Clock(0.02)
+    with clock.at_least(30.0):
+        assert clock.bounded("counting", counts) == 7
+    with pytest.raises(LimitReachedError, match="while counting on"):
+        clock.bounded("counting on", _never_ends)
+    assert not abandoned_work_goes_on(wait=20.0)
+
+
 def test_without_a_limit_nothing_is_abandoned_and_no_thread_is_started():
     assert Clock().bounded("looking", threading.current_thread) is threading.current_thread()
 
@@ -299,7 +314,8 @@ def test_a_mission_ends_in_time_and_says_which_work_was_broken_off():
         cell=0.08,
     )  # fmt: skip
     begin = time.process_time()
+    at_once = MissionPolicy(first_tour_s=0.0)
     with pytest.raises(LimitReachedError, match=r"time limit reached while \w+"):
-        solve_mission(mission, scene=scene, time_limit=0.3)
+        solve_mission(mission, scene=scene, time_limit=0.3, policy=at_once)
     assert time.process_time() - begin < 1.3
     assert not abandoned_work_goes_on(wait=20.0)

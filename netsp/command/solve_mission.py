@@ -73,7 +73,7 @@ def solve(
     from netsp.clock import Clock
     from netsp.command.compiling import compile_messages
     from netsp.command.stages import Stages
-    from netsp.space.solve import solve_mission
+    from netsp.space.solve import MissionPolicy, solve_mission
 
     clock = Clock(time_limit or TIME_LIMIT)  # reading the mission and its scene counts
     begin = time.monotonic()
@@ -81,13 +81,14 @@ def solve(
     stages = None if quiet else Stages(sys.stderr, time_limit or TIME_LIMIT)
     compiling = contextlib.nullcontext() if quiet else compile_messages(sys.stderr)
     with stages or contextlib.nullcontext(), compiling:
-        scene = clock.bounded("reading the scene", mission.load_scene)
         from netsp.command.plot_scene import tell, warn_of_scene
 
-        field = clock.bounded(
-            "measuring distances in the scene",
-            lambda: scene.field(on_progress=None if quiet else tell),
-        )
+        with clock.at_least(MissionPolicy().first_tour_s):
+            scene = clock.bounded("reading the scene", mission.load_scene)
+            field = clock.bounded(
+                "measuring distances in the scene",
+                lambda: scene.field(on_progress=None if quiet else tell),
+            )
         if not quiet:
             from netsp.online.tether import GeodesicTether
 

@@ -158,7 +158,7 @@ def steps() -> Iterator[tuple[str, Callable[[], object]]]:
     yield (
         "tours in space",
         partial(solve_mission, plain.model_copy(update={"waypoints": plain.waypoints[:4]}),
-                scene=scene, time_limit=20.0),
+                scene=scene, time_limit=None),
     )  # fmt: skip
 
     for in_space in (False, True):

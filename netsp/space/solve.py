@@ -11,6 +11,7 @@ in a flight by `predictive`, or by length if there is no time to fly. All tours 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import partial
@@ -76,6 +77,10 @@ class MissionPolicy:
     min_saving : float
         Share of the time until home that a flight by going straight on must save to replace a tour
         with a bound. Stopping within reach of the start saves less than the default.
+    first_tour_s : float
+        CPU seconds, at least 0, until which the tour in the order of the file is worked on even if
+        the limit is shorter. A smaller number leaves more missions without any tour when the limit
+        is short; with a larger one, very large missions end later.
     """
 
     given_share: float = 0.25
@@ -83,13 +88,16 @@ class MissionPolicy:
     bound_share: float = 0.3
     going_on_share: float = 0.3
     min_saving: float = 0.005
+    first_tour_s: float = 15.0
 
     def __post_init__(self) -> None:
         """Refuse values out of range."""
         for item in fields(self):
             value = getattr(self, item.name)
-            if not 0.0 <= value <= 1.0:
-                raise InputError(f"{item.name}: expected a number from 0 to 1, got {value:g}")
+            top = math.inf if item.name.endswith("_s") else 1.0
+            if not 0.0 <= value <= top:
+                expected = "0 or more" if top > 1.0 else "a number from 0 to 1"
+                raise InputError(f"{item.name}: expected {expected}, got {value:g}")
 
 
 @dataclass(frozen=True)
@@ -400,13 +408,15 @@ def solve_mission(
     with until_interrupt(time_limit) as clock:
         check_plannable(mission, solver, params, seed)
         try:
-            scene = scene or clock.bounded("reading the scene", mission.load_scene)
-            water = water_of(mission, clock, scene=scene, field=field, tell=tell)
-            mission, cells = water.mission, water.cells
-            check_tether(mission, clock.bounded("laying the tether", lambda: water.present).length)
-            flights = _Flights(mission, scene, water, clock, tell, policy)
-            found = _Incumbents(flights)
-            _begin_as_given(found, clock.part(policy.given_share), seed)
+            with clock.at_least(policy.first_tour_s):
+                scene = scene or clock.bounded("reading the scene", mission.load_scene)
+                water = water_of(mission, clock, scene=scene, field=field, tell=tell)
+                mission, cells = water.mission, water.cells
+                laid = clock.bounded("laying the tether", lambda: water.present)
+                check_tether(mission, laid.length)
+                flights = _Flights(mission, scene, water, clock, tell, policy)
+                found = _Incumbents(flights)
+                _begin_as_given(found, clock.part(policy.given_share), seed)
         except LimitReachedError:
             if clock.stopped and not (isinstance(time_limit, Clock) and time_limit.up):
                 raise KeyboardInterrupt from None
