@@ -87,9 +87,12 @@ def _standard_input(most: int) -> bytes:
 
 
 def read_text(path: str | Path) -> str:
-    """Contents of a UTF-8 text file, or `InputError` in one line."""
+    """Return the contents of a UTF-8 text file without its byte order mark, or raise `InputError`.
+
+    RFC 8259 (8.1) lets readers of JSON ignore the mark, which spreadsheets and editors write.
+    """
     try:
-        return read_bytes(path).decode("utf-8")
+        return read_bytes(path).decode("utf-8-sig")
     except UnicodeDecodeError:
         raise InputError(f"{path}: not a text file in UTF-8") from None
 

@@ -1,4 +1,4 @@
-"""`netsp import`: a problem from a map."""
+"""`netsp import`: make a problem from a map, and say what became of each of its features."""
 
 from __future__ import annotations
 
@@ -13,14 +13,17 @@ from netsp.command.types import check_writable, length, option, positive
 from netsp.errors import InputError, counted
 
 if TYPE_CHECKING:
+    import shapely
+
     from netsp.problem import Problem
     from netsp.site.options import Looking
+    from netsp.site.read import ImportedSite
 
 EXAMPLE = "netsp import examples/site.geojson -o problem.json"
 
 
 def arguments(p: argparse.ArgumentParser) -> None:
-    """Of the command line."""
+    """Add the arguments of the command line."""
     p.add_argument(
         "site", metavar="SITE",
         help="map: GeoJSON, KML, KMZ, shapefile, GeoPackage, DXF or S-57; or an occupancy image: "
@@ -57,9 +60,21 @@ def arguments(p: argparse.ArgumentParser) -> None:
         help="coordinate system of a file that names none, as EPSG:32632; local for a plane",
     )  # fmt: skip
     p.add_argument(
-        "--units", default="m", metavar="UNIT",
+        "--units", metavar="UNIT",
         help="of lengths and of local coordinates in the file: m, km, cm, mm, ft, us-ft, in, yd, "
-        "fathom; default m",
+        "fathom; default: the unit that the file states, or m",
+    )  # fmt: skip
+    p.add_argument(
+        "--line-width", type=length, metavar="W",
+        help="width (m) of open lines that are obstacles and have none in the file",
+    )  # fmt: skip
+    p.add_argument(
+        "--join-tolerance", type=length, metavar="T",
+        help="join lines to an outline where their ends are no farther apart (m); default 0.01",
+    )  # fmt: skip
+    p.add_argument(
+        "--crop", action=argparse.BooleanOptionalAction,
+        help="leave out obstacles beyond the reach of the tether; default: in charts only",
     )  # fmt: skip
     p.add_argument(
         "--inspect", type=positive, metavar="N", help="N goals about every obstacle, at every depth"
@@ -94,6 +109,10 @@ def arguments(p: argparse.ArgumentParser) -> None:
         help="take cells that the map does not know as free, not as obstacles",
     )  # fmt: skip
     p.add_argument(
+        "--plot", metavar="FILE",
+        help="draw the problem, what was left out dashed: PNG, SVG or PDF",
+    )  # fmt: skip
+    p.add_argument(
         "-o", "--output", metavar="FILE", help="write the problem to this file (default: stdout)"
     )
     told.json_flag(p)
@@ -102,11 +121,17 @@ def arguments(p: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Write the problem, and return the exit code."""
     told.check_stdout(args)
-    check_writable(args.output, inputs=(args.site, args.goals))
+    check_writable(args.output, args.plot, inputs=(args.site, args.goals))
     from netsp.files import write_text
 
+    left_out: tuple[shapely.Geometry, ...] = ()
     with Patience(sys.stderr, f"reading {args.site}"):
-        problem = _of_image(args) if _is_image(args) else _of_map(args)
+        if _is_image(args):
+            problem = _of_image(args)
+        else:
+            found = _of_map(args)
+            problem, left_out = found.problem, found.left_out
+            _show_table(args.site, found)
     why: list[str] = []
     if args.skip_unreachable:
         from netsp.roadmap.within_reach import within_reach
@@ -126,11 +151,16 @@ def run(args: argparse.Namespace) -> int:
         sys.stdout.write(problem.to_json())
     else:
         write_text(args.output, problem.to_json())
+    if args.plot is not None:
+        from netsp.pictures.problem import save_import
+
+        save_import(problem, left_out, args.plot)
     if args.json:
         told.tell({
             "problem": problem.name, "units": problem.units, "goals": len(problem.goals),
             "obstacles": len(problem.obstacles), "tether_length": problem.tether_length,
             "clearance": problem.clearance, "left_out": list(why), "file": args.output,
+            "site": None if problem.site is None else problem.site.model_dump(mode="json"),
         })  # fmt: skip
     return 0
 
@@ -156,7 +186,8 @@ def _is_image(args: argparse.Namespace) -> bool:
 
     image: bool = args.site.lower().endswith((*FILES, *IMAGES))
     wrong = (
-        ("map", "crs", "radius", "inspect", "standoff") if image
+        ("map", "crs", "radius", "inspect", "standoff", "line_width", "join_tolerance", "crop")
+        if image
         else ("goals", "resolution", "tolerance", "unknown_free")
     )  # fmt: skip
     for name in wrong:
@@ -193,18 +224,32 @@ def _of_image(args: argparse.Namespace) -> Problem:
     )  # fmt: skip
 
 
-def _of_map(args: argparse.Namespace) -> Problem:
+def _show_table(site: str, found: ImportedSite) -> None:
+    """Print what became of the features of each layer, and what was assumed."""
+    from netsp.command.text_table import print_table
+
+    record = found.problem.site
+    assert record is not None
+    print_table(record.table(), sys.stderr)
+    left_out = set(record.notes)
+    for note in found.notes:
+        if note not in left_out:  # these stand in the table
+            messages.note(f"{site}: {note}")
+
+
+def _of_map(args: argparse.Namespace) -> ImportedSite:
     from netsp.site.options import SiteOptions
     from netsp.site.projection import Projection
-    from netsp.site.read import read_site
+    from netsp.site.read import import_site
 
     projection = Projection.parse(args.base, name="--base") if args.base else None
     options = SiteOptions(
         tether=args.tether, clearance=args.clearance, radius=args.radius, crs=args.crs,
         units=args.units, maps=args.map, looking=_looking(args),
-        skip_unreachable=args.skip_unreachable,
+        skip_unreachable=args.skip_unreachable, line_width=args.line_width, crop=args.crop,
+        **({} if args.join_tolerance is None else {"join_tolerance": args.join_tolerance}),
     )  # fmt: skip
-    return read_site(args.site, projection, options=options, on_note=messages.note)
+    return import_site(args.site, projection, options=options)
 
 
 def _looking(args: argparse.Namespace) -> Looking | None:

@@ -16,6 +16,7 @@ from netsp.solution import Solution, Status
 from netsp.travel.result import Progress
 
 if TYPE_CHECKING:
+    import shapely
     from matplotlib.axes import Axes
 
 
@@ -30,6 +31,38 @@ TEXTURE = 1000.0
 def save(problem: Problem, solution: Solution | None, path: str | Path) -> None:
     """Draw a problem, with a solution if given, to a file; InputError if it cannot be written."""
     style.save(draw(problem, solution), path)
+
+
+def save_import(problem: Problem, left_out: Sequence[shapely.Geometry], path: str | Path) -> None:
+    """Draw an imported problem to a file, with the features that were left out dashed.
+
+    Parameters
+    ----------
+    problem : Problem
+        The problem.
+    left_out : sequence of shapely.Geometry
+        Shapes that are not in it, in its plane; those outside of the picture are not drawn.
+    path : str or Path
+        PNG, SVG or PDF.
+    """
+    import shapely
+
+    figure, ax = _single(problem)
+    draw_map(problem, ax=ax)
+    limits = (ax.get_xlim(), ax.get_ylim())
+    for shape in left_out:
+        for part in shapely.get_parts(shapely.get_parts(shape)):
+            outline = part.exterior if part.geom_type == "Polygon" else part
+            if outline.is_empty:
+                continue
+            x, y = shapely.get_coordinates(outline).T
+            mark = {"marker": "x", "ms": 4, "ls": "none"} if len(x) == 1 else {"ls": "--"}
+            ax.plot(x, y, color=style.LEFT_OUT, lw=0.8, zorder=2.5, **mark)
+    ax.set(xlim=limits[0], ylim=limits[1])
+    if left_out:
+        ax.plot([], [], color=style.LEFT_OUT, lw=0.8, ls="--", label="left out")
+        ax.legend(loc="best", fontsize=8, frameon=False)
+    style.save(figure, path)
 
 
 def draw(problem: Problem, solution: Solution | None = None) -> Any:

@@ -1,4 +1,4 @@
-"""What a map holds, whatever its format was."""
+"""Features of a map, whatever its format is."""
 
 from __future__ import annotations
 
@@ -9,10 +9,13 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import shapely
 
+NO_NAMES = ("<null>", "null", "none", "nan", "n/a", "unnamed")
+"""Texts, in lower case, that programs write where there is no value."""
+
 
 @dataclass(frozen=True)
 class Feature:
-    """One thing on a map.
+    """Feature of a map.
 
     Attributes
     ----------
@@ -21,7 +24,7 @@ class Feature:
     layer
         Its layer, folder or object class; empty where the format has none.
     identity
-        What the file itself calls it, if it has more than a number.
+        Identifier in the file, if it has more than a number.
     properties
         Name to value.
     shape
@@ -36,7 +39,7 @@ class Feature:
     shape: shapely.Geometry
 
     def get(self, *names: str) -> Any:
-        """The first of some properties, whatever their case, that has a value.
+        """Return the first of some properties, whatever their case, that has a value.
 
         Parameters
         ----------
@@ -51,14 +54,39 @@ class Feature:
         own = {str(k).lower(): v for k, v in self.properties.items()}
         for name in names:
             value = own.get(name)
-            if value is not None and value == value and value != "":  # GDAL's empty numbers are NaN
-                return value
+            if value is None or value != value or value == "":  # GDAL's empty numbers are NaN
+                continue
+            if isinstance(value, str) and value.strip().lower() in NO_NAMES:
+                continue
+            return value
         return None
 
 
 @dataclass(frozen=True)
+class Unread:
+    """Feature of a map that cannot be used, with the reason.
+
+    Attributes
+    ----------
+    where
+        What messages call it, as of a `Feature`.
+    layer
+        Its layer.
+    reason
+        Why it cannot be used, as "has no geometry".
+    shape
+        What is known of its shape, for the picture.
+    """
+
+    where: str
+    layer: str
+    reason: str
+    shape: shapely.Geometry | None = None
+
+
+@dataclass(frozen=True)
 class Map:
-    """A map.
+    """Map: features, and those that could not be read.
 
     Attributes
     ----------
@@ -67,11 +95,16 @@ class Map:
     geographic
         Whether shapes are in degrees.
     layers
-        Their names, with the number of features of each.
+        Their names, with the number of features of each, read or not.
     complaints
-        What cannot be read of it, one line each.
+        Reasons not to go on, one line each.
     notes
-        What was left out, one line each.
+        What was assumed or changed, one line each.
+    unread
+        Features that cannot be used.
+    unit
+        Name of the unit of its plane as the file states it (`netsp.site.options.UNITS`), if it
+        does.
     """
 
     features: tuple[Feature, ...]
@@ -79,3 +112,5 @@ class Map:
     layers: Mapping[str, int]
     complaints: tuple[str, ...] = ()
     notes: tuple[str, ...] = field(default=())
+    unread: tuple[Unread, ...] = ()
+    unit: str | None = None

@@ -1,12 +1,17 @@
-"""A problem from a map, by the contract of docs/sites.md. All that is wrong is told at once."""
+"""Import of a problem from a map, by the contract of docs/sites.md.
+
+All that is wrong is told at once, and every feature of the map ends in the ledger: used as one
+kind, or left out for a reason.
+"""
 
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from pydantic import ValidationError
@@ -14,28 +19,54 @@ from pydantic import ValidationError
 from netsp import steps
 from netsp.errors import InputError, SeveralErrors, counted
 from netsp.fields import checked_number
+from netsp.import_record import KIND_COLUMNS, CropCircle, Site, UsedAs
 from netsp.models import explain, shown
 from netsp.problem import Problem
-from netsp.site.contract import FIELDS, RADIUS, kind_of, words_of
+from netsp.site.contract import FIELDS, RADIUS, SHAPE_LAYERS, kind_of, words_of
+from netsp.site.crop import cropped
 from netsp.site.feature import Feature, Map
 from netsp.site.geojson import read_geojson
+from netsp.site.ledger import Ledger
+from netsp.site.line_work import lines_of, outlines, widened
 from netsp.site.options import UNITS, SiteOptions
 from netsp.site.projection import Projection
-from netsp.site.shapes import circle_of, simple_polygons
+from netsp.site.shapes import outline_of, simple_polygons, spurs_of
 from netsp.site.vector import in_degrees, read_vector
 
 if TYPE_CHECKING:
     import shapely
 
-CHART = (".000",)
+CHART_SUFFIXES = (".000",)
 """Extensions of S-57 charts."""
 
+MAX_NAME = 200
+"""Characters of a file's name that a problem keeps."""
 
-def read_site(
+
+@dataclass(frozen=True)
+class ImportedSite:
+    """Problem of a map, with what was left out of it.
+
+    Attributes
+    ----------
+    problem
+        The problem; its `site` records what became of every feature.
+    left_out
+        Shapes of the features that were left out, in the problem's plane, for the picture.
+    notes
+        What was assumed, changed or left out, one line each.
+    """
+
+    problem: Problem
+    left_out: tuple[shapely.Geometry, ...]
+    notes: tuple[str, ...]
+
+
+def import_site(
     file: str | Path, projection: Projection | None = None, *, options: SiteOptions | None = None,
-    name: str | None = None, on_note: Callable[[str], None] | None = None, **more: Any,
-) -> Problem:  # fmt: skip
-    """The problem of a map, in metres from its base, y to the projection's heading.
+    name: str | None = None,
+) -> ImportedSite:  # fmt: skip
+    """Import the problem of a map, in metres from its base, y to the projection's heading.
 
     Parameters
     ----------
@@ -44,17 +75,13 @@ def read_site(
     projection : Projection, optional
         About the base; None takes the map's own base, y to its heading or to the north.
     options : SiteOptions, optional
-        What is said besides; its fields may be given by name instead.
+        What the user says of the map.
     name : str, optional
-        Of the problem; default: the file's.
-    on_note : callable, optional
-        Called with what was changed or left out, one line each.
-    **more
-        Fields of `SiteOptions`.
+        Name of the problem; default: the file's.
 
     Returns
     -------
-    Problem
+    ImportedSite
         The problem; where the map has a place on the earth, with its origin.
 
     Raises
@@ -62,23 +89,60 @@ def read_site(
     InputError
         Not readable, or not a site: `SeveralErrors` where more than one thing is wrong.
     """
-    said = options or SiteOptions(**more)
-    if said.units not in UNITS:
+    said = options or SiteOptions()
+    if said.units is not None and said.units not in UNITS:
         raise InputError(f"units: expected one of {', '.join(UNITS)}, got {shown(said.units)}")
     kinds, fields = words_of(said.maps)
     found = read_map(file, said.crs)
     for layer in kinds:
-        if layer not in {k.lower() for k in found.layers}:
+        if layer not in {k.lower() for k in found.layers} and layer not in SHAPE_LAYERS:
             raise InputError(
                 f"--map: {file} has no layer {layer!r}; it has "
                 f"{', '.join(k or 'no layers' for k in found.layers)}"
             )
     site = _Site(file, found, said, kinds, fields, projection)
     problem = site.problem(name or Path(file).stem)
-    for note in (*found.notes, *site.notes):
-        if on_note is not None:
+    assert problem.site is not None
+    notes = (*found.notes, *site.notes, *problem.site.notes)
+    return ImportedSite(problem, site.left_out(), notes)
+
+
+def read_site(
+    file: str | Path, projection: Projection | None = None, *, options: SiteOptions | None = None,
+    name: str | None = None, on_note: Callable[[str], None] | None = None, **more: Any,
+) -> Problem:  # fmt: skip
+    """Return the problem of a map, as `import_site`.
+
+    Parameters
+    ----------
+    file : str or Path
+        The map.
+    projection : Projection, optional
+        About the base.
+    options : SiteOptions, optional
+        What the user says of the map; its fields may be given by name instead.
+    name : str, optional
+        Name of the problem.
+    on_note : callable, optional
+        Called with what was assumed, changed or left out, one line each.
+    **more
+        Fields of `SiteOptions`.
+
+    Returns
+    -------
+    Problem
+        The problem; its `site` records what became of every feature.
+
+    Raises
+    ------
+    InputError
+        As of `import_site`.
+    """
+    found = import_site(file, projection, options=options or SiteOptions(**more), name=name)
+    if on_note is not None:
+        for note in found.notes:
             on_note(f"{file}: {note}")
-    return problem
+    return found.problem
 
 
 def read_map(file: str | Path, crs: str | None = None) -> Map:
@@ -126,9 +190,14 @@ class _Site:
     projection: Projection | None
     complaints: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    cropped: CropCircle | None = None
+
+    def __post_init__(self) -> None:
+        self.ledger = Ledger(self.map.layers)
+        self.is_chart = Path(self.file).suffix.lower() in CHART_SUFFIXES
 
     def problem(self, name: str) -> Problem:
-        """The problem, or all complaints."""
+        """Return the problem, or raise all complaints."""
         self.complaints += self.map.complaints
         parts = self._parts()
         base = self._base(parts)
@@ -144,6 +213,8 @@ class _Site:
         clearance = self._length(own, "clearance", self.said.clearance) or 0.0
         goals = self._goals(parts["goal"])
         obstacles = self._obstacles(parts["obstacle"], [anchor, *(g["position"] for g in goals)])
+        if tether is not None and (self.is_chart if self.said.crop is None else self.said.crop):
+            obstacles = self._within_crop(obstacles, anchor, tether + clearance)
         goals += self._inspections(obstacles)
         self._check_names(goals, "goals")
         self._check_names(obstacles, "obstacles")
@@ -164,6 +235,10 @@ class _Site:
                 "goals": [_bare(g) for g in goals], "obstacles": [_bare(o) for o in obstacles],
                 "tether_length": tether, "clearance": clearance,
                 **({"bounds": bounds} if bounds else {}), **self._origin(),
+                "site": Site(
+                    file=Path(self.file).name[:MAX_NAME], imported=self.ledger.records(),
+                    cropped=self.cropped,
+                ),
             },
             goals, obstacles,
         )  # fmt: skip
@@ -185,26 +260,33 @@ class _Site:
     # What is what
 
     def _parts(self) -> dict[str, list[Feature]]:
-        chart = Path(self.file).suffix.lower() in CHART
-        parts: dict[str, list[Feature]] = {
-            k: [] for k in ("base", "goal", "obstacle", "bounds", "path", "ignore")
-        }
+        parts: dict[str, list[Feature]] = {k: [] for k in KIND_COLUMNS}
+        for unread in self.map.unread:
+            self.ledger.leave_out(unread, unread.reason)
         wrong: dict[str, list[str]] = {}
         for feature in self.map.features:
             try:
-                parts[kind_of(feature, self.kinds, chart=chart)].append(feature)
+                decision = kind_of(feature, self.kinds, chart=self.is_chart)
             except InputError as error:
                 what = str(error).removeprefix(feature.where)
                 wrong.setdefault(what, []).append(feature.where)
+                continue
+            if decision.kind in parts:
+                kind = cast("UsedAs", decision.kind)
+                parts[kind].append(feature)
+                self.ledger.use(feature, kind)
+            else:
+                self.ledger.leave_out(feature, decision.reason)
         for what, places in wrong.items():  # as like as not the same slip in all of them
-            more = f" and {len(places) - 1} more" if len(places) > 1 else ""
-            self._complain(f"{places[0]}{more}{what}")
-        if parts["ignore"]:
-            self.notes.append(f"{counted(len(parts['ignore']), 'feature')} left out")
+            self._complain(f"{_first_of(places)}{what}")
         for layer, size in self.map.layers.items():
             if layer and not size:
                 self.notes.append(f"layer {layer!r} is empty")
         return parts
+
+    def left_out(self) -> tuple[shapely.Geometry, ...]:
+        """Return the shapes that were left out, in the plane."""
+        return tuple(self._plane(shape) for shape in self.ledger.left_out_shapes)
 
     def _base(self, parts: dict[str, list[Feature]]) -> tuple[Any, Feature | None] | None:
         """Where the tether is fixed, and the feature that says so; sets the projection."""
@@ -243,7 +325,8 @@ class _Site:
 
     @property
     def _unit(self) -> float:
-        return UNITS[self.said.units]
+        """Metres of a unit of the file: the user's word outweighs the file's."""
+        return UNITS[self.said.units or self.map.unit or "m"]
 
     def _plane(self, shape: shapely.Geometry) -> Any:
         """A shape in metres in the problem's plane."""
@@ -313,59 +396,155 @@ class _Site:
                 if name is not None and len(points) > 1:
                     name = f"{name} {k}"
                 place = self._place(point, feature)
-                goals.append({"name": name, "position": place, "where": feature.where})
+                goals.append(
+                    {"name": name, "position": place, "where": feature.where, "source": feature}
+                )
         return goals
 
     def _obstacles(self, features: list[Feature], free: list[Any]) -> list[dict[str, Any]]:
         """Circles and polygons, in whose holes places that must stay free are."""
         import shapely
 
-        out: list[dict[str, Any]] = []
         spots = shapely.MultiPoint([p[:2] for p in free])
+        drawn: dict[str, list[tuple[Feature, shapely.LineString]]] = {}
+        out: list[dict[str, Any]] = []
 
-        def add(feature: Feature, several: bool, number: int, **more: Any) -> None:
-            name = self._name(feature)
-            if name is not None and several:
-                name = f"{name} {number}"
-            out.append({"name": name, **more, "where": feature.where, "feature": feature})
+        def area(feature: Feature, shape: shapely.Geometry) -> list[dict[str, Any]]:
+            """Obstacles of an area; what of its outline encloses nothing is drawn as a line."""
+            polygons, notes = simple_polygons(shape, lambda p: p.intersects(spots))
+            self.notes += [f"{self._called(feature)}: {note}" for note in notes]
+            walls = spurs_of(shape, polygons, self.said.join_tolerance)
+            drawn.setdefault(feature.layer, []).extend((feature, wall) for wall in walls)
+            if not polygons and not walls:
+                self._complain(
+                    f"{self._called(feature)}: encloses nothing; expected a polygon with an area"
+                )
+            return [{"feature": feature, **outline_of(polygon)} for polygon in polygons]
 
+        pointlike: list[Feature] = []
         for feature in steps.each(features):
-            if "Point" in feature.shape.geom_type:
+            kind = feature.shape.geom_type
+            if "Point" in kind:
                 radius = self._radius(feature)
-                points = getattr(feature.shape, "geoms", [feature.shape])
-                for k, point in enumerate(points, 1) if radius is not None else ():
+                if radius is None:
+                    pointlike.append(feature)
+                    continue
+                for point in getattr(feature.shape, "geoms", [feature.shape]):
                     at = self._plane(point)
-                    add(feature, len(points) > 1, k, center=(at.x, at.y), radius=radius)
-                continue
-            polygons, notes = simple_polygons(
-                self._plane(feature.shape), lambda p: p.intersects(spots)
+                    out.append({"feature": feature, "center": (at.x, at.y), "radius": radius})
+            elif "Line" in kind:
+                lines = lines_of(self._plane(feature.shape))
+                if not lines:
+                    self._complain(f"{self._called(feature)}: a line of no length")
+                for line in lines:
+                    if line.is_closed:
+                        out += area(feature, line)
+                    else:
+                        drawn.setdefault(feature.layer, []).append((feature, line))
+            else:
+                out += area(feature, self._plane(feature.shape))
+        self._complain_of_points(pointlike)
+        for pieces in drawn.values():
+            out += self._line_work(pieces, area)
+        return self._named(out)
+
+    def _line_work(
+        self, pieces: list[tuple[Feature, shapely.LineString]],
+        area: Callable[[Feature, shapely.Geometry], list[dict[str, Any]]],
+    ) -> list[dict[str, Any]]:  # fmt: skip
+        """Obstacles of the open lines of a layer: joined outlines, and lines with a width."""
+        out: list[dict[str, Any]] = []
+        areas, rest = outlines([line for _, line in pieces], self.said.join_tolerance)
+        for polygon, members in areas:
+            own = [pieces[k][0] for k in members]
+            named = next((f for f in own if self._name(f) is not None), own[0])
+            out += area(named, polygon)
+        narrow: list[Feature] = []
+        for k in rest:
+            feature, line = pieces[k]
+            width = self._width(feature)
+            if width is None:
+                narrow.append(feature)
+            else:
+                out += area(feature, widened(line, width))
+        if narrow:
+            layer = narrow[0].layer
+            places = list(dict.fromkeys(f.where for f in narrow))
+            called = f"layer {layer!r}: " if layer else ""
+            pick = layer or "lines"
+            self._complain(
+                f"{called}{counted(len(narrow), 'open line')} ({_first_of(places)}); expected a "
+                f"width for them (--line-width W), or --map path={pick} or --map ignore={pick} to "
+                "leave them out"
             )
-            label = self._name(feature)
-            called = feature.where + (f" ({label})" if label else "")
-            self.notes += [f"{called}: {note}" for note in notes]
-            if not polygons:
-                self._complain(f"{called}: encloses nothing; expected a polygon with an area")
-            for k, polygon in enumerate(polygons, 1):
-                ring = shapely.get_coordinates(polygon.exterior)[:-1]
-                ring = ring[np.hypot(*(ring - np.roll(ring, -1, axis=0)).T) > 1e-6]
-                circle = circle_of(ring)
-                if circle is not None:
-                    add(feature, len(polygons) > 1, k, center=circle[0], radius=circle[1])
-                else:
-                    add(feature, len(polygons) > 1, k, polygon=ring.tolist())
         return out
+
+    def _width(self, feature: Feature) -> float | None:
+        width = self._number(feature, "width")
+        if width is None:
+            return self.said.line_width
+        if not width > 0.0:
+            self._complain(f"{feature.where}: width_m: expected a positive width, got {width:g}")
+        return abs(width) or None
+
+    def _named(self, things: list[dict[str, Any]]) -> list[dict[str, Any]]:
+        """Give obstacles the names of their features, numbered where a feature has several."""
+        size = Counter(thing["feature"].where for thing in things)
+        number: Counter[str] = Counter()
+        out = []
+        for thing in things:
+            feature = thing["feature"]
+            number[feature.where] += 1
+            name = self._name(feature)
+            if name is not None and size[feature.where] > 1:
+                name = f"{name} {number[feature.where]}"
+            out.append({"name": name, **thing, "where": feature.where})
+        return out
+
+    def _within_crop(
+        self, obstacles: list[dict[str, Any]], anchor: Any, reach: float
+    ) -> list[dict[str, Any]]:
+        """Obstacles within the reach of the tether; the others go to the ledger."""
+        radius = reach * (1.0 + self.said.crop_margin)
+        kept, dropped, cut_count = cropped(obstacles, anchor[:2], radius)
+        if not dropped and not cut_count:
+            return obstacles
+        self.cropped = CropCircle(center=anchor[:2], radius=radius)
+        staying = {thing["where"] for thing in kept}
+        reason = f"beyond the reach of the tether ({_metres(radius)} about the base)"
+        for feature in {t["where"]: t["feature"] for t in dropped}.values():
+            if feature.where not in staying:
+                self.ledger.leave_out(feature, reason)
+        if cut_count:
+            self.notes.append(
+                f"{counted(cut_count, 'obstacle')} cut off {_metres(radius)} from the base, beyond "
+                "the reach of the tether"
+            )
+        return kept
+
+    def _called(self, feature: Feature) -> str:
+        label = self._name(feature)
+        return feature.where + (f" ({label})" if label else "")
 
     def _radius(self, feature: Feature) -> float | None:
         metres = "radius" not in self.fields and feature.get(RADIUS[0]) is not None
         radius = self._number(feature, "radius")
         if radius is not None:
             return radius * (1.0 if metres else self._unit)
-        if self.said.radius is None:
-            self._complain(
-                f"{feature.where}: an obstacle without radius_m; expected one, or a radius for all "
-                "that have none (--radius)"
-            )
         return self.said.radius
+
+    def _complain_of_points(self, features: list[Feature]) -> None:
+        """Complain of points without a radius, a line for each layer."""
+        by_layer: dict[str, list[str]] = {}
+        for feature in features:
+            by_layer.setdefault(feature.layer, []).append(feature.where)
+        for layer, places in by_layer.items():
+            what = "an obstacle" if len(places) == 1 else "obstacles"
+            ignore = f", or --map ignore={layer} to leave them out" if layer else ""
+            self._complain(
+                f"{_first_of(places)}: {what} without radius_m; expected one, or a radius for all "
+                f"that have none (--radius R){ignore}"
+            )
 
     def _inspections(self, obstacles: list[dict[str, Any]]) -> list[dict[str, Any]]:
         """The goals about obstacles that are to be looked at."""
@@ -404,13 +583,20 @@ class _Site:
 
         if not features:
             return None
-        if len(features) > 1:
+        shapes = [self._plane(f.shape) for f in features]
+        lines = [line for shape in shapes if "Line" in shape.geom_type for line in lines_of(shape)]
+        areas, rest = outlines(lines, self.said.join_tolerance)
+        whole = [area for area, _ in areas] + [s for s in shapes if "Polygon" in s.geom_type]
+        places = ", ".join(f.where for f in features)[:100]
+        if rest:
             self._complain(
-                f"expected one outline of kind bounds, got {len(features)}: "
-                f"{', '.join(f.where for f in features)[:100]}"
+                f"{places}: bounds that are not closed; expected a closed line or a polygon"
             )
             return None
-        polygons, notes = simple_polygons(self._plane(features[0].shape), lambda p: False)
+        if len(whole) != 1:
+            self._complain(f"expected one outline of kind bounds, got {len(whole)}: {places}")
+            return None
+        polygons, notes = simple_polygons(whole[0], lambda p: False)
         self.notes += [f"{features[0].where}: {note}" for note in notes]
         if len(polygons) != 1:
             self._complain(
@@ -424,6 +610,8 @@ class _Site:
 
     def _check_names(self, things: list[dict[str, Any]], what: str) -> None:
         seen: dict[str, str] = {}
+        if self.is_chart:  # its names are those of places, and need not differ
+            _number_names(things)
         for thing in things:
             name = thing["name"]
             if name is not None and name in seen:
@@ -465,8 +653,16 @@ class _Site:
             else:
                 far.append((away, goal))
         if self.said.skip_unreachable and near:
+            staying = {goal["where"] for goal in near}
             for away, goal in far:
-                self.notes.append(f"{_label(goal)}: is {_metres(away)} from the base: left out")
+                feature = goal.get("source")
+                if feature is None or goal["where"] in staying:  # one of several of its feature
+                    self.notes.append(f"{_label(goal)}: is {_metres(away)} from the base: left out")
+                else:
+                    self.ledger.leave_out(
+                        feature,
+                        f"farther from the base than the tether is long ({_metres(tether)})",
+                    )
         elif len(far) > MOST_OF_A_KIND:
             away, goal = max(far, key=lambda f: f[0])
             self._complain(
@@ -510,7 +706,32 @@ class _Site:
 
 def _bare(thing: dict[str, Any]) -> dict[str, Any]:
     """Without where it came from, nor a name that it does not have."""
-    return {k: v for k, v in thing.items() if k not in ("where", "feature") and v is not None}
+    ours = ("where", "feature", "source")
+    return {k: v for k, v in thing.items() if k not in ours and v is not None}
+
+
+def _first_of(places: list[str]) -> str:
+    """Return the first of some places and how many more there are."""
+    return places[0] + (f" and {len(places) - 1} more" if len(places) > 1 else "")
+
+
+def _number_names(things: list[dict[str, Any]]) -> None:
+    """Number names that stand more than once: "pier", "pier 2"."""
+    taken = {thing["name"] for thing in things}
+    seen: Counter[str] = Counter()
+    for thing in things:
+        name = thing["name"]
+        if name is None:
+            continue
+        seen[name] += 1
+        number = seen[name]
+        while number > 1:
+            other = f"{name} {number}"
+            if other not in taken:
+                thing["name"] = other
+                taken.add(other)
+                break
+            number += 1
 
 
 def _label(thing: dict[str, Any]) -> str:

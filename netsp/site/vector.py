@@ -13,6 +13,7 @@ import zipfile
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ import numpy as np
 
 from netsp.errors import InputError
 from netsp.files import MOST_BYTES, check_file
-from netsp.site.feature import Feature, Map
+from netsp.site.feature import Feature, Map, Unread
 
 MOST_FEATURES = 100_000
 """Of a map: more make no problem that anybody solves."""
@@ -64,6 +65,7 @@ def _read(file: str | Path, plain: str | Path, crs: str | None) -> Map:
     features: list[Feature] = []
     layers: dict[str, int] = {}
     complaints: list[str] = []
+    unread: list[Unread] = []
     places: dict[str, bool] = {}
     for layer, kind in _call(file, pyogrio.list_layers, plain):
         if kind is None:
@@ -95,9 +97,10 @@ def _read(file: str | Path, plain: str | Path, crs: str | None) -> Map:
             }
             inner = str(properties.get("Layer") or layer) if drawing else layer
             layers[inner] = layers.get(inner, 0) + 1
-            if shape is None or shape.is_empty:
-                continue
             where = f"{inner}[{int(ids[k]) if not drawing else layers[inner] - 1}]"
+            if shape is None or shape.is_empty:
+                unread.append(Unread(where, inner, "has no geometry"))
+                continue
             if not np.isfinite(_coordinates(shape)).all():
                 complaints.append(f"{file}: {where}: expected finite coordinates")
                 continue
@@ -110,7 +113,9 @@ def _read(file: str | Path, plain: str | Path, crs: str | None) -> Map:
         )
     if not layers:
         raise InputError(f"{file}: has no layer with places")
-    return Map(tuple(features), all(places.values()), layers, tuple(complaints))
+    return Map(
+        tuple(features), all(places.values()), layers, tuple(complaints), unread=tuple(unread)
+    )
 
 
 def _geometries(shapes: Any, crs: str, where: str) -> list[Any]:
@@ -178,7 +183,7 @@ def in_degrees(map_: Map, crs: str, file: str | Path) -> Map:
         Feature(f.where, f.layer, f.identity, f.properties, s)
         for f, s in zip(map_.features, made, strict=True)
     )
-    return Map(features, crs != LOCAL, map_.layers, map_.complaints, map_.notes)
+    return replace(map_, features=features, geographic=crs != LOCAL)
 
 
 def _coordinates(shape: Any) -> np.ndarray:

@@ -1,0 +1,94 @@
+"""Ledger of an import: what became of each feature, so that none is dropped in silence."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING
+
+from netsp.import_record import KIND_COLUMNS, MAX_NAMED, LayerRecord, OmittedFeatures, UsedAs
+from netsp.site.feature import Feature, Unread
+
+if TYPE_CHECKING:
+    import shapely
+
+
+class Ledger:
+    """Ledger with one entry for each feature of a map.
+
+    Parameters
+    ----------
+    layers : mapping
+        Number of features of each layer, as the reader counted them.
+    """
+
+    def __init__(self, layers: Mapping[str, int]) -> None:
+        self._layers = dict(layers)
+        self._layer_of: dict[str, str] = {}
+        self._kind: dict[str, UsedAs] = {}
+        self._reason: dict[str, str] = {}
+        self.left_out_shapes: list[shapely.Geometry] = []
+
+    def use(self, feature: Feature, kind: UsedAs) -> None:
+        """Note that a feature is used as a kind.
+
+        Parameters
+        ----------
+        feature : Feature
+            The feature.
+        kind : str
+            What it is used as.
+        """
+        self._layer_of[feature.where] = feature.layer
+        self._kind[feature.where] = kind
+        self._reason.pop(feature.where, None)
+
+    def leave_out(self, feature: Feature | Unread, reason: str) -> None:
+        """Note that a feature is left out; that outweighs an earlier use.
+
+        Parameters
+        ----------
+        feature : Feature or Unread
+            The feature.
+        reason : str
+            Why, as "beyond the reach of the tether".
+        """
+        self._layer_of[feature.where] = feature.layer
+        self._kind.pop(feature.where, None)
+        self._reason[feature.where] = reason
+        if feature.shape is not None:
+            self.left_out_shapes.append(feature.shape)
+
+    def records(self) -> tuple[LayerRecord, ...]:
+        """Return the record of every layer, in the order of the map.
+
+        Returns
+        -------
+        tuple of LayerRecord
+            Their numbers add up to all features.
+
+        Raises
+        ------
+        ValueError
+            A feature has no entry: a defect of the reader.
+        """
+        out = []
+        for layer, size in self._layers.items():
+            mine = [where for where, own in self._layer_of.items() if own == layer]
+            used = {
+                kind: n
+                for kind in KIND_COLUMNS
+                if (n := sum(self._kind.get(where) == kind for where in mine))
+            }
+            groups: dict[str, list[str]] = {}
+            for where in mine:
+                if where in self._reason:
+                    groups.setdefault(self._reason[where], []).append(where)
+            out.append(
+                LayerRecord(layer=layer, features=size, used=used, left_out=tuple(_omitted(groups)))
+            )
+        return tuple(out)
+
+
+def _omitted(groups: Mapping[str, list[str]]) -> Iterable[OmittedFeatures]:
+    for reason, places in groups.items():
+        yield OmittedFeatures(reason=reason, features=len(places), first=tuple(places[:MAX_NAMED]))
