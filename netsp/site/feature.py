@@ -103,7 +103,7 @@ class Map:
     unread
         Features that cannot be used.
     unit
-        Name of the unit of its plane as the file states it (`netsp.site.options.UNITS`), if it
+        Name of the unit of its plane as the file states it (`netsp.axes.UNITS`), if it
         does.
     """
 

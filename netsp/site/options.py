@@ -8,12 +8,6 @@ from dataclasses import dataclass
 
 from netsp.errors import InputError
 
-UNITS = {
-    "m": 1.0, "km": 1e3, "cm": 0.01, "mm": 0.001, "ft": 0.3048, "us-ft": 1200.0 / 3937.0,
-    "in": 0.0254, "yd": 0.9144, "fathom": 1.8288,
-}  # fmt: skip
-"""Metres."""
-
 
 @dataclass(frozen=True)
 class Looking:
@@ -49,7 +43,7 @@ class SiteOptions:
     crs
         Coordinate system, as ``EPSG:32632``; ``local`` for a plane of its own.
     units
-        Of lengths in the file, one of `UNITS`; not of coordinates on the earth. None takes the
+        Of lengths in the file, one of `netsp.axes.UNITS`; not of coordinates on the earth. None takes the
         unit that the file states, or metres.
     maps
         Pairs of ours and theirs: ``("obstacle", layer)``, ``("name", property)``.

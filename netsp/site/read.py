@@ -28,7 +28,7 @@ from netsp.site.feature import Feature, Map
 from netsp.site.geojson import read_geojson
 from netsp.site.ledger import Ledger
 from netsp.site.line_work import lines_of, outlines, widened
-from netsp.site.options import UNITS, SiteOptions
+from netsp.site.options import SiteOptions
 from netsp.site.projection import Projection
 from netsp.site.shapes import outline_of, simple_polygons, spurs_of
 from netsp.site.vector import in_degrees, read_vector
