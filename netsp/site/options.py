@@ -43,8 +43,8 @@ class SiteOptions:
     crs
         Coordinate system, as ``EPSG:32632``; ``local`` for a plane of its own.
     units
-        Of lengths in the file, one of `netsp.axes.UNITS`; not of coordinates on the earth. None takes the
-        unit that the file states, or metres.
+        Of lengths in the file, one of `netsp.axes.UNITS`; not of coordinates on the earth. None
+        takes the unit that the file states, or metres.
     maps
         Pairs of ours and theirs: ``("obstacle", layer)``, ``("name", property)``.
     looking

@@ -17,6 +17,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from netsp import steps
+from netsp.axes import UNITS
 from netsp.errors import InputError, SeveralErrors, counted
 from netsp.fields import checked_number
 from netsp.import_record import KIND_COLUMNS, CropCircle, Site, UsedAs
