@@ -21,7 +21,7 @@ from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.fields import LARGEST
 from netsp.files import csv_lines, read_bytes, read_gzip
-from netsp.models import shown
+from netsp.models import parse_json, shown
 
 UNITS = {
     "m": 1.0, "km": 1e3, "cm": 0.01, "mm": 0.001, "ft": 0.3048, "us-ft": 1200.0 / 3937.0,
@@ -65,22 +65,27 @@ _SPEEDS = {
 """Metres per second per unit of speed."""
 
 Quantity = Literal[
-    "x", "y", "z", "east", "north", "altitude", "latitude", "longitude", "time", "heading",
+    "x", "y", "z", "east", "north", "easting", "northing", "altitude", "latitude", "longitude",
+    "time", "heading",
     "velocity_x", "velocity_y", "velocity_z", "name", "identifier", "radius", "armed", "mode",
     "estimate", "paid_out", "classification", "withheld",
 ]  # fmt: skip
-"""Quantities that a column can hold. `east` and `north` count from the base or a map's origin;
-`altitude` may count from the sea floor, so `z` goes before it."""
+"""Quantities that a column can hold. `east` and `north` count from a place such as home, `easting`
+and `northing` are coordinates of a map; `altitude` may count from the sea floor, so `z` goes before
+it."""
+
+MAP_PAIRS: tuple[tuple[Quantity, Quantity], ...] = (
+    ("x", "y"), ("easting", "northing"), ("east", "north"),
+)  # fmt: skip
+"""Pairs of columns that hold a place on a map whose y axis points north, the preferred first."""
 
 _ALIASES: Mapping[Quantity, Mapping[str, float]] = {
     "x": dict.fromkeys(
-        ("x", "easting", "xcoord", "x coord", "x coordinate", "coord x", "coordinate x", "pos x",
-         "position x", "position.x", "point x", "points:0", "points 0", "e", "utm e", "utm x",
-         "utm easting", "local x"), 1.0),
+        ("x", "xcoord", "x coord", "x coordinate", "coord x", "coordinate x", "pos x",
+         "position x", "position.x", "point x", "points:0", "points 0", "local x"), 1.0),
     "y": dict.fromkeys(
-        ("y", "northing", "ycoord", "y coord", "y coordinate", "coord y", "coordinate y", "pos y",
-         "position y", "position.y", "point y", "points:1", "points 1", "n", "utm n", "utm y",
-         "utm northing", "local y"), 1.0),
+        ("y", "ycoord", "y coord", "y coordinate", "coord y", "coordinate y", "pos y",
+         "position y", "position.y", "point y", "points:1", "points 1", "local y"), 1.0),
     "z": {
         **dict.fromkeys(
             ("z", "height", "elevation", "elev", "ele", "up", "zcoord", "z coord", "z coordinate",
@@ -92,6 +97,8 @@ _ALIASES: Mapping[Quantity, Mapping[str, float]] = {
     },
     "east": {"east": 1.0, "west": -1.0},
     "north": {"north": 1.0, "south": -1.0},
+    "easting": dict.fromkeys(("easting", "e", "utm e", "utm x", "utm easting"), 1.0),
+    "northing": dict.fromkeys(("northing", "n", "utm n", "utm y", "utm northing"), 1.0),
     "altitude": dict.fromkeys(("alt", "altitude"), 1.0),
     "latitude": dict.fromkeys(("lat", "latitude", "gps lat", "gps latitude"), 1.0),
     "longitude": dict.fromkeys(
@@ -356,6 +363,24 @@ class Table:
             [[self.number(k, q) for q in quantities] for k in range(len(self.rows))]
         ).reshape(-1, len(places))
 
+    def pair(
+        self, pairs: Sequence[tuple[Quantity, Quantity]] = MAP_PAIRS
+    ) -> tuple[Quantity, Quantity] | None:
+        """Return the first pair of quantities that the table holds; None if it holds none.
+
+        Parameters
+        ----------
+        pairs : sequence of (str, str)
+            Pairs, the preferred one first.
+        """
+        return next((p for p in pairs if p[0] in self and p[1] in self), None)
+
+    def height(self) -> Quantity | None:
+        """Return the quantity that holds z: `z` (perhaps from depths), else `altitude`, or None."""
+        if "z" in self:
+            return "z"
+        return "altitude" if "altitude" in self else None
+
     def wanted(self, text: str) -> InputError:
         """Return an error that says which columns were expected and which there are.
 
@@ -414,6 +439,69 @@ def decode_text(data: bytes, source: str) -> str:
         return data.decode("utf-16" if is_wide else "utf-8-sig").removeprefix("\ufeff")
     except UnicodeDecodeError:
         raise InputError(f"{source}: not a text file in UTF-8") from None
+
+
+def read_path(file: str | Path) -> Floats | None:
+    """Read a polyline from a table or a JSON list of points.
+
+    Parameters
+    ----------
+    file : str or Path
+        Table with the columns x, y and perhaps z or depth in any order, or two or three columns
+        without names.
+
+    Returns
+    -------
+    ndarray, shape (k, 2) or (k, 3), or None
+        None for a JSON object, which is taken for a solution.
+
+    Raises
+    ------
+    InputError
+        A row that cannot be read, or fewer than two points.
+    """
+    text = decode_text(read_bytes(file), str(file))
+    if text.lstrip().startswith("{"):
+        return None
+    if text.lstrip().startswith("["):
+        rows = parse_json(text, str(file))
+        for k, row in enumerate(rows):
+            if not _is_point(row) or len(row) != len(rows[0]):
+                raise InputError(f"{file}: point {k}: expected x, y or x, y, z, got {shown(row)}")
+        points = np.array(rows, dtype=float)
+    elif not text.strip():
+        points = np.empty((0, 2))
+    else:
+        table = read_table(file, positional=("x", "y", "z"), text=text)
+        points = _polyline(table)
+    if len(points) < 2:
+        raise InputError(f"{file}: expected a path of at least 2 points, got {len(points)}")
+    return points
+
+
+def _polyline(table: Table) -> Floats:
+    if table.head:
+        if table.pair((("x", "y"),)) is None:
+            raise table.wanted("columns x, y and perhaps z or depth")
+        up = table.height()
+        return table.numbers(("x", "y", up) if up else ("x", "y"))
+    for k, row in enumerate(table.rows):
+        cells = [c.replace(",", ".") if table.has_decimal_commas else c for c in row]
+        if not _is_point(cells) or len(row) != len(table.rows[0]):
+            raise InputError(
+                f"{table.source}: point {k}: expected x, y or x, y, z, got {shown(row)}"
+            )
+    names: tuple[Quantity, ...] = ("x", "y", "z")
+    return table.numbers(names[: len(table.rows[0])])
+
+
+def _is_point(row: object) -> bool:
+    if not isinstance(row, list) or len(row) not in (2, 3):
+        return False
+    try:
+        return all(abs(float(x)) <= LARGEST for x in row)
+    except (TypeError, ValueError):
+        return False
 
 
 def read_table(
@@ -548,7 +636,8 @@ def _comment_head(comment: str, separator: str) -> tuple[str, ...]:
     for mark in (separator, ",", ";", "\t", " "):
         names = tuple(n.strip() for n in (comment.split() if mark == " " else comment.split(mark)))
         found = {c.quantity for n in names if n and (c := column(n)) is not None}
-        if {"x", "y"} <= found or {"latitude", "longitude"} <= found or {"east", "north"} <= found:
+        pairs = (*MAP_PAIRS, ("latitude", "longitude"))
+        if any(found.issuperset(pair) for pair in pairs):
             return names
     return ()
 

@@ -16,7 +16,7 @@ XYZ = ("x", "y", "z")
 @pytest.mark.parametrize(
     ("name", "quantity", "factor"),
     [
-        ("x", "x", 1.0), ("Easting", "x", 1.0), ("X_m", "x", 1.0), ("y [ft]", "y", 0.3048),
+        ("x", "x", 1.0), ("Easting", "easting", 1.0), ("X_m", "x", 1.0), ("y [ft]", "y", 0.3048),
         ("Depth (m)", "z", -1.0), ("depth_ft", "z", -0.3048), ("DEPTH", "z", -1.0),
         ("elevation", "z", 1.0), ("z[mm]", "z", 0.001), ("Water Depth, m", "z", -1.0),
         ("Latitude", "latitude", 1.0), ("lon (deg)", "longitude", 1.0), ("lat_rad", "latitude",
@@ -66,7 +66,7 @@ def render(head, rows, separator, decimal, encoding):
 def test_order_separator_decimal_sign_and_encoding_do_not_change_the_points(
     tmp_path, separator, decimal, encoding
 ):
-    points = {"X": [4.0, 5.25, -6.0], "Northing": [1.0, 2.5, 3.0], "depth": [10.0, 0.5, 2.0]}
+    points = {"X": [4.0, 5.25, -6.0], "pos_y": [1.0, 2.5, 3.0], "depth": [10.0, 0.5, 2.0]}
     points["id"] = [12.0, 24.0, 36.0]
     for head in itertools.islice(itertools.permutations(points), 0, 24, 5):
         rows = list(zip(*(points[name] for name in head), strict=True))
@@ -74,7 +74,7 @@ def test_order_separator_decimal_sign_and_encoding_do_not_change_the_points(
         file.write_bytes(render(head, rows, separator, decimal, encoding))
         table = read_table(file)
         assert table.numbers(XYZ) == pytest.approx(
-            np.column_stack([points["X"], points["Northing"], -np.array(points["depth"])])
+            np.column_stack([points["X"], points["pos_y"], -np.array(points["depth"])])
         )
 
 
@@ -102,7 +102,7 @@ def test_a_comment_may_name_the_columns(tmp_path):
         ("6,0000,0,0500,-10,0000\n5,9877,0,1564,-9,5000\n", "decimal commas"),
         ("x;y;z\n6,5;1.5;2\n", "expected one of them"),
         ("x,y,z,depth\n1,2,3,4\n", "both hold z"),
-        ("easting,utm_x,y\n1,2,3\n", "both hold x"),
+        ("x_coord,pos_x,y\n1,2,3\n", "both hold x"),
         ("1 4.5 2 3\n2 4.5 5 6\n3 4.5 3 3\n", "number the rows"),
         ("x y z\n1.234,5 2 3\n", "expected a number"),
         ("", "nothing"),

@@ -92,7 +92,9 @@ def arguments(p: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     images = p.add_argument_group("occupancy images")
     images.add_argument(
-        "--goals", metavar="TABLE", help="CSV with the columns x, y and perhaps z, name (m)"
+        "--goals",
+        metavar="TABLE",
+        help="CSV with the columns x, y and perhaps z or depth, name (m)",
     )
     images.add_argument(
         "--resolution",
@@ -212,7 +214,7 @@ def _of_image(args: argparse.Namespace) -> Problem:
         base = ()
     if len(base) not in (2, 3):
         raise InputError(f"--base: expected X,Y or X,Y,Z (m) in an image, got {args.base!r}")
-    places, names = from_table(args.goals)
+    places, names = from_table(args.goals, on_note=messages.note)
     goals = [
         {"position": tuple(p), "name": n or f"g{k}"}
         for k, (p, n) in enumerate(zip(places.tolist(), names, strict=True), 1)

@@ -8,9 +8,9 @@ import sys
 import numpy as np
 
 from netsp.arrays import Floats
+from netsp.axes import read_path
 from netsp.command import messages
 from netsp.errors import InputError
-from netsp.files import read_path
 from netsp.geometry import polylines
 from netsp.online.limits import MOST_NODES
 from netsp.online.scene.field import DistanceField
