@@ -403,16 +403,6 @@ class Table:
         known = [self.title(q) for q in self.columns if q not in quantities]
         return (*known, *self.unused)
 
-    def unstated(self, quantities: Sequence[Quantity]) -> bool:
-        """Tell whether none of the columns names a unit.
-
-        Parameters
-        ----------
-        quantities : sequence of str
-            Quantities of columns.
-        """
-        return not any(q in self.columns and self.columns[q][1].unit for q in quantities)
-
 
 _COMMA = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?$")
 _POINT = re.compile(r"[-+]?(\d+\.\d*|\.\d+)([eE][-+]?\d+)?$")

@@ -82,12 +82,13 @@ def solve(
     compiling = contextlib.nullcontext() if quiet else compile_messages(sys.stderr)
     with stages or contextlib.nullcontext(), compiling:
         scene = mission.load_scene()
-        from netsp.command.plot_scene import tell, warn_of_scene
+        from netsp.command.plot_scene import note_scene, tell, warn_of_scene
 
         field = scene.field(on_progress=None if quiet else tell)
         if not quiet:
             from netsp.online.tether import GeodesicTether
 
+            note_scene(scene.name, field.notes)
             warn_of_scene(
                 GeodesicTether(field, mission.delta), mission.delta, "lower the mission's delta"
             )

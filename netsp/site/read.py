@@ -345,14 +345,15 @@ class _Site:
         return (float(at.x), float(at.y), self._height(feature, point))
 
     def _height(self, feature: Feature, point: Any = None) -> float:
-        """z in metres: of a depth, else of the point itself."""
+        """Return z in metres: of a depth, else of the point itself, whose height on the earth is
+        in metres by its format."""
         depth = self._number(feature, "depth")
         if depth is not None:
             return -depth * self._unit
         at = point if point is not None else feature.shape
         if at.geom_type != "Point" or not at.has_z or at.z != at.z:
             return 0.0
-        return float(at.z) * self._unit
+        return float(at.z) * (1.0 if self.map.geographic else self._unit)
 
     def _get(self, feature: Feature, ours: str) -> Any:
         mapped = self.fields.get(ours)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from netsp.arrays import Floats
-from netsp.axes import read_table
+from netsp.axes import Quantity, read_table
 from netsp.errors import InputError
 from netsp.site.projection import Projection
 
@@ -50,11 +50,12 @@ def from_table(
             f"{file}: positions are in degrees, and the site has no place on the earth; expected "
             "the columns x, y (m)"
         )
-    plane = ("latitude", "longitude") if is_global else pair
+    plane: tuple[Quantity, Quantity] | None = ("latitude", "longitude") if is_global else pair
     if plane is None or not table.rows:
         raise table.wanted("a table with the columns x, y and perhaps z or depth, name")
-    up, label = table.height(), "name" if "name" in table else "identifier"
-    used = [*plane, up] if up else [*plane]
+    up = table.height()
+    label: Quantity = "name" if "name" in table else "identifier"
+    used: list[Quantity] = [*plane, up] if up else [*plane]
     places = table.numbers(used)
     if is_global and projection is not None:
         places[:, :2] = np.asarray(projection.to_plane(places[:, :2]))

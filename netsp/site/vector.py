@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from netsp.axes import height_axis
 from netsp.errors import InputError
 from netsp.files import MOST_BYTES, check_file
 from netsp.site.feature import Feature, Map, Unread
@@ -119,7 +120,8 @@ def _read(file: str | Path, plain: str | Path, crs: str | None) -> Map:
 
 
 def _geometries(shapes: Any, crs: str, where: str) -> list[Any]:
-    """Shapes of WKB in degrees, or as they are where the system is local; None for none."""
+    """Return shapes of WKB in degrees and metres upwards, or as they are where the system is local;
+    None for none."""
     import shapely
 
     made = [None if s is None else shapely.from_wkb(s, on_invalid="ignore") for s in shapes]
@@ -129,9 +131,12 @@ def _geometries(shapes: Any, crs: str, where: str) -> list[Any]:
     if transform is None:
         return made
 
+    up = height_axis(crs)
+
     def degrees(c: np.ndarray) -> np.ndarray:
         out = c.copy()
         out[:, 0], out[:, 1] = transform.transform(c[:, 0], c[:, 1])
+        out[:, 2:] *= up.sign * up.metres
         return out
 
     return [
