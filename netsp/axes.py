@@ -99,7 +99,7 @@ _ALIASES: Mapping[Quantity, Mapping[str, float]] = {
     "north": {"north": 1.0, "south": -1.0},
     "easting": dict.fromkeys(("easting", "e", "utm e", "utm x", "utm easting"), 1.0),
     "northing": dict.fromkeys(("northing", "n", "utm n", "utm y", "utm northing"), 1.0),
-    "altitude": dict.fromkeys(("alt", "altitude"), 1.0),
+    "altitude": dict.fromkeys(("alt", "altitude", "relative alt", "rel alt"), 1.0),
     "latitude": dict.fromkeys(("lat", "latitude", "gps lat", "gps latitude"), 1.0),
     "longitude": dict.fromkeys(
         ("lon", "lng", "long", "longitude", "gps lon", "gps lng", "gps longitude"), 1.0),
@@ -107,7 +107,7 @@ _ALIASES: Mapping[Quantity, Mapping[str, float]] = {
         **dict.fromkeys(
             ("t", "time", "timestamp", "time stamp", "seconds", "secs", "sec", "datetime",
              "date time", "utc", "time utc", "utc time", "gps time", "unix time", "epoch",
-             "elapsed", "elapsed time", "stamp"), 1.0),
+             "elapsed", "elapsed time", "stamp", "time boot", "boot time"), 1.0),
         "timeus": 1e-6, "timems": 1e-3,
     },
     "heading": dict.fromkeys(("heading", "yaw", "hdg", "compass", "psi"), 1.0),

@@ -10,7 +10,7 @@ from netsp.files import check_file
 from netsp.guard.dataflash_log import read_bin
 from netsp.guard.fix import Fix
 from netsp.guard.message_tally import MessageTally
-from netsp.guard.table_recording import read_table
+from netsp.guard.table_recording import read_recording
 from netsp.guard.telemetry_log import read_tlog
 from netsp.link.frame import Frame
 
@@ -55,7 +55,7 @@ def read_fixes(
     any_place = False
     found: Iterator[Fix]
     if name.endswith((".csv", ".csv.gz")):
-        found = read_table(Path(file), frame, tally, say)
+        found = read_recording(Path(file), frame, tally, say)
     elif name.endswith(".tlog"):
         found = iter(read_tlog(Path(file), frame, system, tally, say))
     elif name.endswith(".bin"):
