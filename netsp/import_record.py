@@ -10,7 +10,7 @@ from netsp.errors import counted
 from netsp.fields import Name, Number, Positive
 from netsp.models import Model
 
-UsedAs = Literal["base", "goal", "obstacle", "bounds", "path"]
+UsedAs = Literal["base", "candidate", "goal", "obstacle", "bounds", "path", "floor"]
 """Kinds that a feature of a map can be used as."""
 
 MAX_NAMED = 5
@@ -118,5 +118,7 @@ class Site(Model):
         return rows
 
 
-KIND_COLUMNS: tuple[UsedAs, ...] = ("base", "goal", "obstacle", "bounds", "path")
+KIND_COLUMNS: tuple[UsedAs, ...] = (
+    "base", "candidate", "goal", "obstacle", "bounds", "path", "floor",
+)  # fmt: skip
 """Order of the columns of the table."""

@@ -605,8 +605,10 @@ def test_options_of_images_and_of_maps_do_not_mix(tmp_path, capsys):
     assert "needs --base X,Y" in capsys.readouterr().err
     assert main(["import", str(file), "--crs", "EPSG:32632"]) == 2
     assert "--crs: expected a map with features" in capsys.readouterr().err
-    assert main(["import", "examples/site.geojson", "--goals", "x.csv"]) == 2
-    assert "--goals: expected an occupancy image" in capsys.readouterr().err
+    assert main(["import", "examples/site.geojson", "--resolution", "1"]) == 2
+    assert "--resolution: expected an occupancy image" in capsys.readouterr().err
+    assert main(["import", "examples/site.geojson", "--floor", "f.asc"]) == 2
+    assert "floor: expected a chart" in capsys.readouterr().err
     (tmp_path / "alone.png").write_bytes(b"no image")
     (tmp_path / "goals.csv").write_text("x,y\n0,0\n")
     argv = ["import", str(tmp_path / "alone.png"), "--base", "0,0", "--goals",

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from netsp.problem import Problem
     from netsp.site.options import Looking
     from netsp.site.read import ImportedSite
+    from netsp.site.sea_floor import SeaFloor
 
 EXAMPLE = "netsp import examples/site.geojson -o problem.json"
 
@@ -84,18 +85,44 @@ def arguments(p: argparse.ArgumentParser) -> None:
         help="distance (m) of those goals from its surface",
     )  # fmt: skip
     p.add_argument(
+        "--of", action="append", type=option, default=[], metavar="WORD=VALUE",
+        help="inspect these obstacles only: layer=NAME, name=NAME (with * and ?), "
+        "box=XMIN,YMIN,XMAX,YMAX (m), earth=SOUTH,WEST,NORTH,EAST (degrees); one of each word "
+        "must fit",
+    )  # fmt: skip
+    p.add_argument(
         "--depths", default="0", metavar="D[,D…]", help="depths (m) of those goals; default 0"
     )
     p.add_argument(
         "--skip-unreachable", action="store_true",
         help="leave out goals that the tether cannot reach, and say which and why",
     )  # fmt: skip
-    images = p.add_argument_group("occupancy images")
-    images.add_argument(
-        "--goals",
-        metavar="TABLE",
-        help="CSV with the columns x, y and perhaps z or depth, name (m)",
+    p.add_argument(
+        "--goals", metavar="TABLE",
+        help="more goals: CSV with the columns x, y (m) or lat, lon, and perhaps z or depth, name",
+    )  # fmt: skip
+    p.add_argument(
+        "--candidates", metavar="TABLE",
+        help="places where the base may stand (columns as of --goals): a cropped map holds the "
+        "reach from each",
+    )  # fmt: skip
+    charts = p.add_argument_group("charts")
+    charts.add_argument(
+        "--draught", type=length, metavar="D",
+        help="areas that may be shallower than this (m), or are not surveyed, become obstacles",
+    )  # fmt: skip
+    charts.add_argument(
+        "--floor",
+        metavar="FILE",
+        help="write the sea floor of the chart's depths (.asc, .tif), for scenes",
     )
+    charts.add_argument(
+        "--floor-cell",
+        type=length,
+        metavar="C",
+        help="size of its cells (m); default: 256 along a side",
+    )
+    images = p.add_argument_group("occupancy images")
     images.add_argument(
         "--resolution",
         type=length,
@@ -123,23 +150,33 @@ def arguments(p: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Write the problem, and return the exit code."""
     told.check_stdout(args)
-    check_writable(args.output, args.plot, inputs=(args.site, args.goals))
+    check_writable(
+        args.output, args.plot, args.floor, inputs=(args.site, args.goals, args.candidates)
+    )
     from netsp.files import write_text
+    from netsp.site.sea_floor import check_suffix
+
+    if args.floor is not None:
+        check_suffix(args.floor)
 
     left_out: tuple[shapely.Geometry, ...] = ()
+    viewpoints: frozenset[str] = frozenset()
+    floor: SeaFloor | None = None
     with Patience(sys.stderr, f"reading {args.site}"):
         if _is_image(args):
             problem = _of_image(args)
         else:
             found = _of_map(args)
-            problem, left_out = found.problem, found.left_out
+            problem, left_out, floor = found.problem, found.left_out, found.floor
+            viewpoints = found.viewpoints
             _show_table(args.site, found)
     why: list[str] = []
-    if args.skip_unreachable:
+    is_cropped = problem.site is not None and problem.site.cropped is not None
+    if args.skip_unreachable or (is_cropped and viewpoints):
         from netsp.roadmap.within_reach import within_reach
 
         with Patience(sys.stderr, "looking for the goals in reach"):
-            problem, why = within_reach(problem)
+            problem, why = within_reach(problem, None if args.skip_unreachable else viewpoints)
         for line in why:
             messages.note(f"{line}: left out")
     print(f"{problem.name}: {problem.summary}{_where(problem)}", file=sys.stderr)
@@ -153,6 +190,8 @@ def run(args: argparse.Namespace) -> int:
         sys.stdout.write(problem.to_json())
     else:
         write_text(args.output, problem.to_json())
+    if floor is not None:
+        floor.save(args.floor)
     if args.plot is not None:
         from netsp.pictures.problem import save_import
 
@@ -188,9 +227,12 @@ def _is_image(args: argparse.Namespace) -> bool:
 
     image: bool = args.site.lower().endswith((*FILES, *IMAGES))
     wrong = (
-        ("map", "crs", "radius", "inspect", "standoff", "line_width", "join_tolerance", "crop")
+        (
+            "map", "crs", "radius", "inspect", "standoff", "line_width", "join_tolerance", "crop",
+            "of", "candidates", "draught", "floor", "floor_cell",
+        )
         if image
-        else ("goals", "resolution", "tolerance", "unknown_free")
+        else ("resolution", "tolerance", "unknown_free")
     )  # fmt: skip
     for name in wrong:
         if getattr(args, name):
@@ -249,6 +291,8 @@ def _of_map(args: argparse.Namespace) -> ImportedSite:
         tether=args.tether, clearance=args.clearance, radius=args.radius, crs=args.crs,
         units=args.units, maps=args.map, looking=_looking(args),
         skip_unreachable=args.skip_unreachable, line_width=args.line_width, crop=args.crop,
+        goals=args.goals, candidates=args.candidates, draught=args.draught,
+        floor=args.floor is not None, floor_cell=args.floor_cell,
         **({} if args.join_tolerance is None else {"join_tolerance": args.join_tolerance}),
     )  # fmt: skip
     return import_site(args.site, projection, options=options)
@@ -257,10 +301,12 @@ def _of_map(args: argparse.Namespace) -> ImportedSite:
 def _looking(args: argparse.Namespace) -> Looking | None:
     """How obstacles are looked at, where that is asked for."""
     from netsp.site.options import Looking
+    from netsp.site.selection import Selection
 
     if args.inspect is None:
-        if args.standoff is not None:
-            raise InputError("--standoff: expected --inspect N with it")
+        for name in ("standoff", "of"):
+            if getattr(args, name):
+                raise InputError(f"--{name}: expected --inspect N with it")
         return None
     if args.standoff is None:
         raise InputError("--inspect: expected --standoff S with it")
@@ -268,4 +314,4 @@ def _looking(args: argparse.Namespace) -> Looking | None:
         depths = tuple(0.0 - abs(float(d)) for d in args.depths.split(","))
     except ValueError:
         raise InputError(f"--depths: expected numbers with commas, got {args.depths!r}") from None
-    return Looking(args.inspect, args.standoff, depths)
+    return Looking(args.inspect, args.standoff, depths, Selection.parse(args.of))

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 from netsp.errors import InputError
 from netsp.models import shown
+from netsp.site.chart_classes import chart_kind
 from netsp.site.feature import Feature
 
 SHAPES = {
@@ -99,16 +100,6 @@ WATER_AREAS = {
     },
 }  # fmt: skip
 """Tags of OpenStreetMap's areas of open water: key to values."""
-
-CHART = {
-    "PILPNT", "OFSPLF", "OBSTRN", "WRECKS", "UWTROC", "MORFAC", "PONTON", "LNDARE", "BUISGL",
-    "FSHFAC", "HULKES", "CRANES", "SILTNK", "LNDMRK", "SLCONS", "DAMCON", "BRIDGE", "PYLONS",
-    "FLODOC", "GATCON", "MARCUL", "OILBAR", "FORSTC", "CAUSWY", "DYKCON", "COALNE",
-}  # fmt: skip
-"""Object classes of S-57 (IHO S-57, appendix A) that a tether may catch on."""
-
-CHART_PATHS = {"CBLSUB", "CBLOHD", "PIPSOL", "PIPOHD"}
-"""Object classes of S-57 that are cables and pipelines."""
 
 RADIUS = ("radius_m", "radius")
 WIDTH = ("width_m", "width")
@@ -211,7 +202,8 @@ def kind_of(feature: Feature, kinds: Mapping[str, str], *, chart: bool) -> Decis
     elif layer in WORDS:
         decision = Decision(WORDS[layer], "its layer is named ignore")
     elif chart:
-        decision = _of_chart(feature)
+        of_chart = chart_kind(feature)
+        decision = Decision(of_chart.kind, of_chart.reason)
     else:
         decision = _by_tags(feature, shape) or _by_shape(feature, shape)
     kind = decision.kind
@@ -229,16 +221,6 @@ def kind_of(feature: Feature, kinds: Mapping[str, str], *, chart: bool) -> Decis
             f"{' or '.join(SHAPES[kind])}"
         )
     return Decision(kind)
-
-
-def _of_chart(feature: Feature) -> Decision:
-    """Decide by the object class of a chart."""
-    if feature.layer in CHART:
-        return Decision("obstacle")
-    if feature.layer in CHART_PATHS:
-        return Decision("path" if "Line" in feature.shape.geom_type else "ignore",
-                        "a cable or pipeline that is no line")  # fmt: skip
-    return Decision("ignore", "its object class is none that a tether may catch on")
 
 
 def _by_tags(feature: Feature, shape: str) -> Decision | None:

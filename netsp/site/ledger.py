@@ -26,7 +26,12 @@ class Ledger:
         self._layer_of: dict[str, str] = {}
         self._kind: dict[str, UsedAs] = {}
         self._reason: dict[str, str] = {}
-        self.left_out_shapes: list[shapely.Geometry] = []
+        self._shapes: dict[str, shapely.Geometry] = {}
+
+    @property
+    def left_out_shapes(self) -> list[shapely.Geometry]:
+        """Shapes of the features that are left out."""
+        return list(self._shapes.values())
 
     def use(self, feature: Feature, kind: UsedAs) -> None:
         """Note that a feature is used as a kind.
@@ -41,6 +46,7 @@ class Ledger:
         self._layer_of[feature.where] = feature.layer
         self._kind[feature.where] = kind
         self._reason.pop(feature.where, None)
+        self._shapes.pop(feature.where, None)
 
     def leave_out(self, feature: Feature | Unread, reason: str) -> None:
         """Note that a feature is left out; that outweighs an earlier use.
@@ -56,7 +62,34 @@ class Ledger:
         self._kind.pop(feature.where, None)
         self._reason[feature.where] = reason
         if feature.shape is not None:
-            self.left_out_shapes.append(feature.shape)
+            self._shapes[feature.where] = feature.shape
+
+    def add_layer(self, layer: str, size: int) -> None:
+        """Add a table that was given besides the map.
+
+        Parameters
+        ----------
+        layer : str
+            Its name.
+        size : int
+            Number of its rows.
+        """
+        self._layers[layer] = self._layers.get(layer, 0) + size
+
+    def is_left_out(self, feature: Feature) -> bool:
+        """Return whether a feature is left out so far.
+
+        Parameters
+        ----------
+        feature : Feature
+            The feature.
+
+        Returns
+        -------
+        bool
+            False for one that is used, or of which nothing is noted.
+        """
+        return feature.where in self._reason
 
     def records(self) -> tuple[LayerRecord, ...]:
         """Return the record of every layer, in the order of the map.

@@ -18,20 +18,24 @@ from pydantic import ValidationError
 
 from netsp import steps
 from netsp.axes import UNITS
-from netsp.errors import InputError, SeveralErrors, counted
+from netsp.errors import InputError, UnansweredError, counted
 from netsp.fields import checked_number
-from netsp.import_record import KIND_COLUMNS, CropCircle, Site, UsedAs
+from netsp.import_record import KIND_COLUMNS, MAX_NAMED, CropCircle, Site, UsedAs
 from netsp.models import explain, shown
 from netsp.problem import Problem
-from netsp.site.contract import FIELDS, RADIUS, SHAPE_LAYERS, kind_of, words_of
-from netsp.site.crop import cropped
+from netsp.site.chart_classes import EQUIPMENT, chart_radius, chart_width, lone_equipment
+from netsp.site.chart_depths import chart_floor, shallow_areas
+from netsp.site.contract import FIELDS, RADIUS, SHAPE_LAYERS, Decision, kind_of, words_of
+from netsp.site.crop import CropWindow, cropped
 from netsp.site.feature import Feature, Map
 from netsp.site.geojson import read_geojson
 from netsp.site.ledger import Ledger
 from netsp.site.line_work import lines_of, outlines, widened
 from netsp.site.options import SiteOptions
 from netsp.site.projection import Projection
+from netsp.site.sea_floor import SeaFloor
 from netsp.site.shapes import outline_of, simple_polygons, spurs_of
+from netsp.site.table import from_table
 from netsp.site.vector import in_degrees, read_vector
 
 if TYPE_CHECKING:
@@ -56,11 +60,17 @@ class ImportedSite:
         Shapes of the features that were left out, in the problem's plane, for the picture.
     notes
         What was assumed, changed or left out, one line each.
+    viewpoints
+        Names of the goals that stand for obstacles to be looked at.
+    floor
+        The sea floor, where one was asked for.
     """
 
     problem: Problem
     left_out: tuple[shapely.Geometry, ...]
     notes: tuple[str, ...]
+    viewpoints: frozenset[str] = frozenset()
+    floor: SeaFloor | None = None
 
 
 def import_site(
@@ -105,7 +115,8 @@ def import_site(
     problem = site.problem(name or Path(file).stem)
     assert problem.site is not None
     notes = (*found.notes, *site.notes, *problem.site.notes)
-    return ImportedSite(problem, site.left_out(), notes)
+    viewpoints = frozenset(site.viewpoints)
+    return ImportedSite(problem, site.left_out(), notes, viewpoints, site.floor)
 
 
 def read_site(
@@ -175,6 +186,8 @@ def read_map(file: str | Path, crs: str | None = None) -> Map:
 DEGREES = 0.01
 """Of the tether's length: a plane that spans less is taken for one of degrees."""
 
+SKIP_OPTION = "; leave out what is out of reach with --skip-unreachable"
+
 MOST_OF_A_KIND = 5
 """Goals out of reach that are told one by one."""
 
@@ -189,17 +202,29 @@ class _Site:
     kinds: dict[str, str]
     fields: dict[str, str]
     projection: Projection | None
-    complaints: list[str] = field(default_factory=list)
+    complaints: list[tuple[str, str]] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    asks: list[str] = field(default_factory=list)
     cropped: CropCircle | None = None
+    window: CropWindow | None = None
+    viewpoints: list[str] = field(default_factory=list)
+    floor: SeaFloor | None = None
 
     def __post_init__(self) -> None:
-        self.ledger = Ledger(self.map.layers)
         self.is_chart = Path(self.file).suffix.lower() in CHART_SUFFIXES
+        for name, value in (("draught", self.said.draught), ("floor", self.said.floor or None)):
+            if value is not None and not self.is_chart:
+                raise InputError(
+                    f"{name}: expected a chart (S-57, .000), whose depths are known, got "
+                    f"{self.file}"
+                )
+        self.ledger = Ledger(self.map.layers)
+        self.beyond: dict[str, Feature] = {}
+        self.cut_off: set[str] = set()
 
     def problem(self, name: str) -> Problem:
         """Return the problem, or raise all complaints."""
-        self.complaints += self.map.complaints
+        self.complaints += [(text, "") for text in self.map.complaints]
         parts = self._parts()
         base = self._base(parts)
         if base is None:
@@ -208,22 +233,26 @@ class _Site:
         tether = self._length(own, "tether_length", self.said.tether)
         if tether is None:
             self._complain(
-                "has no tether length; expected tether_length of the base, or one besides "
-                "(--tether)"
+                "has no tether length; expected tether_length of the base",
+                ", or one besides (--tether)",
+                "tether",
             )
         clearance = self._length(own, "clearance", self.said.clearance) or 0.0
-        goals = self._goals(parts["goal"])
-        obstacles = self._obstacles(parts["obstacle"], [anchor, *(g["position"] for g in goals)])
+        goals = self._goals(parts["goal"]) + self._table_goals()
+        candidates = [place for _, place in self._table_places("candidate", self.said.candidates)]
         if tether is not None and (self.is_chart if self.said.crop is None else self.said.crop):
-            obstacles = self._within_crop(obstacles, anchor, tether + clearance)
-        goals += self._inspections(obstacles)
+            self.window = CropWindow.about(
+                [anchor, *candidates], tether + clearance, self.said.crop_margin
+            )
+        if self.is_chart:
+            self._chart_depths(parts)
+        free = [anchor, *candidates, *(g["position"] for g in goals)]
+        obstacles = self._within_crop(self._obstacles(parts["obstacle"], free))
+        goals += self._inspections(obstacles, anchor, tether, clearance)
         self._check_names(goals, "goals")
         self._check_names(obstacles, "obstacles")
         if not goals and not self.complaints:
-            self._complain(
-                "has no goal: a point without radius_m, a layer of goals (--map goal=LAYER), or "
-                "obstacles to inspect (--inspect)"
-            )
+            self._complain_of_no_goal()
         if tether is not None:
             self._check_scale(goals, obstacles, anchor, tether)
             goals = self._within_reach(goals, anchor, tether)
@@ -265,6 +294,7 @@ class _Site:
         for unread in self.map.unread:
             self.ledger.leave_out(unread, unread.reason)
         wrong: dict[str, list[str]] = {}
+        lone = lone_equipment(self.map.features) if self.is_chart else set()
         for feature in self.map.features:
             try:
                 decision = kind_of(feature, self.kinds, chart=self.is_chart)
@@ -272,6 +302,8 @@ class _Site:
                 what = str(error).removeprefix(feature.where)
                 wrong.setdefault(what, []).append(feature.where)
                 continue
+            if decision.reason == EQUIPMENT and feature.where in lone:
+                decision = Decision("obstacle")
             if decision.kind in parts:
                 kind = cast("UsedAs", decision.kind)
                 parts[kind].append(feature)
@@ -284,6 +316,62 @@ class _Site:
             if layer and not size:
                 self.notes.append(f"layer {layer!r} is empty")
         return parts
+
+    def _chart_depths(self, parts: dict[str, list[Feature]]) -> None:
+        """Make obstacles of shallow areas, and the sea floor, where they are asked for."""
+        left_out = [
+            f for f in self.map.features
+            if self.ledger.is_left_out(f) and f.layer.lower() not in self.kinds
+        ]  # fmt: skip
+        if self.said.draught is not None:
+            shallow = shallow_areas(left_out, self.said.draught)
+            for feature in shallow:
+                self.ledger.use(feature, "obstacle")
+            parts["obstacle"] += shallow
+        if not self.said.floor or self.complaints:
+            return
+        self.floor, found = chart_floor(
+            self.map.features, self._plane, self.window, self.said.floor_cell
+        )
+        for feature in found.used:  # a shallow area is an obstacle, too
+            if self.ledger.is_left_out(feature):
+                self.ledger.use(feature, "floor")
+        for feature in found.beyond:
+            if self.ledger.is_left_out(feature):
+                self.ledger.leave_out(feature, self._beyond_reach)
+        for feature in found.depthless:
+            self.ledger.leave_out(feature, "a depth that the chart does not give")
+
+    def _table_places(
+        self, kind: UsedAs, file: str | Path | None
+    ) -> list[tuple[Feature, tuple[float, float, float]]]:
+        """Return the rows of a table that was given besides, and their places in the plane."""
+        import shapely
+
+        if file is None:
+            return []
+        found, names = from_table(file, self.projection, self.notes.append)
+        places = np.column_stack([found, np.zeros(len(found))])[:, :3]  # at the surface without z
+        layer = Path(file).name
+        self.ledger.add_layer(layer, len(places))
+        out = []
+        for k, (place, name) in enumerate(zip(places.tolist(), names, strict=True)):
+            # as the map's own features have it, in degrees or in its unit
+            at = (
+                tuple(self.projection.to_earth([place[:2]])[0][::-1])
+                if self.projection is not None
+                else (place[0] / self._unit, place[1] / self._unit)
+            )
+            row = Feature(f"{layer}[{k}]", layer, "", {"name": name}, shapely.Point(at))
+            self.ledger.use(row, kind)
+            out.append((row, (place[0], place[1], place[2])))
+        return out
+
+    def _table_goals(self) -> list[dict[str, Any]]:
+        return [
+            {"name": self._name(row), "position": place, "where": row.where, "source": row}
+            for row, place in self._table_places("goal", self.said.goals)
+        ]
 
     def left_out(self) -> tuple[shapely.Geometry, ...]:
         """Return the shapes that were left out, in the plane."""
@@ -308,8 +396,9 @@ class _Site:
             if own is None:
                 if not self.complaints:
                     self._complain(
-                        "has no base; expected a Point of kind base, or lat,lon given besides "
-                        "(--base)"
+                        "has no base; expected a Point of kind base",
+                        ", or lat,lon given besides (--base)",
+                        "base",
                     )
                 return None
             heading = self._number(own, "heading") or 0.0
@@ -413,6 +502,17 @@ class _Site:
 
         def area(feature: Feature, shape: shapely.Geometry) -> list[dict[str, Any]]:
             """Obstacles of an area; what of its outline encloses nothing is drawn as a line."""
+            if self.window is not None:
+                if self.window.is_beyond(shape):
+                    self.beyond[feature.where] = feature
+                    return []
+                if "Polygon" in shape.geom_type:
+                    shape, is_cut = self.window.cut(shape)
+                    if is_cut:
+                        self.cut_off.add(feature.where)
+                    if shape.is_empty:
+                        self.beyond[feature.where] = feature
+                        return []
             polygons, notes = simple_polygons(shape, lambda p: p.intersects(spots))
             self.notes += [f"{self._called(feature)}: {note}" for note in notes]
             walls = spurs_of(shape, polygons, self.said.join_tolerance)
@@ -428,6 +528,9 @@ class _Site:
             kind = feature.shape.geom_type
             if "Point" in kind:
                 radius = self._radius(feature)
+                if self._is_beyond(self._plane(feature.shape), radius or 0.0):
+                    self.beyond[feature.where] = feature
+                    continue
                 if radius is None:
                     pointlike.append(feature)
                     continue
@@ -465,6 +568,9 @@ class _Site:
         for k in rest:
             feature, line = pieces[k]
             width = self._width(feature)
+            if self._is_beyond(line, width or 0.0):
+                self.beyond[feature.where] = feature
+                continue
             if width is None:
                 narrow.append(feature)
             else:
@@ -476,13 +582,19 @@ class _Site:
             pick = layer or "lines"
             self._complain(
                 f"{called}{counted(len(narrow), 'open line')} ({_first_of(places)}); expected a "
-                f"width for them (--line-width W), or --map path={pick} or --map ignore={pick} to "
-                "leave them out"
+                "width for them",
+                f" (--line-width W), or --map path={pick} or --map ignore={pick} to leave them out",
+                "line_width",
             )
         return out
 
+    def _is_beyond(self, shape: shapely.Geometry, grown: float) -> bool:
+        return self.window is not None and self.window.is_beyond(shape, grown)
+
     def _width(self, feature: Feature) -> float | None:
         width = self._number(feature, "width")
+        if width is None and self.is_chart:
+            width = chart_width(feature)
         if width is None:
             return self.said.line_width
         if not width > 0.0:
@@ -503,24 +615,31 @@ class _Site:
             out.append({"name": name, **thing, "where": feature.where})
         return out
 
-    def _within_crop(
-        self, obstacles: list[dict[str, Any]], anchor: Any, reach: float
-    ) -> list[dict[str, Any]]:
+    @property
+    def _beyond_reach(self) -> str:
+        """Reason to leave out what lies beyond the window."""
+        assert self.window is not None
+        about = "the base and the candidates" if self.said.candidates is not None else "the base"
+        return f"beyond the reach of the tether ({_metres(self.window.radius)} about {about})"
+
+    def _within_crop(self, obstacles: list[dict[str, Any]]) -> list[dict[str, Any]]:
         """Obstacles within the reach of the tether; the others go to the ledger."""
-        radius = reach * (1.0 + self.said.crop_margin)
-        kept, dropped, cut_count = cropped(obstacles, anchor[:2], radius)
-        if not dropped and not cut_count:
+        if self.window is None:
             return obstacles
-        self.cropped = CropCircle(center=anchor[:2], radius=radius)
+        kept, dropped, cut_off = cropped(obstacles, self.window)
+        self.beyond |= {thing["where"]: thing["feature"] for thing in (*dropped, *cut_off)}
+        self.cut_off |= {thing["where"] for thing in cut_off}
+        if not self.beyond and not self.cut_off:
+            return kept
+        self.cropped = CropCircle(center=self.window.center, radius=self.window.radius)
         staying = {thing["where"] for thing in kept}
-        reason = f"beyond the reach of the tether ({_metres(radius)} about the base)"
-        for feature in {t["where"]: t["feature"] for t in dropped}.values():
-            if feature.where not in staying:
-                self.ledger.leave_out(feature, reason)
-        if cut_count:
+        for where, feature in self.beyond.items():
+            if where not in staying:
+                self.ledger.leave_out(feature, self._beyond_reach)
+        if cut_count := len(self.cut_off & staying):
             self.notes.append(
-                f"{counted(cut_count, 'obstacle')} cut off {_metres(radius)} from the base, beyond "
-                "the reach of the tether"
+                f"{counted(cut_count, 'obstacle')} cut off where the reach of the tether ends "
+                f"({_metres(self.window.radius)})"
             )
         return kept
 
@@ -533,7 +652,8 @@ class _Site:
         radius = self._number(feature, "radius")
         if radius is not None:
             return radius * (1.0 if metres else self._unit)
-        return self.said.radius
+        own = chart_radius(feature) if self.is_chart else None
+        return own if own is not None else self.said.radius
 
     def _complain_of_points(self, features: list[Feature]) -> None:
         """Complain of points without a radius, a line for each layer."""
@@ -545,16 +665,29 @@ class _Site:
             ignore = f", or --map ignore={layer} to leave them out" if layer else ""
             self._complain(
                 f"{_first_of(places)}: {what} without radius_m; expected one, or a radius for all "
-                f"that have none (--radius R){ignore}"
+                "that have none",
+                f" (--radius R){ignore}",
+                "radius",
             )
 
-    def _inspections(self, obstacles: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    def _complain_of_no_goal(self) -> None:
+        self._complain(
+            "has no goal; expected a point without radius_m, a layer of goals, a table of goals, "
+            "or obstacles to inspect",
+            " (--map goal=LAYER, --goals TABLE, --inspect N --standoff S)",
+            "inspect",
+        )
+
+    def _inspections(
+        self, obstacles: list[dict[str, Any]], anchor: Any, tether: float | None, clearance: float
+    ) -> list[dict[str, Any]]:
         """The goals about obstacles that are to be looked at."""
         from netsp.shorthand import Inspection
 
         goals: list[dict[str, Any]] = []
+        chosen = self._chosen(obstacles)
         for k, o in enumerate(obstacles):
-            feature, look = o["feature"], self.said.looking
+            feature, look = o["feature"], self.said.looking if k in chosen else None
             own = feature.get("viewpoints", "inspect")
             if own is None and look is None:
                 continue
@@ -577,8 +710,84 @@ class _Site:
                 text = explain(error) if isinstance(error, ValidationError) else str(error)
                 self._complain(f"{feature.where}: {text}")
                 continue
-            goals += [{**g, "where": feature.where} for g in asked.goals(o)]
+            goals += [{**g, "where": feature.where, "layer": feature.layer} for g in asked.goals(o)]
+        if self.said.looking is not None:
+            goals = self._free_viewpoints(goals, obstacles, anchor, tether, clearance)
+        self._check_names(goals, "goals")
+        self.viewpoints += [str(goal["name"]) for goal in goals]
         return goals
+
+    def _chosen(self, obstacles: list[dict[str, Any]]) -> set[int]:
+        """Return which obstacles the user wants to have looked at."""
+        import shapely
+
+        look = self.said.looking
+        if look is None:
+            return set()
+        rule = look.chosen
+        areas = [shapely.box(*box) for box in rule.boxes]
+        if rule.earth_boxes and self.projection is None:
+            raise InputError(
+                f"{self.file}: has no place on the earth; expected a box in its plane (m)"
+            )
+        for south, west, north, east in rule.earth_boxes:
+            corners = [(south, west), (south, east), (north, east), (north, west)]
+            assert self.projection is not None
+            areas.append(shapely.Polygon(self.projection.to_plane(corners)))
+        found = {
+            k
+            for k, o in enumerate(obstacles)
+            if rule.takes(o["feature"].layer, self._name(o["feature"]) or o["name"])
+            and rule.holds(_shape(o), areas)
+        }
+        if not found and obstacles:
+            layers = dict.fromkeys(o["feature"].layer for o in obstacles)
+            self._complain(
+                "no obstacle within the tether's reach is among those chosen to be inspected; "
+                f"there are obstacles of the layers {', '.join(n or '(none)' for n in layers)}"
+            )
+        return found
+
+    def _free_viewpoints(
+        self, goals: list[dict[str, Any]], obstacles: list[dict[str, Any]], anchor: Any,
+        tether: float | None, clearance: float,
+    ) -> list[dict[str, Any]]:  # fmt: skip
+        """Return the viewpoints with room for the robot; the others are told by layer and cause."""
+        if not goals:
+            return goals
+        places = np.array([g["position"] for g in goals])
+        away = np.linalg.norm(places - np.array(anchor), axis=1)
+        is_far = (away > tether) if self.window is not None and tether is not None else away < 0.0
+        is_in = _distance(places[:, :2], obstacles) < max(clearance, 1e-9)
+        seen: set[tuple[float, ...]] = set()
+        kept: list[dict[str, Any]] = []
+        groups: dict[tuple[str, str], list[str]] = {}
+        for k, goal in enumerate(goals):
+            cause = ""
+            if is_in[k]:
+                cause = "within an obstacle or its clearance"
+            elif is_far[k]:
+                cause = "farther from the base than the tether is long"
+            elif (place := tuple(places[k])) in seen:
+                cause = "in the same place as another"
+            else:
+                seen.add(place)
+                kept.append(goal)
+                continue
+            groups.setdefault((goal["layer"], cause), []).append(str(goal["name"]))
+        for (layer, cause), names in groups.items():
+            shown_names = ", ".join(names[:MAX_NAMED]) + (", …" if len(names) > MAX_NAMED else "")
+            called = f"layer {layer!r}: " if layer else ""
+            self.notes.append(
+                f"{called}{counted(len(names), 'viewpoint')} left out: {cause} ({shown_names})"
+            )
+        if not kept:
+            causes = ", ".join(dict.fromkeys(cause for _, cause in groups))
+            self._complain(
+                f"no viewpoint about an obstacle is left: all {len(goals)} are {causes}; expected "
+                "another standoff, base or tether"
+            )
+        return kept
 
     def _bounds(self, features: list[Feature]) -> list[list[float]] | None:
         import shapely
@@ -638,7 +847,9 @@ class _Site:
         if small and not whole and span <= DEGREES * tether:
             self._complain(
                 f"coordinates span {span:g} m, and the tether is {_metres(tether)} long: they look "
-                "like degrees; expected metres, or --crs EPSG:4326"
+                "like degrees; expected metres",
+                ", or --crs EPSG:4326",
+                "crs",
             )
 
     def _within_reach(
@@ -669,27 +880,28 @@ class _Site:
             away, goal = max(far, key=lambda f: f[0])
             self._complain(
                 f"{len(far)} goals are farther from the base than the tether is long "
-                f"({_metres(tether)}), {_label(goal)} {_metres(away)}{self._cause(goal, tether)}"
+                f"({_metres(tether)}), {_label(goal)} {_metres(away)}{self._cause(goal, tether)}",
+                SKIP_OPTION,
             )
         else:
             for away, goal in far:
                 self._complain(
                     f"{_label(goal)}: is {_metres(away)} from the base, and the tether "
-                    f"{_metres(tether)} long{self._cause(goal, tether)}"
+                    f"{_metres(tether)} long{self._cause(goal, tether)}",
+                    SKIP_OPTION,
                 )
         return near
 
     def _cause(self, goal: dict[str, Any], tether: float) -> str:
         """Why a goal may be so far off."""
-        other = "; leave out what is out of reach with --skip-unreachable"
         if self.projection is None:
-            return other
+            return ""
         ((lat, lon),) = self.projection.to_earth([goal["position"][:2]])
         if abs(lon) <= 90.0:
             ((x, y),) = self.projection.to_plane([[lon, lat]])
             if np.hypot(*(np.array([x, y]) - self.projection.base)) <= 10.0 * tether:
                 return ": latitude and longitude look swapped"
-        return other
+        return ""
 
     def _origin(self) -> dict[str, Any]:
         p = self.projection
@@ -697,19 +909,47 @@ class _Site:
             return {}
         return {"origin": {"latitude": p.latitude, "longitude": p.longitude, "heading": p.heading}}
 
-    def _complain(self, text: str) -> None:
-        self.complaints.append(f"{self.file}: {text.removeprefix(f'{self.file}: ')}")
+    def _complain(self, text: str, option: str = "", ask: str | None = None) -> None:
+        """Note what is wrong; the options that help on the command line stand apart."""
+        self.complaints.append((f"{self.file}: {text.removeprefix(f'{self.file}: ')}", option))
+        if ask is not None:
+            self.asks.append(ask)
 
     def _refused(self) -> InputError:
-        if len(self.complaints) == 1:
-            return InputError(self.complaints[0])
-        return SeveralErrors(self.complaints)
+        whole = [text + option for text, option in self.complaints]
+        return UnansweredError(whole, [text for text, _ in self.complaints], self.asks)
 
 
 def _bare(thing: dict[str, Any]) -> dict[str, Any]:
     """Without where it came from, nor a name that it does not have."""
-    ours = ("where", "feature", "source")
+    ours = ("where", "feature", "source", "layer")
     return {k: v for k, v in thing.items() if k not in ours and v is not None}
+
+
+def _shape(thing: dict[str, Any]) -> shapely.Geometry:
+    """Return an obstacle of a problem file as an area."""
+    import shapely
+
+    if "radius" in thing:
+        return shapely.Point(thing["center"]).buffer(thing["radius"])
+    return shapely.Polygon(thing["polygon"])
+
+
+def _distance(places: np.ndarray, obstacles: list[dict[str, Any]]) -> np.ndarray:
+    """Return the distance of each place from the nearest obstacle, 0 or less within one."""
+    import shapely
+
+    out = np.full(len(places), np.inf)
+    circles = [(*o["center"], o["radius"]) for o in obstacles if "radius" in o]
+    for x, y, radius in circles:
+        out = np.minimum(out, np.hypot(places[:, 0] - x, places[:, 1] - y) - radius)
+    polygons = [shapely.Polygon(o["polygon"]) for o in obstacles if "polygon" in o]
+    if polygons:
+        tree = shapely.STRtree(polygons)
+        points = shapely.points(places)
+        (own, _), away = tree.query_nearest(points, return_distance=True, all_matches=False)
+        out[own] = np.minimum(out[own], away)
+    return out
 
 
 def _first_of(places: list[str]) -> str:

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from netsp.axes import height_axis
-from netsp.errors import InputError
+from netsp.errors import InputError, UnansweredError
 from netsp.files import MOST_BYTES, check_file
 from netsp.site.feature import Feature, Map, Unread
 
@@ -83,10 +83,9 @@ def _read(file: str | Path, plain: str | Path, crs: str | None) -> Map:
         if own is None and drawing:
             own = LOCAL
         if own is None:
-            raise InputError(
-                f"{file}: layer {layer!r}: names no coordinate system; give it with --crs "
-                f"EPSG:4326 (degrees), another EPSG code or --crs {LOCAL}"
-            )
+            plain = f"{file}: layer {layer!r}: names no coordinate system"
+            option = f"; give it with --crs EPSG:4326 (degrees), another EPSG code or --crs {LOCAL}"
+            raise UnansweredError([plain + option], [plain], ["crs"])
         if not len(shapes):
             layers.setdefault(layer, 0)
         places[layer] = own != LOCAL
