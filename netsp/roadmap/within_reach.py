@@ -15,7 +15,7 @@ HAIR = 1e-6
 
 
 def within_reach(
-    problem: Problem, names: Collection[str] | None = None
+    problem: Problem, removable: Collection[str] | None = None
 ) -> tuple[Problem, list[str]]:
     """The problem without the goals that its tether cannot reach.
 
@@ -23,7 +23,7 @@ def within_reach(
     ----------
     problem : Problem
         Any.
-    names : collection of str, optional
+    removable : collection of str, optional
         Goals that may be left out; default all.
 
     Returns
@@ -40,8 +40,8 @@ def within_reach(
     """
     needed = shortest_tethers(problem)
     far = needed > problem.tether_length * (1.0 + HAIR)
-    if names is not None:
-        far &= np.array([g.name in names for g in problem.goals])
+    if removable is not None:
+        far &= np.array([g.name in removable for g in problem.goals])
     if not far.any():
         return problem, []
     why = [str(why_unreached(problem, needed, [int(k)])) for k in np.flatnonzero(far)]

@@ -168,6 +168,8 @@ def lone_equipment(features: Sequence[Feature]) -> set[str]:
             equipment.append(feature)
         elif layer in STANDING or layer in BEACONS or layer in FLOATING:
             carriers.append(feature)
+    if not equipment:
+        return set()
     tree = shapely.STRtree([carrier.shape for carrier in carriers])
     own, _ = tree.query(
         [feature.shape for feature in equipment], predicate="dwithin", distance=CARRIER_DISTANCE

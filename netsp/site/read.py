@@ -248,9 +248,10 @@ class _Site:
             self._chart_depths(parts)
         free = [anchor, *candidates, *(g["position"] for g in goals)]
         obstacles = self._within_crop(self._obstacles(parts["obstacle"], free))
+        self._check_names(obstacles, "obstacles")
         goals += self._inspections(obstacles, anchor, tether, clearance)
         self._check_names(goals, "goals")
-        self._check_names(obstacles, "obstacles")
+        self.viewpoints = [str(goal["name"]) for goal in goals if "layer" in goal]
         if not goals and not self.complaints:
             self._complain_of_no_goal()
         if tether is not None:
@@ -713,8 +714,6 @@ class _Site:
             goals += [{**g, "where": feature.where, "layer": feature.layer} for g in asked.goals(o)]
         if self.said.looking is not None:
             goals = self._free_viewpoints(goals, obstacles, anchor, tether, clearance)
-        self._check_names(goals, "goals")
-        self.viewpoints += [str(goal["name"]) for goal in goals]
         return goals
 
     def _chosen(self, obstacles: list[dict[str, Any]]) -> set[int]:

@@ -140,8 +140,8 @@ def sea_floor(
             f"floor: {columns} x {rows} cells of {cell:g} m; expected at most {MAX_CELLS} along a "
             "side, so larger cells"
         )
-    x = west + cell * (np.arange(columns) + 0.5)
-    y = south + cell * (np.arange(rows) + 0.5)
+    x: Floats = west + cell * np.arange(0.5, columns)
+    y: Floats = south + cell * np.arange(0.5, rows)
     least = np.full((rows, columns), -np.inf)
     greatest = np.full((rows, columns), np.inf)
     has_area = np.zeros((rows, columns), dtype=bool)
