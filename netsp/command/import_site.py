@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from netsp.command import messages, told
 from netsp.command.patience import Patience
-from netsp.command.types import check_writable, length, option, positive
+from netsp.command.types import check_writable, depth, length, option, positive
 from netsp.errors import InputError, counted
 
 if TYPE_CHECKING:
@@ -94,6 +94,9 @@ def arguments(p: argparse.ArgumentParser) -> None:
         "--depths", default="0", metavar="D[,D…]", help="depths (m) of those goals; default 0"
     )
     p.add_argument(
+        "--depth", type=depth, metavar="D", help="depth of all goals (m), instead of their own"
+    )
+    p.add_argument(
         "--skip-unreachable", action="store_true",
         help="leave out goals that the tether cannot reach, and say which and why",
     )  # fmt: skip
@@ -170,6 +173,12 @@ def run(args: argparse.Namespace) -> int:
             problem, left_out, floor = found.problem, found.left_out, found.floor
             viewpoints = found.viewpoints
             _show_table(args.site, found)
+    from netsp.site.goal_depths import surface_warning, with_depth
+
+    if args.depth is not None:
+        problem = with_depth(problem, args.depth)
+    elif (text := surface_warning(problem)) is not None:
+        messages.warning(text)
     why: list[str] = []
     is_cropped = problem.site is not None and problem.site.cropped is not None
     if args.skip_unreachable or (is_cropped and viewpoints):
