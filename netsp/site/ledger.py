@@ -64,8 +64,8 @@ class Ledger:
         if feature.shape is not None:
             self._shapes[feature.where] = feature.shape
 
-    def add_layer(self, layer: str, size: int) -> None:
-        """Add a table that was given besides the map.
+    def add_layer(self, layer: str, size: int) -> str:
+        """Add a table that was given besides the map, and return what its layer is called.
 
         Parameters
         ----------
@@ -73,8 +73,19 @@ class Ledger:
             Its name.
         size : int
             Number of its rows.
+
+        Returns
+        -------
+        str
+            The name, with a number where a layer has it already.
         """
-        self._layers[layer] = self._layers.get(layer, 0) + size
+        number = 1
+        name = layer
+        while name in self._layers:
+            number += 1
+            name = f"{layer} ({number})"
+        self._layers[name] = size
+        return name
 
     def is_left_out(self, feature: Feature) -> bool:
         """Return whether a feature is left out so far.

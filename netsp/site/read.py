@@ -353,8 +353,7 @@ class _Site:
             return []
         found, names = from_table(file, self.projection, self.notes.append)
         places = np.column_stack([found, np.zeros(len(found))])[:, :3]  # at the surface without z
-        layer = Path(file).name
-        self.ledger.add_layer(layer, len(places))
+        layer = self.ledger.add_layer(Path(file).name, len(places))
         out = []
         for k, (place, name) in enumerate(zip(places.tolist(), names, strict=True)):
             # as the map's own features have it, in degrees or in its unit
