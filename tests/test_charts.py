@@ -280,12 +280,26 @@ def test_what_is_missing_is_asked_for_without_options_of_the_command_line(monkey
     )  # fmt: skip
     with pytest.raises(UnansweredError) as caught:
         import_site(file, HERE)
-    assert caught.value.asks == ("tether", "radius", "line_width")
+    assert caught.value.asks == ("tether", "radius", "line_width", "inspect")
     assert not any("--" in text for text in caught.value.plain)
     assert all("--" in text for text in caught.value.complaints)
     with pytest.raises(UnansweredError) as caught:
         import_site(file)
     assert caught.value.asks == ("base",)
+
+
+def test_the_report_says_what_became_of_each_layer(monkeypatch):
+    from netsp.report.briefing import imported
+
+    file = chart(
+        monkeypatch, feature(0, "PILPNT", shapely.Point(5, 0)),
+        feature(1, "PILPNT", shapely.Point(500, 0)), feature(2, "M_COVR", square(0, 0, 900)),
+    )  # fmt: skip
+    options = SiteOptions(tether=50.0, radius=1.0, looking=Looking(1, 2.0))
+    page = imported(import_site(file, HERE, options=options).problem.site)
+    assert "Imported from harbour.000" in page
+    for cell in ("PILPNT", "1: beyond the reach of the tether", "1: says how the chart was made"):
+        assert cell in page
 
 
 def test_a_real_chart_is_imported_in_one_command(tmp_path):

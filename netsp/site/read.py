@@ -254,6 +254,8 @@ class _Site:
         self.viewpoints = [str(goal["name"]) for goal in goals if "layer" in goal]
         if not goals and not self.complaints:
             self._complain_of_no_goal()
+        elif not goals and self.said.looking is None:
+            self.asks.append("inspect")  # so that all is answered at once
         if tether is not None:
             self._check_scale(goals, obstacles, anchor, tether)
             goals = self._within_reach(goals, anchor, tether)
