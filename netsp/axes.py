@@ -348,6 +348,31 @@ class Table:
         InputError
             A cell is no finite number.
         """
+        values = self._numbers(quantities)
+        if "z" in quantities:
+            self.check_depths(values[:, list(quantities).index("z")])
+        return values
+
+    def check_depths(self, z: Floats) -> None:
+        """Refuse a column of depths that holds heights: values of 0 or less only.
+
+        Parameters
+        ----------
+        z : ndarray, shape (n,)
+            Its values, metres upwards.
+
+        Raises
+        ------
+        InputError
+            All values count upwards.
+        """
+        if self.columns["z"][1].factor < 0.0 and len(z) and z.min() >= 0.0 and z.max() > 0.0:
+            raise InputError(
+                f"{self.source}: column {shown(self.title('z'))} holds negative numbers only, and "
+                "depths count downwards; expected positive depths, or the name z for heights"
+            )
+
+    def _numbers(self, quantities: Sequence[Quantity]) -> Floats:
         places = [self.columns[q][0] for q in quantities]
         factors = np.array([self.columns[q][1].factor for q in quantities])
         try:
@@ -547,9 +572,10 @@ def read_table(
             )
     for line, cells in zip(lines, rows, strict=True):
         if head and len(cells) > len(head) and any(c.strip() for c in cells[len(head) :]):
+            hint = "; decimal commas need semicolons between the cells" if separator == "," else ""
             raise InputError(
                 f"{source}: line {line}: expected {len(head)} cells as the head has, got "
-                f"{len(cells)}; decimal commas need semicolons between the cells"
+                f"{len(cells)}{hint}"
             )
     used = [k for q, (k, _) in columns.items() if q not in _TEXTS]
     commas = _decimal_commas(rows, lines, used, source)

@@ -105,6 +105,7 @@ def test_a_comment_may_name_the_columns(tmp_path):
         ("x_coord,pos_x,y\n1,2,3\n", "both hold x"),
         ("1 4.5 2 3\n2 4.5 5 6\n3 4.5 3 3\n", "number the rows"),
         ("x y z\n1.234,5 2 3\n", "expected a number"),
+        ("x,y,depth\n1,2,-3\n4,5,-6\n", "negative numbers only"),
         ("", "nothing"),
     ],
 )

@@ -161,6 +161,8 @@ def _of_table(file: str | Path, problem: Problem, stem: str) -> FoundPath:
     if len(values) < 2:
         raise InputError(f"{file}: expected a path of at least 2 points, got {len(values)}")
     points = np.array(values)
+    if up == "z":
+        table.check_depths(points[:, 2])
     if plane == ("longitude", "latitude"):
         wrong = np.flatnonzero((np.abs(points[:, 0]) > 180.0) | (np.abs(points[:, 1]) > 90.0))
         if len(wrong):

@@ -158,6 +158,8 @@ def load_mesh(
     notes = []
     if others:
         notes.append(f"{counted(len(others), 'part')} of points or lines, not of faces: left out")
+    if kind == ".obj" and (lines := _obj_lines(Path(path))):
+        notes.append(f"{counted(lines, 'element')} of points or lines, not of faces: left out")
     up, unit = _mesh_axes(Path(path), kind, loaded)
     chosen = placement or Placement()
     if chosen.up is None and up != "z":
@@ -170,6 +172,11 @@ def load_mesh(
     if flat:
         notes.append(f"{counted(flat, 'face')} without area")
     return chosen.apply(vertices, up, (unit,) * 3, str(path)), faces, tuple(notes)
+
+
+def _obj_lines(path: Path) -> int:
+    """Return the number of elements of an OBJ file that trimesh passes over: points and lines."""
+    return len(re.findall(rb"^[lp][ \t]", path.read_bytes(), re.MULTILINE))
 
 
 def _mesh_axes(path: Path, kind: str, loaded: Any) -> tuple[Up, float]:
