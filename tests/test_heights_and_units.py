@@ -378,3 +378,37 @@ def test_a_cloud_stands_beside_a_mesh_and_a_floor(tmp_path, capsys):
     at = np.array([(4, 6, -4), (4, 6, -2), (10, 6, -6), (10, 6, -3), (2, 2, -7)], dtype=float)
     assert field.distance(at) == pytest.approx([-1.0, 1.0, -1.0, 1.0, 1.0], abs=0.3)
     assert any("columns that are not used: id" in note for note in field.notes)
+
+
+@pytest.mark.parametrize(("units", "plain"), [(None, -4.0), ("ft", -4.0 * 0.3048)])
+def test_a_depth_of_a_map_is_in_the_unit_that_its_property_names(tmp_path, units, plain):
+    from netsp.site import read_site
+
+    features = [({"kind": "base"}, 0.0), ({"Depth (ft)": 10}, 1.0), ({"depth_m": 4}, 2.0),
+                ({"DEPTH": 4}, 3.0)]  # fmt: skip
+    (tmp_path / "m.geojson").write_text(json.dumps({
+        "type": "FeatureCollection",
+        "features": [
+            {"type": "Feature", "properties": properties,
+             "geometry": {"type": "Point", "coordinates": [9.0 + 1e-5 * x, 57.0]}}
+            for properties, x in features
+        ],
+    }), encoding="utf-8")  # fmt: skip
+    problem = read_site(tmp_path / "m.geojson", tether=60.0, units=units)
+    assert [g.position[2] for g in problem.goals] == pytest.approx([-3.048, -4.0, plain])
+
+
+@pytest.mark.parametrize(("crs", "z"), [("EPSG:25832+5715", -3.0), ("EPSG:25832+5703", 3.0)])
+def test_heights_of_a_map_are_those_of_its_vertical_system(tmp_path, crs, z):
+    pyogrio = pytest.importorskip("pyogrio")
+    shapely = pytest.importorskip("shapely")
+    from netsp.site import read_site
+
+    for layer, point in (("base", (500000, 6400000, 0)), ("goals", (500020, 6400000, 3))):
+        pyogrio.raw.write(
+            tmp_path / "m.gpkg", np.array([shapely.to_wkb(shapely.Point(point))], dtype=object),
+            [np.array(["a"], dtype=object)], ["name"], layer=layer, crs=crs,
+            geometry_type="Point Z", driver="GPKG", append=(layer == "goals"),
+        )  # fmt: skip
+    problem = read_site(tmp_path / "m.gpkg", tether=60.0)
+    assert problem.goals[0].position[2] == z

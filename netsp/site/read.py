@@ -17,7 +17,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from netsp import steps
-from netsp.axes import UNITS
+from netsp.axes import UNITS, column
 from netsp.errors import InputError, UnansweredError, counted
 from netsp.fields import checked_number
 from netsp.import_record import KIND_COLUMNS, MAX_NAMED, CropCircle, Site, UsedAs
@@ -438,20 +438,36 @@ class _Site:
     def _height(self, feature: Feature, point: Any = None) -> float:
         """Return z in metres: of a depth, else of the point itself, whose height on the earth is
         in metres by its format."""
-        depth = self._number(feature, "depth")
+        depth = self._depth(feature)
         if depth is not None:
-            return -depth * self._unit
+            return 0.0 - depth
         at = point if point is not None else feature.shape
         if at.geom_type != "Point" or not at.has_z or at.z != at.z:
             return 0.0
         return float(at.z) * (1.0 if self.map.geographic else self._unit)
 
+    def _depth(self, feature: Feature) -> float | None:
+        """Return the depth in metres that a property of a feature states; None without one."""
+        for name in [] if "depth" in self.fields else feature.properties:
+            if not str(name).lower().startswith("depth"):
+                continue
+            try:
+                meaning = column(str(name))
+            except InputError as error:
+                self._complain(f"{feature.where}: {error}")
+                return None
+            if meaning is not None and meaning.quantity == "z" and meaning.unit:
+                value = self._number(feature, "depth", str(name).lower())
+                return None if value is None else -meaning.factor * value
+        depth = self._number(feature, "depth")
+        return None if depth is None else depth * self._unit
+
     def _get(self, feature: Feature, ours: str) -> Any:
         mapped = self.fields.get(ours)
         return feature.get(mapped) if mapped is not None else feature.get(*FIELDS[ours])
 
-    def _number(self, feature: Feature, ours: str) -> float | None:
-        value = self._get(feature, ours)
+    def _number(self, feature: Feature, ours: str, name: str | None = None) -> float | None:
+        value = self._get(feature, ours) if name is None else feature.get(name)
         if value is None:
             return None
         if isinstance(value, str):  # fields of KML and of tables are text
