@@ -361,7 +361,7 @@ def test_the_page_asks_for_what_a_map_lacks_and_reads_it_with_the_answers(client
     made, _ = client
     before = made.get("/download/problem.json?token=secret").text
     features = [
-        {"type": "Feature", "properties": {"name": n, "man_made": "pier"} if n else {"kind": "path"},
+        {"type": "Feature", "properties": {"man_made": "pier"} if n else {"kind": "path"},
          "geometry": {"type": "LineString", "coordinates": [[12.0001, lat], [12.0002, lat]]}}
         for n, lat in (("north", 55.0001), ("south", 54.9999), (None, 55.0))
     ]  # fmt: skip

@@ -380,7 +380,8 @@ def application(session: Session, token: str, port: int) -> Any:
             return PlainTextResponse(f"netsp: {'; '.join(error.plain)}", status_code=422)
         except NetspError as error:
             return PlainTextResponse(f"netsp: {error}", status_code=422)
-        return PlainTextResponse("\n".join(notes))
+        version = {"x-version": str(session.document.version)}
+        return PlainTextResponse("\n".join(notes), headers=version)
 
     def plotly(request: Request) -> Response:
         del request

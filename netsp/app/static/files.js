@@ -34,6 +34,8 @@ export function files(page, link, say) {
       list.append(item);
     }
     form.append(title, list);
+    const tether = page.data?.tether_length;
+    if (tether !== undefined) before = { tether: String(tether), ...before };
     for (const key of new Set([...Object.keys(before), ...asks.flatMap((one) => FIELDS_OF[one] ?? [one])])) {
       const label = document.createElement("label"), field = document.createElement("input");
       field.name = key;
@@ -70,7 +72,7 @@ export function files(page, link, say) {
     }
     const text = answer ? await answer.text() : "netsp: the server is gone";
     if (!answer?.ok) { say(text.replace(/^netsp: /, ""), true); return; }
-    page.refit();
+    page.refit(Number(answer.headers.get("x-version")));
     say(text.trim() ? text.trim().split("\n").join("; ") : `${file.name} is on the map; Ctrl+Z takes it back`);
   }
 

@@ -111,12 +111,17 @@ function drawn(page) {
 /** What an import made of every feature of a map. @param {any} site */
 function imported(site) {
   if (!site?.imported?.length) return [];
-  const rows = site.imported.map((layer) => {
+  const rows = site.imported.flatMap((layer) => {
     const used = Object.entries(layer.used).map(([kind, n]) => `${n} ${kind}`).join(", ");
-    const out = layer.left_out.map((group) => `${group.features}: ${group.reason}`).join("; ");
-    return element("tr", element("td", layer.layer || "(all)"), element("td", String(layer.features)), element("td", used), element("td", out));
+    const first = element("tr", element("td", layer.layer || "(all)"), element("td", String(layer.features)), element("td", used || "–"));
+    const out = layer.left_out.map((group) => {
+      const cell = element("td", `${group.features} left out: ${group.reason}`);
+      cell.colSpan = 3;
+      return element("tr", cell);
+    });
+    return [first, ...out];
   });
-  const table = element("table", element("tr", ...["layer", "features", "used as", "left out"].map((n) => element("th", n))), ...rows);
+  const table = element("table", element("tr", ...["layer", "features", "used as"].map((n) => element("th", n))), ...rows);
   table.className = "imported";
   return [element("h2", `Map: ${site.file}`), table];
 }
