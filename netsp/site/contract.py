@@ -6,6 +6,7 @@ object classes of charts and tags of OpenStreetMap, the shape.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -19,18 +20,49 @@ SHAPES = {
     "goal": ("Point", "MultiPoint"),
     "obstacle": (
         "Point", "MultiPoint", "Polygon", "MultiPolygon", "LineString", "MultiLineString",
+        "GeometryCollection",
     ),
     "bounds": ("Polygon", "MultiPolygon", "LineString", "MultiLineString"),
-    "path": ("LineString", "MultiLineString"),
+    "path": ("LineString", "MultiLineString", "GeometryCollection"),
 }  # fmt: skip
-"""Shapes that a kind may have; lines of bounds are closed, open ones of obstacles have a width."""
+"""Shapes that a kind may have; lines of bounds are closed, open ones of obstacles have a width.
+
+A `GeometryCollection` is a block of a drawing.
+"""
 
 KINDS = (*SHAPES, "ignore")
 
 WORDS = {
     **dict.fromkeys(("base", "bases", "anchor", "vessel", "ship"), "base"),
     **dict.fromkeys(("goal", "goals", "target", "targets", "inspection points"), "goal"),
-    **dict.fromkeys(("obstacle", "obstacles", "structures", "piles"), "obstacle"),
+    **dict.fromkeys(
+        (
+            "obstacle",
+            "obstacles",
+            "structure",
+            "structures",
+            "pile",
+            "piles",
+            "pier",
+            "piers",
+            "quay",
+            "quays",
+            "breakwater",
+            "breakwaters",
+            "jetty",
+            "jetties",
+            "wall",
+            "walls",
+            "column",
+            "columns",
+            "pontoon",
+            "pontoons",
+            "moorings",
+            "rocks",
+            "wrecks",
+        ),
+        "obstacle",
+    ),
     **dict.fromkeys(("bounds", "boundary", "basin", "workspace"), "bounds"),
     **dict.fromkeys(("path", "paths", "cables"), "path"),
     "ignore": "ignore",
@@ -100,6 +132,9 @@ WATER_AREAS = {
     },
 }  # fmt: skip
 """Tags of OpenStreetMap's areas of open water: key to values."""
+
+LAYER_SUFFIX = re.compile(r"(\s*\(#\d+\)|\.(kml|kmz|dxf|shp|gpkg|geojson|csv|tab|mif|gml|fgb))+$")
+"""Ends of layers' names that say nothing of their kind: GDAL's numbers, extensions of files."""
 
 RADIUS = ("radius_m", "radius")
 WIDTH = ("width_m", "width")
@@ -191,16 +226,20 @@ def kind_of(feature: Feature, kinds: Mapping[str, str], *, chart: bool) -> Decis
     """
     shape = feature.shape.geom_type
     said = feature.get("kind")
-    layer = feature.layer.lower()
+    names = [name.strip().lower() for name in (feature.layer, *feature.folders)]
+    asked = next((kinds[name] for name in names if name in kinds), None)
+    word = next((WORDS[w] for name in names for w in words_in(name) if w in WORDS), None)
     by_shape = next((kinds[w] for w, s in SHAPE_LAYERS.items() if w in kinds and s in shape), None)
-    if layer in kinds:
-        decision = Decision(kinds[layer], "as asked for")
+    if asked is not None:
+        decision = Decision(asked, "as asked for")
     elif by_shape is not None:
         decision = Decision(by_shape, "as asked for")
     elif said is not None:
         decision = Decision(said if isinstance(said, str) else "", "its kind is ignore")
-    elif layer in WORDS:
-        decision = Decision(WORDS[layer], "its layer is named ignore")
+    elif word is not None:
+        decision = Decision(word, "its layer is named ignore")
+    elif feature.kind:
+        decision = Decision(feature.kind)
     elif chart:
         of_chart = chart_kind(feature)
         decision = Decision(of_chart.kind, of_chart.reason)
@@ -214,13 +253,47 @@ def kind_of(feature: Feature, kinds: Mapping[str, str], *, chart: bool) -> Decis
             f"{feature.where}: expected a kind of {', '.join(KINDS)}, got {shape!r} of kind "
             f"{shown(said)}"
         )
-    if shape not in SHAPES[kind]:
+    if shape not in SHAPES[kind] and (feature.marker is None or "Point" not in SHAPES[kind]):
         article = "an" if kind[0] in "aeiou" else "a"
         raise InputError(
             f"{feature.where}: {article} {kind} cannot be a {shape}; expected "
             f"{' or '.join(SHAPES[kind])}"
         )
     return Decision(kind)
+
+
+def is_coastline(feature: Feature) -> bool:
+    """Return whether a feature is a coastline of OpenStreetMap, which has land on its left."""
+    return str(feature.get("natural")).lower() == "coastline"
+
+
+def words_in(name: str) -> tuple[str, ...]:
+    """Return the words of a layer's name that may say its kind, the nearest folder first.
+
+    Parameters
+    ----------
+    name : str
+        Name in lower case, as ``piles (#2)``: GDAL's name for a second layer ``piles``; or a path
+        of folders, as ``piles/north``.
+
+    Returns
+    -------
+    tuple of str
+        Words.
+
+    Examples
+    --------
+    >>> words_in("piles (#2)"), words_in("piles/north")
+    (('piles',), ('piles/north', 'north', 'piles'))
+    """
+    whole = _bare_name(name)
+    parts = [_bare_name(part) for part in whole.split("/")]
+    return (whole,) if len(parts) == 1 else (whole, *reversed(parts))
+
+
+def _bare_name(name: str) -> str:
+    """Return a name without the number of a second layer and the extension of a file."""
+    return LAYER_SUFFIX.sub("", name.strip())
 
 
 def _by_tags(feature: Feature, shape: str) -> Decision | None:
@@ -240,6 +313,6 @@ def _by_tags(feature: Feature, shape: str) -> Decision | None:
 
 def _by_shape(feature: Feature, shape: str) -> Decision:
     """Decide by the shape: polygons and lines are obstacles, points goals without a radius."""
-    if "Polygon" in shape or "Line" in shape:
+    if "Point" not in shape:
         return Decision("obstacle")
     return Decision("obstacle" if feature.get(*RADIUS) is not None else "goal")

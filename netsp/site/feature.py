@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from netsp.errors import counted
+from netsp.import_record import MAX_NAMED
+
 if TYPE_CHECKING:
     import shapely
+
+TAG_PROPERTIES = ("tags", "@tags", "other_tags", "all_tags")
+"""Properties that hold the tags of OpenStreetMap: of osmtogeojson, of Overpass and of GDAL."""
+
+HSTORE_PAIR = re.compile(r'"((?:[^"\\]|\\.)*)"=>"((?:[^"\\]|\\.)*)"')
+"""Key and value in PostgreSQL's hstore text."""
 
 NO_NAMES = ("<null>", "null", "none", "nan", "n/a", "unnamed")
 """Texts, in lower case, that programs write where there is no value."""
@@ -30,6 +40,15 @@ class Feature:
     shape
         Longitudes and latitudes in degrees, or metres where the map has no place on the earth; z in
         the file's units.
+    folders
+        Names of the folders or layers that it lies in, the nearest first, where these are more
+        than its layer: the first that the contract knows decides its kind.
+    marker
+        Place that a symbol of a drawing marks: a goal drawn as a circle or a block is there.
+    is_above_floor
+        Whether z counts from the sea floor, which the map does not have.
+    kind
+        What the format itself says that it is, as ``path`` of a recorded track; empty for most.
     """
 
     where: str
@@ -37,6 +56,10 @@ class Feature:
     identity: str
     properties: Mapping[str, Any]
     shape: shapely.Geometry
+    folders: tuple[str, ...] = ()
+    marker: shapely.Point | None = None
+    is_above_floor: bool = False
+    kind: str = ""
 
     def get(self, *names: str) -> Any:
         """Return the first of some properties, whatever their case, that has a value.
@@ -85,6 +108,90 @@ class Unread:
 
 
 @dataclass(frozen=True)
+class Change:
+    """What was assumed of a feature, or changed in it.
+
+    Attributes
+    ----------
+    where
+        What messages call the feature.
+    layer
+        Its layer.
+    text
+        The change, as "a ring is not closed: closed by its first corner".
+    """
+
+    where: str
+    layer: str
+    text: str
+
+
+def change_notes(changes: Iterable[Change]) -> list[str]:
+    """Return one line for each layer and change, with the first features.
+
+    Parameters
+    ----------
+    changes : iterable of Change
+        In the order of the map.
+
+    Returns
+    -------
+    list of str
+        Notes.
+
+    Examples
+    --------
+    >>> change_notes([Change("piles[0]", "piles", "closed"), Change("piles[2]", "piles", "closed")])
+    ["layer 'piles': 2 features: closed (piles[0], piles[2])"]
+    """
+    groups: dict[tuple[str, str], list[str]] = {}
+    for change in changes:
+        groups.setdefault((change.layer, change.text), []).append(change.where)
+    lines = []
+    for (layer, text), places in groups.items():
+        distinct = list(dict.fromkeys(places))
+        shown = ", ".join(distinct[:MAX_NAMED]) + (", …" if len(distinct) > MAX_NAMED else "")
+        lines.append(
+            f"{f'layer {layer!r}: ' if layer else ''}{counted(len(distinct), 'feature')}: {text} "
+            f"({shown})"
+        )
+    return lines
+
+
+def with_tags(properties: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return properties with the tags of OpenStreetMap that programs put into one of them.
+
+    Parameters
+    ----------
+    properties : mapping
+        As a file has them: Overpass has ``tags`` or ``@tags`` (an object), GDAL ``other_tags``
+        (text as ``"key"=>"value"``).
+
+    Returns
+    -------
+    mapping
+        With the tags beside the others; a property of the same name stays.
+
+    Examples
+    --------
+    >>> with_tags({"other_tags": '"man_made"=>"pier","name"=>"A"', "name": "B"})["man_made"]
+    'pier'
+    """
+    more: dict[str, Any] = {}
+    for key in TAG_PROPERTIES:
+        value = properties.get(key)
+        if isinstance(value, str) and "=>" in value:
+            value = {k: _unescaped(v) for k, v in HSTORE_PAIR.findall(value)}
+        if isinstance(value, Mapping):
+            more |= {k: v for k, v in value.items() if properties.get(k) in (None, "")}
+    return {**properties, **more} if more else properties
+
+
+def _unescaped(text: str) -> str:
+    return re.sub(r"\\(.)", r"\1", text)
+
+
+@dataclass(frozen=True)
 class Map:
     """Map: features, and those that could not be read.
 
@@ -114,3 +221,9 @@ class Map:
     notes: tuple[str, ...] = field(default=())
     unread: tuple[Unread, ...] = ()
     unit: str | None = None
+
+    @property
+    def layer_names(self) -> set[str]:
+        """Names of layers and of folders, lower case, that a user may give a kind."""
+        names = {name.lower() for name in self.layers}
+        return names | {folder.lower() for f in self.features for folder in f.folders}

@@ -92,6 +92,40 @@ def outlines(
     return areas, sorted(open_lines)
 
 
+def is_land(line: shapely.LineString, area: shapely.Polygon | None = None) -> bool:
+    """Return whether a coastline has its area on the left, where the land is.
+
+    Parameters
+    ----------
+    line : shapely.LineString
+        A coastline as OpenStreetMap has it.
+    area : shapely.Polygon, optional
+        Area that it bounds; default: what the line itself encloses.
+
+    Returns
+    -------
+    bool
+        True for an island, False for a shore about water.
+
+    Examples
+    --------
+    >>> import shapely
+    >>> island = shapely.LineString([(0, 0), (2, 0), (2, 2), (0, 0)])
+    >>> is_land(island), is_land(island.reverse())
+    (True, False)
+    """
+    import shapely
+
+    if area is None:
+        return bool(shapely.is_ccw(line))
+    ring = area.exterior if shapely.is_ccw(area.exterior) else area.exterior.reverse()
+    lower, upper = (
+        ring.project(line.interpolate(share, normalized=True)) for share in (0.5, 0.501)
+    )
+    ahead = (upper - lower) % ring.length
+    return bool(ahead < 0.5 * ring.length)
+
+
 def widened(line: shapely.LineString, width: float) -> shapely.Geometry:
     """Return the area within half a width of a line, with square ends.
 

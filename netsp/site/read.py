@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -25,12 +25,23 @@ from netsp.models import explain, shown
 from netsp.problem import Problem
 from netsp.site.chart_classes import EQUIPMENT, chart_radius, chart_width, lone_equipment
 from netsp.site.chart_depths import chart_floor, shallow_areas
-from netsp.site.contract import FIELDS, RADIUS, SHAPE_LAYERS, Decision, kind_of, words_of
+from netsp.site.contract import (
+    FIELDS,
+    RADIUS,
+    SHAPE_LAYERS,
+    WIDTH,
+    Decision,
+    is_coastline,
+    kind_of,
+    words_of,
+)
 from netsp.site.crop import CropWindow, cropped
+from netsp.site.drawing import read_dxf
 from netsp.site.feature import Feature, Map
 from netsp.site.geojson import read_geojson
+from netsp.site.kml_pages import read_kml
 from netsp.site.ledger import Ledger
-from netsp.site.line_work import lines_of, outlines, widened
+from netsp.site.line_work import is_land, lines_of, outlines, widened
 from netsp.site.options import SiteOptions
 from netsp.site.projection import Projection
 from netsp.site.sea_floor import SeaFloor
@@ -104,9 +115,9 @@ def import_site(
     if said.units is not None and said.units not in UNITS:
         raise InputError(f"units: expected one of {', '.join(UNITS)}, got {shown(said.units)}")
     kinds, fields = words_of(said.maps)
-    found = read_map(file, said.crs)
+    found = read_map(file, said.crs, said.units)
     for layer in kinds:
-        if layer not in {k.lower() for k in found.layers} and layer not in SHAPE_LAYERS:
+        if layer not in found.layer_names and layer not in SHAPE_LAYERS:
             raise InputError(
                 f"--map: {file} has no layer {layer!r}; it has "
                 f"{', '.join(k or 'no layers' for k in found.layers)}"
@@ -157,8 +168,8 @@ def read_site(
     return found.problem
 
 
-def read_map(file: str | Path, crs: str | None = None) -> Map:
-    """A map of any format.
+def read_map(file: str | Path, crs: str | None = None, units: str | None = None) -> Map:
+    """Return a map of any format.
 
     Parameters
     ----------
@@ -166,20 +177,28 @@ def read_map(file: str | Path, crs: str | None = None) -> Map:
         The file; its extension tells GeoJSON from the others.
     crs : str, optional
         Coordinate system, ``local`` for a plane.
+    units : str, optional
+        Unit of lengths that the user says; None takes the file's.
 
     Returns
     -------
     Map
-        What it holds.
+        Features, and what could not be read.
 
     Raises
     ------
     InputError
         Not readable.
     """
-    if Path(file).suffix.lower() not in (".geojson", ".json"):
+    suffix = Path(file).suffix.lower()
+    if suffix == ".dxf":
+        return read_dxf(file, crs, units)
+    if suffix in (".kml", ".kmz"):
+        found = read_kml(file, crs)
+    elif suffix in (".geojson", ".json"):
+        found = read_geojson(file, crs)
+    else:
         return read_vector(file, crs)
-    found = read_geojson(file, crs)
     return found if crs is None else in_degrees(found, crs, file)
 
 
@@ -309,7 +328,7 @@ class _Site:
                 decision = Decision("obstacle")
             if decision.kind in parts:
                 kind = cast("UsedAs", decision.kind)
-                parts[kind].append(feature)
+                parts[kind].append(_marked(feature) if kind in ("base", "goal") else feature)
                 self.ledger.use(feature, kind)
             else:
                 self.ledger.leave_out(feature, decision.reason)
@@ -442,6 +461,12 @@ class _Site:
         if depth is not None:
             return 0.0 - depth
         at = point if point is not None else feature.shape
+        if feature.is_above_floor:
+            self._complain(
+                f"{self._called(feature)}: its height counts from the sea floor, which the map "
+                "does not have; expected a height above the water, or a depth"
+            )
+            return 0.0
         if at.geom_type != "Point" or not at.has_z or at.z != at.z:
             return 0.0
         return float(at.z) * (1.0 if self.map.geographic else self._unit)
@@ -543,33 +568,44 @@ class _Site:
 
         pointlike: list[Feature] = []
         for feature in steps.each(features):
-            kind = feature.shape.geom_type
-            if "Point" in kind:
-                radius = self._radius(feature)
-                if self._is_beyond(self._plane(feature.shape), radius or 0.0):
-                    self.beyond[feature.where] = feature
-                    continue
-                if radius is None:
-                    pointlike.append(feature)
-                    continue
-                for point in getattr(feature.shape, "geoms", [feature.shape]):
-                    at = self._plane(point)
-                    out.append({"feature": feature, "center": (at.x, at.y), "radius": radius})
-            elif "Line" in kind:
-                lines = lines_of(self._plane(feature.shape))
-                if not lines:
-                    self._complain(f"{self._called(feature)}: a line of no length")
-                for line in lines:
-                    if line.is_closed:
-                        out += area(feature, line)
-                    else:
-                        drawn.setdefault(feature.layer, []).append((feature, line))
-            else:
-                out += area(feature, self._plane(feature.shape))
+            for shape in _blocks_of(feature.shape):
+                out += self._obstacle(feature, shape, area, drawn, pointlike)
         self._complain_of_points(pointlike)
         for pieces in drawn.values():
             out += self._line_work(pieces, area)
         return self._named(out)
+
+    def _obstacle(
+        self, feature: Feature, shape: shapely.Geometry,
+        area: Callable[[Feature, shapely.Geometry], list[dict[str, Any]]],
+        drawn: dict[str, list[tuple[Feature, shapely.LineString]]], pointlike: list[Feature],
+    ) -> list[dict[str, Any]]:  # fmt: skip
+        """Obstacles of a shape; open lines and points without a radius are noted for later."""
+        kind = shape.geom_type
+        out: list[dict[str, Any]] = []
+        if "Point" in kind:
+            radius = self._radius(feature)
+            if self._is_beyond(self._plane(shape), radius or 0.0):
+                self.beyond[feature.where] = feature
+                return out
+            if radius is None:
+                pointlike.append(feature)
+                return out
+            for point in getattr(shape, "geoms", [shape]):
+                at = self._plane(point)
+                out.append({"feature": feature, "center": (at.x, at.y), "radius": radius})
+        elif "Line" in kind:
+            lines = lines_of(self._plane(shape))
+            if not lines:
+                self._complain(f"{self._called(feature)}: a line of no length")
+            for line in lines:
+                if line.is_closed and not (is_coastline(feature) and not is_land(line)):
+                    out += area(feature, line)
+                else:
+                    drawn.setdefault(feature.layer, []).append((feature, line))
+        else:
+            out += area(feature, self._plane(shape))
+        return out
 
     def _line_work(
         self, pieces: list[tuple[Feature, shapely.LineString]],
@@ -580,6 +616,10 @@ class _Site:
         areas, rest = outlines([line for _, line in pieces], self.said.join_tolerance)
         for polygon, members in areas:
             own = [pieces[k][0] for k in members]
+            coast = all(map(is_coastline, own))
+            if coast and not any(is_land(pieces[k][1], polygon) for k in members):
+                rest += members  # the water lies inside: its coast is a wall
+                continue
             named = next((f for f in own if self._name(f) is not None), own[0])
             out += area(named, polygon)
         narrow: list[Feature] = []
@@ -617,7 +657,8 @@ class _Site:
             return self.said.line_width
         if not width > 0.0:
             self._complain(f"{feature.where}: width_m: expected a positive width, got {width:g}")
-        return abs(width) or None
+        metres = "width" not in self.fields and feature.get(WIDTH[0]) is not None
+        return abs(width) * (1.0 if metres else self._unit) or None
 
     def _named(self, things: list[dict[str, Any]]) -> list[dict[str, Any]]:
         """Give obstacles the names of their features, numbered where a feature has several."""
@@ -934,6 +975,18 @@ class _Site:
     def _refused(self) -> InputError:
         whole = [text + option for text, option in self.complaints]
         return UnansweredError(whole, [text for text, _ in self.complaints], self.asks)
+
+
+def _blocks_of(shape: shapely.Geometry) -> list[shapely.Geometry]:
+    """Return the shapes of a block of a drawing, or the shape alone."""
+    return list(shape.geoms) if shape.geom_type == "GeometryCollection" else [shape]  # type: ignore[attr-defined]
+
+
+def _marked(feature: Feature) -> Feature:
+    """Return a goal or a base as a point: one drawn as a symbol stands where the symbol marks."""
+    if feature.marker is None or "Point" in feature.shape.geom_type:
+        return feature
+    return replace(feature, shape=feature.marker)
 
 
 def _bare(thing: dict[str, Any]) -> dict[str, Any]:
