@@ -403,8 +403,9 @@ class _Family:
         CPU seconds spent compiling, as far as it was seen.
     """
 
-    min_cpu_s = 0.0
-    compiling_s = 0.0
+    min_cpu_s: float = 0.0
+    compiling_s: float = 0.0
+    _looked_at: float
 
     def count_compiling(self) -> None:
         """Count the CPU time since the last call as compiling if something is compiled now."""

@@ -99,6 +99,34 @@ class SeveralErrors(InputError):
         self.complaints = tuple(map(brief, complaints))
 
 
+class UnansweredError(SeveralErrors):
+    """Complaints about an input of which some can be answered by whoever gives it.
+
+    Parameters
+    ----------
+    complaints : sequence of str
+        One line each, with the options of the command line that answer them.
+    plain : sequence of str
+        The same without these options.
+    asks : sequence of str
+        What is to be answered, as ``line_width``.
+
+    Attributes
+    ----------
+    plain : tuple of str
+        One line each.
+    asks : tuple of str
+        Each once.
+    """
+
+    def __init__(
+        self, complaints: Sequence[str], plain: Sequence[str], asks: Sequence[str] = ()
+    ) -> None:
+        super().__init__(complaints)
+        self.plain = tuple(map(brief, plain))
+        self.asks = tuple(dict.fromkeys(asks))
+
+
 class InfeasibleError(NetspError):
     """The problem is proven to have no solution; the message names the goal and the reason.
 

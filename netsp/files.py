@@ -18,12 +18,8 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import ClassVar, Self
 
-import numpy as np
-
-from netsp.arrays import Floats
 from netsp.errors import InputError
-from netsp.fields import LARGEST
-from netsp.models import Model, parse_json, read_model, shown
+from netsp.models import Model, read_model, shown
 
 STANDARD = "-"
 """The name of a file that stands for standard input, or output."""
@@ -87,9 +83,12 @@ def _standard_input(most: int) -> bytes:
 
 
 def read_text(path: str | Path) -> str:
-    """Contents of a UTF-8 text file, or `InputError` in one line."""
+    """Return the contents of a UTF-8 text file without its byte order mark, or raise `InputError`.
+
+    RFC 8259 (8.1) lets readers of JSON ignore the mark, which spreadsheets and editors write.
+    """
     try:
-        return read_bytes(path).decode("utf-8")
+        return read_bytes(path).decode("utf-8-sig")
     except UnicodeDecodeError:
         raise InputError(f"{path}: not a text file in UTF-8") from None
 
@@ -262,48 +261,6 @@ def csv_rows(text: str, source: str) -> list[dict[str, str]]:
             )
         rows.append(dict(zip_longest(names, line, fillvalue="")))
     return rows
-
-
-def read_path(file: str | Path) -> Floats | None:
-    """The (k, 2) or (k, 3) polyline of a path file: CSV rows ``x,y[,z]`` with or without a head, or
-    a JSON list of points; None if the file holds a JSON object, which is taken for a solution.
-
-    Raises InputError with the row that cannot be read.
-    """
-    text = read_text(file)
-    text = text.decode("utf-8-sig", "replace") if isinstance(text, bytes) else text
-    text = text.removeprefix("\ufeff")
-    if text.lstrip().startswith("{"):
-        return None
-    if text.lstrip().startswith("["):
-        rows = parse_json(text, str(file))
-    else:
-        rows = [row for row in csv_lines(text, str(file)) if row]
-        if rows and not any(_is_number(cell) for cell in rows[0]):
-            rows = rows[1:]
-    for k, row in enumerate(rows):
-        if not _is_point(row) or len(row) != len(rows[0]):
-            raise InputError(f"{file}: point {k}: expected x, y or x, y, z, got {shown(row)}")
-    if len(rows) < 2:
-        raise InputError(f"{file}: expected a path of at least 2 points, got {len(rows)}")
-    return np.array(rows, dtype=float)
-
-
-def _is_number(cell: str) -> bool:
-    try:
-        float(cell)
-    except ValueError:
-        return False
-    return True
-
-
-def _is_point(row: object) -> bool:
-    if not isinstance(row, list) or len(row) not in (2, 3):
-        return False
-    try:
-        return all(abs(float(x)) <= LARGEST for x in row)
-    except (TypeError, ValueError):
-        return False
 
 
 class FileModel(Model):

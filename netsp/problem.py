@@ -45,6 +45,7 @@ from netsp.fields import (
 )
 from netsp.files import FileModel
 from netsp.geometry.polygons import check_polygon, polygon_interior_point, polygon_signed_distance
+from netsp.import_record import Site
 from netsp.models import Model, explain, read_model, shown
 from netsp.shorthand import Inspection, written_out
 
@@ -305,6 +306,8 @@ class Problem(Drawn, FileModel):
         Name of the unit of length.
     origin : Origin or None
         Where on the earth the base is, and where the y axis points; for exports.
+    site : Site or None
+        The map that the problem was imported from, with what became of each of its features.
 
     Raises
     ------
@@ -386,6 +389,10 @@ class Problem(Drawn, FileModel):
         State | None,
         Field(description="where the robot is already out, with its tether; null at the base"),
     ] = None
+    site: Annotated[
+        Site | None,
+        Field(description="the map that was imported, and what became of it; null for none"),
+    ] = None
 
     @model_validator(mode="before")
     @classmethod
@@ -413,7 +420,21 @@ class Problem(Drawn, FileModel):
             raise ValueError(complaint)
         self._check_free(goals=info.context != OF_A_RUN)
         self._check_state()
+        self._check_crop()
         return self
+
+    def _check_crop(self) -> None:
+        """The tether does not reach beyond the part of the map that was imported."""
+        circle = None if self.site is None else self.site.cropped
+        if circle is None:
+            return
+        away = float(np.hypot(*np.subtract(self.base[:2], circle.center)))
+        room = circle.radius - away - self.clearance
+        if self.tether_length > room * (1.0 + 1e-9):
+            raise ValueError(
+                f"tether_length: {self.tether_length:g} reaches beyond the part of the map that "
+                f"was imported; expected at most {room:.6g}, or another import with this tether"
+            )
 
     def _check_state(self) -> None:
         """The robot is in free space, and its word names obstacles."""
@@ -710,7 +731,7 @@ class Problem(Drawn, FileModel):
     @property
     def sha256(self) -> str:
         """Hash of what the answer depends on: all values, but no names."""
-        data = self.model_dump(mode="json", exclude={"name", "units", "origin"})
+        data = self.model_dump(mode="json", exclude={"name", "units", "origin", "site"})
         if data["state"] is None:  # problems had none before: their hashes stay
             del data["state"]
         for k, goal in enumerate(data["goals"]):  # nor had goals anything to say of each other

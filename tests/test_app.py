@@ -357,6 +357,38 @@ def test_a_map_on_the_page_is_what_the_command_makes_of_it(client, name):
     assert text == read_site(file).to_json()
 
 
+def test_the_page_asks_for_what_a_map_lacks_and_reads_it_with_the_answers(client):
+    made, _ = client
+    before = made.get("/download/problem.json?token=secret").text
+    features = [
+        {"type": "Feature", "properties": {"man_made": "pier"} if n else {"kind": "path"},
+         "geometry": {"type": "LineString", "coordinates": [[12.0001, lat], [12.0002, lat]]}}
+        for n, lat in (("north", 55.0001), ("south", 54.9999), (None, 55.0))
+    ]  # fmt: skip
+    content = json.dumps({"type": "FeatureCollection", "features": features}).encode()
+    given = {"token": "secret", "name": "piers.geojson"}
+    for answers, asks in (
+        ({}, ["base"]),
+        ({"base": "55,12"}, ["line_width", "inspect"]),
+        ({"line_width": "0.5"}, ["inspect"]),
+        ({"viewpoints": "2", "standoff": "1"}, None),
+    ):
+        given |= answers
+        answer = made.post("/import", params=given, content=content)
+        if asks is None:
+            assert answer.status_code == 200
+            continue
+        assert answer.status_code == 422
+        assert set(asks) <= set(answer.json()["asks"])
+        assert "--" not in answer.text
+        assert made.get("/download/problem.json?token=secret").text == before
+    text = made.get("/download/problem.json?token=secret").text
+    (layer,) = Problem.from_json(text).site.imported
+    assert layer.used == {"obstacle": 2, "path": 1}
+    answer = made.post("/import", params={**given, "radius": "wide"}, content=content)
+    assert "radius: expected a positive number" in answer.text
+
+
 def test_what_cannot_be_opened_changes_nothing(client):
     made, file = client
     before = made.get("/download/problem.json?token=secret").text

@@ -25,10 +25,11 @@ FORMATS = {
     "NKF4": ("QBcccccfbbHBIHb", "TimeUS,C,SV,SP,SH,SM,SVT,errRP,OFN,OFE,FS,TS,SS,GPS,PI"),
     "ARM": ("QBIBB", "TimeUS,ArmState,ArmChecks,Forced,Method"),
     "MODE": ("QMBB", "TimeUS,Mode,ModeNum,Rsn"),
+    "POS": ("QLLfff", "TimeUS,Lat,Lng,Alt,RelHomeAlt,RelOriginAlt"),
     "WINC": ("QBBBBBfffHfb", "TimeUS,Heal,ThEnd,Mov,Clut,Mode,DLen,Len,DRate,Tens,Vcc,Temp"),
 }
 CODES = {
-    "n": "4s", "N": "16s", "Z": "64s", "c": "h", "C": "H", "e": "i", "M": "B",
+    "n": "4s", "N": "16s", "Z": "64s", "c": "h", "C": "H", "e": "i", "M": "B", "L": "i",
     **{k: k for k in "BbHIQf"},
 }  # fmt: skip
 TYPES = {name: 128 + k for k, name in enumerate(FORMATS)}

@@ -511,7 +511,8 @@ def test_a_replay_by_command_writes_lines_of_json(tmp_path, capsys):
     ("name", "text", "says"),
     [
         ("a.csv", "t,x\n1,2\n", "expected columns"),
-        ("a.csv", "t,x,y,z\n1,2,nan,3\n", "line 2: y"),
+        ("a.csv", "t,x,y,z\n1,2,none at all,3\n", "line 2: y"),
+        ("a.csv", "t,x,y,z\n1,2,nan,3\n", "no positions"),
         ("a.csv", "t,x,y,z\n", "no positions"),
         ("a.csv", "t,x,y,z,armed\n1,2,3,4,perhaps\n", "armed"),
         ("a.csv.gz", "no gzip", "a.csv.gz"),

@@ -300,7 +300,8 @@ def test_goals_out_of_reach_are_left_out_only_when_asked(seed, tmp_path):
     notes = []
     found = read_site(file, HERE, tether=50.0, skip_unreachable=True, on_note=notes.append)
     assert len(found.goals) == 4
-    assert sum("left out" in n for n in notes) == 7
+    (note,) = (n for n in notes if "left out" in n)
+    assert "7 features left out: farther from the base than the tether is long (50 m)" in note
 
 
 def test_goals_that_only_a_longer_way_round_reaches_are_left_out_too(tmp_path, capsys):
@@ -604,8 +605,10 @@ def test_options_of_images_and_of_maps_do_not_mix(tmp_path, capsys):
     assert "needs --base X,Y" in capsys.readouterr().err
     assert main(["import", str(file), "--crs", "EPSG:32632"]) == 2
     assert "--crs: expected a map with features" in capsys.readouterr().err
-    assert main(["import", "examples/site.geojson", "--goals", "x.csv"]) == 2
-    assert "--goals: expected an occupancy image" in capsys.readouterr().err
+    assert main(["import", "examples/site.geojson", "--resolution", "1"]) == 2
+    assert "--resolution: expected an occupancy image" in capsys.readouterr().err
+    assert main(["import", "examples/site.geojson", "--floor", "f.asc"]) == 2
+    assert "floor: expected a chart" in capsys.readouterr().err
     (tmp_path / "alone.png").write_bytes(b"no image")
     (tmp_path / "goals.csv").write_text("x,y\n0,0\n")
     argv = ["import", str(tmp_path / "alone.png"), "--base", "0,0", "--goals",

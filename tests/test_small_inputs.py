@@ -12,8 +12,9 @@ import pytest
 
 from netsp import Circle, InputError, Problem, TravelGraph, solve, solve_graph, travel_graph
 from netsp.arrays import ComparesArrays
+from netsp.axes import read_path
 from netsp.command.main import main
-from netsp.files import csv_rows, read_path
+from netsp.files import csv_rows
 from netsp.guard.memory import MAX_LETTERS, GuardState
 from netsp.guard.plane import PlaneSite
 from netsp.online.mission import Mission

@@ -787,17 +787,30 @@ AREA = shapely.box(0, 0, 1, 1)
         (feature(AREA, "OBSTRN"), {}, True, "obstacle"),
         (feature(AREA, "DEPARE"), {}, True, "ignore"),
         (feature(RING, kind="obstacle"), {}, False, "obstacle"),
+        (feature(RING), {}, False, "obstacle"),
+        (feature(LINE), {}, False, "obstacle"),
+        (feature(LINE, kind="obstacle"), {}, False, "obstacle"),
+        (feature(LINE, "cables"), {}, False, "path"),
+        (feature(LINE), {"lines": "path"}, False, "path"),
+        (feature(LINE, man_made="pier"), {"polygons": "ignore"}, False, "obstacle"),
+        (feature(LINE, route="ferry"), {}, False, "path"),
+        (feature(AREA, natural="water"), {}, False, "ignore"),
+        (feature(AREA, natural="water", man_made="pier"), {}, False, "obstacle"),
+        (feature(LINE, "SLCONS"), {}, True, "obstacle"),
+        (feature(LINE, "CBLSUB"), {}, True, "path"),
     ],
 )
 def test_the_first_rule_that_fits_decides_what_a_feature_is(what, kinds, chart, kind):
-    assert kind_of(what, kinds, chart=chart) == kind
+    decision = kind_of(what, kinds, chart=chart)
+    assert decision.kind == kind
+    assert bool(decision.reason) == (kind == "ignore")
 
 
 @pytest.mark.parametrize(
     "what",
     [
-        feature(LINE, kind="obstacle"), feature(AREA, kind="base"), feature(POINT, kind="bounds"),
-        feature(POINT, kind="tree"), feature(LINE, kind="bounds"),
+        feature(AREA, kind="base"), feature(POINT, kind="bounds"), feature(POINT, kind="tree"),
+        feature(AREA, kind="path"),
     ],
 )  # fmt: skip
 def test_a_feature_of_an_impossible_kind_is_refused(what):

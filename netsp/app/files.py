@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import json
+import math
 import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any
 
-from netsp.errors import InputError
+from netsp.errors import InputError, UnansweredError
 from netsp.models import shown
 from netsp.problem import Problem
 from netsp.solution import Solution
@@ -56,8 +59,85 @@ def bare_name(name: str) -> str:
     return last
 
 
+@dataclass(frozen=True)
+class ImportAnswers:
+    """Answers to what an import asks for.
+
+    Attributes
+    ----------
+    base
+        Latitude and longitude of the base, with a comma, in degrees.
+    tether
+        Length of the tether, metres.
+    radius
+        Radius of obstacles that are points, metres.
+    line_width
+        Width of open lines that are obstacles, metres.
+    crs
+        Coordinate system, as ``EPSG:32632`` or ``local``.
+    viewpoints
+        Viewpoints about each obstacle.
+    standoff
+        Distance of viewpoints from its surface, metres.
+    """
+
+    base: str | None = None
+    tether: float | None = None
+    radius: float | None = None
+    line_width: float | None = None
+    crs: str | None = None
+    viewpoints: int | None = None
+    standoff: float | None = None
+
+    @classmethod
+    def parse(cls, given: Mapping[str, str]) -> ImportAnswers:
+        """Return the answers in the fields of a form; those without text are none.
+
+        Parameters
+        ----------
+        given : mapping
+            Name of a field to text; other names do not count.
+
+        Returns
+        -------
+        ImportAnswers
+            The answers.
+
+        Raises
+        ------
+        InputError
+            A field is no positive number.
+        """
+        said = {k: v.strip() for k, v in given.items() if v.strip()}
+        viewpoints = _positive(said, "viewpoints")
+        if viewpoints is not None and viewpoints != int(viewpoints):
+            raise InputError(f"viewpoints: expected a whole number, got {viewpoints:g}")
+        return cls(
+            base=said.get("base"), crs=said.get("crs"),
+            viewpoints=None if viewpoints is None else int(viewpoints),
+            tether=_positive(said, "tether"), radius=_positive(said, "radius"),
+            line_width=_positive(said, "line_width"), standoff=_positive(said, "standoff"),
+        )  # fmt: skip
+
+
+def _positive(said: Mapping[str, str], field: str) -> float | None:
+    if field not in said:
+        return None
+    called = field.replace("_", " ")
+    try:
+        value = float(said[field])
+    except ValueError:
+        value = math.nan
+    if not 0.0 < value < math.inf:
+        raise InputError(f"{called}: expected a positive number, got {shown(said[field])}")
+    return value
+
+
 def imported(
-    name: str, content: bytes, tether_length: float | None = None
+    name: str,
+    content: bytes,
+    tether_length: float | None = None,
+    answers: ImportAnswers | None = None,
 ) -> tuple[dict[str, Any], list[str]]:
     """The problem in a file: a problem file, or a map of a site (docs/sites.md).
 
@@ -69,6 +149,8 @@ def imported(
         Of the file.
     tether_length : float, optional
         Taken where a map says none.
+    answers : ImportAnswers, optional
+        What the user says of a map.
 
     Returns
     -------
@@ -79,6 +161,8 @@ def imported(
 
     Raises
     ------
+    UnansweredError
+        A map lacks what the user may say.
     InputError
         Too large, of no kind that is read, or not valid.
     """
@@ -94,24 +178,50 @@ def imported(
             if ending == ".json" and not _is_geojson(content):
                 problem = Problem.load(file)
             elif ending in (*MAPS, ".json"):
-                problem = _site(file, notes, tether_length)
+                problem = _site(file, notes, tether_length, answers or ImportAnswers())
             else:
                 raise InputError(f"{last}: expected .json, {', '.join(MAPS)}")
-        except InputError as error:  # the folder is ours and gone
+        except UnansweredError as error:  # the folder is ours and gone
+            whole, plain = (
+                [text.replace(f"{folder}/", "") for text in texts]
+                for texts in (error.complaints, error.plain)
+            )
+            raise UnansweredError(whole, plain, error.asks) from None
+        except InputError as error:
             raise InputError(str(error).replace(f"{folder}/", "")) from None
     return json.loads(problem.to_json()), notes
 
 
-def _site(file: Path, notes: list[str], tether_length: float | None) -> Problem:
-    from netsp.site.read import read_site
+def _site(
+    file: Path, notes: list[str], tether_length: float | None, answers: ImportAnswers
+) -> Problem:
+    from netsp.roadmap.within_reach import within_reach
+    from netsp.site.options import Looking, SiteOptions
+    from netsp.site.projection import Projection
+    from netsp.site.read import import_site
 
+    about = Projection.parse(answers.base, name="base") if answers.base else None
+    asked = answers.viewpoints is not None and answers.standoff is not None
+    looking = Looking(answers.viewpoints or 1, answers.standoff or 0.0) if asked else None
+    options = SiteOptions(
+        tether=answers.tether, radius=answers.radius, line_width=answers.line_width,
+        crs=answers.crs, looking=looking,
+    )  # fmt: skip
     try:
-        return read_site(file, on_note=notes.append)
-    except InputError as error:
-        if tether_length is None or "has no tether length" not in str(error):
+        found = import_site(file, about, options=options)
+    except UnansweredError as error:
+        if tether_length is None or "tether" not in error.asks:
             raise
-    notes[:] = [f"{file.name}: has no tether length: {tether_length:g} m, as before"]
-    return read_site(file, on_note=notes.append, tether=tether_length)
+        notes.append(f"{file.name}: has no tether length: {tether_length:g} m, as before")
+        found = import_site(file, about, options=replace(options, tether=tether_length))
+    problem = found.problem
+    assert problem.site is not None
+    in_table = set(problem.site.notes)
+    notes += [f"{file.name}: {note}" for note in found.notes if note not in in_table]
+    if found.viewpoints and problem.site.cropped is not None:
+        problem, why = within_reach(problem, found.viewpoints)
+        notes += [f"{line}: left out" for line in why]
+    return problem
 
 
 def exported(problem: Problem, solution: Solution, kind: str) -> tuple[str, str]:

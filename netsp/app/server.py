@@ -24,13 +24,13 @@ from netsp.app.drawn_path import (
     worth_of_order,
 )
 from netsp.app.facts import facts
-from netsp.app.files import EXPORTS, bare_name, exported, imported
+from netsp.app.files import EXPORTS, ImportAnswers, bare_name, exported, imported
 from netsp.app.files import MOST_BYTES as MOST_FILE
 from netsp.app.shown import Shown
 from netsp.app.solving import Worker
 from netsp.app.state import Document
 from netsp.app.tethers import Cursor
-from netsp.errors import InputError, NetspError
+from netsp.errors import InputError, NetspError, UnansweredError
 from netsp.fields import checked_argument, is_index
 from netsp.models import parse_json_object, shown
 from netsp.problem import Problem
@@ -322,7 +322,7 @@ def application(session: Session, token: str, port: int) -> Any:
     try:
         from starlette.applications import Starlette
         from starlette.requests import ClientDisconnect, Request
-        from starlette.responses import FileResponse, PlainTextResponse, Response
+        from starlette.responses import FileResponse, JSONResponse, PlainTextResponse, Response
         from starlette.routing import Mount, Route, WebSocketRoute
         from starlette.staticfiles import StaticFiles
         from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
@@ -370,11 +370,18 @@ def application(session: Session, token: str, port: int) -> Any:
             data, notes = await asyncio.to_thread(
                 imported, request.query_params.get("name", ""), content,
                 tether if isinstance(tether, int | float) else None,
+                ImportAnswers.parse(request.query_params),
             )  # fmt: skip
             session.do({"edit": {"replace": data}})
+        except UnansweredError as error:  # the page asks for what is missing
+            if error.asks:
+                told = {"said": list(error.plain), "asks": list(error.asks)}
+                return JSONResponse(told, status_code=422)
+            return PlainTextResponse(f"netsp: {'; '.join(error.plain)}", status_code=422)
         except NetspError as error:
             return PlainTextResponse(f"netsp: {error}", status_code=422)
-        return PlainTextResponse("\n".join(notes))
+        version = {"x-version": str(session.document.version)}
+        return PlainTextResponse("\n".join(notes), headers=version)
 
     def plotly(request: Request) -> Response:
         del request

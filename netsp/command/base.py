@@ -54,6 +54,7 @@ def run(args: argparse.Namespace) -> int:
     from netsp.files import write_text
     from netsp.pictures import style
     from netsp.problem import Problem
+    from netsp.site.projection import Projection
     from netsp.site.table import from_table
     from netsp.sizing.base import Candidate, best_base
     from netsp.sizing.candidates import along_line, over_grid
@@ -63,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
     problem = Problem.load(args.problem)
     names: list[str | None] | None = None
     if args.candidates:
-        places, names = from_table(args.candidates)
+        places, names = from_table(args.candidates, Projection.of(problem), messages.note)
     elif args.line:
         places = along_line(args.line)
     else:

@@ -88,6 +88,7 @@ def run(args: argparse.Namespace) -> int:
     start = None if args.start is None else vector(args.start, "--start")
     from netsp.clock import Clock
     from netsp.command.compiling import compile_messages
+    from netsp.command.plot_scene import note_scene
     from netsp.command.stages import Stages
     from netsp.cover import cover
     from netsp.files import write_text
@@ -95,6 +96,8 @@ def run(args: argparse.Namespace) -> int:
 
     clock = Clock(args.time_limit)  # reading the scene counts
     scene = Scene.load(args.scene)
+    if not args.quiet:
+        note_scene(scene.name, scene.reading_notes())
     stages = None if args.quiet else Stages(sys.stderr, args.time_limit)
     compiling = contextlib.nullcontext() if args.quiet else compile_messages(sys.stderr)
     with stages or contextlib.nullcontext(), compiling:

@@ -8,6 +8,7 @@ import sys
 from netsp.command import messages, told
 from netsp.command.types import (
     check_writable,
+    depth,
     length,
     margins,
     natural,
@@ -63,6 +64,10 @@ def arguments(p: argparse.ArgumentParser) -> None:
         help="warn where less tether is left or an obstacle is closer; default 0.3,0.2",
     )  # fmt: skip
     p.add_argument(
+        "--depth", type=depth, metavar="D",
+        help="depth of all goals of a solution (m), instead of their own",
+    )  # fmt: skip
+    p.add_argument(
         "--surface", type=float, default=0.0, metavar="Z",
         help="of a mission: z of the water's surface (m); default 0",
     )  # fmt: skip
@@ -80,6 +85,7 @@ def run(args: argparse.Namespace) -> int:
     if args.problem is None:
         raise InputError(f"--problem: {args.solution} is no mission; expected its problem")
     check_writable(args.output, inputs=(args.solution, args.problem))
+    from netsp.export.common_depth import at_depth
     from netsp.export.margins import warnings
     from netsp.export.write import (
         MOST_FENCE_POINTS,
@@ -92,6 +98,7 @@ def run(args: argparse.Namespace) -> int:
     )
     from netsp.judge import verify
     from netsp.problem import Problem
+    from netsp.site.goal_depths import surface_warning
     from netsp.site.projection import Projection
     from netsp.solution import Solution
 
@@ -100,6 +107,10 @@ def run(args: argparse.Namespace) -> int:
     if not judged:
         failed = next(c for c in judged.checks if not c.passed)
         raise InputError(f"{args.solution}: fails its check {failed.name!r}: {failed.detail}")
+    if args.depth is not None:
+        problem, solution = at_depth(problem, solution, args.depth)
+    elif (text := surface_warning(problem)) is not None:
+        messages.warning(text)
     kind = format_of(args.output, args.format)
     slack, clearance = margins(args.margin)
     projection = None
@@ -158,6 +169,8 @@ def _mission(args: argparse.Namespace) -> int:
     """Write a planned mission."""
     if args.problem is not None:
         raise InputError(f"--problem: {args.solution} is a mission; expected none")
+    if args.depth is not None:
+        raise InputError(f"--depth: {args.solution} is a mission, which has depths of its own")
     check_writable(args.output, inputs=(args.solution,))
     from netsp.command.interrupts import until_interrupted
     from netsp.export.mission import export_mission

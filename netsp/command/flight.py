@@ -60,7 +60,7 @@ def _flown(
     surprises: SceneSurprises | None, source: str | None, check: bool, **how: Any,
 ) -> list[Run]:  # fmt: skip
     from netsp.command.compiling import compile_messages
-    from netsp.command.plot_scene import tell, warn_of_scene
+    from netsp.command.plot_scene import note_scene, tell, warn_of_scene
     from netsp.files import output_folder
     from netsp.online.log import describe_run, write_run
     from netsp.online.simulate import simulate
@@ -85,6 +85,7 @@ def _flown(
         if clock.stopped:
             raise KeyboardInterrupt
         if not quiet:
+            note_scene(scene.name, field.notes)
             warn_of_scene(
                 GeodesicTether(field, mission.delta), mission.delta, "lower the mission's delta"
             )

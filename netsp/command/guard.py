@@ -8,6 +8,7 @@ import sys
 from contextlib import ExitStack, nullcontext
 from typing import TYPE_CHECKING, Any, TextIO
 
+from netsp.command import messages
 from netsp.command.solve_mission import is_mission
 from netsp.command.types import check_writable, length, natural
 from netsp.errors import EXIT_NOT_ALL, EXIT_NOT_VERIFIED, InputError
@@ -43,7 +44,11 @@ def arguments(p: argparse.ArgumentParser) -> None:
         "site has an origin",
     )  # fmt: skip
     source.add_argument(
-        "--system", type=natural, metavar="N", help="the vehicle's system id; default the first"
+        "--system",
+        type=natural,
+        metavar="N",
+        help="the vehicle's system id; default the first heard, in a recording the only one that "
+        "tells positions",
     )
     vehicle = p.add_argument_group("what is known of the vehicle")
     vehicle.add_argument(
@@ -98,7 +103,8 @@ def run(args: argparse.Namespace) -> int:
         from netsp.guard.replay import read_fixes
 
         # all of it before anything is written: what is wrong may stand in its last line
-        fixes = list(read_fixes(args.replay, frame, args.system))
+        say = None if args.quiet else messages.note
+        fixes = list(read_fixes(args.replay, frame, args.system, on_note=say))
     with ExitStack() as stack:
         stack.enter_context(nullcontext() if args.quiet else compile_messages(sys.stderr))
         guard = Guard(told_of, options)
@@ -127,7 +133,8 @@ def run(args: argparse.Namespace) -> int:
             if args.replay is not None:
                 from netsp.guard.stream import replayed
 
-                for report in replayed(guard, fixes):
+                say = None if args.quiet else messages.note
+                for report in replayed(guard, fixes, say):
                     take(report)
             else:
                 from netsp.guard.live import watch
@@ -142,6 +149,7 @@ def run(args: argparse.Namespace) -> int:
     if args.output is None:
         print(json.dumps(told.summary(), indent=1, allow_nan=False))
     if told.last is None:
+        messages.warning(f"nothing was claimed about the tether: {told.reason}")
         return EXIT_NOT_ALL
     return EXIT_NOT_VERIFIED if told.last.loops else 0
 
@@ -191,6 +199,14 @@ class _Told:
                     f"{self.site.tether_length:g} {units}, {now.passes}"[:110],
                     end="", file=sys.stderr, flush=True,
                 )  # fmt: skip
+
+    @property
+    def reason(self) -> str:
+        """Why nothing was claimed, as the last alarm has it."""
+        estimates = [a["text"] for a in self._raised if a["kind"] == "estimate"]
+        if not estimates:
+            return "no position was heard"
+        return str(estimates[-1]).partition(",")[0].partition(":")[0]
 
     def summary(self) -> dict[str, Any]:
         """The numbers."""

@@ -1,4 +1,4 @@
-"""`netsp import`: a problem from a map."""
+"""`netsp import`: make a problem from a map, and say what became of each of its features."""
 
 from __future__ import annotations
 
@@ -9,18 +9,22 @@ from typing import TYPE_CHECKING
 
 from netsp.command import messages, told
 from netsp.command.patience import Patience
-from netsp.command.types import check_writable, length, option, positive
+from netsp.command.types import check_writable, depth, length, option, positive
 from netsp.errors import InputError, counted
 
 if TYPE_CHECKING:
+    import shapely
+
     from netsp.problem import Problem
     from netsp.site.options import Looking
+    from netsp.site.read import ImportedSite
+    from netsp.site.sea_floor import SeaFloor
 
 EXAMPLE = "netsp import examples/site.geojson -o problem.json"
 
 
 def arguments(p: argparse.ArgumentParser) -> None:
-    """Of the command line."""
+    """Add the arguments of the command line."""
     p.add_argument(
         "site", metavar="SITE",
         help="map: GeoJSON, KML, KMZ, shapefile, GeoPackage, DXF or S-57; or an occupancy image: "
@@ -57,9 +61,21 @@ def arguments(p: argparse.ArgumentParser) -> None:
         help="coordinate system of a file that names none, as EPSG:32632; local for a plane",
     )  # fmt: skip
     p.add_argument(
-        "--units", default="m", metavar="UNIT",
+        "--units", metavar="UNIT",
         help="of lengths and of local coordinates in the file: m, km, cm, mm, ft, us-ft, in, yd, "
-        "fathom; default m",
+        "fathom; default: the unit that the file states, or m",
+    )  # fmt: skip
+    p.add_argument(
+        "--line-width", type=length, metavar="W",
+        help="width (m) of open lines that are obstacles and have none in the file",
+    )  # fmt: skip
+    p.add_argument(
+        "--join-tolerance", type=length, metavar="T",
+        help="join lines to an outline where their ends are no farther apart (m); default 0.01",
+    )  # fmt: skip
+    p.add_argument(
+        "--crop", action=argparse.BooleanOptionalAction,
+        help="leave out obstacles beyond the reach of the tether; default: in charts only",
     )  # fmt: skip
     p.add_argument(
         "--inspect", type=positive, metavar="N", help="N goals about every obstacle, at every depth"
@@ -69,16 +85,47 @@ def arguments(p: argparse.ArgumentParser) -> None:
         help="distance (m) of those goals from its surface",
     )  # fmt: skip
     p.add_argument(
+        "--of", action="append", type=option, default=[], metavar="WORD=VALUE",
+        help="inspect these obstacles only: layer=NAME, name=NAME (with * and ?), "
+        "box=XMIN,YMIN,XMAX,YMAX (m), earth=SOUTH,WEST,NORTH,EAST (degrees); one of each word "
+        "must fit",
+    )  # fmt: skip
+    p.add_argument(
         "--depths", default="0", metavar="D[,D…]", help="depths (m) of those goals; default 0"
+    )
+    p.add_argument(
+        "--depth", type=depth, metavar="D", help="depth of all goals (m), instead of their own"
     )
     p.add_argument(
         "--skip-unreachable", action="store_true",
         help="leave out goals that the tether cannot reach, and say which and why",
     )  # fmt: skip
-    images = p.add_argument_group("occupancy images")
-    images.add_argument(
-        "--goals", metavar="TABLE", help="CSV with the columns x, y and perhaps z, name (m)"
+    p.add_argument(
+        "--goals", metavar="TABLE",
+        help="more goals: CSV with the columns x, y (m) or lat, lon, and perhaps z or depth, name",
+    )  # fmt: skip
+    p.add_argument(
+        "--candidates", metavar="TABLE",
+        help="places where the base may stand (columns as of --goals): a cropped map holds the "
+        "reach from each",
+    )  # fmt: skip
+    charts = p.add_argument_group("charts")
+    charts.add_argument(
+        "--draught", type=length, metavar="D",
+        help="areas that may be shallower than this (m), or are not surveyed, become obstacles",
+    )  # fmt: skip
+    charts.add_argument(
+        "--floor",
+        metavar="FILE",
+        help="write the sea floor of the chart's depths (.asc, .tif), for scenes",
     )
+    charts.add_argument(
+        "--floor-cell",
+        type=length,
+        metavar="C",
+        help="size of its cells (m); default: 256 along a side",
+    )
+    images = p.add_argument_group("occupancy images")
     images.add_argument(
         "--resolution",
         type=length,
@@ -94,6 +141,10 @@ def arguments(p: argparse.ArgumentParser) -> None:
         help="take cells that the map does not know as free, not as obstacles",
     )  # fmt: skip
     p.add_argument(
+        "--plot", metavar="FILE",
+        help="draw the problem, what was left out dashed: PNG, SVG or PDF",
+    )  # fmt: skip
+    p.add_argument(
         "-o", "--output", metavar="FILE", help="write the problem to this file (default: stdout)"
     )
     told.json_flag(p)
@@ -102,17 +153,39 @@ def arguments(p: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Write the problem, and return the exit code."""
     told.check_stdout(args)
-    check_writable(args.output, inputs=(args.site, args.goals))
+    check_writable(
+        args.output, args.plot, args.floor, inputs=(args.site, args.goals, args.candidates)
+    )
     from netsp.files import write_text
+    from netsp.site.sea_floor import check_suffix
 
+    if args.floor is not None:
+        check_suffix(args.floor)
+
+    left_out: tuple[shapely.Geometry, ...] = ()
+    viewpoints: frozenset[str] = frozenset()
+    floor: SeaFloor | None = None
     with Patience(sys.stderr, f"reading {args.site}"):
-        problem = _of_image(args) if _is_image(args) else _of_map(args)
+        if _is_image(args):
+            problem = _of_image(args)
+        else:
+            found = _of_map(args)
+            problem, left_out, floor = found.problem, found.left_out, found.floor
+            viewpoints = found.viewpoints
+            _show_table(args.site, found)
+    from netsp.site.goal_depths import surface_warning, with_depth
+
+    if args.depth is not None:
+        problem = with_depth(problem, args.depth)
+    elif (text := surface_warning(problem)) is not None:
+        messages.warning(text)
     why: list[str] = []
-    if args.skip_unreachable:
+    is_cropped = problem.site is not None and problem.site.cropped is not None
+    if args.skip_unreachable or (is_cropped and viewpoints):
         from netsp.roadmap.within_reach import within_reach
 
         with Patience(sys.stderr, "looking for the goals in reach"):
-            problem, why = within_reach(problem)
+            problem, why = within_reach(problem, None if args.skip_unreachable else viewpoints)
         for line in why:
             messages.note(f"{line}: left out")
     print(f"{problem.name}: {problem.summary}{_where(problem)}", file=sys.stderr)
@@ -126,11 +199,18 @@ def run(args: argparse.Namespace) -> int:
         sys.stdout.write(problem.to_json())
     else:
         write_text(args.output, problem.to_json())
+    if floor is not None:
+        floor.save(args.floor)
+    if args.plot is not None:
+        from netsp.pictures.problem import save_import
+
+        save_import(problem, left_out, args.plot)
     if args.json:
         told.tell({
             "problem": problem.name, "units": problem.units, "goals": len(problem.goals),
             "obstacles": len(problem.obstacles), "tether_length": problem.tether_length,
             "clearance": problem.clearance, "left_out": list(why), "file": args.output,
+            "site": None if problem.site is None else problem.site.model_dump(mode="json"),
         })  # fmt: skip
     return 0
 
@@ -156,8 +236,12 @@ def _is_image(args: argparse.Namespace) -> bool:
 
     image: bool = args.site.lower().endswith((*FILES, *IMAGES))
     wrong = (
-        ("map", "crs", "radius", "inspect", "standoff") if image
-        else ("goals", "resolution", "tolerance", "unknown_free")
+        (
+            "map", "crs", "radius", "inspect", "standoff", "line_width", "join_tolerance", "crop",
+            "of", "candidates", "draught", "floor", "floor_cell",
+        )
+        if image
+        else ("resolution", "tolerance", "unknown_free")
     )  # fmt: skip
     for name in wrong:
         if getattr(args, name):
@@ -181,7 +265,7 @@ def _of_image(args: argparse.Namespace) -> Problem:
         base = ()
     if len(base) not in (2, 3):
         raise InputError(f"--base: expected X,Y or X,Y,Z (m) in an image, got {args.base!r}")
-    places, names = from_table(args.goals)
+    places, names = from_table(args.goals, on_note=messages.note)
     goals = [
         {"position": tuple(p), "name": n or f"g{k}"}
         for k, (p, n) in enumerate(zip(places.tolist(), names, strict=True), 1)
@@ -193,27 +277,45 @@ def _of_image(args: argparse.Namespace) -> Problem:
     )  # fmt: skip
 
 
-def _of_map(args: argparse.Namespace) -> Problem:
+def _show_table(site: str, found: ImportedSite) -> None:
+    """Print what became of the features of each layer, and what was assumed."""
+    from netsp.command.text_table import print_table
+
+    record = found.problem.site
+    assert record is not None
+    print_table(record.table(), sys.stderr)
+    left_out = set(record.notes)
+    for note in found.notes:
+        if note not in left_out:  # these stand in the table
+            messages.note(f"{site}: {note}")
+
+
+def _of_map(args: argparse.Namespace) -> ImportedSite:
     from netsp.site.options import SiteOptions
     from netsp.site.projection import Projection
-    from netsp.site.read import read_site
+    from netsp.site.read import import_site
 
     projection = Projection.parse(args.base, name="--base") if args.base else None
     options = SiteOptions(
         tether=args.tether, clearance=args.clearance, radius=args.radius, crs=args.crs,
         units=args.units, maps=args.map, looking=_looking(args),
-        skip_unreachable=args.skip_unreachable,
+        skip_unreachable=args.skip_unreachable, line_width=args.line_width, crop=args.crop,
+        goals=args.goals, candidates=args.candidates, draught=args.draught,
+        floor=args.floor is not None, floor_cell=args.floor_cell,
+        **({} if args.join_tolerance is None else {"join_tolerance": args.join_tolerance}),
     )  # fmt: skip
-    return read_site(args.site, projection, options=options, on_note=messages.note)
+    return import_site(args.site, projection, options=options)
 
 
 def _looking(args: argparse.Namespace) -> Looking | None:
     """How obstacles are looked at, where that is asked for."""
     from netsp.site.options import Looking
+    from netsp.site.selection import Selection
 
     if args.inspect is None:
-        if args.standoff is not None:
-            raise InputError("--standoff: expected --inspect N with it")
+        for name in ("standoff", "of"):
+            if getattr(args, name):
+                raise InputError(f"--{name}: expected --inspect N with it")
         return None
     if args.standoff is None:
         raise InputError("--inspect: expected --standoff S with it")
@@ -221,4 +323,4 @@ def _looking(args: argparse.Namespace) -> Looking | None:
         depths = tuple(0.0 - abs(float(d)) for d in args.depths.split(","))
     except ValueError:
         raise InputError(f"--depths: expected numbers with commas, got {args.depths!r}") from None
-    return Looking(args.inspect, args.standoff, depths)
+    return Looking(args.inspect, args.standoff, depths, Selection.parse(args.of))

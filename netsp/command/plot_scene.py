@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Sequence
 
 import numpy as np
 
 from netsp.arrays import Floats
+from netsp.axes import read_path
 from netsp.command import messages
 from netsp.errors import InputError
-from netsp.files import read_path
 from netsp.geometry import polylines
 from netsp.online.limits import MOST_NODES
 from netsp.online.scene.field import DistanceField
@@ -26,11 +27,12 @@ def plot_scene(args: argparse.Namespace) -> int:
     style.check_format(args.output, pictures.INTERACTIVE)
     scene = Scene.load(args.problem)
     path, tether = None, None
-    if args.solution is not None:
+    if args.solution is None:
+        note_scene(scene.name, scene.reading_notes())
+    else:
         path = points_of(args.solution)
         field = scene.field(on_progress=tell)
-        for note in field.notes:
-            messages.note(f"{scene.name}: {note}")
+        note_scene(scene.name, field.notes)
         check_overlap(scene, field, path, args.solution)
         delta = args.delta or delta_for_path(field, path)
         if (nodes := polylines.length(path) / delta) > MOST_NODES:
@@ -46,6 +48,12 @@ def plot_scene(args: argparse.Namespace) -> int:
         )
     pictures.save(scene, args.output, path=path, tether=tether)
     return 0
+
+
+def note_scene(name: str, notes: Sequence[str]) -> None:
+    """Print what was left out or assumed when the files of a scene were read."""
+    for note in notes:
+        messages.note(f"{name}: {note}")
 
 
 def warn_of_scene(model: GeodesicTether, delta: float, remedy: str) -> None:

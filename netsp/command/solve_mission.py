@@ -81,7 +81,7 @@ def solve(
     stages = None if quiet else Stages(sys.stderr, time_limit or TIME_LIMIT)
     compiling = contextlib.nullcontext() if quiet else compile_messages(sys.stderr)
     with stages or contextlib.nullcontext(), compiling:
-        from netsp.command.plot_scene import tell, warn_of_scene
+        from netsp.command.plot_scene import note_scene, tell, warn_of_scene
 
         with clock.at_least(MissionPolicy().first_tour_s):
             scene = clock.bounded("reading the scene", mission.load_scene)
@@ -92,6 +92,7 @@ def solve(
         if not quiet:
             from netsp.online.tether import GeodesicTether
 
+            note_scene(scene.name, field.notes)
             warn_of_scene(
                 GeodesicTether(field, mission.delta), mission.delta, "lower the mission's delta"
             )

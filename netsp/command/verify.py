@@ -153,8 +153,8 @@ def _is_path(file: str) -> bool:
 
 def _measure_paths(problem: Problem, args: argparse.Namespace) -> None:
     """Print the measures of every path of a file."""
+    from netsp.axes import read_path
     from netsp.command.measures import describe_path, entered
-    from netsp.files import read_path
     from netsp.guard.recorded_path import read_any_paths
     from netsp.site.path_file import ENDINGS, FoundPath
 

@@ -28,11 +28,14 @@ class Alarm:
         How urgent.
     text : str
         One or two sentences: why, and what to do.
+    is_immediate : bool
+        Whether it is raised at once, without waiting for its reason to last.
     """
 
     kind: str
     level: Level
     text: str
+    is_immediate: bool = False
 
 
 RAISED_S = {Level.NOTICE: 0.0, Level.CAUTION: 1.0, Level.WARNING: 0.5, Level.ALARM: 0.3}
@@ -95,7 +98,8 @@ class Alarms:
             new = max(
                 (
                     v for v, t in kept.since.items()
-                    if reason is not None and reason.level >= v and now - t >= RAISED_S[v]
+                    if reason is not None and reason.level >= v
+                    and (reason.is_immediate or now - t >= RAISED_S[v])
                 ),
                 default=None,
             )  # fmt: skip

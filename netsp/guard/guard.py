@@ -105,6 +105,8 @@ class Guard:
         self._vouched: bool | None = None
         self._last = Fix(0.0)
         self._seen, self._looked = -np.inf, -np.inf
+        self._heard_since: float | None = None
+        self._is_beyond = False
         self._looks: list[tuple[float, Look]] = []
         self._ahead, self._sure = Ahead(), 1.0
         self._on_plan = False
@@ -210,11 +212,15 @@ class Guard:
             paid_out=self._last.paid_out if fix.paid_out is None else fix.paid_out,
         )
         self._seen = max(self._seen, fix.time)
+        if self._heard_since is None:
+            self._heard_since = fix.time
         if fix.estimate is not None:
             self._vouched = fix.estimate
             if not fix.estimate:
                 self.track.lose(fix.time)
-        if fix.position is not None and self._beyond(fix.position):
+        if fix.position is not None:
+            self._is_beyond = self._beyond(fix.position)
+        if fix.position is not None and self._is_beyond:
             self.track.lose(fix.time)  # no robot on this tether is there
         elif fix.position is not None and self._vouched is not False:
             motion = self.track.take(fix)
@@ -263,6 +269,7 @@ class Guard:
             self._previous = replace(self._previous, time=self._previous.time - shift)
         self.alarms = Alarms()
         self._seen = self._looked = -np.inf
+        self._heard_since = fix.time
         self.track.lose(fix.time if self.track.time is None else self.track.time)
         self._vouched = None
         return self.take(fix)
@@ -358,7 +365,7 @@ class Guard:
         wound: tuple[float, Sequence[Sequence[Loop]]], strands: Sequence[Strand],
     ) -> list[Alarm]:  # fmt: skip
         if self._motion is None:
-            return []
+            return self._never_placed()
         if not claims:
             why = (
                 "the vehicle does not vouch for its position" if self._vouched is False
@@ -387,6 +394,20 @@ class Guard:
             ),
             *reasons.looped(site, loops, robot, share, on_plan),
         ]  # fmt: skip
+
+    def _never_placed(self) -> list[Alarm]:
+        """Return why nothing was ever claimed; silence is no reason for a while yet."""
+        assert self._heard_since is not None
+        silent = self._seen - self._heard_since
+        if self._vouched is False:
+            return [reasons.never_claimed("the vehicle has never vouched for its position", silent)]
+        if self._is_beyond:
+            far = 2.0 * self.site.tether_length
+            why = f"all positions are more than {far:g} {self.site.units} from the base"
+            return [reasons.never_claimed(why, silent)]
+        if silent > GAP:
+            return [reasons.never_claimed("no position has come", silent)]
+        return []
 
     def _as_planned(self, strands: Sequence[Strand]) -> bool | None:
         if not strands:

@@ -15,16 +15,13 @@ from netsp.guard.plane import PlaneSite
 from netsp.guard.rehearsal import rehearse
 from netsp.guard.report import Report
 from netsp.guard.space import SpaceSite
-from netsp.guard.stream import Stream
+from netsp.guard.stream import SILENT_S, Stream
 from netsp.link.address import Address
 from netsp.link.dialect import dialect
 from netsp.link.frame import Frame
 from netsp.link.messages import Listener
 from netsp.link.statustext import status_texts
 from netsp.link.udp import UdpLink
-
-SILENT_S = 0.5
-"""Seconds without a message after which that itself is reported, and how often."""
 
 SAVE_S = 1.0
 """Seconds between two times that the class is written down."""
@@ -91,7 +88,7 @@ def watch(
     only = None if where.listens else link.peer
     beat = dialect().MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3)  # a computer on board
     beaten = float("-inf")
-    listener, stream = Listener(frame, system), Stream(guard)
+    listener, stream = Listener(frame, system), Stream(guard, on_note=tell)
     heard = saved = sent = told = time.monotonic()
     others: set[int] = set()
     numbers = itertools.count()

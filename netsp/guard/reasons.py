@@ -78,6 +78,13 @@ def estimate_lost(seconds: float, why: str) -> Alarm:
     )  # fmt: skip
 
 
+def never_claimed(why: str, seconds: float) -> Alarm:
+    """Return the alarm that nothing was claimed since the vehicle was first heard."""
+    ago = f", {seconds:.0f} s ago" if seconds >= 1.0 else ""
+    text = f"{why} since it was first heard{ago}: nothing is claimed about the tether"
+    return Alarm("estimate", Level.ALARM, text, is_immediate=True)
+
+
 def in_doubt(classes: Sequence[ClassNow]) -> list[Alarm]:
     """The class is one of several."""
     if len(classes) < 2 or classes[1].likely < DOUBT:

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
 
+from netsp.arrays import Bools, Floats
 from netsp.errors import InputError
-from netsp.files import read_text
+from netsp.files import read_gzip, read_text
 from netsp.geometry import polylines
+from netsp.guard.fix import Fix
 from netsp.guard.replay import read_fixes
 from netsp.link.frame import Frame
+from netsp.link.vehicle_clock import VehicleClock
 from netsp.problem import Problem
 from netsp.site.path_file import FoundPath, read_paths
 
@@ -53,7 +57,8 @@ def read_any_paths(
         The file cannot be read, or holds no path.
     """
     lower = str(file).lower()
-    if lower.endswith(RECORDINGS) or (lower.endswith(".csv") and _has_north_and_east(file)):
+    tables = (".csv", ".csv.gz")
+    if lower.endswith(RECORDINGS) or (lower.endswith(tables) and _has_north_and_east(file)):
         found = [_flight(file, Frame(problem, frame), system)]
     else:
         found = read_paths(file, problem, frame)
@@ -61,8 +66,11 @@ def read_any_paths(
 
 
 def _has_north_and_east(file: str | Path) -> bool:
-    head = read_text(file)[:4096].removeprefix("\ufeff").splitlines()[:1]
-    names = {name.strip().lower() for name in head[0].split(",")} if head else set()
+    if str(file).lower().endswith(".gz"):
+        head = read_gzip(file)[:4096].decode("utf-8-sig", "replace").splitlines()[:1]
+    else:
+        head = read_text(file)[:4096].removeprefix("\ufeff").splitlines()[:1]
+    names = {name.strip().lower() for name in re.split("[,;\t]", head[0])} if head else set()
     return {"north", "east"} <= names
 
 
@@ -72,11 +80,28 @@ def _flight(file: str | Path, frame: Frame, system: int | None) -> FoundPath:
     except InputError as error:
         raise InputError(str(error).removeprefix("--replay: ")) from None
     points = np.array([f.position for f in fixes], dtype=float)
-    times = np.array([f.time for f in fixes], dtype=float)
     if len(np.unique(points, axis=0)) < 2:
         raise InputError(f"{file}: expected a recording with two positions or more that differ")
+    times, is_late = _lasting_times(fixes)
+    points, times = points[~is_late], times[~is_late]
     order = np.argsort(times, kind="stable")
     return FoundPath(Path(file).stem, points[order], times[order])
+
+
+def _lasting_times(fixes: list[Fix]) -> tuple[Floats, Bools]:
+    """Return the times of fixes by a clock that is never set, also over restarts of the vehicle,
+    and which fixes came late."""
+    clock = VehicleClock()
+    times, late, begun, last = [], [], 0.0, 0.0
+    for fix in fixes:
+        reading = clock.take(fix.time)
+        if reading.event == "restart":
+            begun = last - reading.time
+        times.append(reading.time + begun)
+        late.append(reading.event == "late")
+        if not late[-1]:
+            last = times[-1]
+    return np.array(times), np.array(late)
 
 
 def _straightened(path: FoundPath, noise: float) -> FoundPath:

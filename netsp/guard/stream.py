@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import fields, replace
 
 from netsp.guard.fix import Fix
 from netsp.guard.guard import Guard
 from netsp.guard.report import Report
+from netsp.guard.track import GAP
+from netsp.link.vehicle_clock import ClockPolicy, ClockReading, VehicleClock
 
 PERIOD_S = 0.095
 """Between two updates: vehicles tell where they are 10, 25 or 50 times a second."""
+
+SILENT_S = 0.5
+"""Seconds without a position after which that itself is reported, and how often."""
 
 
 class Stream:
@@ -20,10 +25,18 @@ class Stream:
     ----------
     guard : Guard
         That is told.
+    policy : ClockPolicy, optional
+        Rule by which a clock that was set is told from a vehicle that started anew.
+    on_note : callable, optional
+        Called with a line of text when the vehicle's clock goes back.
     """
 
-    def __init__(self, guard: Guard) -> None:
-        self.guard = guard
+    def __init__(
+        self, guard: Guard, policy: ClockPolicy | None = None,
+        on_note: Callable[[str], None] | None = None,
+    ) -> None:  # fmt: skip
+        self.guard, self.on_note = guard, on_note
+        self.clock = VehicleClock(policy)
         self._gathered: Fix | None = None
         self._due = float("-inf")
 
@@ -40,6 +53,12 @@ class Stream:
         Report or None
             None while no update is due.
         """
+        reading = self.clock.take(fix.time)
+        if reading.event == "late":
+            return None
+        if reading.event is not None:
+            self._say(fix.time, reading)
+        fix = replace(fix, time=reading.time)
         before = self._gathered
         if before is not None:
             kept = {
@@ -48,13 +67,20 @@ class Stream:
             }  # fmt: skip
             fix = replace(fix, **kept)
         self._gathered = fix
-        # a vehicle that started anew counts its time from 0 again
-        restarted = fix.time < self._due - 10.0 * PERIOD_S
+        restarted = reading.event == "restart"
         urgent = fix.estimate is False
-        if not urgent and not restarted and (fix.position is None or fix.time < self._due):
+        due = self._due if fix.position is not None else self._due + SILENT_S
+        if not urgent and not restarted and (fix.time < due or self._is_first(fix)):
             return None
         self._gathered, self._due = None, fix.time + PERIOD_S
-        return self.guard.restarted(fix) if restarted else self.guard.take(fix)
+        return self._told(self.guard.restarted(fix) if restarted else self.guard.take(fix))
+
+    def _is_first(self, fix: Fix) -> bool:
+        """Whether a fix without a position is the first of all: it begins the silence."""
+        if fix.position is not None or self._due > float("-inf"):
+            return False
+        self._due = fix.time
+        return True
 
     def wait(self, now: float) -> Report:
         """Nothing has come for a while.
@@ -69,10 +95,22 @@ class Stream:
         Report
             As it is now.
         """
-        return self.guard.wait(now)
+        return self._told(self.guard.wait(now + self.clock.offset))
+
+    def _told(self, report: Report) -> Report:
+        """Return a report by the vehicle's own clock."""
+        offset = self.clock.offset
+        return replace(report, time=report.time - offset) if offset else report
+
+    def _say(self, time: float, reading: ClockReading) -> None:
+        if self.on_note is not None:
+            what = "the vehicle started anew" if reading.event == "restart" else "the clock was set"
+            self.on_note(f"{what}: its time went back by {reading.step:.4g} s to {time:.10g} s")
 
 
-def replayed(guard: Guard, fixes: Iterable[Fix]) -> Iterator[Report]:
+def replayed(
+    guard: Guard, fixes: Iterable[Fix], on_note: Callable[[str], None] | None = None
+) -> Iterator[Report]:  # fmt: skip
     """What a guard would have said.
 
     Parameters
@@ -81,14 +119,23 @@ def replayed(guard: Guard, fixes: Iterable[Fix]) -> Iterator[Report]:
         A new one.
     fixes : iterable of Fix
         Of a recording.
+    on_note : callable, optional
+        Called with a line of text when the vehicle's clock goes back.
 
     Yields
     ------
     Report
         Ten a second, at most.
     """
-    stream = Stream(guard)
+    stream = Stream(guard, on_note=on_note)
+    last: float | None = None
     for fix in fixes:
+        if last is not None and fix.time - last > GAP:  # beside the vehicle silence is told, too
+            waits = int(min(fix.time - last, GAP + 4.0 * SILENT_S) / SILENT_S)
+            for k in range(1, waits + 1):
+                if last + k * SILENT_S < fix.time:
+                    yield stream.wait(last + k * SILENT_S)
+        last = fix.time
         report = stream.take(fix)
         if report is not None:
             yield report

@@ -40,6 +40,7 @@ class Frame:
     def __init__(self, site: Problem | Mission, kind: str | None = None) -> None:
         if kind not in (None, "local", "global"):
             raise InputError(f"--frame: expected local or global, got {kind!r}")
+        self.site, self.is_asked_for = site, kind is not None
         projection = Projection.of(site) if isinstance(site, Problem) else None
         if kind == "global" and projection is None:
             raise InputError("--frame: global needs an origin, and the site has none")
@@ -54,6 +55,20 @@ class Frame:
     def is_global(self) -> bool:
         """Whether places are told in degrees."""
         return self.projection is not None
+
+    @property
+    def has_origin(self) -> bool:
+        """Whether the site says where on the earth it is."""
+        return isinstance(self.site, Problem) and self.site.origin is not None
+
+    @property
+    def is_of_plane(self) -> bool:
+        """Whether the site is a problem of the plane, in which heights count little."""
+        return isinstance(self.site, Problem)
+
+    def local(self) -> Frame:
+        """Return the frame of the same site for places in metres."""
+        return Frame(self.site, "local")
 
     def from_local(self, north: float, east: float, down: float) -> Point3:
         """A place in the site of metres north, east and down of the base at the surface."""
@@ -77,8 +92,12 @@ class Frame:
 
     def from_global(self, lat: int, lon: int, above_home: float) -> Point3:
         """A place in the site, of degrees × 1e7 and metres above home."""
+        return self.from_degrees(lat * DEGREE, lon * DEGREE, above_home)
+
+    def from_degrees(self, lat: float, lon: float, above_home: float) -> Point3:
+        """Return the place in the site of degrees and metres above home."""
         assert self.projection is not None
-        ((x, y),) = self.projection.to_plane([(lat * DEGREE, lon * DEGREE)])
+        ((x, y),) = self.projection.to_plane([(lat, lon)])
         return float(x), float(y), above_home
 
     def to_global(self, place: Point3) -> tuple[int, int, float]:

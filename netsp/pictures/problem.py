@@ -16,12 +16,17 @@ from netsp.solution import Solution, Status
 from netsp.travel.result import Progress
 
 if TYPE_CHECKING:
+    import shapely
     from matplotlib.axes import Axes
 
 
 SMALL = 0.012
 """Radius of the smallest circle that bears its own name, in units of the map."""
 
+
+HIDDEN_RIM = 0.002
+"""Distance from an obstacle's outline, as a share of the picture's width, up to which an outline of
+something left out is not drawn."""
 
 TEXTURE = 1000.0
 """Edges that are drawn at full strength."""
@@ -30,6 +35,43 @@ TEXTURE = 1000.0
 def save(problem: Problem, solution: Solution | None, path: str | Path) -> None:
     """Draw a problem, with a solution if given, to a file; InputError if it cannot be written."""
     style.save(draw(problem, solution), path)
+
+
+def save_import(problem: Problem, left_out: Sequence[shapely.Geometry], path: str | Path) -> None:
+    """Draw an imported problem to a file, with the features that were left out dashed.
+
+    Parameters
+    ----------
+    problem : Problem
+        The problem.
+    left_out : sequence of shapely.Geometry
+        Shapes that are not in it, in its plane; those outside of the picture are not drawn.
+    path : str or Path
+        PNG, SVG or PDF.
+    """
+    import shapely
+
+    figure, ax = _single(problem)
+    draw_map(problem, ax=ax)
+    limits = (ax.get_xlim(), ax.get_ylim())
+    frame = shapely.box(limits[0][0], limits[1][0], limits[0][1], limits[1][1])
+    parts = [part for shape in left_out for part in shapely.get_parts(shapely.get_parts(shape))]
+    outlines = [part.boundary if part.geom_type == "Polygon" else part for part in parts]
+    seen = shapely.intersection([o for o in outlines if not o.is_empty], frame)
+    # edges that areas share are drawn once, since dashes over dashes look like a full line
+    lines = shapely.line_merge(shapely.union_all([s for s in seen if s.length > 0.0]))
+    rims = shapely.union_all([o.shape().boundary for o in problem.obstacles])
+    lines = lines.difference(rims.buffer(HIDDEN_RIM * (limits[0][1] - limits[0][0])))
+    for line in shapely.get_parts(lines):
+        x, y = shapely.get_coordinates(line).T
+        ax.plot(x, y, color=style.LEFT_OUT, lw=0.8, ls="--", zorder=2.5)
+    spots = shapely.get_coordinates([s for s in seen if s.geom_type in ("Point", "MultiPoint")])
+    ax.plot(*spots.T, color=style.LEFT_OUT, marker="x", ms=4, ls="none", zorder=2.5)
+    ax.set(xlim=limits[0], ylim=limits[1])
+    if left_out:
+        ax.plot([], [], color=style.LEFT_OUT, lw=0.8, ls="--", label="left out")
+        ax.legend(loc="best", fontsize=8, frameon=False)
+    style.save(figure, path)
 
 
 def draw(problem: Problem, solution: Solution | None = None) -> Any:

@@ -11,6 +11,7 @@ import numpy as np
 
 from netsp.errors import counted
 from netsp.execute.plan import legs_of
+from netsp.import_record import Site
 from netsp.judge import Verification
 from netsp.problem import Problem
 from netsp.report.wording import Passage, back_from, bearing, listed, passages
@@ -49,6 +50,31 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]], words: Sequence[in
         for row in rows
     )
     return f'<div class="wide"><table><tr>{top}</tr>{body}</table></div>'
+
+
+def imported(site: Site) -> str:
+    """Return the table of what an import made of every feature of a map.
+
+    Parameters
+    ----------
+    site : Site
+        The record of a problem.
+
+    Returns
+    -------
+    str
+        Elements.
+    """
+    head, *rows = site.table()
+    said = f"Imported from {site.file}. What was left out is not in the plan."
+    if site.cropped is not None:
+        x, y = site.cropped.center
+        said += (
+            f" Obstacles farther than {site.cropped.radius:.4g} from ({x:.4g}, {y:.4g}) were left "
+            "out: no tether of the length given at the import reaches them."
+        )
+    words = (0, len(head) - 1)
+    return f'<p class="note">{html.escape(said)}</p>' + table(head, rows, words)
 
 
 def checks(verdict: Verification) -> str:

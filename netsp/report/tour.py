@@ -105,6 +105,8 @@ def page(what: Opened) -> str:
             "none the worse for failing them.</p>",
             _measures(problem, solution),
         ]
+    if problem.site is not None:
+        parts += ["<h2>The map</h2>", briefing.imported(problem.site)]
     if what.rows:
         parts += ["<h2>Log</h2>", _over_time(what.rows, problem.units), _events(run)]
     return (

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 
 from netsp.errors import InfeasibleError
@@ -12,13 +14,17 @@ HAIR = 1e-6
 """Relative; what is so little too far is left to the roadmap to judge."""
 
 
-def within_reach(problem: Problem) -> tuple[Problem, list[str]]:
+def within_reach(
+    problem: Problem, removable: Collection[str] | None = None
+) -> tuple[Problem, list[str]]:
     """The problem without the goals that its tether cannot reach.
 
     Parameters
     ----------
     problem : Problem
         Any.
+    removable : collection of str, optional
+        Goals that may be left out; default all.
 
     Returns
     -------
@@ -34,6 +40,8 @@ def within_reach(problem: Problem) -> tuple[Problem, list[str]]:
     """
     needed = shortest_tethers(problem)
     far = needed > problem.tether_length * (1.0 + HAIR)
+    if removable is not None:
+        far &= np.array([g.name in removable for g in problem.goals])
     if not far.any():
         return problem, []
     why = [str(why_unreached(problem, needed, [int(k)])) for k in np.flatnonzero(far)]

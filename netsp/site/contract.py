@@ -1,15 +1,18 @@
-"""Which feature of a map is what: the contract of docs/sites.md.
+"""Contract of docs/sites.md: what each feature of a map is.
 
-The first that says so decides: the user (`--map`), a property `kind`, the name of the layer, the
-tags and object classes of sea charts, the shape.
+The first rule that matches decides: the user (`--map`), a property `kind`, the name of the layer,
+object classes of charts and tags of OpenStreetMap, the shape.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 from netsp.errors import InputError
 from netsp.models import shown
+from netsp.site.chart_classes import chart_kind
 from netsp.site.feature import Feature
 
 SHAPES = {
@@ -17,43 +20,132 @@ SHAPES = {
     "goal": ("Point", "MultiPoint"),
     "obstacle": (
         "Point", "MultiPoint", "Polygon", "MultiPolygon", "LineString", "MultiLineString",
+        "GeometryCollection",
     ),
-    "bounds": ("Polygon", "MultiPolygon", "LineString"),
-    "path": ("LineString", "MultiLineString"),
+    "bounds": ("Polygon", "MultiPolygon", "LineString", "MultiLineString"),
+    "path": ("LineString", "MultiLineString", "GeometryCollection"),
 }  # fmt: skip
-"""Which shapes a kind may have; lines of obstacles and bounds are closed."""
+"""Shapes that a kind may have; lines of bounds are closed, open ones of obstacles have a width.
+
+A `GeometryCollection` is a block of a drawing.
+"""
 
 KINDS = (*SHAPES, "ignore")
 
 WORDS = {
     **dict.fromkeys(("base", "bases", "anchor", "vessel", "ship"), "base"),
     **dict.fromkeys(("goal", "goals", "target", "targets", "inspection points"), "goal"),
-    **dict.fromkeys(("obstacle", "obstacles", "structures", "piles"), "obstacle"),
+    **dict.fromkeys(
+        (
+            "obstacle",
+            "obstacles",
+            "structure",
+            "structures",
+            "pile",
+            "piles",
+            "pier",
+            "piers",
+            "quay",
+            "quays",
+            "breakwater",
+            "breakwaters",
+            "jetty",
+            "jetties",
+            "wall",
+            "walls",
+            "column",
+            "columns",
+            "pontoon",
+            "pontoons",
+            "moorings",
+            "rocks",
+            "wrecks",
+        ),
+        "obstacle",
+    ),
     **dict.fromkeys(("bounds", "boundary", "basin", "workspace"), "bounds"),
     **dict.fromkeys(("path", "paths", "cables"), "path"),
     "ignore": "ignore",
 }
 """Names of layers, lower case."""
 
-STANDING = {"pile", "platform", "obstruction"}
-"""`seamark:type` of OpenStreetMap's points that stand in the water."""
-
-CHART = {
-    "PILPNT", "OFSPLF", "OBSTRN", "WRECKS", "UWTROC", "MORFAC", "PONTON", "LNDARE", "BUISGL",
-    "FSHFAC", "HULKES", "CRANES", "SILTNK", "LNDMRK",
+STANDING_POINTS = {
+    "seamark:type": {
+        "pile", "platform", "obstruction", "rock", "wreck", "mooring", "pylon", "hulk", "pontoon",
+        "beacon_cardinal", "beacon_lateral", "beacon_isolated_danger", "beacon_special_purpose",
+        "beacon_safe_water", "marine_farm", "production_area", "landmark",
+    },
+    "man_made": {
+        "piling", "offshore_platform", "mooring", "lighthouse", "beacon", "dolphin", "bollard",
+        "wind_turbine", "crane",
+    },
+    "natural": {"rock", "stone"},
+    "historic": {"wreck"},
+    "generator:source": {"wind"},
+    "seamark:landmark:category": {"windmotor"},
+    "mooring": {"dolphin", "pile", "yes", "commercial", "wall", "buoy"},
 }  # fmt: skip
-"""Object classes of S-57 (IHO S-57, appendix A) that a tether may catch on; all others of a chart
-are left out."""
+"""Tags of OpenStreetMap's points that stand in the water: key to values."""
+
+STANDING_LINES = {
+    "man_made": {
+        "pier", "quay", "breakwater", "groyne", "jetty", "dyke", "embankment", "pontoon",
+        "mooring", "dolphin", "reef", "wharf",
+    },
+    "natural": {"coastline", "reef", "cliff", "rock", "bare_rock"},
+    "waterway": {"dam", "weir", "lock_gate"},
+    "seamark:type": {
+        "shoreline_construction", "pontoon", "obstruction", "mooring", "bridge", "gate",
+        "floating_barrier", "causeway", "dyke", "wreck", "rock", "platform", "pile", "hulk",
+        "marine_farm", "fishing_facility",
+    },
+    "mooring": {"yes", "commercial", "wall", "private", "ferry", "cruise", "pile", "dolphin"},
+    "floating": {"yes"},
+    "barrier": {"wall", "fence", "retaining_wall", "boom", "net"},
+    "bridge": {"yes", "movable", "viaduct"},
+}  # fmt: skip
+"""Tags of OpenStreetMap's lines that a tether may catch on: key to values."""
+
+PATH_LINES = {
+    "route": {"ferry"},
+    "power": {"cable"},
+    "communication": {"line", "cable"},
+    "man_made": {"pipeline"},
+    "seamark:type": {
+        "cable_submarine", "cable_overhead", "pipeline_submarine", "ferry_route", "fairway",
+        "navigation_line", "recommended_track", "recommended_route_centreline",
+        "separation_boundary", "separation_line", "depth_contour",
+    },
+}  # fmt: skip
+"""Tags of OpenStreetMap's lines that a tether passes: key to values."""
+
+WATER_AREAS = {
+    "natural": {"water", "bay", "strait"},
+    "water": {"harbour", "basin", "lagoon", "river", "lake", "reservoir"},
+    "place": {"sea", "ocean"},
+    "leisure": {"marina"},
+    "landuse": {"harbour", "port", "basin"},
+    "seamark:type": {
+        "harbour", "harbour_basin", "anchorage", "restricted_area", "depth_area", "fairway",
+        "dredged_area", "sea_area", "military_area", "dumping_ground", "cable_area",
+        "pipeline_area", "precautionary_area", "separation_zone",
+    },
+}  # fmt: skip
+"""Tags of OpenStreetMap's areas of open water: key to values."""
+
+LAYER_SUFFIX = re.compile(r"(\s*\(#\d+\)|\.(kml|kmz|dxf|shp|gpkg|geojson|csv|tab|mif|gml|fgb))+$")
+"""Ends of layers' names that say nothing of their kind: GDAL's numbers, extensions of files."""
 
 RADIUS = ("radius_m", "radius")
+WIDTH = ("width_m", "width")
 DEPTH = ("depth_m", "depth")
 NAME = ("name", "objnam", "label")
 
 FIELDS = {
-    "name": NAME, "radius": RADIUS, "depth": DEPTH, "tether_length": ("tether_length",),
-    "clearance": ("clearance",), "heading": ("heading",),
+    "name": NAME, "radius": RADIUS, "width": WIDTH, "depth": DEPTH,
+    "tether_length": ("tether_length",), "clearance": ("clearance",), "heading": ("heading",),
 }  # fmt: skip
-"""Properties that `--map` may take from others."""
+"""Properties of the contract, and the names that they have in files; `--map` adds others."""
 
 
 def words_of(maps: Sequence[tuple[str, str]]) -> tuple[dict[str, str], dict[str, str]]:
@@ -90,22 +182,42 @@ def words_of(maps: Sequence[tuple[str, str]]) -> tuple[dict[str, str], dict[str,
     return kinds, fields
 
 
-def kind_of(feature: Feature, kinds: Mapping[str, str], *, chart: bool) -> str:
-    """What a feature is.
+SHAPE_LAYERS = {"points": "Point", "lines": "Line", "polygons": "Polygon"}
+"""Words that stand for all features of a shape in ``--map``, where no layer has that name."""
+
+
+@dataclass(frozen=True)
+class Decision:
+    """Kind of a feature, and for one that is left out the reason.
+
+    Attributes
+    ----------
+    kind
+        One of `KINDS`; ``ignore`` for a feature that is left out.
+    reason
+        Why it is left out; empty for the other kinds.
+    """
+
+    kind: str
+    reason: str = ""
+
+
+def kind_of(feature: Feature, kinds: Mapping[str, str], *, chart: bool) -> Decision:
+    """Decide what a feature is.
 
     Parameters
     ----------
     feature : Feature
         The feature.
     kinds : mapping
-        Layer, lower case, to kind, as the user says.
+        Layer or a word of `SHAPE_LAYERS`, lower case, to kind, as the user says.
     chart : bool
         Whether the map is an S-57 chart, of which only known object classes count.
 
     Returns
     -------
-    str
-        One of `KINDS`.
+    Decision
+        Kind or reason. An open line may be an obstacle: it needs a width.
 
     Raises
     ------
@@ -114,51 +226,93 @@ def kind_of(feature: Feature, kinds: Mapping[str, str], *, chart: bool) -> str:
     """
     shape = feature.shape.geom_type
     said = feature.get("kind")
-    if feature.layer.lower() in kinds:
-        kind = kinds[feature.layer.lower()]
+    names = [name.strip().lower() for name in (feature.layer, *feature.folders)]
+    asked = next((kinds[name] for name in names if name in kinds), None)
+    word = next((WORDS[w] for name in names for w in words_in(name) if w in WORDS), None)
+    by_shape = next((kinds[w] for w, s in SHAPE_LAYERS.items() if w in kinds and s in shape), None)
+    if asked is not None:
+        decision = Decision(asked, "as asked for")
+    elif by_shape is not None:
+        decision = Decision(by_shape, "as asked for")
     elif said is not None:
-        kind = said if isinstance(said, str) else ""
-    elif feature.layer.lower() in WORDS:
-        kind = WORDS[feature.layer.lower()]
+        decision = Decision(said if isinstance(said, str) else "", "its kind is ignore")
+    elif word is not None:
+        decision = Decision(word, "its layer is named ignore")
+    elif feature.kind:
+        decision = Decision(feature.kind)
     elif chart:
-        kind = "obstacle" if feature.layer in CHART else "ignore"
-        if kind == "obstacle" and shape not in SHAPES[kind]:
-            kind = "ignore"
+        of_chart = chart_kind(feature)
+        decision = Decision(of_chart.kind, of_chart.reason)
     else:
-        kind = _by_shape(feature, shape)
+        decision = _by_tags(feature, shape) or _by_shape(feature, shape)
+    kind = decision.kind
     if kind == "ignore":
-        return kind
+        return decision
     if kind not in KINDS:
         raise InputError(
             f"{feature.where}: expected a kind of {', '.join(KINDS)}, got {shape!r} of kind "
             f"{shown(said)}"
         )
-    if shape not in SHAPES[kind]:
+    if shape not in SHAPES[kind] and (feature.marker is None or "Point" not in SHAPES[kind]):
         article = "an" if kind[0] in "aeiou" else "a"
         raise InputError(
             f"{feature.where}: {article} {kind} cannot be a {shape}; expected "
             f"{' or '.join(SHAPES[kind])}"
         )
-    if kind in ("obstacle", "bounds") and "Line" in shape and not feature.shape.is_closed:
-        if said is None and kind == "obstacle" and feature.layer.lower() in WORDS:
-            return "ignore"
-        raise InputError(
-            f"{feature.where}: a {shape} of kind {kind} that is not closed; expected a closed line "
-            "or a polygon"
-        )
-    return kind
+    return Decision(kind)
 
 
-def _by_shape(feature: Feature, shape: str) -> str:
-    """Polygons are obstacles, points goals unless they have a radius or a tag of what stands in the
-    water, lines paths."""
-    if "Polygon" in shape:
-        return "obstacle"
+def is_coastline(feature: Feature) -> bool:
+    """Return whether a feature is a coastline of OpenStreetMap, which has land on its left."""
+    return str(feature.get("natural")).lower() == "coastline"
+
+
+def words_in(name: str) -> tuple[str, ...]:
+    """Return the words of a layer's name that may say its kind, the nearest folder first.
+
+    Parameters
+    ----------
+    name : str
+        Name in lower case, as ``piles (#2)``: GDAL's name for a second layer ``piles``; or a path
+        of folders, as ``piles/north``.
+
+    Returns
+    -------
+    tuple of str
+        Words.
+
+    Examples
+    --------
+    >>> words_in("piles (#2)"), words_in("piles/north")
+    (('piles',), ('piles/north', 'north', 'piles'))
+    """
+    whole = _bare_name(name)
+    parts = [_bare_name(part) for part in whole.split("/")]
+    return (whole,) if len(parts) == 1 else (whole, *reversed(parts))
+
+
+def _bare_name(name: str) -> str:
+    """Return a name without the number of a second layer and the extension of a file."""
+    return LAYER_SUFFIX.sub("", name.strip())
+
+
+def _by_tags(feature: Feature, shape: str) -> Decision | None:
+    """Decide by tags of OpenStreetMap; None where none of them is known."""
+
+    def has(tags: Mapping[str, set[str]]) -> bool:
+        return any(str(feature.get(key)).lower() in values for key, values in tags.items())
+
+    if "Point" in shape:
+        return Decision("obstacle") if has(STANDING_POINTS) or has(STANDING_LINES) else None
+    if has(STANDING_LINES):
+        return Decision("obstacle")
     if "Line" in shape:
-        return "path"
-    standing = (
-        feature.get(*RADIUS) is not None
-        or str(feature.get("seamark:type")) in STANDING
-        or feature.get("seamark:landmark:category") == "windmotor"
-    )
-    return "obstacle" if standing else "goal"
+        return Decision("path") if has(PATH_LINES) else None
+    return Decision("ignore", "an area of water") if has(WATER_AREAS) else None
+
+
+def _by_shape(feature: Feature, shape: str) -> Decision:
+    """Decide by the shape: polygons and lines are obstacles, points goals without a radius."""
+    if "Point" not in shape:
+        return Decision("obstacle")
+    return Decision("obstacle" if feature.get(*RADIUS) is not None else "goal")

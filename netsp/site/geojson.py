@@ -3,19 +3,28 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from netsp.errors import InputError
 from netsp.files import read_text
 from netsp.models import parse_json_object, shown
-from netsp.site.feature import Feature, Map
+from netsp.site.feature import Feature, Map, Unread
+
+if TYPE_CHECKING:
+    import shapely
 
 SHAPES = {
     "Point": 0, "MultiPoint": 1, "LineString": 1, "MultiLineString": 2, "Polygon": 2,
     "MultiPolygon": 3,
 }  # fmt: skip
 """How deep the positions lie in the lists of coordinates."""
+
+COLLECTION = "GeometryCollection"
+
+MAX_NESTING = 8
+"""Collections within collections that are read; RFC 7946 (3.1.8) advises against any."""
 
 
 def read_geojson(file: str | Path, crs: str | None) -> Map:
@@ -39,25 +48,46 @@ def read_geojson(file: str | Path, crs: str | None) -> Map:
         Not GeoJSON, or it names another coordinate system than WGS 84.
     """
     data = parse_json_object(read_text(file), str(file))
-    features = data.get("features")
-    if data.get("type") != "FeatureCollection" or not isinstance(features, list):
-        raise InputError(f"{file}: expected a GeoJSON FeatureCollection")
+    features = _features_of(data)
+    if features is None:
+        raise InputError(f"{file}: expected a GeoJSON FeatureCollection, Feature or geometry")
     own = data.get("crs")
     if crs is None and own is not None and not _is_wgs84(own):
         raise InputError(
             f"{file}: crs: expected WGS 84 as RFC 7946 has it, got {json.dumps(own)[:120]}; give "
             "another with --crs"
         )
-    found, complaints = [], []
+    found: list[Feature] = []
+    unread: list[Unread] = []
+    complaints = []
     for k, feature in enumerate(features):
+        where = f"features[{k}]"
         try:
-            read = _feature(feature, f"features[{k}]", degrees=crs is None)
+            found += _feature(feature, where, degrees=crs is None)
+        except _NowhereError as error:
+            unread.append(Unread(where, "", str(error)))
         except InputError as error:
             complaints.append(f"{file}: {error}")
-        else:
-            if read is not None:
-                found.append(read)
-    return Map(tuple(found), True, {"": len(features)}, tuple(complaints))
+    # the parts of a GeometryCollection count as features of their own
+    count = len({f.where for f in found}) + len(unread) + len(complaints)
+    return Map(tuple(found), True, {"": count}, tuple(complaints), unread=tuple(unread))
+
+
+class _NowhereError(Exception):
+    """A feature that is nowhere, which RFC 7946 allows; the text is the reason."""
+
+
+def _features_of(data: dict[str, Any]) -> list[Any] | None:
+    """Return the features of a GeoJSON object of any type; None if it is none."""
+    kind = data.get("type")
+    if kind == "FeatureCollection":
+        features = data.get("features")
+        return features if isinstance(features, list) else None
+    if kind == "Feature":
+        return [data]
+    if isinstance(kind, str) and (kind in SHAPES or kind == COLLECTION):
+        return [{"type": "Feature", "geometry": data, "properties": {}}]
+    return None
 
 
 def _is_wgs84(crs: Any) -> bool:
@@ -65,22 +95,55 @@ def _is_wgs84(crs: Any) -> bool:
     return "CRS84" in text or "4326" in text
 
 
-def _feature(data: Any, where: str, *, degrees: bool) -> Feature | None:
-    """A feature; None if it is nowhere, which RFC 7946 allows."""
-    import shapely
-    from shapely.geometry import shape
-
+def _feature(data: Any, where: str, *, degrees: bool) -> list[Feature]:
+    """Return a feature, or one for each part of a GeometryCollection."""
     if not isinstance(data, dict) or "geometry" not in data:
         raise InputError(f"{where}: expected a feature with a geometry")
     geometry, properties = data["geometry"], data.get("properties") or {}
     if geometry is None:
-        return None
+        raise _NowhereError("has no geometry")
     if not isinstance(geometry, dict) or not isinstance(properties, dict):
         raise InputError(f"{where}: expected an object as geometry and as properties")
+    identity = data.get("id")
+    named = "" if identity is None else str(identity)
+    parts = list(_parts(geometry, where))
+    if not parts:
+        raise _NowhereError("is an empty collection of geometries")
+    return [
+        Feature(place, "", named, properties, _shape(part, place, degrees=degrees))
+        for place, part in parts
+    ]
+
+
+def _parts(geometry: dict[str, Any], where: str, depth: int = 0) -> Iterator[tuple[str, Any]]:
+    """Yield the geometries of a collection, with what messages call them."""
+    if geometry.get("type") != COLLECTION:
+        yield where, geometry
+        return
+    inner = geometry.get("geometries")
+    if not isinstance(inner, list) or depth >= MAX_NESTING:
+        raise InputError(
+            f"{where}: expected a list of geometries, nested at most {MAX_NESTING} times"
+        )
+    for k, part in enumerate(inner):
+        place = f"{where}.geometries[{k}]"
+        if not isinstance(part, dict):
+            raise InputError(f"{place}: expected a geometry, got {shown(part)}")
+        yield from _parts(part, place, depth + 1)
+
+
+def _shape(geometry: dict[str, Any], where: str, *, degrees: bool) -> shapely.Geometry:
+    import shapely
+    from shapely.geometry import shape
+
     kind = geometry.get("type")
     coordinates: Any = geometry.get("coordinates")
     if not isinstance(kind, str) or kind not in SHAPES:
-        raise InputError(f"{where}: expected a {', '.join(SHAPES)}, got {shown(kind)}")
+        raise InputError(
+            f"{where}: expected a {', '.join((*SHAPES, COLLECTION))}, got {shown(kind)}"
+        )
+    if coordinates == []:  # RFC 7946, 3.1: an empty list is a geometry without places
+        raise _NowhereError("has no coordinates")
     _check(coordinates, SHAPES[kind], kind, where, degrees=degrees)
     if kind.endswith("Polygon"):
         for rings in coordinates if kind == "MultiPolygon" else [coordinates]:
@@ -92,11 +155,9 @@ def _feature(data: Any, where: str, *, degrees: bool) -> Feature | None:
             if len(line) < 2:
                 raise InputError(f"{where}: expected a line of two positions or more")
     try:
-        made = shape({"type": kind, "coordinates": _same_size(coordinates)})
+        return shape({"type": kind, "coordinates": _same_size(coordinates)})
     except (ValueError, TypeError, shapely.errors.ShapelyError) as error:
         raise InputError(f"{where}: not a {kind}: {str(error).splitlines()[0]}") from None
-    identity = data.get("id")
-    return Feature(where, "", "" if identity is None else str(identity), properties, made)
 
 
 def _check(coordinates: Any, depth: int, kind: str, where: str, *, degrees: bool) -> None:

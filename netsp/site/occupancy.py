@@ -1,8 +1,9 @@
 """Occupancy images, as ROS's map server writes them: a picture of cells, and a few lines of YAML.
 
 A pixel's value v becomes the probability p = (255 - v) / 255 that its cell is occupied (v / 255 if
-`negate`); above `occupied_thresh` it is, below `free_thresh` it is free, between it is unknown
-(map_server's "trinary" mode; docs.ros.org, nav2_map_server).
+`negate`); above `occupied_thresh` it is, below `free_thresh` it is free, between it is unknown.
+In the mode "trinary" an alpha channel is averaged in as if it were a colour, in the mode "scale" a
+cell that is not opaque is unknown (docs.ros.org, nav2_map_server, `MapMode`).
 """
 
 from __future__ import annotations
@@ -56,6 +57,9 @@ class MapFile(Model):
         tuple[Number, Number, Number],
         Field(description="x, y (m) of the lower left corner, and its rotation (radians)"),
     ] = (0.0, 0.0, 0.0)
+    mode: Annotated[
+        Literal["trinary", "scale"], Field(description="meaning of values and of transparency")
+    ] = "trinary"
     negate: Annotated[Literal[0, 1], Field(description="whether white is occupied")] = 0
     occupied_thresh: Annotated[
         Number, Field(description="probability from which a cell is occupied", ge=0, le=1)
@@ -120,9 +124,17 @@ def read_occupancy(
         raise InputError(
             f"--tolerance: expected at least a tenth of the cell of {cell:g} m, got {slack:g}"
         )
-    values = _values(image)
-    occupied, unknown = _kinds(values, said)
+    values, alpha = _values(image)
     note = on_note or (lambda text: None)
+    occupied, unknown = _kinds(values, alpha, said)
+    if alpha is not None:
+        clear = counted(int((alpha < 255.0).sum()), "cell")
+        note(
+            f"{clear} not opaque: unknown, as map_server reads the mode scale"
+            if said.mode == "scale"
+            else f"its alpha channel is averaged in, as map_server reads the mode trinary; {clear} "
+            "not opaque"
+        )
     if unknown.any():
         taken = "free" if unknown_is_free else "obstacles"
         note(f"{counted(int(unknown.sum()), 'cell')} that the map does not know: taken as {taken}")
@@ -179,7 +191,7 @@ def _opened(file: str | Path, resolution: float | None) -> tuple[MapFile, Path]:
     if data.get("mode") == "raw":
         raise InputError(f"{file}: mode: expected trinary or scale, got 'raw'")
     own = {
-        k: v if k == "image" else _numbers(v)
+        k: v if k in ("image", "mode") else _numbers(v)
         for k, v in data.items() if k in MapFile.model_fields
     }  # fmt: skip
     try:
@@ -216,8 +228,9 @@ def _rasterio() -> Any:
     return rasterio
 
 
-def _values(image: Path) -> Floats:
-    """(rows, columns) of the image from 0 (black) to 255, its first row at the top."""
+def _values(image: Path) -> tuple[Floats, Floats | None]:
+    """Return the means of the colours, (rows, columns) from 0 (black) to 255, the first row at the
+    top, and how opaque each cell is, from 0 to 255; None where all are."""
     check_file(image)
     from PIL import Image, UnidentifiedImageError
 
@@ -235,7 +248,9 @@ def _values(image: Path) -> Floats:
                         f"{image}: pixels of kind {opened.mode!r}; expected grey or colours of 8 "
                         "or 16 bits"
                     )
-                if opened.mode == "P":
+                if "transparency" in opened.info and opened.mode in ("1", "L", "P", "RGB"):
+                    values = np.asarray(opened.convert("RGBA"))
+                elif opened.mode == "P":
                     values = np.asarray(opened.convert("RGB"))
                 else:
                     values = np.asarray(opened)
@@ -244,19 +259,28 @@ def _values(image: Path) -> Floats:
     except (OSError, ValueError, SyntaxError) as error:
         raise InputError(f"{image}: not a whole image: {shown(str(error))}") from None
     if values.dtype == bool:
-        return np.where(values, 255.0, 0.0)
+        return np.where(values, 255.0, 0.0), None
     # pictures of 16 bits are opened as whole numbers of 32
-    most = 255.0 if values.dtype == np.uint8 else 65535.0
+    largest = 255.0 if values.dtype == np.uint8 else 65535.0
+    alpha = None
     if values.ndim == 3:  # the last of two or four channels is how opaque they are
+        if values.shape[2] in (2, 4):
+            alpha = values[:, :, -1].astype(float)
         values = values[:, :, : 3 if values.shape[2] >= 3 else 1].mean(axis=2)
-    return np.asarray(values * (255.0 / most))
+    return np.asarray(values * (255.0 / largest)), alpha
 
 
-def _kinds(values: Floats, said: MapFile) -> tuple[Bools, Bools]:
-    """Which cells are occupied, and which unknown."""
+def _kinds(values: Floats, alpha: Floats | None, said: MapFile) -> tuple[Bools, Bools]:
+    """Return which cells are occupied, and which unknown."""
+    if alpha is not None and said.mode == "trinary":
+        values = (3.0 * values + alpha) / 4.0  # a grey is three equal colours
     p = values / 255.0 if said.negate else 1.0 - values / 255.0
     occupied = p > said.occupied_thresh
-    return occupied, ~occupied & (p >= said.free_thresh)
+    unknown = ~occupied & (p >= said.free_thresh)
+    if alpha is not None and said.mode == "scale":
+        clear = alpha < 255.0
+        occupied, unknown = occupied & ~clear, unknown | clear
+    return occupied, unknown
 
 
 def _placing(said: MapFile, rows: int) -> tuple[float, ...]:

@@ -6,8 +6,6 @@ stay as they are.
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import math
 from collections.abc import Mapping, Sequence
@@ -18,21 +16,14 @@ from typing import Any
 import numpy as np
 
 from netsp.arrays import Floats
+from netsp.axes import read_path, read_table
 from netsp.errors import InputError
 from netsp.fields import LARGEST
-from netsp.files import read_gzip, read_path, read_text
+from netsp.files import read_text
 from netsp.models import parse_json_object, shown
 from netsp.problem import Problem
 from netsp.site.gpx import read_gpx, seconds_of
 from netsp.site.projection import Projection
-
-COLUMNS = {
-    "x": "x", "y": "y", "z": "z", "height": "z", "alt": "z", "altitude": "z", "ele": "z",
-    "elevation": "z", "depth": "depth", "down": "depth", "lon": "lon", "lng": "lon", "long": "lon",
-    "longitude": "lon", "lat": "lat", "latitude": "lat", "t": "t", "time": "t", "seconds": "t",
-    "time_s": "t",
-}  # fmt: skip
-"""Names of columns in lower case, with the quantity that each holds; a depth is a negative z."""
 
 ENDINGS = (".csv", ".csv.gz", ".txt", ".json", ".geojson", ".gpx")
 """Endings of files with paths."""
@@ -136,53 +127,43 @@ def _of_gpx(file: str | Path, problem: Problem, stem: str) -> list[FoundPath]:
 
 
 def _of_table(file: str | Path, problem: Problem, stem: str) -> FoundPath:
-    if str(file).lower().endswith(".gz"):
-        try:
-            text = read_gzip(file).decode("utf-8-sig")
-        except UnicodeDecodeError:
-            raise InputError(f"{file}: not a text file in UTF-8") from None
-    else:
-        text = read_text(file).removeprefix("\ufeff")
-    first = text.lstrip().splitlines()[:1]
-    delimiter = ";" if first and ";" in first[0] else "\t" if first and "\t" in first[0] else ","
+    wanted = "columns x, y or lon, lat"
     try:
-        rows = list(csv.reader(io.StringIO(text, newline=""), delimiter=delimiter))
-    except csv.Error as error:
-        raise InputError(f"{file}: {error}") from None
-    numbered = [(k, row) for k, row in enumerate(rows, 1) if any(cell.strip() for cell in row)]
-    if not numbered:
-        raise InputError(f"{file}: expected columns x, y or lon, lat, got nothing")
-    head = [cell.strip().lower() for cell in numbered[0][1]]
-    if any(_is_number(cell) for cell in head):
-        points = read_path(file) if not str(file).lower().endswith(".gz") else None
+        table = read_table(file, positional=("x", "y", "z"))
+    except InputError as error:
+        if str(error).endswith("got nothing"):
+            raise InputError(f"{file}: expected {wanted}, got nothing") from None
+        raise
+    if not table.head:
+        points = read_path(file)
         if points is None:
-            raise InputError(f"{file}: expected names of columns in the first line")
+            raise InputError(f"{file}: expected {wanted}")
         return FoundPath(stem, points)
-    where = {COLUMNS[name]: k for k, name in reversed(list(enumerate(head))) if name in COLUMNS}
-    if {"x", "y"} <= where.keys():
-        plan = ("x", "y")
-    elif {"lon", "lat"} <= where.keys():
-        plan = ("lon", "lat")
-    else:
-        raise InputError(f"{file}: expected columns x, y or lon, lat, got {shown(', '.join(head))}")
-    up = next((name for name in ("z", "depth") if name in where), None)
+    plane = table.pair((("x", "y"), ("longitude", "latitude")))
+    if plane is None:
+        raise table.wanted(wanted)
+    up = table.height()
+    quantities = [*plane, up] if up else [*plane]
     values: list[list[float]] = []
     times: list[float] = []
-    for number, row in numbered[1:]:
-        cells = {name: row[k].strip() if k < len(row) else "" for name, k in where.items()}
-        wanted = [*plan, *([up] if up else [])]
-        if all(cells[name].lower() in ("", "nan") for name in plan):
+    for k, number in enumerate(table.lines):
+        if all(table.text(k, name).lower() in ("", "nan") for name in plane):
             continue  # a gap of the recording
         place = f"{file}: line {number}, point {len(values)}"
-        values.append([_number(cells[name], f"{place}: {name}") for name in wanted])
-        if "t" in where:
-            times.append(_seconds(cells["t"], f"{place}: t"))
+        values.append([
+            _number(table.plain(k, name), f"{place}: {table.title(name)}")
+            * table.columns[name][1].factor + 0.0
+            for name in quantities
+        ])  # fmt: skip
+        if "time" in table:
+            seconds = _seconds(table.plain(k, "time"), f"{place}: {table.title('time')}")
+            times.append(seconds * table.columns["time"][1].factor)
     if len(values) < 2:
         raise InputError(f"{file}: expected a path of at least 2 points, got {len(values)}")
     points = np.array(values)
-    if up == "depth":
-        points[:, 2] *= -1.0
-    if plan == ("lon", "lat"):
+    if up == "z":
+        table.check_depths(points[:, 2])
+    if plane == ("longitude", "latitude"):
         wrong = np.flatnonzero((np.abs(points[:, 0]) > 180.0) | (np.abs(points[:, 1]) > 90.0))
         if len(wrong):
             raise InputError(

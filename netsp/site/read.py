@@ -1,41 +1,94 @@
-"""A problem from a map, by the contract of docs/sites.md. All that is wrong is told at once."""
+"""Import of a problem from a map, by the contract of docs/sites.md.
+
+All that is wrong is told at once, and every feature of the map ends in the ledger: used as one
+kind, or left out for a reason.
+"""
 
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from pydantic import ValidationError
 
 from netsp import steps
-from netsp.errors import InputError, SeveralErrors, counted
+from netsp.axes import UNITS, column
+from netsp.errors import InputError, UnansweredError, counted
 from netsp.fields import checked_number
+from netsp.import_record import KIND_COLUMNS, MAX_NAMED, CropCircle, Site, UsedAs
 from netsp.models import explain, shown
 from netsp.problem import Problem
-from netsp.site.contract import FIELDS, RADIUS, kind_of, words_of
+from netsp.site.chart_classes import EQUIPMENT, chart_radius, chart_width, lone_equipment
+from netsp.site.chart_depths import chart_floor, shallow_areas
+from netsp.site.contract import (
+    FIELDS,
+    RADIUS,
+    SHAPE_LAYERS,
+    WIDTH,
+    Decision,
+    is_coastline,
+    kind_of,
+    words_of,
+)
+from netsp.site.crop import CropWindow, cropped
+from netsp.site.drawing import read_dxf
 from netsp.site.feature import Feature, Map
 from netsp.site.geojson import read_geojson
-from netsp.site.options import UNITS, SiteOptions
+from netsp.site.kml_pages import read_kml
+from netsp.site.ledger import Ledger
+from netsp.site.line_work import is_land, lines_of, outlines, widened
+from netsp.site.options import SiteOptions
 from netsp.site.projection import Projection
-from netsp.site.shapes import circle_of, simple_polygons
+from netsp.site.sea_floor import SeaFloor
+from netsp.site.shapes import outline_of, simple_polygons, spurs_of
+from netsp.site.table import from_table
 from netsp.site.vector import in_degrees, read_vector
 
 if TYPE_CHECKING:
     import shapely
 
-CHART = (".000",)
+CHART_SUFFIXES = (".000",)
 """Extensions of S-57 charts."""
 
+MAX_NAME = 200
+"""Characters of a file's name that a problem keeps."""
 
-def read_site(
+
+@dataclass(frozen=True)
+class ImportedSite:
+    """Problem of a map, with what was left out of it.
+
+    Attributes
+    ----------
+    problem
+        The problem; its `site` records what became of every feature.
+    left_out
+        Shapes of the features that were left out, in the problem's plane, for the picture.
+    notes
+        What was assumed, changed or left out, one line each.
+    viewpoints
+        Names of the goals that stand for obstacles to be looked at.
+    floor
+        The sea floor, where one was asked for.
+    """
+
+    problem: Problem
+    left_out: tuple[shapely.Geometry, ...]
+    notes: tuple[str, ...]
+    viewpoints: frozenset[str] = frozenset()
+    floor: SeaFloor | None = None
+
+
+def import_site(
     file: str | Path, projection: Projection | None = None, *, options: SiteOptions | None = None,
-    name: str | None = None, on_note: Callable[[str], None] | None = None, **more: Any,
-) -> Problem:  # fmt: skip
-    """The problem of a map, in metres from its base, y to the projection's heading.
+    name: str | None = None,
+) -> ImportedSite:  # fmt: skip
+    """Import the problem of a map, in metres from its base, y to the projection's heading.
 
     Parameters
     ----------
@@ -44,17 +97,13 @@ def read_site(
     projection : Projection, optional
         About the base; None takes the map's own base, y to its heading or to the north.
     options : SiteOptions, optional
-        What is said besides; its fields may be given by name instead.
+        What the user says of the map.
     name : str, optional
-        Of the problem; default: the file's.
-    on_note : callable, optional
-        Called with what was changed or left out, one line each.
-    **more
-        Fields of `SiteOptions`.
+        Name of the problem; default: the file's.
 
     Returns
     -------
-    Problem
+    ImportedSite
         The problem; where the map has a place on the earth, with its origin.
 
     Raises
@@ -62,27 +111,65 @@ def read_site(
     InputError
         Not readable, or not a site: `SeveralErrors` where more than one thing is wrong.
     """
-    said = options or SiteOptions(**more)
-    if said.units not in UNITS:
+    said = options or SiteOptions()
+    if said.units is not None and said.units not in UNITS:
         raise InputError(f"units: expected one of {', '.join(UNITS)}, got {shown(said.units)}")
     kinds, fields = words_of(said.maps)
-    found = read_map(file, said.crs)
+    found = read_map(file, said.crs, said.units)
     for layer in kinds:
-        if layer not in {k.lower() for k in found.layers}:
+        if layer not in found.layer_names and layer not in SHAPE_LAYERS:
             raise InputError(
                 f"--map: {file} has no layer {layer!r}; it has "
                 f"{', '.join(k or 'no layers' for k in found.layers)}"
             )
     site = _Site(file, found, said, kinds, fields, projection)
     problem = site.problem(name or Path(file).stem)
-    for note in (*found.notes, *site.notes):
-        if on_note is not None:
+    assert problem.site is not None
+    notes = (*found.notes, *site.notes, *problem.site.notes)
+    viewpoints = frozenset(site.viewpoints)
+    return ImportedSite(problem, site.left_out(), notes, viewpoints, site.floor)
+
+
+def read_site(
+    file: str | Path, projection: Projection | None = None, *, options: SiteOptions | None = None,
+    name: str | None = None, on_note: Callable[[str], None] | None = None, **more: Any,
+) -> Problem:  # fmt: skip
+    """Return the problem of a map, as `import_site`.
+
+    Parameters
+    ----------
+    file : str or Path
+        The map.
+    projection : Projection, optional
+        About the base.
+    options : SiteOptions, optional
+        What the user says of the map; its fields may be given by name instead.
+    name : str, optional
+        Name of the problem.
+    on_note : callable, optional
+        Called with what was assumed, changed or left out, one line each.
+    **more
+        Fields of `SiteOptions`.
+
+    Returns
+    -------
+    Problem
+        The problem; its `site` records what became of every feature.
+
+    Raises
+    ------
+    InputError
+        As of `import_site`.
+    """
+    found = import_site(file, projection, options=options or SiteOptions(**more), name=name)
+    if on_note is not None:
+        for note in found.notes:
             on_note(f"{file}: {note}")
-    return problem
+    return found.problem
 
 
-def read_map(file: str | Path, crs: str | None = None) -> Map:
-    """A map of any format.
+def read_map(file: str | Path, crs: str | None = None, units: str | None = None) -> Map:
+    """Return a map of any format.
 
     Parameters
     ----------
@@ -90,25 +177,35 @@ def read_map(file: str | Path, crs: str | None = None) -> Map:
         The file; its extension tells GeoJSON from the others.
     crs : str, optional
         Coordinate system, ``local`` for a plane.
+    units : str, optional
+        Unit of lengths that the user says; None takes the file's.
 
     Returns
     -------
     Map
-        What it holds.
+        Features, and what could not be read.
 
     Raises
     ------
     InputError
         Not readable.
     """
-    if Path(file).suffix.lower() not in (".geojson", ".json"):
+    suffix = Path(file).suffix.lower()
+    if suffix == ".dxf":
+        return read_dxf(file, crs, units)
+    if suffix in (".kml", ".kmz"):
+        found = read_kml(file, crs)
+    elif suffix in (".geojson", ".json"):
+        found = read_geojson(file, crs)
+    else:
         return read_vector(file, crs)
-    found = read_geojson(file, crs)
     return found if crs is None else in_degrees(found, crs, file)
 
 
 DEGREES = 0.01
 """Of the tether's length: a plane that spans less is taken for one of degrees."""
+
+SKIP_OPTION = "; leave out what is out of reach with --skip-unreachable"
 
 MOST_OF_A_KIND = 5
 """Goals out of reach that are told one by one."""
@@ -124,12 +221,29 @@ class _Site:
     kinds: dict[str, str]
     fields: dict[str, str]
     projection: Projection | None
-    complaints: list[str] = field(default_factory=list)
+    complaints: list[tuple[str, str]] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    asks: list[str] = field(default_factory=list)
+    cropped: CropCircle | None = None
+    window: CropWindow | None = None
+    viewpoints: list[str] = field(default_factory=list)
+    floor: SeaFloor | None = None
+
+    def __post_init__(self) -> None:
+        self.is_chart = Path(self.file).suffix.lower() in CHART_SUFFIXES
+        for name, value in (("draught", self.said.draught), ("floor", self.said.floor or None)):
+            if value is not None and not self.is_chart:
+                raise InputError(
+                    f"{name}: expected a chart (S-57, .000), whose depths are known, got "
+                    f"{self.file}"
+                )
+        self.ledger = Ledger(self.map.layers)
+        self.beyond: dict[str, Feature] = {}
+        self.cut_off: set[str] = set()
 
     def problem(self, name: str) -> Problem:
-        """The problem, or all complaints."""
-        self.complaints += self.map.complaints
+        """Return the problem, or raise all complaints."""
+        self.complaints += [(text, "") for text in self.map.complaints]
         parts = self._parts()
         base = self._base(parts)
         if base is None:
@@ -138,20 +252,29 @@ class _Site:
         tether = self._length(own, "tether_length", self.said.tether)
         if tether is None:
             self._complain(
-                "has no tether length; expected tether_length of the base, or one besides "
-                "(--tether)"
+                "has no tether length; expected tether_length of the base",
+                ", or one besides (--tether)",
+                "tether",
             )
         clearance = self._length(own, "clearance", self.said.clearance) or 0.0
-        goals = self._goals(parts["goal"])
-        obstacles = self._obstacles(parts["obstacle"], [anchor, *(g["position"] for g in goals)])
-        goals += self._inspections(obstacles)
-        self._check_names(goals, "goals")
-        self._check_names(obstacles, "obstacles")
-        if not goals and not self.complaints:
-            self._complain(
-                "has no goal: a point without radius_m, a layer of goals (--map goal=LAYER), or "
-                "obstacles to inspect (--inspect)"
+        goals = self._goals(parts["goal"]) + self._table_goals()
+        candidates = [place for _, place in self._table_places("candidate", self.said.candidates)]
+        if tether is not None and (self.is_chart if self.said.crop is None else self.said.crop):
+            self.window = CropWindow.about(
+                [anchor, *candidates], tether + clearance, self.said.crop_margin
             )
+        if self.is_chart:
+            self._chart_depths(parts)
+        free = [anchor, *candidates, *(g["position"] for g in goals)]
+        obstacles = self._within_crop(self._obstacles(parts["obstacle"], free))
+        self._check_names(obstacles, "obstacles")
+        goals += self._inspections(obstacles, anchor, tether, clearance)
+        self._check_names(goals, "goals")
+        self.viewpoints = [str(goal["name"]) for goal in goals if "layer" in goal]
+        if not goals and not self.complaints:
+            self._complain_of_no_goal()
+        elif not goals and self.said.looking is None:
+            self.asks.append("inspect")  # so that all is answered at once
         if tether is not None:
             self._check_scale(goals, obstacles, anchor, tether)
             goals = self._within_reach(goals, anchor, tether)
@@ -164,6 +287,10 @@ class _Site:
                 "goals": [_bare(g) for g in goals], "obstacles": [_bare(o) for o in obstacles],
                 "tether_length": tether, "clearance": clearance,
                 **({"bounds": bounds} if bounds else {}), **self._origin(),
+                "site": Site(
+                    file=Path(self.file).name[:MAX_NAME], imported=self.ledger.records(),
+                    cropped=self.cropped,
+                ),
             },
             goals, obstacles,
         )  # fmt: skip
@@ -185,26 +312,91 @@ class _Site:
     # What is what
 
     def _parts(self) -> dict[str, list[Feature]]:
-        chart = Path(self.file).suffix.lower() in CHART
-        parts: dict[str, list[Feature]] = {
-            k: [] for k in ("base", "goal", "obstacle", "bounds", "path", "ignore")
-        }
+        parts: dict[str, list[Feature]] = {k: [] for k in KIND_COLUMNS}
+        for unread in self.map.unread:
+            self.ledger.leave_out(unread, unread.reason)
         wrong: dict[str, list[str]] = {}
+        lone = lone_equipment(self.map.features) if self.is_chart else set()
         for feature in self.map.features:
             try:
-                parts[kind_of(feature, self.kinds, chart=chart)].append(feature)
+                decision = kind_of(feature, self.kinds, chart=self.is_chart)
             except InputError as error:
                 what = str(error).removeprefix(feature.where)
                 wrong.setdefault(what, []).append(feature.where)
+                continue
+            if decision.reason == EQUIPMENT and feature.where in lone:
+                decision = Decision("obstacle")
+            if decision.kind in parts:
+                kind = cast("UsedAs", decision.kind)
+                parts[kind].append(_marked(feature) if kind in ("base", "goal") else feature)
+                self.ledger.use(feature, kind)
+            else:
+                self.ledger.leave_out(feature, decision.reason)
         for what, places in wrong.items():  # as like as not the same slip in all of them
-            more = f" and {len(places) - 1} more" if len(places) > 1 else ""
-            self._complain(f"{places[0]}{more}{what}")
-        if parts["ignore"]:
-            self.notes.append(f"{counted(len(parts['ignore']), 'feature')} left out")
+            self._complain(f"{_first_of(places)}{what}")
         for layer, size in self.map.layers.items():
             if layer and not size:
                 self.notes.append(f"layer {layer!r} is empty")
         return parts
+
+    def _chart_depths(self, parts: dict[str, list[Feature]]) -> None:
+        """Make obstacles of shallow areas, and the sea floor, where they are asked for."""
+        left_out = [
+            f for f in self.map.features
+            if self.ledger.is_left_out(f) and f.layer.lower() not in self.kinds
+        ]  # fmt: skip
+        if self.said.draught is not None:
+            shallow = shallow_areas(left_out, self.said.draught)
+            for feature in shallow:
+                self.ledger.use(feature, "obstacle")
+            parts["obstacle"] += shallow
+        if not self.said.floor or self.complaints:
+            return
+        self.floor, found = chart_floor(
+            self.map.features, self._plane, self.window, self.said.floor_cell
+        )
+        for feature in found.used:  # a shallow area is an obstacle, too
+            if self.ledger.is_left_out(feature):
+                self.ledger.use(feature, "floor")
+        for feature in found.beyond:
+            if self.ledger.is_left_out(feature):
+                self.ledger.leave_out(feature, self._beyond_reach)
+        for feature in found.depthless:
+            self.ledger.leave_out(feature, "a depth that the chart does not give")
+
+    def _table_places(
+        self, kind: UsedAs, file: str | Path | None
+    ) -> list[tuple[Feature, tuple[float, float, float]]]:
+        """Return the rows of a table that was given besides, and their places in the plane."""
+        import shapely
+
+        if file is None:
+            return []
+        found, names = from_table(file, self.projection, self.notes.append)
+        places = np.column_stack([found, np.zeros(len(found))])[:, :3]  # at the surface without z
+        layer = self.ledger.add_layer(Path(file).name, len(places))
+        out = []
+        for k, (place, name) in enumerate(zip(places.tolist(), names, strict=True)):
+            # as the map's own features have it, in degrees or in its unit
+            at = (
+                tuple(self.projection.to_earth([place[:2]])[0][::-1])
+                if self.projection is not None
+                else (place[0] / self._unit, place[1] / self._unit)
+            )
+            row = Feature(f"{layer}[{k}]", layer, "", {"name": name}, shapely.Point(at))
+            self.ledger.use(row, kind)
+            out.append((row, (place[0], place[1], place[2])))
+        return out
+
+    def _table_goals(self) -> list[dict[str, Any]]:
+        return [
+            {"name": self._name(row), "position": place, "where": row.where, "source": row}
+            for row, place in self._table_places("goal", self.said.goals)
+        ]
+
+    def left_out(self) -> tuple[shapely.Geometry, ...]:
+        """Return the shapes that were left out, in the plane."""
+        return tuple(self._plane(shape) for shape in self.ledger.left_out_shapes)
 
     def _base(self, parts: dict[str, list[Feature]]) -> tuple[Any, Feature | None] | None:
         """Where the tether is fixed, and the feature that says so; sets the projection."""
@@ -225,8 +417,9 @@ class _Site:
             if own is None:
                 if not self.complaints:
                     self._complain(
-                        "has no base; expected a Point of kind base, or lat,lon given besides "
-                        "(--base)"
+                        "has no base; expected a Point of kind base",
+                        ", or lat,lon given besides (--base)",
+                        "base",
                     )
                 return None
             heading = self._number(own, "heading") or 0.0
@@ -243,7 +436,8 @@ class _Site:
 
     @property
     def _unit(self) -> float:
-        return UNITS[self.said.units]
+        """Metres of a unit of the file: the user's word outweighs the file's."""
+        return UNITS[self.said.units or self.map.unit or "m"]
 
     def _plane(self, shape: shapely.Geometry) -> Any:
         """A shape in metres in the problem's plane."""
@@ -261,21 +455,44 @@ class _Site:
         return (float(at.x), float(at.y), self._height(feature, point))
 
     def _height(self, feature: Feature, point: Any = None) -> float:
-        """z in metres: of a depth, else of the point itself."""
-        depth = self._number(feature, "depth")
+        """Return z in metres: of a depth, else of the point itself, whose height on the earth is
+        in metres by its format."""
+        depth = self._depth(feature)
         if depth is not None:
-            return -depth * self._unit
+            return 0.0 - depth
         at = point if point is not None else feature.shape
+        if feature.is_above_floor:
+            self._complain(
+                f"{self._called(feature)}: its height counts from the sea floor, which the map "
+                "does not have; expected a height above the water, or a depth"
+            )
+            return 0.0
         if at.geom_type != "Point" or not at.has_z or at.z != at.z:
             return 0.0
-        return float(at.z) * self._unit
+        return float(at.z) * (1.0 if self.map.geographic else self._unit)
+
+    def _depth(self, feature: Feature) -> float | None:
+        """Return the depth in metres that a property of a feature states; None without one."""
+        for name in [] if "depth" in self.fields else feature.properties:
+            if not str(name).lower().startswith("depth"):
+                continue
+            try:
+                meaning = column(str(name))
+            except InputError as error:
+                self._complain(f"{feature.where}: {error}")
+                return None
+            if meaning is not None and meaning.quantity == "z" and meaning.unit:
+                value = self._number(feature, "depth", str(name).lower())
+                return None if value is None else -meaning.factor * value
+        depth = self._number(feature, "depth")
+        return None if depth is None else depth * self._unit
 
     def _get(self, feature: Feature, ours: str) -> Any:
         mapped = self.fields.get(ours)
         return feature.get(mapped) if mapped is not None else feature.get(*FIELDS[ours])
 
-    def _number(self, feature: Feature, ours: str) -> float | None:
-        value = self._get(feature, ours)
+    def _number(self, feature: Feature, ours: str, name: str | None = None) -> float | None:
+        value = self._get(feature, ours) if name is None else feature.get(name)
         if value is None:
             return None
         if isinstance(value, str):  # fields of KML and of tables are text
@@ -313,67 +530,223 @@ class _Site:
                 if name is not None and len(points) > 1:
                     name = f"{name} {k}"
                 place = self._place(point, feature)
-                goals.append({"name": name, "position": place, "where": feature.where})
+                goals.append(
+                    {"name": name, "position": place, "where": feature.where, "source": feature}
+                )
         return goals
 
     def _obstacles(self, features: list[Feature], free: list[Any]) -> list[dict[str, Any]]:
         """Circles and polygons, in whose holes places that must stay free are."""
         import shapely
 
-        out: list[dict[str, Any]] = []
         spots = shapely.MultiPoint([p[:2] for p in free])
+        drawn: dict[str, list[tuple[Feature, shapely.LineString]]] = {}
+        out: list[dict[str, Any]] = []
 
-        def add(feature: Feature, several: bool, number: int, **more: Any) -> None:
-            name = self._name(feature)
-            if name is not None and several:
-                name = f"{name} {number}"
-            out.append({"name": name, **more, "where": feature.where, "feature": feature})
+        def area(feature: Feature, shape: shapely.Geometry) -> list[dict[str, Any]]:
+            """Obstacles of an area; what of its outline encloses nothing is drawn as a line."""
+            if self.window is not None:
+                if self.window.is_beyond(shape):
+                    self.beyond[feature.where] = feature
+                    return []
+                if "Polygon" in shape.geom_type:
+                    shape, is_cut = self.window.cut(shape)
+                    if is_cut:
+                        self.cut_off.add(feature.where)
+                    if shape.is_empty:
+                        self.beyond[feature.where] = feature
+                        return []
+            polygons, notes = simple_polygons(shape, lambda p: p.intersects(spots))
+            self.notes += [f"{self._called(feature)}: {note}" for note in notes]
+            walls = spurs_of(shape, polygons, self.said.join_tolerance)
+            drawn.setdefault(feature.layer, []).extend((feature, wall) for wall in walls)
+            if not polygons and not walls:
+                self._complain(
+                    f"{self._called(feature)}: encloses nothing; expected a polygon with an area"
+                )
+            return [{"feature": feature, **outline_of(polygon)} for polygon in polygons]
 
+        pointlike: list[Feature] = []
         for feature in steps.each(features):
-            if "Point" in feature.shape.geom_type:
-                radius = self._radius(feature)
-                points = getattr(feature.shape, "geoms", [feature.shape])
-                for k, point in enumerate(points, 1) if radius is not None else ():
-                    at = self._plane(point)
-                    add(feature, len(points) > 1, k, center=(at.x, at.y), radius=radius)
-                continue
-            polygons, notes = simple_polygons(
-                self._plane(feature.shape), lambda p: p.intersects(spots)
-            )
-            label = self._name(feature)
-            called = feature.where + (f" ({label})" if label else "")
-            self.notes += [f"{called}: {note}" for note in notes]
-            if not polygons:
-                self._complain(f"{called}: encloses nothing; expected a polygon with an area")
-            for k, polygon in enumerate(polygons, 1):
-                ring = shapely.get_coordinates(polygon.exterior)[:-1]
-                ring = ring[np.hypot(*(ring - np.roll(ring, -1, axis=0)).T) > 1e-6]
-                circle = circle_of(ring)
-                if circle is not None:
-                    add(feature, len(polygons) > 1, k, center=circle[0], radius=circle[1])
+            for shape in _blocks_of(feature.shape):
+                out += self._obstacle(feature, shape, area, drawn, pointlike)
+        self._complain_of_points(pointlike)
+        for pieces in drawn.values():
+            out += self._line_work(pieces, area)
+        return self._named(out)
+
+    def _obstacle(
+        self, feature: Feature, shape: shapely.Geometry,
+        area: Callable[[Feature, shapely.Geometry], list[dict[str, Any]]],
+        drawn: dict[str, list[tuple[Feature, shapely.LineString]]], pointlike: list[Feature],
+    ) -> list[dict[str, Any]]:  # fmt: skip
+        """Obstacles of a shape; open lines and points without a radius are noted for later."""
+        kind = shape.geom_type
+        out: list[dict[str, Any]] = []
+        if "Point" in kind:
+            radius = self._radius(feature)
+            if self._is_beyond(self._plane(shape), radius or 0.0):
+                self.beyond[feature.where] = feature
+                return out
+            if radius is None:
+                pointlike.append(feature)
+                return out
+            for point in getattr(shape, "geoms", [shape]):
+                at = self._plane(point)
+                out.append({"feature": feature, "center": (at.x, at.y), "radius": radius})
+        elif "Line" in kind:
+            lines = lines_of(self._plane(shape))
+            if not lines:
+                self._complain(f"{self._called(feature)}: a line of no length")
+            for line in lines:
+                if line.is_closed and not (is_coastline(feature) and not is_land(line)):
+                    out += area(feature, line)
                 else:
-                    add(feature, len(polygons) > 1, k, polygon=ring.tolist())
+                    drawn.setdefault(feature.layer, []).append((feature, line))
+        else:
+            out += area(feature, self._plane(shape))
         return out
+
+    def _line_work(
+        self, pieces: list[tuple[Feature, shapely.LineString]],
+        area: Callable[[Feature, shapely.Geometry], list[dict[str, Any]]],
+    ) -> list[dict[str, Any]]:  # fmt: skip
+        """Obstacles of the open lines of a layer: joined outlines, and lines with a width."""
+        out: list[dict[str, Any]] = []
+        areas, rest = outlines([line for _, line in pieces], self.said.join_tolerance)
+        for polygon, members in areas:
+            own = [pieces[k][0] for k in members]
+            coast = all(map(is_coastline, own))
+            if coast and not any(is_land(pieces[k][1], polygon) for k in members):
+                rest += members  # the water lies inside: its coast is a wall
+                continue
+            named = next((f for f in own if self._name(f) is not None), own[0])
+            out += area(named, polygon)
+        narrow: list[Feature] = []
+        for k in rest:
+            feature, line = pieces[k]
+            width = self._width(feature)
+            if self._is_beyond(line, width or 0.0):
+                self.beyond[feature.where] = feature
+                continue
+            if width is None:
+                narrow.append(feature)
+            else:
+                out += area(feature, widened(line, width))
+        if narrow:
+            layer = narrow[0].layer
+            places = list(dict.fromkeys(f.where for f in narrow))
+            called = f"layer {layer!r}: " if layer else ""
+            pick = layer or "lines"
+            self._complain(
+                f"{called}{counted(len(narrow), 'open line')} ({_first_of(places)}); expected a "
+                "width for them",
+                f" (--line-width W), or --map path={pick} or --map ignore={pick} to leave them out",
+                "line_width",
+            )
+        return out
+
+    def _is_beyond(self, shape: shapely.Geometry, grown: float) -> bool:
+        return self.window is not None and self.window.is_beyond(shape, grown)
+
+    def _width(self, feature: Feature) -> float | None:
+        width = self._number(feature, "width")
+        if width is None and self.is_chart:
+            width = chart_width(feature)
+        if width is None:
+            return self.said.line_width
+        if not width > 0.0:
+            self._complain(f"{feature.where}: width_m: expected a positive width, got {width:g}")
+        metres = "width" not in self.fields and feature.get(WIDTH[0]) is not None
+        return abs(width) * (1.0 if metres else self._unit) or None
+
+    def _named(self, things: list[dict[str, Any]]) -> list[dict[str, Any]]:
+        """Give obstacles the names of their features, numbered where a feature has several."""
+        size = Counter(thing["feature"].where for thing in things)
+        number: Counter[str] = Counter()
+        out = []
+        for thing in things:
+            feature = thing["feature"]
+            number[feature.where] += 1
+            name = self._name(feature)
+            if name is not None and size[feature.where] > 1:
+                name = f"{name} {number[feature.where]}"
+            out.append({"name": name, **thing, "where": feature.where})
+        return out
+
+    @property
+    def _beyond_reach(self) -> str:
+        """Reason to leave out what lies beyond the window."""
+        assert self.window is not None
+        about = "the base and the candidates" if self.said.candidates is not None else "the base"
+        return f"beyond the reach of the tether ({_metres(self.window.radius)} about {about})"
+
+    def _within_crop(self, obstacles: list[dict[str, Any]]) -> list[dict[str, Any]]:
+        """Obstacles within the reach of the tether; the others go to the ledger."""
+        if self.window is None:
+            return obstacles
+        kept, dropped, cut_off = cropped(obstacles, self.window)
+        self.beyond |= {thing["where"]: thing["feature"] for thing in (*dropped, *cut_off)}
+        self.cut_off |= {thing["where"] for thing in cut_off}
+        if not self.beyond and not self.cut_off:
+            return kept
+        self.cropped = CropCircle(center=self.window.center, radius=self.window.radius)
+        staying = {thing["where"] for thing in kept}
+        for where, feature in self.beyond.items():
+            if where not in staying:
+                self.ledger.leave_out(feature, self._beyond_reach)
+        if cut_count := len(self.cut_off & staying):
+            self.notes.append(
+                f"{counted(cut_count, 'obstacle')} cut off where the reach of the tether ends "
+                f"({_metres(self.window.radius)})"
+            )
+        return kept
+
+    def _called(self, feature: Feature) -> str:
+        label = self._name(feature)
+        return feature.where + (f" ({label})" if label else "")
 
     def _radius(self, feature: Feature) -> float | None:
         metres = "radius" not in self.fields and feature.get(RADIUS[0]) is not None
         radius = self._number(feature, "radius")
         if radius is not None:
             return radius * (1.0 if metres else self._unit)
-        if self.said.radius is None:
-            self._complain(
-                f"{feature.where}: an obstacle without radius_m; expected one, or a radius for all "
-                "that have none (--radius)"
-            )
-        return self.said.radius
+        own = chart_radius(feature) if self.is_chart else None
+        return own if own is not None else self.said.radius
 
-    def _inspections(self, obstacles: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    def _complain_of_points(self, features: list[Feature]) -> None:
+        """Complain of points without a radius, a line for each layer."""
+        by_layer: dict[str, list[str]] = {}
+        for feature in features:
+            by_layer.setdefault(feature.layer, []).append(feature.where)
+        for layer, places in by_layer.items():
+            what = "an obstacle" if len(places) == 1 else "obstacles"
+            ignore = f", or --map ignore={layer} to leave them out" if layer else ""
+            self._complain(
+                f"{_first_of(places)}: {what} without radius_m; expected one, or a radius for all "
+                "that have none",
+                f" (--radius R){ignore}",
+                "radius",
+            )
+
+    def _complain_of_no_goal(self) -> None:
+        self._complain(
+            "has no goal; expected a point without radius_m, a layer of goals, a table of goals, "
+            "or obstacles to inspect",
+            " (--map goal=LAYER, --goals TABLE, --inspect N --standoff S)",
+            "inspect",
+        )
+
+    def _inspections(
+        self, obstacles: list[dict[str, Any]], anchor: Any, tether: float | None, clearance: float
+    ) -> list[dict[str, Any]]:
         """The goals about obstacles that are to be looked at."""
         from netsp.shorthand import Inspection
 
         goals: list[dict[str, Any]] = []
+        chosen = self._chosen(obstacles)
         for k, o in enumerate(obstacles):
-            feature, look = o["feature"], self.said.looking
+            feature, look = o["feature"], self.said.looking if k in chosen else None
             own = feature.get("viewpoints", "inspect")
             if own is None and look is None:
                 continue
@@ -396,21 +769,102 @@ class _Site:
                 text = explain(error) if isinstance(error, ValidationError) else str(error)
                 self._complain(f"{feature.where}: {text}")
                 continue
-            goals += [{**g, "where": feature.where} for g in asked.goals(o)]
+            goals += [{**g, "where": feature.where, "layer": feature.layer} for g in asked.goals(o)]
+        if self.said.looking is not None:
+            goals = self._free_viewpoints(goals, obstacles, anchor, tether, clearance)
         return goals
+
+    def _chosen(self, obstacles: list[dict[str, Any]]) -> set[int]:
+        """Return which obstacles the user wants to have looked at."""
+        import shapely
+
+        look = self.said.looking
+        if look is None:
+            return set()
+        rule = look.chosen
+        areas = [shapely.box(*box) for box in rule.boxes]
+        if rule.earth_boxes and self.projection is None:
+            raise InputError(
+                f"{self.file}: has no place on the earth; expected a box in its plane (m)"
+            )
+        for south, west, north, east in rule.earth_boxes:
+            corners = [(south, west), (south, east), (north, east), (north, west)]
+            assert self.projection is not None
+            areas.append(shapely.Polygon(self.projection.to_plane(corners)))
+        found = {
+            k
+            for k, o in enumerate(obstacles)
+            if rule.takes(o["feature"].layer, self._name(o["feature"]) or o["name"])
+            and rule.holds(_shape(o), areas)
+        }
+        if not found and obstacles:
+            layers = dict.fromkeys(o["feature"].layer for o in obstacles)
+            self._complain(
+                "no obstacle within the tether's reach is among those chosen to be inspected; "
+                f"there are obstacles of the layers {', '.join(n or '(none)' for n in layers)}"
+            )
+        return found
+
+    def _free_viewpoints(
+        self, goals: list[dict[str, Any]], obstacles: list[dict[str, Any]], anchor: Any,
+        tether: float | None, clearance: float,
+    ) -> list[dict[str, Any]]:  # fmt: skip
+        """Return the viewpoints with room for the robot; the others are told by layer and cause."""
+        if not goals:
+            return goals
+        places = np.array([g["position"] for g in goals])
+        away = np.linalg.norm(places - np.array(anchor), axis=1)
+        is_far = (away > tether) if self.window is not None and tether is not None else away < 0.0
+        is_in = _distance(places[:, :2], obstacles) < max(clearance, 1e-9)
+        seen: set[tuple[float, ...]] = set()
+        kept: list[dict[str, Any]] = []
+        groups: dict[tuple[str, str], list[str]] = {}
+        for k, goal in enumerate(goals):
+            cause = ""
+            if is_in[k]:
+                cause = "within an obstacle or its clearance"
+            elif is_far[k]:
+                cause = "farther from the base than the tether is long"
+            elif (place := tuple(places[k])) in seen:
+                cause = "in the same place as another"
+            else:
+                seen.add(place)
+                kept.append(goal)
+                continue
+            groups.setdefault((goal["layer"], cause), []).append(str(goal["name"]))
+        for (layer, cause), names in groups.items():
+            shown_names = ", ".join(names[:MAX_NAMED]) + (", …" if len(names) > MAX_NAMED else "")
+            called = f"layer {layer!r}: " if layer else ""
+            self.notes.append(
+                f"{called}{counted(len(names), 'viewpoint')} left out: {cause} ({shown_names})"
+            )
+        if not kept:
+            causes = ", ".join(dict.fromkeys(cause for _, cause in groups))
+            self._complain(
+                f"no viewpoint about an obstacle is left: all {len(goals)} are {causes}; expected "
+                "another standoff, base or tether"
+            )
+        return kept
 
     def _bounds(self, features: list[Feature]) -> list[list[float]] | None:
         import shapely
 
         if not features:
             return None
-        if len(features) > 1:
+        shapes = [self._plane(f.shape) for f in features]
+        lines = [line for shape in shapes if "Line" in shape.geom_type for line in lines_of(shape)]
+        areas, rest = outlines(lines, self.said.join_tolerance)
+        whole = [area for area, _ in areas] + [s for s in shapes if "Polygon" in s.geom_type]
+        places = ", ".join(f.where for f in features)[:100]
+        if rest:
             self._complain(
-                f"expected one outline of kind bounds, got {len(features)}: "
-                f"{', '.join(f.where for f in features)[:100]}"
+                f"{places}: bounds that are not closed; expected a closed line or a polygon"
             )
             return None
-        polygons, notes = simple_polygons(self._plane(features[0].shape), lambda p: False)
+        if len(whole) != 1:
+            self._complain(f"expected one outline of kind bounds, got {len(whole)}: {places}")
+            return None
+        polygons, notes = simple_polygons(whole[0], lambda p: False)
         self.notes += [f"{features[0].where}: {note}" for note in notes]
         if len(polygons) != 1:
             self._complain(
@@ -424,6 +878,8 @@ class _Site:
 
     def _check_names(self, things: list[dict[str, Any]], what: str) -> None:
         seen: dict[str, str] = {}
+        if self.is_chart:  # its names are those of places, and need not differ
+            _number_names(things)
         for thing in things:
             name = thing["name"]
             if name is not None and name in seen:
@@ -448,7 +904,9 @@ class _Site:
         if small and not whole and span <= DEGREES * tether:
             self._complain(
                 f"coordinates span {span:g} m, and the tether is {_metres(tether)} long: they look "
-                "like degrees; expected metres, or --crs EPSG:4326"
+                "like degrees; expected metres",
+                ", or --crs EPSG:4326",
+                "crs",
             )
 
     def _within_reach(
@@ -465,33 +923,42 @@ class _Site:
             else:
                 far.append((away, goal))
         if self.said.skip_unreachable and near:
+            staying = {goal["where"] for goal in near}
             for away, goal in far:
-                self.notes.append(f"{_label(goal)}: is {_metres(away)} from the base: left out")
+                feature = goal.get("source")
+                if feature is None or goal["where"] in staying:  # one of several of its feature
+                    self.notes.append(f"{_label(goal)}: is {_metres(away)} from the base: left out")
+                else:
+                    self.ledger.leave_out(
+                        feature,
+                        f"farther from the base than the tether is long ({_metres(tether)})",
+                    )
         elif len(far) > MOST_OF_A_KIND:
             away, goal = max(far, key=lambda f: f[0])
             self._complain(
                 f"{len(far)} goals are farther from the base than the tether is long "
-                f"({_metres(tether)}), {_label(goal)} {_metres(away)}{self._cause(goal, tether)}"
+                f"({_metres(tether)}), {_label(goal)} {_metres(away)}{self._cause(goal, tether)}",
+                SKIP_OPTION,
             )
         else:
             for away, goal in far:
                 self._complain(
                     f"{_label(goal)}: is {_metres(away)} from the base, and the tether "
-                    f"{_metres(tether)} long{self._cause(goal, tether)}"
+                    f"{_metres(tether)} long{self._cause(goal, tether)}",
+                    SKIP_OPTION,
                 )
         return near
 
     def _cause(self, goal: dict[str, Any], tether: float) -> str:
         """Why a goal may be so far off."""
-        other = "; leave out what is out of reach with --skip-unreachable"
         if self.projection is None:
-            return other
+            return ""
         ((lat, lon),) = self.projection.to_earth([goal["position"][:2]])
         if abs(lon) <= 90.0:
             ((x, y),) = self.projection.to_plane([[lon, lat]])
             if np.hypot(*(np.array([x, y]) - self.projection.base)) <= 10.0 * tether:
                 return ": latitude and longitude look swapped"
-        return other
+        return ""
 
     def _origin(self) -> dict[str, Any]:
         p = self.projection
@@ -499,18 +966,83 @@ class _Site:
             return {}
         return {"origin": {"latitude": p.latitude, "longitude": p.longitude, "heading": p.heading}}
 
-    def _complain(self, text: str) -> None:
-        self.complaints.append(f"{self.file}: {text.removeprefix(f'{self.file}: ')}")
+    def _complain(self, text: str, option: str = "", ask: str | None = None) -> None:
+        """Note what is wrong; the options that help on the command line stand apart."""
+        self.complaints.append((f"{self.file}: {text.removeprefix(f'{self.file}: ')}", option))
+        if ask is not None:
+            self.asks.append(ask)
 
     def _refused(self) -> InputError:
-        if len(self.complaints) == 1:
-            return InputError(self.complaints[0])
-        return SeveralErrors(self.complaints)
+        whole = [text + option for text, option in self.complaints]
+        return UnansweredError(whole, [text for text, _ in self.complaints], self.asks)
+
+
+def _blocks_of(shape: shapely.Geometry) -> list[shapely.Geometry]:
+    """Return the shapes of a block of a drawing, or the shape alone."""
+    return list(shape.geoms) if shape.geom_type == "GeometryCollection" else [shape]  # type: ignore[attr-defined]
+
+
+def _marked(feature: Feature) -> Feature:
+    """Return a goal or a base as a point: one drawn as a symbol stands where the symbol marks."""
+    if feature.marker is None or "Point" in feature.shape.geom_type:
+        return feature
+    return replace(feature, shape=feature.marker)
 
 
 def _bare(thing: dict[str, Any]) -> dict[str, Any]:
     """Without where it came from, nor a name that it does not have."""
-    return {k: v for k, v in thing.items() if k not in ("where", "feature") and v is not None}
+    ours = ("where", "feature", "source", "layer")
+    return {k: v for k, v in thing.items() if k not in ours and v is not None}
+
+
+def _shape(thing: dict[str, Any]) -> shapely.Geometry:
+    """Return an obstacle of a problem file as an area."""
+    import shapely
+
+    if "radius" in thing:
+        return shapely.Point(thing["center"]).buffer(thing["radius"])
+    return shapely.Polygon(thing["polygon"])
+
+
+def _distance(places: np.ndarray, obstacles: list[dict[str, Any]]) -> np.ndarray:
+    """Return the distance of each place from the nearest obstacle, 0 or less within one."""
+    import shapely
+
+    out = np.full(len(places), np.inf)
+    circles = [(*o["center"], o["radius"]) for o in obstacles if "radius" in o]
+    for x, y, radius in circles:
+        out = np.minimum(out, np.hypot(places[:, 0] - x, places[:, 1] - y) - radius)
+    polygons = [shapely.Polygon(o["polygon"]) for o in obstacles if "polygon" in o]
+    if polygons:
+        tree = shapely.STRtree(polygons)
+        points = shapely.points(places)
+        (own, _), away = tree.query_nearest(points, return_distance=True, all_matches=False)
+        out[own] = np.minimum(out[own], away)
+    return out
+
+
+def _first_of(places: list[str]) -> str:
+    """Return the first of some places and how many more there are."""
+    return places[0] + (f" and {len(places) - 1} more" if len(places) > 1 else "")
+
+
+def _number_names(things: list[dict[str, Any]]) -> None:
+    """Number names that stand more than once: "pier", "pier 2"."""
+    taken = {thing["name"] for thing in things}
+    seen: Counter[str] = Counter()
+    for thing in things:
+        name = thing["name"]
+        if name is None:
+            continue
+        seen[name] += 1
+        number = seen[name]
+        while number > 1:
+            other = f"{name} {number}"
+            if other not in taken:
+                thing["name"] = other
+                taken.add(other)
+                break
+            number += 1
 
 
 def _label(thing: dict[str, Any]) -> str:

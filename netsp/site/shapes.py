@@ -17,6 +17,9 @@ FEWEST_OF_CIRCLE = 16
 ROUND = 2e-3
 """Share of the radius by which corners of a circle may be off: degrees of a map have few places."""
 
+MIN_SIDE = 1e-6
+"""Shortest side of a polygon; shorter ones are rounding, metres."""
+
 EVEN = 0.1
 """Share by which the steps between the corners of a circle may differ."""
 
@@ -47,7 +50,7 @@ def circle_of(ring: Floats) -> tuple[tuple[float, float], float] | None:
 
 
 def simple_polygons(shape: shapely.Geometry, inner: Any) -> tuple[list[shapely.Polygon], list[str]]:
-    """A polygon of a map as simple polygons without holes.
+    """Return a polygon of a map as simple polygons without holes.
 
     Parameters
     ----------
@@ -93,6 +96,64 @@ def simple_polygons(shape: shapely.Geometry, inner: Any) -> tuple[list[shapely.P
     if cut:
         notes.append("has a pool inside: cut into parts that touch")
     return out, notes
+
+
+def outline_of(polygon: shapely.Polygon) -> dict[str, Any]:
+    """Return a polygon without holes as an obstacle of a problem file: a circle where it is one.
+
+    Parameters
+    ----------
+    polygon : shapely.Polygon
+        In the plane, metres.
+
+    Returns
+    -------
+    dict
+        ``center`` and ``radius``, or ``polygon``.
+    """
+    import shapely
+
+    ring = shapely.get_coordinates(polygon.exterior)[:-1]
+    ring = ring[np.hypot(*(ring - np.roll(ring, -1, axis=0)).T) > MIN_SIDE]
+    circle = circle_of(ring)
+    if circle is not None:
+        return {"center": circle[0], "radius": circle[1]}
+    return {"polygon": ring.tolist()}
+
+
+def spurs_of(
+    shape: shapely.Geometry, polygons: list[shapely.Polygon], tolerance: float
+) -> list[shapely.LineString]:
+    """Return the parts of outlines that run out and back, which no polygon of them holds.
+
+    Parameters
+    ----------
+    shape : shapely.Geometry
+        Polygon, multipolygon or closed line, as it was drawn, in the plane.
+    polygons : list of shapely.Polygon
+        What `simple_polygons` made of it.
+    tolerance : float
+        Shorter parts are rounding, metres.
+
+    Returns
+    -------
+    list of shapely.LineString
+        Thin walls.
+    """
+    import shapely
+
+    flat = shapely.force_2d(shape)
+    lines = [flat] if "Line" in flat.geom_type else [
+        part.exterior for part in getattr(flat, "geoms", [flat])
+    ]  # fmt: skip
+    if "Line" not in flat.geom_type and flat.is_valid:
+        return []
+    inside = shapely.union_all(polygons)
+    out = []
+    for line in lines:
+        rest = shapely.line_merge(shapely.difference(shapely.node(line), inside))
+        out += [s for s in getattr(rest, "geoms", [rest]) if s.length > tolerance]
+    return out
 
 
 def _halves(piece: shapely.Polygon) -> list[shapely.Polygon]:

@@ -2,50 +2,63 @@
 
 from __future__ import annotations
 
-import math
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
 from netsp.arrays import Floats
+from netsp.axes import Quantity, read_table
 from netsp.errors import InputError
-from netsp.files import csv_rows, read_text
-from netsp.models import shown
+from netsp.site.projection import Projection
 
 
-def from_table(file: str | Path) -> tuple[Floats, list[str | None]]:
-    """Places and names of a table with the columns x, y and perhaps z and name.
+def from_table(
+    file: str | Path,
+    projection: Projection | None = None,
+    on_note: Callable[[str], None] | None = None,
+) -> tuple[Floats, list[str | None]]:
+    """Read places and their names from a table.
 
     Parameters
     ----------
     file : str or Path
-        CSV, the names of the columns first.
+        Table whose first line names its columns in any order (`netsp.axes`): x, y (or easting,
+        northing, or lat, lon), and perhaps z or depth, and name.
+    projection : Projection, optional
+        Projection of latitudes and longitudes into the plane.
+    on_note : callable, optional
+        Called with one line that names the columns that are not used.
 
     Returns
     -------
     places : ndarray, shape (k, 2) or (k, 3)
-        In the problem's units.
+        Metres, z upwards.
     names : list of str or None
-        One for each.
+        Name of each place.
 
     Raises
     ------
     InputError
-        Not such a table.
+        Not such a table, or degrees without a projection.
     """
-    rows = csv_rows(read_text(file), str(file))
-    if not rows or not {"x", "y"} <= rows[0].keys():
-        raise InputError(f"{file}: expected a table with the columns x, y and perhaps z, name")
-    axes = ("x", "y", "z") if "z" in rows[0] else ("x", "y")
-    places = np.empty((len(rows), len(axes)))
-    for k, row in enumerate(rows):
-        for j, axis in enumerate(axes):
-            try:
-                places[k, j] = float(row[axis] or "")
-            except ValueError:
-                places[k, j] = math.nan
-            if not math.isfinite(places[k, j]):
-                raise InputError(
-                    f"{file}: row {k + 1}: {axis}: expected a number, got {shown(row[axis])}"
-                )
-    return places, [row.get("name") or None for row in rows]
+    table = read_table(file)
+    pair = table.pair()
+    is_global = pair is None and table.pair((("latitude", "longitude"),)) is not None
+    if is_global and projection is None:
+        raise InputError(
+            f"{file}: positions are in degrees, and the site has no place on the earth; expected "
+            "the columns x, y (m)"
+        )
+    plane: tuple[Quantity, Quantity] | None = ("latitude", "longitude") if is_global else pair
+    if plane is None or not table.rows:
+        raise table.wanted("a table with the columns x, y and perhaps z or depth, name")
+    up = table.height()
+    label: Quantity = "name" if "name" in table else "identifier"
+    used: list[Quantity] = [*plane, up] if up else [*plane]
+    places = table.numbers(used)
+    if is_global and projection is not None:
+        places[:, :2] = np.asarray(projection.to_plane(places[:, :2]))
+    if on_note is not None and (unused := table.left_out([*used, label])):
+        on_note(f"{file}: columns that are not used: {', '.join(unused)}")
+    return places, [table.text(k, label) or None for k in range(len(table.rows))]

@@ -1,26 +1,28 @@
-"""Maps of every other kind through GDAL's readers: KML and KMZ, shapefiles, GeoPackages, DXF
-drawings, S-57 charts.
+"""Maps through GDAL's readers: shapefiles, GeoPackages, S-57 charts and what else GDAL reads.
 
-pyogrio brings GDAL with it. A drawing has neither a place on the earth nor a unit that GDAL tells;
-its layers are a field of its entities, and its circles arrive as closed lines of many corners.
+pyogrio brings GDAL with it. Geometries that Shapely does not read are repaired or named
+(`netsp.site.wkb_shapes`).
 """
 
 from __future__ import annotations
 
 import math
-import tempfile
-import zipfile
-import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from netsp.errors import InputError
-from netsp.files import MOST_BYTES, check_file
-from netsp.site.feature import Feature, Map
+from netsp.axes import height_axis
+from netsp.errors import InputError, UnansweredError
+from netsp.files import check_file
+from netsp.site.feature import Change, Feature, Map, Unread, change_notes, with_tags
+from netsp.site.wkb_shapes import NotFiniteError, ShapeError, shape_of
+
+if TYPE_CHECKING:
+    import shapely
 
 MOST_FEATURES = 100_000
 """Of a map: more make no problem that anybody solves."""
@@ -28,11 +30,9 @@ MOST_FEATURES = 100_000
 LOCAL = "local"
 """The coordinate system of a map without a place on the earth."""
 
-NAMES = ("name", "objnam", "id", "label")
-
 
 def read_vector(file: str | Path, crs: str | None) -> Map:
-    """A file of any format that GDAL reads as a map.
+    """Return a file of any format that GDAL reads as a map.
 
     Parameters
     ----------
@@ -53,85 +53,278 @@ def read_vector(file: str | Path, crs: str | None) -> Map:
         is not installed.
     """
     check_file(file)
-    with _unpacked(file) as plain:
-        return _read(file, plain, crs)
-
-
-def _read(file: str | Path, plain: str | Path, crs: str | None) -> Map:
-    """What stands in a file, which may have been unpacked to another place."""
-    pyogrio = _pyogrio()
-    drawing = Path(file).suffix.lower() == ".dxf"
-    features: list[Feature] = []
-    layers: dict[str, int] = {}
-    complaints: list[str] = []
+    found = _Found(file)
     places: dict[str, bool] = {}
-    for layer, kind in _call(file, pyogrio.list_layers, plain):
+    for name, kind in gdal_layers(file, file, found.notes):
         if kind is None:
-            continue  # a table without places
-        meta, ids, shapes, columns = _call(
-            file, pyogrio.raw.read, plain, layer=layer, return_fids=True, force_2d=False
-        )
-        if len(shapes) > MOST_FEATURES:
-            raise InputError(
-                f"{file}: layer {layer!r}: {len(shapes):,} features; expected at most "
-                f"{MOST_FEATURES:,}"
-            )
-        own = crs if crs is not None else meta.get("crs")
-        if own is None and drawing:
-            own = LOCAL
+            found.add_table(name, _row_count(file, name))
+            continue
+        layer = read_layer(file, file, name, found.notes)
+        own = crs if crs is not None else layer.crs
         if own is None:
-            raise InputError(
-                f"{file}: layer {layer!r}: names no coordinate system; give it with --crs "
-                f"EPSG:4326 (degrees), another EPSG code or --crs {LOCAL}"
-            )
-        if not len(shapes):
-            layers.setdefault(layer, 0)
-        places[layer] = own != LOCAL
-        geometries = _geometries(shapes, str(own), f"{file}: layer {layer!r}")
-        for k, shape in enumerate(geometries):
-            properties = {
-                str(name): _plain(column[k])
-                for name, column in zip(meta["fields"], columns, strict=True)
-            }
-            inner = str(properties.get("Layer") or layer) if drawing else layer
-            layers[inner] = layers.get(inner, 0) + 1
-            if shape is None or shape.is_empty:
-                continue
-            where = f"{inner}[{int(ids[k]) if not drawing else layers[inner] - 1}]"
-            if not np.isfinite(_coordinates(shape)).all():
-                complaints.append(f"{file}: {where}: expected finite coordinates")
-                continue
-            features.append(Feature(where, inner, "", properties, shape))
+            plain = f"{file}: layer {name!r}: names no coordinate system"
+            option = f"; give it with --crs EPSG:4326 (degrees), another EPSG code or --crs {LOCAL}"
+            raise UnansweredError([plain + option], [plain], ["crs"])
+        places[name] = own != LOCAL
+        found.add_layer(name, layer, _mover(str(own), f"{file}: layer {name!r}"))
     if len(set(places.values())) > 1:
         some = next(name for name, on in places.items() if not on)
         raise InputError(
             f"{file}: layer {some!r} has no place on the earth and others have; expected one "
             "system for all"
         )
-    if not layers:
+    if not places:
         raise InputError(f"{file}: has no layer with places")
-    return Map(tuple(features), all(places.values()), layers, tuple(complaints))
+    return found.map(all(places.values()))
 
 
-def _geometries(shapes: Any, crs: str, where: str) -> list[Any]:
-    """Shapes of WKB in degrees, or as they are where the system is local; None for none."""
+@dataclass(frozen=True)
+class GdalLayer:
+    """Layer as GDAL reads it.
+
+    Attributes
+    ----------
+    crs
+        Its coordinate system, None without one.
+    numbers
+        Numbers of its features.
+    shapes
+        Well-known binary of each feature; None for one without geometry.
+    properties
+        Name to value, for each feature.
+    """
+
+    crs: str | None
+    numbers: list[int]
+    shapes: list[bytes | None]
+    properties: list[dict[str, Any]]
+
+
+def gdal_layers(file: str | Path, plain: str | Path, notes: list[str]) -> list[tuple[str, Any]]:
+    """Return the layers of a file, with the type of their geometries; None for tables.
+
+    Parameters
+    ----------
+    file : str or Path
+        The user's file, for messages.
+    plain : str or Path
+        Where it is read.
+    notes : list of str
+        Gets what GDAL warns of.
+
+    Returns
+    -------
+    list of (str, str or None)
+        In the order of the file.
+    """
+    layers = _call(file, notes, _pyogrio().list_layers, plain)
+    return [(str(name), kind) for name, kind in layers]
+
+
+def read_layer(file: str | Path, plain: str | Path, layer: str, notes: list[str]) -> GdalLayer:
+    """Read one layer with GDAL.
+
+    Parameters
+    ----------
+    file : str or Path
+        The user's file, for messages.
+    plain : str or Path
+        Where it is read.
+    layer : str
+        Name of the layer.
+    notes : list of str
+        Gets what GDAL warns of.
+
+    Returns
+    -------
+    GdalLayer
+        All of its features.
+
+    Raises
+    ------
+    InputError
+        Not readable, or too many features.
+    """
+    meta, ids, shapes, columns = _call(
+        file, notes, _pyogrio().raw.read, plain, layer=layer, return_fids=True, force_2d=False
+    )
+    if len(shapes) > MOST_FEATURES:
+        raise InputError(
+            f"{file}: layer {layer!r}: {len(shapes):,} features; expected at most {MOST_FEATURES:,}"
+        )
+    names = [str(name) for name in meta["fields"]]
+    properties = [
+        {name: _plain(column[k]) for name, column in zip(names, columns, strict=True)}
+        for k in range(len(shapes))
+    ]
+    return GdalLayer(meta.get("crs"), [int(i) for i in ids], list(shapes), properties)
+
+
+@contextmanager
+def gdal_options(options: Mapping[str, str]) -> Iterator[None]:
+    """Set options of GDAL for a while.
+
+    Parameters
+    ----------
+    options : mapping
+        Name to value.
+
+    Yields
+    ------
+    None
+        While they hold.
+    """
+    pyogrio = _pyogrio()
+    before = {name: pyogrio.get_gdal_config_option(name) for name in options}
+    pyogrio.set_gdal_config_options(dict(options))
+    try:
+        yield
+    finally:
+        pyogrio.set_gdal_config_options(before)
+
+
+def _row_count(file: str | Path, layer: str) -> int:
+    found = _call(file, [], _pyogrio().read_info, file, layer=layer, force_feature_count=True)
+    return min(max(int(found["features"]), 0), MOST_FEATURES)
+
+
+class _Found:
+    """What has been found in a file so far."""
+
+    def __init__(self, file: str | Path) -> None:
+        self.file = file
+        self.notes: list[str] = []
+        self.features: list[Feature] = []
+        self.unread: list[Unread] = []
+        self.changes: list[Change] = []
+        self.complaints: list[str] = []
+        self.layers: dict[str, int] = {}
+
+    def add_table(self, name: str, rows: int) -> None:
+        """Leave out the rows of a table without places."""
+        self.layers[name] = rows
+        self.unread += [Unread(f"{name}[{k}]", name, "a table without places") for k in range(rows)]
+
+    def add_layer(self, name: str, layer: GdalLayer, move: Mover) -> None:
+        """Add the features of a layer, or why they cannot be used."""
+        self.layers.setdefault(name, 0)
+        for k, data, properties in zip(layer.numbers, layer.shapes, layer.properties, strict=True):
+            where = f"{name}[{k}]"
+            try:
+                shapes = self.shapes(where, name, data, move)
+            except NotFiniteError as error:
+                self.layers[name] += 1
+                self.complaints.append(f"{self.file}: {where}: {error}")
+                continue
+            except ShapeError as error:
+                self.layers[name] += 1
+                self.unread.append(Unread(where, name, str(error)))
+                continue
+            tags = with_tags(properties)
+            for place, shape in shapes:
+                self.layers[name] += 1
+                self.features.append(Feature(place, name, "", tags, shape))
+
+    def shapes(
+        self, where: str, layer: str, data: bytes | None, move: Mover
+    ) -> list[tuple[str, shapely.Geometry]]:
+        """Return the shape of a feature, or the parts of a collection, with their names."""
+        if data is None:
+            raise ShapeError("has no geometry")
+        shape, changes = shape_from_gdal(data)
+        parts = list(parts_of(shape, where))
+        if not parts:
+            raise ShapeError("has no geometry")
+        self.changes += [Change(where, layer, text) for text in changes]
+        return [(place, move(part)) for place, part in parts]
+
+    def map(self, geographic: bool) -> Map:
+        """Return the map."""
+        return Map(
+            tuple(self.features), geographic, self.layers, tuple(self.complaints),
+            notes=(*self.notes, *change_notes(self.changes)), unread=tuple(self.unread),
+        )  # fmt: skip
+
+
+def shape_from_gdal(data: bytes) -> tuple[shapely.Geometry, tuple[str, ...]]:
+    """Return a shape that GDAL gives, whatever its type, and what was changed in it.
+
+    Parameters
+    ----------
+    data : bytes
+        Well-known binary.
+
+    Returns
+    -------
+    shape : shapely.Geometry
+        Without measures.
+    changes : tuple of str
+        As of `netsp.site.wkb_shapes.shape_of`.
+    """
     import shapely
 
-    made = [None if s is None else shapely.from_wkb(s, on_invalid="ignore") for s in shapes]
-    if crs == LOCAL:
-        return made
-    transform = _to_degrees(crs, where)
+    shape = shapely.from_wkb(data, on_invalid="ignore")
+    changes: tuple[str, ...] = ()
+    if shape is None or getattr(shape, "has_m", False):
+        shape, changes = shape_of(data)
+    if not np.isfinite(shapely.get_coordinates(shape)).all():
+        raise NotFiniteError
+    return shape, changes
+
+
+def parts_of(shape: shapely.Geometry, where: str) -> Iterator[tuple[str, shapely.Geometry]]:
+    """Yield the geometries of a collection that are not empty, with what messages call them.
+
+    Parameters
+    ----------
+    shape : shapely.Geometry
+        Any.
+    where : str
+        Name of the feature.
+
+    Yields
+    ------
+    where : str
+        As ``piles[3].geometries[0]``, or the feature's own for one that is no collection.
+    shape : shapely.Geometry
+        No `GeometryCollection`.
+    """
+    if shape.is_empty:
+        return
+    if shape.geom_type != "GeometryCollection":
+        yield where, shape
+        return
+    for k, part in enumerate(shape.geoms):
+        yield from parts_of(part, f"{where}.geometries[{k}]")
+
+
+Mover = Callable[["shapely.Geometry"], "shapely.Geometry"]
+"""Change of a shape from the file's system to degrees."""
+
+
+def _mover(crs: str, where: str) -> Mover:
+    """Return what moves shapes to degrees, or leaves them where the system is local."""
+    import shapely
+
+    transform = None if crs == LOCAL else _to_degrees(crs, where)
     if transform is None:
-        return made
+        return lambda shape: shape
+
+    up = height_axis(crs)
 
     def degrees(c: np.ndarray) -> np.ndarray:
         out = c.copy()
         out[:, 0], out[:, 1] = transform.transform(c[:, 0], c[:, 1])
+        out[:, 2:] *= up.sign * up.metres
         return out
 
-    return [
-        None if s is None else shapely.transform(s, degrees, include_z=bool(s.has_z)) for s in made
-    ]
+    def moved(shape: shapely.Geometry) -> shapely.Geometry:
+        out = shapely.transform(shape, degrees, include_z=bool(shape.has_z))
+        if not np.isfinite(shapely.get_coordinates(out)).all():
+            raise NotFiniteError
+        return out
+
+    return moved
 
 
 def _to_degrees(crs: str, where: str) -> Any:
@@ -170,21 +363,19 @@ def in_degrees(map_: Map, crs: str, file: str | Path) -> Map:
     Map
         In degrees, or the same where the system is local.
     """
-    import shapely
-
-    shapes = [shapely.to_wkb(f.shape) for f in map_.features]
-    made = _geometries(shapes, crs, str(file))
-    features = tuple(
-        Feature(f.where, f.layer, f.identity, f.properties, s)
-        for f, s in zip(map_.features, made, strict=True)
-    )
-    return Map(features, crs != LOCAL, map_.layers, map_.complaints, map_.notes)
-
-
-def _coordinates(shape: Any) -> np.ndarray:
-    import shapely
-
-    return np.asarray(shapely.get_coordinates(shape))
+    move = _mover(crs, str(file))
+    features: list[Feature] = []
+    complaints: list[str] = []
+    for feature in map_.features:
+        try:
+            marker = None if feature.marker is None else move(feature.marker)
+            features.append(replace(feature, shape=move(feature.shape), marker=marker))
+        except NotFiniteError as error:
+            complaints.append(f"{file}: {feature.where}: {error}")
+    return replace(
+        map_, features=tuple(features), geographic=crs != LOCAL,
+        complaints=(*map_.complaints, *complaints),
+    )  # fmt: skip
 
 
 def _plain(value: Any) -> Any:
@@ -196,40 +387,22 @@ def _plain(value: Any) -> Any:
     return value
 
 
-@contextmanager
-def _unpacked(file: str | Path) -> Iterator[str | Path]:
-    """Where a file is to be read: the page in a KMZ apart from it, because GDAL reads no data of
-    places (their schema) in the archive."""
-    if Path(file).suffix.lower() != ".kmz":
-        yield file
-        return
-    try:
-        with zipfile.ZipFile(file) as archive:
-            pages = [e for e in archive.infolist() if e.filename.lower().endswith(".kml")]
-            if not pages:
-                raise InputError(f"{file}: cannot be read as a map: holds no .kml")
-            if pages[0].file_size > MOST_BYTES:
-                raise InputError(f"{file}: unpacks to more than {MOST_BYTES / 2**20:g} MiB")
-            text = archive.read(pages[0])
-    except (zipfile.BadZipFile, zlib.error, OSError, RuntimeError, NotImplementedError) as error:
-        raise InputError(f"{file}: cannot be read as a map: {error}") from None
-    with tempfile.TemporaryDirectory() as folder:
-        page = Path(folder) / "doc.kml"
-        page.write_bytes(text)
-        yield page
-
-
-def _call(file: str | Path, function: Any, *args: Any, **more: Any) -> Any:
-    """A call of GDAL, whose readers raise what they like."""
+def _call(file: str | Path, notes: list[str], function: Any, *args: Any, **more: Any) -> Any:
+    """Call GDAL, whose readers raise what they like; what it warns of becomes a note."""
     import warnings
 
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            return function(*args, **more)
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            out = function(*args, **more)
     except Exception as error:
         first = (str(error) or type(error).__name__).splitlines()[0].split("; It might")[0][:160]
         raise InputError(f"{file}: cannot be read as a map: {first}") from None
+    for warning in caught:
+        text = f"GDAL: {str(warning.message).splitlines()[0][:160]}"
+        if issubclass(warning.category, RuntimeWarning) and text not in notes:
+            notes.append(text)
+    return out
 
 
 def _pyogrio() -> Any:

@@ -40,6 +40,9 @@ if TYPE_CHECKING:
 
 MOST_CANDIDATES = 10_000
 
+HAIR = 1e-9
+"""Relative rounding of distances."""
+
 HEAD = (
     "rank", "name", "x", "y", "z", "shortest_tether", "lower_bound", "lower_bound_of",
     "length", "status", "why",
@@ -237,6 +240,7 @@ def best_base(
     if problem.state is not None:
         raise InputError("state: a base is chosen before the robot is out; expected none")
     places = _places(problem, candidates)
+    _check_crop(problem, places, names)
     with until_interrupt(time_limit) as clock:
         rated = _rated(problem, places, names, clock, seed)
         return _solved(problem, rated, clock, every=every, seed=seed, on_candidate=on_candidate)
@@ -312,6 +316,25 @@ def _places(problem: Problem, candidates: npt.ArrayLike) -> Floats:
     if given.shape[1] == 2:
         given = np.column_stack([given, np.full(len(given), problem.base[2])])
     return given
+
+
+def _check_crop(problem: Problem, places: Floats, names: Sequence[str | None] | None) -> None:
+    """Raise an `InputError` where a tether would leave the part of the map that was imported."""
+    circle = None if problem.site is None else problem.site.cropped
+    if circle is None:
+        return
+    away = np.hypot(*(places[:, :2] - np.array(circle.center)).T)
+    beyond = np.flatnonzero(
+        away + problem.tether_length + problem.clearance > circle.radius * (1.0 + HAIR)
+    )
+    if len(beyond):
+        first = int(beyond[0])
+        called = (names[first] if names is not None else None) or f"#{first}"
+        more = f" and {len(beyond) - 1} more" if len(beyond) > 1 else ""
+        raise InputError(
+            f"candidates: {called}{more}: the tether reaches beyond the part of the map that was "
+            "imported; expected places that were given to netsp import (--candidates)"
+        )
 
 
 def _rated(

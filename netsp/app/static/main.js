@@ -18,7 +18,7 @@ const page = {
   data: null, version: -1, error: null, saved: true, file: null, tour: null, chosen: [], along: 0,
   tool: "select", draft: null, ask: (m) => link.ask(m), edit, redraw, drawTethers, view: null, facts: null,
   inSpace: () => space.open, picked: null, note, wrong: null, undo: false, redo: false,
-  drawn: null, download: null, refill: () => fill(page), shown: false, run: false, events: [], refit: () => { fitted = false; }, go: goTo,
+  drawn: null, download: null, refill: () => fill(page), shown: false, run: false, events: [], refit, go: goTo,
 };
 
 const view = new ChartView(by("map"));
@@ -28,6 +28,14 @@ const link = new Link(heard);
 page.drawn = new DrawnPath(page, link);
 const space = new Space(by("space"), link, note);
 let fitted = false;
+
+/** Fits the view to a version, now or when it comes. @param {number} version */
+function refit(version) {
+  fitted = page.version >= version && !space.open;
+  if (!fitted) return;
+  view.fit(page.data);
+  redraw();
+}
 
 /** Seconds in which the whole tour is played. */
 const LASTS = 24;

@@ -73,7 +73,7 @@ export function fill(page) {
     parts.push(element("h2", "Tour"), element("table",
       element("tr", element("th", ""), element("th", "goal"), element("th", "tether m"), element("th", "slack m")), ...rows));
   }
-  parts.push(...drawn(page), ...profiles(page, page.go), ...margins(page));
+  parts.push(...drawn(page), ...profiles(page, page.go), ...margins(page), ...imported(data.site));
   if (!page.shown) parts.push(...origin(data, set));
   panel.replaceChildren(...parts);
 }
@@ -106,6 +106,24 @@ function drawn(page) {
   table.id = "drawn";
   const hint = path.points.length ? [] : [element("p", "Click the points of a path on the map, or hold and draw; it begins at the base.")];
   return [element("h2", "Path by hand"), ...hint, table, element("div", back, " ", none, " ", save)];
+}
+
+/** What an import made of every feature of a map. @param {any} site */
+function imported(site) {
+  if (!site?.imported?.length) return [];
+  const rows = site.imported.flatMap((layer) => {
+    const used = Object.entries(layer.used).map(([kind, n]) => `${n} ${kind}`).join(", ");
+    const first = element("tr", element("td", layer.layer || "(all)"), element("td", String(layer.features)), element("td", used || "–"));
+    const out = layer.left_out.map((group) => {
+      const cell = element("td", `${group.features} left out: ${group.reason}`);
+      cell.colSpan = 3;
+      return element("tr", cell);
+    });
+    return [first, ...out];
+  });
+  const table = element("table", element("tr", ...["layer", "features", "used as"].map((n) => element("th", n))), ...rows);
+  table.className = "imported";
+  return [element("h2", `Map: ${site.file}`), table];
 }
 
 /** How far the world may be off. @param {any} page */

@@ -5,7 +5,8 @@ Validated at the door like a problem; `netsp schema scene` prints the JSON Schem
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self
 
@@ -20,6 +21,7 @@ from netsp.files import FileModel, read_text
 from netsp.models import Model
 from netsp.online.scene.field import DistanceField
 from netsp.online.scene.grid import VoxelGrid
+from netsp.online.scene.readers import Placement, load_cloud, load_mesh
 from netsp.online.scene.seams import seam_boxes
 from netsp.online.scene.shapes import (
     Box,
@@ -80,19 +82,41 @@ class Source(Model):
         Metres per unit of the file.
     voxel
         Metres; size of a voxel, default 1/200 of the longest side.
+    origin
+        (x, y) in the file, z upwards, that is (0, 0) of the scene, in units of the file.
+    up
+        Axis of the file that points upwards; None for what its format says, or z.
+    rotate
+        Degrees about the axes x, then y, then z of the scene.
     """
 
     file: Annotated[
         str,
         Field(
-            description="mesh (STL, OBJ, PLY, GLB) or cloud (npz, npy, csv, xyz, PLY, LAS, LAZ), "
-            "relative to the scene file"
+            description="mesh (STL, OBJ, PLY, GLB, glTF, DAE) or cloud (npz, npy, csv, txt, xyz, "
+            "asc, PTS, PCD, PLY, LAS, LAZ), relative to the scene file"
         ),
     ]
     scale: Annotated[Positive, Field(description="factor from the file's units to metres")] = 1.0
     voxel: Annotated[
         Positive | None, Field(description="edge of the voxels, m; null for a choice by size")
     ] = None
+    origin: Annotated[
+        Point2, Field(description="(x, y) of the file that is (0, 0) here, in its units")
+    ] = (0.0, 0.0)
+    up: Annotated[
+        Literal["x", "y", "z"] | None,
+        Field(description="axis of the file that points upwards; null for its format's, or z"),
+    ] = None
+    rotate: Annotated[
+        tuple[Number, Number, Number],
+        Field(description="degrees about the axes x, then y, then z of the scene"),
+    ] = (0.0, 0.0, 0.0)
+
+    @property
+    def placement(self) -> Placement:
+        """Place of the file in the scene."""
+        return Placement(self.scale, self.up, self.origin, self.rotate)
 
 
 class Floor(Model):
@@ -359,35 +383,82 @@ class Scene(FileModel):
             return None
         from netsp.online.scene import voxels
 
-        if self.cloud is not None:
-            others = [n for n in ("mesh", "floor") if getattr(self, n) is not None]
-            if others:
-                raise InputError(f"{self.name}: {others[0]}, cloud: expected one of them, got both")
-            return voxels.of_cloud_file(
-                self.cloud.file, scale=self.cloud.scale, voxel=voxel or self.cloud.voxel,
-                memory_limit=memory_limit, on_progress=on_progress,
-            )  # fmt: skip
-        if self.floor is None:
-            assert self.mesh is not None
-            return voxels.of_mesh(
-                self.mesh.file, scale=self.mesh.scale, voxel=voxel or self.mesh.voxel,
-                memory_limit=memory_limit, on_progress=on_progress,
-            )  # fmt: skip
-        parts = dict(self.meshes())
-        # below a sea floor, and beyond its walls, there is nothing to know
+        parts, points, said = self._files()
+        options: dict[str, Any] = {
+            "voxel": voxel or self._voxel(), "memory_limit": memory_limit,
+            "on_progress": on_progress, "source": self._source(),
+        }  # fmt: skip
+        if points is not None:
+            grid = (
+                voxels.of_meshes_and_cloud(list(parts.values()), points, **options)
+                if parts
+                else voxels.of_cloud(points, **options)
+            )
+        else:
+            region = self._water(parts) if "floor" in parts else None
+            grid = voxels.of_meshes(list(parts.values()), region=region, **options)
+        return replace(grid, notes=(*said, *grid.notes))
+
+    def _water(self, parts: Mapping[str, Any]) -> Floats:
+        """Return the box above a sea floor; below it, and beyond its walls, there is nothing to
+        know."""
         vertices = parts["floor"][0]
         top = vertices[: len(vertices) // 2]
         water = np.array([top.min(0), [*top.max(0)[:2], np.inf]])
-        if self.mesh is not None:
+        if "mesh" in parts:
             water = np.array([
                 np.minimum(water[0], parts["mesh"][0].min(0)),
                 np.maximum(water[1], parts["mesh"][0].max(0)),
             ])  # fmt: skip
-        return voxels.of_meshes(
-            list(parts.values()), region=water,
-            memory_limit=memory_limit, on_progress=on_progress, source=self.name,
-            voxel=voxel or self.floor.voxel or (self.mesh.voxel if self.mesh else None),
-        )  # fmt: skip
+        return water
+
+    def _voxel(self) -> float | None:
+        """Return the edge of voxels that the scene asks for: the smallest of its files, metres."""
+        given = [f.voxel for f in (self.floor, self.mesh, self.cloud) if f is not None and f.voxel]
+        return min(given) if given else None
+
+    def _source(self) -> str:
+        files = [f.file for f in (self.mesh, self.cloud, self.floor) if f is not None]
+        return files[0] if len(files) == 1 and self.floor is None else self.name
+
+    def _files(
+        self,
+    ) -> tuple[dict[str, tuple[Floats, npt.NDArray[np.int64]]], Floats | None, list[str]]:
+        """Read mesh, floor and cloud: triangles by name, points, and notes of what was left out."""
+        parts: dict[str, tuple[Floats, npt.NDArray[np.int64]]] = {}
+        points, said = None, []
+        if self.mesh is not None:
+            vertices, faces, notes = load_mesh(self.mesh.file, self.mesh.placement)
+            parts["mesh"] = vertices, faces
+            said += [f"{self.mesh.file}: {note}" for note in notes]
+        if self.floor is not None:
+            from netsp.online.scene.floor import load_floor
+
+            vertices, faces, notes = load_floor(
+                self.floor.file, scale=self.floor.scale, origin=self.floor.origin,
+                depths=self.floor.depths,
+            )  # fmt: skip
+            parts["floor"] = vertices, faces
+            said += [f"{self.floor.file}: {note}" for note in notes]
+        if self.cloud is not None:
+            points, notes = load_cloud(self.cloud.file, self.cloud.placement)
+            said += [f"{self.cloud.file}: {note}" for note in notes]
+        return parts, points, said
+
+    def reading_notes(self) -> list[str]:
+        """Return what was left out, turned or converted when the scene's files were read.
+
+        Returns
+        -------
+        list of str
+            One line for each file and reason.
+
+        Raises
+        ------
+        InputError
+            A file cannot be read.
+        """
+        return self._files()[2]
 
     def meshes(self) -> list[tuple[str, tuple[Floats, npt.NDArray[np.int64]]]]:
         """Mesh and sea floor as triangles.
@@ -402,21 +473,8 @@ class Scene(FileModel):
         InputError
             A file cannot be read.
         """
-        out = []
-        if self.mesh is not None:
-            from netsp.online.scene.readers import read_mesh
-
-            vertices, faces = read_mesh(self.mesh.file)
-            out.append(("mesh", (vertices * self.mesh.scale, faces)))
-        if self.floor is not None:
-            from netsp.online.scene.floor import floor_mesh
-
-            floor = self.floor
-            triangles = floor_mesh(
-                floor.file, scale=floor.scale, origin=floor.origin, depths=floor.depths
-            )
-            out.append(("floor", triangles))
-        return out
+        without = self.model_copy(update={"cloud": None})
+        return list(without._files()[0].items())
 
 
 def _thickness(solids: tuple[Solid, ...]) -> list[tuple[str, float]]:

@@ -171,8 +171,8 @@ def extent(scene: Scene, *points: Floats) -> tuple[Floats, Floats]:
 
 def drawn_points(scene: Scene) -> Floats:
     """Some of the points of the scene's cloud."""
-    from netsp.online.scene.readers import read_cloud
+    from netsp.online.scene.readers import load_cloud
 
     assert scene.cloud is not None
-    points = read_cloud(scene.cloud.file) * scene.cloud.scale
+    points = load_cloud(scene.cloud.file, scene.cloud.placement)[0]
     return np.asarray(points[:: -(-len(points) // MOST_POINTS)])

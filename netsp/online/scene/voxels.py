@@ -10,17 +10,18 @@ the grid from its border, and what it does not reach is solid.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
-from netsp.arrays import Floats
+from netsp.arrays import Floats, Singles
 from netsp.clock import end_if_abandoned
 from netsp.errors import InputError
 from netsp.online.scene.grid import SIDE, VoxelGrid
 from netsp.online.scene.lattice import Dense, Lattice, OnStage, sparse_near, tell
-from netsp.online.scene.readers import read_cloud, read_mesh
+from netsp.online.scene.readers import Placement, load_cloud, load_mesh
 from netsp.online.scene.sites import point_sites, triangle_sites
 
 DEFAULT_VOXELS = 200
@@ -64,12 +65,13 @@ def of_mesh(
         Not readable, no triangles, coordinates that are not finite, a grid too large for
         `memory_limit` (GiB), or trimesh is not installed.
     """
-    vertices, faces = read_mesh(path)
+    vertices, faces, notes = load_mesh(path, Placement(scale))
     end_if_abandoned()
-    return of_triangles(
-        vertices * scale, faces, voxel=voxel, memory_limit=memory_limit,
+    grid = of_triangles(
+        vertices, faces, voxel=voxel, memory_limit=memory_limit,
         on_progress=on_progress, source=str(path),
     )  # fmt: skip
+    return replace(grid, notes=(*notes, *grid.notes))
 
 
 def of_meshes(
@@ -113,50 +115,72 @@ def of_triangles(
         raise InputError(f"{source}: a face has a corner that is none of the {len(v)} vertices")
     if not np.isfinite(v).all():
         raise InputError(f"{source}: a vertex is not finite")
-    open_edges, uneven = _edges(f, v)
-    turned = 0
-    if not open_edges:
-        f, turned = _outward(f, v)
-    triangles = v[f]
-    low, high = triangles.min((0, 1)), triangles.max((0, 1))
-    end_if_abandoned()
-    sites = triangle_sites(triangles)
+    mesh = _Triangles.of(v, f)
+    low, high = mesh.triangles.min((0, 1)), mesh.triangles.max((0, 1))
     lattice = _lattice(
-        low, high, voxel, memory_limit, source, sites,
-        shell=SHEET if open_edges else 0.0, triangles=None if open_edges else triangles,
-        region=region,
+        low, high, voxel, memory_limit, source, mesh.sites,
+        shell=SHEET if mesh.open_edges else 0.0,
+        triangles=None if mesh.open_edges else mesh.triangles, region=region,
     )  # fmt: skip
-    size, notes = lattice.size, []
-    values = lattice.closest(sites, on_progress, whose=False)[0]
-    if open_edges:
-        shell = SHEET * size
-        notes.append(
-            f"the mesh is open ({open_edges} edges have one triangle only): taken as a shell, "
-            f"{2 * shell:.3g} thick; spaces that water cannot reach count as solid"
-        )
-        values -= np.float32(shell)
-    else:
-        most = lattice.turn_inside(values, triangles)
-        if uneven:
-            notes.append(
-                f"faces at {uneven} edges have opposite orientations: taken as solid wherever the "
-                "winding number is not zero"
-            )
-        if turned:
-            notes.append(f"{turned} parts are inside out, or cavities: taken as solid")
-        elif most > 1:
-            notes.append("parts of the mesh overlap: taken as their union")
-    end_if_abandoned()
-    enclosed = lattice.unreached(values)
-    if enclosed.any():
-        values[enclosed] = -np.abs(values[enclosed])
-        if not open_edges:
-            notes.append("closed cavities count as solid")
-    if not (values < 0.0).any():
-        raise InputError(f"{source}: no solid at voxels of {size:.3g}; expected smaller voxels")
-    grow = SHEET * size if open_edges else 0.0
+    values, notes = mesh.values(lattice, on_progress, source)
+    grow = SHEET * lattice.size if mesh.open_edges else 0.0
     tell(on_progress, "distances", 1.0)
     return lattice.grid(values, np.array([low - grow, high + grow]), tuple(notes))
+
+
+@dataclass
+class _Triangles:
+    """Triangles (m, 3, 3) of a mesh, with their sites and what is known of their edges."""
+
+    triangles: Floats
+    sites: Floats
+    open_edges: int
+    uneven: int
+    turned: int
+
+    @classmethod
+    def of(cls, v: Floats, f: npt.NDArray[np.int64]) -> _Triangles:
+        open_edges, uneven = _edges(f, v)
+        turned = 0
+        if not open_edges:
+            f, turned = _outward(f, v)
+        triangles = v[f]
+        end_if_abandoned()
+        return cls(triangles, triangle_sites(triangles), open_edges, uneven, turned)
+
+    def values(
+        self, lattice: Lattice, on_progress: OnStage, source: str
+    ) -> tuple[Singles, list[str]]:
+        """Return the signed distances at the points of a lattice, and what was assumed."""
+        size, notes = lattice.size, []
+        values = lattice.closest(self.sites, on_progress, whose=False)[0]
+        if self.open_edges:
+            shell = SHEET * size
+            notes.append(
+                f"the mesh is open ({self.open_edges} edges have one triangle only): taken as a "
+                f"shell, {2 * shell:.3g} thick; spaces that water cannot reach count as solid"
+            )
+            values -= np.float32(shell)
+        else:
+            most = lattice.turn_inside(values, self.triangles)
+            if self.uneven:
+                notes.append(
+                    f"faces at {self.uneven} edges have opposite orientations: taken as solid "
+                    "wherever the winding number is not zero"
+                )
+            if self.turned:
+                notes.append(f"{self.turned} parts are inside out, or cavities: taken as solid")
+            elif most > 1:
+                notes.append("parts of the mesh overlap: taken as their union")
+        end_if_abandoned()
+        enclosed = lattice.unreached(values)
+        if enclosed.any():
+            values[enclosed] = -np.abs(values[enclosed])
+            if not self.open_edges:
+                notes.append("closed cavities count as solid")
+        if not (values < 0.0).any():
+            raise InputError(f"{source}: no solid at voxels of {size:.3g}; expected smaller voxels")
+        return values, notes
 
 
 def of_cloud_file(
@@ -167,12 +191,14 @@ def of_cloud_file(
     memory_limit: float = 4.0,
     on_progress: OnStage = None,
 ) -> VoxelGrid:
-    """The distance grid of a cloud file: .npz or .npy (an array (n, 3), in .npz named `points`),
-    .csv, .txt or .xyz (three columns), .ply, .las or .laz. InputError as for `of_mesh`."""
-    return of_cloud(
-        read_cloud(path) * scale, voxel=voxel, memory_limit=memory_limit, on_progress=on_progress,
+    """The distance grid of a cloud file in any format of `netsp.online.scene.readers.load_cloud`.
+    InputError as for `of_mesh`."""
+    points, notes = load_cloud(path, Placement(scale))
+    grid = of_cloud(
+        points, voxel=voxel, memory_limit=memory_limit, on_progress=on_progress,
         source=str(path),
     )  # fmt: skip
+    return replace(grid, notes=(*notes, *grid.notes))
 
 
 def of_cloud(
@@ -190,6 +216,20 @@ def of_cloud(
     passes through the points and bridges gaps of up to about 2 r. Where nothing solid would be left
     (a sheet of points) the points themselves are, `SHEET` voxels to either side.
     """
+    p = _points(points, source)
+    low, high = p.min(0), p.max(0)
+    ball = _ball(p, _size(low, high, voxel, source))
+    sites = point_sites(p)
+    lattice = _lattice(
+        low, high, voxel, memory_limit, source, sites, shell=0.0, extra=_spacing(p),
+        block=CLOUD_BLOCK,
+    )  # fmt: skip
+    out, notes, grow = _cloud_values(lattice, p, sites, ball, on_progress, source)
+    tell(on_progress, "distances", 1.0)
+    return lattice.grid(out, np.array([low - grow, high + grow]), tuple(notes))
+
+
+def _points(points: npt.ArrayLike, source: str) -> Floats:
     p = np.asarray(points, dtype=float)
     if p.ndim != 2 or p.shape[1] != 3:
         raise InputError(f"{source}: expected points of three coordinates, got shape {p.shape}")
@@ -197,23 +237,22 @@ def of_cloud(
         raise InputError(f"{source}: expected at least 4 points, got {len(p)}")
     if not np.isfinite(p).all():
         raise InputError(f"{source}: a point is not finite")
+    return p
+
+
+def _ball(p: Floats, size: float) -> float:
+    """Radius of the balls about points that keep the water out, metres."""
     from scipy.spatial import cKDTree
 
-    low, high = p.min(0), p.max(0)
     near, _ = cKDTree(p).query(p, k=min(7, len(p)))
-    ball = max(1.5 * _size(low, high, voxel, source), float(np.quantile(near[:, -1], 0.95)))
-    sites = point_sites(p)
-    lattice = _lattice(
-        low,
-        high,
-        voxel,
-        memory_limit,
-        source,
-        sites,
-        shell=0.0,
-        extra=_spacing(p),
-        block=CLOUD_BLOCK,
-    )
+    return max(1.5 * size, float(np.quantile(near[:, -1], 0.95)))
+
+
+def _cloud_values(
+    lattice: Lattice, p: Floats, sites: Floats, ball: float, on_progress: OnStage, source: str
+) -> tuple[Singles, list[str], float]:
+    """Return the signed distances at the points of a lattice, what was assumed, and by how much
+    the solid is larger than the box of the points."""
     size = lattice.size
     distances, owner = lattice.closest(sites, on_progress)
     tell(on_progress, "flood", 0.5)
@@ -241,8 +280,64 @@ def of_cloud(
                 f"{100 * loose.mean():.0f} % of the points enclose nothing: taken as a sheet, "
                 f"{2 * half:.3g} thick"
             )
+    return out, notes, grow
+
+
+def of_meshes_and_cloud(
+    parts: list[tuple[Floats, npt.NDArray[np.int64]]],
+    points: npt.ArrayLike,
+    *,
+    voxel: float | None = None,
+    memory_limit: float = 4.0,
+    on_progress: OnStage = None,
+    source: str = "scene",
+) -> VoxelGrid:
+    """Return the distance grid of meshes and a cloud of points together.
+
+    Both are measured at the points of one lattice. Outside of their union the smaller distance is
+    the distance to it; inside, it is no deeper than the truth.
+
+    Parameters
+    ----------
+    parts : list of (ndarray, ndarray)
+        Vertices (n, 3) and faces (m, 3) of each mesh.
+    points : ndarray, shape (k, 3)
+        Points of the cloud.
+    voxel : float, optional
+        Edge of a voxel, metres.
+    memory_limit : float
+        GiB.
+    on_progress : callable, optional
+        Called with (stage, fraction done).
+    source : str
+        Name of the scene, for messages.
+
+    Raises
+    ------
+    InputError
+        As for `of_triangles` and `of_cloud`.
+    """
+    p = _points(points, source)
+    first = np.cumsum([0, *(len(v) for v, _ in parts)])
+    v = np.vstack([v for v, _ in parts])
+    f = np.vstack([f + n for (_, f), n in zip(parts, first, strict=False)])
+    mesh = _Triangles.of(v, f)
+    low = np.minimum(mesh.triangles.min((0, 1)), p.min(0))
+    high = np.maximum(mesh.triangles.max((0, 1)), p.max(0))
+    size = _size(low, high, voxel, source)
+    extra = _spacing(p)
+    flat = triangle_sites(np.repeat(p[:, None], 3, axis=1))  # points, where blocks are placed
+    lattice = _lattice(
+        low, high, size, memory_limit, source, np.vstack([mesh.sites, flat]),
+        shell=SHEET if mesh.open_edges else 0.0, extra=extra, block=CLOUD_BLOCK,
+    )  # fmt: skip
+    values, notes = mesh.values(lattice, on_progress, source)
+    cloud, more, grow = _cloud_values(lattice, p, point_sites(p), _ball(p, size), None, source)
+    if mesh.open_edges:
+        grow = max(grow, SHEET * lattice.size)
     tell(on_progress, "distances", 1.0)
-    return lattice.grid(out, np.array([low - grow, high + grow]), tuple(notes))
+    box = np.array([low - grow, high + grow])
+    return lattice.grid(np.minimum(values, cloud), box, (*notes, *more))
 
 
 def _lattice(

@@ -1,0 +1,211 @@
+"""Telemetry logs of ground stations (.tlog): a time of eight bytes before each MAVLink message."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from netsp.errors import InputError
+from netsp.files import read_bytes
+from netsp.guard.fix import Fix
+from netsp.guard.message_tally import MessageTally
+from netsp.link.dialect import dialect, parser
+from netsp.link.frame import Frame
+from netsp.link.messages import AUTOPILOT, Listener
+
+MAX_PACKET = 300
+"""Bytes of a MAVLink message, at most."""
+
+POSITIONS = ("LOCAL_POSITION_NED", "GLOBAL_POSITION_INT")
+"""Messages that tell a position: in metres, and in degrees."""
+
+
+def read_tlog(
+    file: Path, frame: Frame, system: int | None, tally: MessageTally,
+    on_note: Callable[[str], None],
+) -> list[Fix]:  # fmt: skip
+    """Read the messages of one vehicle.
+
+    Parameters
+    ----------
+    file : Path
+        Log of a ground station.
+    frame : Frame
+        Frame of the site.
+    system : int, optional
+        System id of the vehicle; by default the only one that tells positions.
+    tally : MessageTally
+        Told what becomes of each message.
+    on_note : callable
+        Called with what was assumed.
+
+    Returns
+    -------
+    list of Fix
+        One for each message that says something that counts; none with a position where the
+        recording has none.
+
+    Raises
+    ------
+    InputError
+        Several vehicles tell positions and `system` is None; no message is of `system`.
+    """
+    where = f"--replay: {file}"
+    data = read_bytes(file)
+    heard = _Recording.heard(data, frame)
+    vehicle = heard.vehicle(system, where)
+    if not vehicle.has_positions and frame.is_global and not frame.is_asked_for:
+        other = _Recording.heard(data, frame.local())
+        fallback = other.vehicle(system, where)
+        if fallback.has_positions:
+            on_note(
+                f"{where}: no GLOBAL_POSITION_INT with a GPS fix; LOCAL_POSITION_NED is taken as "
+                "metres north, east and down of the base, as with --frame local: true if the "
+                "vehicle's estimate began there"
+            )
+            heard, vehicle = other, fallback
+    heard.count(vehicle, tally)
+    if not vehicle.has_positions:
+        raise InputError(f"{where}: has no positions{_help(heard, vehicle, frame)}")
+    return vehicle.fixes
+
+
+def messages_of(data: bytes) -> Iterator[Any]:
+    """Yield the messages of a log; what belongs to none is passed over.
+
+    Parameters
+    ----------
+    data : bytes
+        The log.
+
+    Yields
+    ------
+    MAVLink_message
+        One after the other.
+    """
+    error = dialect().MAVError
+    at = 0
+    while at + 8 < len(data):
+        reads = parser()
+        message = None
+        for k in range(at + 8, min(len(data), at + 8 + MAX_PACKET)):
+            try:
+                message = reads.parse_char(data[k : k + 1])
+            except (error, struct.error, ValueError):
+                break
+            if message is not None:
+                break
+        if message is None or message.get_type() == "BAD_DATA":
+            at += 1  # something is missing: on to where messages begin again
+            continue
+        at = k + 1
+        yield message
+
+
+@dataclass
+class _Vehicle:
+    """Messages of one system."""
+
+    system: int
+    listener: Listener
+    fixes: list[Fix] = field(default_factory=list)
+    tally: MessageTally = field(default_factory=MessageTally)
+
+    @property
+    def has_positions(self) -> bool:
+        return any(f.position is not None for f in self.fixes)
+
+    def take(self, message: Any) -> None:
+        fix = self.listener.understand(message)
+        kind = message.get_type()
+        if fix is None and self.listener.left_out:
+            self.tally.leave_out(kind, self.listener.left_out)
+            return
+        self.tally.use(kind)
+        if fix is not None:
+            self.fixes.append(fix)
+
+
+class _Recording:
+    """Recording by vehicles."""
+
+    def __init__(self) -> None:
+        self.vehicles: dict[int, _Vehicle] = {}
+        self.others = MessageTally()
+
+    @classmethod
+    def heard(cls, data: bytes, frame: Frame) -> _Recording:
+        self = cls()
+        for message in messages_of(data):
+            system = message.get_srcSystem()
+            if message.get_srcComponent() != AUTOPILOT:
+                kind = f"{message.get_type()} of component {message.get_srcComponent()}"
+                self.others.leave_out(kind, "not of an autopilot (component 1)")
+                continue
+            vehicle = self.vehicles.get(system)
+            if vehicle is None:
+                vehicle = _Vehicle(system, Listener(frame, system))
+                self.vehicles[system] = vehicle
+            vehicle.take(message)
+        return self
+
+    def vehicle(self, system: int | None, where: str) -> _Vehicle:
+        """Return the vehicle that is asked for, or the only one that tells positions."""
+        if system is not None:
+            if system not in self.vehicles:
+                raise InputError(f"{where}: has no positions of system {system}{self._systems()}")
+            return self.vehicles[system]
+        if not self.vehicles:
+            raise InputError(f"{where}: has no positions: no message of an autopilot")
+        placed = [v for v in self.vehicles.values() if v.has_positions]
+        if len(placed) > 1:
+            names = " and ".join(str(v.system) for v in placed)
+            raise InputError(
+                f"{where}: systems {names} tell positions; expected one of them with "
+                + " or ".join(f"--system {v.system}" for v in placed)
+            )
+        return placed[0] if placed else next(iter(self.vehicles.values()))
+
+    def _systems(self) -> str:
+        heard = ", ".join(f"{v.system}" for v in self.vehicles.values())
+        return f"; it has messages of system {heard}" if heard else "; it has no messages"
+
+    def count(self, vehicle: _Vehicle, tally: MessageTally) -> None:
+        """Tell what became of each message."""
+        for other in self.vehicles.values():
+            if other is vehicle:
+                tally.used.update(other.tally.used)
+                for reason, kinds in other.tally.left_out.items():
+                    for kind, n in kinds.items():
+                        tally.leave_out(kind, reason, n)
+            else:
+                kind = f"of system {other.system}"
+                reason = f"not of the vehicle, system {vehicle.system}"
+                tally.leave_out(kind, reason, other.tally.total)
+        for reason, kinds in self.others.left_out.items():
+            for kind, n in kinds.items():
+                tally.leave_out(kind, reason, n)
+
+
+def _help(heard: _Recording, vehicle: _Vehicle, frame: Frame) -> str:
+    """Return what to do about a recording without positions."""
+    reasons = {
+        (kind, reason): n for reason, kinds in vehicle.tally.left_out.items()
+        for kind, n in kinds.items() if kind in POSITIONS
+    }  # fmt: skip
+    if not reasons:
+        placed = [v.system for v in heard.vehicles.values() if v.has_positions]
+        looked = f" of system {vehicle.system}: expected {' or '.join(POSITIONS)}"
+        return looked + (f"; or --system {placed[0]}" if placed else "")
+    said = "; ".join(f"{n} {kind}: {reason}" for (kind, reason), n in reasons.items())
+    local, degrees = (any(k == kind for k, _ in reasons) for kind in POSITIONS)
+    if local and frame.is_global:
+        said += "; expected --frame local to read the metres"
+    elif degrees and not frame.is_global and frame.has_origin:
+        said += "; expected --frame global to read the degrees"
+    elif degrees and not frame.is_global:
+        said += "; expected a problem with an origin to read the degrees"
+    return f": {said}"

@@ -1,0 +1,358 @@
+"""Recordings of any format: every message or row is used or left out for a reason, and what cannot
+be read says what would help."""
+
+import struct
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from netsp import Circle, InputError, Problem
+from netsp.command.main import main
+from netsp.guard.alarms import Level
+from netsp.guard.fix import Fix
+from netsp.guard.guard import Guard, GuardOptions
+from netsp.guard.message_tally import MessageTally
+from netsp.guard.recorded_path import read_any_paths
+from netsp.guard.replay import read_fixes
+from netsp.guard.stream import Stream, replayed
+from netsp.link.frame import Frame
+from netsp.link.vehicle_clock import ClockPolicy, VehicleClock
+from netsp.problem import Origin
+
+SITE = Problem(
+    base=(0, 0), goals=[(9, 0, -1)], tether_length=30,
+    obstacles=[Circle(center=(5, 3), radius=0.5, name="A")],
+)  # fmt: skip
+ON_EARTH = SITE.model_copy(update={"origin": Origin(latitude=58.0, longitude=5.5, heading=30.0)})
+EXACT = GuardOptions(noise=0.02, drift=0.02)
+GOOD, NONE = 1 | 2 | 8 | 16 | 32, 0
+
+
+def told(file, site=SITE, kind=None, system=None):
+    tally, notes = MessageTally(), []
+    fixes = list(read_fixes(file, Frame(site, kind), system, tally=tally, on_note=notes.append))
+    return fixes, tally, notes
+
+
+def places(fixes):
+    return np.array([f.position for f in fixes if f.position is not None])
+
+
+# tables
+
+WAY = [(0.1 * k, 0.3 * k, 0.2 * k, -1.0) for k in range(20)]
+
+
+def degrees(x, y):
+    from netsp.site.projection import Projection
+
+    ((lat, lon),) = Projection.of(ON_EARTH).to_earth([(x, y)])
+    return f"{lat:.10f}", f"{lon:.10f}"
+
+
+TABLES = {
+    "seconds": ("t,x,y,z", lambda t, x, y, z: (t, x, y, z)),
+    "epoch": ("t,x,y,z", lambda t, x, y, z: (t + 1.732e9, x, y, z)),
+    "epoch in ms": ("time,x,y,z", lambda t, x, y, z: (round(1e3 * t) + 1732000000000, x, y, z)),
+    "boot time in ms": ("time_boot_ms,x,y,z", lambda t, x, y, z: (round(1e3 * t), x, y, z)),
+    "ISO, other order": (
+        "Z,Time,Y,X", lambda t, x, y, z: (z, f"2024-11-19T07:06:{t:06.3f}Z", y, x)
+    ),
+    "local": ("x,y,t,depth", lambda t, x, y, z: (x, y, t, -z)),
+    "earth": (
+        "timestamp,latitude,longitude,altitude", lambda t, x, y, z: (t, *degrees(x, y), z)
+    ),
+    "earth by depth": ("t,lon,lat,depth", lambda t, x, y, z: (t, *degrees(x, y)[::-1], -z)),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", sorted(TABLES))
+@pytest.mark.parametrize("separator", [",", ";"])
+def test_tables_of_any_times_columns_and_frames_tell_the_same_track(tmp_path, name, separator):
+    head, row = TABLES[name]
+    rows = [list(map(str, row(*place))) for place in WAY]
+    if separator == ";":
+        rows = [[c if "T" in c else c.replace(".", ",") for c in r] for r in rows]
+    lines = [head.replace(",", separator), *(separator.join(r) for r in rows)]
+    (tmp_path / "a.csv").write_text("\ufeff" + "\n".join(lines))
+    fixes, tally, _ = told(tmp_path / "a.csv", ON_EARTH)
+    np.testing.assert_allclose(places(fixes), np.array(WAY)[:, 1:], atol=1e-3)
+    times = np.array([f.time for f in fixes])
+    np.testing.assert_allclose(times - times[0], np.array(WAY)[:, 0], atol=1e-3)
+    assert (tally.used["rows"], tally.total) == (len(WAY), len(WAY))
+
+
+@settings(max_examples=40, deadline=None)
+@given(rows=st.lists(st.sampled_from(["place", "nan", "empty", "half", "no fix", "blank"]),
+                     min_size=1, max_size=12))  # fmt: skip
+def test_rows_without_a_position_are_gaps_and_all_rows_are_counted(rows, tmp_path_factory):
+    cells = {
+        "place": f"{{t}},{','.join(degrees(1, 2))},-1", "nan": "{t},nan,NaN,nan",
+        "empty": "{t},,,", "half": "{t},58.0,nan,-1", "no fix": "{t},0,0,0.0", "blank": ",,,",
+    }  # fmt: skip
+    file = tmp_path_factory.mktemp("rows") / "a.csv"
+    text = "\n".join(cells[kind].format(t=k) for k, kind in enumerate(rows))
+    file.write_text(f"t,lat,lon,alt\n{text}\n")
+    if "place" not in rows:
+        with pytest.raises(InputError, match="has no positions"):
+            told(file, ON_EARTH)
+        return
+    fixes, tally, notes = told(file, ON_EARTH)
+    assert tally.total == len(rows) - rows.count("blank")  # a line without a cell is no row
+    assert tally.used["rows"] == rows.count("place") == len(places(fixes))
+    assert any("gap" in note for note in notes) is bool(set(rows) - {"place", "blank"})
+
+
+@pytest.mark.parametrize(
+    ("text", "site", "kind", "says"),
+    [
+        ("t,lat,lon,z\n0,58,5.5,0\n", SITE, None, "expected a problem with an origin"),
+        ("t,lat,lon,z\n0,58,5.5,0\n", ON_EARTH, "local", "expected --frame global"),
+        ("t,lat,lon,z\n0,580000000,55000000,0\n", ON_EARTH, None, "lat within 90"),
+        ("t,x,y,z\n,1,2,3\n", SITE, None, "t: expected seconds, got nothing"),
+        ("t,x,y,z\nnoon,1,2,3\n", SITE, None, "expected a time such as"),
+        ("t,name\n0,1\n", SITE, None, "expected columns t, x, y, z"),
+    ],
+)
+def test_a_table_that_cannot_be_read_says_what_would_help(tmp_path, text, site, kind, says):
+    (tmp_path / "a.csv").write_text(text)
+    with pytest.raises(InputError, match=says):
+        told(tmp_path / "a.csv", site, kind)
+
+
+def test_columns_that_are_not_understood_are_named(tmp_path):
+    (tmp_path / "a.csv").write_text("t,x,y,battery,leak\n0,1,2,16.1,0\n1,1,3,16,0\n")
+    _, _, notes = told(tmp_path / "a.csv")
+    assert any("columns left out: battery, leak" in note for note in notes)
+    assert any("z is taken as 0" in note for note in notes)
+
+
+# telemetry logs
+
+
+def tlog(file, *rows):
+    """Rows of (system, component, message)."""
+    from netsp.link.dialect import parser
+
+    data = b"".join(
+        struct.pack(">Q", 10**15 + k) + message.pack(parser(system, component))
+        for k, (system, component, message) in enumerate(rows)
+    )
+    file.write_bytes(data)
+    return file
+
+
+def vehicle(m, system=1, *, local=True, degrees=None, flags=GOOD, n=30, begin=0):
+    rows = []
+    for k in range(n):
+        t = begin + 100 * k
+        if k % 5 == 0:
+            rows += [(system, 1, m.MAVLink_heartbeat_message(12, 3, 128, 4, 4, 3)),
+                     (system, 1, m.MAVLink_ekf_status_report_message(flags, 0, 0, 0, 0, 0)),
+                     (system, 154, m.MAVLink_heartbeat_message(26, 8, 0, 0, 4, 3)),
+                     (system, 1, m.MAVLink_system_time_message(0, t))]  # fmt: skip
+        if local:
+            place = m.MAVLink_local_position_ned_message(t, 0.0, 0.04 * k, 1.0, 0, 0.4, 0)
+            rows.append((system, 1, place))
+        if degrees is not None:
+            lat, lon = degrees
+            place = m.MAVLink_global_position_int_message(t, lat, lon, 0, -1000, 0, 0, 0, 0)
+            rows.append((system, 1, place))
+    return rows
+
+
+@pytest.fixture(scope="module")
+def m():
+    pytest.importorskip("pymavlink")
+    from netsp.link.dialect import dialect
+
+    return dialect()
+
+
+FIX, NO_FIX = (580000100, 55000100), (0, 0)
+
+
+@pytest.mark.parametrize("first", [True, False])
+def test_the_only_vehicle_that_tells_positions_is_read_whoever_is_heard_first(tmp_path, m, first):
+    mine, other = vehicle(m, 1), vehicle(m, 2, local=False, degrees=NO_FIX)
+    rows = [*mine, *other] if first else [*other, *mine]
+    fixes, tally, notes = told(tlog(tmp_path / "a.tlog", *rows))
+    assert len(places(fixes)) == 30
+    assert tally.total == len(rows)
+    assert any("not of the vehicle, system 1" in note for note in notes)
+
+
+def test_of_several_vehicles_with_positions_one_is_asked_for(tmp_path, m):
+    rows = [*vehicle(m, 7), *vehicle(m, 1, n=10)]
+    file = tlog(tmp_path / "a.tlog", *rows)
+    with pytest.raises(InputError, match="--system 7 or --system 1"):
+        told(file)
+    fixes, tally, _ = told(file, system=1)
+    assert (len(places(fixes)), tally.total) == (10, len(rows))
+    with pytest.raises(
+        InputError, match="no positions of system 3; it has messages of system 7, 1"
+    ):
+        told(file, system=3)
+
+
+def test_without_a_gps_fix_metres_are_read_and_it_is_said(tmp_path, m):
+    file = tlog(tmp_path / "a.tlog", *vehicle(m, degrees=NO_FIX))
+    fixes, tally, notes = told(file, ON_EARTH)
+    assert len(places(fixes)) == 30
+    assert any("as with --frame local" in note for note in notes)
+    assert tally.left_out["no GPS fix (lat = lon = 0)"] == {"GLOBAL_POSITION_INT": 30}
+    np.testing.assert_allclose(places(fixes), places(told(file, ON_EARTH, "local")[0]))
+    with pytest.raises(InputError, match=r"no GPS fix.*--frame local"):
+        told(file, ON_EARTH, "global")
+
+
+def test_degrees_count_where_both_are_told(tmp_path, m):
+    fixes, tally, notes = told(tlog(tmp_path / "a.tlog", *vehicle(m, degrees=FIX)), ON_EARTH)
+    assert len({tuple(p) for p in places(fixes)}) == 1
+    assert sum(tally.left_out["degrees count, because the site has an origin"].values()) == 30
+    assert not any("as with --frame local" in note for note in notes)
+
+
+@pytest.mark.parametrize(
+    ("site", "kind", "says"),
+    [(SITE, None, "expected a problem with an origin"), (ON_EARTH, "local", "--frame global")],
+)
+def test_degrees_that_cannot_be_placed_say_what_would_help(tmp_path, m, site, kind, says):
+    file = tlog(tmp_path / "a.tlog", *vehicle(m, local=False, degrees=FIX))
+    with pytest.raises(InputError, match=says):
+        told(file, site, kind)
+
+
+# logs of vehicles
+
+
+def test_a_log_with_pos_only_is_read_where_the_site_is_on_the_earth(tmp_path):
+    pytest.importorskip("pymavlink")
+    from tests.test_dataflash import FORMATS, header, packed, place
+
+    pos = [
+        packed("POS", int(1e6 * t), *((580000050, 55000030) if t > 1 else (0, 0)), -1.0, -1.5, -1.0)
+        for t in range(6)
+    ]
+    file = tmp_path / "a.bin"
+    file.write_bytes(header() + packed("ARM", 10**6, 1, 0, 0, 0) + b"".join(pos))
+    fixes, tally, _ = told(file, ON_EARTH)
+    assert len(places(fixes)) == 4
+    assert places(fixes)[0][2] == -1.5
+    assert tally.left_out["no GPS fix (lat = lon = 0)"] == {"POS": 2}
+    assert tally.total == len(FORMATS) + 1 + 6
+    with pytest.raises(InputError, match="4 POS are in degrees; expected a problem with an origin"):
+        told(file, SITE)
+    with pytest.raises(InputError, match="expected --frame global"):
+        told(file, ON_EARTH, "local")
+    rows = b"".join(place(t, 0.1 * t, 0.0, 1.0) for t in range(6))
+    file.write_bytes(header() + rows)
+    fixes, tally, notes = told(file, ON_EARTH)
+    assert any("as with --frame local" in note for note in notes)
+    assert tally.total == len(FORMATS) + 6
+    file.write_bytes(header() + packed("ARM", 10**6, 1, 0, 0, 0))
+    with pytest.raises(InputError, match="in XKF1, NKF1 and POS; the log has 1 ARM"):
+        told(file, ON_EARTH)
+
+
+# clocks
+
+
+def drive(times, offset=lambda t: 0.0, **more):
+    return [Fix(t + offset(t), (0.4 * t, 0.0, -1.0), estimate=True, **more) for t in times]
+
+
+TIMES = np.round(np.arange(0.0, 12.0, 0.1), 3)
+
+
+@pytest.mark.parametrize("begin", [0.0, 100.0, 1.732e9])
+@pytest.mark.parametrize("step", [2.0, 4.0])
+def test_a_clock_that_is_set_is_not_a_restart(begin, step):
+    """What is believed is as with a clock that is not set, and nothing is lost."""
+    notes = []
+    fixes = drive(TIMES, lambda t: begin - (step if t >= 8.0 else 0.0))
+    reports = list(replayed(Guard(SITE, EXACT), fixes, notes.append))
+    assert not [a for r in reports for a in r.raised]
+    assert all(r.claims for r in reports)
+    assert reports[-1].time == pytest.approx(TIMES[-1] + begin - step)
+    (note,) = notes
+    assert "the clock was set: its time went back by" in note
+
+
+@pytest.mark.parametrize("begin", [100.0, 4000.0])
+@pytest.mark.parametrize("boot", [0.2, 20.0])
+def test_a_clock_that_begins_anew_near_zero_is_a_restart(begin, boot):
+    notes = []
+    fixes = drive(TIMES, lambda t: begin if t < 6.0 else boot - 6.0)
+    reports = list(replayed(Guard(SITE, EXACT), fixes, notes.append))
+    assert "the vehicle started anew" in notes[0]
+    assert reports[-1].time == pytest.approx(TIMES[-1] + boot - 6.0)
+    assert reports[-1].claims
+
+
+def test_a_message_that_comes_late_is_left_out():
+    stream = Stream(Guard(SITE, EXACT))
+    for fix in drive(TIMES[:50]):
+        stream.take(fix)
+    assert stream.take(Fix(1.0, (0.4, 0.0, -1.0))) is None
+    assert stream.take(Fix(5.0, (2.0, 0.0, -1.0))).claims
+
+
+@settings(max_examples=50, deadline=None)
+@given(steps=st.lists(st.tuples(st.integers(6, 30), st.floats(1.5, 5.0)), max_size=5))
+def test_a_clock_that_is_set_again_and_again_never_goes_back(steps):
+    clock, own, times = VehicleClock(), 1000.0, []
+    for n, back in steps:
+        for _ in range(n):
+            own += 0.1
+            reading = clock.take(own)
+            assert reading.event != "restart"
+            if reading.event != "late":
+                times.append(reading.time)
+        own -= back
+    assert (np.diff(times) > 0.0).all()
+    assert len(times) >= sum(n - 4 for n, _ in steps)
+
+
+def test_a_policy_out_of_range_is_refused():
+    for wrong in ({"max_late_s": 0.0}, {"max_boot_s": -1.0}, {"n_behind": 0}):
+        with pytest.raises(InputError, match=next(iter(wrong))):
+            ClockPolicy(**wrong)
+
+
+def test_the_path_of_a_recording_keeps_its_order_when_the_clock_is_set(tmp_path):
+    rows = "\n".join(f"{t if t < 6.0 else t - 2.0:.2f},0,{0.4 * t:.3f},1" for t in TIMES.tolist())
+    (tmp_path / "a.csv").write_text(f"t,north,east,down\n{rows}\n")
+    (path,) = read_any_paths(tmp_path / "a.csv", SITE)
+    assert (np.diff(path.points[:, 0]) > 0.0).all()
+    assert (np.diff(path.times) > 0.0).all()
+    assert path.times[-1] == pytest.approx(TIMES[-1])
+
+
+# what is not known
+
+
+def test_an_estimate_that_was_never_vouched_for_is_an_alarm_at_once(tmp_path, m, capsys):
+    file = tlog(tmp_path / "a.tlog", *vehicle(m, flags=NONE))
+    reports = list(replayed(Guard(SITE, EXACT), told(file)[0]))
+    assert [a.kind for a in reports[0].raised] == ["estimate"]
+    assert "never vouched" in reports[0].raised[0].text
+    assert not any(r.claims for r in reports)
+    (tmp_path / "site.json").write_text(SITE.to_json())
+    assert main(["guard", str(tmp_path / "site.json"), "--replay", str(file)]) == 4
+    said = capsys.readouterr()
+    assert "nothing was claimed about the tether: the vehicle has never vouched" in said.err
+    assert '"kind": "estimate"' in said.out
+
+
+def test_a_gap_in_a_recording_is_told_as_beside_the_vehicle():
+    rows = [f for f in drive(TIMES) if not 3.0 < f.time < 9.0]
+    gaps = [Fix(t) for t in TIMES if 3.0 < t < 9.0]
+    for fixes in (rows, sorted([*rows, *gaps], key=lambda f: f.time)):
+        reports = list(replayed(Guard(SITE, EXACT), fixes))
+        raised = [a.text for r in reports for a in r.raised if a.level == Level.ALARM]
+        assert len(raised) == 1
+        assert "no position has come" in raised[0]
+        assert reports[-1].claims
