@@ -130,6 +130,20 @@ _ALIASES: Mapping[Quantity, Mapping[str, float]] = {
 _TEXTS = {"name", "identifier", "mode", "armed", "estimate", "withheld"}
 """Quantities without a unit."""
 
+_PLACES = {
+    "x", "y", "z", "east", "north", "easting", "northing", "altitude", "latitude", "longitude",
+}  # fmt: skip
+"""Quantities of which an unknown unit is refused; other columns with one are not used."""
+
+_DIRECTIONS = {"up": 1.0, "down": -1.0, "positive up": 1.0, "positive down": -1.0}
+"""Sign that a word after the name of a height gives its values."""
+
+_REFERENCES = {
+    "utc", "gmt", "iso", "iso8601", "iso 8601", "unix", "epoch", "gps", "utm", "wgs84", "wgs 84",
+    "etrs89", "msl", "cd", "chart datum", "mllw", "navd88", "nap", "nn", "nhn",
+}  # fmt: skip
+"""Clocks, systems and datums that stand in brackets where others write a unit."""
+
 NOISE_CLASSES = {7: "low noise", 18: "high noise"}
 """Classes of points that are no surface (ASPRS LAS 1.4 R15, tables 9 and 17)."""
 
@@ -208,10 +222,14 @@ def column(name: str) -> Column | None:
             factor = _unit_factor(quantity, unit)
             if factor is not None:
                 return Column(quantity, names[stem] * factor, unit)
-            if is_certain and unit and quantity not in _TEXTS:
-                raise InputError(f"column {shown(name)}: unit {shown(unit)} is not known")
-            if is_certain and not unit:
+            if quantity == "z" and unit in _DIRECTIONS:
+                return Column(quantity, names[stem] * _DIRECTIONS[unit])
+            if not is_certain:
+                continue
+            if not unit or unit in _REFERENCES:
                 return Column(quantity, names[stem])
+            if quantity in _PLACES:
+                raise InputError(f"column {shown(name)}: unit {shown(unit)} is not known")
     return None
 
 

@@ -98,6 +98,14 @@ def test_noise_in_a_table_is_left_out_and_named(tmp_path):
     )  # fmt: skip
 
 
+def test_rows_without_coordinates_are_left_out_and_counted(tmp_path):
+    points, notes = pile(tmp_path / "c.csv", "x,y,z\n1,2,3\nnan,nan,nan\n,,\n4,5,6\n,nan,\n")
+    assert points.tolist() == [[1, 2, 3], [4, 5, 6]]
+    assert notes == ("2 rows without coordinates left out",)
+    with pytest.raises(InputError, match="line 3: y: expected a number, got 'nan'"):
+        pile(tmp_path / "c.csv", "x,y,z\n1,2,3\n1,nan,3\n")
+
+
 def las(file, points, crs=None, **fields):
     laspy = pytest.importorskip("laspy")
     header = laspy.LasHeader(point_format=6, version="1.4")
