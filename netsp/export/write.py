@@ -225,8 +225,10 @@ def _plan(
         }
         for p, (lat, lon) in zip(points, places, strict=True)
     ]  # fmt: skip
+    for item, p in zip(items, points, strict=True):
+        item["netsp"] = _mark(problem, p)  # ground stations pass over what they do not know
     if settings.speed is not None:
-        change = {
+        change: dict[str, Any] = {
             "type": "SimpleItem", "command": CHANGE_SPEED, "frame": MISSION_FRAME,
             "autoContinue": True,
             "params": [GROUND_SPEED, settings.speed, KEEP_THROTTLE, 0, 0, 0, 0],
@@ -246,6 +248,10 @@ def _plan(
             polygons.append({"version": 1, "inclusion": False, "polygon": corners})
     plan = {
         "fileType": "Plan", "version": 1, "groundStation": "QGroundControl",
+        "netsp": {
+            "tether_length": problem.tether_length, "clearance": problem.clearance,
+            "heading": projection.heading,
+        },
         "geoFence": {"version": 2, "circles": circles, "polygons": polygons},
         "rallyPoints": {"version": 2, "points": []},
         "mission": {
@@ -257,6 +263,18 @@ def _plan(
         },
     }  # fmt: skip
     return json.dumps(plan, indent=1, allow_nan=False) + "\n"
+
+
+def _mark(problem: Problem, point: Waypoint) -> dict[str, Any]:
+    """Return what a waypoint is, so that `netsp import` tells goals from bends."""
+    if point.start:
+        return {"kind": "start"}
+    if point.goal is None:
+        return {"kind": "bend"}
+    if point.goal == HOME:
+        return {"kind": "base"}
+    name = problem.goals[point.goal].name
+    return {"kind": "goal", **({} if name is None else {"name": name})}
 
 
 def _wpl(
@@ -307,7 +325,8 @@ def _geojson(
     visits = {p.goal: (n, p) for n, p in enumerate(q for q in points if q.goal not in (None, HOME))}
     features = [
         feature("base", "Point", lonlat(problem.base[:2], problem.base[2]),
-                tether_length=problem.tether_length, clearance=problem.clearance)
+                tether_length=problem.tether_length, clearance=problem.clearance,
+                heading=projection.heading or None)
     ]  # fmt: skip
     for k, goal in enumerate(problem.goals):
         visit, point = visits.get(k, (None, None))

@@ -40,20 +40,29 @@ from netsp.site.drawing import read_dxf
 from netsp.site.feature import Feature, Map
 from netsp.site.geojson import read_geojson
 from netsp.site.kml_pages import read_kml
+from netsp.site.gpx import read_gpx_map
 from netsp.site.ledger import Ledger
 from netsp.site.line_work import is_land, lines_of, outlines, widened
 from netsp.site.options import SiteOptions
 from netsp.site.projection import Projection
+from netsp.site.qgc_plan import read_plan
 from netsp.site.sea_floor import SeaFloor
 from netsp.site.shapes import outline_of, simple_polygons, spurs_of
 from netsp.site.table import from_table
 from netsp.site.vector import in_degrees, read_vector
+from netsp.site.waypoint_list import is_waypoint_list, read_waypoint_list
 
 if TYPE_CHECKING:
     import shapely
 
 CHART_SUFFIXES = (".000",)
 """Extensions of S-57 charts."""
+
+EARTH_READERS = {
+    ".plan": read_plan, ".waypoints": read_waypoint_list, ".wpl": read_waypoint_list,
+    ".gpx": read_gpx_map,
+}  # fmt: skip
+"""Readers of formats that are in degrees always, by extension."""
 
 MAX_NAME = 200
 """Characters of a file's name that a problem keeps."""
@@ -93,7 +102,8 @@ def import_site(
     Parameters
     ----------
     file : str or Path
-        GeoJSON, KML, KMZ, shapefile, GeoPackage, DXF, S-57, or what else GDAL reads.
+        GeoJSON, GPX, .plan, .waypoints, KML, KMZ, shapefile, GeoPackage, DXF, S-57, or what else
+        GDAL reads.
     projection : Projection, optional
         About the base; None takes the map's own base, y to its heading or to the north.
     options : SiteOptions, optional
@@ -191,6 +201,10 @@ def read_map(file: str | Path, crs: str | None = None, units: str | None = None)
         Not readable.
     """
     suffix = Path(file).suffix.lower()
+    if suffix in EARTH_READERS or (suffix == ".txt" and is_waypoint_list(file)):
+        if crs is not None:
+            raise InputError(f"--crs: {file} is in degrees always; expected no system")
+        return EARTH_READERS.get(suffix, read_waypoint_list)(file)
     if suffix == ".dxf":
         return read_dxf(file, crs, units)
     if suffix in (".kml", ".kmz"):
