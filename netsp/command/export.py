@@ -161,6 +161,11 @@ def run(args: argparse.Namespace) -> int:
             messages.note(
                 f"{counted(shallow, 'waypoint')} shallower than {SHALLOWEST} m moved to that depth"
             )
+        if kind == "wpl" and settings.hold is not None and settings.hold <= settings.bend:
+            messages.note(
+                "goals hold no longer than bends, so that nothing tells them apart in this format; "
+                "a .plan or .geojson keeps them"
+            )
         messages.note("home is assumed to be at the surface above the base; do not set it by hand")
     return 0
 

@@ -27,8 +27,8 @@ def arguments(p: argparse.ArgumentParser) -> None:
     """Add the arguments of the command line."""
     p.add_argument(
         "site", metavar="SITE",
-        help="map: GeoJSON, KML, KMZ, shapefile, GeoPackage, DXF or S-57; or an occupancy image: "
-        "YAML, PNG, PGM (docs/sites.md)",
+        help="map: GeoJSON, KML, KMZ, shapefile, GeoPackage, DXF, S-57, GPX, .plan or .waypoints; "
+        "or an occupancy image: YAML, PNG, PGM (docs/sites.md)",
     )  # fmt: skip
     p.add_argument(
         "--base",
