@@ -39,8 +39,8 @@ from netsp.site.crop import CropWindow, cropped
 from netsp.site.drawing import read_dxf
 from netsp.site.feature import Feature, Map
 from netsp.site.geojson import read_geojson
-from netsp.site.kml_pages import read_kml
 from netsp.site.gpx import read_gpx_map
+from netsp.site.kml_pages import read_kml
 from netsp.site.ledger import Ledger
 from netsp.site.line_work import is_land, lines_of, outlines, widened
 from netsp.site.options import SiteOptions
