@@ -791,6 +791,13 @@ class HeightAxis:
     metres: float = 1.0
     is_stated: bool = False
 
+    @property
+    def change(self) -> str:
+        """What becomes of heights along it, in words; empty for metres upwards."""
+        parts = ["count downwards"] if self.sign < 0.0 else []
+        parts += [f"are in units of {self.metres:.7g} m"] if self.metres != 1.0 else []
+        return f"heights {' and '.join(parts)}: metres upwards here" if parts else ""
+
 
 def height_axis(crs: Any) -> HeightAxis:
     """Return the direction and the unit of heights in a coordinate system.

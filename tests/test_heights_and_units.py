@@ -418,5 +418,32 @@ def test_heights_of_a_map_are_those_of_its_vertical_system(tmp_path, crs, z):
             [np.array(["a"], dtype=object)], ["name"], layer=layer, crs=crs,
             geometry_type="Point Z", driver="GPKG", append=(layer == "goals"),
         )  # fmt: skip
-    problem = read_site(tmp_path / "m.gpkg", tether=60.0)
+    notes: list[str] = []
+    problem = read_site(tmp_path / "m.gpkg", tether=60.0, on_note=notes.append)
     assert problem.goals[0].position[2] == z
+    assert any("downwards" in note for note in notes) == (z < 0.0)
+
+
+@pytest.mark.parametrize("kind", ["las", "csv", "pcd"])
+def test_every_point_of_a_cloud_is_used_or_counted_in_a_note(tmp_path, kind):
+    rng = np.random.default_rng(len(kind))
+    points = rng.uniform(-5.0, 5.0, (60, 3)).round(2)
+    classes = rng.choice([0, 2, 6, 7, 18], 60)
+    withheld = rng.integers(0, 2, 60)
+    file = tmp_path / f"c.{kind}"
+    if kind == "las":
+        las(file, points, classification=classes, withheld=withheld)
+    elif kind == "csv":
+        head = "Withheld;z;class;y;x\n"
+        file.write_text(head + "\n".join(
+            ";".join(map(str, row))
+            for row in zip(withheld, points[:, 2], classes, points[:, 1], points[:, 0], strict=True)
+        ), encoding="utf-8")  # fmt: skip
+    else:
+        points[withheld == 1] = np.nan
+        file.write_text("FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 60\nHEIGHT 1\nDATA ascii\n"
+                        + "\n".join(" ".join(map(str, p)) for p in points), encoding="utf-8")  # fmt: skip
+    used, notes = load_cloud(file)
+    left_out = sum(int(note.split()[0]) for note in notes if note.endswith("left out"))
+    assert 0 < left_out
+    assert len(used) + left_out == 60

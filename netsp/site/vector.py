@@ -67,6 +67,9 @@ def read_vector(file: str | Path, crs: str | None) -> Map:
             raise UnansweredError([plain + option], [plain], ["crs"])
         places[name] = own != LOCAL
         found.add_layer(name, layer, _mover(str(own), f"{file}: layer {name!r}"))
+        change = "" if own == LOCAL else height_axis(str(own)).change
+        if change and any(f.layer == name and f.shape.has_z for f in found.features):
+            found.notes.append(f"layer {name!r}: {change}")
     if len(set(places.values())) > 1:
         some = next(name for name, on in places.items() if not on)
         raise InputError(

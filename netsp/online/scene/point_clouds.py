@@ -188,7 +188,7 @@ def read_las(path: str | Path) -> PointCloud:
         notes.append(f"in units of {unit:.7g} m, heights of {metres:.7g} m: in metres here")
     points[:, 2] *= heights.sign
     if heights.sign < 0.0:
-        notes.append("its vertical system counts downwards: z is upwards here")
+        notes.append("its heights count downwards: z is upwards here")
     return PointCloud(points[kept], (unit, unit, metres), tuple(notes))
 
 
