@@ -441,9 +441,10 @@ def test_every_point_of_a_cloud_is_used_or_counted_in_a_note(tmp_path, kind):
         ), encoding="utf-8")  # fmt: skip
     else:
         points[withheld == 1] = np.nan
-        file.write_text("FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 60\nHEIGHT 1\nDATA ascii\n"
-                        + "\n".join(" ".join(map(str, p)) for p in points), encoding="utf-8")  # fmt: skip
+        head = "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 60\nHEIGHT 1\nDATA ascii\n"
+        body = "\n".join(" ".join(map(str, p)) for p in points)
+        file.write_text(head + body, encoding="utf-8")
     used, notes = load_cloud(file)
     left_out = sum(int(note.split()[0]) for note in notes if note.endswith("left out"))
-    assert 0 < left_out
+    assert left_out > 0
     assert len(used) + left_out == 60
