@@ -97,8 +97,8 @@ _ALIASES: Mapping[Quantity, Mapping[str, float]] = {
     },
     "east": {"east": 1.0, "west": -1.0},
     "north": {"north": 1.0, "south": -1.0},
-    "easting": dict.fromkeys(("easting", "e", "utm e", "utm x", "utm easting"), 1.0),
-    "northing": dict.fromkeys(("northing", "n", "utm n", "utm y", "utm northing"), 1.0),
+    "easting": dict.fromkeys(("easting", "e", "utm e", "utm x", "x utm", "utm easting"), 1.0),
+    "northing": dict.fromkeys(("northing", "n", "utm n", "utm y", "y utm", "utm northing"), 1.0),
     "altitude": dict.fromkeys(("alt", "altitude", "relative alt", "rel alt"), 1.0),
     "latitude": dict.fromkeys(("lat", "latitude", "gps lat", "gps latitude"), 1.0),
     "longitude": dict.fromkeys(
@@ -397,14 +397,14 @@ class Table:
             cells = [[row[k] for k in places] for row in self.rows]
             if self.has_decimal_commas:
                 cells = [[c.replace(",", ".") for c in row] for row in cells]
-            values = np.array(cells, dtype=float).reshape(-1, len(places))
+            values = np.array(cells, dtype=float).reshape(len(cells), len(places))
             if (np.abs(values) <= LARGEST).all():
                 return np.asarray(values * factors + 0.0)
         except (ValueError, IndexError):
             pass
         return np.array(
             [[self.number(k, q) for q in quantities] for k in range(len(self.rows))]
-        ).reshape(-1, len(places))
+        ).reshape(len(self.rows), len(places))
 
     def pair(
         self, pairs: Sequence[tuple[Quantity, Quantity]] = MAP_PAIRS

@@ -28,7 +28,7 @@ def from_table(
     projection : Projection, optional
         Projection of latitudes and longitudes into the plane.
     on_note : callable, optional
-        Called with one line that names the columns that are not used.
+        Called with one line each for decimal commas and for columns that are not used.
 
     Returns
     -------
@@ -59,6 +59,8 @@ def from_table(
     places = table.numbers(used)
     if is_global and projection is not None:
         places[:, :2] = np.asarray(projection.to_plane(places[:, :2]))
+    if on_note is not None and table.has_decimal_commas:
+        on_note(f"{file}: numbers are read with decimal commas")
     if on_note is not None and (unused := table.left_out([*used, label])):
         on_note(f"{file}: columns that are not used: {', '.join(unused)}")
     return places, [table.text(k, label) or None for k in range(len(table.rows))]
