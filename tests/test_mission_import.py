@@ -169,7 +169,7 @@ SITE = Problem(
 )  # fmt: skip
 
 
-@pytest.mark.parametrize("kind", ["plan", "waypoints", "geojson"])
+@pytest.mark.parametrize("kind", ["plan", "waypoints", "geojson", "kml"])
 @pytest.mark.parametrize("heading", [0.0, 25.0])
 @pytest.mark.parametrize("hold", [None, 30])
 def test_what_export_writes_comes_back_as_the_same_goals(tmp_path, kind, heading, hold):
@@ -185,6 +185,43 @@ def test_what_export_writes_comes_back_as_the_same_goals(tmp_path, kind, heading
         assert len(again.obstacles) == len(SITE.obstacles)
         own = import_site(file).problem
         assert (own.tether_length, own.clearance) == (SITE.tether_length, SITE.clearance)
+
+
+ORDER = ["name", "visibility", "open", "description", "styleUrl", "Style", "ExtendedData", "Point",
+         "LineString", "Polygon", "Folder", "Placemark"]  # fmt: skip
+"""Order of elements by the schema of KML 2.2, of those that are written."""
+
+
+def test_a_tour_in_kml_follows_the_schema_and_draws_every_tether(tmp_path):
+    from xml.etree import ElementTree
+
+    odd = SITE.model_copy(update={"goals": (*SITE.goals[:2], Goal(
+        name="<C> & 'ä'", position=(9, 9, -3)))})  # fmt: skip
+    tour, file = solve(odd), tmp_path / "tour.kml"
+    points = export(odd, tour, file, "kml", Projection(LAT, LON))
+    root = ElementTree.parse(file).getroot()
+    tag = "{http://www.opengis.net/kml/2.2}"
+    for element in root.iter():
+        if element.tag in (f"{tag}Document", f"{tag}Folder", f"{tag}Placemark"):
+            order = [ORDER.index(child.tag.removeprefix(tag)) for child in element]
+            assert order == sorted(order)
+    folders = {f.findtext(f"{tag}name"): f for f in root.iter(f"{tag}Folder")}
+    assert list(folders) == ["base", "goals", "obstacles", "path", "tethers"]
+    lines = {}
+    for name in ("path", "tethers"):
+        lines[name] = [
+            np.array([list(map(float, c.split(","))) for c in e.text.split()])
+            for e in folders[name].iter(f"{tag}coordinates")
+        ]
+    assert folders["tethers"].findtext(f"{tag}visibility") == "0"
+    assert len(lines["path"][0]) == len(points)
+    for line, visit in zip(lines["tethers"], tour.tour, strict=True):
+        xy = Projection(LAT, LON).to_plane(line[:, 1::-1])
+        taut = np.linalg.norm(np.diff(np.column_stack([xy, line[:, 2]]), axis=0), axis=1).sum()
+        assert taut == pytest.approx(visit.tether_length, rel=2e-3)
+    modes = {e.text for e in root.iter(f"{tag}altitudeMode")}
+    assert modes == {"absolute"}
+    assert len(import_site(file).problem.goals) == 3
 
 
 def test_waypoints_that_are_passed_are_named_and_may_be_goals(tmp_path, capsys):

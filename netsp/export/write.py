@@ -1,4 +1,4 @@
-"""Mission files: QGroundControl plans and waypoint lists for ArduSub, GeoJSON and CSV.
+"""Mission files: QGroundControl plans and waypoint lists for ArduSub, GeoJSON, KML and CSV.
 
 Formats: QGroundControl's plan files and MAVLink's mission items; RFC 7946 for GeoJSON, which has no
 circle, so that obstacles are points with `radius_m`. ArduSub: depth is a negative altitude relative
@@ -24,6 +24,7 @@ import numpy as np
 
 from netsp.errors import InputError
 from netsp.execute.plan import HOME
+from netsp.export.kml import kml_of
 from netsp.export.waypoints import Waypoint, waypoints_of
 from netsp.fields import checked_argument, checked_instance
 from netsp.files import cell, write_text
@@ -380,10 +381,19 @@ def _csv(
     return text.getvalue()
 
 
+def _kml(
+    problem: Problem, points: list[Waypoint], projection: Projection | None, settings: Settings
+) -> str:
+    del settings
+    assert projection is not None
+    return kml_of(problem, points, projection)
+
+
 FORMATS: dict[str, Callable[[Problem, list[Waypoint], Projection | None, Settings], str]] = {
     "plan": _plan,
     "wpl": _wpl,
     "geojson": _geojson,
+    "kml": _kml,
     "csv": _csv,
 }
 
@@ -392,7 +402,7 @@ __all__ = ["FORMATS", "Settings", "altitude", "export"]
 
 EXTENSIONS = {
     ".plan": "plan", ".waypoints": "wpl", ".txt": "wpl", ".geojson": "geojson", ".json": "geojson",
-    ".csv": "csv",
+    ".kml": "kml", ".csv": "csv",
 }  # fmt: skip
 """Which format a file's name asks for."""
 
