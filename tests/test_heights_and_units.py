@@ -14,6 +14,7 @@ from netsp.online.scene.readers import Placement, load_cloud, load_mesh
 from netsp.problem import Problem
 from netsp.site.goal_depths import surface_warning, with_depth
 from netsp.site.path_file import read_paths
+from netsp.site.projection import Projection
 from netsp.site.table import from_table
 
 PILE = np.array([(4.0, -1.0, -10.0), (6.0, 1.0, 0.0), (5.0, 0.5, -3.25), (5.5, -0.25, -7.0)])
@@ -298,6 +299,11 @@ def test_a_goal_is_as_deep_as_its_table_says(tmp_path):
     file.write_text("lat,lon\n57,9\n", encoding="utf-8")
     with pytest.raises(InputError, match="degrees"):
         from_table(file)
+    projection = Projection(57.0, 9.0)
+    assert from_table(file, projection)[0] == pytest.approx(np.zeros((1, 2)), abs=1e-6)
+    file.write_text("easting,northing\n500000,6300000\n", encoding="utf-8")
+    with pytest.raises(InputError, match="lat, lon"):
+        from_table(file, projection)
     notes: list[str] = []
     file.write_text("x,y,Tiefe\n1,2,3\n", encoding="utf-8")
     from_table(file, on_note=notes.append)
