@@ -376,3 +376,19 @@ def test_paths_of_tables_have_the_same_times_and_gaps(tmp_path, text, n, says, c
     (tmp_path / "p.json").write_text(ON_EARTH.to_json())
     assert main(["verify", str(tmp_path / "p.json"), str(tmp_path / "a.csv"), "--measures"]) == 0
     assert says is None or says in capsys.readouterr().err
+
+
+def test_beside_the_vehicle_it_is_said_once_which_option_would_help(m):
+    from netsp.guard.live import _Hints
+    from netsp.link.dialect import parser
+    from netsp.link.messages import Listener
+
+    listener, hints = Listener(Frame(ON_EARTH)), _Hints()
+    said = []
+    for system, _, packet in [*vehicle(m, 2, local=False, degrees=NO_FIX),
+                              *vehicle(m, 1, local=False, degrees=FIX)]:  # fmt: skip
+        (message,) = parser().parse_buffer(packet.pack(parser(system, 1)))
+        said += hints.about(message, listener.understand(message), listener)
+    assert len(said) == 2
+    assert "--frame local" in said[0]
+    assert "--system 1" in said[1]

@@ -21,12 +21,12 @@ LONGEST_NAME = 200
 MOST_BYTES = 64 * 2**20
 """Of a file that comes in."""
 
-MAPS = (".geojson", ".kml", ".kmz", ".gpkg", ".dxf", ".000")
+MAPS = (".geojson", ".kml", ".kmz", ".gpkg", ".dxf", ".000", ".gpx", ".plan", ".waypoints")
 """Sites in one file; shapefiles come in several, and images with a YAML beside them."""
 
 EXPORTS = {
     "plan": "mission.plan", "wpl": "mission.waypoints", "geojson": "tour.geojson",
-    "csv": "tour.csv",
+    "kml": "tour.kml", "csv": "tour.csv",
 }  # fmt: skip
 """What a tour can be written as, and the name that it is offered under."""
 
