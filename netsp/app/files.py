@@ -195,7 +195,7 @@ def imported(
 def _site(
     file: Path, notes: list[str], tether_length: float | None, answers: ImportAnswers
 ) -> Problem:
-    from netsp.roadmap.within_reach import within_reach
+    from netsp.roadmap.within_reach import unreached_note, within_reach
     from netsp.site.options import Looking, SiteOptions
     from netsp.site.projection import Projection
     from netsp.site.read import import_site
@@ -220,7 +220,8 @@ def _site(
     notes += [f"{file.name}: {note}" for note in found.notes if note not in in_table]
     if found.viewpoints and problem.site.cropped is not None:
         problem, why = within_reach(problem, found.viewpoints)
-        notes += [f"{line}: left out" for line in why]
+        if why:
+            notes.append(f"{file.name}: {unreached_note(found.problem.goals, problem.goals)}")
     return problem
 
 

@@ -852,13 +852,30 @@ class _Site:
             self.notes.append(
                 f"{called}{counted(len(names), 'viewpoint')} left out: {cause} ({shown_names})"
             )
-        if not kept:
-            causes = ", ".join(dict.fromkeys(cause for _, cause in groups))
+        if not kept and not self._complains_of_base(anchor, obstacles):
+            number: Counter[str] = Counter()
+            for (_, cause), names in groups.items():
+                number[cause] += len(names)
+            causes = ", ".join(f"{n} {cause}" for cause, n in number.items())
             self._complain(
-                f"no viewpoint about an obstacle is left: all {len(goals)} are {causes}; expected "
-                "another standoff, base or tether"
+                f"no viewpoint about an obstacle is left ({causes}); expected another standoff, "
+                "base or tether"
             )
         return kept
+
+    def _complains_of_base(self, anchor: Any, obstacles: list[dict[str, Any]]) -> bool:
+        """Complain of a base within an obstacle, and return whether it is."""
+        import shapely
+
+        spot = shapely.Point(anchor[:2])
+        for thing in obstacles:
+            if _shape(thing).contains(spot):
+                self._complain(
+                    f"base: lies inside {self._called(thing['feature'])}; expected a place in the "
+                    "water"
+                )
+                return True
+        return False
 
     def _bounds(self, features: list[Feature]) -> list[list[float]] | None:
         import shapely
