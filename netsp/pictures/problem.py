@@ -68,7 +68,7 @@ def save_import(problem: Problem, left_out: Sequence[shapely.Geometry], path: st
         for at in (edges[:, 0], edges.mean(axis=1), edges[:, 1])
     ]
     along = [edge for edge, _ in set.intersection(*hidden)]  # all of it along one obstacle
-    lines = shapely.line_merge(shapely.multilinestrings(list(np.delete(edges, along, axis=0))))
+    lines = shapely.line_merge(shapely.MultiLineString(np.delete(edges, along, axis=0).tolist()))
     for line in shapely.get_parts(lines):
         x, y = shapely.get_coordinates(line).T
         ax.plot(x, y, color=style.LEFT_OUT, lw=0.8, ls="--", zorder=2.5)
