@@ -909,6 +909,7 @@ class _Site:
 
     def _check_names(self, things: list[dict[str, Any]], what: str) -> None:
         seen: dict[str, str] = {}
+        _number_parts(things)
         if self.is_chart:  # its names are those of places, and need not differ
             _number_names(things)
         for thing in things:
@@ -1055,6 +1056,18 @@ def _distance(places: np.ndarray, obstacles: list[dict[str, Any]]) -> np.ndarray
 def _first_of(places: list[str]) -> str:
     """Return the first of some places and how many more there are."""
     return places[0] + (f" and {len(places) - 1} more" if len(places) > 1 else "")
+
+
+def _number_parts(things: list[dict[str, Any]]) -> None:
+    """Number the names of things that are parts of one collection: "pier 1", "pier 2"."""
+    groups: dict[tuple[str, str], list[dict[str, Any]]] = {}
+    for thing in things:
+        whole, dot, _ = thing["where"].partition(".geometries[")
+        if thing["name"] is not None and dot:
+            groups.setdefault((whole, thing["name"]), []).append(thing)
+    for (_, name), parts in groups.items():
+        for number, part in enumerate(parts, 1):
+            part["name"] = f"{name} {number}" if len(parts) > 1 else name
 
 
 def _number_names(things: list[dict[str, Any]]) -> None:
