@@ -97,8 +97,8 @@ _ALIASES: Mapping[Quantity, Mapping[str, float]] = {
     },
     "east": {"east": 1.0, "west": -1.0},
     "north": {"north": 1.0, "south": -1.0},
-    "easting": dict.fromkeys(("easting", "e", "utm e", "utm x", "utm easting"), 1.0),
-    "northing": dict.fromkeys(("northing", "n", "utm n", "utm y", "utm northing"), 1.0),
+    "easting": dict.fromkeys(("easting", "e", "utm e", "utm x", "x utm", "utm easting"), 1.0),
+    "northing": dict.fromkeys(("northing", "n", "utm n", "utm y", "y utm", "utm northing"), 1.0),
     "altitude": dict.fromkeys(("alt", "altitude", "relative alt", "rel alt"), 1.0),
     "latitude": dict.fromkeys(("lat", "latitude", "gps lat", "gps latitude"), 1.0),
     "longitude": dict.fromkeys(
@@ -129,6 +129,20 @@ _ALIASES: Mapping[Quantity, Mapping[str, float]] = {
 
 _TEXTS = {"name", "identifier", "mode", "armed", "estimate", "withheld"}
 """Quantities without a unit."""
+
+_PLACES = {
+    "x", "y", "z", "east", "north", "easting", "northing", "altitude", "latitude", "longitude",
+}  # fmt: skip
+"""Quantities of which an unknown unit is refused; other columns with one are not used."""
+
+_DIRECTIONS = {"up": 1.0, "down": -1.0, "positive up": 1.0, "positive down": -1.0}
+"""Sign that a word after the name of a height gives its values."""
+
+_REFERENCES = {
+    "utc", "gmt", "iso", "iso8601", "iso 8601", "unix", "epoch", "gps", "utm", "wgs84", "wgs 84",
+    "etrs89", "msl", "cd", "chart datum", "mllw", "navd88", "nap", "nn", "nhn",
+}  # fmt: skip
+"""Clocks, systems and datums that stand in brackets where others write a unit."""
 
 NOISE_CLASSES = {7: "low noise", 18: "high noise"}
 """Classes of points that are no surface (ASPRS LAS 1.4 R15, tables 9 and 17)."""
@@ -208,10 +222,14 @@ def column(name: str) -> Column | None:
             factor = _unit_factor(quantity, unit)
             if factor is not None:
                 return Column(quantity, names[stem] * factor, unit)
-            if is_certain and unit and quantity not in _TEXTS:
-                raise InputError(f"column {shown(name)}: unit {shown(unit)} is not known")
-            if is_certain and not unit:
+            if quantity == "z" and unit in _DIRECTIONS:
+                return Column(quantity, names[stem] * _DIRECTIONS[unit])
+            if not is_certain:
+                continue
+            if not unit or unit in _REFERENCES:
                 return Column(quantity, names[stem])
+            if quantity in _PLACES:
+                raise InputError(f"column {shown(name)}: unit {shown(unit)} is not known")
     return None
 
 
@@ -379,14 +397,14 @@ class Table:
             cells = [[row[k] for k in places] for row in self.rows]
             if self.has_decimal_commas:
                 cells = [[c.replace(",", ".") for c in row] for row in cells]
-            values = np.array(cells, dtype=float).reshape(-1, len(places))
+            values = np.array(cells, dtype=float).reshape(len(cells), len(places))
             if (np.abs(values) <= LARGEST).all():
                 return np.asarray(values * factors + 0.0)
         except (ValueError, IndexError):
             pass
         return np.array(
             [[self.number(k, q) for q in quantities] for k in range(len(self.rows))]
-        ).reshape(-1, len(places))
+        ).reshape(len(self.rows), len(places))
 
     def pair(
         self, pairs: Sequence[tuple[Quantity, Quantity]] = MAP_PAIRS
@@ -772,6 +790,13 @@ class HeightAxis:
     sign: float = 1.0
     metres: float = 1.0
     is_stated: bool = False
+
+    @property
+    def change(self) -> str:
+        """What becomes of heights along it, in words; empty for metres upwards."""
+        parts = ["count downwards"] if self.sign < 0.0 else []
+        parts += [f"are in units of {self.metres:.7g} m"] if self.metres != 1.0 else []
+        return f"heights {' and '.join(parts)}: metres upwards here" if parts else ""
 
 
 def height_axis(crs: Any) -> HeightAxis:

@@ -22,6 +22,8 @@ XYZ = ("x", "y", "z")
         ("Latitude", "latitude", 1.0), ("lon (deg)", "longitude", 1.0), ("lat_rad", "latitude",
         180.0 / np.pi), ("time_ms", "time", 1e-3), ("TimeUS", "time", 1e-6),
         ("diameter", "radius", 0.5), ("vx (m/s)", "velocity_x", 1.0), ("Label", "name", 1.0),
+        ("Time (UTC)", "time", 1.0), ("z (down)", "z", -1.0), ("z_up", "z", 1.0),
+        ("Depth [MSL]", "z", -1.0),
     ],
 )  # fmt: skip
 def test_the_name_of_a_column_states_quantity_direction_and_unit(name, quantity, factor):
@@ -38,6 +40,7 @@ def test_a_name_that_only_begins_like_a_known_one_means_nothing(name):
 def test_an_unknown_unit_in_brackets_is_refused():
     with pytest.raises(InputError, match="furlong"):
         column("depth (furlong)")
+    assert column("heading (mils)") is None
 
 
 def test_units_have_names_in_full():

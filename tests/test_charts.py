@@ -273,6 +273,13 @@ def test_viewpoints_without_room_are_told_and_left_out(monkeypatch):
     assert set(found.viewpoints) == {g.name for g in found.problem.goals}
 
 
+def test_a_base_on_land_is_told_before_lost_viewpoints(monkeypatch):
+    file = chart(monkeypatch, feature(0, "LNDARE", square(-900, -900, 1800), OBJNAM="Isle"))
+    options = SiteOptions(tether=50.0, looking=Looking(1, 2.0))
+    with pytest.raises(InputError, match=r"base: lies inside LNDARE\[0\] \(Isle\)"):
+        import_site(file, HERE, options=options)
+
+
 def test_what_is_missing_is_asked_for_without_options_of_the_command_line(monkeypatch):
     file = chart(
         monkeypatch, feature(0, "SLCONS", shapely.LineString([(5, 5), (5, 25)])),

@@ -206,7 +206,7 @@ def test_tags_of_sea_charts_are_read(tmp_path):
         (["--origin", "55,12,400"], "--origin: heading: expected -360 to 360, got 400"),
         (["--origin", "here"], "--origin: expected lat,lon or lat,lon,heading, got 'here'"),
         ([], "origin: format 'plan' needs latitude"),
-        (["--origin", "55,12", "--format", "kml"], "format: expected plan, wpl, geojson, csv"),
+        (["--origin", "55,12", "--format", "dxf"], "format: expected plan, wpl, geojson, kml, csv"),
         (["--origin", "55,12", "--max-waypoints", "3"], "waypoints, and the vehicle takes 3"),
         (["--origin", "55,12", "--hold", "9999"], "hold: expected whole seconds"),
     ],

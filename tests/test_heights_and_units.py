@@ -14,6 +14,7 @@ from netsp.online.scene.readers import Placement, load_cloud, load_mesh
 from netsp.problem import Problem
 from netsp.site.goal_depths import surface_warning, with_depth
 from netsp.site.path_file import read_paths
+from netsp.site.projection import Projection
 from netsp.site.table import from_table
 
 PILE = np.array([(4.0, -1.0, -10.0), (6.0, 1.0, 0.0), (5.0, 0.5, -3.25), (5.5, -0.25, -7.0)])
@@ -96,6 +97,14 @@ def test_noise_in_a_table_is_left_out_and_named(tmp_path):
     assert notes == (
         "1 point of class 7 (low noise) left out", "1 point of class 18 (high noise) left out",
     )  # fmt: skip
+
+
+def test_rows_without_coordinates_are_left_out_and_counted(tmp_path):
+    points, notes = pile(tmp_path / "c.csv", "x,y,z\n1,2,3\nnan,nan,nan\n,,\n4,5,6\n,nan,\n")
+    assert points.tolist() == [[1, 2, 3], [4, 5, 6]]
+    assert notes == ("2 rows without coordinates left out",)
+    with pytest.raises(InputError, match="line 3: y: expected a number, got 'nan'"):
+        pile(tmp_path / "c.csv", "x,y,z\n1,2,3\n1,nan,3\n")
 
 
 def las(file, points, crs=None, **fields):
@@ -290,6 +299,11 @@ def test_a_goal_is_as_deep_as_its_table_says(tmp_path):
     file.write_text("lat,lon\n57,9\n", encoding="utf-8")
     with pytest.raises(InputError, match="degrees"):
         from_table(file)
+    projection = Projection(57.0, 9.0)
+    assert from_table(file, projection)[0] == pytest.approx(np.zeros((1, 2)), abs=1e-6)
+    file.write_text("easting,northing\n500000,6300000\n", encoding="utf-8")
+    with pytest.raises(InputError, match="lat, lon"):
+        from_table(file, projection)
     notes: list[str] = []
     file.write_text("x,y,Tiefe\n1,2,3\n", encoding="utf-8")
     from_table(file, on_note=notes.append)
@@ -410,5 +424,33 @@ def test_heights_of_a_map_are_those_of_its_vertical_system(tmp_path, crs, z):
             [np.array(["a"], dtype=object)], ["name"], layer=layer, crs=crs,
             geometry_type="Point Z", driver="GPKG", append=(layer == "goals"),
         )  # fmt: skip
-    problem = read_site(tmp_path / "m.gpkg", tether=60.0)
+    notes: list[str] = []
+    problem = read_site(tmp_path / "m.gpkg", tether=60.0, on_note=notes.append)
     assert problem.goals[0].position[2] == z
+    assert any("downwards" in note for note in notes) == (z < 0.0)
+
+
+@pytest.mark.parametrize("kind", ["las", "csv", "pcd"])
+def test_every_point_of_a_cloud_is_used_or_counted_in_a_note(tmp_path, kind):
+    rng = np.random.default_rng(len(kind))
+    points = rng.uniform(-5.0, 5.0, (60, 3)).round(2)
+    classes = rng.choice([0, 2, 6, 7, 18], 60)
+    withheld = rng.integers(0, 2, 60)
+    file = tmp_path / f"c.{kind}"
+    if kind == "las":
+        las(file, points, classification=classes, withheld=withheld)
+    elif kind == "csv":
+        head = "Withheld;z;class;y;x\n"
+        file.write_text(head + "\n".join(
+            ";".join(map(str, row))
+            for row in zip(withheld, points[:, 2], classes, points[:, 1], points[:, 0], strict=True)
+        ), encoding="utf-8")  # fmt: skip
+    else:
+        points[withheld == 1] = np.nan
+        head = "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 60\nHEIGHT 1\nDATA ascii\n"
+        body = "\n".join(" ".join(map(str, p)) for p in points)
+        file.write_text(head + body, encoding="utf-8")
+    used, notes = load_cloud(file)
+    left_out = sum(int(note.split()[0]) for note in notes if note.endswith("left out"))
+    assert left_out > 0
+    assert len(used) + left_out == 60

@@ -356,3 +356,39 @@ def test_a_gap_in_a_recording_is_told_as_beside_the_vehicle():
         assert len(raised) == 1
         assert "no position has come" in raised[0]
         assert reports[-1].claims
+
+
+@pytest.mark.parametrize(
+    ("text", "n", "says"),
+    [
+        ("timestamp,x,y\n1732000000000,0,0\n1732000000500,1,0\n", 2, "milliseconds since 1970"),
+        ("t,x,y,z\n0,0,0,1\n1,nan,2,1\n2,1,NaN,1\n3,1,1,\n4,2,2,1\n", 2, "3 rows left out"),
+        ("t,lat,lon,depth\n0,0,0,1\n1,58,5.5,1\n2,58.0001,5.5,1\n", 2, "1 row left out"),
+        ("time,x,y\n2026-05-01T12:00:00Z,0,0\n2026-05-01T12:00:02Z,1,1\n", 2, None),
+    ],
+)
+def test_paths_of_tables_have_the_same_times_and_gaps(tmp_path, text, n, says, capsys):
+    (tmp_path / "a.csv").write_text(text)
+    (path,) = read_any_paths(tmp_path / "a.csv", ON_EARTH)
+    assert len(path.points) == n
+    assert 0.0 < path.times[-1] - path.times[0] < 10.0
+    assert len(path.notes) == (says is not None)
+    (tmp_path / "p.json").write_text(ON_EARTH.to_json())
+    assert main(["verify", str(tmp_path / "p.json"), str(tmp_path / "a.csv"), "--measures"]) == 0
+    assert says is None or says in capsys.readouterr().err
+
+
+def test_beside_the_vehicle_it_is_said_once_which_option_would_help(m):
+    from netsp.guard.live import _Hints
+    from netsp.link.dialect import parser
+    from netsp.link.messages import Listener
+
+    listener, hints = Listener(Frame(ON_EARTH)), _Hints()
+    said = []
+    for system, _, packet in [*vehicle(m, 2, local=False, degrees=NO_FIX),
+                              *vehicle(m, 1, local=False, degrees=FIX)]:  # fmt: skip
+        (message,) = parser().parse_buffer(packet.pack(parser(system, 1)))
+        said += hints.about(message, listener.understand(message), listener)
+    assert len(said) == 2
+    assert "--frame local" in said[0]
+    assert "--system 1" in said[1]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import tempfile
 import time
 from collections.abc import Callable, Iterator
@@ -154,8 +155,37 @@ def formats() -> tuple[str, bool]:
     return f"{found.length:.2f} m among {len(problem.obstacles)} polygons", good
 
 
+def spellings() -> tuple[str, bool]:
+    """One cloud in every order of columns, with each separator, decimal sign and encoding."""
+    from netsp.online.scene.readers import read_cloud
+
+    points = np.random.default_rng(60).uniform(-9.0, 9.0, (40, 3)).round(3) - (0.0, 0.0, 10.0)
+    columns = {
+        "id": np.arange(40.0), "Easting": points[:, 0], "Northing": points[:, 1],
+        "depth (ft)": -points[:, 2] / 0.3048,
+    }  # fmt: skip
+    tried = wrong = 0
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "cloud.csv"
+        for head in itertools.permutations(columns):
+            rows = np.column_stack([columns[name] for name in head])
+            for separator, decimal in ((",", "."), (";", ","), ("\t", "."), ("\t", ",")):
+                lines = [separator.join(head)]
+                lines += [
+                    separator.join(f"{v:.6f}".replace(".", decimal) for v in row) for row in rows
+                ]
+                for encoding in ("utf-8", "utf-8-sig", "utf-16"):
+                    file.write_bytes("\r\n".join(lines).encode(encoding))
+                    tried += 1
+                    wrong += not np.allclose(read_cloud(file), points, atol=1e-5)
+    return f"{wrong} of {tried} wrong", wrong == 0
+
+
 def claims() -> Iterator[Claim]:
     """All of this file."""
+    yield Claim(
+        "a cloud in every order, separator, decimal sign, encoding", "none wrong", spellings
+    )
     yield Claim("example sites, and back from their export", "proven; 1e-5", examples)
     yield Claim("an occupancy image planned on", "proven, verified", formats)
     yield Claim("orders given in part, 12 to 20 goals", "lengths of the docs, proven", arranged)

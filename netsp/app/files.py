@@ -21,12 +21,12 @@ LONGEST_NAME = 200
 MOST_BYTES = 64 * 2**20
 """Of a file that comes in."""
 
-MAPS = (".geojson", ".kml", ".kmz", ".gpkg", ".dxf", ".000")
+MAPS = (".geojson", ".kml", ".kmz", ".gpkg", ".dxf", ".000", ".gpx", ".plan", ".waypoints")
 """Sites in one file; shapefiles come in several, and images with a YAML beside them."""
 
 EXPORTS = {
     "plan": "mission.plan", "wpl": "mission.waypoints", "geojson": "tour.geojson",
-    "csv": "tour.csv",
+    "kml": "tour.kml", "csv": "tour.csv",
 }  # fmt: skip
 """What a tour can be written as, and the name that it is offered under."""
 
@@ -195,7 +195,7 @@ def imported(
 def _site(
     file: Path, notes: list[str], tether_length: float | None, answers: ImportAnswers
 ) -> Problem:
-    from netsp.roadmap.within_reach import within_reach
+    from netsp.roadmap.within_reach import unreached_note, within_reach
     from netsp.site.options import Looking, SiteOptions
     from netsp.site.projection import Projection
     from netsp.site.read import import_site
@@ -220,7 +220,8 @@ def _site(
     notes += [f"{file.name}: {note}" for note in found.notes if note not in in_table]
     if found.viewpoints and problem.site.cropped is not None:
         problem, why = within_reach(problem, found.viewpoints)
-        notes += [f"{line}: left out" for line in why]
+        if why:
+            notes.append(f"{file.name}: {unreached_note(found.problem.goals, problem.goals)}")
     return problem
 
 

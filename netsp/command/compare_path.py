@@ -165,6 +165,9 @@ def _inputs(args: argparse.Namespace) -> tuple[Problem, list[FoundPath]]:
         found = read_any_paths(
             file, problem, frame=args.frame, system=args.system, noise=args.noise
         )
+        if not args.quiet:
+            for note in dict.fromkeys(note for path in found for note in path.notes):
+                messages.note(note)
         paths += [replace(p, name=label) for p in found] if label else found
     return problem, paths
 

@@ -32,7 +32,8 @@ def arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument("--problem", metavar="FILE", help="the problem that a solution solves")
     p.add_argument(
         "--format", metavar="NAME",
-        help="plan (QGroundControl), wpl (QGC WPL 110), geojson or csv; default: by the extension",
+        help="plan (QGroundControl), wpl (QGC WPL 110), geojson, kml or csv; default: by the "
+        "extension",
     )  # fmt: skip
     p.add_argument(
         "--origin", metavar="LAT,LON[,HEADING]",
@@ -160,6 +161,11 @@ def run(args: argparse.Namespace) -> int:
         if shallow:
             messages.note(
                 f"{counted(shallow, 'waypoint')} shallower than {SHALLOWEST} m moved to that depth"
+            )
+        if kind == "wpl" and settings.hold is not None and settings.hold <= settings.bend:
+            messages.note(
+                "goals hold no longer than bends, so that nothing tells them apart in this format; "
+                "a .plan or .geojson keeps them"
             )
         messages.note("home is assumed to be at the surface above the base; do not set it by hand")
     return 0

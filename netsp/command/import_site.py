@@ -27,8 +27,8 @@ def arguments(p: argparse.ArgumentParser) -> None:
     """Add the arguments of the command line."""
     p.add_argument(
         "site", metavar="SITE",
-        help="map: GeoJSON, KML, KMZ, shapefile, GeoPackage, DXF or S-57; or an occupancy image: "
-        "YAML, PNG, PGM (docs/sites.md)",
+        help="map: GeoJSON, KML, KMZ, shapefile, GeoPackage, DXF, S-57, GPX, .plan or .waypoints; "
+        "or an occupancy image: YAML, PNG, PGM (docs/sites.md)",
     )  # fmt: skip
     p.add_argument(
         "--base",
@@ -182,12 +182,16 @@ def run(args: argparse.Namespace) -> int:
     why: list[str] = []
     is_cropped = problem.site is not None and problem.site.cropped is not None
     if args.skip_unreachable or (is_cropped and viewpoints):
-        from netsp.roadmap.within_reach import within_reach
+        from netsp.roadmap.within_reach import unreached_note, within_reach
 
         with Patience(sys.stderr, "looking for the goals in reach"):
+            before = problem.goals
             problem, why = within_reach(problem, None if args.skip_unreachable else viewpoints)
-        for line in why:
-            messages.note(f"{line}: left out")
+        if args.skip_unreachable:
+            for line in why:
+                messages.note(f"{line}: left out")
+        elif why:
+            messages.note(f"{args.site}: {unreached_note(before, problem.goals)}")
     print(f"{problem.name}: {problem.summary}{_where(problem)}", file=sys.stderr)
     above = [problem.goal_name(k) for k, g in enumerate(problem.goals) if g.position[2] > 0.0]
     if above:

@@ -6,7 +6,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 from netsp.command import messages, told
-from netsp.command.types import load_pair
+from netsp.command.types import load_pair, natural
 from netsp.errors import EXIT_NOT_VERIFIED, InputError
 
 if TYPE_CHECKING:
@@ -35,6 +35,15 @@ def arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument(
         "--margins", action="store_true",
         help="print how far the world may be off, too (netsp margins)",
+    )  # fmt: skip
+    p.add_argument(
+        "--frame", metavar="NAME",
+        help="of a path to measure: local (the problem's plane) or global (degrees)",
+    )  # fmt: skip
+    p.add_argument(
+        "--system", type=natural, metavar="N",
+        help="the vehicle's system id in a .tlog to measure; default the only one that tells "
+        "positions",
     )  # fmt: skip
     p.add_argument("--quiet", action="store_true", help="exit code only")
     told.json_flag(p)
@@ -159,11 +168,14 @@ def _measure_paths(problem: Problem, args: argparse.Namespace) -> None:
     from netsp.site.path_file import ENDINGS, FoundPath
 
     if args.solution.lower().endswith((*ENDINGS, *PATH_ENDINGS)):
-        paths = read_any_paths(args.solution, problem)
+        paths = read_any_paths(args.solution, problem, frame=args.frame, system=args.system)
     else:
         points = read_path(args.solution)
         assert points is not None
         paths = [FoundPath("", points)]
+    if not args.quiet:
+        for note in dict.fromkeys(note for path in paths for note in path.notes):
+            messages.note(note)
     for k, path in enumerate(paths):
         text = describe_path(problem, path.points, path.times)
         for name in entered(problem, path.points):

@@ -1,4 +1,4 @@
-"""Mission files: QGroundControl plans and waypoint lists for ArduSub, GeoJSON and CSV.
+"""Mission files: QGroundControl plans and waypoint lists for ArduSub, GeoJSON, KML and CSV.
 
 Formats: QGroundControl's plan files and MAVLink's mission items; RFC 7946 for GeoJSON, which has no
 circle, so that obstacles are points with `radius_m`. ArduSub: depth is a negative altitude relative
@@ -24,6 +24,7 @@ import numpy as np
 
 from netsp.errors import InputError
 from netsp.execute.plan import HOME
+from netsp.export.kml import kml_of
 from netsp.export.waypoints import Waypoint, waypoints_of
 from netsp.fields import checked_argument, checked_instance
 from netsp.files import cell, write_text
@@ -225,8 +226,10 @@ def _plan(
         }
         for p, (lat, lon) in zip(points, places, strict=True)
     ]  # fmt: skip
+    for item, p in zip(items, points, strict=True):
+        item["netsp"] = _mark(problem, p)  # ground stations pass over what they do not know
     if settings.speed is not None:
-        change = {
+        change: dict[str, Any] = {
             "type": "SimpleItem", "command": CHANGE_SPEED, "frame": MISSION_FRAME,
             "autoContinue": True,
             "params": [GROUND_SPEED, settings.speed, KEEP_THROTTLE, 0, 0, 0, 0],
@@ -246,6 +249,10 @@ def _plan(
             polygons.append({"version": 1, "inclusion": False, "polygon": corners})
     plan = {
         "fileType": "Plan", "version": 1, "groundStation": "QGroundControl",
+        "netsp": {
+            "tether_length": problem.tether_length, "clearance": problem.clearance,
+            "heading": projection.heading,
+        },
         "geoFence": {"version": 2, "circles": circles, "polygons": polygons},
         "rallyPoints": {"version": 2, "points": []},
         "mission": {
@@ -257,6 +264,18 @@ def _plan(
         },
     }  # fmt: skip
     return json.dumps(plan, indent=1, allow_nan=False) + "\n"
+
+
+def _mark(problem: Problem, point: Waypoint) -> dict[str, Any]:
+    """Return what a waypoint is, so that `netsp import` tells goals from bends."""
+    if point.start:
+        return {"kind": "start"}
+    if point.goal is None:
+        return {"kind": "bend"}
+    if point.goal == HOME:
+        return {"kind": "base"}
+    name = problem.goals[point.goal].name
+    return {"kind": "goal", **({} if name is None else {"name": name})}
 
 
 def _wpl(
@@ -307,7 +326,8 @@ def _geojson(
     visits = {p.goal: (n, p) for n, p in enumerate(q for q in points if q.goal not in (None, HOME))}
     features = [
         feature("base", "Point", lonlat(problem.base[:2], problem.base[2]),
-                tether_length=problem.tether_length, clearance=problem.clearance)
+                tether_length=problem.tether_length, clearance=problem.clearance,
+                heading=projection.heading or None)
     ]  # fmt: skip
     for k, goal in enumerate(problem.goals):
         visit, point = visits.get(k, (None, None))
@@ -361,10 +381,19 @@ def _csv(
     return text.getvalue()
 
 
+def _kml(
+    problem: Problem, points: list[Waypoint], projection: Projection | None, settings: Settings
+) -> str:
+    del settings
+    assert projection is not None
+    return kml_of(problem, points, projection)
+
+
 FORMATS: dict[str, Callable[[Problem, list[Waypoint], Projection | None, Settings], str]] = {
     "plan": _plan,
     "wpl": _wpl,
     "geojson": _geojson,
+    "kml": _kml,
     "csv": _csv,
 }
 
@@ -373,7 +402,7 @@ __all__ = ["FORMATS", "Settings", "altitude", "export"]
 
 EXTENSIONS = {
     ".plan": "plan", ".waypoints": "wpl", ".txt": "wpl", ".geojson": "geojson", ".json": "geojson",
-    ".csv": "csv",
+    ".kml": "kml", ".csv": "csv",
 }  # fmt: skip
 """Which format a file's name asks for."""
 

@@ -6,9 +6,11 @@ import itertools
 import queue
 import time
 from collections.abc import Callable, Iterator
+from typing import Any
 
 from netsp.errors import InputError
 from netsp.guard.alarms import Level
+from netsp.guard.fix import Fix
 from netsp.guard.guard import Guard
 from netsp.guard.memory import restore, save
 from netsp.guard.plane import PlaneSite
@@ -19,7 +21,7 @@ from netsp.guard.stream import SILENT_S, Stream
 from netsp.link.address import Address
 from netsp.link.dialect import dialect
 from netsp.link.frame import Frame
-from netsp.link.messages import Listener
+from netsp.link.messages import AUTOPILOT, NO_GPS_FIX, POSITIONS, Listener
 from netsp.link.statustext import status_texts
 from netsp.link.udp import UdpLink
 
@@ -91,6 +93,7 @@ def watch(
     listener, stream = Listener(frame, system), Stream(guard, on_note=tell)
     heard = saved = sent = told = time.monotonic()
     others: set[int] = set()
+    hints = _Hints()
     numbers = itertools.count()
     try:
         tell(f"listening on {address}")
@@ -104,6 +107,8 @@ def watch(
                 if only is not None and peer != only:
                     continue
                 fix = listener.understand(message)
+                for line in hints.about(message, fix, listener):
+                    tell(line)
                 if fix is None or message.get_srcSystem() != listener.system:
                     continue
                 heard = now
@@ -134,6 +139,32 @@ def watch(
         link.close()
         if state is not None:
             save(guard, state)
+
+
+class _Hints:
+    """Options that would help while no position is understood, each told once."""
+
+    def __init__(self) -> None:
+        self._has_position = False
+        self._told: set[str] = set()
+
+    def about(self, message: Any, fix: Fix | None, listener: Listener) -> Iterator[str]:
+        """Yield what helps with a message that tells a position and is not understood."""
+        self._has_position = self._has_position or (fix is not None and fix.position is not None)
+        if self._has_position or fix is not None or message.get_type() not in POSITIONS:
+            return
+        line = ""
+        if message.get_srcSystem() != listener.system:
+            if message.get_srcComponent() == AUTOPILOT and listener.heard:
+                line = (
+                    f"system {message.get_srcSystem()} tells positions, and system "
+                    f"{listener.system} none yet: expected --system {message.get_srcSystem()}?"
+                )
+        elif listener.left_out == NO_GPS_FIX:
+            line = f"GLOBAL_POSITION_INT: {NO_GPS_FIX}; read metres with --frame local"
+        if line and line not in self._told:
+            self._told.add(line)
+            yield line
 
 
 def _correct(

@@ -75,17 +75,22 @@ def _has_north_and_east(file: str | Path) -> bool:
 
 
 def _flight(file: str | Path, frame: Frame, system: int | None) -> FoundPath:
+    notes: list[str] = []
     try:
-        fixes = [f for f in read_fixes(file, frame, system) if f.position is not None]
+        found = read_fixes(file, frame, system, on_note=notes.append)
+        fixes = [f for f in found if f.position is not None]
     except InputError as error:
         raise InputError(str(error).removeprefix("--replay: ")) from None
     points = np.array([f.position for f in fixes], dtype=float)
     if len(np.unique(points, axis=0)) < 2:
         raise InputError(f"{file}: expected a recording with two positions or more that differ")
     times, is_late = _lasting_times(fixes)
+    if is_late.any():
+        notes.append(f"{file}: {int(is_late.sum())} left out: their times are behind the others")
     points, times = points[~is_late], times[~is_late]
     order = np.argsort(times, kind="stable")
-    return FoundPath(Path(file).stem, points[order], times[order])
+    told = tuple(note.removeprefix("--replay: ") for note in notes)
+    return FoundPath(Path(file).stem, points[order], times[order], told)
 
 
 def _lasting_times(fixes: list[Fix]) -> tuple[Floats, Bools]:
@@ -107,4 +112,4 @@ def _lasting_times(fixes: list[Fix]) -> tuple[Floats, Bools]:
 def _straightened(path: FoundPath, noise: float) -> FoundPath:
     kept = polylines.telling(path.points, noise)
     times = None if path.times is None else path.times[kept]
-    return FoundPath(path.name, path.points[kept], times)
+    return FoundPath(path.name, path.points[kept], times, path.notes)

@@ -14,20 +14,12 @@ from netsp.guard.message_tally import MessageTally
 from netsp.link.frame import Frame
 from netsp.models import shown
 from netsp.site.gpx import seconds_of
+from netsp.site.time_stamps import MAX_SECONDS, NO_VALUES, unit_of_time
 
 TRUTH = {"1": True, "true": True, "yes": True, "0": False, "false": False, "no": False}
 
-NO_VALUES = ("", "nan", "-nan", "null", "none", "na", "n/a", "<null>")
-"""Cells, in lower case, that hold nothing."""
-
 MAX_METRES = 1e9
 """Bound on places, lengths and velocities of a table, m or m/s: numbers beyond are damage."""
-
-MAX_SECONDS = 1e11
-"""Bound on times, s: the year 5138. Larger numbers without a unit are milliseconds or less."""
-
-FINER = ((1e-3, "milliseconds"), (1e-6, "microseconds"), (1e-9, "nanoseconds"))
-"""Units of times since 1970 that are finer than seconds."""
 
 PLANS: tuple[tuple[Quantity, Quantity], ...] = (
     ("x", "y"), ("north", "east"), ("latitude", "longitude"),
@@ -193,10 +185,7 @@ class _Rows:
         except ValueError:
             return seconds_of(text, name)
         if self.scale is None:
-            self.scale, unit = next(
-                (pair for pair in ((1.0, ""), *FINER) if abs(value) * pair[0] < MAX_SECONDS),
-                (1.0, ""),
-            )
+            self.scale, unit = unit_of_time(value)
             if unit:
                 self._note(f"times are taken as {unit} since 1970")
         value *= self.scale

@@ -14,13 +14,10 @@ from netsp.guard.fix import Fix
 from netsp.guard.message_tally import MessageTally
 from netsp.link.dialect import dialect, parser
 from netsp.link.frame import Frame
-from netsp.link.messages import AUTOPILOT, Listener
+from netsp.link.messages import AUTOPILOT, POSITIONS, Listener
 
 MAX_PACKET = 300
 """Bytes of a MAVLink message, at most."""
-
-POSITIONS = ("LOCAL_POSITION_NED", "GLOBAL_POSITION_INT")
-"""Messages that tell a position: in metres, and in degrees."""
 
 
 def read_tlog(

@@ -28,6 +28,9 @@ FARTHEST = 1e7
 FASTEST = 1e3
 """m/s; a velocity beyond is none."""
 
+POSITIONS = ("LOCAL_POSITION_NED", "GLOBAL_POSITION_INT")
+"""Messages that tell a position: in metres, and in degrees."""
+
 NO_GPS_FIX = "no GPS fix (lat = lon = 0)"
 NO_NUMBERS = "its numbers are NaN or out of range"
 """Reasons why a message says nothing that counts."""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from netsp import steps
+from netsp.arrays import Floats
 from netsp.pictures import style
 from netsp.problem import Circle, Problem
 from netsp.roadmap.paths import TautPaths
@@ -59,9 +60,15 @@ def save_import(problem: Problem, left_out: Sequence[shapely.Geometry], path: st
     outlines = [part.boundary if part.geom_type == "Polygon" else part for part in parts]
     seen = shapely.intersection([o for o in outlines if not o.is_empty], frame)
     # edges that areas share are drawn once, since dashes over dashes look like a full line
-    lines = shapely.line_merge(shapely.union_all([s for s in seen if s.length > 0.0]))
-    rims = shapely.union_all([o.shape().boundary for o in problem.obstacles])
-    lines = lines.difference(rims.buffer(HIDDEN_RIM * (limits[0][1] - limits[0][0])))
+    edges = _edges(shapely.union_all([s for s in seen if s.length > 0.0]))
+    rims = shapely.STRtree([o.shape().boundary for o in problem.obstacles])
+    width = HIDDEN_RIM * (limits[0][1] - limits[0][0])
+    hidden = [
+        set(map(tuple, rims.query(shapely.points(at), "dwithin", width).T.tolist()))
+        for at in (edges[:, 0], edges.mean(axis=1), edges[:, 1])
+    ]
+    along = [edge for edge, _ in set.intersection(*hidden)]  # all of it along one obstacle
+    lines = shapely.line_merge(shapely.MultiLineString(np.delete(edges, along, axis=0).tolist()))
     for line in shapely.get_parts(lines):
         x, y = shapely.get_coordinates(line).T
         ax.plot(x, y, color=style.LEFT_OUT, lw=0.8, ls="--", zorder=2.5)
@@ -72,6 +79,15 @@ def save_import(problem: Problem, left_out: Sequence[shapely.Geometry], path: st
         ax.plot([], [], color=style.LEFT_OUT, lw=0.8, ls="--", label="left out")
         ax.legend(loc="best", fontsize=8, frameon=False)
     style.save(figure, path)
+
+
+def _edges(lines: shapely.Geometry) -> Floats:
+    """Return the (n, 2, 2) ends of the edges of lines."""
+    import shapely
+
+    places, line = shapely.get_coordinates(shapely.get_parts(lines), return_index=True)
+    is_edge = line[1:] == line[:-1]
+    return np.asarray(np.stack([places[:-1], places[1:]], axis=1)[is_edge])
 
 
 def draw(problem: Problem, solution: Solution | None = None) -> Any:

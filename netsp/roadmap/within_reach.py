@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from netsp.errors import InfeasibleError
-from netsp.problem import Problem
+from netsp.errors import InfeasibleError, counted
+from netsp.problem import Goal, Problem
 from netsp.roadmap.reach import shortest_tethers, why_unreached
+
+MAX_EXPLAINED = 5
+"""Enclosed goals whose obstacles are named: to find them takes longer than to find the goals."""
 
 HAIR = 1e-6
 """Relative; what is so little too far is left to the roadmap to judge."""
@@ -44,7 +47,14 @@ def within_reach(
         far &= np.array([g.name in removable for g in problem.goals])
     if not far.any():
         return problem, []
-    why = [str(why_unreached(problem, needed, [int(k)])) for k in np.flatnonzero(far)]
+    why = []
+    enclosed = 0
+    for k in np.flatnonzero(far).tolist():
+        enclosed += bool(np.isinf(needed[k]))
+        if np.isinf(needed[k]) and enclosed > MAX_EXPLAINED:
+            why.append(f"{problem.goal_label(k)} cannot be reached with a tether of any length")
+        else:
+            why.append(str(why_unreached(problem, needed, [k])))
     if far.all():
         raise InfeasibleError(f"no goal is in reach: {why[0]}")
     kept = [g for g, out in zip(problem.goals, far, strict=True) if not out]
@@ -53,3 +63,27 @@ def within_reach(
         g.model_copy(update={"after": tuple(n for n in g.after if n in names)}) for g in kept
     )
     return problem.model_copy(update={"goals": goals}), why
+
+
+def unreached_note(before: Sequence[Goal], after: Sequence[Goal]) -> str:
+    """Return one line on viewpoints that a tether cannot reach.
+
+    Parameters
+    ----------
+    before : sequence of Goal
+        All of them.
+    after : sequence of Goal
+        Those in reach.
+
+    Returns
+    -------
+    str
+        Their number and the first of their names.
+    """
+    kept = {goal.name for goal in after}
+    names = [str(goal.name) for goal in before if goal.name not in kept]
+    shown = ", ".join(names[:MAX_EXPLAINED]) + (", …" if len(names) > MAX_EXPLAINED else "")
+    return (
+        f"{counted(len(names), 'viewpoint')} left out: the tether cannot reach there among the "
+        f"obstacles ({shown})"
+    )

@@ -32,6 +32,9 @@ A `GeometryCollection` is a block of a drawing.
 
 KINDS = (*SHAPES, "ignore")
 
+MAX_REASON = 300
+"""Characters of a reason; `why` of a feature of kind ignore is cut off there."""
+
 WORDS = {
     **dict.fromkeys(("base", "bases", "anchor", "vessel", "ship"), "base"),
     **dict.fromkeys(("goal", "goals", "target", "targets", "inspection points"), "goal"),
@@ -235,7 +238,8 @@ def kind_of(feature: Feature, kinds: Mapping[str, str], *, chart: bool) -> Decis
     elif by_shape is not None:
         decision = Decision(by_shape, "as asked for")
     elif said is not None:
-        decision = Decision(said if isinstance(said, str) else "", "its kind is ignore")
+        why = str(feature.get("why") or "its kind is ignore")[:MAX_REASON]
+        decision = Decision(said if isinstance(said, str) else "", why)
     elif word is not None:
         decision = Decision(word, "its layer is named ignore")
     elif feature.kind:

@@ -254,6 +254,8 @@ class _Reader:
             plain = Path(folder) / "drawing.dxf"
             plain.write_text(written(self.plain(by_handle)), encoding="latin-1", newline="\n")
             layer = read_layer(self.file, plain, "entities", self.notes)
+        # blocks of which nothing is read are named with what refers to them
+        self.notes = [note for note in self.notes if not NO_BLOCK.match(note)]
         for data, properties in zip(layer.shapes, layer.properties, strict=True):
             entity = by_handle[str(properties["EntityHandle"])]
             if data is None:
@@ -269,7 +271,11 @@ class _Reader:
                 continue
             self.changes += [Change(entity.where, entity.layer, text) for text in changes]
             inner = str(properties.get("Layer") or entity.layer)
-            entity.pieces += [(inner, part) for _, part in parts_of(shape, entity.where)]
+            parts = [part for _, part in parts_of(shape, entity.where)]
+            long = [p for p in parts if p.geom_type == "Point" or p.length > 0.0]
+            if len(long) < len(parts):
+                entity.failure = f"has no length ({entity.record.type})"
+            entity.pieces += [(inner, part) for part in long]
 
     def plain(self, by_handle: dict[str, _Entity]) -> Iterator[Tag]:
         """Yield the drawing with nothing but what is to be read, each with a handle of its own."""
@@ -297,12 +303,14 @@ class _Reader:
     def features(self, entity: _Entity) -> list[Feature]:
         """Return the feature of an entity; of a block with several layers one for each."""
         record, layer = entity.record, entity.layer
-        if record.type == "INSERT":
+        if record.type == "INSERT" and entity.pieces:
             for text in self.lost_in(record.get(2)):
                 self.changes.append(Change(entity.where, layer, text))
         if not entity.pieces:
             if entity.failure != "complained of":
-                reason = entity.failure or f"GDAL gives no shape of it ({record.type})"
+                reason = entity.failure or f"has no shape that is read ({record.type})"
+                if record.type == "INSERT" and not entity.failure:
+                    reason = f"its block {self.text(record.get(2))!r} holds no shape that is read"
                 self.unread.append(Unread(entity.where, layer, reason))
             return []
         groups: dict[str, list[shapely.Geometry]] = {}
@@ -443,6 +451,9 @@ class _Reader:
             text = data.decode(self.encoding, "replace")
         return UNICODE.sub(lambda found: chr(int(found[1], 16)), text)
 
+
+NO_BLOCK = re.compile(r"GDAL: Block .* does not exist")
+"""Warning of GDAL of a block without records."""
 
 UNICODE = re.compile(r"\\U\+([0-9A-Fa-f]{4})")
 """A character as drawings escape it."""

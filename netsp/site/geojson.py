@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from netsp.errors import InputError
 from netsp.files import read_text
 from netsp.models import parse_json_object, shown
-from netsp.site.feature import Feature, Map, Unread
+from netsp.site.feature import Feature, Map, Unread, with_tags
 
 if TYPE_CHECKING:
     import shapely
@@ -104,6 +104,7 @@ def _feature(data: Any, where: str, *, degrees: bool) -> list[Feature]:
         raise _NowhereError("has no geometry")
     if not isinstance(geometry, dict) or not isinstance(properties, dict):
         raise InputError(f"{where}: expected an object as geometry and as properties")
+    properties = with_tags(properties)
     identity = data.get("id")
     named = "" if identity is None else str(identity)
     parts = list(_parts(geometry, where))

@@ -1,4 +1,4 @@
-"""Tracks and routes of GPX files (1.0 and 1.1), read without any other library."""
+"""GPX files (1.0 and 1.1), read without any other library: waypoints, tracks and routes."""
 
 from __future__ import annotations
 
@@ -11,9 +11,13 @@ from xml.etree import ElementTree
 from netsp.errors import InputError
 from netsp.files import read_bytes
 from netsp.models import shown
+from netsp.site.feature import Feature, Map, Unread
 
 MAX_HEIGHT = 12_000.0
 """Largest height or depth in a file, metres; no place on the earth exceeds it."""
+
+HEADER = ("name", "desc", "author", "email", "url", "urlname", "time", "keywords", "bounds")
+"""Elements of GPX 1.0 that describe the whole file."""
 
 FORBIDDEN = (b"<!DOCTYPE", b"<!ENTITY")
 """XML declarations that are refused: GPX needs none, and entities can expand without end."""
@@ -73,17 +77,7 @@ def read_gpx(file: str | Path) -> list[GpxLine]:
     InputError
         Not GPX, a point without a position, or neither a track nor a route of two points.
     """
-    data = read_bytes(file)
-    if any(word in data.upper() for word in FORBIDDEN):
-        raise InputError(
-            f"{file}: expected GPX without a document type, got {FORBIDDEN[0].decode()}"
-        )
-    try:
-        root = ElementTree.fromstring(data)
-    except (ElementTree.ParseError, ValueError, LookupError, RecursionError) as error:
-        raise InputError(f"{file}: not XML: {error}") from None
-    if _tag(root) != "gpx":
-        raise InputError(f"{file}: expected a gpx element, got {shown(_tag(root))}")
+    root = _root(file)
     lines: list[GpxLine] = []
     count = {"trk": 0, "rte": 0, "wpt": 0}
     for element in root:
@@ -105,6 +99,92 @@ def read_gpx(file: str | Path) -> list[GpxLine]:
             f"tracks, {count['rte']} routes and {count['wpt']} waypoints"
         )
     return lines
+
+
+def _root(file: str | Path) -> ElementTree.Element:
+    """Return the root of a GPX file."""
+    data = read_bytes(file)
+    if any(word in data.upper() for word in FORBIDDEN):
+        raise InputError(
+            f"{file}: expected GPX without a document type, got {FORBIDDEN[0].decode()}"
+        )
+    try:
+        root = ElementTree.fromstring(data)
+    except (ElementTree.ParseError, ValueError, LookupError, RecursionError) as error:
+        raise InputError(f"{file}: not XML: {error}") from None
+    if _tag(root) != "gpx":
+        raise InputError(f"{file}: expected a gpx element, got {shown(_tag(root))}")
+    return root
+
+
+def read_gpx_map(file: str | Path) -> Map:
+    """Read a GPX file as a map: waypoints are goals, tracks and routes paths.
+
+    Parameters
+    ----------
+    file : str or Path
+        The file.
+
+    Returns
+    -------
+    Map
+        In degrees; heights of waypoints are z. Texts and extensions of waypoints are properties, so
+        that a `depth` of a dive computer counts.
+
+    Raises
+    ------
+    InputError
+        Not GPX.
+    """
+    import shapely
+
+    features: list[Feature] = []
+    unread: list[Unread] = []
+    complaints: list[str] = []
+    layers: dict[str, int] = {}
+    for element in _root(file):
+        kind = _tag(element)
+        if kind == "metadata" or (kind in HEADER and not len(element)):
+            continue  # says nothing of places
+        where = f"{kind}[{layers.get(kind, 0)}]"
+        layers[kind] = layers.get(kind, 0) + 1
+        if kind not in ("wpt", "trk", "rte"):
+            unread.append(Unread(where, kind, "an element that is no part of GPX's places"))
+            continue
+        try:
+            if kind == "wpt":
+                point = _point(element, where)
+                at = shapely.Point(point.longitude, point.latitude, point.height or 0.0)
+                features.append(Feature(where, kind, "", _properties(element, "goal"), at))
+                continue
+            parts = [e for e in element if _tag(e) == "trkseg"] if kind == "trk" else [element]
+            lines = [
+                [_point(p, f"{where}: point {k}") for k, p in enumerate(part)
+                 if _tag(p) in ("trkpt", "rtept")]
+                for part in parts
+            ]  # fmt: skip
+        except InputError as error:
+            complaints.append(f"{file}: {error}")
+            continue
+        drawn = [[(p.longitude, p.latitude) for p in line] for line in lines if len(line) > 1]
+        if not drawn:
+            unread.append(Unread(where, kind, "has no two points in a row"))
+            continue
+        shape = shapely.LineString(drawn[0]) if len(drawn) == 1 else shapely.MultiLineString(drawn)
+        features.append(Feature(where, kind, "", _properties(element, "path"), shape))
+    return Map(tuple(features), True, layers, tuple(complaints), unread=tuple(unread))
+
+
+def _properties(element: ElementTree.Element, kind: str) -> dict[str, str]:
+    """Return the texts of an element and of its extensions, by their names; the kind is ours."""
+    found: dict[str, str] = {}
+    points = ("trkseg", "trkpt", "rtept")
+    for child in element:
+        parts = child.iter() if _tag(child) == "extensions" else [child]
+        for part in parts:
+            if _tag(part) not in points and part.text and part.text.strip():
+                found.setdefault(_tag(part), part.text.strip())
+    return {**found, "kind": kind}
 
 
 def _tag(element: ElementTree.Element) -> str:

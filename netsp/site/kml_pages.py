@@ -35,6 +35,9 @@ if TYPE_CHECKING:
 MAX_DEPTH = 100
 """Elements within elements that are read; more would exceed Python's stack."""
 
+ZIP = b"PK\x03\x04"
+"""First bytes of an archive."""
+
 MAX_PAGES = 1000
 """Pages of one map that are read."""
 
@@ -73,13 +76,15 @@ def read_kml(file: str | Path, crs: str | None = None) -> Map:
         Not KML, or too large.
     """
     reader = _Reader(file, degrees=crs is None)
+    reader.seen.add(f"\n{Path(file).resolve()}")
     if zipfile.is_zipfile(file):
         archive = _Archive.of(file)
         reader.read_archive(archive, archive.main, (), folder=Path(file).parent)
     else:
-        reader.read_page(
-            _Page(Path(file).name, read_bytes(file), Path(file).parent), (), is_root=True
-        )
+        data = read_bytes(file)
+        if data.startswith(ZIP):
+            raise InputError(f"{file}: cannot be read as a map: a damaged archive")
+        reader.read_page(_Page(Path(file).name, data, Path(file).parent), (), is_root=True)
     return reader.map()
 
 
@@ -208,6 +213,11 @@ class _Reader:
         root = _parsed(page.data, called)
         if root.tag not in ("kml", *CONTAINERS, "Placemark", "NetworkLink", *OVERLAYS):
             raise InputError(f"{called}: expected a kml element, got {shown(root.tag)}")
+        # KML 2.1: a Schema gives placemarks another name
+        schemas = {str(e.get("name")) for e in root.iter("Schema")} - set(_FEATURES)
+        for element in root.iter():
+            if element.tag in schemas:
+                element.tag = "Placemark"
         position = _Position(folders)
         if root.tag == "kml":
             for child in root:
@@ -224,10 +234,7 @@ class _Reader:
             inside = _Position((*at.folders, name), hidden)
             if not len(element) or not any(c.tag in _FEATURES for c in element):
                 self.layers.setdefault(inside.layer, 0)
-            schemas = {str(s.get("name")) for s in element if s.tag == "Schema"}
             for child in element:
-                if child.tag in schemas and child.tag not in _FEATURES:  # KML 2.1: Schema parent
-                    child.tag = "Placemark"
                 self.feature(child, inside, page, called)
         elif tag == "Placemark":
             self.placemark(element, at, called, hidden=hidden)

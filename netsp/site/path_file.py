@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from netsp.arrays import Floats
-from netsp.axes import read_path, read_table
+from netsp.axes import Quantity, Table, read_path, read_table
 from netsp.errors import InputError
 from netsp.fields import LARGEST
 from netsp.files import read_text
@@ -24,6 +24,7 @@ from netsp.models import parse_json_object, shown
 from netsp.problem import Problem
 from netsp.site.gpx import read_gpx, seconds_of
 from netsp.site.projection import Projection
+from netsp.site.time_stamps import NO_VALUES, unit_of_time
 
 ENDINGS = (".csv", ".csv.gz", ".txt", ".json", ".geojson", ".gpx")
 """Endings of files with paths."""
@@ -43,11 +44,14 @@ class FoundPath:
         Points in the frame of the problem.
     times : ndarray, shape (k,), optional
         Time stamps of the points, s.
+    notes : tuple of str
+        What was assumed and left out, one line each.
     """
 
     name: str
     points: Floats = field(repr=False)
     times: Floats | None = field(repr=False, default=None)
+    notes: tuple[str, ...] = ()
 
 
 def read_paths(file: str | Path, problem: Problem, frame: str | None = None) -> list[FoundPath]:
@@ -143,12 +147,17 @@ def _of_table(file: str | Path, problem: Problem, stem: str) -> FoundPath:
     if plane is None:
         raise table.wanted(wanted)
     up = table.height()
-    quantities = [*plane, up] if up else [*plane]
+    quantities: list[Quantity] = [*plane, up] if up else [*plane]
     values: list[list[float]] = []
     times: list[float] = []
+    notes: list[str] = []
+    scale: float | None = None
+    gaps = 0
+    is_global = plane == ("longitude", "latitude")
     for k, number in enumerate(table.lines):
-        if all(table.text(k, name).lower() in ("", "nan") for name in plane):
-            continue  # a gap of the recording
+        if _is_gap(table, k, quantities, is_global=is_global):
+            gaps += 1
+            continue
         place = f"{file}: line {number}, point {len(values)}"
         values.append([
             _number(table.plain(k, name), f"{place}: {table.title(name)}")
@@ -156,14 +165,27 @@ def _of_table(file: str | Path, problem: Problem, stem: str) -> FoundPath:
             for name in quantities
         ])  # fmt: skip
         if "time" in table:
-            seconds = _seconds(table.plain(k, "time"), f"{place}: {table.title('time')}")
-            times.append(seconds * table.columns["time"][1].factor)
+            text, meaning = table.plain(k, "time"), table.columns["time"][1]
+            where = f"{place}: {table.title('time')}"
+            if not _is_number(text):
+                times.append(seconds_of(text, where))
+                continue
+            if scale is None:
+                scale, unit = meaning.factor, ""
+                if not meaning.unit and meaning.factor == 1.0:
+                    scale, unit = unit_of_time(float(text))
+                if unit:
+                    notes.append(f"{file}: times are taken as {unit} since 1970")
+            times.append(_number(text, where, LARGEST / scale) * scale)
+    if gaps:
+        rows = "1 row" if gaps == 1 else f"{gaps} rows"
+        notes.append(f"{file}: {rows} left out: no position: a gap of the path")
     if len(values) < 2:
         raise InputError(f"{file}: expected a path of at least 2 points, got {len(values)}")
     points = np.array(values)
     if up == "z":
         table.check_depths(points[:, 2])
-    if plane == ("longitude", "latitude"):
+    if is_global:
         wrong = np.flatnonzero((np.abs(points[:, 0]) > 180.0) | (np.abs(points[:, 1]) > 90.0))
         if len(wrong):
             raise InputError(
@@ -171,7 +193,15 @@ def _of_table(file: str | Path, problem: Problem, stem: str) -> FoundPath:
                 f"got {points[wrong[0], 0]:g}, {points[wrong[0], 1]:g}"
             )
         points[:, :2] = _to_plane(problem, [(b, a) for a, b in points[:, :2]], str(file))
-    return FoundPath(stem, points, np.array(times) if times else None)
+    return FoundPath(stem, points, np.array(times) if times else None, tuple(notes))
+
+
+def _is_gap(table: Table, row: int, quantities: list[Quantity], *, is_global: bool) -> bool:
+    """Whether a row has no position: a cell without a value, or degrees without a GPS fix."""
+    cells = [table.plain(row, name) for name in quantities]
+    if any(cell.lower() in NO_VALUES for cell in cells):
+        return True
+    return is_global and all(_is_number(c) and float(c) == 0.0 for c in cells[:2])
 
 
 def _is_number(cell: str) -> bool:
@@ -182,12 +212,12 @@ def _is_number(cell: str) -> bool:
     return True
 
 
-def _number(text: str, where: str) -> float:
+def _number(text: str, where: str, most: float = LARGEST) -> float:
     try:
         value = float(text)
     except ValueError:
         value = math.nan
-    if not abs(value) <= LARGEST:
+    if not abs(value) <= most:
         raise InputError(f"{where}: expected a number, got {shown(text)}")
     return value
 

@@ -39,21 +39,30 @@ from netsp.site.crop import CropWindow, cropped
 from netsp.site.drawing import read_dxf
 from netsp.site.feature import Feature, Map
 from netsp.site.geojson import read_geojson
+from netsp.site.gpx import read_gpx_map
 from netsp.site.kml_pages import read_kml
 from netsp.site.ledger import Ledger
 from netsp.site.line_work import is_land, lines_of, outlines, widened
 from netsp.site.options import SiteOptions
 from netsp.site.projection import Projection
+from netsp.site.qgc_plan import read_plan
 from netsp.site.sea_floor import SeaFloor
 from netsp.site.shapes import outline_of, simple_polygons, spurs_of
 from netsp.site.table import from_table
 from netsp.site.vector import in_degrees, read_vector
+from netsp.site.waypoint_list import is_waypoint_list, read_waypoint_list
 
 if TYPE_CHECKING:
     import shapely
 
 CHART_SUFFIXES = (".000",)
 """Extensions of S-57 charts."""
+
+EARTH_READERS = {
+    ".plan": read_plan, ".waypoints": read_waypoint_list, ".wpl": read_waypoint_list,
+    ".gpx": read_gpx_map,
+}  # fmt: skip
+"""Readers of formats that are in degrees always, by extension."""
 
 MAX_NAME = 200
 """Characters of a file's name that a problem keeps."""
@@ -93,7 +102,8 @@ def import_site(
     Parameters
     ----------
     file : str or Path
-        GeoJSON, KML, KMZ, shapefile, GeoPackage, DXF, S-57, or what else GDAL reads.
+        GeoJSON, GPX, .plan, .waypoints, KML, KMZ, shapefile, GeoPackage, DXF, S-57, or what else
+        GDAL reads.
     projection : Projection, optional
         About the base; None takes the map's own base, y to its heading or to the north.
     options : SiteOptions, optional
@@ -191,6 +201,10 @@ def read_map(file: str | Path, crs: str | None = None, units: str | None = None)
         Not readable.
     """
     suffix = Path(file).suffix.lower()
+    if suffix in EARTH_READERS or (suffix == ".txt" and is_waypoint_list(file)):
+        if crs is not None:
+            raise InputError(f"--crs: {file} is in degrees always; expected no system")
+        return EARTH_READERS.get(suffix, read_waypoint_list)(file)
     if suffix == ".dxf":
         return read_dxf(file, crs, units)
     if suffix in (".kml", ".kmz"):
@@ -838,13 +852,30 @@ class _Site:
             self.notes.append(
                 f"{called}{counted(len(names), 'viewpoint')} left out: {cause} ({shown_names})"
             )
-        if not kept:
-            causes = ", ".join(dict.fromkeys(cause for _, cause in groups))
+        if not kept and not self._complains_of_base(anchor, obstacles):
+            number: Counter[str] = Counter()
+            for (_, cause), names in groups.items():
+                number[cause] += len(names)
+            causes = ", ".join(f"{n} {cause}" for cause, n in number.items())
             self._complain(
-                f"no viewpoint about an obstacle is left: all {len(goals)} are {causes}; expected "
-                "another standoff, base or tether"
+                f"no viewpoint about an obstacle is left ({causes}); expected another standoff, "
+                "base or tether"
             )
         return kept
+
+    def _complains_of_base(self, anchor: Any, obstacles: list[dict[str, Any]]) -> bool:
+        """Complain of a base within an obstacle, and return whether it is."""
+        import shapely
+
+        spot = shapely.Point(anchor[:2])
+        for thing in obstacles:
+            if _shape(thing).contains(spot):
+                self._complain(
+                    f"base: lies inside {self._called(thing['feature'])}; expected a place in the "
+                    "water"
+                )
+                return True
+        return False
 
     def _bounds(self, features: list[Feature]) -> list[list[float]] | None:
         import shapely
@@ -878,6 +909,7 @@ class _Site:
 
     def _check_names(self, things: list[dict[str, Any]], what: str) -> None:
         seen: dict[str, str] = {}
+        _number_parts(things)
         if self.is_chart:  # its names are those of places, and need not differ
             _number_names(things)
         for thing in things:
@@ -1024,6 +1056,18 @@ def _distance(places: np.ndarray, obstacles: list[dict[str, Any]]) -> np.ndarray
 def _first_of(places: list[str]) -> str:
     """Return the first of some places and how many more there are."""
     return places[0] + (f" and {len(places) - 1} more" if len(places) > 1 else "")
+
+
+def _number_parts(things: list[dict[str, Any]]) -> None:
+    """Number the names of things that are parts of one collection: "pier 1", "pier 2"."""
+    groups: dict[tuple[str, str], list[dict[str, Any]]] = {}
+    for thing in things:
+        whole, dot, _ = thing["where"].partition(".geometries[")
+        if thing["name"] is not None and dot:
+            groups.setdefault((whole, thing["name"]), []).append(thing)
+    for (_, name), parts in groups.items():
+        for number, part in enumerate(parts, 1):
+            part["name"] = f"{name} {number}" if len(parts) > 1 else name
 
 
 def _number_names(things: list[dict[str, Any]]) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from netsp.arrays import Floats
-from netsp.axes import Quantity, read_table
+from netsp.axes import MAP_PAIRS, Quantity, read_table
 from netsp.errors import InputError
 from netsp.site.projection import Projection
 
@@ -23,12 +23,12 @@ def from_table(
     Parameters
     ----------
     file : str or Path
-        Table whose first line names its columns in any order (`netsp.axes`): x, y (or easting,
-        northing, or lat, lon), and perhaps z or depth, and name.
+        Table whose first line names its columns in any order (`netsp.axes`): x, y (without a
+        projection easting, northing, too; with one lat, lon), and perhaps z or depth, and name.
     projection : Projection, optional
         Projection of latitudes and longitudes into the plane.
     on_note : callable, optional
-        Called with one line that names the columns that are not used.
+        Called with one line each for decimal commas and for columns that are not used.
 
     Returns
     -------
@@ -43,7 +43,8 @@ def from_table(
         Not such a table, or degrees without a projection.
     """
     table = read_table(file)
-    pair = table.pair()
+    # coordinates of a map are not those of a plane about a base
+    pair = table.pair(MAP_PAIRS if projection is None else (("x", "y"),))
     is_global = pair is None and table.pair((("latitude", "longitude"),)) is not None
     if is_global and projection is None:
         raise InputError(
@@ -52,13 +53,16 @@ def from_table(
         )
     plane: tuple[Quantity, Quantity] | None = ("latitude", "longitude") if is_global else pair
     if plane is None or not table.rows:
-        raise table.wanted("a table with the columns x, y and perhaps z or depth, name")
+        wanted = "x, y" if projection is None else "x, y (m) or lat, lon"
+        raise table.wanted(f"a table with the columns {wanted} and perhaps z or depth, name")
     up = table.height()
     label: Quantity = "name" if "name" in table else "identifier"
     used: list[Quantity] = [*plane, up] if up else [*plane]
     places = table.numbers(used)
     if is_global and projection is not None:
         places[:, :2] = np.asarray(projection.to_plane(places[:, :2]))
+    if on_note is not None and table.has_decimal_commas:
+        on_note(f"{file}: numbers are read with decimal commas")
     if on_note is not None and (unused := table.left_out([*used, label])):
         on_note(f"{file}: columns that are not used: {', '.join(unused)}")
     return places, [table.text(k, label) or None for k in range(len(table.rows))]

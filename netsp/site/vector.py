@@ -7,25 +7,43 @@ pyogrio brings GDAL with it. Geometries that Shapely does not read are repaired 
 from __future__ import annotations
 
 import math
+import re
+import sqlite3
+import tempfile
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
 
 from netsp.axes import height_axis
 from netsp.errors import InputError, UnansweredError
-from netsp.files import check_file
+from netsp.files import check_file, read_bytes
 from netsp.site.feature import Change, Feature, Map, Unread, change_notes, with_tags
-from netsp.site.wkb_shapes import NotFiniteError, ShapeError, shape_of
+from netsp.site.wkb_shapes import NotFiniteError, ShapeError, collected, shape_of
 
 if TYPE_CHECKING:
     import shapely
 
 MOST_FEATURES = 100_000
 """Of a map: more make no problem that anybody solves."""
+
+OSM_SUFFIXES = (".osm", ".pbf")
+"""Extensions of OpenStreetMap's own formats."""
+
+SQLITE = b"SQLite format 3\0"
+"""First bytes of a GeoPackage."""
+
+GML_MEMBER = re.compile(
+    rb"<(?:[\w.-]+:)?(?:featureMembers?|member)\b[^>]*>\s*<(?:[\w.-]+:)?([\w.-]+)"
+)
+"""Feature of GML: the name of its element is its layer's."""
+
+UNSUPPORTED = "Geometry type is not supported"
+"""Words of pyogrio for layers that are declared to hold faces."""
 
 LOCAL = "local"
 """The coordinate system of a map without a place on the earth."""
@@ -53,20 +71,33 @@ def read_vector(file: str | Path, crs: str | None) -> Map:
         is not installed.
     """
     check_file(file)
+    with _readable(file) as plain:
+        return _read(file, plain, crs)
+
+
+def _read(file: str | Path, plain: str | Path, crs: str | None) -> Map:
+    """Return a file as a map, read where GDAL can."""
     found = _Found(file)
     places: dict[str, bool] = {}
-    for name, kind in gdal_layers(file, file, found.notes):
+    is_osm = Path(file).suffix.lower() in OSM_SUFFIXES
+    for name, kind in gdal_layers(file, plain, found.notes):
         if kind is None:
-            found.add_table(name, _row_count(file, name))
+            found.add_table(name, _row_count(plain, name))
             continue
-        layer = read_layer(file, file, name, found.notes)
+        layer = read_layer(file, plain, name, found.notes)
+        if is_osm and not layer.shapes:
+            continue  # GDAL has the same five layers for every file
         own = crs if crs is not None else layer.crs
         if own is None:
             plain = f"{file}: layer {name!r}: names no coordinate system"
             option = f"; give it with --crs EPSG:4326 (degrees), another EPSG code or --crs {LOCAL}"
             raise UnansweredError([plain + option], [plain], ["crs"])
         places[name] = own != LOCAL
+        found.is_osm = is_osm
         found.add_layer(name, layer, _mover(str(own), f"{file}: layer {name!r}"))
+        change = "" if own == LOCAL else height_axis(str(own)).change
+        if change and any(f.layer == name and f.shape.has_z for f in found.features):
+            found.notes.append(f"layer {name!r}: {change}")
     if len(set(places.values())) > 1:
         some = next(name for name, on in places.items() if not on)
         raise InputError(
@@ -183,6 +214,44 @@ def gdal_options(options: Mapping[str, str]) -> Iterator[None]:
         pyogrio.set_gdal_config_options(before)
 
 
+@contextmanager
+def _readable(file: str | Path) -> Iterator[str | Path]:
+    """Yield where a file can be read: layers that are declared to hold faces through a virtual one.
+
+    pyogrio refuses such layers (PolyhedralSurface, TIN, Triangle) whatever they hold.
+    """
+    try:
+        _call(file, [], _pyogrio().list_layers, file)
+    except InputError as error:
+        names = _layer_names(file) if UNSUPPORTED in str(error) else {}
+        if not names:
+            raise
+    else:
+        yield file
+        return
+    source = f"<SrcDataSource>{escape(str(Path(file).resolve()))}</SrcDataSource>"
+    with tempfile.TemporaryDirectory() as folder:
+        plain = Path(folder) / "layers.vrt"
+        layers = [
+            f"<OGRVRTLayer name={quoteattr(name)}>{source}"
+            f"<GeometryType>{kind}</GeometryType></OGRVRTLayer>"
+            for name, kind in names.items()
+        ]
+        plain.write_text(f"<OGRVRTDataSource>{''.join(layers)}</OGRVRTDataSource>", "utf-8")
+        yield plain
+
+
+def _layer_names(file: str | Path) -> dict[str, str]:
+    """Return the layers of a GeoPackage or of GML, elsewhere that of the file, and their types."""
+    data = read_bytes(file)
+    if data.startswith(SQLITE):
+        with closing(sqlite3.connect(f"{Path(file).resolve().as_uri()}?mode=ro", uri=True)) as base:
+            rows = base.execute("SELECT table_name, data_type FROM gpkg_contents").fetchall()
+        return {str(name): "wkbUnknown" if kind == "features" else "wkbNone" for name, kind in rows}
+    names = [name.decode("ascii", "replace") for name in GML_MEMBER.findall(data)]
+    return dict.fromkeys(names or [Path(file).stem], "wkbUnknown")
+
+
 def _row_count(file: str | Path, layer: str) -> int:
     found = _call(file, [], _pyogrio().read_info, file, layer=layer, force_feature_count=True)
     return min(max(int(found["features"]), 0), MOST_FEATURES)
@@ -199,6 +268,7 @@ class _Found:
         self.changes: list[Change] = []
         self.complaints: list[str] = []
         self.layers: dict[str, int] = {}
+        self.is_osm = False
 
     def add_table(self, name: str, rows: int) -> None:
         """Leave out the rows of a table without places."""
@@ -221,7 +291,10 @@ class _Found:
                 self.unread.append(Unread(where, name, str(error)))
                 continue
             tags = with_tags(properties)
-            for place, shape in shapes:
+            for place, area in shapes:
+                shape = area
+                if self.is_osm and tags.get("natural") == "coastline":
+                    shape = _shore(area)  # GDAL makes areas of closed ways
                 self.layers[name] += 1
                 self.features.append(Feature(place, name, "", tags, shape))
 
@@ -246,6 +319,17 @@ class _Found:
         )  # fmt: skip
 
 
+def _shore(shape: shapely.Geometry) -> shapely.Geometry:
+    """Return the outlines of areas as closed lines in their sense; other shapes as they are."""
+    if "Polygon" not in shape.geom_type:
+        return shape
+    import shapely
+
+    return collected([
+        shapely.LineString(part.exterior.coords) for part in getattr(shape, "geoms", [shape])
+    ])  # fmt: skip
+
+
 def shape_from_gdal(data: bytes) -> tuple[shapely.Geometry, tuple[str, ...]]:
     """Return a shape that GDAL gives, whatever its type, and what was changed in it.
 
@@ -263,12 +347,15 @@ def shape_from_gdal(data: bytes) -> tuple[shapely.Geometry, tuple[str, ...]]:
     """
     import shapely
 
-    shape = shapely.from_wkb(data, on_invalid="ignore")
+    with np.errstate(invalid="ignore"):  # places that are no numbers are refused below
+        shape = shapely.from_wkb(data, on_invalid="ignore")
     changes: tuple[str, ...] = ()
     if shape is None or getattr(shape, "has_m", False):
         shape, changes = shape_of(data)
     if not np.isfinite(shapely.get_coordinates(shape)).all():
         raise NotFiniteError
+    if "Polygon" in shape.geom_type and not shape.is_empty and not shape.length:
+        raise ShapeError("an area that is one point")
     return shape, changes
 
 

@@ -90,6 +90,8 @@ def load_floor(
         notes.append(
             f"map in units of {grid.metres:.7g} m, heights of {height:.7g} m: in metres here"
         )
+    if sign > 0.0 and grid.z.min() > 0.0:
+        notes.append("all heights are above 0: set depths to true if values count downwards")
     x = (grid.x - origin[0]) * grid.metres * scale
     y = (grid.y - origin[1]) * grid.metres * scale
     z = grid.z * (sign * height * scale) + 0.0

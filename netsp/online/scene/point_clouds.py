@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -82,8 +83,9 @@ def read_text_cloud(path: str | Path) -> PointCloud:
     if plane is None or up is None:
         raise table.wanted("columns x, y and z (or depth)")
     used: tuple[Quantity, ...] = (*plane, up)
+    table, gaps = _without_gaps(table, used)
     points = table.numbers(used)
-    notes = []
+    notes = [f"{counted(gaps, 'row')} without coordinates left out"] if gaps else []
     if table.has_decimal_commas:
         notes.append("numbers are read with decimal commas")
     kept, left_out = _surface(_classes(table), _withheld(table), len(points))
@@ -91,6 +93,21 @@ def read_text_cloud(path: str | Path) -> PointCloud:
     if unused := table.left_out((*used, "classification", "withheld")):
         notes.append(f"columns that are not used: {', '.join(unused)}")
     return PointCloud(points[kept], notes=tuple(notes))
+
+
+def _without_gaps(table: Table, used: Sequence[Quantity]) -> tuple[Table, int]:
+    """Return the table without rows whose coordinates are all empty or nan, and their number."""
+    first = table.columns[used[0]][0]
+    blank = {
+        k for k, cells in enumerate(table.rows)
+        if first >= len(cells) or cells[first].strip().lower() in ("", "nan")
+    }  # fmt: skip
+    blank = {k for k in blank if all(table.text(k, q).lower() in ("", "nan") for q in used)}
+    if not blank:
+        return table, 0
+    kept = [k for k in range(len(table.rows)) if k not in blank]
+    rows, lines = [table.rows[k] for k in kept], [table.lines[k] for k in kept]
+    return replace(table, rows=rows, lines=lines), len(blank)
 
 
 def _classes(table: Table) -> Floats | None:
@@ -161,6 +178,8 @@ def read_las(path: str | Path) -> PointCloud:
         raise InputError(f"{path}: in degrees; expected a cloud in metres, such as UTM")
     elif keys or any(v.record_id == _WKT for v in data.header.vlrs):
         notes.append("its coordinate system is not known here: taken as metres, z upwards")
+    if not heights.is_stated and 1024 <= keys.get(_VERTICAL, 0) < 32767:
+        heights = height_axis(f"EPSG:{keys[_VERTICAL]}")
     unit = 1.0 if unit is None else unit
     metres = _KEY_UNITS.get(keys.get(_HEIGHT_UNIT, 0))
     if metres is None:
@@ -169,12 +188,17 @@ def read_las(path: str | Path) -> PointCloud:
         notes.append(f"in units of {unit:.7g} m, heights of {metres:.7g} m: in metres here")
     points[:, 2] *= heights.sign
     if heights.sign < 0.0:
-        notes.append("its vertical system counts downwards: z is upwards here")
+        notes.append("its heights count downwards: z is upwards here")
     return PointCloud(points[kept], (unit, unit, metres), tuple(notes))
 
 
 _WKT, _KEYS = 2112, 34735  # records of LAS with a coordinate system (LAS 1.4 R15, section 3)
-_MODEL, _MAP_UNIT, _HEIGHT_UNIT = 1024, 3076, 4099  # keys of GeoTIFF 1.1, sections 7.3 to 7.5
+_MODEL, _MAP_UNIT, _VERTICAL, _HEIGHT_UNIT = (
+    1024,
+    3076,
+    4096,
+    4099,
+)  # keys of GeoTIFF 1.1, section 7
 _KEY_UNITS = {9001: 1.0, 9002: UNITS["ft"], 9003: UNITS["us-ft"]}
 """Metres per unit, by its number in GeoTIFF keys."""
 
