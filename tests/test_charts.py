@@ -314,7 +314,7 @@ def test_a_real_chart_is_imported_in_one_command(tmp_path):
         pytest.skip("needs ../shared/data/charts/US5MIACB.000")
     out, floor = tmp_path / "p.json", tmp_path / "floor.asc"
     argv = ["import", str(CHART), "--base", "25.7787,-80.1854", "--tether", "100", "--radius", "1",
-            "--line-width", "1", "--inspect", "2", "--standoff", "3", "--of", "layer=PONTON",
+            "--line-width", "1", "--inspect", "1", "--standoff", "3", "--of", "layer=SLCONS",
             "--floor", str(floor), "-o", str(out), "--plot", str(tmp_path / "p.png")]  # fmt: skip
     assert main(argv) == 0
     problem = Problem.load(out)
