@@ -910,7 +910,8 @@ class _Site:
     def _check_names(self, things: list[dict[str, Any]], what: str) -> None:
         seen: dict[str, str] = {}
         _number_parts(things)
-        if self.is_chart:  # its names are those of places, and need not differ
+        is_drawing = Path(self.file).suffix.lower() == ".dxf"
+        if self.is_chart or is_drawing:  # names of places or of blocks need not differ
             _number_names(things)
         for thing in things:
             name = thing["name"]
