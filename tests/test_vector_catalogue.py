@@ -11,8 +11,9 @@ import pytest
 
 from netsp import InputError
 from netsp.site.contract import words_in
-from netsp.site.options import SiteOptions
+from netsp.site.options import Looking, SiteOptions
 from netsp.site.read import import_site
+from netsp.site.selection import Selection
 
 pyogrio = pytest.importorskip("pyogrio")
 shapely = pytest.importorskip("shapely")
@@ -148,6 +149,17 @@ def test_the_nearest_folder_with_a_word_decides(name, depth, tmp_path):
     left = imported(tmp_path / "s.kml", text, maps=[("ignore", name)])
     assert not left.problem.obstacles
     assert counts(left) == (2, 1)
+
+
+@pytest.mark.parametrize(("layer", "count"), [("Piles", 4), ("North", 4), ("Piles/North", 4)])
+def test_goals_about_obstacles_are_chosen_by_any_folder(layer, count, tmp_path):
+    piles = folder("Piles", folder("North", mark("P", point(9, 0))), folder("South"))
+    text = kml(
+        folder("site", START, piles, folder("Walls", mark("W", area(30, 0))), tag="Document")
+    )
+    look = Looking(viewpoints=4, standoff=1.0, chosen=Selection.parse([("layer", layer)]))
+    found = imported(tmp_path / "s.kml", text, looking=look)
+    assert len(found.problem.goals) == 1 + count
 
 
 def test_words_of_a_path_of_folders_go_from_the_nearest_outwards():

@@ -820,7 +820,10 @@ class _Site:
         found = {
             k
             for k, o in enumerate(obstacles)
-            if rule.takes(o["feature"].layer, self._name(o["feature"]) or o["name"])
+            if any(
+                rule.takes(layer, self._name(o["feature"]) or o["name"])
+                for layer in (o["feature"].layer, *o["feature"].folders)
+            )
             and rule.holds(_shape(o), areas)
         }
         if not found and obstacles:
