@@ -230,6 +230,7 @@ def test_a_base_is_sought_only_where_the_imported_map_holds_its_reach(monkeypatc
     with pytest.raises(InputError, match="candidates: far and 1 more: the tether reaches beyond"):
         best_base(wide, [[0, 40], [90, 0], [0, 90]], names=["quay", "far", None])
     assert Problem.model_validate({**wide.model_dump(), "base": (0.0, 40.0, 0.0)})
+    assert best_base(wide, [[0.0, 40.0]]).best is not None
 
 
 def test_obstacles_to_inspect_are_chosen_by_layer_name_and_box(monkeypatch):
