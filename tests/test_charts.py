@@ -230,6 +230,7 @@ def test_a_base_is_sought_only_where_the_imported_map_holds_its_reach(monkeypatc
     with pytest.raises(InputError, match="candidates: far and 1 more: the tether reaches beyond"):
         best_base(wide, [[0, 40], [90, 0], [0, 90]], names=["quay", "far", None])
     assert Problem.model_validate({**wide.model_dump(), "base": (0.0, 40.0, 0.0)})
+    assert best_base(wide, [[0.0, 40.0]]).best is not None
 
 
 def test_obstacles_to_inspect_are_chosen_by_layer_name_and_box(monkeypatch):
@@ -314,7 +315,7 @@ def test_a_real_chart_is_imported_in_one_command(tmp_path):
         pytest.skip("needs ../shared/data/charts/US5MIACB.000")
     out, floor = tmp_path / "p.json", tmp_path / "floor.asc"
     argv = ["import", str(CHART), "--base", "25.7787,-80.1854", "--tether", "100", "--radius", "1",
-            "--line-width", "1", "--inspect", "2", "--standoff", "3", "--of", "layer=PONTON",
+            "--line-width", "1", "--inspect", "1", "--standoff", "3", "--of", "layer=SLCONS",
             "--floor", str(floor), "-o", str(out), "--plot", str(tmp_path / "p.png")]  # fmt: skip
     assert main(argv) == 0
     problem = Problem.load(out)

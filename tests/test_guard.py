@@ -898,7 +898,7 @@ def test_goals_with_alternatives_and_polygons_change_nothing_for_the_tether():
 def test_a_recording_that_is_wrong_at_its_end_leaves_the_output_as_it_was(tmp_path, capsys):
     out = tmp_path / "kept.jsonl"
     out.write_text("before")
-    (tmp_path / "bad.csv").write_text("t,x,y,z\n0,0,0,0\n1,0.1,0,0\n2,nan,0,0\n")
+    (tmp_path / "bad.csv").write_text("t,x,y,z\n0,0,0,0\n1,0.1,0,0\n2,right,0,0\n")
     told = ["guard", str(PROBLEMS / "wharf.json"), "-o", str(out), "--quiet", "--replay"]
     for name in ("bad.csv", "missing.csv"):
         assert main([*told, str(tmp_path / name)]) == 2

@@ -115,6 +115,13 @@ def test_altitudes_are_those_of_their_frame(tmp_path, is_list):
         import_site(write(tmp_path, items), options=TETHER)
 
 
+def test_a_given_base_goes_before_the_planned_home_and_it_is_said(tmp_path):
+    file = plan(tmp_path, [item(16)])
+    found = import_site(file, Projection(LAT + STEP, LON), options=TETHER)
+    assert any("plannedHomePosition: the base is where --base says, 11.1" in n for n in found.notes)
+    assert not any("--base says" in n for n in import_site(file, HERE, options=TETHER).notes)
+
+
 def ring(size):
     return [(LAT - size, LON - size), (LAT - size, LON + size), (LAT + size, LON + size),
             (LAT + size, LON - size)]  # fmt: skip

@@ -11,8 +11,9 @@ import pytest
 
 from netsp import InputError
 from netsp.site.contract import words_in
-from netsp.site.options import SiteOptions
+from netsp.site.options import Looking, SiteOptions
 from netsp.site.read import import_site
+from netsp.site.selection import Selection
 
 pyogrio = pytest.importorskip("pyogrio")
 shapely = pytest.importorskip("shapely")
@@ -148,6 +149,17 @@ def test_the_nearest_folder_with_a_word_decides(name, depth, tmp_path):
     left = imported(tmp_path / "s.kml", text, maps=[("ignore", name)])
     assert not left.problem.obstacles
     assert counts(left) == (2, 1)
+
+
+@pytest.mark.parametrize(("layer", "count"), [("Piles", 4), ("North", 4), ("Piles/North", 4)])
+def test_goals_about_obstacles_are_chosen_by_any_folder(layer, count, tmp_path):
+    piles = folder("Piles", folder("North", mark("P", point(9, 0))), folder("South"))
+    text = kml(
+        folder("site", START, piles, folder("Walls", mark("W", area(30, 0))), tag="Document")
+    )
+    look = Looking(viewpoints=4, standoff=1.0, chosen=Selection.parse([("layer", layer)]))
+    found = imported(tmp_path / "s.kml", text, looking=look)
+    assert len(found.problem.goals) == 1 + count
 
 
 def test_words_of_a_path_of_folders_go_from_the_nearest_outwards():
@@ -690,3 +702,30 @@ def test_lines_of_openstreetmap_are_obstacles_and_a_coast_about_water_is_a_wall(
         assert whole.area == pytest.approx(size, rel=0.15), name
     (goal,) = found.problem.goals
     assert not any(o.shape().covers(shapely.Point(goal.position)) for o in found.problem.obstacles)
+
+
+def test_blocks_of_one_name_are_numbered(tmp_path):
+    posts = [
+        [
+            *insert("PILES", "POST", x, 9, 66, 1),
+            *entity("ATTRIB", "0", 2, "NAME", 1, "P"),
+            0,
+            "SEQEND",
+        ]
+        for x in (5, 15, 25)
+    ]
+    blocks = {"POST": [circle("0", 0, 0)]}
+    found = imported(tmp_path / "b.dxf", drawing(*PLACES, *posts, blocks=blocks))
+    assert sorted(o.name for o in found.problem.obstacles) == ["P", "P 2", "P 3"]
+
+
+def test_a_plan_without_a_place_on_the_earth_is_a_plane(tmp_path):
+    (tmp_path / "p.mid").write_text('"base"\n"goal"\n"obstacle"\n')
+    found = imported(
+        tmp_path / "p.mif",
+        'VERSION 300\nDELIMITER ","\nCOORDSYS NONEARTH UNITS "m" BOUNDS (-99,-99) (99,99)\n'
+        "COLUMNS 1\n kind char(10)\nDATA\nPOINT 0 0\nPOINT 9 0\nRECT 3 0 4 1\n",
+    )
+    assert found.problem.origin is None
+    assert found.problem.goals[0].position == (9.0, 0.0, 0.0)
+    assert found.problem.obstacles[0].shape().area == pytest.approx(1.0)

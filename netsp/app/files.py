@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -120,6 +121,30 @@ class ImportAnswers:
         )  # fmt: skip
 
 
+def without_options(text: str) -> str:
+    """Return a message without its clauses about options of the command line.
+
+    Parameters
+    ----------
+    text : str
+        One line.
+
+    Returns
+    -------
+    str
+        One line.
+
+    Examples
+    --------
+    >>> without_options("no coordinate system; give it with --crs EPSG:4326, or --crs local")
+    'no coordinate system'
+    >>> without_options("1 open line (pier); expected a width (--line-width W), in metres")
+    '1 open line (pier); expected a width, in metres'
+    """
+    bare = re.sub(r"\s*\([^()]*--[a-z][^()]*\)", "", text)
+    return re.sub(r"(;|,| or)\s[^;,]*--[a-z][^;]*", "", bare)
+
+
 def _positive(said: Mapping[str, str], field: str) -> float | None:
     if field not in said:
         return None
@@ -183,13 +208,14 @@ def imported(
                 raise InputError(f"{last}: expected .json, {', '.join(MAPS)}")
         except UnansweredError as error:  # the folder is ours and gone
             whole, plain = (
-                [text.replace(f"{folder}/", "") for text in texts]
+                [without_options(text.replace(f"{folder}/", "")) for text in texts]
                 for texts in (error.complaints, error.plain)
             )
             raise UnansweredError(whole, plain, error.asks) from None
         except InputError as error:
-            raise InputError(str(error).replace(f"{folder}/", "")) from None
-    return json.loads(problem.to_json()), notes
+            raise InputError(without_options(str(error).replace(f"{folder}/", ""))) from None
+    said = [without_options(note.replace(f"{folder}/", "")) for note in notes]
+    return json.loads(problem.to_json()), said
 
 
 def _site(

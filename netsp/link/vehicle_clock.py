@@ -33,6 +33,8 @@ class ClockPolicy:
     max_boot_s
         Largest first reading of a clock after a restart, s: the link takes that long to come back.
         Positive.
+    min_behind_s
+        Time for which messages are behind before the clock is taken to have changed, s; 0 or more.
     n_behind
         Messages in a row that are behind before the clock is taken to have changed, at least 1.
     """
@@ -40,7 +42,8 @@ class ClockPolicy:
     max_late_s: float = 0.95
     min_restart_step_s: float = 5.0
     max_boot_s: float = 60.0
-    n_behind: int = 5
+    min_behind_s: float = 0.3
+    n_behind: int = 2
 
     def __post_init__(self) -> None:
         if not 0.0 < self.max_late_s <= self.min_restart_step_s:
@@ -50,6 +53,8 @@ class ClockPolicy:
             )
         if not self.max_boot_s > 0.0:
             raise InputError(f"max_boot_s: expected a positive time, got {self.max_boot_s!r}")
+        if not self.min_behind_s >= 0.0:
+            raise InputError(f"min_behind_s: expected 0 or more, got {self.min_behind_s!r}")
         if self.n_behind < 1:
             raise InputError(f"n_behind: expected 1 or more, got {self.n_behind!r}")
 
@@ -90,7 +95,7 @@ class VehicleClock:
 
     Examples
     --------
-    >>> clock = VehicleClock(ClockPolicy(n_behind=1))
+    >>> clock = VehicleClock(ClockPolicy(min_behind_s=0.0, n_behind=1))
     >>> [clock.take(t).time for t in (100.0, 100.1, 98.2)]
     [100.0, 100.1, 100.1]
     >>> clock.take(0.5).event
@@ -124,7 +129,8 @@ class VehicleClock:
         if self._behind and time < self._behind[-1] - p.max_late_s:
             self._behind = []
         self._behind.append(time)
-        if len(self._behind) < p.n_behind:
+        is_brief = time - self._behind[0] < p.min_behind_s - 1e-6  # of decimal fractions
+        if is_brief or len(self._behind) < p.n_behind:
             return ClockReading(time + self.offset, "late")
         begin = self._behind[0]
         period = (time - begin) / max(len(self._behind) - 1, 1)

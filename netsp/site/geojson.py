@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from netsp.errors import InputError
+from netsp.errors import InputError, UnansweredError
 from netsp.files import read_text
 from netsp.models import parse_json_object, shown
 from netsp.site.feature import Feature, Map, Unread, with_tags
@@ -53,10 +53,8 @@ def read_geojson(file: str | Path, crs: str | None) -> Map:
         raise InputError(f"{file}: expected a GeoJSON FeatureCollection, Feature or geometry")
     own = data.get("crs")
     if crs is None and own is not None and not _is_wgs84(own):
-        raise InputError(
-            f"{file}: crs: expected WGS 84 as RFC 7946 has it, got {json.dumps(own)[:120]}; give "
-            "another with --crs"
-        )
+        plain = f"{file}: crs: expected WGS 84 as RFC 7946 has it, got {json.dumps(own)[:120]}"
+        raise UnansweredError([f"{plain}; give another with --crs"], [plain], ["crs"])
     found: list[Feature] = []
     unread: list[Unread] = []
     complaints = []

@@ -219,6 +219,10 @@ def read_map(file: str | Path, crs: str | None = None, units: str | None = None)
 DEGREES = 0.01
 """Of the tether's length: a plane that spans less is taken for one of degrees."""
 
+BASE_OFF = 0.01
+"""Distance of a given base from the file's own from which on a note says so, m: coordinates of a
+centimetre are written with seven decimals of a degree."""
+
 SKIP_OPTION = "; leave out what is out of reach with --skip-unreachable"
 
 MOST_OF_A_KIND = 5
@@ -444,6 +448,14 @@ class _Site:
                 return None
         x, y = self.projection.base.tolist()
         z = self._height(own) if own is not None else 0.0
+        if own is not None:
+            there = self._plane(own.shape)
+            away = float(np.hypot(there.x - x, there.y - y))
+            if away > BASE_OFF:
+                self.notes.append(
+                    f"{own.where}: the base is where --base says, {_metres(away)} away; the file's "
+                    "own gives its properties only"
+                )
         return (x, y, z), own
 
     # Places and lengths
@@ -808,7 +820,10 @@ class _Site:
         found = {
             k
             for k, o in enumerate(obstacles)
-            if rule.takes(o["feature"].layer, self._name(o["feature"]) or o["name"])
+            if any(
+                rule.takes(layer, self._name(o["feature"]) or o["name"])
+                for layer in (o["feature"].layer, *o["feature"].folders)
+            )
             and rule.holds(_shape(o), areas)
         }
         if not found and obstacles:
@@ -910,7 +925,8 @@ class _Site:
     def _check_names(self, things: list[dict[str, Any]], what: str) -> None:
         seen: dict[str, str] = {}
         _number_parts(things)
-        if self.is_chart:  # its names are those of places, and need not differ
+        is_drawing = Path(self.file).suffix.lower() == ".dxf"
+        if self.is_chart or is_drawing:  # names of places or of blocks need not differ
             _number_names(things)
         for thing in things:
             name = thing["name"]

@@ -19,7 +19,7 @@ from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
 
-from netsp.axes import height_axis
+from netsp.axes import height_axis, map_unit
 from netsp.errors import InputError, UnansweredError
 from netsp.files import check_file, read_bytes
 from netsp.site.feature import Change, Feature, Map, Unread, change_notes, with_tags
@@ -30,6 +30,9 @@ if TYPE_CHECKING:
 
 MOST_FEATURES = 100_000
 """Of a map: more make no problem that anybody solves."""
+
+PLANE_SYSTEMS = ("LOCAL_CS", "ENGCRS", "ENGINEERINGCRS")
+"""First words of systems without a place on the earth, in well-known text."""
 
 OSM_SUFFIXES = (".osm", ".pbf")
 """Extensions of OpenStreetMap's own formats."""
@@ -88,6 +91,8 @@ def _read(file: str | Path, plain: str | Path, crs: str | None) -> Map:
         if is_osm and not layer.shapes:
             continue  # GDAL has the same five layers for every file
         own = crs if crs is not None else layer.crs
+        if own is not None and own.startswith(PLANE_SYSTEMS) and map_unit(own) == 1.0:
+            own = LOCAL  # a plan without a place on the earth says so itself
         if own is None:
             plain = f"{file}: layer {name!r}: names no coordinate system"
             option = f"; give it with --crs EPSG:4326 (degrees), another EPSG code or --crs {LOCAL}"

@@ -413,7 +413,7 @@ def shortest_paths(problem: Problem, places: Floats) -> tuple[Floats, Floats]:
     every = np.vstack([goals, places])
     flat, which = np.unique(every[:, :2], axis=0, return_inverse=True)
     which = np.asarray(which).reshape(-1)
-    data: dict[str, Any] = problem.model_dump(exclude={"origin", "state", "bounds"})
+    data: dict[str, Any] = problem.model_dump(exclude={"origin", "state", "bounds", "site"})
     reach = 10.0 * float(np.ptp(flat, axis=0).max() + problem.tether_length)
     plain = Problem(
         **{

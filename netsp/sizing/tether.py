@@ -258,6 +258,12 @@ def tether_curve(
         )
     if longest is not None:
         longest = checked_argument("longest", longest, 1e-9)
+        is_cropped = problem.site is not None and problem.site.cropped is not None
+        if is_cropped and longest > problem.tether_length:
+            raise InputError(
+                f"longest: expected at most {problem.tether_length:g}, the tether that the map was "
+                f"imported for, got {longest:g}"
+            )
         problem = problem.model_copy(update={"tether_length": longest})
     with until_interrupt(time_limit) as clock:
         return _staircase(problem, solver, clock, seed, on_step)
