@@ -224,7 +224,7 @@ def _where(problem: Problem) -> str:
     import numpy as np
 
     places = np.vstack([problem.points[:, :2], problem.representative_points.reshape(-1, 2)])
-    wide, high = np.ptp(places, axis=0)
+    wide, high = np.round(np.ptp(places, axis=0), 3) + 0.0
     said = f", clearance {problem.clearance:g} {problem.units}"
     said += f"; {wide:.3g} x {high:.3g} {problem.units}"
     if problem.origin is not None:
