@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
+from scipy.spatial import cKDTree
 
 from netsp.arrays import Floats, Ints
 from netsp.geometry.polygons import counterclockwise
@@ -78,7 +79,7 @@ def inset(problem: Problem, obstacle: Circle | Polygon, place: float, origin: Fl
     v = counterclockwise(np.array(obstacle.polygon) - origin)
     disks = np.column_stack([v, np.full(len(v), c)])
     if c <= NO_ROOM * place:
-        back = np.minimum(place, SHARE * room(v))
+        back = np.minimum(place, SHARE * room(v, place / SHARE))
         shape = shapely.Polygon(v + back[:, None] * _inward(v))
         if not shape.is_valid:  # needles of rounding: better too strict than blind
             shape = shapely.Polygon(v)
@@ -88,21 +89,41 @@ def inset(problem: Problem, obstacle: Circle | Polygon, place: float, origin: Fl
     by = min(place, SHARE * c)
     shape = shapely.Polygon(v).buffer(c - by, quad_segs=SIDES_AT_CORNER // 4)
     ring = shapely.get_coordinates(shape.exterior)[:-1]
-    away = np.hypot(ring[:, None, 0] - v[None, :, 0], ring[:, None, 1] - v[None, :, 1])
-    return Inset(shapely.Polygon(ring), ring, np.argmin(away, axis=1), disks, by)
+    return Inset(shapely.Polygon(ring), ring, _nearest(v, ring), disks, by)
 
 
-def room(v: Floats) -> Floats:
-    """(k,) at each corner of a polygon, how near its two edges come to any other part of it."""
+def _nearest(v: Floats, ring: Floats) -> Ints:
+    """Return for each point of a ring the nearest of some corners, the first of two as near."""
+    away, index = cKDTree(v).query(ring, k=2)
+    index = np.where((away[:, 0] == away[:, 1])[:, None], np.sort(index, axis=1), index)
+    return np.asarray(index[:, 0], dtype=np.int64)
+
+
+def room(v: Floats, limit: float) -> Floats:
+    """Return how near the two edges at each corner of a polygon come to any other part of it.
+
+    Parameters
+    ----------
+    v : ndarray, shape (k, 2)
+        Corners.
+    limit : float
+        Larger distances are infinite, so that not all pairs need be looked at.
+
+    Returns
+    -------
+    ndarray, shape (k,)
+        Distances.
+    """
     k = len(v)
-    w = np.roll(v, -1, axis=0)
-    edges = shapely.linestrings(np.stack([v, w], axis=1))
+    edges = shapely.linestrings(np.stack([v, np.roll(v, -1, axis=0)], axis=1))
     corners = shapely.points(v)
-    far = shapely.distance(edges[:, None], corners[None, :])
-    i = np.arange(k)
-    far[i, i] = far[i, (i + 1) % k] = np.inf  # the ends of an edge are its own
-    of_edge = far.min(axis=1)
-    of_corner = far.min(axis=0)
+    edge, corner = shapely.STRtree(corners).query(edges, predicate="dwithin", distance=limit)
+    other = (corner != edge) & (corner != (edge + 1) % k)  # the ends of an edge are its own
+    edge, corner = edge[other], corner[other]
+    far = shapely.distance(edges[edge], corners[corner])
+    of_edge, of_corner = np.full(k, np.inf), np.full(k, np.inf)
+    np.minimum.at(of_edge, edge, far)
+    np.minimum.at(of_corner, corner, far)
     return np.asarray(np.minimum(np.minimum(of_edge, np.roll(of_edge, 1)), of_corner))
 
 
