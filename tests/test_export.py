@@ -225,7 +225,8 @@ def test_bad_exports_are_named_and_nothing_is_written(options, message, tmp_path
     ("text", "message"),
     [
         ("[]", "expected a JSON object"),
-        ('{"type": "Feature"}', "expected a GeoJSON FeatureCollection"),
+        ('{"type": "Feature"}', "expected a feature with a geometry"),
+        ('{"type": "Topology"}', "expected a GeoJSON FeatureCollection, Feature or geometry"),
         ('{"type": "FeatureCollection", "features": [1]}', "features[0]: expected a feature"),
         (
             '{"type": "FeatureCollection", "features": [{"geometry": {"type": "Point", '
@@ -261,13 +262,12 @@ RING = [[12.0005, 55.0], [12.0007, 55.0], [12.0006, 55.0002], [12.0005, 55.0]]
 @pytest.mark.parametrize(
     ("feature", "message"),
     [
-        (shape("Polygon", []), "expected a polygon with an outer ring"),
         (shape("Polygon", None), "expected a polygon with an outer ring"),
         (shape("Polygon", [RING[:3]]), "expected a closed ring"),
         (shape("Polygon", [RING, RING]), "encloses nothing; expected a polygon with an area"),
         (shape("MultiPolygon", [[]]), "expected a polygon with an outer ring"),
         (shape("Polygon", [RING], kind="base"), "a base cannot be a Polygon"),
-        (shape("LineString", RING[:3], kind="obstacle"), "not closed; expected"),
+        (shape("LineString", RING[:3], kind="obstacle"), "1 open line .*; expected a width"),
         (shape("Point", [12, 55], kind="spaceship"), "got 'Point' of kind 'spaceship'"),
         (shape("Point", [float("nan"), 55]), "within 180 and 90 degrees"),
         ({**shape("Point", [12, 55]), "properties": [1]}, "expected an object"),
@@ -285,9 +285,14 @@ def test_repeated_corners_and_features_without_a_place_do_no_harm(tmp_path):
     site = tmp_path / "s.geojson"
     twice = [*RING[:2], RING[1], *RING[2:]]
     nowhere = {"type": "Feature", "properties": {}, "geometry": None}
-    site.write_text(json.dumps(collection(shape("Polygon", [twice]), nowhere)))
+    empty = shape("Polygon", [])
+    site.write_text(json.dumps(collection(shape("Polygon", [twice]), nowhere, empty)))
     problem = read_site(site, None)
     assert len(problem.obstacles[0].polygon) == 3
+    (layer,) = problem.site.imported
+    assert {g.reason: g.features for g in layer.left_out} == {
+        "has no geometry": 1, "has no coordinates": 1,
+    }  # fmt: skip
 
 
 def test_southern_and_western_places_can_be_typed(tmp_path, capsys):

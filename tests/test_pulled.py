@@ -107,5 +107,5 @@ def test_lengths_in_bulk_are_those_of_single_paths_and_unknown_words_have_none()
     alone = [paths.length(0, b, w) for b, w in zip([1, 2, 1, 2, 1], words, strict=True)]
     assert np.allclose(found, alone, rtol=1e-12)
     assert len(paths.lengths([], [], [])) == 0
-    with pytest.raises(NetspError, match="no taut path"):
+    with pytest.raises(NetspError, match="no obstacle for every letter"):
         paths.lengths([0], [1], [(3,)])

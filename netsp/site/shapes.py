@@ -152,7 +152,9 @@ def spurs_of(
     out = []
     for line in lines:
         rest = shapely.line_merge(shapely.difference(shapely.node(line), inside))
-        out += [s for s in getattr(rest, "geoms", [rest]) if s.length > tolerance]
+        parts = getattr(rest, "geoms", [rest])
+        # a whole ring is left where a hole of the same outline takes all: it is no wall
+        out += [s for s in parts if s.length > tolerance and not s.is_closed]
     return out
 
 
