@@ -1,8 +1,8 @@
 """Cross-sections of the solids that stand upright through a range of depths.
 
-A cross-section here is certain: it lies within the solid at every height of the range, and deeper
-than a given depth below its surface. A path or tether that enters solids by less than that depth
-stays outside of all cross-sections (docs/theory.md).
+A certain cross-section lies within the solid at every height of the range, and deeper below the
+surface of the solid than a given depth. A path or tether that enters solids by less than that depth
+stays outside of all certain cross-sections (docs/theory.md).
 """
 
 from __future__ import annotations
@@ -21,16 +21,17 @@ from netsp.problem import Circle, Polygon
 from netsp.space.prisms import wall_corners
 
 MAX_LEAN = 1e-3
-"""Largest tangent of the angle between the vertical and the axis of an upright solid. Depths that
-are measured across the axis and horizontally then differ by less than `ACROSS`."""
+"""Maximum tangent of the angle between the vertical and the axis of an upright solid. Depths
+measured across the axis and depths measured horizontally then differ by less than `LEAN_MARGIN`."""
 
-ACROSS = 1e-6
-"""Relative increase of a depth that covers the difference between across the axis and
-horizontally, which is the square of `MAX_LEAN`."""
+LEAN_MARGIN = 1e-6
+"""Relative increase of a depth; covers the difference between measuring across the axis and
+measuring horizontally, at most the square of `MAX_LEAN`."""
 
-SPARE = 2.0
-"""Height by which a solid must exceed the range, as a multiple of the depth. Within the range a
-point less deep than that is then near the side of the solid, not near its end."""
+MIN_EXCESS_RATIO = 2.0
+"""Minimum height by which a solid exceeds the range at both ends, as a multiple of the depth to
+which paths may enter solids. A point of the range that is less deep in the solid is then near the
+side of the solid, not near its end."""
 
 
 @dataclass(frozen=True)
@@ -154,7 +155,7 @@ def _section(
 ) -> tuple[bool, Circle | Polygon | None]:
     """Return whether a solid stands upright through a range, and its certain cross-section; None
     for a solid that is too thin."""
-    deep = dip * (1.0 + ACROSS)
+    deep = dip * (1.0 + LEAN_MARGIN)
     if kind == solids.POST:
         return True, _circle(row[:2], row[2] + offset - deep)
     if kind == solids.PRISM:
@@ -164,7 +165,7 @@ def _section(
         a = row[:3]
         b = a + row[7] * row[3:6] if kind == solids.CYLINDER else row[3:6]
         lean, radius = _lean(b - a), float(row[6])
-        spare = SPARE * dip + lean * radius
+        spare = MIN_EXCESS_RATIO * dip + lean * radius
         if lean > MAX_LEAN or not _spans((a[2], b[2]), depths, spare):
             return False, None
         middle = a + (depths.middle - a[2]) / (b[2] - a[2]) * (b - a)
@@ -193,9 +194,9 @@ def _box_section(
     lean = _lean(axes[up])
     if lean > MAX_LEAN:
         return False, None
-    # a turned box ends where its lowest corner of the upper face is
+    # a leaning box ends at the lowest corner of its upper face
     end = half[up] * abs(axes[up, 2]) - sum(half[k] * abs(axes[k, 2]) for k in sides)
-    if not _spans((centre[2] - end, centre[2] + end), depths, SPARE * dip):
+    if not _spans((centre[2] - end, centre[2] + end), depths, MIN_EXCESS_RATIO * dip):
         return False, None
     middle = centre[:2] + (depths.middle - centre[2]) / axes[up, 2] * axes[up, :2]
     across = np.linalg.inv(axes[sides, :2])

@@ -3,7 +3,7 @@
 The estimate of a leg is the straight distance, and more if a solid stands between its ends. The
 planner `predictive` drives the order in both directions (`netsp.space.given_order`). The lengths of
 the driven legs replace their estimates, and the next round begins. Each round takes about as long
-as driving one tour, which is far less than a search for states, and nothing is proven.
+as driving one tour, which is far less than a search for states. The tours have no proof.
 """
 
 from __future__ import annotations
@@ -90,7 +90,7 @@ def short_order_tour(
     best: Driven | None = None
     seen: set[tuple[int, ...]] = set()
     for _ in range(policy.max_rounds):
-        order = _order(estimates, places, Clock(policy.max_solve_s, within=clock), seed)
+        order = _shortest_order(estimates, places, Clock(policy.max_solve_s, within=clock), seed)
         if order is None or tuple(order) in seen:
             return best
         seen |= {tuple(order), tuple(order[::-1])}
@@ -101,24 +101,24 @@ def short_order_tour(
             driven = drive_order(water, [(int(n), int(c)) for n, c in _stops(places, there)], clock)
             if driven is None:
                 continue
-            _learn(estimates, places, there, driven)
+            _update_estimates(estimates, places, there, driven)
             if best is None or _rank(driven) < _rank(best):
                 best = driven
     return best
 
 
 def _rank(driven: Driven) -> tuple[int, float]:
-    """Return the key that puts the best tour first."""
+    """Return the sort key of a tour: more stops first, then the shorter tour."""
     return -len(driven.stops), driven.length
 
 
 def _stops(places: Places, order: list[int]) -> Ints:
-    """Return waypoint and choice (n, 2) of some places."""
+    """Return the waypoint and the choice of each place of an order, shape (n, 2)."""
     return np.column_stack([places.waypoint[order], places.choice[order]])
 
 
 def _estimates(water: Water, places: Places, clock: Clock, policy: OrderPolicy) -> Floats:
-    """Return the estimated lengths (n + 1, n + 1) of legs between the start, first, and places."""
+    """Return the estimated lengths (n + 1, n + 1) of legs; row 0 is the start, then places."""
     points = np.vstack([water.mission.start, places.points])
     lengths = np.linalg.norm(points[:, None] - points[None], axis=2)
     if len(points) > policy.max_sighted + 1:
@@ -132,7 +132,7 @@ def _estimates(water: Water, places: Places, clock: Clock, policy: OrderPolicy) 
     return np.asarray(lengths)
 
 
-def _order(estimates: Floats, places: Places, clock: Clock, seed: int) -> list[int] | None:
+def _shortest_order(estimates: Floats, places: Places, clock: Clock, seed: int) -> list[int] | None:
     """Return the places of the shortest tour by estimates; None if the time is up."""
     cluster = np.r_[0, 1 + places.waypoint]
     graph, first = TravelGraph.from_costs(estimates, cluster), 1
@@ -142,7 +142,7 @@ def _order(estimates: Floats, places: Places, clock: Clock, seed: int) -> list[i
     return None if result.tour is None else [v - 1 for v in result.tour[first:]]
 
 
-def _learn(estimates: Floats, places: Places, order: list[int], driven: Driven) -> None:
+def _update_estimates(estimates: Floats, places: Places, order: list[int], driven: Driven) -> None:
     """Replace the estimates of legs by the lengths that they were driven with."""
     place_of = {places.waypoint[n]: 1 + n for n in order}
     here = 0 if places.begin is None else 1 + places.begin
