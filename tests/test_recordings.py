@@ -125,7 +125,7 @@ def test_a_table_that_cannot_be_read_says_what_would_help(tmp_path, text, site, 
 def test_columns_that_are_not_understood_are_named(tmp_path):
     (tmp_path / "a.csv").write_text("t,x,y,battery,leak\n0,1,2,16.1,0\n1,1,3,16,0\n")
     _, _, notes = told(tmp_path / "a.csv")
-    assert any("columns left out: battery, leak" in note for note in notes)
+    assert any("unused columns: battery, leak" in note for note in notes)
     assert any("z is taken as 0" in note for note in notes)
 
 
@@ -291,7 +291,7 @@ def test_a_clock_that_begins_anew_near_zero_is_a_restart(begin, boot):
     notes = []
     fixes = drive(TIMES, lambda t: begin if t < 6.0 else boot - 6.0)
     reports = list(replayed(Guard(SITE, EXACT), fixes, notes.append))
-    assert "the vehicle started anew" in notes[0]
+    assert "the vehicle restarted" in notes[0]
     assert reports[-1].time == pytest.approx(TIMES[-1] + boot - 6.0)
     assert reports[-1].claims
 

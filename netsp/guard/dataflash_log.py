@@ -18,8 +18,11 @@ from netsp.link.messages import CONSTANT, HORIZONTAL, NO_GPS_FIX, NO_NUMBERS
 from netsp.link.modes import mode_name
 from netsp.models import shown
 
-MAX_SECONDS = MAX_METRES = 1e9
-"""Bounds on times (s), places (m) and velocities (m/s) of a log; numbers beyond are damage."""
+MAX_SECONDS = 1e9
+"""Bound on times of a log, s; messages with larger ones are damaged."""
+
+MAX_METRES = 1e9
+"""Bound on places (m) and velocities (m/s) of a log; messages with larger ones are damaged."""
 
 FILTERS = ("XKF", "NKF")
 """Families of filters: EKF3, and EKF2 of older vehicles."""
@@ -27,13 +30,14 @@ FILTERS = ("XKF", "NKF")
 KINDS = ("XKF1", "XKF4", "NKF1", "NKF4", "POS", "ARM", "MODE", "WINC")
 """Messages that are read."""
 
-UNUSED = "says nothing that the guard uses"
+UNUSED_REASON = "says nothing that the guard uses"
+"""Reason to leave out messages of other kinds."""
 
 
 def read_bin(
     file: Path, frame: Frame, tally: MessageTally, on_note: Callable[[str], None]
 ) -> list[Fix]:
-    """Read the estimates of the filter that the vehicle goes by, arming, modes and the winch.
+    """Read the estimates of the primary filter, arming, modes and the winch.
 
     Where the site has an origin and the log has POS with a GPS fix, the degrees of POS count;
     otherwise the metres of EKF3 (XKF1, XKF4), or of EKF2 in older vehicles, from the base.
@@ -68,7 +72,7 @@ def read_bin(
     try:
         for source in choices:
             own = MessageTally()
-            found = _of_log(messages, frame, source, own)
+            found = _fixes_of_log(messages, frame, source, own)
             if any(fix.position is not None for fix in found):
                 break
         else:
@@ -80,7 +84,7 @@ def read_bin(
     if frame.is_global and source != "POS":
         on_note(
             f"{where}: no POS with a GPS fix; {source}1 is taken as metres north, east and down of "
-            "the base, as with --frame local: true if the vehicle's estimate began there"
+            "the base, as with --frame local; right only if the vehicle's estimate began there"
         )
     tally.used.update(own.used)
     for reason, kinds in own.left_out.items():
@@ -88,7 +92,7 @@ def read_bin(
             tally.leave_out(kind, reason, n)
     for kind, n in counts.items():
         if kind not in KINDS:
-            tally.leave_out(kind, UNUSED, n)
+            tally.leave_out(kind, UNUSED_REASON, n)
     return found
 
 
@@ -136,8 +140,10 @@ def _messages(file: Path, where: str) -> tuple[list[Any], Counter[str]]:
     return messages, counts
 
 
-def _of_log(messages: Sequence[Any], frame: Frame, source: str, tally: MessageTally) -> list[Fix]:
-    """Return what messages say, with positions of POS or of a family of filters.
+def _fixes_of_log(
+    messages: Sequence[Any], frame: Frame, source: str, tally: MessageTally
+) -> list[Fix]:
+    """Return the fixes of messages, with positions of POS or of a family of filters.
 
     Of several filters that run beside each other the one that the vehicle goes by counts, if it is
     logged. Older vehicles log the first one only under these names, and do not number it.
@@ -159,7 +165,7 @@ def _of_log(messages: Sequence[Any], frame: Frame, source: str, tally: MessageTa
         if kind in (places, status) and getattr(m, "C", primary) != primary:
             tally.leave_out(kind, "of a filter that the vehicle does not go by")
             continue
-        fix = _of_message(m, kind, time, frame, source, places, status)
+        fix = _fix_of_message(m, kind, time, frame, source, places, status)
         if isinstance(fix, str):
             tally.leave_out(kind, fix)
         else:
@@ -168,14 +174,14 @@ def _of_log(messages: Sequence[Any], frame: Frame, source: str, tally: MessageTa
     return found
 
 
-def _of_message(
+def _fix_of_message(
     m: Any, kind: str, time: float, frame: Frame, source: str, places: str, status: str
 ) -> Fix | str:
-    """Return what a message says, or why it says nothing that counts."""
+    """Return the fix of a message, or the reason to leave it out."""
     if kind == places:
-        return _of_filter(m, time, frame, has_place=source != "POS")
+        return _fix_of_filter(m, time, frame, has_place=source != "POS")
     if kind == "POS":
-        return _of_pos(m, time, frame) if source == "POS" else _pos_unused(m, frame)
+        return _fix_of_pos(m, time, frame) if source == "POS" else _pos_unused(m, frame)
     if kind == status:
         # nav_filter_status: the first bits are those of EKF_STATUS_REPORT, but the one that says
         # there that nothing is known yet is here set for good once the vehicle has turned
@@ -191,7 +197,7 @@ def _of_message(
     return "of the other family of filters"
 
 
-def _of_filter(m: Any, time: float, frame: Frame, *, has_place: bool) -> Fix | str:
+def _fix_of_filter(m: Any, time: float, frame: Frame, *, has_place: bool) -> Fix | str:
     """Return place, velocity and heading of a filter; without the place where POS has it."""
     at, speeds = ([float(v) for v in some] for some in ((m.PN, m.PE, m.PD), (m.VN, m.VE, m.VD)))
     if has_place and not all(abs(v) < MAX_METRES for v in at):
@@ -204,7 +210,7 @@ def _of_filter(m: Any, time: float, frame: Frame, *, has_place: bool) -> Fix | s
     )  # fmt: skip
 
 
-def _of_pos(m: Any, time: float, frame: Frame) -> Fix | str:
+def _fix_of_pos(m: Any, time: float, frame: Frame) -> Fix | str:
     """Return the best place of all that the vehicle has, in degrees."""
     lat, lon = float(m.Lat), float(m.Lng)
     if lat == 0.0 and lon == 0.0:

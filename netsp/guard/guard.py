@@ -396,7 +396,7 @@ class Guard:
         ]  # fmt: skip
 
     def _never_placed(self) -> list[Alarm]:
-        """Return why nothing was ever claimed; silence is no reason for a while yet."""
+        """Return the alarm that nothing was ever claimed; silence counts after `GAP` seconds."""
         assert self._heard_since is not None
         silent = self._seen - self._heard_since
         if self._vouched is False:

@@ -142,14 +142,14 @@ def watch(
 
 
 class _Hints:
-    """Options that would help while no position is understood, each told once."""
+    """Hints at options that help while no position is understood; each is given once."""
 
     def __init__(self) -> None:
         self._has_position = False
         self._told: set[str] = set()
 
     def about(self, message: Any, fix: Fix | None, listener: Listener) -> Iterator[str]:
-        """Yield what helps with a message that tells a position and is not understood."""
+        """Yield the hint for a position message that is not understood."""
         self._has_position = self._has_position or (fix is not None and fix.position is not None)
         if self._has_position or fix is not None or message.get_type() not in POSITIONS:
             return
@@ -157,8 +157,8 @@ class _Hints:
         if message.get_srcSystem() != listener.system:
             if message.get_srcComponent() == AUTOPILOT and listener.heard:
                 line = (
-                    f"system {message.get_srcSystem()} tells positions, and system "
-                    f"{listener.system} none yet: expected --system {message.get_srcSystem()}?"
+                    f"system {message.get_srcSystem()} sends positions, system {listener.system} "
+                    f"none yet; follow the other one with --system {message.get_srcSystem()}"
                 )
         elif listener.left_out == NO_GPS_FIX:
             line = f"GLOBAL_POSITION_INT: {NO_GPS_FIX}; read metres with --frame local"

@@ -60,12 +60,12 @@ class MessageTally:
 
     @property
     def total(self) -> int:
-        """Number of all messages."""
+        """Return the number of all messages."""
         return sum(self.used.values()) + sum(sum(c.values()) for c in self.left_out.values())
 
     @property
     def notes(self) -> list[str]:
-        """One line for each reason for which messages are left out."""
+        """Return one line for each reason for which messages are left out."""
         lines = []
         for reason, kinds in self.left_out.items():
             named = [f"{n:,} {kind}" for kind, n in kinds.most_common(MAX_KINDS)]

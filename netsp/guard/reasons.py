@@ -81,7 +81,7 @@ def estimate_lost(seconds: float, why: str) -> Alarm:
 def never_claimed(why: str, seconds: float) -> Alarm:
     """Return the alarm that nothing was claimed since the vehicle was first heard."""
     ago = f", {seconds:.0f} s ago" if seconds >= 1.0 else ""
-    text = f"{why} since it was first heard{ago}: nothing is claimed about the tether"
+    text = f"{why} since the vehicle was first heard{ago}: nothing is claimed about the tether"
     return Alarm("estimate", Level.ALARM, text, is_immediate=True)
 
 

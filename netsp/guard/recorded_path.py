@@ -41,7 +41,7 @@ def read_any_paths(
     frame : str, optional
         Frame of recordings and GeoJSON: "local" or "global".
     system : int, optional
-        System id of the vehicle in a telemetry log; by default the first heard.
+        System id of the vehicle in a telemetry log; by default the only one with positions.
     noise : float
         Largest distance of a point that is left out from the simplified path (Douglas & Peucker
         1973), in the problem's units. Noise of the positions would lengthen the path.
@@ -86,7 +86,7 @@ def _flight(file: str | Path, frame: Frame, system: int | None) -> FoundPath:
         raise InputError(f"{file}: expected a recording with two positions or more that differ")
     times, is_late = _lasting_times(fixes)
     if is_late.any():
-        notes.append(f"{file}: {int(is_late.sum())} left out: their times are behind the others")
+        notes.append(f"{file}: {int(is_late.sum())} positions left out: their times go back")
     points, times = points[~is_late], times[~is_late]
     order = np.argsort(times, kind="stable")
     told = tuple(note.removeprefix("--replay: ") for note in notes)

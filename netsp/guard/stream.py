@@ -15,7 +15,7 @@ PERIOD_S = 0.095
 """Between two updates: vehicles tell where they are 10, 25 or 50 times a second."""
 
 SILENT_S = 0.5
-"""Seconds without a position after which that itself is reported, and how often."""
+"""Seconds without a position after which silence is reported, and period of these reports."""
 
 
 class Stream:
@@ -26,7 +26,7 @@ class Stream:
     guard : Guard
         That is told.
     policy : ClockPolicy, optional
-        Rule by which a clock that was set is told from a vehicle that started anew.
+        Rule that tells a clock that was set from a vehicle that restarted.
     on_note : callable, optional
         Called with a line of text when the vehicle's clock goes back.
     """
@@ -57,7 +57,7 @@ class Stream:
         if reading.event == "late":
             return None
         if reading.event is not None:
-            self._say(fix.time, reading)
+            self._note_clock(fix.time, reading)
         fix = replace(fix, time=reading.time)
         before = self._gathered
         if before is not None:
@@ -73,10 +73,12 @@ class Stream:
         if not urgent and not restarted and (fix.time < due or self._is_first(fix)):
             return None
         self._gathered, self._due = None, fix.time + PERIOD_S
-        return self._told(self.guard.restarted(fix) if restarted else self.guard.take(fix))
+        return self._by_vehicle_clock(
+            self.guard.restarted(fix) if restarted else self.guard.take(fix)
+        )
 
     def _is_first(self, fix: Fix) -> bool:
-        """Whether a fix without a position is the first of all: it begins the silence."""
+        """Return whether a fix without a position is the first of all, and begin the silence."""
         if fix.position is not None or self._due > float("-inf"):
             return False
         self._due = fix.time
@@ -95,16 +97,16 @@ class Stream:
         Report
             As it is now.
         """
-        return self._told(self.guard.wait(now + self.clock.offset))
+        return self._by_vehicle_clock(self.guard.wait(now + self.clock.offset))
 
-    def _told(self, report: Report) -> Report:
-        """Return a report by the vehicle's own clock."""
+    def _by_vehicle_clock(self, report: Report) -> Report:
+        """Return a report with the time of the vehicle's own clock."""
         offset = self.clock.offset
         return replace(report, time=report.time - offset) if offset else report
 
-    def _say(self, time: float, reading: ClockReading) -> None:
+    def _note_clock(self, time: float, reading: ClockReading) -> None:
         if self.on_note is not None:
-            what = "the vehicle started anew" if reading.event == "restart" else "the clock was set"
+            what = "the vehicle restarted" if reading.event == "restart" else "the clock was set"
             self.on_note(f"{what}: its time went back by {reading.step:.4g} s to {time:.10g} s")
 
 

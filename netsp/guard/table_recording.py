@@ -19,17 +19,17 @@ from netsp.site.time_stamps import MAX_SECONDS, NO_VALUES, unit_of_time
 TRUTH = {"1": True, "true": True, "yes": True, "0": False, "false": False, "no": False}
 
 MAX_METRES = 1e9
-"""Bound on places, lengths and velocities of a table, m or m/s: numbers beyond are damage."""
+"""Bound on places, lengths (m) and velocities (m/s) of a table; larger numbers are refused."""
 
-PLANS: tuple[tuple[Quantity, Quantity], ...] = (
+POSITION_PAIRS: tuple[tuple[Quantity, Quantity], ...] = (
     ("x", "y"), ("north", "east"), ("latitude", "longitude"),
 )  # fmt: skip
-"""Pairs of quantities that are a place in the plan; the first that a table has counts."""
+"""Pairs of quantities that give a position in the plan; the first pair in the table counts."""
 
-SAID: tuple[Quantity, ...] = (
+EXTRA_QUANTITIES: tuple[Quantity, ...] = (
     "velocity_x", "velocity_y", "velocity_z", "heading", "armed", "mode", "estimate", "paid_out",
 )  # fmt: skip
-"""Quantities besides the place that a row may tell."""
+"""Quantities besides the position that a row may have."""
 
 
 def read_recording(
@@ -81,7 +81,7 @@ class _Rows:
         self.table, self.frame = table, frame
         self.where = table.source
         self.on_note = on_note
-        plan, up = table.pair(PLANS), table.height()
+        plan, up = table.pair(POSITION_PAIRS), table.height()
         if plan is None or "time" not in table or (up is None and not frame.is_of_plane):
             raise table.wanted(
                 "columns t, x, y, z (or t, north, east, down; or t, lat, lon, altitude or depth)"
@@ -95,9 +95,9 @@ class _Rows:
                 + ("--frame local asks for metres; expected --frame global" if frame.has_origin
                    else "the site has no origin; expected a problem with an origin")
             )  # fmt: skip
-        unused = table.left_out(("time", *plan, *SAID, *((up,) if up else ())))
+        unused = table.left_out(("time", *plan, *EXTRA_QUANTITIES, *((up,) if up else ())))
         if unused:
-            self._note(f"columns left out: {', '.join(unused)[:200]}")
+            self._note(f"unused columns: {', '.join(unused)[:200]}")
         self.scale: float | None = None
         meaning = table.columns["time"][1]
         if meaning.unit or meaning.factor != 1.0:
@@ -123,7 +123,7 @@ class _Rows:
             raise InputError(
                 f"{self._at(k)}: {self.table.title('time')}: expected seconds, got nothing"
             )
-        v, w, u = (self._number(k, q) for q in SAID[:3])
+        v, w, u = (self._number(k, q) for q in EXTRA_QUANTITIES[:3])
         velocity = None
         if v is not None and w is not None:
             there = (v, w, u or 0.0)

@@ -16,8 +16,8 @@ from netsp.link.dialect import dialect, parser
 from netsp.link.frame import Frame
 from netsp.link.messages import AUTOPILOT, POSITIONS, Listener
 
-MAX_PACKET = 300
-"""Bytes of a MAVLink message, at most."""
+MAX_PACKET_BYTES = 300
+"""Maximum length of a MAVLink message, bytes."""
 
 
 def read_tlog(
@@ -60,8 +60,8 @@ def read_tlog(
         if fallback.has_positions:
             on_note(
                 f"{where}: no GLOBAL_POSITION_INT with a GPS fix; LOCAL_POSITION_NED is taken as "
-                "metres north, east and down of the base, as with --frame local: true if the "
-                "vehicle's estimate began there"
+                "metres north, east and down of the base, as with --frame local; right only if "
+                "the vehicle's estimate began there"
             )
             heard, vehicle = other, fallback
     heard.count(vehicle, tally)
@@ -71,7 +71,7 @@ def read_tlog(
 
 
 def messages_of(data: bytes) -> Iterator[Any]:
-    """Yield the messages of a log; what belongs to none is passed over.
+    """Yield the messages of a log; bytes that belong to no message are skipped.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def messages_of(data: bytes) -> Iterator[Any]:
     while at + 8 < len(data):
         reads = parser()
         message = None
-        for k in range(at + 8, min(len(data), at + 8 + MAX_PACKET)):
+        for k in range(at + 8, min(len(data), at + 8 + MAX_PACKET_BYTES)):
             try:
                 message = reads.parse_char(data[k : k + 1])
             except (error, struct.error, ValueError):
@@ -96,7 +96,7 @@ def messages_of(data: bytes) -> Iterator[Any]:
             if message is not None:
                 break
         if message is None or message.get_type() == "BAD_DATA":
-            at += 1  # something is missing: on to where messages begin again
+            at += 1  # damaged: look for the next message
             continue
         at = k + 1
         yield message
