@@ -1,7 +1,7 @@
-"""Columns, axes and units: what a table's column, a coordinate system's axis or a unit means.
+"""Meaning of columns of tables, axes of coordinate systems, and units.
 
-Readers of goals, paths, clouds, recordings, grids and maps ask this module, so that a depth counts
-downwards and a foot is a foot in all of them.
+All readers of goals, paths, clouds, recordings, grids and maps use this module, so that a depth
+counts downwards and a foot is a foot in each of them.
 """
 
 from __future__ import annotations
@@ -71,8 +71,8 @@ Quantity = Literal[
     "estimate", "paid_out", "classification", "withheld",
 ]  # fmt: skip
 """Quantities that a column can hold. `east` and `north` count from a place such as home, `easting`
-and `northing` are coordinates of a map; `altitude` may count from the sea floor, so `z` goes before
-it."""
+and `northing` are coordinates of a map. A column `z` is preferred to `altitude`, which may count
+from the sea floor."""
 
 MAP_PAIRS: tuple[tuple[Quantity, Quantity], ...] = (
     ("x", "y"), ("easting", "northing"), ("east", "north"),
@@ -133,19 +133,19 @@ _TEXTS = {"name", "identifier", "mode", "armed", "estimate", "withheld"}
 _PLACES = {
     "x", "y", "z", "east", "north", "easting", "northing", "altitude", "latitude", "longitude",
 }  # fmt: skip
-"""Quantities of which an unknown unit is refused; other columns with one are not used."""
+"""Quantities whose unknown units are refused. Other columns with an unknown unit are not used."""
 
 _DIRECTIONS = {"up": 1.0, "down": -1.0, "positive up": 1.0, "positive down": -1.0}
-"""Sign that a word after the name of a height gives its values."""
+"""Sign of the values of a height column, by the word after its name."""
 
 _REFERENCES = {
     "utc", "gmt", "iso", "iso8601", "iso 8601", "unix", "epoch", "gps", "utm", "wgs84", "wgs 84",
     "etrs89", "msl", "cd", "chart datum", "mllw", "navd88", "nap", "nn", "nhn",
 }  # fmt: skip
-"""Clocks, systems and datums that stand in brackets where others write a unit."""
+"""Clocks, systems and datums that may stand in brackets in place of a unit."""
 
 NOISE_CLASSES = {7: "low noise", 18: "high noise"}
-"""Classes of points that are no surface (ASPRS LAS 1.4 R15, tables 9 and 17)."""
+"""Classes of points that belong to no surface (ASPRS LAS 1.4 R15, tables 9 and 17)."""
 
 SAMPLE_LINES = 1000
 """Lines of a table that decide its separator and its decimal sign; later lines must agree."""
@@ -229,7 +229,10 @@ def column(name: str) -> Column | None:
             if not unit or unit in _REFERENCES:
                 return Column(quantity, names[stem])
             if quantity in _PLACES:
-                raise InputError(f"column {shown(name)}: unit {shown(unit)} is not known")
+                known = ", ".join(UNITS)
+                raise InputError(
+                    f"column {shown(name)}: expected a unit of {known}, got {shown(unit)}"
+                )
     return None
 
 
@@ -730,7 +733,7 @@ def _by_position(
 def _decimal_commas(
     rows: Sequence[Sequence[str]], lines: Sequence[int], used: Sequence[int], source: str
 ) -> bool:
-    """Tell whether numbers are written with decimal commas; refuse a mixture."""
+    """Return whether numbers are written with decimal commas; refuse a mixture."""
     comma = point = -1
     for k, cells in enumerate(rows):
         for j in used:
@@ -793,10 +796,10 @@ class HeightAxis:
 
     @property
     def change(self) -> str:
-        """What becomes of heights along it, in words; empty for metres upwards."""
+        """Return the note on converted heights; empty for heights in metres upwards."""
         parts = ["count downwards"] if self.sign < 0.0 else []
         parts += [f"are in units of {self.metres:.7g} m"] if self.metres != 1.0 else []
-        return f"heights {' and '.join(parts)}: metres upwards here" if parts else ""
+        return f"heights {' and '.join(parts)}: converted to metres upwards" if parts else ""
 
 
 def height_axis(crs: Any) -> HeightAxis:
@@ -810,8 +813,8 @@ def height_axis(crs: Any) -> HeightAxis:
     Returns
     -------
     HeightAxis
-        That of the vertical system. A projected system without one measures heights in the unit of
-        its map, and one in degrees in metres.
+        Axis of the vertical system. Without a vertical system, heights count upwards, in the unit
+        of a projected map, or in metres for a system in degrees.
 
     Raises
     ------

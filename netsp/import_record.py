@@ -11,7 +11,7 @@ from netsp.fields import Name, Number, Positive
 from netsp.models import Model
 
 UsedAs = Literal["base", "candidate", "goal", "obstacle", "bounds", "path", "floor"]
-"""Kinds that a feature of a map can be used as."""
+"""Kinds of use of a feature of a map."""
 
 MAX_NAMED = 5
 """Features of a group that a note names; the file counts all of them."""
@@ -28,7 +28,7 @@ class OmittedFeatures(Model):
 
 
 class LayerRecord(Model):
-    """What became of the features of one layer.
+    """Record of what became of the features of one layer.
 
     Raises
     ------
@@ -60,7 +60,7 @@ class LayerRecord(Model):
 class CropCircle(Model):
     """Circle outside of which an import left obstacles out.
 
-    No tether of the length given at the import leaves it, so the problem holds for no longer one.
+    The tether of the import cannot leave the circle. The problem does not hold for a longer tether.
     """
 
     center: Annotated[
@@ -70,7 +70,7 @@ class CropCircle(Model):
 
 
 class Site(Model):
-    """Where a problem comes from, and what became of every feature of the map.
+    """Source of a problem, and record of what became of every feature of the map.
 
     Examples
     --------
@@ -88,7 +88,7 @@ class Site(Model):
 
     @property
     def notes(self) -> list[str]:
-        """One line for each layer and reason for which features were left out."""
+        """Return one line for each layer and reason for which features were left out."""
         lines = []
         for layer in self.imported:
             name = f"layer {layer.layer!r}: " if layer.layer else ""

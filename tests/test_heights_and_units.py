@@ -391,7 +391,7 @@ def test_a_cloud_stands_beside_a_mesh_and_a_floor(tmp_path, capsys):
     field = Scene.load(tmp_path / "s.json").field()
     at = np.array([(4, 6, -4), (4, 6, -2), (10, 6, -6), (10, 6, -3), (2, 2, -7)], dtype=float)
     assert field.distance(at) == pytest.approx([-1.0, 1.0, -1.0, 1.0, 1.0], abs=0.3)
-    assert any("columns that are not used: id" in note for note in field.notes)
+    assert any("unused columns: id" in note for note in field.notes)
 
 
 @pytest.mark.parametrize(("units", "plain"), [(None, -4.0), ("ft", -4.0 * 0.3048)])

@@ -202,7 +202,7 @@ class _Told:
 
     @property
     def reason(self) -> str:
-        """Why nothing was claimed, as the last alarm has it."""
+        """Return why nothing was claimed, as in the last alarm."""
         estimates = [a["text"] for a in self._raised if a["kind"] == "estimate"]
         if not estimates:
             return "no position was heard"

@@ -87,8 +87,8 @@ def arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument(
         "--of", action="append", type=option, default=[], metavar="WORD=VALUE",
         help="inspect these obstacles only: layer=NAME, name=NAME (with * and ?), "
-        "box=XMIN,YMIN,XMAX,YMAX (m), earth=SOUTH,WEST,NORTH,EAST (degrees); one of each word "
-        "must fit",
+        "box=XMIN,YMIN,XMAX,YMAX (m), earth=SOUTH,WEST,NORTH,EAST (degrees); repeat a word for "
+        "alternatives, different words must all match",
     )  # fmt: skip
     p.add_argument(
         "--depths", default="0", metavar="D[,D…]", help="depths (m) of those goals; default 0"
@@ -106,8 +106,8 @@ def arguments(p: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     p.add_argument(
         "--candidates", metavar="TABLE",
-        help="places where the base may stand (columns as of --goals): a cropped map holds the "
-        "reach from each",
+        help="places where the base may stand (columns as for --goals); a cropped map keeps the "
+        "reach from each of them",
     )  # fmt: skip
     charts = p.add_argument_group("charts")
     charts.add_argument(
@@ -192,12 +192,13 @@ def run(args: argparse.Namespace) -> int:
                 messages.note(f"{line}: left out")
         elif why:
             messages.note(f"{args.site}: {unreached_note(before, problem.goals)}")
-    print(f"{problem.name}: {problem.summary}{_where(problem)}", file=sys.stderr)
+    print(f"{problem.name}: {problem.summary}{_extent(problem)}", file=sys.stderr)
     above = [problem.goal_name(k) for k, g in enumerate(problem.goals) if g.position[2] > 0.0]
     if above:
         messages.warning(
             f"{counted(len(above), 'goal')} above the water ({', '.join(above[:3])}"
-            f"{', …' if len(above) > 3 else ''}): depths count downwards, heights z upwards"
+            f"{', …' if len(above) > 3 else ''}): give depths as positive numbers, "
+            "or z as negative ones"
         )
     if args.output is None:
         sys.stdout.write(problem.to_json())
@@ -219,8 +220,8 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _where(problem: Problem) -> str:
-    """Clearance, extent and place on the earth: what a slip in the map shows in."""
+def _extent(problem: Problem) -> str:
+    """Return clearance, extent and place on the earth in words, which show slips in the map."""
     import numpy as np
 
     places = np.vstack([problem.points[:, :2], problem.representative_points.reshape(-1, 2)])
@@ -235,7 +236,7 @@ def _where(problem: Problem) -> str:
 
 
 def _is_image(args: argparse.Namespace) -> bool:
-    """Whether the site is an occupancy image; what goes with the other kind is refused."""
+    """Return whether the site is an occupancy image; refuse options of the other kind."""
     from netsp.site.occupancy import FILES, IMAGES
 
     image: bool = args.site.lower().endswith((*FILES, *IMAGES))
@@ -312,7 +313,7 @@ def _of_map(args: argparse.Namespace) -> ImportedSite:
 
 
 def _looking(args: argparse.Namespace) -> Looking | None:
-    """How obstacles are looked at, where that is asked for."""
+    """Return how to inspect obstacles; None without --inspect."""
     from netsp.site.options import Looking
     from netsp.site.selection import Selection
 

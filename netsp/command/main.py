@@ -38,15 +38,15 @@ def main(argv: Sequence[str] | None = None) -> int:
     return code
 
 
-LEAVE_S = 0.5
-"""Seconds that abandoned work gets to end by itself, and to end the processes that it started."""
+ABANDONED_GRACE_S = 0.5
+"""Seconds for abandoned work to end by itself, and to end the processes that it started."""
 
 
 def _end_abandoned_work(code: int) -> None:
     """End the process at once if work that was abandoned still runs in another language: Python
     would end its thread in the middle of it, which aborts the process."""
     clock = sys.modules.get("netsp.clock")
-    if clock is None or not clock.abandoned_work_goes_on(LEAVE_S):
+    if clock is None or not clock.abandoned_work_goes_on(ABANDONED_GRACE_S):
         return
     with contextlib.suppress(OSError, ValueError):
         sys.stdout.flush()

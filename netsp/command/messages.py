@@ -1,4 +1,4 @@
-"""What commands say on standard error besides progress: an error ends them, a warning does not."""
+"""Errors, warnings and notes of commands on standard error; only an error ends a command."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from netsp.errors import LeftOutWarning
 
 
 def error(text: str) -> None:
-    """In one line."""
+    """Print an error in one line."""
     print(f"netsp: {text}", file=sys.stderr)
 
 
 def warning(text: str) -> None:
-    """Of what may go wrong with what was asked."""
+    """Print a warning of what may go wrong."""
     print(f"netsp: warning: {text}", file=sys.stderr)
 
 
 def note(text: str) -> None:
-    """Of what was assumed or done that was not asked."""
+    """Print a note of what was assumed, or done without being asked for."""
     print(f"netsp: note: {text}", file=sys.stderr)
 
 
 @contextlib.contextmanager
 def warnings_in_one_line() -> Iterator[None]:
-    """Print each warning of something left out as a command says it, once."""
+    """Print each `LeftOutWarning` once, in one line."""
     said: set[str] = set()
     with warnings.catch_warnings():
         warnings.simplefilter("always", LeftOutWarning)

@@ -109,7 +109,7 @@ class Unread:
 
 @dataclass(frozen=True)
 class Change:
-    """What was assumed of a feature, or changed in it.
+    """Assumption about a feature, or change of it.
 
     Attributes
     ----------
@@ -118,7 +118,7 @@ class Change:
     layer
         Its layer.
     text
-        The change, as "a ring is not closed: closed by its first corner".
+        Text of the note, as "a ring is not closed: closed by its first corner".
     """
 
     where: str

@@ -49,7 +49,7 @@ class Ledger:
         self._shapes.pop(feature.where, None)
 
     def leave_out(self, feature: Feature | Unread, reason: str) -> None:
-        """Note that a feature is left out; that outweighs an earlier use.
+        """Note that a feature is left out; this replaces an earlier use.
 
         Parameters
         ----------
@@ -65,7 +65,7 @@ class Ledger:
             self._shapes[feature.where] = feature.shape
 
     def add_layer(self, layer: str, size: int) -> str:
-        """Add a table that was given besides the map, and return what its layer is called.
+        """Add a table that was given besides the map, and return the name of its layer.
 
         Parameters
         ----------
@@ -77,7 +77,7 @@ class Ledger:
         Returns
         -------
         str
-            The name, with a number where a layer has it already.
+            Name of the layer, with a number if another layer has the same name.
         """
         number = 1
         name = layer
@@ -98,7 +98,7 @@ class Ledger:
         Returns
         -------
         bool
-            False for one that is used, or of which nothing is noted.
+            False for a feature that is used, or that has no entry yet.
         """
         return feature.where in self._reason
 

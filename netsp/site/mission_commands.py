@@ -340,7 +340,7 @@ def add_circle(
     turn = [2.0 * math.pi * k / CIRCLE_CORNERS for k in range(CIRCLE_CORNERS)]
     ring = [(radius * math.cos(a), radius * math.sin(a)) for a in turn]
     places = Projection(center[1], center[0]).to_earth(ring)[:, ::-1]
-    out.notes.append(f"{where}: the round fence is taken as {CIRCLE_CORNERS} corners on its circle")
+    out.notes.append(f"{where}: the round fence becomes a polygon of {CIRCLE_CORNERS} corners")
     out.features.append(Feature(where, FENCE, "", {"kind": "bounds"}, shapely.Polygon(places)))
 
 

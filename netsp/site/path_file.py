@@ -197,7 +197,7 @@ def _of_table(file: str | Path, problem: Problem, stem: str) -> FoundPath:
 
 
 def _is_gap(table: Table, row: int, quantities: list[Quantity], *, is_global: bool) -> bool:
-    """Whether a row has no position: a cell without a value, or degrees without a GPS fix."""
+    """Return whether a row has no position: an empty cell, or degrees without a GPS fix."""
     cells = [table.plain(row, name) for name in quantities]
     if any(cell.lower() in NO_VALUES for cell in cells):
         return True

@@ -453,8 +453,8 @@ class _Site:
             away = float(np.hypot(there.x - x, there.y - y))
             if away > BASE_OFF:
                 self.notes.append(
-                    f"{own.where}: the base is where --base says, {_metres(away)} away; the file's "
-                    "own gives its properties only"
+                    f"{own.where}: the base is where --base says, {_metres(away)} away; only the "
+                    "properties of the file's base are used"
                 )
         return (x, y, z), own
 
@@ -462,7 +462,7 @@ class _Site:
 
     @property
     def _unit(self) -> float:
-        """Metres of a unit of the file: the user's word outweighs the file's."""
+        """Return the metres per unit of the file; the unit in the options overrides the file's."""
         return UNITS[self.said.units or self.map.unit or "m"]
 
     def _plane(self, shape: shapely.Geometry) -> Any:
@@ -702,7 +702,7 @@ class _Site:
 
     @property
     def _beyond_reach(self) -> str:
-        """Reason to leave out what lies beyond the window."""
+        """Return the reason to leave out features beyond the window."""
         assert self.window is not None
         about = "the base and the candidates" if self.said.candidates is not None else "the base"
         return f"beyond the reach of the tether ({_metres(self.window.radius)} about {about})"
@@ -838,7 +838,7 @@ class _Site:
         self, goals: list[dict[str, Any]], obstacles: list[dict[str, Any]], anchor: Any,
         tether: float | None, clearance: float,
     ) -> list[dict[str, Any]]:  # fmt: skip
-        """Return the viewpoints with room for the robot; the others are told by layer and cause."""
+        """Return the viewpoints with room for the robot; note the others by layer and cause."""
         if not goals:
             return goals
         places = np.array([g["position"] for g in goals])

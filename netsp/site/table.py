@@ -28,7 +28,7 @@ def from_table(
     projection : Projection, optional
         Projection of latitudes and longitudes into the plane.
     on_note : callable, optional
-        Called with one line each for decimal commas and for columns that are not used.
+        Called with one line each for decimal commas and for unused columns.
 
     Returns
     -------
@@ -64,5 +64,5 @@ def from_table(
     if on_note is not None and table.has_decimal_commas:
         on_note(f"{file}: numbers are read with decimal commas")
     if on_note is not None and (unused := table.left_out([*used, label])):
-        on_note(f"{file}: columns that are not used: {', '.join(unused)}")
+        on_note(f"{file}: unused columns: {', '.join(unused)}")
     return places, [table.text(k, label) or None for k in range(len(table.rows))]

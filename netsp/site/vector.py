@@ -263,7 +263,7 @@ def _row_count(file: str | Path, layer: str) -> int:
 
 
 class _Found:
-    """What has been found in a file so far."""
+    """Features, notes and complaints found in a file so far."""
 
     def __init__(self, file: str | Path) -> None:
         self.file = file

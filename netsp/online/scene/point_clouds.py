@@ -91,7 +91,7 @@ def read_text_cloud(path: str | Path) -> PointCloud:
     kept, left_out = _surface(_classes(table), _withheld(table), len(points))
     notes += left_out
     if unused := table.left_out((*used, "classification", "withheld")):
-        notes.append(f"columns that are not used: {', '.join(unused)}")
+        notes.append(f"unused columns: {', '.join(unused)}")
     return PointCloud(points[kept], notes=tuple(notes))
 
 
@@ -177,7 +177,7 @@ def read_las(path: str | Path) -> PointCloud:
     elif keys.get(_MODEL, 0) == 2:
         raise InputError(f"{path}: in degrees; expected a cloud in metres, such as UTM")
     elif keys or any(v.record_id == _WKT for v in data.header.vlrs):
-        notes.append("its coordinate system is not known here: taken as metres, z upwards")
+        notes.append("coordinate system unknown: read as metres, z upwards")
     if not heights.is_stated and 1024 <= keys.get(_VERTICAL, 0) < 32767:
         heights = height_axis(f"EPSG:{keys[_VERTICAL]}")
     unit = 1.0 if unit is None else unit
