@@ -1,5 +1,6 @@
 """Every feature of every input is used or left out for a reason: used + left out = all."""
 
+import itertools
 import json
 
 import numpy as np
@@ -227,3 +228,31 @@ def test_a_cropped_problem_refuses_a_tether_that_leaves_its_part_of_the_map(tmp_
     data = json.loads(found.problem.to_json())
     with pytest.raises(InputError, match="reaches beyond the part of the map that was imported"):
         Problem.from_json(json.dumps({**data, "tether_length": 64.0}))
+
+
+def feature(geometry, **properties):
+    return {"type": "Feature", "geometry": geometry, "properties": properties}
+
+
+def sides(corners, **properties):
+    """Return the sides of a square as features, each with a name of its own."""
+    return [
+        feature({"type": "LineString", "coordinates": [a, b]}, name=f"N{n}", **properties)
+        for n, (a, b) in enumerate(itertools.pairwise(corners))
+    ]
+
+
+@pytest.mark.parametrize("is_joined", [True, False])
+def test_points_keep_their_heights_beside_points_without(tmp_path):
+    both = {"type": "MultiPoint", "coordinates": [[*at(0), -3.0], at(1)]}
+    found = import_site(geojson(tmp_path, [feature(both)]), options=SiteOptions(tether=60.0))
+    assert [goal.position[2] for goal in found.problem.goals] == [0.0, -3.0, 0.0]
+
+
+def test_an_empty_part_of_a_collection_takes_no_other_part_with_it(tmp_path):
+    parts = [{"type": "Point", "coordinates": []}, GEOMETRIES["polygon"](0)]
+    mixed = feature({"type": "GeometryCollection", "geometries": parts})
+    found = import_site(geojson(tmp_path, [mixed]), options=SiteOptions(tether=60.0))
+    assert len(found.problem.obstacles) == 1
+    (layer,) = found.problem.site.imported
+    assert layer.left_out[0].first == ("features[2].geometries[0]",)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -61,7 +62,8 @@ def read_geojson(file: str | Path, crs: str | None) -> Map:
     for k, feature in enumerate(features):
         where = f"features[{k}]"
         try:
-            found += _feature(feature, where, degrees=crs is None)
+            for part in _feature(feature, where, degrees=crs is None):
+                (unread if isinstance(part, Unread) else found).append(part)  # type: ignore[arg-type]
         except _NowhereError as error:
             unread.append(Unread(where, "", str(error)))
         except InputError as error:
@@ -93,8 +95,8 @@ def _is_wgs84(crs: Any) -> bool:
     return "CRS84" in text or "4326" in text
 
 
-def _feature(data: Any, where: str, *, degrees: bool) -> list[Feature]:
-    """Return a feature, or one for each part of a GeometryCollection."""
+def _feature(data: Any, where: str, *, degrees: bool) -> list[Feature | Unread]:
+    """Return a feature, or one for each part of a GeometryCollection; empty parts are unread."""
     if not isinstance(data, dict) or "geometry" not in data:
         raise InputError(f"{where}: expected a feature with a geometry")
     geometry, properties = data["geometry"], data.get("properties") or {}
@@ -108,10 +110,15 @@ def _feature(data: Any, where: str, *, degrees: bool) -> list[Feature]:
     parts = list(_parts(geometry, where))
     if not parts:
         raise _NowhereError("is an empty collection of geometries")
-    return [
-        Feature(place, "", named, properties, _shape(part, place, degrees=degrees))
-        for place, part in parts
-    ]
+    out: list[Feature | Unread] = []
+    for place, part in parts:
+        try:
+            shape = _shape(part, place, degrees=degrees)
+        except _NowhereError as error:
+            out.append(Unread(place, "", str(error)))
+        else:
+            out.append(Feature(place, "", named, properties, shape))
+    return out
 
 
 def _parts(geometry: dict[str, Any], where: str, depth: int = 0) -> Iterator[tuple[str, Any]]:
@@ -154,7 +161,7 @@ def _shape(geometry: dict[str, Any], where: str, *, degrees: bool) -> shapely.Ge
             if len(line) < 2:
                 raise InputError(f"{where}: expected a line of two positions or more")
     try:
-        return shape({"type": kind, "coordinates": _same_size(coordinates)})
+        return shape({"type": kind, "coordinates": _same_size(coordinates, kind)})
     except (ValueError, TypeError, shapely.errors.ShapelyError) as error:
         raise InputError(f"{where}: not a {kind}: {str(error).splitlines()[0]}") from None
 
@@ -180,8 +187,11 @@ def _check(coordinates: Any, depth: int, kind: str, where: str, *, degrees: bool
         )
 
 
-def _same_size(coordinates: Any) -> Any:
-    """Positions of two or three numbers, all alike: shapely takes no mixture."""
+def _same_size(coordinates: Any, kind: str) -> Any:
+    """Return positions of two or of three numbers, all alike, as shapely wants them.
+
+    Points keep their heights, and those without get NaN; heights of lines and areas are ignored.
+    """
     sizes: set[int] = set()
 
     def visit(c: Any) -> None:
@@ -192,7 +202,9 @@ def _same_size(coordinates: Any) -> Any:
             sizes.add(min(len(c), 3))
 
     def cut(c: Any, size: int) -> Any:
-        return [cut(p, size) for p in c] if isinstance(c[0], list) else c[:size]
+        if isinstance(c[0], list):
+            return [cut(p, size) for p in c]
+        return [*c[:size], *[math.nan] * (size - len(c))]
 
     visit(coordinates)
-    return cut(coordinates, min(sizes))
+    return cut(coordinates, max(sizes) if kind == "MultiPoint" else min(sizes))
