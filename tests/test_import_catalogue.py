@@ -256,3 +256,17 @@ def test_an_empty_part_of_a_collection_takes_no_other_part_with_it(tmp_path):
     assert len(found.problem.obstacles) == 1
     (layer,) = found.problem.site.imported
     assert layer.left_out[0].first == ("features[2].geometries[0]",)
+
+
+def test_a_system_that_outweighs_the_files_own_is_told(tmp_path):
+    pyogrio = pytest.importorskip("pyogrio")
+    file = tmp_path / "m.gpkg"
+    places = np.array([shapely.to_wkb(shapely.Point(500_000, 6_000_000))], dtype=object)
+    pyogrio.raw.write(
+        file, geometry=places, field_data=[np.array(["base"], dtype=object)], fields=["kind"],
+        crs="EPSG:32632", geometry_type="Point", layer="a",
+    )  # fmt: skip
+    from netsp.site.read import read_map
+
+    assert any("EPSG:32632 is not used" in note for note in read_map(file, "EPSG:32633").notes)
+    assert not any("is not used" in note for note in read_map(file, "epsg:32632").notes)

@@ -91,6 +91,10 @@ def _read(file: str | Path, plain: str | Path, crs: str | None) -> Map:
         if is_osm and not layer.shapes:
             continue  # GDAL has the same five layers for every file
         own = crs if crs is not None else layer.crs
+        if crs is not None and layer.crs is not None and not _is_same_system(crs, layer.crs):
+            found.notes.append(
+                f"layer {name!r}: its own system {_system_name(layer.crs)} is not used: --crs {crs}"
+            )
         if own is not None and own.startswith(PLANE_SYSTEMS) and map_unit(own) == 1.0:
             own = LOCAL  # a plan without a place on the earth says so itself
         if own is None:
@@ -417,6 +421,27 @@ def _mover(crs: str, where: str) -> Mover:
         return out
 
     return moved
+
+
+def _system_name(crs: str) -> str:
+    """Return the name of a coordinate system, without its definition."""
+    found = re.search(r'"([^"]{1,80})"', crs)
+    return crs if len(crs) <= 40 or found is None else found[1]
+
+
+def _is_same_system(crs: str, other: str) -> bool:
+    """Return whether two texts name one coordinate system."""
+    if crs.strip().lower() == other.strip().lower():
+        return True
+    try:
+        from pyproj import CRS
+        from pyproj.exceptions import ProjError
+    except ImportError:
+        return False
+    try:
+        return bool(CRS.from_user_input(crs) == CRS.from_user_input(other))
+    except ProjError:  # local, or a system that is refused where it is used
+        return False
 
 
 def _to_degrees(crs: str, where: str) -> Any:
