@@ -258,6 +258,22 @@ def test_an_empty_part_of_a_collection_takes_no_other_part_with_it(tmp_path):
     assert layer.left_out[0].first == ("features[2].geometries[0]",)
 
 
+KML = '<kml xmlns="http://www.opengis.net/kml/2.2"><Document>{}</Document></kml>'
+
+
+def placemark(name, lon, lat, more=""):
+    place = f"<Point><coordinates>{lon},{lat}</coordinates></Point>"
+    return f"<Placemark><name>{name}</name>{more}{place}</Placemark>"
+
+
+def test_depths_in_elements_of_other_namespaces_are_read(tmp_path):
+    file = tmp_path / "m.kml"
+    data = '<ExtendedData xmlns:c="urn:c"><c:depth>4</c:depth></ExtendedData>'
+    file.write_text(KML.format(placemark("G", 12.0, 55.0001, data)))
+    (goal,) = import_site(file, HERE, options=SiteOptions(tether=60.0)).problem.goals
+    assert goal.position[2] == -4.0
+
+
 def test_a_system_that_outweighs_the_files_own_is_told(tmp_path):
     pyogrio = pytest.importorskip("pyogrio")
     file = tmp_path / "m.gpkg"

@@ -398,6 +398,9 @@ def _properties(element: Element) -> dict[str, Any]:
             out[tag] = value
     for holder in element:
         if holder.tag == "ExtendedData":
+            for child in holder:  # elements of other namespaces hold data, too
+                if child.tag not in ("Data", "SchemaData") and not len(child):
+                    out.setdefault(child.tag, (child.text or "").strip() or None)
             for child in holder.iter():
                 if child.tag == "Data" and child.get("name"):
                     out.setdefault(str(child.get("name")), _text(child, "value"))
