@@ -266,6 +266,19 @@ def placemark(name, lon, lat, more=""):
     return f"<Placemark><name>{name}</name>{more}{place}</Placemark>"
 
 
+def test_a_word_of_a_shape_that_is_a_layer_stands_for_that_layer_only(tmp_path):
+    file = tmp_path / "m.kml"
+    inner = placemark("A", 12.0001, 55.0)
+    goal = placemark("G", 12.0, 55.0001)
+    folders = (
+        f"<Folder><name>Points</name>{inner}</Folder><Folder><name>Goals</name>{goal}</Folder>"
+    )
+    file.write_text(KML.format(folders))
+    options = SiteOptions(tether=60.0, radius=1.0, maps=[("obstacle", "points")])
+    problem = import_site(file, HERE, options=options).problem
+    assert ([g.name for g in problem.goals], [o.name for o in problem.obstacles]) == (["G"], ["A"])
+
+
 def test_depths_in_elements_of_other_namespaces_are_read(tmp_path):
     file = tmp_path / "m.kml"
     data = '<ExtendedData xmlns:c="urn:c"><c:depth>4</c:depth></ExtendedData>'

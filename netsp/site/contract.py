@@ -7,7 +7,7 @@ object classes of charts and tags of OpenStreetMap, the shape.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass
 
 from netsp.errors import InputError
@@ -205,7 +205,9 @@ class Decision:
     reason: str = ""
 
 
-def kind_of(feature: Feature, kinds: Mapping[str, str], *, chart: bool) -> Decision:
+def kind_of(
+    feature: Feature, kinds: Mapping[str, str], *, chart: bool, layers: Container[str] = ()
+) -> Decision:
     """Decide what a feature is.
 
     Parameters
@@ -216,6 +218,9 @@ def kind_of(feature: Feature, kinds: Mapping[str, str], *, chart: bool) -> Decis
         Layer or a word of `SHAPE_LAYERS`, lower case, to kind, as the user says.
     chart : bool
         Whether the map is an S-57 chart, of which only known object classes count.
+    layers : container of str
+        Names of the map's layers, lower case: a word of `SHAPE_LAYERS` among them is that layer
+        only.
 
     Returns
     -------
@@ -232,7 +237,14 @@ def kind_of(feature: Feature, kinds: Mapping[str, str], *, chart: bool) -> Decis
     names = [name.strip().lower() for name in (feature.layer, *feature.folders)]
     asked = next((kinds[name] for name in names if name in kinds), None)
     word = next((WORDS[w] for name in names for w in words_in(name) if w in WORDS), None)
-    by_shape = next((kinds[w] for w, s in SHAPE_LAYERS.items() if w in kinds and s in shape), None)
+    by_shape = next(
+        (
+            kinds[w]
+            for w, s in SHAPE_LAYERS.items()
+            if w in kinds and w not in layers and s in shape
+        ),
+        None,
+    )
     if asked is not None:
         decision = Decision(asked, "as asked for")
     elif by_shape is not None:

@@ -334,10 +334,11 @@ class _Site:
         for unread in self.map.unread:
             self.ledger.leave_out(unread, unread.reason)
         wrong: dict[str, list[str]] = {}
+        layers = self.map.layer_names
         lone = lone_equipment(self.map.features) if self.is_chart else set()
         for feature in self.map.features:
             try:
-                decision = kind_of(feature, self.kinds, chart=self.is_chart)
+                decision = kind_of(feature, self.kinds, chart=self.is_chart, layers=layers)
             except InputError as error:
                 what = str(error).removeprefix(feature.where)
                 wrong.setdefault(what, []).append(feature.where)
