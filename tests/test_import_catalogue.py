@@ -242,7 +242,42 @@ def sides(corners, **properties):
     ]
 
 
+def test_all_pieces_of_a_cropped_outline_are_counted_as_left_out(tmp_path):
+    far = [[lon + 0.01, lat] for lon, lat in square(0)]
+    file = geojson(tmp_path, sides(far))
+    found = import_site(file, options=SiteOptions(tether=60.0, crop=True))
+    (layer,) = found.problem.site.imported
+    assert "obstacle" not in layer.used
+    assert [group.features for group in layer.left_out] == [4]
+
+
+def test_the_other_names_of_a_joined_outline_are_told(tmp_path):
+    found = import_site(geojson(tmp_path, sides(square(0))), options=SiteOptions(tether=60.0))
+    (obstacle,) = found.problem.obstacles
+    assert obstacle.name == "N0"
+    assert any("'N1', 'N2', 'N3'" in note for note in found.notes)
+
+
 @pytest.mark.parametrize("is_joined", [True, False])
+def test_an_outline_holds_the_width_that_its_lines_state(tmp_path, is_joined):
+    ring = feature({"type": "LineString", "coordinates": square(0)}, width_m=0.8)
+    drawn = sides(square(0), width_m=0.8) if is_joined else [ring]
+    found = import_site(geojson(tmp_path, drawn), options=SiteOptions(tether=60.0))
+    (obstacle,) = found.problem.obstacles
+    outline = shapely.Polygon(HERE.to_plane([c[::-1] for c in square(0)]))
+    assert obstacle.shape().covers(outline.buffer(0.4 - 1e-3))
+
+
+def test_a_hole_in_the_bounds_is_an_obstacle(tmp_path):
+    rim = [[11.9995, 54.9995], [12.0005, 54.9995], [12.0005, 55.0005], [11.9995, 55.0005]]
+    basin = feature({"type": "Polygon", "coordinates": [[*rim, rim[0]], square(0)]}, kind="bounds")
+    found = import_site(geojson(tmp_path, [basin]), options=SiteOptions(tether=60.0))
+    island = shapely.Polygon(HERE.to_plane([c[::-1] for c in square(0)]))
+    whole = shapely.union_all([o.shape() for o in found.problem.obstacles])
+    assert whole.covers(island.buffer(-1e-3))
+    assert any("1 hole in the bounds" in note for note in found.notes)
+
+
 def test_points_keep_their_heights_beside_points_without(tmp_path):
     both = {"type": "MultiPoint", "coordinates": [[*at(0), -3.0], at(1)]}
     found = import_site(geojson(tmp_path, [feature(both)]), options=SiteOptions(tether=60.0))
@@ -256,6 +291,16 @@ def test_an_empty_part_of_a_collection_takes_no_other_part_with_it(tmp_path):
     assert len(found.problem.obstacles) == 1
     (layer,) = found.problem.site.imported
     assert layer.left_out[0].first == ("features[2].geometries[0]",)
+
+
+def test_a_goal_just_out_of_reach_is_not_said_to_be_swapped(tmp_path):
+    here = Projection(0.0, 0.0)
+    file = geojson(tmp_path, [feature({"type": "Point", "coordinates": [0.0, 0.001]})])
+    text = file.read_text().replace("12.0", "0.0").replace("55.0", "0.0")
+    file.write_text(text.replace("11.99999", "0.00001"))
+    with pytest.raises(InputError) as refused:
+        import_site(file, here, options=SiteOptions(tether=60.0))
+    assert "swapped" not in str(refused.value)
 
 
 KML = '<kml xmlns="http://www.opengis.net/kml/2.2"><Document>{}</Document></kml>'

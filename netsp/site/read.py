@@ -258,6 +258,7 @@ class _Site:
         self.ledger = Ledger(self.map.layers)
         self.beyond: dict[str, Feature] = {}
         self.cut_off: set[str] = set()
+        self.joined: dict[str, list[Feature]] = {}  # pieces of outlines, by the feature that names
 
     def problem(self, name: str) -> Problem:
         """Return the problem, or raise all complaints."""
@@ -285,6 +286,8 @@ class _Site:
             self._chart_depths(parts)
         free = [anchor, *candidates, *(g["position"] for g in goals)]
         obstacles = self._within_crop(self._obstacles(parts["obstacle"], free))
+        bounds, islands = self._bounds(parts["bounds"])
+        obstacles += islands
         self._check_names(obstacles, "obstacles")
         goals += self._inspections(obstacles, anchor, tether, clearance)
         self._check_names(goals, "goals")
@@ -296,7 +299,6 @@ class _Site:
         if tether is not None:
             self._check_scale(goals, obstacles, anchor, tether)
             goals = self._within_reach(goals, anchor, tether)
-        bounds = self._bounds(parts["bounds"])
         if self.complaints:
             raise self._refused()
         return self._made(
@@ -627,7 +629,7 @@ class _Site:
                 self._complain(f"{self._called(feature)}: a line of no length")
             for line in lines:
                 if line.is_closed and not (is_coastline(feature) and not is_land(line)):
-                    out += area(feature, line)
+                    out += area(feature, self._with_rim(line, [(feature, line)]))
                 else:
                     drawn.setdefault(feature.layer, []).append((feature, line))
         else:
@@ -648,7 +650,16 @@ class _Site:
                 rest += members  # the water lies inside: its coast is a wall
                 continue
             named = next((f for f in own if self._name(f) is not None), own[0])
-            out += area(named, polygon)
+            found = area(named, self._with_rim(polygon, [pieces[k] for k in members]))
+            self.joined.setdefault(named.where, []).extend(own)
+            names = list(dict.fromkeys(n for f in own if (n := self._name(f)) is not None))
+            if found and len(names) > 1:
+                self.notes.append(
+                    f"{_first_of([f.where for f in own])}: lines joined to one outline, named "
+                    f"{names[0]!r}; their other names: {', '.join(map(repr, names[1:MAX_NAMED]))}"
+                    + (", …" if len(names) > MAX_NAMED else "")
+                )
+            out += found
         narrow: list[Feature] = []
         for k in rest:
             feature, line = pieces[k]
@@ -672,6 +683,22 @@ class _Site:
                 "line_width",
             )
         return out
+
+    def _with_rim(
+        self, outline: shapely.Geometry, pieces: list[tuple[Feature, shapely.LineString]]
+    ) -> shapely.Geometry:
+        """Return an outline with the area of those of its lines that state a width."""
+        import shapely
+
+        rims = [
+            widened(line, width)
+            for feature, line in pieces
+            if self._number(feature, "width") is not None and (width := self._width(feature))
+        ]
+        if not rims:
+            return outline
+        inner = shapely.Polygon(outline.coords) if "Line" in outline.geom_type else outline
+        return shapely.union_all([*shapely.get_parts(shapely.make_valid(inner)), *rims])
 
     def _is_beyond(self, shape: shapely.Geometry, grown: float) -> bool:
         return self.window is not None and self.window.is_beyond(shape, grown)
@@ -721,7 +748,9 @@ class _Site:
         staying = {thing["where"] for thing in kept}
         for where, feature in self.beyond.items():
             if where not in staying:
-                self.ledger.leave_out(feature, self._beyond_reach)
+                for piece in (feature, *self.joined.get(where, ())):
+                    if piece.where not in staying:
+                        self.ledger.leave_out(piece, self._beyond_reach)
         if cut_count := len(self.cut_off & staying):
             self.notes.append(
                 f"{counted(cut_count, 'obstacle')} cut off where the reach of the tether ends "
@@ -893,11 +922,12 @@ class _Site:
                 return True
         return False
 
-    def _bounds(self, features: list[Feature]) -> list[list[float]] | None:
+    def _bounds(self, features: list[Feature]) -> tuple[list[list[float]] | None, list[Any]]:
+        """Return the outline of the bounds, and the islands in it: obstacles without a name."""
         import shapely
 
         if not features:
-            return None
+            return None, []
         shapes = [self._plane(f.shape) for f in features]
         lines = [line for shape in shapes if "Line" in shape.geom_type for line in lines_of(shape)]
         areas, rest = outlines(lines, self.said.join_tolerance)
@@ -907,19 +937,29 @@ class _Site:
             self._complain(
                 f"{places}: bounds that are not closed; expected a closed line or a polygon"
             )
-            return None
+            return None, []
         if len(whole) != 1:
             self._complain(f"expected one outline of kind bounds, got {len(whole)}: {places}")
-            return None
-        polygons, notes = simple_polygons(whole[0], lambda p: False)
-        self.notes += [f"{features[0].where}: {note}" for note in notes]
+            return None, []
+        feature = features[0]
+        drawn = shapely.get_parts(whole[0])
+        holes = [shapely.Polygon(ring) for part in drawn for ring in part.interiors]
+        filled = shapely.MultiPolygon([shapely.Polygon(part.exterior) for part in drawn])
+        polygons, notes = simple_polygons(filled, lambda p: False)
+        self.notes += [f"{feature.where}: {note}" for note in notes]
         if len(polygons) != 1:
-            self._complain(
-                f"{features[0].where}: expected bounds in one piece, got {len(polygons)}"
-            )
-            return None
+            self._complain(f"{feature.where}: expected bounds in one piece, got {len(polygons)}")
+            return None, []
         ring: list[list[float]] = shapely.get_coordinates(polygons[0].exterior)[:-1].tolist()
-        return ring
+        islands = [
+            {"feature": feature, "name": None, "where": feature.where, **outline_of(polygon)}
+            for hole in holes for polygon in simple_polygons(hole, lambda p: False)[0]
+        ]  # fmt: skip
+        if islands:
+            self.notes.append(
+                f"{feature.where}: {counted(len(islands), 'hole')} in the bounds: an obstacle each"
+            )
+        return ring, islands
 
     # What is checked of the whole
 
@@ -1005,7 +1045,11 @@ class _Site:
         ((lat, lon),) = self.projection.to_earth([goal["position"][:2]])
         if abs(lon) <= 90.0:
             ((x, y),) = self.projection.to_plane([[lon, lat]])
-            if np.hypot(*(np.array([x, y]) - self.projection.base)) <= 10.0 * tether:
+            as_read, swapped = (
+                np.hypot(*(np.array(place) - self.projection.base))
+                for place in (goal["position"][:2], (x, y))
+            )
+            if swapped <= 10.0 * tether < as_read:
                 return ": latitude and longitude look swapped"
         return ""
 
