@@ -271,7 +271,7 @@ TIMES = np.round(np.arange(0.0, 12.0, 0.1), 3)
 @pytest.mark.parametrize("step", [2.0, 4.0])
 @pytest.mark.parametrize("every", [1, 5, 10])
 def test_a_clock_that_is_set_is_not_a_restart(begin, step, every):
-    """What is believed is as with a clock that is not set, and nothing is lost."""
+    """The guard goes on as with a clock that is not set: without an alarm and without a gap."""
     notes = []
     fixes = drive(TIMES[::every], lambda t: begin - (step if t >= 8.0 else 0.0))
     reports = list(replayed(Guard(SITE, EXACT), fixes, notes.append))

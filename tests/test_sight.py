@@ -69,7 +69,7 @@ def test_tangents_by_horizons_are_those_of_all_pairs(seed, clearance, sectors):
 
 
 def _is_blocked(a, b, blockers):
-    """Whether a segment enters a blocker, each asked by itself."""
+    """Return whether a segment enters a blocker, tested one by one."""
     for o in range(len(blockers.box)):
         begin, end = blockers.edge_start[o], blockers.edge_start[o + 1]
         edges, limit = blockers.edges, blockers.grow[o] - blockers.eps

@@ -59,7 +59,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     p.add_argument(
         "--system", type=natural, metavar="N",
-        help="the vehicle's system id in a .tlog; default the only one that tells positions",
+        help="the vehicle's system id in a .tlog; default: the only one with positions",
     )  # fmt: skip
     p.add_argument(
         "--time-limit", type=seconds, metavar="S", help="seconds for the tour; default no limit"

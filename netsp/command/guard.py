@@ -47,8 +47,8 @@ def arguments(p: argparse.ArgumentParser) -> None:
         "--system",
         type=natural,
         metavar="N",
-        help="the vehicle's system id; default the first heard, in a recording the only one that "
-        "tells positions",
+        help="the vehicle's system id; default: the first one heard; in a recording, the only one "
+        "with positions",
     )
     vehicle = p.add_argument_group("what is known of the vehicle")
     vehicle.add_argument(

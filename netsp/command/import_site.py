@@ -62,8 +62,8 @@ def arguments(p: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     p.add_argument(
         "--units", metavar="UNIT",
-        help="of lengths and of local coordinates in the file: m, km, cm, mm, ft, us-ft, in, yd, "
-        "fathom; default: the unit that the file states, or m",
+        help="unit of lengths and of local coordinates in the file: m, km, cm, mm, ft, us-ft, in, "
+        "yd, fathom; default: the unit that the file states, or m",
     )  # fmt: skip
     p.add_argument(
         "--line-width", type=length, metavar="W",

@@ -38,12 +38,11 @@ def arguments(p: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     p.add_argument(
         "--frame", metavar="NAME",
-        help="of a path to measure: local (the problem's plane) or global (degrees)",
+        help="frame of a path to measure: local (the problem's plane) or global (degrees)",
     )  # fmt: skip
     p.add_argument(
         "--system", type=natural, metavar="N",
-        help="the vehicle's system id in a .tlog to measure; default the only one that tells "
-        "positions",
+        help="the vehicle's system id in a .tlog to measure; default: the only one with positions",
     )  # fmt: skip
     p.add_argument("--quiet", action="store_true", help="exit code only")
     told.json_flag(p)

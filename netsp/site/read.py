@@ -272,7 +272,7 @@ class _Site:
         if tether is None:
             self._complain(
                 "has no tether length; expected tether_length of the base",
-                ", or one besides (--tether)",
+                ", or --tether L",
                 "tether",
             )
         clearance = self._length(own, "clearance", self.said.clearance) or 0.0
@@ -439,7 +439,7 @@ class _Site:
                 if not self.complaints:
                     self._complain(
                         "has no base; expected a Point of kind base",
-                        ", or lat,lon given besides (--base)",
+                        ", or --base LAT,LON",
                         "base",
                     )
                 return None
@@ -626,7 +626,9 @@ class _Site:
         elif "Line" in kind:
             lines = lines_of(self._plane(shape))
             if not lines:
-                self._complain(f"{self._called(feature)}: a line of no length")
+                self._complain(
+                    f"{self._called(feature)}: is a line without length; expected two places"
+                )
             for line in lines:
                 if line.is_closed and not (is_coastline(feature) and not is_land(line)):
                     out += area(feature, self._with_rim(line, [(feature, line)]))

@@ -84,11 +84,11 @@ def load_floor(
     notes = list(grid.notes)
     sign = -1.0 if depths or grid.counts_down else 1.0
     if grid.counts_down and not depths:
-        notes.append("its heights count downwards: z is upwards here")
+        notes.append("heights count downwards: converted to z upwards")
     height = grid.metres if grid.height_metres is None else grid.height_metres
     if grid.metres != 1.0 or height != 1.0:
         notes.append(
-            f"map in units of {grid.metres:.7g} m, heights of {height:.7g} m: in metres here"
+            f"map in units of {grid.metres:.7g} m, heights of {height:.7g} m: converted to metres"
         )
     if sign > 0.0 and grid.z.min() > 0.0:
         notes.append("all heights are above 0: set depths to true if values count downwards")
@@ -201,8 +201,8 @@ def _without_nodata(z: Floats, path: str | Path, notes: list[str]) -> Floats:
             continue  # a height among others
         z[cells] = np.nan
         notes.append(
-            f"{counted(int(cells.sum()), 'cell')} of {value:.6g} taken as without a height, though "
-            "the grid does not say so"
+            f"{counted(int(cells.sum()), 'cell')} of {value:.6g} taken as empty, although "
+            "the grid does not call this value nodata"
         )
     missing = np.isnan(z)
     if missing.all():

@@ -185,10 +185,10 @@ def read_las(path: str | Path) -> PointCloud:
     if metres is None:
         metres = heights.metres if heights.is_stated else unit
     if unit != 1.0 or metres != 1.0:
-        notes.append(f"in units of {unit:.7g} m, heights of {metres:.7g} m: in metres here")
+        notes.append(f"in units of {unit:.7g} m, heights of {metres:.7g} m: converted to metres")
     points[:, 2] *= heights.sign
     if heights.sign < 0.0:
-        notes.append("its heights count downwards: z is upwards here")
+        notes.append("heights count downwards: converted to z upwards")
     return PointCloud(points[kept], (unit, unit, metres), tuple(notes))
 
 
@@ -280,5 +280,5 @@ def read_pcd(path: str | Path) -> PointCloud:
         notes.append(f"{counted(int((~known).sum()), 'point')} without coordinates left out")
     view = [float(v) for v in head.get("VIEWPOINT", [])]
     if view and view != [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]:
-        notes.append("its VIEWPOINT is not applied: points are taken as they stand")
+        notes.append("VIEWPOINT is ignored: points keep their coordinates")
     return PointCloud(points[known], notes=tuple(notes))

@@ -163,9 +163,9 @@ def load_mesh(
     up, unit = _mesh_axes(Path(path), kind, loaded)
     chosen = placement or Placement()
     if chosen.up is None and up != "z":
-        notes.append(f"its format says that {up} is up: turned, so that z is")
+        notes.append(f"{up} is up in this format: turned so that z is up")
     if unit != 1.0:
-        notes.append(f"in units of {unit:.7g} m: in metres here")
+        notes.append(f"in units of {unit:.7g} m: converted to metres")
     corners = vertices[faces]
     area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     flat = int((np.abs(area).max(axis=1) == 0.0).sum())
