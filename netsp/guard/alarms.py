@@ -29,7 +29,7 @@ class Alarm:
     text : str
         One or two sentences: why, and what to do.
     is_immediate : bool
-        Whether it is raised at once, without waiting for its reason to last.
+        True to raise the alarm at once, without waiting for its reason to last.
     """
 
     kind: str

@@ -58,12 +58,12 @@ class Frame:
 
     @property
     def has_origin(self) -> bool:
-        """Whether the site says where on the earth it is."""
+        """Return whether the site has a place on the earth."""
         return isinstance(self.site, Problem) and self.site.origin is not None
 
     @property
     def is_of_plane(self) -> bool:
-        """Whether the site is a problem of the plane, in which heights count little."""
+        """Return whether the site is a problem of the plane, where heights do not matter much."""
         return isinstance(self.site, Problem)
 
     def local(self) -> Frame:

@@ -30,7 +30,7 @@ class Ledger:
 
     @property
     def left_out_shapes(self) -> list[shapely.Geometry]:
-        """Shapes of the features that are left out."""
+        """Return the shapes of the features that are left out."""
         return list(self._shapes.values())
 
     def use(self, feature: Feature, kind: UsedAs) -> None:

@@ -573,7 +573,7 @@ class _Site:
         out: list[dict[str, Any]] = []
 
         def area(feature: Feature, shape: shapely.Geometry) -> list[dict[str, Any]]:
-            """Obstacles of an area; what of its outline encloses nothing is drawn as a line."""
+            """Return the obstacles of an area; parts without an area become lines."""
             if self.window is not None:
                 if self.window.is_beyond(shape):
                     self.beyond[feature.where] = feature
@@ -609,7 +609,7 @@ class _Site:
         area: Callable[[Feature, shapely.Geometry], list[dict[str, Any]]],
         drawn: dict[str, list[tuple[Feature, shapely.LineString]]], pointlike: list[Feature],
     ) -> list[dict[str, Any]]:  # fmt: skip
-        """Obstacles of a shape; open lines and points without a radius are noted for later."""
+        """Return the obstacles of a shape; defer open lines and points without a radius."""
         kind = shape.geom_type
         out: list[dict[str, Any]] = []
         if "Point" in kind:
@@ -642,7 +642,7 @@ class _Site:
         self, pieces: list[tuple[Feature, shapely.LineString]],
         area: Callable[[Feature, shapely.Geometry], list[dict[str, Any]]],
     ) -> list[dict[str, Any]]:  # fmt: skip
-        """Obstacles of the open lines of a layer: joined outlines, and lines with a width."""
+        """Return the obstacles of a layer's open lines: joined outlines, and lines with a width."""
         out: list[dict[str, Any]] = []
         areas, rest = outlines([line for _, line in pieces], self.said.join_tolerance)
         for polygon, members in areas:
@@ -738,7 +738,7 @@ class _Site:
         return f"beyond the reach of the tether ({_metres(self.window.radius)} about {about})"
 
     def _within_crop(self, obstacles: list[dict[str, Any]]) -> list[dict[str, Any]]:
-        """Obstacles within the reach of the tether; the others go to the ledger."""
+        """Return the obstacles within the reach of the tether; the others go to the ledger."""
         if self.window is None:
             return obstacles
         kept, dropped, cut_off = cropped(obstacles, self.window)

@@ -66,7 +66,7 @@ def read_waypoint_list(file: str | Path) -> Map:
 
 
 def _is_home(item: MissionItem, line: str) -> bool:
-    """Whether an item is home: ArduPilot keeps it as number 0, a waypoint above the sea."""
+    """Return whether an item is home, which ArduPilot stores as waypoint 0, above the sea."""
     number = line.split()[0]
     return int(float(number)) == 0 and item.command == 16 and item.frame in ABOVE_SEA
 
