@@ -344,3 +344,14 @@ def test_a_system_that_outweighs_the_files_own_is_told(tmp_path):
 
     assert any("EPSG:32632 is not used" in note for note in read_map(file, "EPSG:32633").notes)
     assert not any("is not used" in note for note in read_map(file, "epsg:32632").notes)
+
+
+def test_messages_of_a_damaged_drawing_name_no_temporary_file(tmp_path):
+    pytest.importorskip("pyogrio")
+    file = tmp_path / "damaged.dxf"
+    tags = "0 SECTION 2 ENTITIES 0 SPLINE 5 A1 8 X 70 8 71 3 72 0 73 0 74 0 0 ENDSEC 0 EOF"
+    file.write_text("\n".join(tags.split()) + "\n")
+    with pytest.raises(InputError, match=r"damaged\.dxf: .*audit the drawing") as refused:
+        import_site(file, options=SiteOptions(tether=60.0))
+    assert "drawing.dxf" not in str(refused.value)
+    assert ".cpp" not in str(refused.value)

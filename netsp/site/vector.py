@@ -10,7 +10,7 @@ import math
 import re
 import sqlite3
 import tempfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -44,6 +44,9 @@ GML_MEMBER = re.compile(
     rb"<(?:[\w.-]+:)?(?:featureMembers?|member)\b[^>]*>\s*<(?:[\w.-]+:)?([\w.-]+)"
 )
 """Feature of GML: the name of its element is its layer's."""
+
+SOURCE_PLACE = re.compile(r"^\S+\.(?:cpp|c|h), \d+: ")
+"""Place in GDAL's own code, with which some of its messages begin."""
 
 UNSUPPORTED = "Geometry type is not supported"
 """Words of pyogrio for layers that are declared to hold faces."""
@@ -513,13 +516,26 @@ def _call(file: str | Path, notes: list[str], function: Any, *args: Any, **more:
             warnings.simplefilter("always")
             out = function(*args, **more)
     except Exception as error:
-        first = (str(error) or type(error).__name__).splitlines()[0].split("; It might")[0][:160]
+        first = _user_text(str(error) or type(error).__name__, file, args)[:160]
         raise InputError(f"{file}: cannot be read as a map: {first}") from None
     for warning in caught:
-        text = f"GDAL: {str(warning.message).splitlines()[0][:160]}"
+        text = f"GDAL: {_user_text(str(warning.message), file, args)[:160]}"
         if issubclass(warning.category, RuntimeWarning) and text not in notes:
             notes.append(text)
     return out
+
+
+def _user_text(text: str, file: str | Path, args: Sequence[Any]) -> str:
+    """Return the first line of what GDAL says, by the user's file and without places in its code.
+
+    Lines of a temporary file are not those of the user's.
+    """
+    first = SOURCE_PLACE.sub("", text.splitlines()[0].split("; It might")[0])
+    for plain in (str(arg) for arg in args if isinstance(arg, Path) and str(arg) != str(file)):
+        damaged = "a damaged entity; audit the drawing in its program and save it again"
+        first = re.sub(rf"error at line \d+ of {re.escape(plain)}", damaged, first)
+        first = first.replace(plain, str(file))
+    return first
 
 
 def _pyogrio() -> Any:
