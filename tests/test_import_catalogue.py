@@ -355,3 +355,26 @@ def test_messages_of_a_damaged_drawing_name_no_temporary_file(tmp_path):
         import_site(file, options=SiteOptions(tether=60.0))
     assert "drawing.dxf" not in str(refused.value)
     assert ".cpp" not in str(refused.value)
+
+
+def test_parts_of_a_feature_beyond_the_crop_are_told(tmp_path):
+    far = [12.01, 55.0]
+    piles = feature({"type": "MultiPoint", "coordinates": [at(0), far]}, radius_m=0.2)
+    file = geojson(tmp_path, [piles])
+    found = import_site(file, options=SiteOptions(tether=60.0, crop=True))
+    assert len(found.problem.obstacles) == 1
+    assert any("1 obstacle cut off where the reach" in note for note in found.notes)
+
+
+def test_a_property_that_no_feature_has_is_refused(tmp_path):
+    file = geojson(tmp_path, [feature(GEOMETRIES["point"](0), tiefe=4)])
+    options = SiteOptions(tether=60.0, maps=[("depth", "TIEFEN")])
+    with pytest.raises(InputError, match=r"no feature of .* has the property 'tiefen'.*tiefe"):
+        import_site(file, options=options)
+
+
+def test_degrees_out_of_range_in_a_table_name_the_row(tmp_path):
+    table = tmp_path / "goals.csv"
+    table.write_text("lat,lon\n55,12\n3,200\n")
+    with pytest.raises(InputError, match=r"goals\.csv: row 2: .*got 3 and 200"):
+        import_site(geojson(tmp_path, []), options=SiteOptions(tether=60.0, goals=table))

@@ -64,6 +64,9 @@ EARTH_READERS = {
 }  # fmt: skip
 """Readers of formats that are in degrees always, by extension."""
 
+MAX_LISTED = 20
+"""Properties that a message lists."""
+
 MAX_NAME = 200
 """Characters of a file's name that a problem keeps."""
 
@@ -131,6 +134,13 @@ def import_site(
             raise InputError(
                 f"--map: {file} has no layer {layer!r}; it has "
                 f"{', '.join(k or 'no layers' for k in found.layers)}"
+            )
+    properties = {str(name).lower() for feature in found.features for name in feature.properties}
+    for ours, theirs in fields.items():
+        if theirs not in properties:
+            raise InputError(
+                f"--map: no feature of {file} has the property {theirs!r}, which is to be its "
+                f"{ours}; there are {', '.join(sorted(properties)[:MAX_LISTED]) or 'none'}"
             )
     site = _Site(file, found, said, kinds, fields, projection)
     problem = site.problem(name or Path(file).stem)
@@ -753,7 +763,8 @@ class _Site:
                 for piece in (feature, *self.joined.get(where, ())):
                     if piece.where not in staying:
                         self.ledger.leave_out(piece, self._beyond_reach)
-        if cut_count := len(self.cut_off & staying):
+        # some parts of a feature may lie beyond while others stay
+        if cut_count := len((self.cut_off | set(self.beyond)) & staying):
             self.notes.append(
                 f"{counted(cut_count, 'obstacle')} cut off where the reach of the tether ends "
                 f"({_metres(self.window.radius)})"

@@ -60,6 +60,13 @@ def from_table(
     used: list[Quantity] = [*plane, up] if up else [*plane]
     places = table.numbers(used)
     if is_global and projection is not None:
+        wrong = np.flatnonzero((np.abs(places[:, :2]) > [90.0, 180.0]).any(axis=1))
+        if wrong.size:
+            lat, lon = places[wrong[0], :2]
+            raise InputError(
+                f"{file}: row {wrong[0] + 1}: expected a latitude within 90 and a longitude within "
+                f"180 degrees, got {lat:g} and {lon:g}"
+            )
         places[:, :2] = np.asarray(projection.to_plane(places[:, :2]))
     if on_note is not None and table.has_decimal_commas:
         on_note(f"{file}: numbers are read with decimal commas")
