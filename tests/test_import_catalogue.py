@@ -378,3 +378,8 @@ def test_degrees_out_of_range_in_a_table_name_the_row(tmp_path):
     table.write_text("lat,lon\n55,12\n3,200\n")
     with pytest.raises(InputError, match=r"goals\.csv: row 2: .*got 3 and 200"):
         import_site(geojson(tmp_path, []), options=SiteOptions(tether=60.0, goals=table))
+
+
+def test_units_of_an_occupancy_image_are_refused(tmp_path, capsys):
+    assert main(["import", str(tmp_path / "m.yaml"), "--units", "ft", "--base", "1,1"]) == 2
+    assert "--units: expected a map with features" in capsys.readouterr().err

@@ -243,7 +243,7 @@ def _is_image(args: argparse.Namespace) -> bool:
     wrong = (
         (
             "map", "crs", "radius", "inspect", "standoff", "line_width", "join_tolerance", "crop",
-            "of", "candidates", "draught", "floor", "floor_cell",
+            "of", "candidates", "draught", "floor", "floor_cell", "units",
         )
         if image
         else ("resolution", "tolerance", "unknown_free")
