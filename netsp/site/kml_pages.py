@@ -171,6 +171,7 @@ class _Reader:
     numbers: dict[str, int] = field(default_factory=dict)
     seen: set[str] = field(default_factory=set)
     size: int = 0
+    count: int = 0
 
     def map(self) -> Map:
         """Return the map."""
@@ -253,7 +254,8 @@ class _Reader:
         layer = at.layer
         number = self.numbers.get(layer, 0)
         self.numbers[layer] = number + 1
-        if sum(self.numbers.values()) > MOST_FEATURES:
+        self.count += 1
+        if self.count > MOST_FEATURES:
             raise InputError(
                 f"{self.file}: more than {MOST_FEATURES:,} features; expected at most that many"
             )

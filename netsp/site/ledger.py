@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
@@ -116,13 +117,13 @@ class Ledger:
             A feature has no entry: a defect of the reader.
         """
         out = []
+        members: dict[str, list[str]] = {}
+        for where, own in self._layer_of.items():
+            members.setdefault(own, []).append(where)
         for layer, size in self._layers.items():
-            mine = [where for where, own in self._layer_of.items() if own == layer]
-            used = {
-                kind: n
-                for kind in KIND_COLUMNS
-                if (n := sum(self._kind.get(where) == kind for where in mine))
-            }
+            mine = members.get(layer, [])
+            number = Counter(self._kind[where] for where in mine if where in self._kind)
+            used = {kind: number[kind] for kind in KIND_COLUMNS if number[kind]}
             groups: dict[str, list[str]] = {}
             for where in mine:
                 if where in self._reason:
