@@ -144,7 +144,7 @@ def test_solvers_functions_and_commands_are_ranked_by_what_the_judge_passes(
 ):
     with_records(small, tour)
     rows = tmp_path / "rows.jsonl"
-    words = ["library", "rank", "--folder", str(small), "-o", str(rows), "--time-limit", "1"]
+    words = ["library", "rank", "--folder", str(small), "-o", str(rows), "--time-limit", "3"]
     script = tmp_path / "mine.py"
     script.write_text(
         "import sys\nfrom netsp import Problem, solve\n"

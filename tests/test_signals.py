@@ -3,6 +3,7 @@
 import json
 import re
 import signal
+import socket
 import sys
 import threading
 from pathlib import Path
@@ -95,8 +96,8 @@ RUNS = {
     "simulate": ("simulate mission.json --quiet", "online/simulation.py", 4),
     "execute": ("execute p.json s.json -o out", "execute/run.py", 130),
     "execute mission": ("execute planned.json -o out", "space/judge.py", 130),
-    "fly": ("fly p.json s.json --link udpin:14571 -o out", "fly/rehearsal.py", 130),
-    "guard": ("guard p.json --link udpin:14572 -o out.jsonl", "guard/live.py", 4),
+    "fly": ("fly p.json s.json --link udpin:{port} -o out", "fly/rehearsal.py", 130),
+    "guard": ("guard p.json --link udpin:{port} -o out.jsonl", "guard/live.py", 4),
     "export": ("export planned.json -o out.csv", "export/mission.py", 0),
     "import": (f"import {ROOT}/examples/site.geojson -o out.json", "site/read.py", 130),
     "compare": (
@@ -130,6 +131,9 @@ def _end(words, module, number, folder, inputs, monkeypatch, capsys):
     for file in inputs.iterdir():
         (folder / file.name).write_bytes(file.read_bytes())
     monkeypatch.chdir(folder)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+        free.bind(("127.0.0.1", 0))
+        words = words.replace("{port}", str(free.getsockname()[1]))
     with Pressed(number, module) as pressed:
         code = main(words.split())
     assert pressed.sent, f"{words} entered no function of {module}"

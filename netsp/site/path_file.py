@@ -197,8 +197,13 @@ def _of_table(file: str | Path, problem: Problem, stem: str) -> FoundPath:
 
 
 def _is_gap(table: Table, row: int, quantities: list[Quantity], *, is_global: bool) -> bool:
-    """Return whether a row has no position: an empty cell, or degrees without a GPS fix."""
+    """Return whether a row has no position: an empty cell, or degrees without a GPS fix.
+
+    A row that is cut off after one of two coordinates is none: that is a damaged file.
+    """
     cells = [table.plain(row, name) for name in quantities]
+    if sum(not cell for cell in cells[:2]) == 1:
+        return False
     if any(cell.lower() in NO_VALUES for cell in cells):
         return True
     return is_global and all(_is_number(c) and float(c) == 0.0 for c in cells[:2])
