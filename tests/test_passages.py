@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from netsp.clock import Clock
@@ -58,6 +58,7 @@ def gaps_of(scene: Scene, **more):
 
 
 @settings(max_examples=16, deadline=None)
+@example(y=0.6875, width=0.21875, x=0.0, thick=0.1)
 @given(
     y=st.floats(-1.5, 1.5), width=st.floats(0.205, 0.5), x=st.sampled_from([0.0, 0.1]),
     thick=st.sampled_from([0.1, 0.2]),
@@ -70,7 +71,10 @@ def test_a_slot_wide_enough_is_shown_by_the_cells_or_named_with_its_place_and_wi
     grid = GapGrid.of(scene.field(), grid_box(mission_of(), scene), CLEARANCE)
     gaps = unresolved_gaps(grid)
     rows = grid.low[1] + (np.arange(grid.shape[1]) + 0.5) * grid.cell
-    shown = (np.abs(rows - y) <= 0.5 * width - CLEARANCE).any()
+    # middles of the cells beside a thin wall at x = 0 are a little off its corners
+    beside = max(0.0, 0.5 * grid.cell - 0.5 * thick) if x == 0.0 else 0.0
+    room = 0.5 * width - np.abs(rows - y)
+    shown = (np.hypot(beside, room[room > 0.0]) >= CLEARANCE).any()
     if shown:
         assert gaps == []
     else:
