@@ -51,6 +51,7 @@ from netsp.space.plan import (
     plans,
     water_of,
 )
+from netsp.space.potential import PotentialParams
 from netsp.space.upright import bound_of_upright
 from netsp.space.water import SHARE, Water, along, has_room
 from netsp.travel.result import relative_gap
@@ -81,6 +82,8 @@ class MissionPolicy:
         CPU seconds, at least 0, until which the tour in the order of the file is worked on even if
         the limit is shorter. A smaller number leaves more missions without any tour when the limit
         is short; with a larger one, very large missions end later.
+    potential : PotentialParams
+        Effort of the bound on each leg.
     """
 
     given_share: float = 0.25
@@ -89,11 +92,14 @@ class MissionPolicy:
     going_on_share: float = 0.3
     min_saving: float = 0.005
     first_tour_s: float = 15.0
+    potential: PotentialParams = field(default_factory=PotentialParams)
 
     def __post_init__(self) -> None:
         """Refuse values out of range."""
         for item in fields(self):
             value = getattr(self, item.name)
+            if isinstance(value, PotentialParams):  # checks itself
+                continue
             top = math.inf if item.name.endswith("_s") else 1.0
             if not 0.0 <= value <= top:
                 expected = "0 or more" if top > 1.0 else "a number from 0 to 1"
@@ -572,7 +578,9 @@ def _raise_bound(
         bound = bound_of_upright(flights.mission, flights.water, some, places, part)
     elif plan.kind not in (PLANE, SHORT_ORDER) and not out.has_all_bounds:
         flights.tell("bound on all tours")
-        bound = bound_of_all(plan.ways, sorted(visited), part, seed)
+        bound = bound_of_all(
+            plan.ways, sorted(visited), part, seed, params=flights.policy.potential
+        )
         out.has_all_bounds = True
     else:
         return
