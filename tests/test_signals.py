@@ -12,6 +12,7 @@ import pytest
 
 from netsp import Problem, solve
 from netsp.command.main import COMMANDS, main
+from netsp.fly.rehearsal import rehearse
 from netsp.online.mission import Mission
 from netsp.space.plan import plan
 from tests.test_tour import written
@@ -134,6 +135,7 @@ def _end(words, module, number, folder, inputs, monkeypatch, capsys):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
         free.bind(("127.0.0.1", 0))
         words = words.replace("{port}", str(free.getsockname()[1]))
+    rehearse.cache_clear()  # another test of this process may have rehearsed already
     with Pressed(number, module) as pressed:
         code = main(words.split())
     assert pressed.sent, f"{words} entered no function of {module}"
