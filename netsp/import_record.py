@@ -23,7 +23,7 @@ class OmittedFeatures(Model):
     reason: Annotated[str, Field(description="why they were left out", max_length=300)]
     features: Annotated[int, Field(description="number of them", ge=1)]
     first: Annotated[
-        tuple[str, ...], Field(description="the first of them, by layer and number")
+        tuple[str, ...], Field(description="up to five of these features, by layer and number")
     ] = ()
 
 

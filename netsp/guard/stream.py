@@ -132,7 +132,7 @@ def replayed(
     stream = Stream(guard, on_note=on_note)
     last: float | None = None
     for fix in fixes:
-        if last is not None and fix.time - last > GAP:  # beside the vehicle silence is told, too
+        if last is not None and fix.time - last > GAP:  # a live guard reports silence, too
             waits = int(min(fix.time - last, GAP + 4.0 * SILENT_S) / SILENT_S)
             for k in range(1, waits + 1):
                 if last + k * SILENT_S < fix.time:

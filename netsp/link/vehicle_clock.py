@@ -17,7 +17,7 @@ ClockEvent = Literal["late", "set", "restart"]
 
 @dataclass(frozen=True)
 class ClockPolicy:
-    """Rule by which times that go back are told apart.
+    """Policy that tells a restart of the vehicle, a clock that was set, and a late message apart.
 
     A vehicle has restarted where its clock begins anew near zero: it goes back by more than
     `min_restart_step_s`, to within `max_boot_s` of zero, and to at most half of what it said. Any

@@ -70,7 +70,7 @@ class SightPolicy:
 
 
 class Horizons(NamedTuple):
-    """What the pencils of all arcs (2 each, counter-clockwise first) and points see.
+    """Horizons of the pencils of all arcs (2 each, counter-clockwise first) and points.
 
     Attributes
     ----------

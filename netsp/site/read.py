@@ -1,7 +1,7 @@
 """Import of a problem from a map, by the contract of docs/sites.md.
 
-All that is wrong is told at once, and every feature of the map ends in the ledger: used as one
-kind, or left out for a reason.
+All complaints are collected and raised together. Every feature of the map ends in the ledger: used
+as one kind, or left out for a reason.
 """
 
 from __future__ import annotations
@@ -398,7 +398,7 @@ class _Site:
     def _table_places(
         self, kind: UsedAs, file: str | Path | None
     ) -> list[tuple[Feature, tuple[float, float, float]]]:
-        """Return the rows of a table that was given besides, and their places in the plane."""
+        """Return the rows of a table of goals or candidates, and their places in the plane."""
         import shapely
 
         if file is None:
