@@ -1,5 +1,6 @@
 """Tours in space: the fewest metres, a tether that fits, and nothing that is wound up."""
 
+import dataclasses
 import heapq
 import itertools
 import json
@@ -22,7 +23,7 @@ from netsp.space.judge import verify_mission
 from netsp.space.labels import LENGTHS, STEPS, axes_of, lower_end, nth_axis, staircase
 from netsp.space.legs import Legs, Ways
 from netsp.space.places import Places
-from netsp.space.plan import plan
+from netsp.space.plan import _best_driven, plan
 from netsp.space.states import Effort, first_states
 from netsp.space.water import Water, has_room
 
@@ -332,6 +333,26 @@ def test_a_leg_that_arrives_in_one_direction_only_is_gone_in_that_direction():
             driven = board.driven(tour)
             assert driven.fault is None
             assert driven.tour == [v, w]
+
+
+def test_a_tour_whose_only_way_is_forbidden_when_the_time_is_up_is_not_driven_again(monkeypatch):
+    water, places = free_bar()
+    states = first_states(water, places, 19.8, Effort.of(2), Clock())
+    a, b = states.of[0][0], states.of[1][0]
+    own_way, driven = Board._own_way, Board.driven
+    # the robot gets to b by way of a alone, and whatever is driven is at fault on that leg
+    monkeypatch.setattr(Board, "_own_way", lambda self, v: own_way(self, v) if v == a else None)
+    monkeypatch.setattr(
+        Board, "driven",
+        lambda self, tour: dataclasses.replace(driven(self, tour), fault=(min(a, b), max(a, b))),
+    )  # fmt: skip
+    board = Board(water, states)
+    line = places.points[[0, 1]]
+    board.take(Legs({(a, b): line, (b, a): line[::-1]}), Clock())
+    assert board.leads_to([a, b])
+    assert _best_driven(board, Clock(0.0), lambda _: None, None, 1.0, {"seed": 0}) is None
+    assert board.leads_to([a])
+    assert not board.leads_to([a, b])
 
 
 def test_ways_made_of_tethers_are_ways_of_their_words_and_no_bound_rests_on_them(posts):

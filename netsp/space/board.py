@@ -262,6 +262,18 @@ class Board:
         self._forbidden.add(pair)
         return pair not in self._cut
 
+    def leads_to(self, tour: Sequence[int]) -> bool:
+        """Return whether the robot gets from the start to every state of a tour.
+
+        A leg that is forbidden may have been the only way to a state.
+
+        Parameters
+        ----------
+        tour : sequence of int
+            States.
+        """
+        return all(np.isfinite(self._home[v]) for v in tour)
+
     @property
     def _usable(self) -> list[int]:
         """States that the robot gets to."""

@@ -638,8 +638,9 @@ def _best_driven(
         driven = board.driven(tour)
         if driven.fault is None:
             return with_status(result, driven, ROUNDING), driven
-        if not board.forbid(driven.fault) and clock.up:
-            return None
+        joined = board.forbid(driven.fault)
+        if clock.up and not (joined and board.leads_to(tour)):
+            return None  # no time to solve again, and this tour cannot be driven any more
         warm = None  # it may go along that leg
         again += 1
         if not clock.up:

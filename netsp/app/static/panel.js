@@ -116,7 +116,7 @@ function imported(site) {
     const first = element("tr", element("td", layer.layer || "(all)"), element("td", String(layer.features)), element("td", used || "–"));
     const out = layer.left_out.map((group) => {
       const cell = element("td", `${group.features} left out: ${group.reason}`);
-      cell.colSpan = 3;
+      cell.setAttribute("colspan", "3");
       return element("tr", cell);
     });
     return [first, ...out];
