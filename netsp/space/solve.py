@@ -79,9 +79,10 @@ class MissionPolicy:
         Share of the time until home that a flight by going straight on must save to replace a tour
         with a bound. Stopping within reach of the start saves less than the default.
     first_tour_s : float
-        CPU seconds, at least 0, until which the tour in the order of the file is worked on even if
-        the limit is shorter. A smaller number leaves more missions without any tour when the limit
-        is short; with a larger one, very large missions end later.
+        CPU seconds, at least 0, until which the first tour is worked on even if the limit is
+        shorter: the one in the order of the file or, where that is no tour, another. A smaller
+        number leaves more missions without any tour when the limit is short; with a larger one,
+        very large missions end later.
     potential : PotentialParams
         Effort of the bound on each leg.
     """
@@ -546,17 +547,23 @@ def _search(
     def next_plan() -> SpacePlan | None:
         return clock.bounded("looking for tours", lambda: next(candidates, None), winds_down=True)
 
+    # where the order of the file cannot be driven, the first tour is found here
+    needs_tour = found.best is None
+    first_tour_s = flights.policy.first_tour_s if needs_tour else 0.0
     try:
-        while (plan := next_plan()) is not None:
-            if plan.kind == PLANE and found.best is not None and found.best.tour.solver == PLANE:
-                continue  # the accepted tour, for the whole tether, is at most as long
-            clock.bounded(
-                "bounding all tours", partial(_raise_bound, out, plan, flights, clock, seed)
-            )
-            out.plan = out.plan if out.plan is not None and plan.kind == OUT_AND_BACK else plan
-            found.offer(_of_plan(plan, name, seed), f"the tour ({plan.kind})")
-            if plan.kind == TAUT_LEGS and found.best is not None:
-                break
+        with clock.at_least(first_tour_s):
+            while (plan := next_plan()) is not None:
+                best = found.best
+                if plan.kind == PLANE and best is not None and best.tour.solver == PLANE:
+                    continue  # the accepted tour, for the whole tether, is at most as long
+                clock.bounded(
+                    "bounding all tours", partial(_raise_bound, out, plan, flights, clock, seed)
+                )
+                out.plan = out.plan if out.plan is not None and plan.kind == OUT_AND_BACK else plan
+                found.offer(_of_plan(plan, name, seed), f"the tour ({plan.kind})")
+                has_tour = found.best is not None
+                if has_tour and (plan.kind == TAUT_LEGS or (needs_tour and clock.up)):
+                    break
     except (InputError, LimitReachedError) as error:
         if found.best is None or not found.best.tour.stops:
             raise
