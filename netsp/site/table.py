@@ -68,8 +68,7 @@ def from_table(
                 f"180 degrees, got {lat:g} and {lon:g}"
             )
         places[:, :2] = np.asarray(projection.to_plane(places[:, :2]))
-    if on_note is not None and table.has_decimal_commas:
-        on_note(f"{file}: numbers are read with decimal commas")
-    if on_note is not None and (unused := table.left_out([*used, label])):
-        on_note(f"{file}: unused columns: {', '.join(unused)}")
+    if on_note is not None:
+        for note in table.notes([*used, label]):
+            on_note(f"{file}: {note}")
     return places, [table.text(k, label) or None for k in range(len(table.rows))]
