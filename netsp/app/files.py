@@ -80,6 +80,8 @@ class ImportAnswers:
         Viewpoints about each obstacle.
     standoff
         Distance of viewpoints from its surface, metres.
+    units
+        Unit of lengths in the file, as ``mm``.
     """
 
     base: str | None = None
@@ -89,6 +91,7 @@ class ImportAnswers:
     crs: str | None = None
     viewpoints: int | None = None
     standoff: float | None = None
+    units: str | None = None
 
     @classmethod
     def parse(cls, given: Mapping[str, str]) -> ImportAnswers:
@@ -114,7 +117,7 @@ class ImportAnswers:
         if viewpoints is not None and viewpoints != int(viewpoints):
             raise InputError(f"viewpoints: expected a whole number, got {viewpoints:g}")
         return cls(
-            base=said.get("base"), crs=said.get("crs"),
+            base=said.get("base"), crs=said.get("crs"), units=said.get("units"),
             viewpoints=None if viewpoints is None else int(viewpoints),
             tether=_positive(said, "tether"), radius=_positive(said, "radius"),
             line_width=_positive(said, "line_width"), standoff=_positive(said, "standoff"),
@@ -231,7 +234,7 @@ def _site(
     looking = Looking(answers.viewpoints or 1, answers.standoff or 0.0) if asked else None
     options = SiteOptions(
         tether=answers.tether, radius=answers.radius, line_width=answers.line_width,
-        crs=answers.crs, looking=looking,
+        crs=answers.crs, units=answers.units, looking=looking,
     )  # fmt: skip
     try:
         found = import_site(file, about, options=options)

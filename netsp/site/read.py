@@ -476,7 +476,7 @@ class _Site:
     @property
     def _unit(self) -> float:
         """Return the metres per unit of the file; the unit in the options overrides the file's."""
-        return UNITS[self.said.units or self.map.unit or "m"]
+        return UNITS[self.said.units] if self.said.units else self.map.metres or 1.0
 
     def _plane(self, shape: shapely.Geometry) -> Any:
         """A shape in metres in the problem's plane."""
@@ -498,6 +498,11 @@ class _Site:
         in metres by its format."""
         depth = self._depth(feature)
         if depth is not None:
+            if depth < 0.0:
+                self._complain(
+                    f"{self._called(feature)}: depth: counts downwards; expected 0 or more, got "
+                    f"{depth:g} m; if it is a height, give the point itself the height"
+                )
             return 0.0 - depth
         at = point if point is not None else feature.shape
         if feature.is_above_floor:
@@ -555,8 +560,8 @@ class _Site:
     def _name(self, feature: Feature) -> str | None:
         value = self._get(feature, "name")
         if value is not None:
-            return str(value)
-        return feature.identity or None
+            return str(value).strip()
+        return feature.identity.strip() or None
 
     # Goals and obstacles
 
@@ -977,20 +982,17 @@ class _Site:
     # What is checked of the whole
 
     def _check_names(self, things: list[dict[str, Any]], what: str) -> None:
-        seen: dict[str, str] = {}
+        """Number the names that several goals or obstacles share, and say so."""
         _number_parts(things)
-        is_drawing = Path(self.file).suffix.lower() == ".dxf"
-        if self.is_chart or is_drawing:  # names of places or of blocks need not differ
-            _number_names(things)
-        for thing in things:
-            name = thing["name"]
-            if name is not None and name in seen:
-                self._complain(
-                    f"two {what} are named {name!r} ({seen[name]}, {thing['where']}); expected "
-                    "names of their own"
-                )
-            if name is not None:
-                seen.setdefault(name, thing["where"])
+        numbered = _number_names(things)
+        if numbered:
+            shown_names = ", ".join(
+                f"{old!r} is {new!r} ({where})" for old, new, where in numbered[:MAX_NAMED]
+            )
+            self.notes.append(
+                f"names that several {what} share are numbered: {shown_names}"
+                + (f", and {len(numbered) - MAX_NAMED} more" if len(numbered) > MAX_NAMED else "")
+            )
 
     def _check_scale(
         self, goals: list[dict[str, Any]], obstacles: list[dict[str, Any]], anchor: Any,
@@ -1144,10 +1146,11 @@ def _number_parts(things: list[dict[str, Any]]) -> None:
             part["name"] = f"{name} {number}" if len(parts) > 1 else name
 
 
-def _number_names(things: list[dict[str, Any]]) -> None:
-    """Number names that stand more than once: "pier", "pier 2"."""
+def _number_names(things: list[dict[str, Any]]) -> list[tuple[str, str, str]]:
+    """Number names that stand more than once ("pier", "pier 2"); return old, new and place."""
     taken = {thing["name"] for thing in things}
     seen: Counter[str] = Counter()
+    changed = []
     for thing in things:
         name = thing["name"]
         if name is None:
@@ -1159,8 +1162,11 @@ def _number_names(things: list[dict[str, Any]]) -> None:
             if other not in taken:
                 thing["name"] = other
                 taken.add(other)
+                changed.append((name, other, str(thing["where"])))
                 break
             number += 1
+        seen[name] = number
+    return changed
 
 
 def _label(thing: dict[str, Any]) -> str:
