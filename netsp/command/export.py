@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from typing import TYPE_CHECKING
 
 from netsp.command import messages, told
 from netsp.command.types import (
@@ -15,6 +16,10 @@ from netsp.command.types import (
     positive,
 )
 from netsp.errors import InputError, counted
+
+if TYPE_CHECKING:
+    from netsp.export.waypoints import Waypoint
+    from netsp.export.write import Settings
 
 SPEED = 0.5
 """Metres per second, where none is given."""
@@ -95,6 +100,7 @@ def run(args: argparse.Namespace) -> int:
         export,
         fence_points,
         format_of,
+        not_written,
         predicted_s,
     )
     from netsp.judge import verify
@@ -140,6 +146,9 @@ def run(args: argparse.Namespace) -> int:
         })  # fmt: skip
     for line in warnings(problem, solution, points, slack, clearance):
         messages.warning(line)
+    if kind != "csv" and (text := not_written(problem, kind)):
+        messages.note(text)
+    _note_bends(points, settings)
     if kind in ("plan", "wpl"):
         if kind == "plan" and fence_points(problem) > MOST_FENCE_POINTS:
             messages.warning(
@@ -162,13 +171,19 @@ def run(args: argparse.Namespace) -> int:
             messages.note(
                 f"{counted(shallow, 'waypoint')} shallower than {SHALLOWEST} m moved to that depth"
             )
-        if kind == "wpl" and settings.hold is not None and settings.hold <= settings.bend:
-            messages.note(
-                "goals hold no longer than bends, so that nothing tells them apart in this format; "
-                "a .plan or .geojson keeps them"
-            )
         messages.note("home is assumed to be at the surface above the base; do not set it by hand")
     return 0
+
+
+def _note_bends(points: list[Waypoint], settings: Settings) -> None:
+    """Say so where bends hold longer than usual, so that goals are told from them."""
+    from netsp.export.write import told_apart
+
+    if (seconds := told_apart(points, settings).bend) > settings.bend:
+        messages.note(
+            f"the vehicle holds {seconds} s at bends, because it holds {settings.bend} s at goals: "
+            "this tells goals from bends when the file is imported"
+        )
 
 
 def _mission(args: argparse.Namespace) -> int:
@@ -230,6 +245,7 @@ def _mission(args: argparse.Namespace) -> int:
             messages.note(
                 f"{counted(shallow, 'waypoint')} shallower than {SHALLOWEST} m moved to that depth"
             )
+        _note_bends(done.points, settings)
         messages.note("the solids are not written: fences are upright, whatever the depth")
         messages.note("home is assumed to be at the surface above the start; do not set it by hand")
     return 0

@@ -38,6 +38,7 @@ from netsp.site.contract import (
 from netsp.site.crop import CropWindow, cropped
 from netsp.site.drawing import read_dxf
 from netsp.site.feature import Feature, Map
+from netsp.site.fence_list import read_fence_list, read_rally_list
 from netsp.site.geojson import read_geojson
 from netsp.site.gpx import read_gpx_map
 from netsp.site.kml_pages import read_kml
@@ -45,7 +46,7 @@ from netsp.site.ledger import Ledger
 from netsp.site.line_work import is_land, lines_of, outlines, widened
 from netsp.site.options import SiteOptions
 from netsp.site.projection import Projection
-from netsp.site.qgc_plan import read_plan
+from netsp.site.qgc_plan import is_plan, read_plan
 from netsp.site.sea_floor import SeaFloor
 from netsp.site.shapes import outline_of, simple_polygons, spurs_of
 from netsp.site.table import from_table
@@ -60,7 +61,7 @@ CHART_SUFFIXES = (".000",)
 
 EARTH_READERS = {
     ".plan": read_plan, ".waypoints": read_waypoint_list, ".wpl": read_waypoint_list,
-    ".gpx": read_gpx_map,
+    ".gpx": read_gpx_map, ".fen": read_fence_list, ".ral": read_rally_list,
 }  # fmt: skip
 """Readers of formats that are in degrees always, by extension."""
 
@@ -211,10 +212,15 @@ def read_map(file: str | Path, crs: str | None = None, units: str | None = None)
         Not readable.
     """
     suffix = Path(file).suffix.lower()
-    if suffix in EARTH_READERS or (suffix == ".txt" and is_waypoint_list(file)):
+    reader = EARTH_READERS.get(suffix)
+    if suffix == ".txt" and is_waypoint_list(file):
+        reader = read_waypoint_list
+    elif suffix == ".json" and is_plan(file):
+        reader = read_plan
+    if reader is not None:
         if crs is not None:
             raise InputError(f"--crs: {file} is in degrees always; expected no system")
-        return EARTH_READERS.get(suffix, read_waypoint_list)(file)
+        return reader(file)
     if suffix == ".dxf":
         return read_dxf(file, crs, units)
     if suffix in (".kml", ".kmz"):
@@ -956,8 +962,23 @@ class _Site:
                 f"{places}: bounds that are not closed; expected a closed line or a polygon"
             )
             return None, []
+        if len(whole) > 1 and all(f.get("fence") == "inclusion" for f in features):
+            common = shapely.intersection_all(list(map(shapely.make_valid, whole)))
+            areas_in = [g for g in shapely.get_parts(common) if g.geom_type == "Polygon"]
+            whole = [shapely.MultiPolygon(areas_in)]
+            self.notes.append(
+                f"{len(features)} inclusion fences ({places}): the bounds are where all of them "
+                "overlap, because the vehicle stays within each"
+            )
+            if whole[0].area <= 0.0:
+                self._complain(f"{places}: inclusion fences that do not overlap; expected one area")
+                return None, []
         if len(whole) != 1:
-            self._complain(f"expected one outline of kind bounds, got {len(whole)}: {places}")
+            self._complain(
+                f"expected one outline of kind bounds, got {len(whole)}: {places}; keep one, or "
+                "make obstacles of what lies between them",
+                "; --map ignore=LAYER leaves out a layer",
+            )
             return None, []
         feature = features[0]
         drawn = shapely.get_parts(whole[0])
