@@ -226,7 +226,7 @@ SITE = Problem(
 )  # fmt: skip
 
 
-@pytest.mark.parametrize("kind", ["plan", "waypoints", "geojson", "kml"])
+@pytest.mark.parametrize("kind", ["plan", "waypoints", "geojson", "kml", "kmz"])
 @pytest.mark.parametrize("heading", [0.0, 25.0])
 @pytest.mark.parametrize("hold", [None, 0, 1, 30])
 def test_what_export_writes_comes_back_as_the_same_goals(tmp_path, kind, heading, hold):
@@ -301,6 +301,32 @@ def test_a_tour_in_kml_follows_the_schema_and_draws_every_tether(tmp_path):
     modes = {e.text for e in root.iter(f"{tag}altitudeMode")}
     assert modes == {"absolute"}
     assert len(import_site(file).problem.goals) == 3
+
+
+def test_a_tour_in_kml_and_kmz_is_what_gdal_reads(tmp_path):
+    import zipfile
+
+    pyogrio = pytest.importorskip("pyogrio")
+    tour = solve(SITE)
+    page, packed = tmp_path / "tour.kml", tmp_path / "tour.kmz"
+    points = export(SITE, tour, page, "kml", Projection(LAT, LON))
+    export(SITE, tour, packed, "kmz", Projection(LAT, LON))
+    with zipfile.ZipFile(packed) as archive:
+        assert archive.namelist() == ["doc.kml"]
+        assert archive.read("doc.kml") == page.read_bytes()
+    assert import_site(packed).problem.goals == import_site(page).problem.goals
+    for file in (page, packed):
+        shapes = {
+            layer: shapely.from_wkb(pyogrio.raw.read(file, layer=layer)[2])
+            for layer, _ in pyogrio.list_layers(file)
+        }
+        assert {layer: len(own) for layer, own in shapes.items()} == {
+            "base": 1, "goals": 3, "obstacles": 2, "path": 1, "tethers": 3,
+        }  # fmt: skip
+        drawn = shapely.get_coordinates(shapes["path"], include_z=True)
+        flown = np.array([p.position for p in points])
+        there = Projection(LAT, LON).to_plane(drawn[:, 1::-1])
+        np.testing.assert_allclose(np.column_stack([there, drawn[:, 2]]), flown, atol=1e-3)
 
 
 def test_waypoints_that_are_passed_are_named_and_may_be_goals(tmp_path, capsys):

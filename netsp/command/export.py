@@ -37,8 +37,8 @@ def arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument("--problem", metavar="FILE", help="the problem that a solution solves")
     p.add_argument(
         "--format", metavar="NAME",
-        help="plan (QGroundControl), wpl (QGC WPL 110), geojson, kml or csv; default: by the "
-        "extension",
+        help="plan (QGroundControl), wpl (QGC WPL 110), geojson, kml, kmz or csv; default: by "
+        "the extension",
     )  # fmt: skip
     p.add_argument(
         "--origin", metavar="LAT,LON[,HEADING]",

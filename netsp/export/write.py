@@ -24,10 +24,10 @@ import numpy as np
 
 from netsp.errors import InputError
 from netsp.execute.plan import HOME
-from netsp.export.kml import kml_of
+from netsp.export.kml import kml_of, kmz_of
 from netsp.export.waypoints import Waypoint, waypoints_of
 from netsp.fields import checked_argument, checked_instance
-from netsp.files import cell, write_text
+from netsp.files import cell, write_bytes, write_text
 from netsp.problem import Circle, Problem
 from netsp.site.projection import Projection
 from netsp.solution import Solution
@@ -141,8 +141,31 @@ def export(
             f"solution: needs {len(points)} waypoints, and the vehicle takes "
             f"{settings.max_waypoints}; raise that number if yours takes more"
         )
-    write_text(file, FORMATS[kind](problem, points, projection, settings))
+    write_page(file, kind, FORMATS[kind](problem, points, projection, settings))
     return points
+
+
+def write_page(file: str | Path, kind: str, text: str) -> None:
+    """Write the text of a format to a file; for ``kmz``, into an archive.
+
+    Parameters
+    ----------
+    file : str or Path
+        The file.
+    kind : str
+        One of `FORMATS`.
+    text : str
+        Text that the format gives.
+
+    Raises
+    ------
+    InputError
+        It cannot be written.
+    """
+    if kind == "kmz":
+        write_bytes(file, kmz_of(text))
+    else:
+        write_text(file, text)
 
 
 def check_settings(kind: str, settings: Settings) -> None:
@@ -439,6 +462,7 @@ FORMATS: dict[str, Callable[[Problem, list[Waypoint], Projection | None, Setting
     "geojson": _geojson,
     "kml": _kml,
     "csv": _csv,
+    "kmz": _kml,  # packed by `write_page`
 }
 
 __all__ = ["FORMATS", "Settings", "altitude", "export"]
@@ -446,7 +470,7 @@ __all__ = ["FORMATS", "Settings", "altitude", "export"]
 
 EXTENSIONS = {
     ".plan": "plan", ".waypoints": "wpl", ".txt": "wpl", ".geojson": "geojson", ".json": "geojson",
-    ".kml": "kml", ".csv": "csv",
+    ".kml": "kml", ".kmz": "kmz", ".csv": "csv",
 }  # fmt: skip
 """Which format a file's name asks for."""
 
