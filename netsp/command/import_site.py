@@ -111,7 +111,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     charts = p.add_argument_group("charts")
     charts.add_argument(
-        "--draught", type=length, metavar="D",
+        "--draught", type=depth, metavar="D",
         help="areas that may be shallower than this (m), or are not surveyed, become obstacles",
     )  # fmt: skip
     charts.add_argument(

@@ -212,6 +212,8 @@ class Map:
         Features that cannot be used.
     metres
         Metres per unit of its plane as the file states it, if it does.
+    is_chart
+        Whether it is an S-57 chart, whose object classes decide kinds.
     """
 
     features: tuple[Feature, ...]
@@ -221,6 +223,7 @@ class Map:
     notes: tuple[str, ...] = field(default=())
     unread: tuple[Unread, ...] = ()
     metres: float | None = None
+    is_chart: bool = False
 
     @property
     def layer_names(self) -> set[str]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
@@ -23,8 +23,22 @@ from netsp.fields import checked_number
 from netsp.import_record import KIND_COLUMNS, MAX_NAMED, CropCircle, Site, UsedAs
 from netsp.models import explain, shown
 from netsp.problem import Problem
-from netsp.site.chart_classes import EQUIPMENT, chart_radius, chart_width, lone_equipment
-from netsp.site.chart_depths import chart_floor, shallow_areas
+from netsp.site.chart_classes import (
+    EQUIPMENT,
+    chart_radius,
+    chart_width,
+    depth_range,
+    lone_equipment,
+    sounding_depth,
+)
+from netsp.site.chart_depths import (
+    chart_floor,
+    depthless_share,
+    shallow_areas,
+    shoal_soundings,
+    uncharted_share,
+)
+from netsp.site.chart_reader import is_chart, read_chart
 from netsp.site.contract import (
     FIELDS,
     RADIUS,
@@ -55,9 +69,6 @@ from netsp.site.waypoint_list import is_waypoint_list, read_waypoint_list
 
 if TYPE_CHECKING:
     import shapely
-
-CHART_SUFFIXES = (".000",)
-"""Extensions of S-57 charts."""
 
 EARTH_READERS = {
     ".plan": read_plan, ".waypoints": read_waypoint_list, ".wpl": read_waypoint_list,
@@ -221,6 +232,8 @@ def read_map(file: str | Path, crs: str | None = None, units: str | None = None)
         if crs is not None:
             raise InputError(f"--crs: {file} is in degrees always; expected no system")
         return reader(file)
+    if is_chart(file):
+        return read_chart(file, crs, units)
     if suffix == ".dxf":
         return read_dxf(file, crs, units)
     if suffix in (".kml", ".kmz"):
@@ -240,6 +253,10 @@ BASE_OFF = 0.01
 centimetre are written with seven decimals of a degree."""
 
 SKIP_OPTION = "; leave out what is out of reach with --skip-unreachable"
+
+MIN_SHARE = 5e-4
+"""Share of the tether's reach from which on a note says what is not known there: 0.05 %, the least
+that two digits show as more than a rounding of areas."""
 
 MOST_OF_A_KIND = 5
 """Goals out of reach that are told one by one."""
@@ -264,7 +281,7 @@ class _Site:
     floor: SeaFloor | None = None
 
     def __post_init__(self) -> None:
-        self.is_chart = Path(self.file).suffix.lower() in CHART_SUFFIXES
+        self.is_chart = self.map.is_chart
         for name, value in (("draught", self.said.draught), ("floor", self.said.floor or None)):
             if value is not None and not self.is_chart:
                 raise InputError(
@@ -294,12 +311,16 @@ class _Site:
         clearance = self._length(own, "clearance", self.said.clearance) or 0.0
         goals = self._goals(parts["goal"]) + self._table_goals()
         candidates = [place for _, place in self._table_places("candidate", self.said.candidates)]
-        if tether is not None and (self.is_chart if self.said.crop is None else self.said.crop):
-            self.window = CropWindow.about(
+        reach = None
+        if tether is not None:
+            reach = CropWindow.about(
                 [anchor, *candidates], tether + clearance, self.said.crop_margin
             )
+        if self.is_chart if self.said.crop is None else self.said.crop:
+            self.window = reach
         if self.is_chart:
-            self._chart_depths(parts)
+            places = {"base": anchor, **{_label(goal): goal["position"] for goal in goals}}
+            self._chart_depths(parts, places, reach)
         free = [anchor, *candidates, *(g["position"] for g in goals)]
         obstacles = self._within_crop(self._obstacles(parts["obstacle"], free))
         bounds, islands = self._bounds(parts["bounds"])
@@ -376,22 +397,36 @@ class _Site:
                 self.notes.append(f"layer {layer!r} is empty")
         return parts
 
-    def _chart_depths(self, parts: dict[str, list[Feature]]) -> None:
+    def _chart_depths(
+        self, parts: dict[str, list[Feature]], places: Mapping[str, Any], reach: CropWindow | None
+    ) -> None:
         """Make obstacles of shallow areas, and the sea floor, where they are asked for."""
+        free = [f for f in self.map.features if self.kinds.get(f.layer.lower()) != "ignore"]
         left_out = [
-            f for f in self.map.features
-            if self.ledger.is_left_out(f) and f.layer.lower() not in self.kinds
-        ]  # fmt: skip
-        if self.said.draught is not None:
-            shallow = shallow_areas(left_out, self.said.draught)
-            for feature in shallow:
+            f for f in free if self.ledger.is_left_out(f) and f.layer.lower() not in self.kinds
+        ]
+        draught = self.said.draught
+        if draught is not None:
+            shallow = shallow_areas(left_out, draught)
+            self._check_depth(shallow, places, draught)
+            shoals = shoal_soundings(left_out, draught, shallow)
+            for feature in (*shallow, *shoals):
                 self.ledger.use(feature, "obstacle")
-            parts["obstacle"] += shallow
+            parts["obstacle"] += [*shallow, *shoals]
+        if reach is not None:
+            if draught is not None:
+                self._note_share(
+                    depthless_share(self.map.features, self._plane, reach),
+                    "is water whose depth the chart does not give; --draught makes no obstacle of "
+                    "it",
+                )
+            self._note_share(
+                uncharted_share(self.map.features, self._plane, reach),
+                "is not on this chart, and free of obstacles in the problem",
+            )
         if not self.said.floor or self.complaints:
             return
-        self.floor, found = chart_floor(
-            self.map.features, self._plane, self.window, self.said.floor_cell
-        )
+        self.floor, found = chart_floor(free, self._plane, self.window, self.said.floor_cell)
         for feature in found.used:  # a shallow area is an obstacle, too
             if self.ledger.is_left_out(feature):
                 self.ledger.use(feature, "floor")
@@ -400,6 +435,30 @@ class _Site:
                 self.ledger.leave_out(feature, self._beyond_reach)
         for feature in found.depthless:
             self.ledger.leave_out(feature, "a depth that the chart does not give")
+
+    def _check_depth(
+        self, shallow: list[Feature], places: Mapping[str, Any], draught: float
+    ) -> None:
+        """Complain of places that the robot needs in water that may be too shallow."""
+        import shapely
+
+        areas = [self._plane(feature.shape) for feature in shallow]
+        tree = shapely.STRtree(areas)
+        for called, place in places.items():
+            held = tree.query(shapely.Point(place[:2]), predicate="within").tolist()
+            if not held:
+                continue
+            area = shallow[min(held)]
+            least, _ = depth_range(area)
+            depth = "of unknown depth" if least is None else f"from {_metres(least)} of depth on"
+            self._complain(
+                f"{called}: lies in {self._called(area)}, {depth}, and the draught is "
+                f"{_metres(draught)}; expected a place in deeper water, or a smaller draught"
+            )
+
+    def _note_share(self, share: float, what: str) -> None:
+        if share >= MIN_SHARE:
+            self.notes.append(f"{100.0 * share:.2g} % of the tether's reach {what}")
 
     def _table_places(
         self, kind: UsedAs, file: str | Path | None
@@ -482,6 +541,8 @@ class _Site:
     @property
     def _unit(self) -> float:
         """Return the metres per unit of the file; the unit in the options overrides the file's."""
+        if self.is_chart:  # its reader converts them
+            return 1.0
         return UNITS[self.said.units] if self.said.units else self.map.metres or 1.0
 
     def _plane(self, shape: shapely.Geometry) -> Any:
@@ -535,6 +596,8 @@ class _Site:
                 value = self._number(feature, "depth", str(name).lower())
                 return None if value is None else -meaning.factor * value
         depth = self._number(feature, "depth")
+        if depth is None and self.is_chart:
+            return sounding_depth(feature)
         return None if depth is None else depth * self._unit
 
     def _get(self, feature: Feature, ours: str) -> Any:

@@ -78,11 +78,31 @@ def read_vector(file: str | Path, crs: str | None) -> Map:
     """
     check_file(file)
     with _readable(file) as plain:
-        return _read(file, plain, crs)
+        return read_plain(file, plain, crs)
 
 
-def _read(file: str | Path, plain: str | Path, crs: str | None) -> Map:
-    """Return a file as a map, read where GDAL can."""
+def read_plain(file: str | Path, plain: str | Path, crs: str | None) -> Map:
+    """Return a file as a map from a copy of it that GDAL reads.
+
+    Parameters
+    ----------
+    file : str or Path
+        The user's file, for messages.
+    plain : str or Path
+        Where it is read.
+    crs : str, optional
+        Coordinate system, as of `read_vector`.
+
+    Returns
+    -------
+    Map
+        As of `read_vector`.
+
+    Raises
+    ------
+    InputError
+        As of `read_vector`.
+    """
     found = _Found(file)
     places: dict[str, bool] = {}
     is_osm = Path(file).suffix.lower() in OSM_SUFFIXES
@@ -201,6 +221,40 @@ def read_layer(file: str | Path, plain: str | Path, layer: str, notes: list[str]
         for k in range(len(shapes))
     ]
     return GdalLayer(meta.get("crs"), [int(i) for i in ids], list(shapes), properties)
+
+
+def read_rows(
+    file: str | Path, plain: str | Path, layer: str, notes: list[str]
+) -> list[dict[str, Any]]:
+    """Read the rows of a table without places with GDAL.
+
+    Parameters
+    ----------
+    file : str or Path
+        The user's file, for messages.
+    plain : str or Path
+        Where it is read.
+    layer : str
+        Name of the table.
+    notes : list of str
+        Gets what GDAL warns of.
+
+    Returns
+    -------
+    list of dict
+        Column to value, for each row.
+
+    Raises
+    ------
+    InputError
+        Not readable.
+    """
+    meta, _, _, columns = _call(
+        file, notes, _pyogrio().raw.read, plain, layer=layer, read_geometry=False
+    )
+    names = [str(name) for name in meta["fields"]]
+    plain_columns = [[_plain(value) for value in column] for column in columns]
+    return [dict(zip(names, row, strict=True)) for row in zip(*plain_columns, strict=True)]
 
 
 @contextmanager
