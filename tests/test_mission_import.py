@@ -118,8 +118,11 @@ def test_altitudes_are_those_of_their_frame(tmp_path, is_list):
 def test_a_given_base_goes_before_the_planned_home_and_it_is_said(tmp_path):
     file = plan(tmp_path, [item(16)])
     found = import_site(file, Projection(LAT + STEP, LON), options=TETHER)
-    assert any("plannedHomePosition: the base is where --base says, 11.1" in n for n in found.notes)
-    assert not any("--base says" in n for n in import_site(file, HERE, options=TETHER).notes)
+    assert any(
+        "plannedHomePosition: the base is at the place that was given, 11.1" in n
+        for n in found.notes
+    )
+    assert not any("that was given" in n for n in import_site(file, HERE, options=TETHER).notes)
 
 
 def ring(size):

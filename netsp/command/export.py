@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-from typing import TYPE_CHECKING
 
 from netsp.command import messages, told
 from netsp.command.types import (
@@ -16,10 +15,6 @@ from netsp.command.types import (
     positive,
 )
 from netsp.errors import InputError, counted
-
-if TYPE_CHECKING:
-    from netsp.export.waypoints import Waypoint
-    from netsp.export.write import Settings
 
 SPEED = 0.5
 """Metres per second, where none is given."""
@@ -92,17 +87,9 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(f"--problem: {args.solution} is no mission; expected its problem")
     check_writable(args.output, inputs=(args.solution, args.problem))
     from netsp.export.common_depth import at_depth
+    from netsp.export.export_notes import export_notes
     from netsp.export.margins import warnings
-    from netsp.export.write import (
-        MOST_FENCE_POINTS,
-        SHALLOWEST,
-        Settings,
-        export,
-        fence_points,
-        format_of,
-        not_written,
-        predicted_s,
-    )
+    from netsp.export.write import Settings, export, format_of, predicted_s
     from netsp.judge import verify
     from netsp.problem import Problem
     from netsp.site.goal_depths import surface_warning
@@ -146,44 +133,12 @@ def run(args: argparse.Namespace) -> int:
         })  # fmt: skip
     for line in warnings(problem, solution, points, slack, clearance):
         messages.warning(line)
-    if kind != "csv" and (text := not_written(problem, kind)):
-        messages.note(text)
-    _note_bends(points, settings)
-    if kind in ("plan", "wpl"):
-        if kind == "plan" and fence_points(problem) > MOST_FENCE_POINTS:
-            messages.warning(
-                f"the obstacles take {fence_points(problem)} fence points; the vehicle stores "
-                f"about {MOST_FENCE_POINTS} without a card"
-            )
-        above = [
-            problem.goal_name(p.goal)
-            for p in points
-            if p.goal is not None and p.goal >= 0 and p.position[2] > 0.0
-        ]
-        if above:
-            messages.warning(
-                f"{counted(len(above), 'goal')} above the water ({', '.join(above[:3])}"
-                f"{', …' if len(above) > 3 else ''}): heights are negative below it; moved to "
-                f"{SHALLOWEST} m of depth"
-            )
-        shallow = sum(p.position[2] > -SHALLOWEST for p in points) - len(above)
-        if shallow:
-            messages.note(
-                f"{counted(shallow, 'waypoint')} shallower than {SHALLOWEST} m moved to that depth"
-            )
-        messages.note("home is assumed to be at the surface above the base; do not set it by hand")
+    said = export_notes(problem, points, kind, settings)
+    for line in said.warnings:
+        messages.warning(line)
+    for line in said.notes:
+        messages.note(line)
     return 0
-
-
-def _note_bends(points: list[Waypoint], settings: Settings) -> None:
-    """Say so where bends hold longer than usual, so that goals are told from them."""
-    from netsp.export.write import told_apart
-
-    if (seconds := told_apart(points, settings).bend) > settings.bend:
-        messages.note(
-            f"the vehicle holds {seconds} s at bends, because it holds {settings.bend} s at goals: "
-            "this tells goals from bends when the file is imported"
-        )
 
 
 def _mission(args: argparse.Namespace) -> int:
@@ -194,6 +149,7 @@ def _mission(args: argparse.Namespace) -> int:
         raise InputError(f"--depth: {args.solution} is a mission, which has depths of its own")
     check_writable(args.output, inputs=(args.solution,))
     from netsp.command.interrupts import until_interrupted
+    from netsp.export.export_notes import bend_note
     from netsp.export.mission import export_mission
     from netsp.export.write import SHALLOWEST, Settings, format_of, predicted_s
     from netsp.online.mission import Mission
@@ -245,7 +201,8 @@ def _mission(args: argparse.Namespace) -> int:
             messages.note(
                 f"{counted(shallow, 'waypoint')} shallower than {SHALLOWEST} m moved to that depth"
             )
-        _note_bends(done.points, settings)
+        if (text := bend_note(done.points, settings)) is not None:
+            messages.note(text)
         messages.note("the solids are not written: fences are upright, whatever the depth")
         messages.note("home is assumed to be at the surface above the start; do not set it by hand")
     return 0

@@ -200,6 +200,12 @@ def features_of_items(
             above_sea = above_sea or not is_bend
             z -= home_altitude or 0.0
         out.features.append(_visited(item, (lon, lat), z, is_bend=is_bend, by_mark=has_marks))
+    passed = [f for f in out.features if f.layer == BENDS] if not has_marks else []
+    if passed:
+        out.notes.append(
+            f"{counted(len(passed), 'waypoint')} passed by: taken as bends of the path; make goals "
+            f"of them with --map goal={BENDS}"
+        )
     if terrain:
         out.complaints.append(
             f"{counted(len(terrain), 'waypoint')} ({terrain[0]}): altitudes above the terrain are "
@@ -281,8 +287,7 @@ def _visited(
     if is_bend:
         why = (
             "a bend of the tour, as netsp wrote it" if by_mark
-            else f"passed: it holds for {item.hold_s:g} s, as at home or less than others; use it "
-            f"with --map goal={BENDS}"
+            else f"passed: it holds for {item.hold_s:g} s, as at home or less than others"
         )  # fmt: skip
         return Feature(item.where, BENDS, "", {"kind": "ignore", "why": why}, point)
     properties = {"kind": "goal", "command": VISITED[item.command]}

@@ -531,8 +531,8 @@ class _Site:
             away = float(np.hypot(there.x - x, there.y - y))
             if away > BASE_OFF:
                 self.notes.append(
-                    f"{own.where}: the base is where --base says, {_metres(away)} away; only the "
-                    "properties of the file's base are used"
+                    f"{own.where}: the base is at the place that was given, {_metres(away)} away; "
+                    "only the properties of the file's base are used"
                 )
         return (x, y, z), own
 

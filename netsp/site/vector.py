@@ -116,7 +116,8 @@ def read_plain(file: str | Path, plain: str | Path, crs: str | None) -> Map:
         own = crs if crs is not None else layer.crs
         if crs is not None and layer.crs is not None and not _is_same_system(crs, layer.crs):
             found.notes.append(
-                f"layer {name!r}: its own system {_system_name(layer.crs)} is not used: --crs {crs}"
+                f"layer {name!r}: its own system {_system_name(layer.crs)} is not used; it is read "
+                f"as {crs}"
             )
         if own is not None and own.startswith(PLANE_SYSTEMS) and map_unit(own) == 1.0:
             own = LOCAL  # a plan without a place on the earth says so itself

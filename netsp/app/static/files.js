@@ -87,7 +87,8 @@ export function files(page, link, say) {
     a.download = named ? named[1] : name;
     a.click();
     setTimeout(() => URL.revokeObjectURL(a.href), 10000);
-    say(`${a.download} is downloaded`);
+    const notes = decodeURIComponent(answer.headers.get("x-notes") ?? "").split("\n").filter(Boolean);
+    say([`${a.download} is downloaded`, ...notes].join("; "));
   }
 
   page.download = fetched;
