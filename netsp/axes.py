@@ -860,7 +860,7 @@ def height_axis(crs: Any) -> HeightAxis:
 
 
 def map_unit(crs: Any) -> float | None:
-    """Return the metres per unit of a coordinate system's map; None where it is in degrees.
+    """Return the metres per unit of a coordinate system's map; None where it is in angles.
 
     Parameters
     ----------
@@ -872,10 +872,11 @@ def map_unit(crs: Any) -> float | None:
     InputError
         Unknown system, or pyproj is not installed.
     """
-    for axis in _system(crs).axis_info:
+    system = _system(crs)
+    if system.is_geographic:  # in degrees or grads
+        return None
+    for axis in system.axis_info:
         if axis.direction.lower() not in ("up", "down"):
-            if axis.unit_name and "degree" in axis.unit_name.lower():
-                return None
             return float(axis.unit_conversion_factor or 1.0)
     return 1.0
 

@@ -240,6 +240,48 @@ def test_bad_kml_is_refused_in_one_line_with_its_name(data, said, tmp_path):
     assert "\n" not in str(error.value)
 
 
+@pytest.mark.parametrize(
+    ("body", "tag"),
+    [
+        ("<Placemark><Folder>{}</Folder></Placemark>", "Folder"),
+        ("<Placemark>{}</Placemark>", "Placemark"),
+        (
+            "<Placemark><MultiGeometry><gx:Circle>{}</gx:Circle></MultiGeometry></Placemark>",
+            "Circle",
+        ),
+        ("<Other>{}</Other>", "Other"),
+    ],
+)
+def test_places_where_kml_has_none_are_named(body, tag, tmp_path):
+    found = imported(tmp_path / "s.kml", kml(START, body.format(mark("x", area(5, 5)))))
+    assert not found.problem.obstacles
+    assert any(f"an element {tag}" in reason for reason in reasons(found))
+
+
+@pytest.mark.parametrize("name", ["&lt;Null&gt;", "  ", "", "None", "unnamed"])
+def test_names_that_several_share_are_numbered_and_no_names_stay_none(name, tmp_path):
+    piles = [mark("P", area(10 * k, 5)) for k in range(1, 4)] + [mark("P 2", area(50, 5))]
+    nameless = [mark(name, area(10 * k, 20)) for k in range(2)]
+    goals = folder(
+        "Goals", mark("G", point(1, -5)), mark("G", point(3, -5)), mark(name, point(5, -5))
+    )
+    found = imported(tmp_path / "n.kml", kml(START, goals, folder("Piles", *piles, *nameless)))
+    assert [o.name for o in found.problem.obstacles] == ["P", "P 3", "P 4", "P 2", None, None]
+    assert [g.name for g in found.problem.goals] == ["G", "G 2", "G 3", None]
+    assert sum("share are numbered" in note for note in found.notes) == 2
+
+
+def test_a_negative_depth_is_refused_with_what_to_do(tmp_path):
+    deep = "<ExtendedData><Data name='depth'><value>-4</value></Data></ExtendedData>"
+    text = kml(START, folder("Goals", mark("D", point(5, 5), deep)))
+    with pytest.raises(InputError, match=r"Goals\[1\] \(D\): depth: .*0 or more, got -4 m"):
+        imported(tmp_path / "d.kml", text)
+    table = tmp_path / "goals.csv"
+    table.write_text("x,y,depth\n5,5,3\n7,5,-3\n")
+    with pytest.raises(InputError, match=r"goals\.csv: row 2: 'depth' .*0 or more, got -3 m"):
+        imported(tmp_path / "d.kml", kml(START), goals=table)
+
+
 # Drawings
 
 
@@ -865,3 +907,45 @@ def test_a_plan_without_a_place_on_the_earth_is_a_plane(tmp_path):
     assert found.problem.origin is None
     assert found.problem.goals[0].position == (9.0, 0.0, 0.0)
     assert found.problem.obstacles[0].shape().area == pytest.approx(1.0)
+
+
+def test_texts_of_a_map_are_no_goals(tmp_path):
+    (tmp_path / "t.mid").write_text('"base"\n"goal"\n""\n"obstacle"\n')
+    found = imported(
+        tmp_path / "t.mif",
+        'VERSION 300\nDELIMITER ","\nCOORDSYS NONEARTH UNITS "m" BOUNDS (-99,-99) (99,99)\n'
+        "COLUMNS 1\n kind char(10)\nDATA\nPOINT 0 0\nPOINT 9 0\n"
+        'TEXT\n "depth 4"\n 5 5 8 7\n Font ("Arial",0,0,0)\nRECT 3 0 4 1\n',
+    )
+    assert counts(found) == (3, 1)
+    assert reasons(found) == {"writing on the map (a text)": 1}
+
+
+SEQUENCE = [
+    '{"type": "Feature", "properties": {"kind": "base"}, '
+    '"geometry": {"type": "Point", "coordinates": [5.5, 58]}}',
+    '{"type": "Point", "coordinates": [5.5001, 58, -3]}',
+    '{"type": "LineString", "coordinates": [[5.5002, 58], [5.5002, 58.0001]]}',
+]
+
+
+@pytest.mark.parametrize(("before", "after"), [("", "\n"), ("\x1e", "\n"), ("\x1e\n", "")])
+def test_sequences_of_geojson_are_read_whole_or_refused(before, after, tmp_path):
+    text = "".join(f"{before}{part}{after}" for part in SEQUENCE)
+    found = imported(tmp_path / "s.geojsonl", text)
+    assert counts(found) == (3, 0)
+    assert found.problem.goals[0].position[2] == -3.0
+    with pytest.raises(InputError, match=r"s\.geojsonl: (line|text) 3: not JSON"):
+        imported(tmp_path / "s.geojsonl", text[:-20])
+
+
+@pytest.mark.parametrize("crs", ["EPSG:4807", "EPSG:4258"])
+def test_heights_in_a_system_of_angles_are_metres(crs, tmp_path):
+    file = tmp_path / "a.gpkg"
+    spots = [shapely.to_wkb(shapely.Point(2.0 + x, 50.0, -z)) for x, z in ((0, 0), (1e-4, 10))]
+    pyogrio.raw.write(
+        file, np.array(spots, object), [np.array(["base", "goal"], object)], ["kind"],
+        driver="GPKG", crs=crs, geometry_type="Point Z", layer="a",
+    )  # fmt: skip
+    (goal,) = import_site(file, options=SiteOptions(tether=50.0)).problem.goals
+    assert goal.position[2] == -10.0

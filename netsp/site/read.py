@@ -53,7 +53,7 @@ from netsp.site.crop import CropWindow, cropped
 from netsp.site.drawing import read_dxf
 from netsp.site.feature import Feature, Map
 from netsp.site.fence_list import read_fence_list, read_rally_list
-from netsp.site.geojson import read_geojson
+from netsp.site.geojson import read_geojson, read_geojson_sequence
 from netsp.site.gpx import read_gpx_map
 from netsp.site.kml_pages import read_kml
 from netsp.site.ledger import Ledger
@@ -69,6 +69,9 @@ from netsp.site.waypoint_list import is_waypoint_list, read_waypoint_list
 
 if TYPE_CHECKING:
     import shapely
+
+SEQUENCE_SUFFIXES = (".geojsonl", ".geojsons", ".geojsonseq", ".ndjson", ".ndgeojson", ".jsonl")
+"""Extensions of sequences of GeoJSON texts."""
 
 EARTH_READERS = {
     ".plan": read_plan, ".waypoints": read_waypoint_list, ".wpl": read_waypoint_list,
@@ -240,6 +243,8 @@ def read_map(file: str | Path, crs: str | None = None, units: str | None = None)
         found = read_kml(file, crs)
     elif suffix in (".geojson", ".json"):
         found = read_geojson(file, crs)
+    elif suffix in SEQUENCE_SUFFIXES:
+        found = read_geojson_sequence(file, crs)
     else:
         return read_vector(file, crs)
     return found if crs is None else in_degrees(found, crs, file)

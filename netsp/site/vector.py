@@ -37,6 +37,9 @@ PLANE_SYSTEMS = ("LOCAL_CS", "ENGCRS", "ENGINEERINGCRS")
 OSM_SUFFIXES = (".osm", ".pbf")
 """Extensions of OpenStreetMap's own formats."""
 
+TEXT_DRIVERS = ("MapInfo File", "DGN")
+"""GDAL's drivers of formats with texts, which GDAL gives as points with the style of a label."""
+
 SQLITE = b"SQLite format 3\0"
 """First bytes of a GeoPackage."""
 
@@ -50,6 +53,9 @@ SOURCE_PLACE = re.compile(r"^\S+\.(?:cpp|c|h), \d+: ")
 
 UNSUPPORTED = "Geometry type is not supported"
 """Words of pyogrio for layers that are declared to hold faces."""
+
+MIXED_TYPES = "Unrecognized geometry type"
+"""Words of pyogrio for layers whose geometries are of several types, some with heights."""
 
 LOCAL = "local"
 """The coordinate system of a map without a place on the earth."""
@@ -138,7 +144,10 @@ def read_plain(file: str | Path, plain: str | Path, crs: str | None) -> Map:
             "system for all"
         )
     if not places:
-        raise InputError(f"{file}: has no layer with places")
+        raise InputError(
+            f"{file}: has no layer with places; expected geometries (tables of goals are read "
+            "beside a map: --goals TABLE)"
+        )
     return found.map(all(places.values()))
 
 
@@ -156,12 +165,15 @@ class GdalLayer:
         Well-known binary of each feature; None for one without geometry.
     properties
         Name to value, for each feature.
+    texts
+        Numbers of the features that are texts.
     """
 
     crs: str | None
     numbers: list[int]
     shapes: list[bytes | None]
     properties: list[dict[str, Any]]
+    texts: frozenset[int] = frozenset()
 
 
 def gdal_layers(file: str | Path, plain: str | Path, notes: list[str]) -> list[tuple[str, Any]]:
@@ -221,7 +233,24 @@ def read_layer(file: str | Path, plain: str | Path, layer: str, notes: list[str]
         {name: _plain(column[k]) for name, column in zip(names, columns, strict=True)}
         for k in range(len(shapes))
     ]
-    return GdalLayer(meta.get("crs"), [int(i) for i in ids], list(shapes), properties)
+    numbers = [int(i) for i in ids]
+    return GdalLayer(meta.get("crs"), numbers, list(shapes), properties, _texts(file, plain, layer))
+
+
+def _texts(file: str | Path, plain: str | Path, layer: str) -> frozenset[int]:
+    """Return the numbers of the features of a layer that are texts."""
+    pyogrio = _pyogrio()
+    if _call(file, [], pyogrio.read_info, plain, layer=layer)["driver"] not in TEXT_DRIVERS:
+        return frozenset()
+    quoted = layer.replace('"', '\\"')
+    _, ids, _, (styles,) = _call(
+        file, [], pyogrio.raw.read, plain, sql=f'SELECT OGR_STYLE FROM "{quoted}"',
+        sql_dialect="OGRSQL", return_fids=True, read_geometry=False,
+    )  # fmt: skip
+    return frozenset(
+        int(number) for number, style in zip(ids, styles, strict=True)
+        if str(style).startswith("LABEL")
+    )  # fmt: skip
 
 
 def read_rows(
@@ -347,6 +376,10 @@ class _Found:
         self.layers.setdefault(name, 0)
         for k, data, properties in zip(layer.numbers, layer.shapes, layer.properties, strict=True):
             where = f"{name}[{k}]"
+            if k in layer.texts:
+                self.layers[name] += 1
+                self.unread.append(Unread(where, name, "writing on the map (a text)"))
+                continue
             try:
                 shapes = self.shapes(where, name, data, move)
             except NotFiniteError as error:
@@ -575,6 +608,8 @@ def _call(file: str | Path, notes: list[str], function: Any, *args: Any, **more:
         raise InputError(f"{file}: cannot be read as a map: {first}") from None
     for warning in caught:
         text = f"GDAL: {_user_text(str(warning.message), file, args)[:160]}"
+        if MIXED_TYPES in text:
+            continue  # its shapes are read all the same
         if issubclass(warning.category, RuntimeWarning) and text not in notes:
             notes.append(text)
     return out
