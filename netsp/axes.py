@@ -10,7 +10,7 @@ import csv
 import io
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
@@ -66,7 +66,7 @@ _SPEEDS = {
 
 Quantity = Literal[
     "x", "y", "z", "east", "north", "easting", "northing", "altitude", "latitude", "longitude",
-    "time", "heading",
+    "time", "date", "heading",
     "velocity_x", "velocity_y", "velocity_z", "name", "identifier", "radius", "armed", "mode",
     "estimate", "paid_out", "classification", "withheld",
 ]  # fmt: skip
@@ -110,6 +110,7 @@ _ALIASES: Mapping[Quantity, Mapping[str, float]] = {
              "elapsed", "elapsed time", "stamp", "time boot", "boot time"), 1.0),
         "timeus": 1e-6, "timems": 1e-3,
     },
+    "date": dict.fromkeys(("date", "utc date", "date utc", "gps date"), 1.0),
     "heading": dict.fromkeys(("heading", "yaw", "hdg", "compass", "psi"), 1.0),
     "velocity_x": dict.fromkeys(("vx", "vel x", "velocity x", "v x"), 1.0),
     "velocity_y": dict.fromkeys(("vy", "vel y", "velocity y", "v y"), 1.0),
@@ -127,7 +128,7 @@ _ALIASES: Mapping[Quantity, Mapping[str, float]] = {
 }  # fmt: skip
 """Names of columns in lower case with blanks for underscores, and the factor on their values."""
 
-_TEXTS = {"name", "identifier", "mode", "armed", "estimate", "withheld"}
+_TEXTS = {"date", "name", "identifier", "mode", "armed", "estimate", "withheld"}
 """Quantities without a unit."""
 
 _PLACES = {
@@ -149,6 +150,10 @@ NOISE_CLASSES = {7: "low noise", 18: "high noise"}
 
 SAMPLE_LINES = 1000
 """Lines of a table that decide its separator and its decimal sign; later lines must agree."""
+
+
+MAX_LISTED = 200
+"""Characters of a list of unused columns; a longer list is cut off."""
 
 
 @dataclass(frozen=True)
@@ -449,6 +454,23 @@ class Table:
         known = [self.title(q) for q in self.columns if q not in quantities]
         return (*known, *self.unused)
 
+    def notes(self, quantities: Sequence[Quantity]) -> list[str]:
+        """Return what a reader of the table has to tell: decimal commas, and unused columns.
+
+        Parameters
+        ----------
+        quantities : sequence of str
+            Quantities that the reader uses.
+
+        Returns
+        -------
+        list of str
+            One line each.
+        """
+        out = ["numbers are read with decimal commas"] if self.has_decimal_commas else []
+        names = [shown(name) if "," in name else name for name in self.left_out(quantities)]
+        return out + ([f"unused columns: {', '.join(names)[:MAX_LISTED]}"] if names else [])
+
 
 _COMMA = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?$")
 _POINT = re.compile(r"[-+]?(\d+\.\d*|\.\d+)([eE][-+]?\d+)?$")
@@ -477,7 +499,9 @@ def decode_text(data: bytes, source: str) -> str:
         raise InputError(f"{source}: not a text file in UTF-8") from None
 
 
-def read_path(file: str | Path) -> Floats | None:
+def read_path(
+    file: str | Path, on_note: Callable[[str], None] | None = None
+) -> Floats | None:  # fmt: skip
     """Read a polyline from a table or a JSON list of points.
 
     Parameters
@@ -485,6 +509,8 @@ def read_path(file: str | Path) -> Floats | None:
     file : str or Path
         Table with the columns x, y and perhaps z or depth in any order, or two or three columns
         without names.
+    on_note : callable, optional
+        Called with one line each for decimal commas and for unused columns.
 
     Returns
     -------
@@ -510,6 +536,9 @@ def read_path(file: str | Path) -> Floats | None:
     else:
         table = read_table(file, positional=("x", "y", "z"), text=text)
         points = _polyline(table)
+        if on_note is not None:
+            for note in table.notes(("x", "y", "z", "altitude")):
+                on_note(f"{file}: {note}")
     if len(points) < 2:
         raise InputError(f"{file}: expected a path of at least 2 points, got {len(points)}")
     return points
@@ -831,7 +860,7 @@ def height_axis(crs: Any) -> HeightAxis:
 
 
 def map_unit(crs: Any) -> float | None:
-    """Return the metres per unit of a coordinate system's map; None where it is in degrees.
+    """Return the metres per unit of a coordinate system's map; None where it is in angles.
 
     Parameters
     ----------
@@ -843,10 +872,11 @@ def map_unit(crs: Any) -> float | None:
     InputError
         Unknown system, or pyproj is not installed.
     """
-    for axis in _system(crs).axis_info:
+    system = _system(crs)
+    if system.is_geographic:  # in degrees or grads
+        return None
+    for axis in system.axis_info:
         if axis.direction.lower() not in ("up", "down"):
-            if axis.unit_name and "degree" in axis.unit_name.lower():
-                return None
             return float(axis.unit_conversion_factor or 1.0)
     return 1.0
 

@@ -118,21 +118,58 @@ def read_gzip(path: str | Path, most: int = MOST_BYTES) -> bytes:
 
 
 def write_text(path: str | Path, text: str) -> None:
-    """Write a file by renaming a finished one into place, so that it is never half there; through a
-    symbolic link, what it points to is replaced. ``-`` is standard output."""
+    """Write a text in UTF-8 to a file as `write_bytes` does.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file; ``-`` is standard output.
+    text : str
+        Text.
+
+    Raises
+    ------
+    InputError
+        It cannot be written.
+    """
     if path == STANDARD:
         sys.stdout.write(text)
         sys.stdout.flush()
         return
     try:
-        text.encode()
+        data = text.encode()
+    except UnicodeError as error:
+        raise InputError(f"{shown(str(path))}: cannot be written: {error}"[:300]) from None
+    write_bytes(path, data)
+
+
+def write_bytes(path: str | Path, data: bytes) -> None:
+    """Write a file by renaming a finished one into place, so that it is never half there.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file; through a symbolic link, what it points to is replaced. ``-`` is standard output.
+    data : bytes
+        Contents.
+
+    Raises
+    ------
+    InputError
+        It cannot be written.
+    """
+    if path == STANDARD:
+        sys.stdout.buffer.write(data)
+        sys.stdout.flush()
+        return
+    try:
         target = Path(os.path.realpath(path)) if os.path.islink(path) else Path(path)
         special = target.exists() and not target.is_file()  # /dev/stdout and the like
     except (UnicodeError, ValueError, OSError) as error:
         raise InputError(f"{shown(str(path))}: cannot be written: {error}"[:300]) from None
     if special:
         try:
-            target.write_text(text, encoding="utf-8")
+            target.write_bytes(data)
         except OSError as error:
             raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
         return
@@ -143,8 +180,8 @@ def write_text(path: str | Path, text: str) -> None:
     except ValueError as error:  # half a character, a zero
         raise InputError(f"{shown(str(path))}: cannot be written: {error}") from None
     try:
-        with os.fdopen(handle, "w", encoding="utf-8") as stream:
-            stream.write(text)
+        with os.fdopen(handle, "wb") as stream:
+            stream.write(data)
         umask = os.umask(0)
         os.umask(umask)
         os.chmod(name, 0o666 & ~umask)

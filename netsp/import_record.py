@@ -85,6 +85,10 @@ class Site(Model):
         CropCircle | None,
         Field(description="circle outside of which obstacles were left out; null if none were"),
     ] = None
+    edited: Annotated[
+        bool,
+        Field(description="whether goals, obstacles, base or bounds were changed after the import"),
+    ] = False
 
     @property
     def notes(self) -> list[str]:

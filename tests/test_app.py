@@ -389,6 +389,39 @@ def test_the_page_asks_for_what_a_map_lacks_and_reads_it_with_the_answers(client
     assert "radius: expected a positive number" in answer.text
 
 
+def test_the_page_shows_what_an_import_says_and_that_the_problem_was_edited(client):
+    """As `netsp import`: the table, notes, and depth 0 everywhere, without options of a command."""
+    made, _ = client
+    headers = {"host": "127.0.0.1:1234", "origin": "http://127.0.0.1:1234"}
+    hold = [20, 1, 20]
+    rows = [f"{k}\t0\t3\t16\t{h}\t0\t0\t0\t55.000{k}\t12.0001\t0\t1" for k, h in enumerate(hold, 1)]
+    content = "\n".join(["QGC WPL 110", "0\t1\t0\t16\t0\t0\t0\t0\t55\t12\t0\t1", *rows]).encode()
+    given = {"token": "secret", "name": "m.waypoints", "tether": "60"}
+    answer = made.post("/import", params=given, content=content)
+    assert answer.status_code == 200
+    assert "1 waypoint passed by: taken as bends" in answer.text
+    assert "all goals are at depth 0" in answer.text
+    assert "--" not in answer.text
+    with made.websocket_connect("/live?token=secret", headers=headers) as page:
+        state = page.receive_json()["state"]
+        assert answer.text.split("\n") == state["notes"]
+        site = state["data"]["site"]
+        assert [(r["layer"], r["used"]) for r in site["imported"]] == [
+            ("waypoints", {"goal": 2}), ("bends", {}), ("home", {"base": 1}),
+        ]  # fmt: skip
+        assert "--" not in json.dumps(site)
+        goals = [{**g, "position": [*g["position"][:2], -2.0]} for g in state["data"]["goals"]]
+        page.send_json({"edit": {"set": ["name"], "value": "renamed"}})
+        assert not listen(page, lambda m: "state" in m)["state"]["data"]["site"]["edited"]
+        page.send_json({"edit": {"set": ["goals"], "value": goals}})
+        state = listen(page, lambda m: "state" in m)["state"]
+        assert state["data"]["site"] == {**site, "edited": True}
+        assert not any("depth 0" in note for note in state["notes"])
+        page.send_json({"undo": True})
+        assert not listen(page, lambda m: "state" in m)["state"]["data"]["site"]["edited"]
+    assert Problem.from_json(made.get("/download/problem.json?token=secret").text).site is not None
+
+
 def test_what_cannot_be_opened_changes_nothing(client):
     made, file = client
     before = made.get("/download/problem.json?token=secret").text

@@ -42,7 +42,11 @@ def feature(k, layer, shape, **properties):
 def chart(monkeypatch, *features):
     """Return the name of a chart that holds some features."""
     layers = Counter(f.layer for f in features)
-    monkeypatch.setattr(read, "read_map", lambda *_: Map(tuple(features), True, layers))
+
+    def found(file, *_):
+        return Map(tuple(features), True, layers, is_chart=str(file).endswith(".000"))
+
+    monkeypatch.setattr(read, "read_map", found)
     return "harbour.000"
 
 

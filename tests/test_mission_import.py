@@ -118,8 +118,11 @@ def test_altitudes_are_those_of_their_frame(tmp_path, is_list):
 def test_a_given_base_goes_before_the_planned_home_and_it_is_said(tmp_path):
     file = plan(tmp_path, [item(16)])
     found = import_site(file, Projection(LAT + STEP, LON), options=TETHER)
-    assert any("plannedHomePosition: the base is where --base says, 11.1" in n for n in found.notes)
-    assert not any("--base says" in n for n in import_site(file, HERE, options=TETHER).notes)
+    assert any(
+        "plannedHomePosition: the base is at the place that was given, 11.1" in n
+        for n in found.notes
+    )
+    assert not any("that was given" in n for n in import_site(file, HERE, options=TETHER).notes)
 
 
 def ring(size):
@@ -159,6 +162,56 @@ def test_fences_are_bounds_and_obstacles(tmp_path, is_list):
     np.testing.assert_allclose(problem.bounds, box, atol=0.02)
 
 
+def inside(corners):
+    return {"inclusion": True, "version": 1, "polygon": corners}
+
+
+def test_several_inclusion_fences_leave_what_is_in_all_of_them(tmp_path):
+    left, right = ring(1e-3), [(a, b + 1e-3) for a, b in ring(1e-3)]
+    circle = {"inclusion": True, "version": 1, "circle": {"center": [LAT, LON], "radius": 900.0}}
+    fence = {"version": 2, "polygons": [inside(left), inside(right)], "circles": [circle]}
+    found = import_site(plan(tmp_path, [item(16)], geoFence=fence), options=TETHER)
+    assert found.problem.bounds[0] == pytest.approx(HERE.to_plane([right[0]])[0][0], abs=0.1)
+    assert found.problem.bounds[2] == pytest.approx(HERE.to_plane([left[1]])[0][0], abs=0.1)
+    assert counts(found.problem.site)[0]["bounds"] == 3
+    assert any("where all of them overlap" in note for note in found.notes)
+    apart = [(a, b + 1e-2) for a, b in ring(1e-3)]
+    fence = {"version": 2, "polygons": [inside(left), inside(apart)], "circles": []}
+    with pytest.raises(InputError, match="do not overlap"):
+        import_site(plan(tmp_path, [item(16)], geoFence=fence), options=TETHER)
+
+
+@pytest.mark.parametrize("mark", ["", "\ufeff"])
+def test_fences_and_rally_points_of_mission_planner_are_read_or_named(tmp_path, mark):
+    corners = [*ring(1e-3), ring(1e-3)[0]]
+    lines = "\n".join(f"{a}\t{b}" for a, b in [(LAT, LON), *corners])
+    (tmp_path / "f.fen").write_text(f"{mark}#saved by APM Planner\n{lines}\n")
+    (tmp_path / "g.csv").write_text("x,y,depth\n3,4,2\n")
+    options = SiteOptions(tether=300.0, goals=tmp_path / "g.csv")
+    problem = import_site(tmp_path / "f.fen", HERE, options=options).problem
+    assert counts(problem.site) == ({"bounds": 1, "goal": 1}, 1)
+    box = HERE.to_plane(corners)
+    np.testing.assert_allclose(problem.bounds, [*box.min(axis=0), *box.max(axis=0)], atol=0.02)
+    rally = f"{mark}#saved by Mission Planner\nRALLY\t{LAT}\t{LON}\t30\t0\t0\t0\n"
+    (tmp_path / "r.ral").write_text(rally)
+    problem = import_site(tmp_path / "r.ral", HERE, options=options).problem
+    assert counts(problem.site) == ({"goal": 1}, 1)
+    for name, text, says in (
+        ("f.fen", "55\t12\n55.1\t12\n", "then three corners or more"),
+        ("f.fen", "550\t12\n" * 5, "line 1: expected latitude and longitude"),
+        ("r.ral", "55\t12\n", "expected RALLY first"),
+        ("r.ral", "", "expected rally points"),
+    ):
+        (tmp_path / name).write_text(text)
+        with pytest.raises(InputError, match=says):
+            import_site(tmp_path / name, HERE, options=options)
+
+
+def test_a_plan_that_was_saved_as_json_is_a_plan(tmp_path):
+    file = plan(tmp_path, [item(16)]).rename(tmp_path / "m.json")
+    assert len(import_site(file, options=TETHER).problem.goals) == 1
+
+
 def test_a_round_fence_to_stay_inside_is_bounds_on_its_circle(tmp_path):
     circle = {"inclusion": True, "version": 1, "circle": {"center": [LAT, LON], "radius": 90.0}}
     fence = {"version": 2, "polygons": [], "circles": [circle]}
@@ -176,9 +229,9 @@ SITE = Problem(
 )  # fmt: skip
 
 
-@pytest.mark.parametrize("kind", ["plan", "waypoints", "geojson", "kml"])
+@pytest.mark.parametrize("kind", ["plan", "waypoints", "geojson", "kml", "kmz"])
 @pytest.mark.parametrize("heading", [0.0, 25.0])
-@pytest.mark.parametrize("hold", [None, 30])
+@pytest.mark.parametrize("hold", [None, 0, 1, 30])
 def test_what_export_writes_comes_back_as_the_same_goals(tmp_path, kind, heading, hold):
     tour, file = solve(SITE), tmp_path / f"m.{kind}"
     form = "wpl" if kind == "waypoints" else kind
@@ -192,6 +245,28 @@ def test_what_export_writes_comes_back_as_the_same_goals(tmp_path, kind, heading
         assert len(again.obstacles) == len(SITE.obstacles)
         own = import_site(file).problem
         assert (own.tether_length, own.clearance) == (SITE.tether_length, SITE.clearance)
+
+
+@pytest.mark.parametrize("hold", [None, 0, 1, 2])
+def test_a_plan_that_a_ground_station_saved_keeps_its_goals(tmp_path, hold):
+    """Ground stations drop members that they do not know, as `netsp`."""
+    tour, file = solve(SITE), tmp_path / "m.plan"
+    points = export(SITE, tour, file, "plan", HERE, settings=Settings(hold=hold))
+    data = json.loads(file.read_text())
+    holds = [i["params"][0] for i in data["mission"]["items"] if i["command"] == 16]
+    stops = [p.goal is not None and p.goal >= 0 for p in points]
+    assert not {h for h, s in zip(holds, stops, strict=True) if s} & {
+        h for h, s in zip(holds, stops, strict=True) if not s
+    }
+    del data["netsp"]
+    for one in data["mission"]["items"]:
+        one.pop("netsp", None)
+    file.write_text(json.dumps(data))
+    again = import_site(file, options=TETHER).problem
+    assert sorted(np.round(g.position, 3).tolist() for g in again.goals) == sorted(
+        list(map(float, g.position)) for g in SITE.goals
+    )
+    assert len(again.obstacles) == len(SITE.obstacles)
 
 
 ORDER = ["name", "visibility", "open", "description", "styleUrl", "Style", "ExtendedData", "Point",
@@ -229,6 +304,32 @@ def test_a_tour_in_kml_follows_the_schema_and_draws_every_tether(tmp_path):
     modes = {e.text for e in root.iter(f"{tag}altitudeMode")}
     assert modes == {"absolute"}
     assert len(import_site(file).problem.goals) == 3
+
+
+def test_a_tour_in_kml_and_kmz_is_what_gdal_reads(tmp_path):
+    import zipfile
+
+    pyogrio = pytest.importorskip("pyogrio")
+    tour = solve(SITE)
+    page, packed = tmp_path / "tour.kml", tmp_path / "tour.kmz"
+    points = export(SITE, tour, page, "kml", Projection(LAT, LON))
+    export(SITE, tour, packed, "kmz", Projection(LAT, LON))
+    with zipfile.ZipFile(packed) as archive:
+        assert archive.namelist() == ["doc.kml"]
+        assert archive.read("doc.kml") == page.read_bytes()
+    assert import_site(packed).problem.goals == import_site(page).problem.goals
+    for file in (page, packed):
+        shapes = {
+            layer: shapely.from_wkb(pyogrio.raw.read(file, layer=layer)[2])
+            for layer, _ in pyogrio.list_layers(file)
+        }
+        assert {layer: len(own) for layer, own in shapes.items()} == {
+            "base": 1, "goals": 3, "obstacles": 2, "path": 1, "tethers": 3,
+        }  # fmt: skip
+        drawn = shapely.get_coordinates(shapes["path"], include_z=True)
+        flown = np.array([p.position for p in points])
+        there = Projection(LAT, LON).to_plane(drawn[:, 1::-1])
+        np.testing.assert_allclose(np.column_stack([there, drawn[:, 2]]), flown, atol=1e-3)
 
 
 def test_waypoints_that_are_passed_are_named_and_may_be_goals(tmp_path, capsys):

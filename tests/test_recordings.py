@@ -15,6 +15,7 @@ from netsp.guard.fix import Fix
 from netsp.guard.guard import Guard, GuardOptions
 from netsp.guard.message_tally import MessageTally
 from netsp.guard.recorded_path import read_any_paths
+from netsp.guard.recording_checks import RecordingPolicy
 from netsp.guard.replay import read_fixes
 from netsp.guard.stream import Stream, replayed
 from netsp.link.frame import Frame
@@ -120,6 +121,113 @@ def test_a_table_that_cannot_be_read_says_what_would_help(tmp_path, text, site, 
     (tmp_path / "a.csv").write_text(text)
     with pytest.raises(InputError, match=says):
         told(tmp_path / "a.csv", site, kind)
+
+
+TRACK = [(0.0, 0.0, 0.0, -1.0), (1.0, 1.0, 0.5, -1.0), (2.0, 2.0, 1.0, -1.0)]
+DAY = "2024-11-19"
+
+
+def table(head, row):
+    """A table of `TRACK`: `row` names its cells with t (whole seconds), x, y and z."""
+    lines = [
+        row.format(t=int(t), ms=int(1e3 * t), x=x, y=y, z=z, d=-z, cx=f"{x:.1f}".replace(".", ","),
+                   cy=f"{y:.1f}".replace(".", ","), fx=x / 0.3048, fy=y / 0.3048, fd=-z / 0.3048)
+        for t, x, y, z in TRACK
+    ]  # fmt: skip
+    return "\n".join([head, *lines]) + "\n"
+
+
+READ_TABLES = {
+    "unit in brackets": (table("time (ms),x [m],y [m],z [m]", "{ms},{x},{y},{z}"), None),
+    "feet": (table("t,x (ft),y (ft),depth (ft)", "{t},{fx},{fy},{fd}"), None),
+    "zone": (table("time,z,y,x", DAY + "T07:06:4{t}+02:00,{z},{y},{x}"), None),
+    "no zone": (table("time,x,y,z", DAY + " 07:06:4{t},{x},{y},{z}"), None),
+    "UTC in words": (table("time,x,y,z", DAY + " 7:06:4{t} UTC,{x},{y},{z}"), None),
+    "German": (table("Zeit;time;x;y;z", "1;19.11.2024 7:06:4{t};{cx};{cy};-1"), "decimal commas"),
+    "two columns": (table("date,time,x,y,z", DAY + ",07:06:4{t},{x},{y},{z}"), None),
+    "only a date": (table("x,y,z,date", "{x},{y},{z}," + DAY + "T07:06:4{t}Z"), None),
+    "clock": (table("time,x,y,z", "07:06:4{t},{x},{y},{z}"), "hours, minutes and seconds"),
+    "midnight": ("time,x,y,z\n23:59:59,0,0,-1\n00:00:00,1,.5,-1\n00:00:01,2,1,-1\n", "hours"),
+    "midnight, dated": (
+        "date,time,x,y,z\n2024-11-19,23:59:59,0,0,-1\n2024-11-20,00:00:00,1,.5,-1\n"
+        "2024-11-20,00:00:01,2,1,-1\n", None
+    ),
+    "no values": (
+        "t,x,y,z\n0,0,0,-1\n.2,#N/A,#N/A,#N/A\n.4,-,-,-\n.6,inf,inf,-1\n.8,-9999,-9999,-9999\n"
+        "1,1,.5,-1\n2,2,1,-1\n", "4 left out: no position"
+    ),
+    "no time": ("t,x,y,z\nnan,7,7,-1\n0,0,0,-1\n1,1,.5,-1\n2,2,1,-1\n", "without a time"),
+    "newest first": ("t,x,y,z\n2,2,1,-1\n1,1,.5,-1\n0,0,0,-1\n", "sorted"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", sorted(READ_TABLES))
+def test_tables_of_loggers_tell_the_track_and_what_was_assumed(tmp_path, name):
+    text, says = READ_TABLES[name]
+    (tmp_path / "a.csv").write_text(text)
+    fixes, tally, notes = told(tmp_path / "a.csv")
+    fixes = [f for f in fixes if f.position is not None]
+    np.testing.assert_allclose(places(fixes), np.array(TRACK)[:, 1:], atol=1e-9)
+    assert [f.time - fixes[0].time for f in fixes] == pytest.approx([0.0, 1.0, 2.0])
+    assert tally.total == len(text.splitlines()) - 1
+    assert (
+        any(says in note for note in notes) if says else not [n for n in notes if "Zeit" not in n]
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "site", "says"),
+    [
+        (table("time,x,y,z", "{ms},{x},{y},{z}"), SITE, "1000 s between positions"),
+        ("t,x,y,z\n45615.29,0,0,-1\n45615.290001,1,0,-1\n", SITE, "move at 1e+06 m/s"),
+        (table("t,x,y,z", "{t},45{t}000.5,63{t}0000,{z}"), SITE, "3 of 3 positions are farther"),
+        ("t,lat,lon,z\n0,5.5,58,-1\n1,5.5,58,-1\n", ON_EARTH, "check the frame"),
+        ("t,x,y,z\n5,0,0,-1\n3,1,0,-1\n5,0,0,-1\n6,0,0,-1\n7,0,0,-1\n", SITE, "go back at 1 place"),
+        (table("t,x,y,z,yaw", "{t},{x},{y},{z},1.{t}"), SITE, "name it yaw_rad"),
+        (table("t;x;y;z;leak", "{t};{cx};{cy};-1;0"), SITE, "unused columns: leak"),
+    ],
+)  # fmt: skip
+def test_what_is_unlikely_of_a_recording_is_told_with_what_helps(tmp_path, text, site, says):
+    (tmp_path / "a.csv").write_text(text)
+    assert any(says in note for note in told(tmp_path / "a.csv", site)[2])
+
+
+@pytest.mark.parametrize(
+    ("name", "data", "says"),
+    [
+        ("a.csv", b"t,x,y,depth\n0,0,0,-1\n1,0,0,-2\n", "depths count downwards"),
+        ("a.csv", b"t,x,y,z\n0,0,0,0\n2024-11-19T07:00:00Z,1,0,0\n", "expected one kind of times"),
+        ("a.csv", b"time,x,y,z\n11/12/2024 07:00:00,0,0,0\n", "expected a time such as"),
+        ("a.csv", b"", "expected a table, got nothing"),
+        ("a.csv", bytes(range(256)), "not a text file"),
+        ("a.tlog", b"", "holds no MAVLink message"),
+        ("a.tlog", b"t,x,y,z\n0,0,0,0\n" * 9, "holds no MAVLink message"),
+        ("a.bin", b"", "the file is empty"),
+        ("a.bin", b"t,x,y,z\n0,0,0,0\n" * 9, "no message in its beginning"),
+    ],
+)
+def test_what_is_no_recording_is_refused_with_what_was_expected(tmp_path, name, data, says):
+    pytest.importorskip("pymavlink")
+    (tmp_path / name).write_bytes(data)
+    with pytest.raises(InputError, match=says):
+        told(tmp_path / name)
+
+
+def test_a_policy_of_recordings_out_of_range_is_refused():
+    for wrong in ({"max_speed": 0.0}, {"max_far_share": 2.0}, {"max_back_share": -1.0},
+                  {"max_height": -1.0}, {"min_back_count": 0}):  # fmt: skip
+        with pytest.raises(InputError, match=next(iter(wrong))):
+            RecordingPolicy(**wrong)
+
+
+def test_bytes_of_a_log_that_belong_to_no_message_are_counted(tmp_path, m):
+    file = tlog(tmp_path / "a.tlog", *vehicle(m))
+    whole = places(told(file)[0])
+    assert not any("no message" in note for note in told(file)[2])
+    file.write_bytes(b"noise" + file.read_bytes() + b"cut off")
+    fixes, _, notes = told(file)
+    assert len(places(fixes)) == len(whole)
+    assert any("12 bytes left out: they belong to no message" in note for note in notes)
 
 
 def test_columns_that_are_not_understood_are_named(tmp_path):

@@ -10,6 +10,9 @@ import numpy as np
 import pytest
 
 from netsp import InputError
+from netsp.app.files import ImportAnswers
+from netsp.app.files import imported as read_upload
+from netsp.errors import UnansweredError
 from netsp.site.contract import words_in
 from netsp.site.options import Looking, SiteOptions
 from netsp.site.read import import_site
@@ -237,6 +240,48 @@ def test_bad_kml_is_refused_in_one_line_with_its_name(data, said, tmp_path):
     assert "\n" not in str(error.value)
 
 
+@pytest.mark.parametrize(
+    ("body", "tag"),
+    [
+        ("<Placemark><Folder>{}</Folder></Placemark>", "Folder"),
+        ("<Placemark>{}</Placemark>", "Placemark"),
+        (
+            "<Placemark><MultiGeometry><gx:Circle>{}</gx:Circle></MultiGeometry></Placemark>",
+            "Circle",
+        ),
+        ("<Other>{}</Other>", "Other"),
+    ],
+)
+def test_places_where_kml_has_none_are_named(body, tag, tmp_path):
+    found = imported(tmp_path / "s.kml", kml(START, body.format(mark("x", area(5, 5)))))
+    assert not found.problem.obstacles
+    assert any(f"an element {tag}" in reason for reason in reasons(found))
+
+
+@pytest.mark.parametrize("name", ["&lt;Null&gt;", "  ", "", "None", "unnamed"])
+def test_names_that_several_share_are_numbered_and_no_names_stay_none(name, tmp_path):
+    piles = [mark("P", area(10 * k, 5)) for k in range(1, 4)] + [mark("P 2", area(50, 5))]
+    nameless = [mark(name, area(10 * k, 20)) for k in range(2)]
+    goals = folder(
+        "Goals", mark("G", point(1, -5)), mark("G", point(3, -5)), mark(name, point(5, -5))
+    )
+    found = imported(tmp_path / "n.kml", kml(START, goals, folder("Piles", *piles, *nameless)))
+    assert [o.name for o in found.problem.obstacles] == ["P", "P 3", "P 4", "P 2", None, None]
+    assert [g.name for g in found.problem.goals] == ["G", "G 2", "G 3", None]
+    assert sum("share are numbered" in note for note in found.notes) == 2
+
+
+def test_a_negative_depth_is_refused_with_what_to_do(tmp_path):
+    deep = "<ExtendedData><Data name='depth'><value>-4</value></Data></ExtendedData>"
+    text = kml(START, folder("Goals", mark("D", point(5, 5), deep)))
+    with pytest.raises(InputError, match=r"Goals\[1\] \(D\): depth: .*0 or more, got -4 m"):
+        imported(tmp_path / "d.kml", text)
+    table = tmp_path / "goals.csv"
+    table.write_text("x,y,depth\n5,5,3\n7,5,-3\n")
+    with pytest.raises(InputError, match=r"goals\.csv: row 2: 'depth' .*0 or more, got -3 m"):
+        imported(tmp_path / "d.kml", kml(START), goals=table)
+
+
 # Drawings
 
 
@@ -391,7 +436,23 @@ def test_texts_beside_places_are_their_names_and_others_are_left_out(tmp_path):
 
 @pytest.mark.parametrize(
     ("number", "metres"),
-    [(1, 0.0254), (2, 0.3048), (4, 1e-3), (5, 0.01), (6, 1.0), (7, 1e3), (10, 0.9144)],
+    [
+        (1, 0.0254),
+        (2, 0.3048),
+        (3, 1609.344),
+        (4, 1e-3),
+        (5, 0.01),
+        (6, 1.0),
+        (7, 1e3),
+        (10, 0.9144),
+        (14, 0.1),
+        (15, 10.0),
+        (16, 100.0),
+        (21, 12 / 39.37),
+        (22, 1 / 39.37),
+        (23, 36 / 39.37),
+        (24, 63360 / 39.37),
+    ],
 )
 def test_the_header_states_the_unit_and_the_user_overrules_it(number, metres, tmp_path):
     header = (9, "$INSUNITS", 70, number)
@@ -404,11 +465,23 @@ def test_the_header_states_the_unit_and_the_user_overrules_it(number, metres, tm
     assert found.problem.goals[0].position[0] == pytest.approx(3 * 0.9144)
 
 
-def test_a_unit_that_no_site_has_is_asked_about(tmp_path):
-    data = drawing(*PLACES, header=(9, "$INSUNITS", 70, 9))
-    with pytest.raises(InputError, match=r"\$INSUNITS: expected a unit of .* got 9"):
+@pytest.mark.parametrize(
+    ("header", "said"),
+    [
+        ((9, "$INSUNITS", 70, 18), r"has \$INSUNITS 18, which is no unit of a site"),
+        ((9, "$INSUNITS", 70, "x"), r"has \$INSUNITS x, which is no unit of a site"),
+        ((9, "$INSUNITS", 70, 0, 9, "$MEASUREMENT", 70, 1), "states no unit"),
+        ((9, "$MEASUREMENT", 70, 0), "states no unit"),
+    ],
+)
+def test_a_unit_that_no_site_has_is_asked_about(header, said, tmp_path):
+    data = drawing(*PLACES, header=header)
+    with pytest.raises(UnansweredError, match=f"{said}; give the unit with --units") as refused:
         imported(tmp_path / "u.dxf", data)
+    assert refused.value.asks == ("units",)
     assert imported(tmp_path / "u.dxf", data, units="cm").problem.goals
+    answers = ImportAnswers.parse({"units": "cm", "tether": "5"})
+    assert read_upload("u.dxf", data.encode(), answers=answers)[0]["goals"]
 
 
 def test_blocks_keep_layers_symbols_stand_where_they_mark_and_arrays_are_whole(tmp_path):
@@ -497,6 +570,111 @@ def test_a_hatch_in_an_outline_that_is_read_is_left_out(tmp_path):
     found = imported(tmp_path / "h.dxf", drawing(*PLACES, box, hatch(5), hatch(15)))
     assert len(found.problem.obstacles) == 2
     assert reasons(found) == {"fills an outline that is read (HATCH)": 1}
+
+
+def wall(layer, points, mitres, offsets, *codes):
+    """Return an MLINE: at each vertex, its mitre and the distance of each line along that."""
+    out = []
+    for (x, y), (dx, dy) in zip(points, mitres, strict=True):
+        out += [11, x, 21, y, 31, 0, 12, 1, 22, 0, 32, 0, 13, dx, 23, dy, 33, 0]
+        for offset in offsets:
+            out += [74, 2, 41, offset, 41, 0.0, 75, 0]
+    return entity("MLINE", layer, 72, len(points), 73, len(offsets), 10, 0, 20, 0, *codes, *out)
+
+
+SQUARE = [(5, 0), (15, 0), (15, 10), (5, 10)]
+INWARDS = [(1, 1), (-1, 1), (-1, -1), (1, -1)]
+
+
+@pytest.mark.parametrize(
+    ("thing", "area"),
+    [
+        (wall("W", [(5, 0), (15, 0)], [(0, 1)] * 2, [0, -1, -3]), 30.0),
+        (wall("W", SQUARE, INWARDS, [0, 1], 71, 3), 100.0 - 64.0),  # (10, 5) stays free
+        (wall("W", SQUARE[:2], [(0, 1)] * 2, [0.5]), 10.5 * 0.5),  # a line, of --line-width
+        (insert("W", "B", 20, 0, 41, 2, 42, 2), 20.0),
+        (entity("SOLID", "W", 10, 5, 20, 0, 11, 9, 21, 0, 12, 5, 22, 4), 8.0),  # three corners
+        (entity("LWPOLYLINE", "W", 90, 2, 10, 5, 20, 0, 40, 1, 41, 2, 10, 9, 20, 0, 40, 2), 12.0),
+        (insert("W", "WIDE", 0, 0, 41, 2, 42, 2), 2.0 * 10.0),
+    ],
+)
+def test_walls_have_the_area_that_is_drawn(thing, area, tmp_path):
+    blocks = {
+        "B": [wall("0", [(0, 0), (5, 0)], [(0, 1)] * 2, [0, 1])],
+        "WIDE": [entity("LWPOLYLINE", "0", 90, 2, 43, 1, 10, 5, 20, 0, 10, 9, 20, 0)],
+    }
+    found = imported(
+        tmp_path / "w.dxf", drawing(*PLACES, dot("GOALS", 10, 5), thing, blocks=blocks)
+    )
+    assert counts(found) == (4, 0)
+    whole = shapely.union_all([o.shape() for o in found.problem.obstacles])
+    assert whole.area == pytest.approx(area, rel=1e-6)
+
+
+def test_goals_drawn_as_arrays_and_mirrored_symbols_are_where_they_are_drawn(tmp_path):
+    blocks = {"S": [circle("0", 0, 0)]}
+    row = insert("GOALS", "S", 5, 5, 70, 3, 71, 2, 44, 5, 45, 2, 50, 90)
+    mirrored = insert("GOALS", "S", 5, 40, 30, 2, 210, 0, 220, 0, 230, -1)
+    found = imported(tmp_path / "a.dxf", drawing(*PLACES, row, mirrored, blocks=blocks))
+    places = {tuple(round(v, 9) for v in g.position) for g in found.problem.goals[1:]}
+    assert places == {(x, y, 0.0) for x in (5, 3) for y in (5, 10, 15)} | {(-5.0, 40.0, -2.0)}
+    with pytest.raises(InputError, match=r"BASE\[0\].*a base cannot be"):
+        imported(tmp_path / "a.dxf", drawing(insert("BASE", "S", 5, 5, 70, 3), blocks=blocks))
+
+
+LINE = (10, 5, 20, 0, 11, 9, 21, 0)
+
+
+@pytest.mark.parametrize(
+    ("thing", "said"),
+    [
+        (entity("LINE", "X", 5, "1F", 10, "abc", *LINE[2:]), "code 10: expected a number.*'abc'"),
+        (entity("LINE", "X", 5, "1F", 10, "1,5", *LINE[2:]), "code 10: expected a number.*'1,5'"),
+        (entity("LINE", "X", 5, "1F", 10, "nan", *LINE[2:]), "code 10: expected a number.*'nan'"),
+        (entity("LINE", "X", 5, "1F", 10, "1e99", *LINE[2:]), "code 10: expected a number"),
+        (entity("LINE", "X", 5, "1F", *LINE[:6]), "code 21: missing"),
+        (entity("LWPOLYLINE", "X", 5, "1F", 90, 3, *LINE[:4]), "expected 3 corners.*got 1 x"),
+        (entity("SPLINE", "X", 5, "1F", 71, 3, *LINE[:4]), "got 1 x, 1 y and 0 knots"),
+        (entity("SPLINE", "X", 5, "1F", 71, 3, *LINE[4:]), "no control points"),
+        (insert("X", "BAD", 0, 0, 5, "1F"), r"'BAD': LINE \(handle 2A\): group code 20: expected"),
+        (insert("X", "SELF", 0, 0, 5, "1F"), "'SELF' holds itself"),
+        (insert("X", "GOOD", 0, 0, 5, "1F", 41, 0), "its scale is 0"),
+        (entity("MESH", "X", 5, "1F", 92, 1, *LINE[:4], 30, 0, 93, 4, 90, 3), "list of 4 numbers"),
+        (entity("MESH", "X", 5, "1F", 92, 2, *LINE[:4], 30, 0), "expected 2 corners, got 1"),
+        (entity("MLINE", "X", 5, "1F", 72, 2), "expected 2 vertices"),
+        (entity("HATCH", "X", 5, "1F", 91, 1, 92, 2, 72, 0, 73, 1, 93, 4, *LINE[:4]), "a damaged"),
+    ],
+)
+def test_damaged_entities_are_named_with_their_handles(thing, said, tmp_path):
+    blocks = {
+        "GOOD": [circle("0", 0, 0)], "SELF": [insert("0", "SELF", 1, 1)],
+        "BAD": [entity("LINE", "0", 5, "2A", 10, 5, 20, "O", 11, 9, 21, 0)],
+    }  # fmt: skip
+    data = drawing(*PLACES, circle("X", 30, 0), thing, circle("X", 40, 0), blocks=blocks)
+    with pytest.raises(InputError, match=said):
+        imported(tmp_path / "d.dxf", data)
+    with pytest.raises(InputError, match=r"X\[1\] \(handle 1F\): a damaged .*repair or delete it"):
+        imported(tmp_path / "d.dxf", data)
+
+
+def test_a_drawing_that_is_cut_short_is_refused(tmp_path):
+    whole = drawing(*PLACES, circle("X", 30, 0))
+    with pytest.raises(InputError, match="cut short: its section ENTITIES has no end"):
+        imported(tmp_path / "d.dxf", whole[: whole.rindex("0\nENDSEC")])
+
+
+@pytest.mark.parametrize("kind", ["3DSOLID", "REGION", "BODY", "PLANESURFACE"])
+def test_solids_are_named_with_what_to_do(kind, tmp_path):
+    found = imported(tmp_path / "d.dxf", drawing(*PLACES, entity(kind, "X")))
+    assert counts(found) == (2, 1)
+    assert any(f"({kind}): draw its outline" in reason for reason in reasons(found))
+
+
+def test_other_drawings_that_are_referred_to_are_named(tmp_path):
+    data = drawing(*PLACES, insert("X", "O", 3, 3), blocks={"O": []})
+    data = data.replace("BLOCK\n2\nO\n", "BLOCK\n2\nO\n70\n4\n1\nother.dwg\n")
+    found = imported(tmp_path / "d.dxf", data)
+    assert any("another drawing (other.dwg)" in reason for reason in reasons(found))
 
 
 def binary(*entities):
@@ -729,3 +907,45 @@ def test_a_plan_without_a_place_on_the_earth_is_a_plane(tmp_path):
     assert found.problem.origin is None
     assert found.problem.goals[0].position == (9.0, 0.0, 0.0)
     assert found.problem.obstacles[0].shape().area == pytest.approx(1.0)
+
+
+def test_texts_of_a_map_are_no_goals(tmp_path):
+    (tmp_path / "t.mid").write_text('"base"\n"goal"\n""\n"obstacle"\n')
+    found = imported(
+        tmp_path / "t.mif",
+        'VERSION 300\nDELIMITER ","\nCOORDSYS NONEARTH UNITS "m" BOUNDS (-99,-99) (99,99)\n'
+        "COLUMNS 1\n kind char(10)\nDATA\nPOINT 0 0\nPOINT 9 0\n"
+        'TEXT\n "depth 4"\n 5 5 8 7\n Font ("Arial",0,0,0)\nRECT 3 0 4 1\n',
+    )
+    assert counts(found) == (3, 1)
+    assert reasons(found) == {"writing on the map (a text)": 1}
+
+
+SEQUENCE = [
+    '{"type": "Feature", "properties": {"kind": "base"}, '
+    '"geometry": {"type": "Point", "coordinates": [5.5, 58]}}',
+    '{"type": "Point", "coordinates": [5.5001, 58, -3]}',
+    '{"type": "LineString", "coordinates": [[5.5002, 58], [5.5002, 58.0001]]}',
+]
+
+
+@pytest.mark.parametrize(("before", "after"), [("", "\n"), ("\x1e", "\n"), ("\x1e\n", "")])
+def test_sequences_of_geojson_are_read_whole_or_refused(before, after, tmp_path):
+    text = "".join(f"{before}{part}{after}" for part in SEQUENCE)
+    found = imported(tmp_path / "s.geojsonl", text)
+    assert counts(found) == (3, 0)
+    assert found.problem.goals[0].position[2] == -3.0
+    with pytest.raises(InputError, match=r"s\.geojsonl: (line|text) 3: not JSON"):
+        imported(tmp_path / "s.geojsonl", text[:-20])
+
+
+@pytest.mark.parametrize("crs", ["EPSG:4807", "EPSG:4258"])
+def test_heights_in_a_system_of_angles_are_metres(crs, tmp_path):
+    file = tmp_path / "a.gpkg"
+    spots = [shapely.to_wkb(shapely.Point(2.0 + x, 50.0, -z)) for x, z in ((0, 0), (1e-4, 10))]
+    pyogrio.raw.write(
+        file, np.array(spots, object), [np.array(["base", "goal"], object)], ["kind"],
+        driver="GPKG", crs=crs, geometry_type="Point Z", layer="a",
+    )  # fmt: skip
+    (goal,) = import_site(file, options=SiteOptions(tether=50.0)).problem.goals
+    assert goal.position[2] == -10.0

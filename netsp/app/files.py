@@ -22,7 +22,10 @@ LONGEST_NAME = 200
 MOST_BYTES = 64 * 2**20
 """Of a file that comes in."""
 
-MAPS = (".geojson", ".kml", ".kmz", ".gpkg", ".dxf", ".000", ".gpx", ".plan", ".waypoints")
+MAPS = (
+    ".geojson", ".kml", ".kmz", ".gpkg", ".dxf", ".000", ".gpx", ".plan", ".waypoints", ".wpl",
+    ".fen", ".ral",
+)  # fmt: skip
 """Sites in one file; shapefiles come in several, and images with a YAML beside them."""
 
 EXPORTS = {
@@ -80,6 +83,8 @@ class ImportAnswers:
         Viewpoints about each obstacle.
     standoff
         Distance of viewpoints from its surface, metres.
+    units
+        Unit of lengths in the file, as ``mm``.
     """
 
     base: str | None = None
@@ -89,6 +94,7 @@ class ImportAnswers:
     crs: str | None = None
     viewpoints: int | None = None
     standoff: float | None = None
+    units: str | None = None
 
     @classmethod
     def parse(cls, given: Mapping[str, str]) -> ImportAnswers:
@@ -114,7 +120,7 @@ class ImportAnswers:
         if viewpoints is not None and viewpoints != int(viewpoints):
             raise InputError(f"viewpoints: expected a whole number, got {viewpoints:g}")
         return cls(
-            base=said.get("base"), crs=said.get("crs"),
+            base=said.get("base"), crs=said.get("crs"), units=said.get("units"),
             viewpoints=None if viewpoints is None else int(viewpoints),
             tether=_positive(said, "tether"), radius=_positive(said, "radius"),
             line_width=_positive(said, "line_width"), standoff=_positive(said, "standoff"),
@@ -142,6 +148,7 @@ def without_options(text: str) -> str:
     '1 open line (pier); expected a width, in metres'
     """
     bare = re.sub(r"\s*\([^()]*--[a-z][^()]*\)", "", text)
+    bare = re.sub(r"(?<![\w-])--([a-z][a-z-]*):", lambda m: m[1].replace("-", " ") + ":", bare)
     return re.sub(r"(;|,| or)\s[^;,]*--[a-z][^;]*", "", bare)
 
 
@@ -200,7 +207,7 @@ def imported(
         file = Path(folder) / last
         file.write_bytes(content)
         try:
-            if ending == ".json" and not _is_geojson(content):
+            if ending == ".json" and not is_map(content):
                 problem = Problem.load(file)
             elif ending in (*MAPS, ".json"):
                 problem = _site(file, notes, tether_length, answers or ImportAnswers())
@@ -231,7 +238,7 @@ def _site(
     looking = Looking(answers.viewpoints or 1, answers.standoff or 0.0) if asked else None
     options = SiteOptions(
         tether=answers.tether, radius=answers.radius, line_width=answers.line_width,
-        crs=answers.crs, looking=looking,
+        crs=answers.crs, units=answers.units, looking=looking,
     )  # fmt: skip
     try:
         found = import_site(file, about, options=options)
@@ -251,7 +258,24 @@ def _site(
     return problem
 
 
-def exported(problem: Problem, solution: Solution, kind: str) -> tuple[str, str]:
+def import_warnings(problem: Problem) -> list[str]:
+    """Return what may be wrong with the problem of a map, one line each; nothing of other problems.
+
+    Parameters
+    ----------
+    problem : Problem
+        Problem that was imported, perhaps edited since.
+    """
+    if problem.site is None:
+        return []
+    from netsp.site.goal_depths import HEIGHTS_REMEDY, height_warning, surface_warning
+
+    remedy = "set one depth for all in the panel"
+    found = (surface_warning(problem, remedy), height_warning(problem, HEIGHTS_REMEDY))
+    return [text for text in found if text is not None]
+
+
+def exported(problem: Problem, solution: Solution, kind: str) -> tuple[str, str, list[str]]:
     """A tour as a mission file.
 
     Parameters
@@ -269,25 +293,49 @@ def exported(problem: Problem, solution: Solution, kind: str) -> tuple[str, str]
         That it is offered under.
     text : str
         What `netsp export` writes.
+    notes : list of str
+        What `netsp export` says of it.
 
     Raises
     ------
     InputError
         An unknown kind, no origin; as of `netsp.export.write.export`.
     """
-    from netsp.export.write import export
+    from netsp.export.export_notes import export_notes
+    from netsp.export.margins import LEAST_CLEARANCE, LEAST_SLACK, warnings
+    from netsp.export.write import Settings, export
+    from netsp.site.goal_depths import surface_warning
 
     if kind not in EXPORTS:
         raise InputError(f"export: expected one of {', '.join(EXPORTS)}, got {kind!r}")
+    if problem.origin is None and kind != "csv":
+        raise InputError(
+            "origin: the place of the base on the earth is not known; give its latitude and "
+            "longitude in the panel"
+        )
     with tempfile.TemporaryDirectory(prefix="netsp-") as folder:
         file = Path(folder) / EXPORTS[kind]
-        export(problem, solution, file, kind)
-        return file.name, file.read_text(encoding="utf-8")
+        points = export(problem, solution, file, kind)
+        said = export_notes(problem, points, kind, Settings())
+        surface = surface_warning(problem, "set one depth for all in the panel")
+        notes = [
+            *([surface] if surface is not None else []),
+            *warnings(problem, solution, points, LEAST_SLACK, LEAST_CLEARANCE),
+            *said.warnings, *said.notes,
+        ]  # fmt: skip
+        return file.name, file.read_text(encoding="utf-8"), notes
 
 
-def _is_geojson(content: bytes) -> bool:
+def is_map(content: bytes) -> bool:
+    """Tell whether a JSON file is a map, as GeoJSON or a plan of QGroundControl, and no problem.
+
+    Parameters
+    ----------
+    content : bytes
+        Contents of the file.
+    """
     try:
-        data = json.loads(content)
+        data = json.loads(content.decode("utf-8-sig"))
     except (ValueError, RecursionError):  # `Problem.load` says what is wrong
         return False
-    return isinstance(data, dict) and data.get("type") == "FeatureCollection"
+    return isinstance(data, dict) and ("type" in data or "fileType" in data)

@@ -11,10 +11,10 @@ import contextlib
 import json
 import os
 import secrets
-from collections.abc import AsyncIterator, Mapping
+from collections.abc import AsyncIterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
-from urllib.parse import urlsplit
+from urllib.parse import quote, urlsplit
 
 from netsp.app.drawn_path import (
     drawn_figures,
@@ -24,7 +24,15 @@ from netsp.app.drawn_path import (
     worth_of_order,
 )
 from netsp.app.facts import facts
-from netsp.app.files import EXPORTS, ImportAnswers, bare_name, exported, imported
+from netsp.app.files import (
+    EXPORTS,
+    ImportAnswers,
+    bare_name,
+    exported,
+    import_warnings,
+    imported,
+    without_options,
+)
 from netsp.app.files import MOST_BYTES as MOST_FILE
 from netsp.app.shown import Shown
 from netsp.app.solving import Worker
@@ -67,12 +75,16 @@ class Session:
         Seconds of solving for one version.
     shown : Shown, optional
         Something that is only looked at: nothing is edited or solved then.
+    notes : sequence of str
+        What was assumed, changed or left out when the document was imported from a map.
     """
 
     def __init__(
-        self, document: Document, time_limit: float = 60.0, shown: Shown | None = None
-    ) -> None:
+        self, document: Document, time_limit: float = 60.0, shown: Shown | None = None,
+        notes: Sequence[str] = (),
+    ) -> None:  # fmt: skip
         self.document, self.shown = document, shown
+        self._notes = {_source(document.data): list(notes)}
         self.pages: set[asyncio.Queue[str]] = set()
         self.answer: dict[str, Any] | None = None
         self.solution: str | None = None
@@ -187,6 +199,25 @@ class Session:
             )
         return None
 
+    def take_in(self, data: Mapping[str, Any], notes: Sequence[str]) -> list[str]:
+        """Make a version of an imported file.
+
+        Parameters
+        ----------
+        data : mapping
+            Problem as a problem file has it.
+        notes : sequence of str
+            What was assumed, changed or left out; shown while this problem is on the map.
+
+        Returns
+        -------
+        list of str
+            What may be wrong with the problem.
+        """
+        self._notes[_source(data)] = list(notes)
+        self.do({"edit": {"replace": data}})
+        return import_warnings(self.document.problem())
+
     def _problem(self) -> Problem:
         return self.document.problem() if self.shown is None else self.shown.problem()
 
@@ -255,9 +286,13 @@ class Session:
     def _state(self) -> dict[str, Any]:
         document = self.document
         wrong = document.complaint() if self.shown is None else None
+        notes = list(self._notes.get(_source(document.data), []))
+        if self.shown is None and wrong is None:
+            notes += import_warnings(document.problem())
         return {"state": {
             "version": document.version, "data": document.data, "error": wrong,
             "undo": document.can_undo, "redo": document.can_redo,
+            "notes": notes,
             "saved": document.saved, "file": document.file.name if document.file else None,
             "shown": self.shown is not None,
             "events": self.shown.events if self.shown is not None else [],
@@ -372,7 +407,7 @@ def application(session: Session, token: str, port: int) -> Any:
                 tether if isinstance(tether, int | float) else None,
                 ImportAnswers.parse(request.query_params),
             )  # fmt: skip
-            session.do({"edit": {"replace": data}})
+            notes += session.take_in(data, notes)
         except UnansweredError as error:  # the page asks for what is missing
             if error.asks:
                 told = {"said": list(error.plain), "asks": list(error.asks)}
@@ -516,6 +551,7 @@ def _download(session: Session, name: str) -> Any:
     """A file of what is shown: problem.json, solution.json, report.html."""
     from starlette.responses import PlainTextResponse, Response
 
+    notes: list[str] = []
     try:
         if session.shown is not None and session.shown.solution is None:
             return PlainTextResponse("netsp: a run has no such file", status_code=404)
@@ -538,13 +574,23 @@ def _download(session: Session, name: str) -> Any:
             solution = Solution.from_json(session.solution)
             text, kind = page(Opened(problem, solution)), "text/html"
         elif name in EXPORTS:
-            name, text = exported(problem, Solution.from_json(session.solution), name)
+            name, text, notes = exported(problem, Solution.from_json(session.solution), name)
             kind = "application/octet-stream"
         else:
             return PlainTextResponse("netsp: no such file", status_code=404)
     except InputError as error:
-        return PlainTextResponse(f"netsp: {error}", status_code=409)
+        return PlainTextResponse(f"netsp: {without_options(str(error))}", status_code=409)
     return Response(
         text, media_type=kind,
-        headers={"content-disposition": f'attachment; filename="{name}"'},
+        headers={
+            "content-disposition": f'attachment; filename="{name}"',
+            "x-notes": quote("\n".join(map(without_options, notes))),
+        },
     )  # fmt: skip
+
+
+def _source(data: Mapping[str, Any]) -> str:
+    """Return what tells the import of a document from other imports: its record, as text."""
+    site = data.get("site")
+    own = {k: v for k, v in site.items() if k != "edited"} if isinstance(site, dict) else None
+    return json.dumps(own, sort_keys=True)

@@ -26,6 +26,9 @@ EMPTY: dict[str, Any] = {
 
 LISTS = ("goals", "obstacles")
 
+MAPPED = ("base", "bounds", *LISTS)
+"""Fields that an import takes from a map: a change of them is noted in `site`."""
+
 MOST_VERSIONS = 10_000
 """Versions that can be gone back to; each shares with the one before what did not change."""
 
@@ -148,6 +151,10 @@ class Document:
         else:
             raise InputError(f"edit: expected set, add, delete or replace, got {shown(edit)}")
         _check_lists(data)
+        site = data.get("site")
+        is_changed = any(data.get(name) != self.data.get(name) for name in MAPPED)
+        if "replace" not in edit and isinstance(site, dict) and is_changed:
+            data["site"] = {**site, "edited": True}
         return data
 
     @property

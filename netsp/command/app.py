@@ -44,18 +44,35 @@ def arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument("--no-browser", action="store_true", help="only print the address")
 
 
-def _document(name: str | None) -> Document:
-    """What is on the map at first: a problem, or a site, which becomes one beside it."""
-    from netsp.app.state import Document
-
-    if name is None or name.lower().endswith(".json"):
-        return Document(name)
+def _document(name: str | None) -> tuple[Document, list[str]]:
+    """Return what is on the map at first, a problem or that of a map, and notes on the import."""
     from pathlib import Path
 
-    from netsp.site.read import read_site
+    from netsp.app.files import import_warnings, is_map, without_options
+    from netsp.app.state import Document
+    from netsp.command.import_site import show_table
+    from netsp.site.read import import_site
 
-    made = read_site(name, on_note=messages.note)
-    return Document(Path(name).with_suffix(".json"), json.loads(made.to_json()))
+    path = Path(name or "")
+    is_problem = path.suffix.lower() == ".json" and not (
+        path.is_file() and is_map(path.read_bytes())
+    )
+    if name is None or is_problem:
+        return Document(name), []
+    target = path.with_suffix(".json")
+    if target == path:
+        raise InputError(
+            f"{name}: is a map, and its problem would be saved over it; expected the map under "
+            "another ending, as .geojson or .plan"
+        )
+    found = import_site(name)
+    record = found.problem.site
+    assert record is not None
+    show_table(name, found)
+    for text in import_warnings(found.problem):
+        messages.warning(text)
+    notes = [f"{path.name}: {without_options(n)}" for n in found.notes if n not in record.notes]
+    return Document(target, json.loads(found.problem.to_json())), notes
 
 
 def run(args: argparse.Namespace) -> int:
@@ -67,7 +84,7 @@ def run(args: argparse.Namespace) -> int:
     from netsp.app.server import MOST_BYTES, Session, application
     from netsp.app.state import Document
 
-    looked_at = None
+    looked_at, notes = None, list[str]()
     if args.show:
         from netsp.app.shown import read_shown
 
@@ -78,7 +95,7 @@ def run(args: argparse.Namespace) -> int:
     elif args.problem_file is not None:
         raise InputError("--problem: goes with --show only")
     else:
-        document = _document(args.problem)
+        document, notes = _document(args.problem)
     if not document.saved:
         messages.note(f"{args.problem}: what was edited last and not saved is on the map")
     if not 0 <= args.port <= 65535:
@@ -91,7 +108,7 @@ def run(args: argparse.Namespace) -> int:
         port = listening.getsockname()[1]
         token = secrets.token_urlsafe(24)
         address = f"http://127.0.0.1:{port}/?token={token}"
-        session = Session(document, float(args.time_limit), looked_at)
+        session = Session(document, float(args.time_limit), looked_at, notes)
         print(f"the map is at {address}\nCtrl-C ends it", file=sys.stderr, flush=True)
         if not args.no_browser:
             threading.Timer(0.5, webbrowser.open, [address]).start()

@@ -32,8 +32,8 @@ def arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument("--problem", metavar="FILE", help="the problem that a solution solves")
     p.add_argument(
         "--format", metavar="NAME",
-        help="plan (QGroundControl), wpl (QGC WPL 110), geojson, kml or csv; default: by the "
-        "extension",
+        help="plan (QGroundControl), wpl (QGC WPL 110), geojson, kml, kmz or csv; default: by "
+        "the extension",
     )  # fmt: skip
     p.add_argument(
         "--origin", metavar="LAT,LON[,HEADING]",
@@ -87,16 +87,9 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(f"--problem: {args.solution} is no mission; expected its problem")
     check_writable(args.output, inputs=(args.solution, args.problem))
     from netsp.export.common_depth import at_depth
+    from netsp.export.export_notes import export_notes
     from netsp.export.margins import warnings
-    from netsp.export.write import (
-        MOST_FENCE_POINTS,
-        SHALLOWEST,
-        Settings,
-        export,
-        fence_points,
-        format_of,
-        predicted_s,
-    )
+    from netsp.export.write import Settings, export, format_of, predicted_s
     from netsp.judge import verify
     from netsp.problem import Problem
     from netsp.site.goal_depths import surface_warning
@@ -140,34 +133,11 @@ def run(args: argparse.Namespace) -> int:
         })  # fmt: skip
     for line in warnings(problem, solution, points, slack, clearance):
         messages.warning(line)
-    if kind in ("plan", "wpl"):
-        if kind == "plan" and fence_points(problem) > MOST_FENCE_POINTS:
-            messages.warning(
-                f"the obstacles take {fence_points(problem)} fence points; the vehicle stores "
-                f"about {MOST_FENCE_POINTS} without a card"
-            )
-        above = [
-            problem.goal_name(p.goal)
-            for p in points
-            if p.goal is not None and p.goal >= 0 and p.position[2] > 0.0
-        ]
-        if above:
-            messages.warning(
-                f"{counted(len(above), 'goal')} above the water ({', '.join(above[:3])}"
-                f"{', …' if len(above) > 3 else ''}): heights are negative below it; moved to "
-                f"{SHALLOWEST} m of depth"
-            )
-        shallow = sum(p.position[2] > -SHALLOWEST for p in points) - len(above)
-        if shallow:
-            messages.note(
-                f"{counted(shallow, 'waypoint')} shallower than {SHALLOWEST} m moved to that depth"
-            )
-        if kind == "wpl" and settings.hold is not None and settings.hold <= settings.bend:
-            messages.note(
-                "goals hold no longer than bends, so that nothing tells them apart in this format; "
-                "a .plan or .geojson keeps them"
-            )
-        messages.note("home is assumed to be at the surface above the base; do not set it by hand")
+    said = export_notes(problem, points, kind, settings)
+    for line in said.warnings:
+        messages.warning(line)
+    for line in said.notes:
+        messages.note(line)
     return 0
 
 
@@ -179,6 +149,7 @@ def _mission(args: argparse.Namespace) -> int:
         raise InputError(f"--depth: {args.solution} is a mission, which has depths of its own")
     check_writable(args.output, inputs=(args.solution,))
     from netsp.command.interrupts import until_interrupted
+    from netsp.export.export_notes import bend_note
     from netsp.export.mission import export_mission
     from netsp.export.write import SHALLOWEST, Settings, format_of, predicted_s
     from netsp.online.mission import Mission
@@ -230,6 +201,8 @@ def _mission(args: argparse.Namespace) -> int:
             messages.note(
                 f"{counted(shallow, 'waypoint')} shallower than {SHALLOWEST} m moved to that depth"
             )
+        if (text := bend_note(done.points, settings)) is not None:
+            messages.note(text)
         messages.note("the solids are not written: fences are upright, whatever the depth")
         messages.note("home is assumed to be at the surface above the start; do not set it by hand")
     return 0

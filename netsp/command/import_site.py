@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from netsp.command import messages, told
 from netsp.command.patience import Patience
 from netsp.command.types import check_writable, depth, length, option, positive
-from netsp.errors import InputError, counted
+from netsp.errors import InputError
 
 if TYPE_CHECKING:
     import shapely
@@ -111,7 +111,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     charts = p.add_argument_group("charts")
     charts.add_argument(
-        "--draught", type=length, metavar="D",
+        "--draught", type=depth, metavar="D",
         help="areas that may be shallower than this (m), or are not surveyed, become obstacles",
     )  # fmt: skip
     charts.add_argument(
@@ -172,8 +172,8 @@ def run(args: argparse.Namespace) -> int:
             found = _of_map(args)
             problem, left_out, floor = found.problem, found.left_out, found.floor
             viewpoints = found.viewpoints
-            _show_table(args.site, found)
-    from netsp.site.goal_depths import surface_warning, with_depth
+            show_table(args.site, found)
+    from netsp.site.goal_depths import HEIGHTS_REMEDY, height_warning, surface_warning, with_depth
 
     if args.depth is not None:
         problem = with_depth(problem, args.depth)
@@ -193,13 +193,8 @@ def run(args: argparse.Namespace) -> int:
         elif why:
             messages.note(f"{args.site}: {unreached_note(before, problem.goals)}")
     print(f"{problem.name}: {problem.summary}{_extent(problem)}", file=sys.stderr)
-    above = [problem.goal_name(k) for k, g in enumerate(problem.goals) if g.position[2] > 0.0]
-    if above:
-        messages.warning(
-            f"{counted(len(above), 'goal')} above the water ({', '.join(above[:3])}"
-            f"{', …' if len(above) > 3 else ''}): give depths as positive numbers, "
-            "or z as negative ones"
-        )
+    if (text := height_warning(problem, HEIGHTS_REMEDY)) is not None:
+        messages.warning(text)
     if args.output is None:
         sys.stdout.write(problem.to_json())
     else:
@@ -282,8 +277,16 @@ def _of_image(args: argparse.Namespace) -> Problem:
     )  # fmt: skip
 
 
-def _show_table(site: str, found: ImportedSite) -> None:
-    """Print what became of the features of each layer, and what was assumed."""
+def show_table(site: str, found: ImportedSite) -> None:
+    """Print what became of the features of each layer, and what was assumed.
+
+    Parameters
+    ----------
+    site : str
+        Name of the map.
+    found : ImportedSite
+        What the import made of it.
+    """
     from netsp.command.text_table import print_table
 
     record = found.problem.site

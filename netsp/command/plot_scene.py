@@ -79,7 +79,7 @@ def lay(field: DistanceField, path: Floats, model: str, delta: float) -> Tether:
 
 def points_of(file: str) -> Floats:
     """The points (k, 3) of a path file: CSV x,y,z or a JSON list of points."""
-    path = read_path(file)
+    path = read_path(file, messages.note)
     if path is None:
         raise InputError(f"{file}: expected a path: CSV x,y,z or a JSON list of points")
     points = np.asarray(path, dtype=float)

@@ -169,7 +169,7 @@ def _measure_paths(problem: Problem, args: argparse.Namespace) -> None:
     if args.solution.lower().endswith((*ENDINGS, *PATH_ENDINGS)):
         paths = read_any_paths(args.solution, problem, frame=args.frame, system=args.system)
     else:
-        points = read_path(args.solution)
+        points = read_path(args.solution, messages.note)
         assert points is not None
         paths = [FoundPath("", points)]
     if not args.quiet:

@@ -7,7 +7,9 @@ file back.
 
 from __future__ import annotations
 
+import io
 import math
+import zipfile
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import escape, quoteattr
@@ -100,6 +102,27 @@ def kml_of(problem: Problem, points: Sequence[Waypoint], projection: Projection)
         f"<Document><name>{_text(problem.name or 'tour')}</name>\n{styles}{''.join(folders)}"
         "</Document>\n</kml>\n"
     )
+
+
+def kmz_of(page: str) -> bytes:
+    """Return an archive (KMZ) that holds a KML page.
+
+    Parameters
+    ----------
+    page : str
+        KML document.
+
+    Returns
+    -------
+    bytes
+        Archive with the page as ``doc.kml`` at its root; equal pages give equal archives.
+    """
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as archive:
+        entry = zipfile.ZipInfo("doc.kml")  # dated 1980
+        entry.compress_type = zipfile.ZIP_DEFLATED
+        archive.writestr(entry, page.encode())
+    return out.getvalue()
 
 
 def _is_stop(point: Waypoint) -> bool:

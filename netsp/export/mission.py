@@ -19,9 +19,8 @@ from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.execute.plan import HOME
 from netsp.export.waypoints import STRAIGHT, Waypoint, turn
-from netsp.export.write import FORMATS, Settings, check_settings
+from netsp.export.write import FORMATS, Settings, check_settings, told_apart, write_page
 from netsp.fields import Point3, checked_argument
-from netsp.files import write_text
 from netsp.geometry import polylines
 from netsp.online.mission import Mission
 from netsp.online.scene.field import DistanceField
@@ -121,7 +120,8 @@ def export_mission(
         _check_free(field, way, share * acceptance)
         longest = max(longest, _checked(water, points, way, share == 0.0))
     sunk = [_sunk(p, surface) for p in points]
-    write_text(file, FORMATS[kind](_stand_in(mission, surface), sunk, projection, settings))
+    settings = told_apart(sunk, settings)
+    write_page(file, kind, FORMATS[kind](_stand_in(mission, surface), sunk, projection, settings))
     room = float(field.distance(polylines.dense(line, 0.05)).min())
     return Exported(sunk, longest, room)
 

@@ -15,8 +15,8 @@ import csv
 import io
 import json
 import os
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -24,10 +24,10 @@ import numpy as np
 
 from netsp.errors import InputError
 from netsp.execute.plan import HOME
-from netsp.export.kml import kml_of
+from netsp.export.kml import kml_of, kmz_of
 from netsp.export.waypoints import Waypoint, waypoints_of
 from netsp.fields import checked_argument, checked_instance
-from netsp.files import cell, write_text
+from netsp.files import cell, write_bytes, write_text
 from netsp.problem import Circle, Problem
 from netsp.site.projection import Projection
 from netsp.solution import Solution
@@ -66,7 +66,8 @@ class Settings:
     hold
         Whole seconds at goals.
     bend
-        At bends and at the start, at least 1.
+        Whole seconds at bends, at the start and at the end, at least 1; longer where a goal holds
+        as long (`told_apart`).
     speed
         m/s; None leaves it to the vehicle.
     max_waypoints
@@ -134,13 +135,37 @@ def export(
             "LAT,LON, or the field origin in the problem"
         )
     points = [start_of(problem, solution), *waypoints_of(problem, solution, acceptance)]
+    settings = told_apart(points, settings)
     if len(points) > settings.max_waypoints and kind in ("plan", "wpl"):
         raise InputError(
             f"solution: needs {len(points)} waypoints, and the vehicle takes "
             f"{settings.max_waypoints}; raise that number if yours takes more"
         )
-    write_text(file, FORMATS[kind](problem, points, projection, settings))
+    write_page(file, kind, FORMATS[kind](problem, points, projection, settings))
     return points
+
+
+def write_page(file: str | Path, kind: str, text: str) -> None:
+    """Write the text of a format to a file; for ``kmz``, into an archive.
+
+    Parameters
+    ----------
+    file : str or Path
+        The file.
+    kind : str
+        One of `FORMATS`.
+    text : str
+        Text that the format gives.
+
+    Raises
+    ------
+    InputError
+        It cannot be written.
+    """
+    if kind == "kmz":
+        write_bytes(file, kmz_of(text))
+    else:
+        write_text(file, text)
 
 
 def check_settings(kind: str, settings: Settings) -> None:
@@ -181,15 +206,17 @@ def start_of(problem: Problem, solution: Solution) -> Waypoint:
 
 def predicted_s(points: list[Waypoint], settings: Settings) -> float | None:
     """Seconds that the vehicle will take from the first waypoint on; None without a speed."""
-    if settings.speed is None:
+    speed = settings.speed
+    if speed is None:
         return None
+    settings = told_apart(points, settings)
     places = np.array([p.position for p in points])
     legs = np.linalg.norm(np.diff(places, axis=0), axis=1)
-    stop = STOP_S * (settings.speed / 0.5) ** STOP_GROWTH
+    stop = STOP_S * (speed / 0.5) ** STOP_GROWTH
     # gathering way and losing it evenly, a short leg never gets to full speed
-    at_speed = legs / settings.speed + stop
-    moving = np.where(legs >= stop * settings.speed, at_speed,
-                      2.0 * np.sqrt(legs * stop / settings.speed))  # fmt: skip
+    at_speed = legs / speed + stop
+    moving = np.where(legs >= stop * speed, at_speed,
+                      2.0 * np.sqrt(legs * stop / speed))  # fmt: skip
     return float(moving.sum()) + sum(_hold(p, settings) for p in points)
 
 
@@ -198,9 +225,49 @@ def fence_points(problem: Problem) -> int:
     return sum(1 if isinstance(o, Circle) else len(o.polygon) for o in problem.obstacles)
 
 
+def not_written(problem: Problem, kind: str) -> str | None:
+    """Return what of a problem a format has no place for; None if it holds all of it.
+
+    Parameters
+    ----------
+    problem : Problem
+        Problem that was solved.
+    kind : str
+        One of `FORMATS`.
+    """
+    lost = []
+    if kind == "wpl":
+        lost += ["the tether's length", "the clearance"]
+        lost += ["obstacles"] if problem.obstacles else []
+        lost += ["names of goals"] if any(g.name is not None for g in problem.goals) else []
+    if kind == "plan" and any(o.name is not None for o in problem.obstacles):
+        lost.append("names of obstacles")
+    lost += ["bounds"] if problem.bounds is not None else []
+    lost += ["the state of the tether"] if problem.state is not None else []
+    return f"not written in this format: {', '.join(lost)}" if lost else None
+
+
 def altitude(z: float) -> float:
     """The relative altitude that stands for a height."""
     return round(min(z, -SHALLOWEST), 3)
+
+
+def told_apart(points: Sequence[Waypoint], settings: Settings) -> Settings:
+    """Return settings with a hold at bends that no goal has.
+
+    Mission files say of a waypoint only how long the vehicle holds there: this tells goals from
+    bends when a file is imported, also after a ground station saved it.
+
+    Parameters
+    ----------
+    points : sequence of Waypoint
+        Waypoints that are written.
+    settings : Settings
+        Settings of the file; their hold at bends is the least.
+    """
+    holds = {_hold(p, settings) for p in points if p.goal not in (None, HOME)}
+    free = (s for s in range(settings.bend, settings.bend + len(holds) + 1) if s not in holds)
+    return replace(settings, bend=next(free))
 
 
 def _hold(point: Waypoint, settings: Settings) -> int:
@@ -395,6 +462,7 @@ FORMATS: dict[str, Callable[[Problem, list[Waypoint], Projection | None, Setting
     "geojson": _geojson,
     "kml": _kml,
     "csv": _csv,
+    "kmz": _kml,  # packed by `write_page`
 }
 
 __all__ = ["FORMATS", "Settings", "altitude", "export"]
@@ -402,7 +470,7 @@ __all__ = ["FORMATS", "Settings", "altitude", "export"]
 
 EXTENSIONS = {
     ".plan": "plan", ".waypoints": "wpl", ".txt": "wpl", ".geojson": "geojson", ".json": "geojson",
-    ".kml": "kml", ".csv": "csv",
+    ".kml": "kml", ".kmz": "kmz", ".csv": "csv",
 }  # fmt: skip
 """Which format a file's name asks for."""
 

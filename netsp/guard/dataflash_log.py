@@ -27,6 +27,12 @@ MAX_METRES = 1e9
 FILTERS = ("XKF", "NKF")
 """Families of filters: EKF3, and EKF2 of older vehicles."""
 
+MESSAGE_MARK = b"\xa3\x95"
+"""First bytes of each message of a log."""
+
+SEARCHED_BYTES = 65_536
+"""Bytes at the beginning of a log in which a first message is sought; damage may come before it."""
+
 KINDS = ("XKF1", "XKF4", "NKF1", "NKF4", "POS", "ARM", "MODE", "WINC")
 """Messages that are read."""
 
@@ -64,6 +70,7 @@ def read_bin(
         No such log, or none with positions.
     """
     where = f"--replay: {file}"
+    _check_begin(file, where)
     messages, counts = _messages(file, where)
     choices = [*FILTERS]
     if frame.is_global:
@@ -94,6 +101,15 @@ def read_bin(
         if kind not in KINDS:
             tally.leave_out(kind, UNUSED_REASON, n)
     return found
+
+
+def _check_begin(file: Path, where: str) -> None:
+    """Refuse a file whose beginning holds no message of ArduPilot, as of a renamed file."""
+    with open(file, "rb") as stream:
+        begin = stream.read(SEARCHED_BYTES)
+    if MESSAGE_MARK not in begin:
+        what = "the file is empty" if not begin else "no message in its beginning"
+        raise InputError(f"{where}: no log of ArduPilot: {what}; expected a .bin of the vehicle")
 
 
 @contextlib.contextmanager

@@ -10,6 +10,7 @@ from netsp.files import check_file
 from netsp.guard.dataflash_log import read_bin
 from netsp.guard.fix import Fix
 from netsp.guard.message_tally import MessageTally
+from netsp.guard.recording_checks import doubts
 from netsp.guard.table_recording import read_recording
 from netsp.guard.telemetry_log import read_tlog
 from netsp.link.frame import Frame
@@ -52,7 +53,7 @@ def read_fixes(
     check_file(file)
     tally = MessageTally() if tally is None else tally
     say = on_note or (lambda _: None)
-    any_place = False
+    placed: list[Fix] = []
     found: Iterator[Fix]
     if name.endswith((".csv", ".csv.gz")):
         found = read_recording(Path(file), frame, tally, say)
@@ -63,9 +64,10 @@ def read_fixes(
     else:
         raise InputError(f"--replay: {file}: expected a file that ends in {KINDS}")
     for fix in found:
-        any_place = any_place or fix.position is not None
+        if fix.position is not None:
+            placed.append(fix)
         yield fix
-    if not any_place:
+    if not placed:
         raise InputError(f"--replay: {file}: has no positions")
-    for note in tally.notes:
+    for note in (*tally.notes, *doubts(placed, frame.site)):
         say(f"--replay: {file}: {note}")

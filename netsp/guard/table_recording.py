@@ -6,15 +6,17 @@ import math
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import numpy as np
+
 from netsp.axes import Quantity, Table, read_table
 from netsp.errors import InputError
 from netsp.fields import Point3
 from netsp.guard.fix import Fix
 from netsp.guard.message_tally import MessageTally
+from netsp.guard.recording_checks import RecordingPolicy, in_order_of_time
 from netsp.link.frame import Frame
 from netsp.models import shown
-from netsp.site.gpx import seconds_of
-from netsp.site.time_stamps import MAX_SECONDS, NO_VALUES, unit_of_time
+from netsp.site.time_stamps import NO_VALUES, TimeStamps
 
 TRUTH = {"1": True, "true": True, "yes": True, "0": False, "false": False, "no": False}
 
@@ -56,33 +58,42 @@ def read_recording(
     Raises
     ------
     InputError
-        No such table, or a value that is none.
+        No such table, a value that is none, or a column of depths that holds heights.
     """
+    policy = RecordingPolicy()
+    found: list[Fix] = []
     try:
-        rows = _Rows(read_table(file), frame, on_note)
+        rows = _Rows(read_table(file), frame, on_note, policy)
         for k in range(len(rows.table.rows)):
             fix = rows.fix(k)
-            if fix is None:
-                tally.leave_out("rows", "neither a time nor a position")
+            if isinstance(fix, str):
+                tally.leave_out("rows", fix)
                 continue
             if fix.position is None:
                 tally.leave_out("rows", "no position: a gap of the track")
             else:
                 tally.use("rows")
-            yield fix
+            found.append(fix)
     except InputError as error:
         raise InputError(f"--replay: {error}") from None
+    ordered = in_order_of_time(found, policy)
+    if ordered is not found:
+        on_note(f"--replay: {file}: the rows are not in the order of their times: sorted")
+    yield from ordered
 
 
 class _Rows:
     """Rows of a table as fixes."""
 
-    def __init__(self, table: Table, frame: Frame, on_note: Callable[[str], None]) -> None:
-        self.table, self.frame = table, frame
+    def __init__(
+        self, table: Table, frame: Frame, on_note: Callable[[str], None], policy: RecordingPolicy
+    ) -> None:  # fmt: skip
+        self.table, self.frame, self.policy = table, frame, policy
         self.where = table.source
         self.on_note = on_note
         plan, up = table.pair(POSITION_PAIRS), table.height()
-        if plan is None or "time" not in table or (up is None and not frame.is_of_plane):
+        self.clock: Quantity = "time" if "time" in table else "date"
+        if plan is None or self.clock not in table or (up is None and not frame.is_of_plane):
             raise table.wanted(
                 "columns t, x, y, z (or t, north, east, down; or t, lat, lon, altitude or depth)"
             )
@@ -95,13 +106,34 @@ class _Rows:
                 + ("--frame local asks for metres; expected --frame global" if frame.has_origin
                    else "the site has no origin; expected a problem with an origin")
             )  # fmt: skip
-        unused = table.left_out(("time", *plan, *EXTRA_QUANTITIES, *((up,) if up else ())))
-        if unused:
-            self._note(f"unused columns: {', '.join(unused)[:200]}")
-        self.scale: float | None = None
-        meaning = table.columns["time"][1]
-        if meaning.unit or meaning.factor != 1.0:
-            self.scale = meaning.factor
+        used = ("time", "date", *plan, *EXTRA_QUANTITIES, *((up,) if up else ()))
+        for note in table.notes(used):
+            self._note(note)
+        self.stamps = TimeStamps(table.columns[self.clock][1], self._note)
+        self.has_times = any(self._cell(k, self.clock) for k in range(len(table.rows)))
+        self._check_depths()
+        self._check_heading()
+
+    def _check_depths(self) -> None:
+        """Refuse a column of depths that holds heights."""
+        if self.up != "z":
+            return
+        z = [v for k in range(len(self.table.rows)) if (v := self._number(k, "z")) is not None]
+        if z and max(z) > self.policy.max_height:
+            self.table.check_depths(np.array(z))
+
+    def _check_heading(self) -> None:
+        """Tell of headings that may be radians."""
+        if "heading" not in self.table or self.table.columns["heading"][1].unit:
+            return
+        values = [self._number(k, "heading") for k in range(len(self.table.rows))]
+        turns = {abs(v) for v in values if v is not None}
+        if len(turns) > 1 and max(turns) <= 2.0 * math.pi:
+            title = self.table.title("heading")
+            self._note(
+                f"column {title} is taken as degrees, and holds {max(turns):.3g} at most; name it "
+                f"{title}_rad if these are radians"
+            )
 
     def _note(self, text: str) -> None:
         self.on_note(f"--replay: {self.where}: {text}")
@@ -109,20 +141,24 @@ class _Rows:
     def _at(self, k: int) -> str:
         return f"{self.where}: line {self.table.lines[k]}"
 
-    def fix(self, k: int) -> Fix | None:
-        """Return what row k says; None for one without a time and a position."""
+    def fix(self, k: int) -> Fix | str:
+        """Return what row k says, or the reason to leave it out."""
         a, b = (self._number(k, q) for q in self.plan)
         z = 0.0 if self.up is None else self._number(k, self.up)
         place = None
         if a is not None and b is not None and z is not None:
             place = self._place(a, b, z, self._at(k))
-        time = self._time(k)
-        if time is None:
+        text = self._cell(k, self.clock)
+        if not text:
             if place is None:
-                return None
+                return "neither a time nor a position"
+            if self.has_times:
+                return "a position without a time"
             raise InputError(
-                f"{self._at(k)}: {self.table.title('time')}: expected seconds, got nothing"
+                f"{self._at(k)}: {self.table.title(self.clock)}: expected seconds, got nothing"
             )
+        date = self._cell(k, "date") if self.clock == "time" else ""
+        time = self.stamps.seconds(text, f"{self._at(k)}: {self.table.title(self.clock)}", date)
         v, w, u = (self._number(k, q) for q in EXTRA_QUANTITIES[:3])
         velocity = None
         if v is not None and w is not None:
@@ -162,6 +198,8 @@ class _Rows:
         return TRUTH.get(text)
 
     def _place(self, a: float, b: float, z: float, where: str) -> Point3 | None:
+        if a == b and a in self.policy.no_places:
+            return None
         if self.plan == ("x", "y"):
             return a, b, z
         if self.plan == ("north", "east"):
@@ -173,22 +211,3 @@ class _Rows:
                 f"{where}: expected degrees, lat within 90 and lon within 180, got {a:g}, {b:g}"
             )
         return self.frame.from_degrees(a, b, z)
-
-    def _time(self, k: int) -> float | None:
-        """Return seconds: numbers of the column's unit, or ISO 8601."""
-        text = self._cell(k, "time")
-        if not text:
-            return None
-        name = f"{self._at(k)}: {self.table.title('time')}"
-        try:
-            value = float(text)
-        except ValueError:
-            return seconds_of(text, name)
-        if self.scale is None:
-            self.scale, unit = unit_of_time(value)
-            if unit:
-                self._note(f"times are taken as {unit} since 1970")
-        value *= self.scale
-        if not abs(value) < MAX_SECONDS:
-            raise InputError(f"{name}: expected seconds below {MAX_SECONDS:g}, got {shown(text)}")
-        return value

@@ -19,6 +19,9 @@ from netsp.link.messages import AUTOPILOT, POSITIONS, Listener
 MAX_PACKET_BYTES = 300
 """Maximum length of a MAVLink message, bytes."""
 
+STAMP_BYTES = 8
+"""Length of the time before each message, bytes."""
+
 
 def read_tlog(
     file: Path, frame: Frame, system: int | None, tally: MessageTally,
@@ -65,6 +68,8 @@ def read_tlog(
             )
             heard, vehicle = other, fallback
     heard.count(vehicle, tally)
+    if heard.foreign_bytes > 0:
+        on_note(f"{where}: {heard.foreign_bytes:,} bytes left out: they belong to no message")
     if not vehicle.has_positions:
         raise InputError(f"{where}: has no positions{_help(heard, vehicle, frame)}")
     return vehicle.fixes
@@ -85,10 +90,10 @@ def messages_of(data: bytes) -> Iterator[Any]:
     """
     error = dialect().MAVError
     at = 0
-    while at + 8 < len(data):
+    while at + STAMP_BYTES < len(data):
         reads = parser()
         message = None
-        for k in range(at + 8, min(len(data), at + 8 + MAX_PACKET_BYTES)):
+        for k in range(at + STAMP_BYTES, min(len(data), at + STAMP_BYTES + MAX_PACKET_BYTES)):
             try:
                 message = reads.parse_char(data[k : k + 1])
             except (error, struct.error, ValueError):
@@ -132,11 +137,14 @@ class _Recording:
     def __init__(self) -> None:
         self.vehicles: dict[int, _Vehicle] = {}
         self.others = MessageTally()
+        self.foreign_bytes = 0
 
     @classmethod
     def heard(cls, data: bytes, frame: Frame) -> _Recording:
         self = cls()
+        self.foreign_bytes = len(data)
         for message in messages_of(data):
+            self.foreign_bytes -= STAMP_BYTES + len(message.get_msgbuf())
             system = message.get_srcSystem()
             if message.get_srcComponent() != AUTOPILOT:
                 kind = f"{message.get_type()} of component {message.get_srcComponent()}"
@@ -155,6 +163,10 @@ class _Recording:
             if system not in self.vehicles:
                 raise InputError(f"{where}: has no positions of system {system}{self._systems()}")
             return self.vehicles[system]
+        if not self.vehicles and not self.others.total:
+            raise InputError(
+                f"{where}: holds no MAVLink message; expected a telemetry log of a ground station"
+            )
         if not self.vehicles:
             raise InputError(f"{where}: has no positions: no message of an autopilot")
         placed = [v for v in self.vehicles.values() if v.has_positions]

@@ -67,6 +67,8 @@ def imported(site: Site) -> str:
     """
     head, *rows = site.table()
     said = f"Imported from {site.file}. What was left out is not in the plan."
+    if site.edited:
+        said += " The problem was edited after the import; the table shows the import."
     if site.cropped is not None:
         x, y = site.cropped.center
         said += (

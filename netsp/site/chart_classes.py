@@ -28,11 +28,17 @@ DEPTH_AREAS = frozenset({"DEPARE", "DRGARE"})
 LAND = "LNDARE"
 """Class of areas of land."""
 
+COVERAGE = "M_COVR"
+"""Class of areas that the chart covers (`CATCOV` 1) or does not cover (2)."""
+
+COVERED = 1
+"""Value of `CATCOV` of an area with data."""
+
 UNSURVEYED = "UNSARE"
 """Class of areas whose depth nobody knows."""
 
 SOUNDINGS = "SOUNDG"
-"""Class of soundings: points whose z is a depth."""
+"""Class of soundings: points whose depth is their z, downwards."""
 
 CONTOURS = "DEPCNT"
 """Class of depth contours (`VALDCO`)."""
@@ -233,6 +239,16 @@ def depth_range(feature: Feature) -> tuple[float | None, float | None]:
 def contour_depth(feature: Feature) -> float | None:
     """Return the depth of a contour (`VALDCO`), None where the chart does not give it."""
     return _number(feature, "valdco")
+
+
+def is_covered(feature: Feature) -> bool:
+    """Return whether a feature is an area that its chart covers with data."""
+    return feature.layer.upper() == COVERAGE and _code(feature, "catcov") == COVERED
+
+
+def sounding_depth(feature: Feature) -> float | None:
+    """Return the depth of the top of a danger (`VALSOU`), None where the chart does not give it."""
+    return _number(feature, "valsou")
 
 
 def _code(feature: Feature, name: str) -> int | None:

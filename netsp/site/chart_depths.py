@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,10 +18,12 @@ from netsp.site.chart_classes import (
     UNSURVEYED,
     contour_depth,
     depth_range,
+    is_covered,
+    sounding_depth,
 )
 from netsp.site.feature import Feature
 from netsp.site.options import FLOOR_CELLS
-from netsp.site.sea_floor import DepthArea, SeaFloor, sea_floor
+from netsp.site.sea_floor import Danger, DepthArea, SeaFloor, sea_floor
 
 if TYPE_CHECKING:
     import shapely
@@ -54,6 +56,100 @@ def shallow_areas(features: Sequence[Feature], draught: float) -> list[Feature]:
         if layer == UNSURVEYED or (layer in DEPTH_AREAS and (least is None or least < draught)):
             out.append(feature)
     return out
+
+
+def shoal_soundings(
+    features: Sequence[Feature], draught: float, shallow: Sequence[Feature]
+) -> list[Feature]:
+    """Return the soundings of a chart that are shallower than a draught.
+
+    Parameters
+    ----------
+    features : sequence of Feature
+        Those of the chart.
+    draught : float
+        Depth that is needed, metres.
+    shallow : sequence of Feature
+        Areas that are obstacles for their depth; soundings within them need no obstacle.
+
+    Returns
+    -------
+    list of Feature
+        Those of class SOUNDG with such a sounding, each with these points only.
+    """
+    import shapely
+
+    tree = shapely.STRtree([area.shape for area in shallow])
+    out = []
+    for feature in features:
+        if feature.layer.upper() != SOUNDINGS or not feature.shape.has_z:
+            continue
+        places = shapely.get_coordinates(feature.shape, include_z=True)
+        places = places[-places[:, 2] < draught]
+        held, _ = tree.query(shapely.points(places[:, :2]), predicate="intersects")
+        open_ones = np.delete(places, held, axis=0)
+        if len(open_ones):
+            out.append(replace(feature, shape=shapely.MultiPoint(open_ones[:, :2])))
+    return out
+
+
+def uncharted_share(
+    features: Sequence[Feature], plane: Callable[[shapely.Geometry], Any], window: CropWindow
+) -> float:
+    """Return the share of a window that the chart does not cover.
+
+    Parameters
+    ----------
+    features : sequence of Feature
+        Those of the chart.
+    plane : callable
+        Projects a shape to the problem's plane.
+    window : CropWindow
+        What the tether reaches.
+
+    Returns
+    -------
+    float
+        Between 0 and 1; 0 where the chart does not say what it covers.
+    """
+    covered = [plane(feature.shape) for feature in features if is_covered(feature)]
+    return _share_beyond(covered, window) if covered else 0.0
+
+
+def depthless_share(
+    features: Sequence[Feature], plane: Callable[[shapely.Geometry], Any], window: CropWindow
+) -> float:
+    """Return the share of a window that is neither land nor an area of known or unknown depth.
+
+    Parameters
+    ----------
+    features : sequence of Feature
+        Those of the chart.
+    plane : callable
+        Projects a shape to the problem's plane.
+    window : CropWindow
+        What the tether reaches.
+
+    Returns
+    -------
+    float
+        Between 0 and 1.
+    """
+    classes = (*DEPTH_AREAS, LAND, UNSURVEYED)
+    areas = [
+        plane(feature.shape)
+        for feature in features
+        if feature.layer.upper() in classes and "Polygon" in feature.shape.geom_type
+    ]
+    return _share_beyond(areas, window)
+
+
+def _share_beyond(areas: Sequence[shapely.Geometry], window: CropWindow) -> float:
+    import shapely
+
+    circle = window.polygon
+    near = [shapely.make_valid(area) for area in areas if not window.is_beyond(area)]
+    return float(circle.difference(shapely.union_all(near)).area / circle.area)
 
 
 @dataclass
@@ -106,17 +202,20 @@ def chart_floor(
     """
     found = FloorFeatures()
     areas: list[DepthArea] = []
-    points: list[Floats] = [np.empty((0, 3))]
+    contours: list[Floats] = [np.empty((0, 3))]
+    soundings: list[Floats] = [np.empty((0, 3))]
+    dangers: list[Danger] = []
     land: list[Any] = []
     for feature in features:
         layer = feature.layer.upper()
         is_area = "Polygon" in feature.shape.geom_type
+        top = sounding_depth(feature)
         is_depth = layer in (SOUNDINGS, CONTOURS) or (layer in DEPTH_AREAS and is_area)
-        if not is_depth and not (layer == LAND and is_area):
+        if not is_depth and top is None and not (layer == LAND and is_area):
             continue
         shape = plane(feature.shape)
         if window is not None and window.is_beyond(shape):
-            if is_depth:
+            if is_depth or top is not None:
                 found.beyond.append(feature)
             continue
         if layer == LAND:
@@ -124,12 +223,14 @@ def chart_floor(
             continue
         if layer in DEPTH_AREAS:
             areas.append(DepthArea(shape, *depth_range(feature)))
+        elif top is not None and not is_depth:
+            dangers.append(Danger(shape, top))
         else:
             places = _depths(feature, shape)
             if places is None:
                 found.depthless.append(feature)
                 continue
-            points.append(places)
+            (soundings if layer == SOUNDINGS else contours).append(places)
         found.used.append(feature)
     if window is not None:
         (x, y), r = window.center, window.radius
@@ -141,7 +242,11 @@ def chart_floor(
         low, high = corners[:, :2].min(axis=0), corners[:, 2:].max(axis=0)
         box = (float(low[0]), float(low[1]), float(high[0]), float(high[1]))
     side = cell if cell is not None else max(box[2] - box[0], box[3] - box[1]) / FLOOR_CELLS
-    return sea_floor(areas, np.vstack(points), land, box, side), found
+    floor = sea_floor(
+        areas, np.vstack(contours), land, box, side, soundings=np.vstack(soundings),
+        dangers=dangers,
+    )  # fmt: skip
+    return floor, found
 
 
 def _depths(feature: Feature, shape: shapely.Geometry) -> Floats | None:
@@ -154,6 +259,6 @@ def _depths(feature: Feature, shape: shapely.Geometry) -> Floats | None:
         if depth is None:
             return None
         return np.column_stack([places, np.full(len(places), depth)])
-    depths = shapely.get_coordinates(feature.shape, include_z=True)[:, 2]
+    depths = 0.0 - shapely.get_coordinates(feature.shape, include_z=True)[:, 2]
     known = np.isfinite(depths)
     return np.column_stack([places, depths])[known] if known.any() else None

@@ -269,7 +269,8 @@ def kind_of(
             f"{feature.where}: expected a kind of {', '.join(KINDS)}, got {shape!r} of kind "
             f"{shown(said)}"
         )
-    if shape not in SHAPES[kind] and (feature.marker is None or "Point" not in SHAPES[kind]):
+    marked = shape if feature.marker is None else feature.marker.geom_type
+    if shape not in SHAPES[kind] and marked not in SHAPES[kind]:
         article = "an" if kind[0] in "aeiou" else "a"
         raise InputError(
             f"{feature.where}: {article} {kind} cannot be a {shape}; expected "

@@ -17,47 +17,77 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from netsp.errors import InputError, counted
+from netsp.arrays import Floats
+from netsp.axes import UNITS
+from netsp.errors import InputError, UnansweredError, counted
 from netsp.files import check_file, read_bytes
 from netsp.site.contract import WORDS, words_in
+from netsp.site.dxf_shapes import WITHOUT_WIDTH, shape_damage, simple_entities
 from netsp.site.dxf_tags import Drawing, Record, Tag, read_drawing, written
 from netsp.site.feature import Change, Feature, Map, Unread, change_notes
 from netsp.site.vector import (
     LOCAL,
     MOST_FEATURES,
+    GdalLayer,
     gdal_options,
     in_degrees,
     parts_of,
     read_layer,
     shape_from_gdal,
 )
-from netsp.site.wkb_shapes import NotFiniteError, ShapeError, collected
+from netsp.site.wkb_shapes import MAX_NESTING, NotFiniteError, ShapeError, collected
 
 if TYPE_CHECKING:
     import shapely
 
+US_FOOT = UNITS["us-ft"]
+
 INSUNITS = {
-    1: "in", 2: "ft", 4: "mm", 5: "cm", 6: "m", 7: "km", 10: "yd", 21: "us-ft",
+    1: ("inches", 0.0254), 2: ("feet", 0.3048), 3: ("miles", 1609.344), 4: ("millimetres", 1e-3),
+    5: ("centimetres", 0.01), 6: ("metres", 1.0), 7: ("kilometres", 1e3),
+    8: ("microinches", 2.54e-8), 9: ("mils", 2.54e-5), 10: ("yards", 0.9144),
+    11: ("angstroms", 1e-10), 12: ("nanometres", 1e-9), 13: ("microns", 1e-6),
+    14: ("decimetres", 0.1), 15: ("decametres", 10.0), 16: ("hectometres", 100.0),
+    21: ("US survey feet", US_FOOT), 22: ("US survey inches", US_FOOT / 12.0),
+    23: ("US survey yards", 3.0 * US_FOOT), 24: ("US survey miles", 5280.0 * US_FOOT),
 }  # fmt: skip
-"""Units of the header's $INSUNITS that a site may have (Autodesk's DXF reference)."""
+"""Units of the header's $INSUNITS: name and metres (Autodesk's DXF reference).
+
+Units of astronomy (17 to 20) are none of a site.
+"""
 
 SHAPES = {
     "POINT", "LINE", "LWPOLYLINE", "POLYLINE", "CIRCLE", "ARC", "ELLIPSE", "SPLINE", "INSERT",
-    "SOLID", "TRACE", "3DFACE", "HATCH", "MESH",
+    "SOLID", "TRACE", "3DFACE", "HATCH", "MESH", "MLINE",
 }  # fmt: skip
 """Types of entities that are read."""
 
 TEXTS = {"TEXT", "MTEXT", "ATTRIB", "ATTDEF", "RTEXT", "ARCALIGNEDTEXT"}
 
-ANNOTATIONS = TEXTS | {
+WRITING = TEXTS | {
     "DIMENSION", "ARC_DIMENSION", "LARGE_RADIAL_DIMENSION", "LEADER", "MLEADER", "MULTILEADER",
-    "TOLERANCE", "ACAD_TABLE", "VIEWPORT", "WIPEOUT", "IMAGE", "OLEFRAME", "OLE2FRAME", "LIGHT",
-    "CAMERA", "SUN", "PDFUNDERLAY", "DWFUNDERLAY", "DGNUNDERLAY", "GEOPOSITIONMARKER", "SEQEND",
-    "VERTEX", "SECTIONOBJECT",
+    "TOLERANCE", "ACAD_TABLE", "SECTIONOBJECT",
 }  # fmt: skip
-"""Types of entities that write on a drawing, and are no shape of the site."""
+"""Types of entities that write on a drawing."""
+
+PICTURES = {
+    "IMAGE", "WIPEOUT", "OLEFRAME", "OLE2FRAME", "PDFUNDERLAY", "DWFUNDERLAY", "DGNUNDERLAY",
+}  # fmt: skip
+"""Types of entities that show or cover a picture."""
+
+NO_SHAPES = {"VIEWPORT", "LIGHT", "CAMERA", "SUN", "GEOPOSITIONMARKER", "SEQEND", "VERTEX"}
+"""Types of entities that help to show or to place a drawing."""
+
+SOLIDS = {
+    "3DSOLID", "REGION", "BODY", "SURFACE", "EXTRUDEDSURFACE", "LOFTEDSURFACE", "NURBSURFACE",
+    "PLANESURFACE", "REVOLVEDSURFACE", "SWEPTSURFACE",
+}  # fmt: skip
+"""Types of entities whose shape is in the format of a solid modeller (ACIS)."""
 
 ENDLESS = {"XLINE", "RAY"}
+
+EXTERNAL = 4
+"""Flag (70) of a block that stands for another drawing."""
 
 PAPER = "*paper_space"
 DIMENSION_LAYER = "defpoints"
@@ -66,8 +96,10 @@ DIMENSION_LAYER = "defpoints"
 LABELLED = ("POINT", "CIRCLE", "INSERT")
 """Types of entities that stand for one place, and take the name of a text beside it."""
 
-FLAG_POLYGON_MESH, FLAG_POLYFACE = 16, 64
-OPTIONS = {"DXF_MERGE_BLOCK_GEOMETRIES": "FALSE", "DXF_INLINE_BLOCKS": "TRUE"}
+OPTIONS = {
+    "DXF_MERGE_BLOCK_GEOMETRIES": "FALSE", "DXF_INLINE_BLOCKS": "TRUE",
+    "DXF_FEATURE_LIMIT_PER_BLOCK": str(MOST_FEATURES),
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -112,34 +144,39 @@ def read_dxf(
     Raises
     ------
     InputError
-        Not a drawing, too large, or its unit is none of a site.
+        Not a drawing, too large, or its unit is unknown.
     """
     check_file(file)
     drawing = read_drawing(file, read_bytes(file))
     reader = _Reader(file, drawing, labels or LabelRule())
-    unit, note = _unit(file, drawing, units)
-    found = reader.map(unit, note)
+    metres, note = _unit(file, drawing, units)
+    found = reader.map(metres, note)
     return found if crs in (None, LOCAL) else in_degrees(found, str(crs), file)
 
 
-def _unit(file: str | Path, drawing: Drawing, asked: str | None) -> tuple[str | None, str]:
-    """Return the unit that the header states, and what is to be said of it."""
-    text = drawing.header.get("$INSUNITS", "0")
+def _unit(file: str | Path, drawing: Drawing, asked: str | None) -> tuple[float | None, str]:
+    """Return the metres per unit that the header states, and what is to be said of it.
+
+    A drawing that could state a unit and states none is asked about. Releases before 2000 could
+    not: their lengths are metres, as in other planes.
+    """
+    text = drawing.header.get("$INSUNITS", "")
     try:
-        number = int(float(text))
+        number = int(float(text or "0"))
     except (ValueError, OverflowError):
         number = -1
-    unit = INSUNITS.get(number)
-    says = f"the drawing's header says {unit}" if unit else "the drawing's header states no unit"
+    name, metres = INSUNITS.get(number, ("", None))
+    said = f"the drawing's header says {name}" if name else "the drawing's header states no unit"
     if asked is not None:
-        return unit, f"lengths are in {asked}, as asked for ({says})"
-    if unit is not None:
-        return unit, f"lengths are in {unit}, as the drawing's header says ($INSUNITS {number})"
-    if number == 0:
-        return None, f"{says}: lengths are taken as metres; --units says otherwise"
-    raise InputError(
-        f"{file}: $INSUNITS: expected a unit of {', '.join(INSUNITS.values())}, got {text}; give "
-        "the unit with --units"
+        return metres, f"lengths are in {asked}, as asked for ({said})"
+    if metres is not None:
+        return metres, f"lengths are in {name}, as the drawing's header says ($INSUNITS {number})"
+    if not text and "$MEASUREMENT" not in drawing.header:
+        return None, f"{said}: lengths are taken as metres; --units says otherwise"
+    what = "states no unit" if number == 0 else f"has $INSUNITS {text}, which is no unit of a site"
+    plain = f"{file}: the drawing's header {what}"
+    raise UnansweredError(
+        [f"{plain}; give the unit with --units, as --units mm"], [plain], ["units"]
     )
 
 
@@ -174,8 +211,11 @@ class _Reader:
         self.complaints: list[str] = []
         self.notes: list[str] = []
         self.texts: list[tuple[str, str, Record]] = []
+        self.sizes: dict[str, int] = {}
+        self.cyclic: dict[str, bool] = {}
+        self.widths: dict[str, float] = {}
 
-    def map(self, unit: str | None, note: str) -> Map:
+    def map(self, metres: float | None, note: str) -> Map:
         """Return the map."""
         kept = [e for e in map(self.entity, self.drawing.entities) if e is not None]
         if sum(self.layers.values()) > MOST_FEATURES:
@@ -196,7 +236,7 @@ class _Reader:
         return Map(
             tuple(features), False, self.layers, tuple(self.complaints),
             notes=(note, *self.notes, *change_notes(self.changes)), unread=tuple(self.unread),
-            unit=unit,
+            metres=metres,
         )  # fmt: skip
 
     # What is no shape of the site
@@ -210,6 +250,12 @@ class _Reader:
         where = f"{layer}[{number}]" + (f" (handle {handle})" if handle else "")
         reason = self.reason(record, layer)
         if not reason:
+            if why := self.damage(record):
+                self.complaints.append(
+                    f"{self.file}: {where}: a damaged {record.type}: {why}; repair or delete it, "
+                    "or audit the drawing in its program and save it again"
+                )
+                return None
             return _Entity(record, where, layer)
         if record.type in TEXTS and self.visible(record, layer):
             self.texts.append((where, layer, record))
@@ -227,8 +273,12 @@ class _Reader:
         kind = record.type
         if record.get(67, "0") not in ("", "0"):
             return "in paper space"
-        if kind in ANNOTATIONS:
+        if kind in WRITING:
             return f"writing on the drawing ({kind})"
+        if kind in PICTURES:
+            return f"a picture ({kind})"
+        if kind in NO_SHAPES:
+            return f"no shape of the site ({kind})"
         if layer.lower() in self.hidden:
             return f"its layer is {self.hidden[layer.lower()]}"
         if record.get(60) == "1":
@@ -237,11 +287,81 @@ class _Reader:
             return "on the layer of dimensions' points"
         if kind in ENDLESS:
             return f"a construction line without end ({kind})"
+        if kind in SOLIDS:
+            return f"a solid, whose shape is not read ({kind}): draw its outline as a polyline"
         if kind not in SHAPES:
-            return f"its type is not read ({kind})"
-        if kind == "INSERT" and record.get(2).lower() not in self.blocks:
-            return f"its block {record.get(2)!r} is not in the drawing"
+            return f"its type is not read ({kind}): explode it, or draw its outline as a polyline"
+        block = record.get(2).lower()
+        if kind == "INSERT" and block not in self.blocks:
+            return f"its block {self.text(record.get(2))!r} is not in the drawing"
+        if kind == "INSERT" and int(self.head(block).number(70)) & EXTERNAL:
+            return (
+                f"another drawing ({self.text(self.head(block).get(1)) or block}): bind it to this "
+                "one, or import it, too"
+            )
         return ""
+
+    def head(self, block: str) -> Record:
+        """Return the record that begins a block."""
+        return self.drawing.block_records[self.blocks[block]]
+
+    def damage(self, record: Record) -> str:
+        """Return what is wrong with an entity or the blocks in it; empty where nothing is."""
+        own = record.damage() or shape_damage(record)
+        if own or record.type != "INSERT":
+            return own
+        if self.holds_itself(record.get(2)):
+            return f"its block {self.text(record.get(2))!r} holds itself"
+        for block in self.blocks_in(record.get(2)):
+            head = self.head(block)
+            inner = (r for r in self.drawing.blocks[self.blocks[block]]
+                     if not self.reason(r, self.text(r.get(8, "0"))))  # fmt: skip
+            for part in (head, *inner):
+                if why := part.damage() or shape_damage(part):
+                    handle = f" (handle {part.get(5)})" if part.get(5) else ""
+                    return f"its block {self.text(head.get(2))!r}: {part.type}{handle}: {why}"
+        return ""
+
+    def holds_itself(self, block: str, above: tuple[str, ...] = ()) -> bool:
+        """Return whether a block refers to itself, perhaps through others."""
+        name = block.lower()
+        if name in above or len(above) >= MAX_NESTING:
+            return True
+        if name not in self.cyclic:
+            self.cyclic[name] = any(
+                self.holds_itself(record.get(2), (*above, name))
+                for record in self.drawing.blocks[self.blocks[name]]
+                if record.type == "INSERT" and record.get(2).lower() in self.blocks
+            )
+        return self.cyclic[name]
+
+    def size(self, record: Record) -> int:
+        """Return the number of shapes that an entity gives: for a block that of its entities."""
+        if record.type != "INSERT":
+            return len(simple_entities(record)) if record.type == "MLINE" else 1
+        name = record.get(2).lower()
+        if name not in self.sizes:
+            self.sizes[name] = sum(
+                self.size(r) for r in self.drawing.blocks[self.blocks[name]]
+                if not self.reason(r, self.text(r.get(8, "0")))
+            )  # fmt: skip
+        columns, rows = _array(record)
+        return columns * rows * self.sizes[name]
+
+    def blocks_in(self, block: str) -> Iterator[str]:
+        """Yield a block and those in it, each once, in lower case."""
+        stack, seen = [block.lower()], set[str]()
+        while stack:
+            name = stack.pop()
+            if name in seen or name not in self.blocks:
+                continue
+            seen.add(name)
+            yield name
+            stack += [
+                record.get(2).lower()
+                for record in self.drawing.blocks[self.blocks[name]]
+                if record.type == "INSERT" and not self.reason(record, self.text(record.get(8)))
+            ]
 
     # Shapes
 
@@ -249,15 +369,29 @@ class _Reader:
         """Give entities the shapes that GDAL reads, by handles that are made for that."""
         if not entities:
             return
+        if (total := sum(self.size(entity.record) for entity in entities)) > MOST_FEATURES:
+            raise InputError(
+                f"{self.file}: {total:,} entities in all its blocks; expected at most "
+                f"{MOST_FEATURES:,}"
+            )
         by_handle = {f"{k + 0x100000:X}": entity for k, entity in enumerate(entities)}
-        with tempfile.TemporaryDirectory() as folder, gdal_options(OPTIONS):
-            plain = Path(folder) / "drawing.dxf"
-            plain.write_text(written(self.plain(by_handle)), encoding="latin-1", newline="\n")
-            layer = read_layer(self.file, plain, "entities", self.notes)
+        try:
+            layer = self.from_gdal(by_handle)
+        except InputError as error:
+            raise InputError(self.damaged(list(by_handle.items()), error)) from None
         # blocks of which nothing is read are named with what refers to them
-        self.notes = [note for note in self.notes if not NO_BLOCK.match(note)]
-        for data, properties in zip(layer.shapes, layer.properties, strict=True):
-            entity = by_handle[str(properties["EntityHandle"])]
+        self.notes = [note for note in self.notes if not NO_LOSS.match(note)]
+        handles = [str(properties["EntityHandle"]) for properties in layer.properties]
+        found = Counter(handles)
+        for handle, entity in by_handle.items():
+            expected = self.size(entity.record)
+            if found[handle] < expected and entity.record.type == "INSERT":
+                self.complaints.append(
+                    f"{self.file}: {entity.where}: GDAL reads {found[handle]} of the {expected} "
+                    f"entities in its block {self.text(entity.record.get(2))!r}; explode the block"
+                )
+        for data, handle, properties in zip(layer.shapes, handles, layer.properties, strict=True):
+            entity = by_handle[handle]
             if data is None:
                 continue  # it has no piece then, and is named below
             try:
@@ -277,6 +411,35 @@ class _Reader:
                 entity.failure = f"has no length ({entity.record.type})"
             entity.pieces += [(inner, part) for part in long]
 
+    def from_gdal(self, by_handle: dict[str, _Entity]) -> GdalLayer:
+        """Return what GDAL reads of some entities."""
+        with tempfile.TemporaryDirectory() as folder, gdal_options(OPTIONS):
+            plain = Path(folder) / "drawing.dxf"
+            plain.write_text(written(self.plain(by_handle)), encoding="latin-1", newline="\n")
+            return read_layer(self.file, plain, "entities", self.notes)
+
+    def damaged(self, entities: list[tuple[str, _Entity]], error: InputError) -> str:
+        """Return the message for a drawing that GDAL does not read: the entity that stops it."""
+
+        def is_read(some: list[tuple[str, _Entity]]) -> bool:
+            try:
+                self.from_gdal(dict(some))
+            except InputError:
+                return False
+            return True
+
+        low, high = 0, len(entities)  # the first `low` are read, the first `high` are not
+        if not is_read([]):
+            return str(error)
+        while high - low > 1:
+            middle = (low + high) // 2
+            low, high = (middle, high) if is_read(entities[:middle]) else (low, middle)
+        entity = entities[low][1]
+        return (
+            f"{self.file}: {entity.where}: a damaged {entity.record.type}; repair or delete it, or "
+            "audit the drawing in its program and save it again"
+        )
+
     def plain(self, by_handle: dict[str, _Entity]) -> Iterator[Tag]:
         """Yield the drawing with nothing but what is to be read, each with a handle of its own."""
         version = self.drawing.header.get("$ACADVER", "AC1009")
@@ -290,18 +453,21 @@ class _Reader:
             yield from self.drawing.block_records[name].all_tags()
             for record in records:
                 if not self.reason(record, self.text(record.get(8, "0"))):
-                    yield from _readable(record).all_tags()
+                    for simple in simple_entities(record):
+                        yield from simple.all_tags()
             yield 0, "ENDBLK"
         yield from ((0, "ENDSEC"), (0, "SECTION"), (2, "ENTITIES"))
         for handle, entity in by_handle.items():
-            record = _readable(entity.record)
-            tags = [(5, handle), *(tag for tag in record.tags if tag[0] != 5)]
-            followers = [f for f in record.followers if f.type != "ATTRIB"]
-            yield from Record(record.type, tags, followers).all_tags()
+            for record in simple_entities(entity.record):
+                tags = [(5, handle), *(tag for tag in record.tags if tag[0] != 5)]
+                followers = [f for f in record.followers if f.type != "ATTRIB"]
+                yield from Record(record.type, tags, followers).all_tags()
         yield from ((0, "ENDSEC"), (0, "EOF"))
 
     def features(self, entity: _Entity) -> list[Feature]:
         """Return the feature of an entity; of a block with several layers one for each."""
+        import shapely
+
         record, layer = entity.record, entity.layer
         if record.type == "INSERT" and entity.pieces:
             for text in self.lost_in(record.get(2)):
@@ -319,6 +485,11 @@ class _Reader:
             own = layer if inner == "0" else inner
             groups.setdefault(own if split else layer, []).append(piece)
         self.layers[layer] += len(groups) - 1
+        widths = set(_widths(record))
+        if len(widths) > 1 and max(widths) > 0.0:
+            self.changes.append(Change(entity.where, layer, CHANGING_WIDTH))
+        elif record.type == "INSERT" and self.width(record) > 0.0:
+            self.changes.append(Change(entity.where, layer, WIDTH_OF_BLOCK))
         out = []
         for inner, pieces in groups.items():
             where = entity.where + (f" {inner}" if len(groups) > 1 else "")
@@ -327,6 +498,8 @@ class _Reader:
                 self.changes.append(
                     Change(where, layer, "points in its block, beside other shapes: left out")
                 )
+            if record.type == "MLINE" and all(p.geom_type == "Polygon" for p in whole):
+                whole = [shapely.union_all(whole)]
             shape = whole[0] if len(whole) == 1 else collected(whole)
             out.append(
                 Feature(
@@ -344,14 +517,26 @@ class _Reader:
         }
         if record.type == "INSERT":
             out["block"] = self.text(record.get(2))
-        elif record.type == "LWPOLYLINE" and record.number(43) > 0.0:
-            out["width"] = record.number(43)
-        elif record.type == "POLYLINE" and record.number(40) == record.number(41) > 0.0:
-            out["width"] = record.number(40)
+        width = self.width(record)
+        if width > 0.0:
+            out["width"] = width
         return out
 
-    def marker(self, entity: _Entity) -> shapely.Point | None:
-        """Return the place that a circle or a block stands for."""
+    def width(self, record: Record) -> float:
+        """Return the largest width of a polyline, or of the polylines in a block; 0 for none."""
+        if record.type == "INSERT":
+            name = record.get(2).lower()
+            if name not in self.widths:
+                inner = self.drawing.blocks[self.blocks[name]]
+                self.widths[name] = max(
+                    (self.width(r) for r in inner if not self.reason(r, self.text(r.get(8, "0")))),
+                    default=0.0,
+                )
+            return self.widths[name] * max(abs(record.number(code, 1.0)) for code in (41, 42))
+        return max(_widths(record), default=0.0)
+
+    def marker(self, entity: _Entity) -> shapely.Geometry | None:
+        """Return the place that a circle or a block stands for, or the places of an array."""
         import shapely
 
         record = entity.record
@@ -359,25 +544,29 @@ class _Reader:
             ring = shapely.get_coordinates(entity.pieces[0][1], include_z=True)
             x, y = 0.5 * (ring[:, :2].min(0) + ring[:, :2].max(0))
             return shapely.Point(x, y, np.nan_to_num(ring[0, 2]))
-        if record.type == "INSERT" and record.number(230, 1.0) > 0.0:
-            return shapely.Point(record.number(10), record.number(20), record.number(30))
-        return None
+        if record.type != "INSERT":
+            return None
+        columns, rows = _array(record)
+        turn = math.radians(record.number(50))
+        along = np.array([math.cos(turn), math.sin(turn)]) * record.number(44)
+        across = np.array([-math.sin(turn), math.cos(turn)]) * record.number(45)
+        start = np.array([record.number(10), record.number(20)])
+        corners = [start + j * along + i * across for i in range(rows) for j in range(columns)]
+        places = _in_world(
+            np.column_stack([np.array(corners), np.full(len(corners), record.number(30))]),
+            np.array([record.number(210), record.number(220), record.number(230, 1.0)]),
+        )
+        spots = shapely.points(places)
+        return spots[0] if len(spots) == 1 else shapely.MultiPoint(spots)
 
     def lost_in(self, block: str) -> list[str]:
         """Return what of a block, and of those in it, is not read, one line for each reason."""
         lost: Counter[str] = Counter()
-        stack, seen = [block.lower()], set[str]()
-        while stack:
-            name = stack.pop()
-            if name in seen or name not in self.blocks:
-                continue
-            seen.add(name)
+        for name in self.blocks_in(block):
             for record in self.drawing.blocks[self.blocks[name]]:
                 reason = self.reason(record, self.text(record.get(8, "0")))
                 if reason and record.type not in ("ATTDEF", "SEQEND"):
                     lost[reason] += 1
-                elif record.type == "INSERT":
-                    stack.append(record.get(2).lower())
         return [
             f"{counted(n, 'record')} of its block {block!r} left out: {reason}"
             for reason, n in lost.items()
@@ -452,8 +641,51 @@ class _Reader:
         return UNICODE.sub(lambda found: chr(int(found[1], 16)), text)
 
 
-NO_BLOCK = re.compile(r"GDAL: Block .* does not exist")
-"""Warning of GDAL of a block without records."""
+def _widths(record: Record) -> list[float]:
+    """Return the widths that a polyline states, of all its parts and their ends."""
+    if record.type == "LWPOLYLINE":
+        parts = [record]
+    elif record.type == "POLYLINE" and not int(record.number(70)) & WITHOUT_WIDTH:
+        parts = [record, *record.followers]
+    else:
+        return []
+    return [float(v) for part in parts for code, v in part.tags if code in (40, 41, 43)]
+
+
+def _array(record: Record) -> tuple[int, int]:
+    """Return the columns and rows in which an INSERT stands."""
+    columns, rows = (max(1, int(record.number(code, 1.0))) for code in (70, 71))
+    return columns, rows
+
+
+def _in_world(places: Floats, normal: Floats) -> Floats:
+    """Return places of an entity's own system in that of the drawing (arbitrary axis algorithm).
+
+    Parameters
+    ----------
+    places : ndarray, shape (n, 3)
+        As the entity has them.
+    normal : ndarray, shape (3,)
+        Its direction of extrusion, not zero.
+
+    Returns
+    -------
+    ndarray, shape (n, 3)
+        Right-handed; x of the entity lies in the drawing's plane of x and y.
+    """
+    up = normal / (float(np.linalg.norm(normal)) or 1.0)
+    # Autodesk's bound: normals nearer to the axis z take y for it
+    near = max(abs(up[0]), abs(up[1])) < 1.0 / 64.0
+    x = np.cross([0.0, 1.0, 0.0] if near else [0.0, 0.0, 1.0], up)
+    x /= float(np.linalg.norm(x)) or 1.0
+    return np.asarray(places @ np.array([x, np.cross(up, x), up]))
+
+
+CHANGING_WIDTH = "a width that changes: taken as the largest"
+WIDTH_OF_BLOCK = "lines in its block are as wide as the widest polyline there"
+
+NO_LOSS = re.compile(r"GDAL: (Block .* does not exist|Non closed ring detected)")
+"""Warnings of GDAL that tell nothing new: of a block without records, and of each 3DFACE."""
 
 UNICODE = re.compile(r"\\U\+([0-9A-Fa-f]{4})")
 """A character as drawings escape it."""
@@ -516,77 +748,3 @@ def _alike(a: shapely.Polygon, b: shapely.Polygon) -> bool:
     if not a.is_valid or not b.is_valid:
         return False
     return bool(a.symmetric_difference(b).area <= 0.01 * a.area)
-
-
-def _readable(record: Record) -> Record:
-    """Return a mesh as the polyface mesh that GDAL reads; others as they are."""
-    if record.type == "MESH":
-        return _of_mesh(record)
-    if record.type == "POLYLINE" and int(record.number(70)) & FLAG_POLYGON_MESH:
-        return _of_grid(record)
-    return record
-
-
-def _of_mesh(record: Record) -> Record:
-    """Return a MESH, with its corners (10, 20, 30) and faces (90, of 93) before subdivision."""
-    corners: list[tuple[float, float, float]] = []
-    faces: list[list[int]] = []
-    tags = iter(record.tags)
-    for code, value in tags:
-        if code == 10:
-            corners.append((float(value), float(next(tags)[1]), float(next(tags)[1])))
-        elif code == 93:
-            items = [int(next(tags)[1]) for _ in range(int(value))]
-            at = 0
-            while at < len(items):
-                faces.append(items[at + 1 : at + 1 + items[at]])
-                at += 1 + items[at]
-            break
-    return _polyface(record, corners, faces)
-
-
-def _of_grid(record: Record) -> Record:
-    """Return a polygon mesh of rows and columns (flag 16)."""
-    flags = int(record.number(70))
-    rows, columns = int(record.number(71)), int(record.number(72))
-    corners = [
-        (f.number(10), f.number(20), f.number(30))
-        for f in record.followers
-        if f.type == "VERTEX" and not int(f.number(70)) & 16  # the frame of a smooth surface
-    ]
-    if flags & 4:  # smoothed: the density of the surface
-        rows, columns = int(record.number(73)) or rows, int(record.number(74)) or columns
-    faces = []
-    for i in range(rows if flags & 1 else rows - 1):
-        for j in range(columns if flags & 32 else columns - 1):
-            a, b = i * columns + j, i * columns + (j + 1) % columns
-            c, d = (i + 1) % rows * columns + (j + 1) % columns, (i + 1) % rows * columns + j
-            faces.append([a, b, c, d])
-    return _polyface(record, corners, faces)
-
-
-def _polyface(
-    record: Record, corners: list[tuple[float, float, float]], faces: list[list[int]]
-) -> Record:
-    """Return a polyface mesh; faces of many corners become triangles."""
-    shared = [(c, v) for c, v in record.tags if c in (5, 8, 60, 67)]
-    layer = (8, record.get(8, "0"))
-    head = Record("POLYLINE", [*shared, (66, "1"), (70, str(FLAG_POLYFACE)),
-                               (71, str(len(corners))), (72, str(len(faces)))])  # fmt: skip
-    for x, y, z in corners:
-        head.followers.append(
-            Record("VERTEX", [layer, (10, repr(x)), (20, repr(y)), (30, repr(z)), (70, "192")])
-        )
-    for face in faces:
-        fans = [face] if len(face) <= 4 else [[face[0], *face[k : k + 2]]
-                                              for k in range(1, len(face) - 1)]  # fmt: skip
-        for fan in fans:
-            if all(0 <= i < len(corners) for i in fan):
-                numbers = [(71 + k, str(i + 1)) for k, i in enumerate(fan)]
-                head.followers.append(
-                    Record(
-                        "VERTEX", [layer, (10, "0"), (20, "0"), (30, "0"), (70, "128"), *numbers]
-                    )
-                )
-    head.followers.append(Record("SEQEND", [layer]))
-    return head

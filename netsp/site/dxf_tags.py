@@ -2,16 +2,36 @@
 
 from __future__ import annotations
 
+import re
 import struct
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from netsp.errors import InputError
+from netsp.fields import LARGEST
 from netsp.models import shown
 
 Tag = tuple[int, str]
 """Group code and value; text is Latin-1, one character for each byte of the file."""
+
+NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?")
+"""A number as drawings write it; GDAL reads other text as 0, or up to the first odd character."""
+
+NUMERIC_CODES = frozenset({*range(10, 60), *range(60, 80), *range(90, 100), *range(210, 240)})
+"""Group codes of places, lengths, angles, flags and counts."""
+
+REQUIRED_CODES = {
+    "POINT": (10, 20), "LINE": (10, 20, 11, 21), "CIRCLE": (10, 20, 40),
+    "ARC": (10, 20, 40, 50, 51), "ELLIPSE": (10, 20, 11, 21, 40), "INSERT": (10, 20),
+    "SOLID": (10, 20, 11, 21, 12, 22), "TRACE": (10, 20, 11, 21, 12, 22),
+    "3DFACE": (10, 20, 11, 21, 12, 22), "SPLINE": (71,), "VERTEX": (10, 20),
+}  # fmt: skip
+"""Group codes without a default, by the type of entity (Autodesk's reference)."""
+
+POLYFACE_FACE = 128
+"""Flag (70) of a vertex that lists corners of a face and has no place."""
 
 BINARY = b"AutoCAD Binary DXF\r\n\x1a\x00"
 """First bytes of a binary drawing."""
@@ -70,6 +90,45 @@ class Record:
             return float(self.get(code))
         except ValueError:
             return default
+
+    def damage(self) -> str:
+        """Return what is wrong with the numbers of the record; empty where nothing is.
+
+        Returns
+        -------
+        str
+            As "group code 10: expected a number, got 'abc'".
+        """
+        for code, value in self.tags:
+            if code in NUMERIC_CODES:
+                text = value.strip()
+                if not NUMBER.fullmatch(text) or abs(float(text)) > LARGEST:
+                    return f"group code {code}: expected a number, got {shown(text)}"
+        size = Counter(code for code, _ in self.tags)
+        is_face = self.type == "VERTEX" and int(self.number(70)) & POLYFACE_FACE
+        needed = () if is_face else REQUIRED_CODES.get(self.type, ())
+        for code in needed:
+            if not size[code]:
+                return f"group code {code}: missing; expected a number"
+        if self.type == "LWPOLYLINE" and (
+            size[10] != size[20] or int(self.number(90, size[10])) != size[10] or not size[10]
+        ):
+            return (
+                f"expected {self.get(90, 'some')} corners (group code 90), got {size[10]} x and "
+                f"{size[20]} y"
+            )
+        if self.type == "INSERT" and 0.0 in (self.number(41, 1.0), self.number(42, 1.0)):
+            return "its scale is 0 (group code 41 or 42)"
+        if self.type == "SPLINE":
+            knots = size[10] + int(self.number(71)) + 1
+            if not size[10]:
+                return "no control points (group code 10); expected a spline with them"
+            if size[10] != size[20] or size[40] != knots:
+                return (
+                    f"expected as many x as y and {knots} knots (group code 40), got {size[10]} x, "
+                    f"{size[20]} y and {size[40]} knots"
+                )
+        return next(filter(None, (follower.damage() for follower in self.followers)), "")
 
     def all_text(self) -> str:
         """Return the text of TEXT (code 1) or MTEXT (pieces 3, then 1)."""
@@ -140,6 +199,7 @@ def read_drawing(file: str | Path, data: bytes) -> Drawing:
     tags = _binary_tags(file, data) if data.startswith(BINARY) else _text_tags(file, data)
     sections: dict[str, list[Tag]] = {}
     current: list[Tag] | None = None
+    name = ""
     for k, (code, value) in enumerate(tags):
         if code == 0 and value.strip() == "SECTION":
             name = tags[k + 1][1].strip() if k + 1 < len(tags) else ""
@@ -148,6 +208,10 @@ def read_drawing(file: str | Path, data: bytes) -> Drawing:
             current = None
         elif current is not None:
             current.append((code, value))
+    if current is not None:
+        raise InputError(
+            f"{file}: cannot be read as a map: cut short: its section {name} has no end (ENDSEC)"
+        )
     if "ENTITIES" not in sections:
         raise InputError(
             f"{file}: cannot be read as a map: not a DXF drawing: expected a section ENTITIES"

@@ -19,7 +19,7 @@ TAG_PROPERTIES = ("tags", "@tags", "other_tags", "all_tags")
 HSTORE_PAIR = re.compile(r'"((?:[^"\\]|\\.)*)"=>"((?:[^"\\]|\\.)*)"')
 """Key and value in PostgreSQL's hstore text."""
 
-NO_NAMES = ("<null>", "null", "none", "nan", "n/a", "unnamed")
+NO_NAMES = ("", "<null>", "null", "none", "nan", "n/a", "unnamed")
 """Texts, in lower case, that programs write where there is no value."""
 
 
@@ -44,7 +44,8 @@ class Feature:
         Names of the folders or layers that it lies in, the nearest first, where these are more
         than its layer: the first that the contract knows decides its kind.
     marker
-        Place that a symbol of a drawing marks: a goal drawn as a circle or a block is there.
+        Place that a symbol of a drawing marks, or places of an array of symbols: a goal drawn as a
+        circle or a block is there.
     is_above_floor
         Whether z counts from the sea floor, which the map does not have.
     kind
@@ -57,7 +58,7 @@ class Feature:
     properties: Mapping[str, Any]
     shape: shapely.Geometry
     folders: tuple[str, ...] = ()
-    marker: shapely.Point | None = None
+    marker: shapely.Geometry | None = None
     is_above_floor: bool = False
     kind: str = ""
 
@@ -77,7 +78,7 @@ class Feature:
         own = {str(k).lower(): v for k, v in self.properties.items()}
         for name in names:
             value = own.get(name)
-            if value is None or value != value or value == "":  # GDAL's empty numbers are NaN
+            if value is None or value != value:  # GDAL's empty numbers are NaN
                 continue
             if isinstance(value, str) and value.strip().lower() in NO_NAMES:
                 continue
@@ -209,9 +210,10 @@ class Map:
         What was assumed or changed, one line each.
     unread
         Features that cannot be used.
-    unit
-        Name of the unit of its plane as the file states it (`netsp.axes.UNITS`), if it
-        does.
+    metres
+        Metres per unit of its plane as the file states it, if it does.
+    is_chart
+        Whether it is an S-57 chart, whose object classes decide kinds.
     """
 
     features: tuple[Feature, ...]
@@ -220,7 +222,8 @@ class Map:
     complaints: tuple[str, ...] = ()
     notes: tuple[str, ...] = field(default=())
     unread: tuple[Unread, ...] = ()
-    unit: str | None = None
+    metres: float | None = None
+    is_chart: bool = False
 
     @property
     def layer_names(self) -> set[str]:

@@ -24,6 +24,9 @@ SHAPES = {
 
 COLLECTION = "GeometryCollection"
 
+RECORD_SEPARATOR = "\x1e"
+"""Character before each text of a sequence (RFC 8142)."""
+
 MAX_NESTING = 8
 """Collections within collections that are read; RFC 7946 (3.1.8) advises against any."""
 
@@ -48,14 +51,58 @@ def read_geojson(file: str | Path, crs: str | None) -> Map:
     InputError
         Not GeoJSON, or it names another coordinate system than WGS 84.
     """
-    data = parse_json_object(read_text(file), str(file))
+    return _map(file, _checked_features(read_text(file), str(file), crs), crs)
+
+
+def read_geojson_sequence(file: str | Path, crs: str | None) -> Map:
+    """Return a sequence of GeoJSON texts as a map.
+
+    Parameters
+    ----------
+    file : str or Path
+        Texts after record separators (RFC 8142), or one a line.
+    crs : str, optional
+        Coordinate system given by the user; None takes degrees, as RFC 7946 has it.
+
+    Returns
+    -------
+    Map
+        In degrees, unless the user says otherwise.
+
+    Raises
+    ------
+    InputError
+        A text is not GeoJSON: the message names it, because a text that is lost may be an
+        obstacle.
+    """
+    text = read_text(file)
+    is_separated = RECORD_SEPARATOR in text
+    parts = text.split(RECORD_SEPARATOR) if is_separated else text.split("\n")
+    features: list[Any] = []
+    for k, part in enumerate(parts, 0 if is_separated else 1):
+        if part.strip():
+            called = f"{file}: {'text' if is_separated else 'line'} {k}"
+            features += _checked_features(part, called, crs)
+    if not features:
+        raise InputError(f"{file}: cannot be read as a map: holds no GeoJSON")
+    return _map(file, features, crs)
+
+
+def _checked_features(text: str, called: str, crs: str | None) -> list[Any]:
+    """Return the features of a GeoJSON text in WGS 84, or in the system that the user gives."""
+    data = parse_json_object(text, called)
     features = _features_of(data)
     if features is None:
-        raise InputError(f"{file}: expected a GeoJSON FeatureCollection, Feature or geometry")
+        raise InputError(f"{called}: expected a GeoJSON FeatureCollection, Feature or geometry")
     own = data.get("crs")
     if crs is None and own is not None and not _is_wgs84(own):
-        plain = f"{file}: crs: expected WGS 84 as RFC 7946 has it, got {json.dumps(own)[:120]}"
+        plain = f"{called}: crs: expected WGS 84 as RFC 7946 has it, got {json.dumps(own)[:120]}"
         raise UnansweredError([f"{plain}; give another with --crs"], [plain], ["crs"])
+    return features
+
+
+def _map(file: str | Path, features: list[Any], crs: str | None) -> Map:
+    """Return the map of features, named by their numbers."""
     found: list[Feature] = []
     unread: list[Unread] = []
     complaints = []

@@ -2,8 +2,15 @@
 
 from __future__ import annotations
 
+from netsp.errors import counted
 from netsp.fields import checked_argument
 from netsp.problem import Problem
+
+MAX_LISTED = 3
+"""Goals that a warning names."""
+
+HEIGHTS_REMEDY = "give depths as positive numbers, or z as negative ones"
+"""What to do about goals of a map that are above the water."""
 
 
 def with_depth(problem: Problem, depth: float) -> Problem:
@@ -28,7 +35,9 @@ def with_depth(problem: Problem, depth: float) -> Problem:
     return problem.model_copy(update={"goals": goals})
 
 
-def surface_warning(problem: Problem) -> str | None:
+def surface_warning(
+    problem: Problem, remedy: str = "give one depth for all with --depth D"
+) -> str | None:  # fmt: skip
     """Return a warning where all goals are at depth 0, as tables and maps without heights have
     them; None otherwise.
 
@@ -36,7 +45,26 @@ def surface_warning(problem: Problem) -> str | None:
     ----------
     problem : Problem
         Problem that was imported or is to be exported.
+    remedy : str
+        What to do if the goals are deeper.
     """
     if not problem.goals or any(g.position[2] != 0.0 for g in problem.goals):
         return None
-    return "all goals are at depth 0; if they are deeper, give one depth for all with --depth D"
+    return f"all goals are at depth 0; if they are deeper, {remedy}"
+
+
+def height_warning(problem: Problem, remedy: str) -> str | None:
+    """Return a warning where goals are above the water; None otherwise.
+
+    Parameters
+    ----------
+    problem : Problem
+        Problem that was imported or is to be exported.
+    remedy : str
+        What to do, or what is done.
+    """
+    above = [problem.goal_name(k) for k, g in enumerate(problem.goals) if g.position[2] > 0.0]
+    if not above:
+        return None
+    named = f"{', '.join(above[:MAX_LISTED])}{', …' if len(above) > MAX_LISTED else ''}"
+    return f"{counted(len(above), 'goal')} above the water ({named}): {remedy}"

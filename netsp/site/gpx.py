@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from pathlib import Path
 from xml.etree import ElementTree
 
-from netsp.errors import InputError
+from netsp.errors import InputError, counted
 from netsp.files import read_bytes
 from netsp.models import shown
 from netsp.site.feature import Feature, Map, Unread
+from netsp.site.time_stamps import seconds_of
 
 MAX_HEIGHT = 12_000.0
 """Largest height or depth in a file, metres; no place on the earth exceeds it."""
@@ -59,13 +60,15 @@ class GpxLine:
     points: tuple[GpxPoint, ...]
 
 
-def read_gpx(file: str | Path) -> list[GpxLine]:
+def read_gpx(file: str | Path, on_note: Callable[[str], None] | None = None) -> list[GpxLine]:
     """Read the tracks and routes of a GPX file.
 
     Parameters
     ----------
     file : str or Path
         The file.
+    on_note : callable, optional
+        Called with one line each for what is left out, and for segments that are joined.
 
     Returns
     -------
@@ -77,22 +80,28 @@ def read_gpx(file: str | Path) -> list[GpxLine]:
     InputError
         Not GPX, a point without a position, or neither a track nor a route of two points.
     """
-    root = _root(file)
+    say = on_note or (lambda _: None)
     lines: list[GpxLine] = []
     count = {"trk": 0, "rte": 0, "wpt": 0}
-    for element in root:
+    for element in _root(file):
         kind = _tag(element)
         if kind not in count:
-            continue
+            continue  # a description of the file, which says nothing of places
         count[kind] += 1
         if kind == "wpt":
             continue
-        where = f"{file}: {kind}[{count[kind] - 1}]"
-        wanted = ("trkpt", "rtept")
-        points = [p for p in element.iter() if _tag(p) in wanted]
-        read = tuple(_point(p, f"{where}: point {k}") for k, p in enumerate(points))
-        if len(read) >= 2:
-            lines.append(GpxLine((_text(element, "name") or "").strip(), read))
+        name = f"{kind}[{count[kind] - 1}]"
+        parts = [points for _, points in _parts(element)]
+        points = [p for part in parts for p in part]
+        read = tuple(_point(p, f"{file}: {name}: point {k}") for k, p in enumerate(points))
+        if len(read) < 2:
+            say(f"{name} left out: has fewer than two points")
+            continue
+        if len(parts) > 1:
+            say(f"{name}: its {len(parts)} segments are joined by straight lines")
+        lines.append(GpxLine((_text(element, "name") or "").strip(), read))
+    if lines and count["wpt"]:
+        say(f"{counted(count['wpt'], 'waypoint')} left out: no part of a path")
     if not lines:
         raise InputError(
             f"{file}: expected a track or a route of two points or more, got {count['trk']} "
@@ -141,6 +150,7 @@ def read_gpx_map(file: str | Path) -> Map:
     features: list[Feature] = []
     unread: list[Unread] = []
     complaints: list[str] = []
+    notes: list[str] = []
     layers: dict[str, int] = {}
     for element in _root(file):
         kind = _tag(element)
@@ -157,22 +167,34 @@ def read_gpx_map(file: str | Path) -> Map:
                 at = shapely.Point(point.longitude, point.latitude, point.height or 0.0)
                 features.append(Feature(where, kind, "", _properties(element, "goal"), at))
                 continue
-            parts = [e for e in element if _tag(e) == "trkseg"] if kind == "trk" else [element]
             lines = [
-                [_point(p, f"{where}: point {k}") for k, p in enumerate(part)
-                 if _tag(p) in ("trkpt", "rtept")]
-                for part in parts
-            ]  # fmt: skip
+                (name, [_point(p, f"{name}: point {k}") for k, p in enumerate(part)])
+                for name, part in ((where + own, part) for own, part in _parts(element))
+            ]
         except InputError as error:
             complaints.append(f"{file}: {error}")
             continue
-        drawn = [[(p.longitude, p.latitude) for p in line] for line in lines if len(line) > 1]
+        drawn = [[(p.longitude, p.latitude) for p in line] for _, line in lines if len(line) > 1]
         if not drawn:
             unread.append(Unread(where, kind, "has no two points in a row"))
             continue
+        notes += [
+            f"{name} left out: has fewer than two points" for name, line in lines if len(line) < 2
+        ]
         shape = shapely.LineString(drawn[0]) if len(drawn) == 1 else shapely.MultiLineString(drawn)
         features.append(Feature(where, kind, "", _properties(element, "path"), shape))
-    return Map(tuple(features), True, layers, tuple(complaints), unread=tuple(unread))
+    return Map(tuple(features), True, layers, tuple(complaints), tuple(notes), tuple(unread))
+
+
+def _parts(element: ElementTree.Element) -> list[tuple[str, list[ElementTree.Element]]]:
+    """Return the segments of a track, or the whole of a route: their names and their points."""
+    if _tag(element) == "rte":
+        return [("", [p for p in element if _tag(p) == "rtept"])]
+    segments = [e for e in element if _tag(e) == "trkseg"]
+    return [
+        (f" trkseg[{k}]", [p for p in segment if _tag(p) == "trkpt"])
+        for k, segment in enumerate(segments)
+    ]
 
 
 def _properties(element: ElementTree.Element, kind: str) -> dict[str, str]:
@@ -199,6 +221,9 @@ def _point(element: ElementTree.Element, where: str) -> GpxPoint:
     latitude = _number(element.get("lat"), 90.0, f"{where}: lat")
     longitude = _number(element.get("lon"), 180.0, f"{where}: lon")
     height = _text(element, "ele")
+    depth = next((e.text for e in element.iter() if _tag(e) == "depth" and e.text), None)
+    if depth is not None:  # of an extension, as dive computers write it
+        height = str(0.0 - _number(depth, MAX_HEIGHT, f"{where}: depth"))
     time = _text(element, "time")
     return GpxPoint(
         latitude, longitude,
@@ -216,32 +241,3 @@ def _number(text: str | None, most: float, where: str) -> float:
     if not abs(value) <= most:
         raise InputError(f"{where}: expected a number within {most:g}, got {shown(text)}")
     return value
-
-
-def seconds_of(text: str, where: str) -> float:
-    """Return the seconds since 1970 of an ISO 8601 time; without a time zone it is UTC.
-
-    Parameters
-    ----------
-    text : str
-        The time.
-    where : str
-        Name of the value in messages.
-
-    Returns
-    -------
-    float
-        Seconds since 1970.
-
-    Raises
-    ------
-    InputError
-        No such time.
-    """
-    try:
-        time = datetime.fromisoformat(text.strip())
-        return (time if time.tzinfo else time.replace(tzinfo=UTC)).timestamp()
-    except (ValueError, OverflowError, OSError):
-        raise InputError(
-            f"{where}: expected a time such as 2026-05-01T12:00:00Z, got {shown(text)}"
-        ) from None

@@ -12,7 +12,7 @@ import posixpath
 import re
 import zipfile
 import zlib
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -46,6 +46,12 @@ OVERLAYS = ("GroundOverlay", "ScreenOverlay", "PhotoOverlay", "Tour")
 GEOMETRIES = (
     "Point", "LineString", "LinearRing", "Polygon", "MultiGeometry", "Track", "MultiTrack", "Model",
 )  # fmt: skip
+
+PLACES = ("coordinates", "coord")
+"""Elements that hold places."""
+
+BESIDES = ("Camera", "LookAt", "Region")
+"""Elements of a placemark that say how it is looked at."""
 
 ABOVE_FLOOR = ("relativeToSeaFloor", "clampToSeaFloor")
 """Altitude modes that count from the sea floor."""
@@ -246,7 +252,7 @@ class _Reader:
         elif tag == "NetworkLinkControl":
             if element.find(".//Update") is not None:
                 self.leave_out(at, "an Update of other pages, which is not read")
-        elif any(e.tag in ("coordinates", "coord") for e in element.iter()):
+        elif _holds(element, (*PLACES, *_FEATURES)):
             self.leave_out(at, f"an element {tag} that KML does not have")
 
     def where(self, at: _Position) -> str:
@@ -269,8 +275,12 @@ class _Reader:
     def placemark(self, element: Element, at: _Position, called: str, *, hidden: bool) -> None:
         """Read a placemark; parts of a collection are features of their own."""
         geometries = [child for child in element if child.tag in GEOMETRIES]
+        strays = list(_strays(element))
+        for stray in strays:
+            self.leave_out(at, f"places in an element {stray.tag}, which is no geometry of KML")
         if not geometries:
-            self.leave_out(at, "has no geometry")
+            if not strays:
+                self.leave_out(at, "has no geometry")
             return
         where, layer = self.where(at), at.layer
         properties = with_tags(_properties(element))
@@ -411,6 +421,20 @@ def _properties(element: Element) -> dict[str, Any]:
     return out
 
 
+def _holds(element: Element, tags: Container[str]) -> bool:
+    """Return whether an element is or holds one of some names."""
+    return any(e.tag in tags for e in element.iter())
+
+
+def _strays(element: Element) -> Iterator[Element]:
+    """Yield the elements with places in a placemark or a collection that are no geometries."""
+    for child in element:
+        if child.tag in ("MultiGeometry", "MultiTrack"):
+            yield from _strays(child)
+        elif child.tag not in (*GEOMETRIES, *BESIDES) and _holds(child, PLACES):
+            yield child
+
+
 def _parts(geometries: list[Element], where: str | None) -> Iterator[tuple[str | None, Element]]:
     """Yield the geometries of a placemark that are no collections, with their names."""
     for k, geometry in enumerate(geometries):
@@ -449,6 +473,8 @@ def _shape(element: Element, changes: list[str], *, degrees: bool) -> tuple[shap
         )
     else:
         points = _ring(element, degrees=degrees)
+        if sum(child.tag == "coordinates" for child in element) > 1:
+            changes.append("several lists of coordinates: taken as one")
     if not len(points):
         raise ShapeError("has no coordinates")
     (points,), above = _heights([points], element, changes)

@@ -6,7 +6,7 @@ Numbers and names: MAVLink's common message set (MAV_CMD, MAV_FRAME).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -68,9 +68,16 @@ MAX_PASS_S = 1.0
 """Longest hold at a bend that is passed, s, in files where other waypoints hold longer: netsp and
 ArduSub hold bends for a second, because a vehicle flies through waypoints without a hold."""
 
+HOME_RADIUS_M = 0.1
+"""Distance of a waypoint from home up to which it is at home, m; files state centimetres."""
+
 WAYPOINTS, BENDS, COMMANDS = "waypoints", "bends", "commands"
 FENCE, RALLY, HOME = "fence", "rally points", "home"
 """Layers of a mission file."""
+
+INSIDE = {"kind": "bounds", "fence": "inclusion"}
+"""Properties of a fence within which the vehicle stays; of several fences it stays within all, as
+ArduPilot takes them unless its option for the union of inclusion areas is set."""
 
 CIRCLE_CORNERS = 64
 """Corners of the polygon, on the circle, that stands for a round inclusion fence."""
@@ -140,7 +147,10 @@ class ItemFeatures:
         return counts
 
 
-def features_of_items(items: Sequence[MissionItem], home_altitude: float | None) -> ItemFeatures:
+def features_of_items(
+    items: Sequence[MissionItem], home_altitude: float | None,
+    home: tuple[float, float] | None = None,
+) -> ItemFeatures:  # fmt: skip
     """Return the features of mission items: goals, fences, and what is neither.
 
     Parameters
@@ -149,6 +159,8 @@ def features_of_items(items: Sequence[MissionItem], home_altitude: float | None)
         In the order of the mission.
     home_altitude : float or None
         Altitude of home above mean sea level, m; None where it is not stated.
+    home : (float, float), optional
+        Longitude and latitude of home, degrees.
 
     Returns
     -------
@@ -158,7 +170,7 @@ def features_of_items(items: Sequence[MissionItem], home_altitude: float | None)
     out = ItemFeatures([], [], [], [])
     stops = [i for i in items if i.command in VISITED and i.lonlat is not None]
     has_marks = any(i.mark is not None for i in stops)
-    some_hold = any(i.hold_s is not None and i.hold_s > MAX_PASS_S for i in stops)
+    is_passed = _passing_rule(stops, home)
     terrain: list[str] = []
     above_sea = False
     fences = [i for i in items if i.command in (*POLYGONS, *CIRCLES)]
@@ -177,7 +189,7 @@ def features_of_items(items: Sequence[MissionItem], home_altitude: float | None)
             continue
         is_bend = (
             item.mark is not None and item.mark.get("kind") != "goal" if has_marks
-            else some_hold and item.hold_s is not None and item.hold_s <= MAX_PASS_S
+            else is_passed(item)
         )  # fmt: skip
         z = item.place[2]
         if item.frame in ABOVE_TERRAIN:
@@ -188,6 +200,12 @@ def features_of_items(items: Sequence[MissionItem], home_altitude: float | None)
             above_sea = above_sea or not is_bend
             z -= home_altitude or 0.0
         out.features.append(_visited(item, (lon, lat), z, is_bend=is_bend, by_mark=has_marks))
+    passed = [f for f in out.features if f.layer == BENDS] if not has_marks else []
+    if passed:
+        out.notes.append(
+            f"{counted(len(passed), 'waypoint')} passed by: taken as bends of the path; make goals "
+            f"of them with --map goal={BENDS}"
+        )
     if terrain:
         out.complaints.append(
             f"{counted(len(terrain), 'waypoint')} ({terrain[0]}): altitudes above the terrain are "
@@ -199,6 +217,28 @@ def features_of_items(items: Sequence[MissionItem], home_altitude: float | None)
         out.notes.append(f"altitudes above mean sea level: the water's surface is taken at {level}")
     _fences(fences, out)
     return out
+
+
+def _passing_rule(
+    stops: Sequence[MissionItem], home: tuple[float, float] | None
+) -> Callable[[MissionItem], bool]:  # fmt: skip
+    """Return the rule that tells bends from goals by the seconds for which the vehicle holds.
+
+    A tour of netsp ends at home, where it holds as long as at its first waypoint and at every bend,
+    and never as long at a goal. In other missions the vehicle passes waypoints of a second or less,
+    if it holds longer anywhere.
+    """
+    holds = [i.hold_s for i in stops]
+    last = stops[-1].lonlat if stops else None
+    if home is not None and last is not None and holds[-1] and holds[0] == holds[-1]:
+        from netsp.site.projection import Projection
+
+        away = Projection(home[1], home[0]).to_plane([(last[1], last[0])])
+        if math.hypot(*away[0]) <= HOME_RADIUS_M and any(h != holds[-1] for h in holds):
+            return lambda item: item.hold_s == holds[-1]
+    if any(h is not None and h > MAX_PASS_S for h in holds):
+        return lambda item: item.hold_s is not None and item.hold_s <= MAX_PASS_S
+    return lambda item: False
 
 
 def _is_geographic(item: MissionItem) -> bool:
@@ -247,8 +287,7 @@ def _visited(
     if is_bend:
         why = (
             "a bend of the tour, as netsp wrote it" if by_mark
-            else f"passed: it holds for {MAX_PASS_S:g} s or less, and others hold longer; use it "
-            f"with --map goal={BENDS}"
+            else f"passed: it holds for {item.hold_s:g} s, as at home or less than others"
         )  # fmt: skip
         return Feature(item.where, BENDS, "", {"kind": "ignore", "why": why}, point)
     properties = {"kind": "goal", "command": VISITED[item.command]}
@@ -303,7 +342,7 @@ def add_polygon(
     if len(places) < 3 or any(abs(lat) > 90.0 or abs(lon) > 180.0 for lon, lat in places):
         out.unread.append(Unread(where, FENCE, "a fence without three corners in degrees"))
         return
-    properties = {"kind": "bounds" if is_inclusion else "obstacle"}
+    properties = INSIDE if is_inclusion else {"kind": "obstacle"}
     out.features.append(Feature(where, FENCE, "", properties, shapely.Polygon(places)))
 
 
@@ -341,7 +380,7 @@ def add_circle(
     ring = [(radius * math.cos(a), radius * math.sin(a)) for a in turn]
     places = Projection(center[1], center[0]).to_earth(ring)[:, ::-1]
     out.notes.append(f"{where}: the round fence becomes a polygon of {CIRCLE_CORNERS} corners")
-    out.features.append(Feature(where, FENCE, "", {"kind": "bounds"}, shapely.Polygon(places)))
+    out.features.append(Feature(where, FENCE, "", INSIDE, shapely.Polygon(places)))
 
 
 def add_home(

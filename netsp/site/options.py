@@ -105,8 +105,8 @@ class SiteOptions:
             raise InputError(
                 f"join_tolerance: expected a positive length (m), got {self.join_tolerance!r}"
             )
-        if self.draught is not None and not 0.0 < self.draught < math.inf:
-            raise InputError(f"draught: expected a positive depth (m), got {self.draught!r}")
+        if self.draught is not None and not 0.0 <= self.draught < math.inf:
+            raise InputError(f"draught: expected a depth of 0 m or more, got {self.draught!r}")
         if self.floor_cell is not None and not 0.0 < self.floor_cell < math.inf:
             raise InputError(f"floor_cell: expected a positive length (m), got {self.floor_cell!r}")
         if not 0.0 <= self.crop_margin < math.inf:

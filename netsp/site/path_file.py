@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -22,9 +22,9 @@ from netsp.fields import LARGEST
 from netsp.files import read_text
 from netsp.models import parse_json_object, shown
 from netsp.problem import Problem
-from netsp.site.gpx import read_gpx, seconds_of
+from netsp.site.gpx import read_gpx
 from netsp.site.projection import Projection
-from netsp.site.time_stamps import NO_VALUES, unit_of_time
+from netsp.site.time_stamps import NO_VALUES, TimeStamps, seconds_of
 
 ENDINGS = (".csv", ".csv.gz", ".txt", ".json", ".geojson", ".gpx")
 """Endings of files with paths."""
@@ -117,7 +117,8 @@ def _to_plane(problem: Problem, latlon: Sequence[tuple[float, float]], where: st
 
 def _of_gpx(file: str | Path, problem: Problem, stem: str) -> list[FoundPath]:
     out = []
-    lines = read_gpx(file)
+    notes: list[str] = []
+    lines = read_gpx(file, lambda text: notes.append(f"{file}: {text}"))
     for k, line in enumerate(lines):
         xy = _to_plane(problem, [(p.latitude, p.longitude) for p in line.points], str(file))
         heights = [p.height for p in line.points]
@@ -126,8 +127,14 @@ def _of_gpx(file: str | Path, problem: Problem, stem: str) -> list[FoundPath]:
         stamps = [p.time_s for p in line.points]
         times = None if None in stamps else np.array(stamps, dtype=float)
         name = line.name or (stem if len(lines) == 1 else f"{stem} {k + 1}")
+        for what, values in (("heights", heights), ("times", stamps)):
+            if None in values and any(v is not None for v in values):
+                notes.append(
+                    f"{file}: {name}: {values.count(None)} of {len(values)} points have no "
+                    f"{what}: {what} are not used"
+                )
         out.append(FoundPath(name, points, times))
-    return out
+    return [replace(path, notes=tuple(notes)) for path in out]
 
 
 def _of_table(file: str | Path, problem: Problem, stem: str) -> FoundPath:
@@ -139,21 +146,25 @@ def _of_table(file: str | Path, problem: Problem, stem: str) -> FoundPath:
             raise InputError(f"{file}: expected {wanted}, got nothing") from None
         raise
     if not table.head:
-        points = read_path(file)
+        said: list[str] = []
+        points = read_path(file, said.append)
         if points is None:
             raise InputError(f"{file}: expected {wanted}")
-        return FoundPath(stem, points)
+        return FoundPath(stem, points, notes=tuple(said))
     plane = table.pair((("x", "y"), ("longitude", "latitude")))
     if plane is None:
         raise table.wanted(wanted)
     up = table.height()
     quantities: list[Quantity] = [*plane, up] if up else [*plane]
+    clock: Quantity = "time" if "time" in table else "date"
     values: list[list[float]] = []
     times: list[float] = []
-    notes: list[str] = []
-    scale: float | None = None
+    notes = [f"{file}: {note}" for note in table.notes(["time", "date", *quantities])]
     gaps = 0
     is_global = plane == ("longitude", "latitude")
+    stamps = None
+    if clock in table:
+        stamps = TimeStamps(table.columns[clock][1], lambda text: notes.append(f"{file}: {text}"))
     for k, number in enumerate(table.lines):
         if _is_gap(table, k, quantities, is_global=is_global):
             gaps += 1
@@ -164,19 +175,10 @@ def _of_table(file: str | Path, problem: Problem, stem: str) -> FoundPath:
             * table.columns[name][1].factor + 0.0
             for name in quantities
         ])  # fmt: skip
-        if "time" in table:
-            text, meaning = table.plain(k, "time"), table.columns["time"][1]
-            where = f"{place}: {table.title('time')}"
-            if not _is_number(text):
-                times.append(seconds_of(text, where))
-                continue
-            if scale is None:
-                scale, unit = meaning.factor, ""
-                if not meaning.unit and meaning.factor == 1.0:
-                    scale, unit = unit_of_time(float(text))
-                if unit:
-                    notes.append(f"{file}: times are taken as {unit} since 1970")
-            times.append(_number(text, where, LARGEST / scale) * scale)
+        if stamps is not None:
+            date = table.text(k, "date") if clock == "time" else ""
+            where = f"{place}: {table.title(clock)}"
+            times.append(stamps.seconds(table.plain(k, clock), where, date))
     if gaps:
         rows = "1 row" if gaps == 1 else f"{gaps} rows"
         notes.append(f"{file}: {rows} left out: no position: a gap of the path")

@@ -25,6 +25,20 @@ LONGEST = 1e9
 """Bound on numbers of a plan; larger ones are damage."""
 
 
+def is_plan(file: str | Path) -> bool:
+    """Tell whether a JSON file is a plan of QGroundControl.
+
+    Parameters
+    ----------
+    file : str or Path
+        File of any kind.
+    """
+    try:
+        return parse_json_object(read_text(file), str(file)).get("fileType") == "Plan"
+    except InputError:  # the reader of other maps says what is wrong
+        return False
+
+
 def read_plan(file: str | Path) -> Map:
     """Read a plan as a map.
 
@@ -68,7 +82,7 @@ def read_plan(file: str | Path) -> Map:
     home = mission.get("plannedHomePosition")
     place = [_number(v) for v in home] if isinstance(home, list) else []
     altitude = place[2] if len(place) > 2 else None
-    found = features_of_items(items, altitude)
+    found = features_of_items(items, altitude, None if home is None else _lonlat(home))
     found.unread += complex_items
     if home is not None:
         numbers = {k: _number(own.get(k)) for k in ("tether_length", "clearance", "heading")}

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
@@ -23,8 +23,22 @@ from netsp.fields import checked_number
 from netsp.import_record import KIND_COLUMNS, MAX_NAMED, CropCircle, Site, UsedAs
 from netsp.models import explain, shown
 from netsp.problem import Problem
-from netsp.site.chart_classes import EQUIPMENT, chart_radius, chart_width, lone_equipment
-from netsp.site.chart_depths import chart_floor, shallow_areas
+from netsp.site.chart_classes import (
+    EQUIPMENT,
+    chart_radius,
+    chart_width,
+    depth_range,
+    lone_equipment,
+    sounding_depth,
+)
+from netsp.site.chart_depths import (
+    chart_floor,
+    depthless_share,
+    shallow_areas,
+    shoal_soundings,
+    uncharted_share,
+)
+from netsp.site.chart_reader import is_chart, read_chart
 from netsp.site.contract import (
     FIELDS,
     RADIUS,
@@ -38,14 +52,15 @@ from netsp.site.contract import (
 from netsp.site.crop import CropWindow, cropped
 from netsp.site.drawing import read_dxf
 from netsp.site.feature import Feature, Map
-from netsp.site.geojson import read_geojson
+from netsp.site.fence_list import read_fence_list, read_rally_list
+from netsp.site.geojson import read_geojson, read_geojson_sequence
 from netsp.site.gpx import read_gpx_map
 from netsp.site.kml_pages import read_kml
 from netsp.site.ledger import Ledger
 from netsp.site.line_work import is_land, lines_of, outlines, widened
 from netsp.site.options import SiteOptions
 from netsp.site.projection import Projection
-from netsp.site.qgc_plan import read_plan
+from netsp.site.qgc_plan import is_plan, read_plan
 from netsp.site.sea_floor import SeaFloor
 from netsp.site.shapes import outline_of, simple_polygons, spurs_of
 from netsp.site.table import from_table
@@ -55,12 +70,12 @@ from netsp.site.waypoint_list import is_waypoint_list, read_waypoint_list
 if TYPE_CHECKING:
     import shapely
 
-CHART_SUFFIXES = (".000",)
-"""Extensions of S-57 charts."""
+SEQUENCE_SUFFIXES = (".geojsonl", ".geojsons", ".geojsonseq", ".ndjson", ".ndgeojson", ".jsonl")
+"""Extensions of sequences of GeoJSON texts."""
 
 EARTH_READERS = {
     ".plan": read_plan, ".waypoints": read_waypoint_list, ".wpl": read_waypoint_list,
-    ".gpx": read_gpx_map,
+    ".gpx": read_gpx_map, ".fen": read_fence_list, ".ral": read_rally_list,
 }  # fmt: skip
 """Readers of formats that are in degrees always, by extension."""
 
@@ -211,16 +226,25 @@ def read_map(file: str | Path, crs: str | None = None, units: str | None = None)
         Not readable.
     """
     suffix = Path(file).suffix.lower()
-    if suffix in EARTH_READERS or (suffix == ".txt" and is_waypoint_list(file)):
+    reader = EARTH_READERS.get(suffix)
+    if suffix == ".txt" and is_waypoint_list(file):
+        reader = read_waypoint_list
+    elif suffix == ".json" and is_plan(file):
+        reader = read_plan
+    if reader is not None:
         if crs is not None:
             raise InputError(f"--crs: {file} is in degrees always; expected no system")
-        return EARTH_READERS.get(suffix, read_waypoint_list)(file)
+        return reader(file)
+    if is_chart(file):
+        return read_chart(file, crs, units)
     if suffix == ".dxf":
         return read_dxf(file, crs, units)
     if suffix in (".kml", ".kmz"):
         found = read_kml(file, crs)
     elif suffix in (".geojson", ".json"):
         found = read_geojson(file, crs)
+    elif suffix in SEQUENCE_SUFFIXES:
+        found = read_geojson_sequence(file, crs)
     else:
         return read_vector(file, crs)
     return found if crs is None else in_degrees(found, crs, file)
@@ -234,6 +258,10 @@ BASE_OFF = 0.01
 centimetre are written with seven decimals of a degree."""
 
 SKIP_OPTION = "; leave out what is out of reach with --skip-unreachable"
+
+MIN_SHARE = 5e-4
+"""Share of the tether's reach from which on a note says what is not known there: 0.05 %, the least
+that two digits show as more than a rounding of areas."""
 
 MOST_OF_A_KIND = 5
 """Goals out of reach that are told one by one."""
@@ -258,7 +286,7 @@ class _Site:
     floor: SeaFloor | None = None
 
     def __post_init__(self) -> None:
-        self.is_chart = Path(self.file).suffix.lower() in CHART_SUFFIXES
+        self.is_chart = self.map.is_chart
         for name, value in (("draught", self.said.draught), ("floor", self.said.floor or None)):
             if value is not None and not self.is_chart:
                 raise InputError(
@@ -288,12 +316,16 @@ class _Site:
         clearance = self._length(own, "clearance", self.said.clearance) or 0.0
         goals = self._goals(parts["goal"]) + self._table_goals()
         candidates = [place for _, place in self._table_places("candidate", self.said.candidates)]
-        if tether is not None and (self.is_chart if self.said.crop is None else self.said.crop):
-            self.window = CropWindow.about(
+        reach = None
+        if tether is not None:
+            reach = CropWindow.about(
                 [anchor, *candidates], tether + clearance, self.said.crop_margin
             )
+        if self.is_chart if self.said.crop is None else self.said.crop:
+            self.window = reach
         if self.is_chart:
-            self._chart_depths(parts)
+            places = {"base": anchor, **{_label(goal): goal["position"] for goal in goals}}
+            self._chart_depths(parts, places, reach)
         free = [anchor, *candidates, *(g["position"] for g in goals)]
         obstacles = self._within_crop(self._obstacles(parts["obstacle"], free))
         bounds, islands = self._bounds(parts["bounds"])
@@ -370,22 +402,36 @@ class _Site:
                 self.notes.append(f"layer {layer!r} is empty")
         return parts
 
-    def _chart_depths(self, parts: dict[str, list[Feature]]) -> None:
+    def _chart_depths(
+        self, parts: dict[str, list[Feature]], places: Mapping[str, Any], reach: CropWindow | None
+    ) -> None:
         """Make obstacles of shallow areas, and the sea floor, where they are asked for."""
+        free = [f for f in self.map.features if self.kinds.get(f.layer.lower()) != "ignore"]
         left_out = [
-            f for f in self.map.features
-            if self.ledger.is_left_out(f) and f.layer.lower() not in self.kinds
-        ]  # fmt: skip
-        if self.said.draught is not None:
-            shallow = shallow_areas(left_out, self.said.draught)
-            for feature in shallow:
+            f for f in free if self.ledger.is_left_out(f) and f.layer.lower() not in self.kinds
+        ]
+        draught = self.said.draught
+        if draught is not None:
+            shallow = shallow_areas(left_out, draught)
+            self._check_depth(shallow, places, draught)
+            shoals = shoal_soundings(left_out, draught, shallow)
+            for feature in (*shallow, *shoals):
                 self.ledger.use(feature, "obstacle")
-            parts["obstacle"] += shallow
+            parts["obstacle"] += [*shallow, *shoals]
+        if reach is not None:
+            if draught is not None:
+                self._note_share(
+                    depthless_share(self.map.features, self._plane, reach),
+                    "is water whose depth the chart does not give; --draught makes no obstacle of "
+                    "it",
+                )
+            self._note_share(
+                uncharted_share(self.map.features, self._plane, reach),
+                "is not on this chart, and free of obstacles in the problem",
+            )
         if not self.said.floor or self.complaints:
             return
-        self.floor, found = chart_floor(
-            self.map.features, self._plane, self.window, self.said.floor_cell
-        )
+        self.floor, found = chart_floor(free, self._plane, self.window, self.said.floor_cell)
         for feature in found.used:  # a shallow area is an obstacle, too
             if self.ledger.is_left_out(feature):
                 self.ledger.use(feature, "floor")
@@ -394,6 +440,30 @@ class _Site:
                 self.ledger.leave_out(feature, self._beyond_reach)
         for feature in found.depthless:
             self.ledger.leave_out(feature, "a depth that the chart does not give")
+
+    def _check_depth(
+        self, shallow: list[Feature], places: Mapping[str, Any], draught: float
+    ) -> None:
+        """Complain of places that the robot needs in water that may be too shallow."""
+        import shapely
+
+        areas = [self._plane(feature.shape) for feature in shallow]
+        tree = shapely.STRtree(areas)
+        for called, place in places.items():
+            held = tree.query(shapely.Point(place[:2]), predicate="within").tolist()
+            if not held:
+                continue
+            area = shallow[min(held)]
+            least, _ = depth_range(area)
+            depth = "of unknown depth" if least is None else f"from {_metres(least)} of depth on"
+            self._complain(
+                f"{called}: lies in {self._called(area)}, {depth}, and the draught is "
+                f"{_metres(draught)}; expected a place in deeper water, or a smaller draught"
+            )
+
+    def _note_share(self, share: float, what: str) -> None:
+        if share >= MIN_SHARE:
+            self.notes.append(f"{100.0 * share:.2g} % of the tether's reach {what}")
 
     def _table_places(
         self, kind: UsedAs, file: str | Path | None
@@ -466,8 +536,8 @@ class _Site:
             away = float(np.hypot(there.x - x, there.y - y))
             if away > BASE_OFF:
                 self.notes.append(
-                    f"{own.where}: the base is where --base says, {_metres(away)} away; only the "
-                    "properties of the file's base are used"
+                    f"{own.where}: the base is at the place that was given, {_metres(away)} away; "
+                    "only the properties of the file's base are used"
                 )
         return (x, y, z), own
 
@@ -476,7 +546,9 @@ class _Site:
     @property
     def _unit(self) -> float:
         """Return the metres per unit of the file; the unit in the options overrides the file's."""
-        return UNITS[self.said.units or self.map.unit or "m"]
+        if self.is_chart:  # its reader converts them
+            return 1.0
+        return UNITS[self.said.units] if self.said.units else self.map.metres or 1.0
 
     def _plane(self, shape: shapely.Geometry) -> Any:
         """A shape in metres in the problem's plane."""
@@ -498,6 +570,11 @@ class _Site:
         in metres by its format."""
         depth = self._depth(feature)
         if depth is not None:
+            if depth < 0.0:
+                self._complain(
+                    f"{self._called(feature)}: depth: counts downwards; expected 0 or more, got "
+                    f"{depth:g} m; if it is a height, give the point itself the height"
+                )
             return 0.0 - depth
         at = point if point is not None else feature.shape
         if feature.is_above_floor:
@@ -524,6 +601,8 @@ class _Site:
                 value = self._number(feature, "depth", str(name).lower())
                 return None if value is None else -meaning.factor * value
         depth = self._number(feature, "depth")
+        if depth is None and self.is_chart:
+            return sounding_depth(feature)
         return None if depth is None else depth * self._unit
 
     def _get(self, feature: Feature, ours: str) -> Any:
@@ -555,8 +634,8 @@ class _Site:
     def _name(self, feature: Feature) -> str | None:
         value = self._get(feature, "name")
         if value is not None:
-            return str(value)
-        return feature.identity or None
+            return str(value).strip()
+        return feature.identity.strip() or None
 
     # Goals and obstacles
 
@@ -951,8 +1030,23 @@ class _Site:
                 f"{places}: bounds that are not closed; expected a closed line or a polygon"
             )
             return None, []
+        if len(whole) > 1 and all(f.get("fence") == "inclusion" for f in features):
+            common = shapely.intersection_all(list(map(shapely.make_valid, whole)))
+            areas_in = [g for g in shapely.get_parts(common) if g.geom_type == "Polygon"]
+            whole = [shapely.MultiPolygon(areas_in)]
+            self.notes.append(
+                f"{len(features)} inclusion fences ({places}): the bounds are where all of them "
+                "overlap, because the vehicle stays within each"
+            )
+            if whole[0].area <= 0.0:
+                self._complain(f"{places}: inclusion fences that do not overlap; expected one area")
+                return None, []
         if len(whole) != 1:
-            self._complain(f"expected one outline of kind bounds, got {len(whole)}: {places}")
+            self._complain(
+                f"expected one outline of kind bounds, got {len(whole)}: {places}; keep one, or "
+                "make obstacles of what lies between them",
+                "; --map ignore=LAYER leaves out a layer",
+            )
             return None, []
         feature = features[0]
         drawn = shapely.get_parts(whole[0])
@@ -977,20 +1071,17 @@ class _Site:
     # What is checked of the whole
 
     def _check_names(self, things: list[dict[str, Any]], what: str) -> None:
-        seen: dict[str, str] = {}
+        """Number the names that several goals or obstacles share, and say so."""
         _number_parts(things)
-        is_drawing = Path(self.file).suffix.lower() == ".dxf"
-        if self.is_chart or is_drawing:  # names of places or of blocks need not differ
-            _number_names(things)
-        for thing in things:
-            name = thing["name"]
-            if name is not None and name in seen:
-                self._complain(
-                    f"two {what} are named {name!r} ({seen[name]}, {thing['where']}); expected "
-                    "names of their own"
-                )
-            if name is not None:
-                seen.setdefault(name, thing["where"])
+        numbered = _number_names(things)
+        if numbered:
+            shown_names = ", ".join(
+                f"{old!r} is {new!r} ({where})" for old, new, where in numbered[:MAX_NAMED]
+            )
+            self.notes.append(
+                f"names that several {what} share are numbered: {shown_names}"
+                + (f", and {len(numbered) - MAX_NAMED} more" if len(numbered) > MAX_NAMED else "")
+            )
 
     def _check_scale(
         self, goals: list[dict[str, Any]], obstacles: list[dict[str, Any]], anchor: Any,
@@ -1144,10 +1235,11 @@ def _number_parts(things: list[dict[str, Any]]) -> None:
             part["name"] = f"{name} {number}" if len(parts) > 1 else name
 
 
-def _number_names(things: list[dict[str, Any]]) -> None:
-    """Number names that stand more than once: "pier", "pier 2"."""
+def _number_names(things: list[dict[str, Any]]) -> list[tuple[str, str, str]]:
+    """Number names that stand more than once ("pier", "pier 2"); return old, new and place."""
     taken = {thing["name"] for thing in things}
     seen: Counter[str] = Counter()
+    changed = []
     for thing in things:
         name = thing["name"]
         if name is None:
@@ -1159,8 +1251,11 @@ def _number_names(things: list[dict[str, Any]]) -> None:
             if other not in taken:
                 thing["name"] = other
                 taken.add(other)
+                changed.append((name, other, str(thing["where"])))
                 break
             number += 1
+        seen[name] = number
+    return changed
 
 
 def _label(thing: dict[str, Any]) -> str:

@@ -47,6 +47,22 @@ class DepthArea:
 
 
 @dataclass(frozen=True)
+class Danger:
+    """Rock, wreck or obstruction with the depth of its top.
+
+    Attributes
+    ----------
+    shape
+        Point, line or area in the problem's plane.
+    depth
+        Depth of its top, metres downwards; negative where it dries.
+    """
+
+    shape: shapely.Geometry
+    depth: float
+
+
+@dataclass(frozen=True)
 class SeaFloor:
     """Grid of heights below the chart's datum.
 
@@ -101,27 +117,36 @@ def check_suffix(file: str | Path) -> None:
 
 
 def sea_floor(
-    areas: Sequence[DepthArea], points: Floats, land: Sequence[shapely.Geometry],
-    box: tuple[float, float, float, float], cell: float,
+    areas: Sequence[DepthArea], contours: Floats, land: Sequence[shapely.Geometry],
+    box: tuple[float, float, float, float], cell: float, *, soundings: Floats | None = None,
+    dangers: Sequence[Danger] = (),
 ) -> SeaFloor:  # fmt: skip
     """Return the sea floor that a chart's depths give.
 
-    Heights are interpolated between soundings and contours, and kept within the range of depths of
+    Depths are interpolated between soundings and contours, and kept within the range of depths of
     the area that they lie in, the shallower where areas overlap. Beyond all soundings and contours
     an area has its least depth. Land is at the datum.
+
+    The floor is never deeper than a sounding or the top of a danger within it, also between the
+    middles of cells, where a scene interpolates. A sounding shallower than its area raises the
+    floor as far as the neighbouring soundings and contours.
 
     Parameters
     ----------
     areas : sequence of DepthArea
         Areas with depths.
-    points : ndarray, shape (k, 3)
-        Soundings and corners of contours: x, y and depth downwards.
+    contours : ndarray, shape (k, 3)
+        Corners of contours: x, y and depth downwards.
     land : sequence of shapely.Geometry
         Areas of land.
     box : (xmin, ymin, xmax, ymax)
-        What the grid is to hold.
+        Extent that the grid must hold.
     cell : float
         Side of a cell, metres.
+    soundings : ndarray, shape (k, 3), optional
+        x, y and depth downwards.
+    dangers : sequence of Danger
+        Rocks, wrecks and obstructions whose depth is known.
 
     Returns
     -------
@@ -140,6 +165,7 @@ def sea_floor(
             f"floor: {columns} x {rows} cells of {cell:g} m; expected at most {MAX_CELLS} along a "
             "side, so larger cells"
         )
+    spots = np.empty((0, 3)) if soundings is None else soundings
     x: Floats = west + cell * np.arange(0.5, columns)
     y: Floats = south + cell * np.arange(0.5, rows)
     least = np.full((rows, columns), -np.inf)
@@ -155,16 +181,57 @@ def sea_floor(
         both = inside & has_area
         least[both] = np.minimum(least[both], low)
         has_area |= inside
-    depth = _interpolated(points, x, y)
-    depth = np.where(np.isfinite(depth), depth, least)  # beyond all soundings: the least depth
+    between, by_shoal = _interpolated(contours, spots, _is_shoal(spots, areas), x, y)
+    depth = np.where(np.isfinite(between), between, least)  # beyond all soundings: the least depth
     depth = np.minimum(np.maximum(depth, least), np.maximum(greatest, least))
+    depth[by_shoal] = np.minimum(depth, between)[by_shoal]
     depth[~has_area] = np.nan
     for shape in land:
         depth[_covered(shape, x, y)] = 0.0
     depth[~np.isfinite(depth)] = np.nan
+    _cap(depth, spots, (west, south), cell)
+    for danger in dangers:
+        _cap_danger(depth, danger, x, y, (west, south), cell)
     if np.isnan(depth).all():
         raise InputError("floor: the chart gives no depth within the tether's reach")
     return SeaFloor(west, south, cell, 0.0 - depth[::-1])
+
+
+def _is_shoal(soundings: Floats, areas: Sequence[DepthArea]) -> np.ndarray:
+    """Return which soundings are shallower than the least depth of every area that they lie in."""
+    import shapely
+
+    least = np.full(len(soundings), np.inf)
+    tree = shapely.STRtree([area.shape for area in areas])
+    spots = shapely.points(soundings[:, :2])
+    for spot, area in tree.query(spots, predicate="intersects").T.tolist():
+        low = areas[area].least
+        least[spot] = min(least[spot], -np.inf if low is None else low)
+    return np.asarray(np.isfinite(least) & (soundings[:, 2] < least))
+
+
+def _cap(depth: Floats, soundings: Floats, corner: tuple[float, float], cell: float) -> None:
+    """Keep the floor above soundings: each caps the four middles of cells about it."""
+    rows, columns = depth.shape
+    left, low = (np.floor((soundings[:, k] - corner[k]) / cell - 0.5).astype(int) for k in (0, 1))
+    for row, column in ((low, left), (low, left + 1), (low + 1, left), (low + 1, left + 1)):
+        held = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
+        np.fmin.at(depth, (row[held], column[held]), soundings[held, 2])
+
+
+def _cap_danger(
+    depth: Floats, danger: Danger, x: Floats, y: Floats, corner: tuple[float, float], cell: float
+) -> None:
+    """Keep the floor above the top of a danger, wherever it lies."""
+    import shapely
+
+    if "Point" in danger.shape.geom_type:
+        places = shapely.get_coordinates(danger.shape)
+        _cap(depth, np.column_stack([places, np.full(len(places), danger.depth)]), corner, cell)
+        return
+    # the middles of cells about any of its points are at most a diagonal of 1.42 cells away
+    held = _covered(danger.shape.buffer(1.5 * cell), x, y)
+    depth[held] = np.fmin(depth[held], danger.depth)
 
 
 def _covered(shape: shapely.Geometry, x: Floats, y: Floats) -> np.ndarray:
@@ -183,21 +250,32 @@ def _covered(shape: shapely.Geometry, x: Floats, y: Floats) -> np.ndarray:
     return inside
 
 
-def _interpolated(points: Floats, x: Floats, y: Floats) -> Floats:
-    """Return depths linear between points, NaN beyond them."""
+def _interpolated(
+    contours: Floats, soundings: Floats, is_shoal: np.ndarray, x: Floats, y: Floats
+) -> tuple[Floats, np.ndarray]:
+    """Return depths linear between points, NaN beyond them, and which depend on a shoal."""
     from scipy.interpolate import LinearNDInterpolator
-    from scipy.spatial import QhullError
+    from scipy.spatial import Delaunay, QhullError
 
-    known = np.unique(points, axis=0)
+    points = np.vstack([contours, soundings])
+    marks = np.concatenate([np.zeros(len(contours), dtype=bool), is_shoal])
+    order = np.lexsort((points[:, 2], points[:, 1], points[:, 0]))
+    points, marks = points[order], marks[order]
+    # one depth at one place: the least
+    is_first = np.any(np.diff(points[:, :2], axis=0, prepend=np.nan) != 0.0, axis=1)
+    known, marks = points[is_first], marks[is_first]
     none = np.full((len(y), len(x)), np.nan)
     if len(known) < 3:
-        return none
+        return none, np.isfinite(none)
     try:
-        linear = LinearNDInterpolator(known[:, :2], known[:, 2], rescale=False)
+        triangles = Delaunay(known[:, :2])
     except QhullError:  # all on one line
-        return none
+        return none, np.isfinite(none)
     gx, gy = np.meshgrid(x, y)
-    return np.asarray(linear(gx, gy), dtype=float)
+    depths = np.asarray(LinearNDInterpolator(triangles, known[:, 2])(gx, gy), dtype=float)
+    own = triangles.find_simplex(np.stack([gx, gy], axis=-1))
+    by_shoal = marks[triangles.simplices].any(axis=1)[own] & (own >= 0) & np.isfinite(depths)
+    return depths, by_shoal
 
 
 def _save_geotiff(

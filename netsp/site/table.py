@@ -10,6 +10,7 @@ import numpy as np
 from netsp.arrays import Floats
 from netsp.axes import MAP_PAIRS, Quantity, read_table
 from netsp.errors import InputError
+from netsp.models import shown
 from netsp.site.projection import Projection
 
 
@@ -59,6 +60,12 @@ def from_table(
     label: Quantity = "name" if "name" in table else "identifier"
     used: list[Quantity] = [*plane, up] if up else [*plane]
     places = table.numbers(used)
+    if up is not None and table.columns[up][1].factor < 0.0 and (places[:, 2] > 0.0).any():
+        row = int(np.flatnonzero(places[:, 2] > 0.0)[0])
+        raise InputError(
+            f"{file}: row {row + 1}: {shown(table.title(up))} counts downwards; expected 0 or "
+            f"more, got {-places[row, 2]:g} m; heights belong into a column z"
+        )
     if is_global and projection is not None:
         wrong = np.flatnonzero((np.abs(places[:, :2]) > [90.0, 180.0]).any(axis=1))
         if wrong.size:
@@ -68,8 +75,7 @@ def from_table(
                 f"180 degrees, got {lat:g} and {lon:g}"
             )
         places[:, :2] = np.asarray(projection.to_plane(places[:, :2]))
-    if on_note is not None and table.has_decimal_commas:
-        on_note(f"{file}: numbers are read with decimal commas")
-    if on_note is not None and (unused := table.left_out([*used, label])):
-        on_note(f"{file}: unused columns: {', '.join(unused)}")
+    if on_note is not None:
+        for note in table.notes([*used, label]):
+            on_note(f"{file}: {note}")
     return places, [table.text(k, label) or None for k in range(len(table.rows))]

@@ -37,6 +37,9 @@ PLANE_SYSTEMS = ("LOCAL_CS", "ENGCRS", "ENGINEERINGCRS")
 OSM_SUFFIXES = (".osm", ".pbf")
 """Extensions of OpenStreetMap's own formats."""
 
+TEXT_DRIVERS = ("MapInfo File", "DGN")
+"""GDAL's drivers of formats with texts, which GDAL gives as points with the style of a label."""
+
 SQLITE = b"SQLite format 3\0"
 """First bytes of a GeoPackage."""
 
@@ -50,6 +53,9 @@ SOURCE_PLACE = re.compile(r"^\S+\.(?:cpp|c|h), \d+: ")
 
 UNSUPPORTED = "Geometry type is not supported"
 """Words of pyogrio for layers that are declared to hold faces."""
+
+MIXED_TYPES = "Unrecognized geometry type"
+"""Words of pyogrio for layers whose geometries are of several types, some with heights."""
 
 LOCAL = "local"
 """The coordinate system of a map without a place on the earth."""
@@ -78,11 +84,31 @@ def read_vector(file: str | Path, crs: str | None) -> Map:
     """
     check_file(file)
     with _readable(file) as plain:
-        return _read(file, plain, crs)
+        return read_plain(file, plain, crs)
 
 
-def _read(file: str | Path, plain: str | Path, crs: str | None) -> Map:
-    """Return a file as a map, read where GDAL can."""
+def read_plain(file: str | Path, plain: str | Path, crs: str | None) -> Map:
+    """Return a file as a map from a copy of it that GDAL reads.
+
+    Parameters
+    ----------
+    file : str or Path
+        The user's file, for messages.
+    plain : str or Path
+        Where it is read.
+    crs : str, optional
+        Coordinate system, as of `read_vector`.
+
+    Returns
+    -------
+    Map
+        As of `read_vector`.
+
+    Raises
+    ------
+    InputError
+        As of `read_vector`.
+    """
     found = _Found(file)
     places: dict[str, bool] = {}
     is_osm = Path(file).suffix.lower() in OSM_SUFFIXES
@@ -96,7 +122,8 @@ def _read(file: str | Path, plain: str | Path, crs: str | None) -> Map:
         own = crs if crs is not None else layer.crs
         if crs is not None and layer.crs is not None and not _is_same_system(crs, layer.crs):
             found.notes.append(
-                f"layer {name!r}: its own system {_system_name(layer.crs)} is not used: --crs {crs}"
+                f"layer {name!r}: its own system {_system_name(layer.crs)} is not used; it is read "
+                f"as {crs}"
             )
         if own is not None and own.startswith(PLANE_SYSTEMS) and map_unit(own) == 1.0:
             own = LOCAL  # a plan without a place on the earth says so itself
@@ -117,7 +144,10 @@ def _read(file: str | Path, plain: str | Path, crs: str | None) -> Map:
             "system for all"
         )
     if not places:
-        raise InputError(f"{file}: has no layer with places")
+        raise InputError(
+            f"{file}: has no layer with places; expected geometries (tables of goals are read "
+            "beside a map: --goals TABLE)"
+        )
     return found.map(all(places.values()))
 
 
@@ -135,12 +165,15 @@ class GdalLayer:
         Well-known binary of each feature; None for one without geometry.
     properties
         Name to value, for each feature.
+    texts
+        Numbers of the features that are texts.
     """
 
     crs: str | None
     numbers: list[int]
     shapes: list[bytes | None]
     properties: list[dict[str, Any]]
+    texts: frozenset[int] = frozenset()
 
 
 def gdal_layers(file: str | Path, plain: str | Path, notes: list[str]) -> list[tuple[str, Any]]:
@@ -200,7 +233,58 @@ def read_layer(file: str | Path, plain: str | Path, layer: str, notes: list[str]
         {name: _plain(column[k]) for name, column in zip(names, columns, strict=True)}
         for k in range(len(shapes))
     ]
-    return GdalLayer(meta.get("crs"), [int(i) for i in ids], list(shapes), properties)
+    numbers = [int(i) for i in ids]
+    return GdalLayer(meta.get("crs"), numbers, list(shapes), properties, _texts(file, plain, layer))
+
+
+def _texts(file: str | Path, plain: str | Path, layer: str) -> frozenset[int]:
+    """Return the numbers of the features of a layer that are texts."""
+    pyogrio = _pyogrio()
+    if _call(file, [], pyogrio.read_info, plain, layer=layer)["driver"] not in TEXT_DRIVERS:
+        return frozenset()
+    quoted = layer.replace('"', '\\"')
+    _, ids, _, (styles,) = _call(
+        file, [], pyogrio.raw.read, plain, sql=f'SELECT OGR_STYLE FROM "{quoted}"',
+        sql_dialect="OGRSQL", return_fids=True, read_geometry=False,
+    )  # fmt: skip
+    return frozenset(
+        int(number) for number, style in zip(ids, styles, strict=True)
+        if str(style).startswith("LABEL")
+    )  # fmt: skip
+
+
+def read_rows(
+    file: str | Path, plain: str | Path, layer: str, notes: list[str]
+) -> list[dict[str, Any]]:
+    """Read the rows of a table without places with GDAL.
+
+    Parameters
+    ----------
+    file : str or Path
+        The user's file, for messages.
+    plain : str or Path
+        Where it is read.
+    layer : str
+        Name of the table.
+    notes : list of str
+        Gets what GDAL warns of.
+
+    Returns
+    -------
+    list of dict
+        Column to value, for each row.
+
+    Raises
+    ------
+    InputError
+        Not readable.
+    """
+    meta, _, _, columns = _call(
+        file, notes, _pyogrio().raw.read, plain, layer=layer, read_geometry=False
+    )
+    names = [str(name) for name in meta["fields"]]
+    plain_columns = [[_plain(value) for value in column] for column in columns]
+    return [dict(zip(names, row, strict=True)) for row in zip(*plain_columns, strict=True)]
 
 
 @contextmanager
@@ -292,6 +376,10 @@ class _Found:
         self.layers.setdefault(name, 0)
         for k, data, properties in zip(layer.numbers, layer.shapes, layer.properties, strict=True):
             where = f"{name}[{k}]"
+            if k in layer.texts:
+                self.layers[name] += 1
+                self.unread.append(Unread(where, name, "writing on the map (a text)"))
+                continue
             try:
                 shapes = self.shapes(where, name, data, move)
             except NotFiniteError as error:
@@ -520,6 +608,8 @@ def _call(file: str | Path, notes: list[str], function: Any, *args: Any, **more:
         raise InputError(f"{file}: cannot be read as a map: {first}") from None
     for warning in caught:
         text = f"GDAL: {_user_text(str(warning.message), file, args)[:160]}"
+        if MIXED_TYPES in text:
+            continue  # its shapes are read all the same
         if issubclass(warning.category, RuntimeWarning) and text not in notes:
             notes.append(text)
     return out

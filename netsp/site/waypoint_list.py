@@ -56,7 +56,7 @@ def read_waypoint_list(file: str | Path) -> Map:
     home = rows[0] if rows and _is_home(rows[0], lines[1][1]) else None
     items = rows[1:] if home is not None else rows
     altitude = None if home is None else home.place[2]
-    found = features_of_items(items, altitude)
+    found = features_of_items(items, altitude, None if home is None else home.lonlat)
     if home is not None:
         add_home(found, home.where, home.lonlat)
     return Map(

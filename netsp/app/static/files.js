@@ -11,6 +11,7 @@ const LABELS = {
   radius: "Radius of obstacles that are points (m)",
   line_width: "Width of open lines that are obstacles (m)",
   crs: "Coordinate system (as EPSG:32632, or local)",
+  units: "Unit of lengths in the file (m, mm, cm, ft, in, …)",
   viewpoints: "Viewpoints about each obstacle",
   standoff: "Distance of viewpoints from the obstacle (m)",
 };
@@ -86,7 +87,8 @@ export function files(page, link, say) {
     a.download = named ? named[1] : name;
     a.click();
     setTimeout(() => URL.revokeObjectURL(a.href), 10000);
-    say(`${a.download} is downloaded`);
+    const notes = decodeURIComponent(answer.headers.get("x-notes") ?? "").split("\n").filter(Boolean);
+    say([`${a.download} is downloaded`, ...notes].join("; "));
   }
 
   page.download = fetched;

@@ -73,7 +73,7 @@ export function fill(page) {
     parts.push(element("h2", "Tour"), element("table",
       element("tr", element("th", ""), element("th", "goal"), element("th", "tether m"), element("th", "slack m")), ...rows));
   }
-  parts.push(...drawn(page), ...profiles(page, page.go), ...margins(page), ...imported(data.site));
+  parts.push(...drawn(page), ...profiles(page, page.go), ...margins(page), ...imported(page, set));
   if (!page.shown) parts.push(...origin(data, set));
   panel.replaceChildren(...parts);
 }
@@ -108,9 +108,22 @@ function drawn(page) {
   return [element("h2", "Path by hand"), ...hint, table, element("div", back, " ", none, " ", save)];
 }
 
-/** What an import made of every feature of a map. @param {any} site */
-function imported(site) {
+/** What an import made of every feature of a map, and what it assumed.
+ * @param {any} page @param {(path: any[], value: any) => void} set */
+function imported(page, set) {
+  const site = page.data.site, goals = page.data.goals ?? [];
   if (!site?.imported?.length) return [];
+  const notes = (page.notes ?? []).map((/** @type {string} */ text) => element("li", text));
+  const list = element("ul", ...notes);
+  list.className = "notes";
+  const edited = site.edited ? [element("p", "Edited after the import; the table shows the import.")] : [];
+  const depths = new Set(goals.map((/** @type {any} */ g) => 0 - (placeOf(g)[2] ?? 0)));
+  const sink = (/** @type {string} */ v) => set(["goals"], goals.map((/** @type {any} */ g) => {
+    const at = [placeOf(g)[0], placeOf(g)[1], 0 - Number(v)];
+    return Array.isArray(g) ? at : { ...g, position: at };
+  }));
+  const depth = page.shown || !goals.length ? []
+    : [field("depth of all goals (m)", depths.size === 1 ? [...depths][0] : null, sink, "number", (v) => v >= 0, "a depth of 0 or more")];
   const rows = site.imported.flatMap((layer) => {
     const used = Object.entries(layer.used).map(([kind, n]) => `${n} ${kind}`).join(", ");
     const first = element("tr", element("td", layer.layer || "(all)"), element("td", String(layer.features)), element("td", used || "–"));
@@ -123,7 +136,7 @@ function imported(site) {
   });
   const table = element("table", element("tr", ...["layer", "features", "used as"].map((n) => element("th", n))), ...rows);
   table.className = "imported";
-  return [element("h2", `Map: ${site.file}`), table];
+  return [element("h2", `Map: ${site.file}`), table, ...edited, ...(notes.length ? [list] : []), ...depth];
 }
 
 /** How far the world may be off. @param {any} page */

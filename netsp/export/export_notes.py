@@ -1,0 +1,97 @@
+"""Notes on a mission file: what is moved, what is not written, what is assumed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from netsp.errors import counted
+from netsp.export.waypoints import Waypoint
+from netsp.export.write import (
+    MOST_FENCE_POINTS,
+    SHALLOWEST,
+    Settings,
+    fence_points,
+    not_written,
+    told_apart,
+)
+from netsp.problem import Problem
+from netsp.site.goal_depths import height_warning
+
+MISSION_FILES = ("plan", "wpl")
+"""Formats that a vehicle flies."""
+
+
+@dataclass(frozen=True)
+class ExportNotes:
+    """Notes on a file that was written.
+
+    Attributes
+    ----------
+    warnings
+        What may go wrong, one line each.
+    notes
+        What was changed, assumed or not written, one line each.
+    """
+
+    warnings: tuple[str, ...]
+    notes: tuple[str, ...]
+
+
+def export_notes(
+    problem: Problem, points: list[Waypoint], kind: str, settings: Settings
+) -> ExportNotes:
+    """Return what there is to say of a file with a tour.
+
+    Parameters
+    ----------
+    problem : Problem
+        Problem that was solved.
+    points : list of Waypoint
+        Waypoints that were written.
+    kind : str
+        One of `netsp.export.FORMATS`.
+    settings : Settings
+        Settings of the file.
+    """
+    warnings, notes = [], []
+    if kind != "csv" and (text := not_written(problem, kind)):
+        notes.append(text)
+    if kind in MISSION_FILES and (text := bend_note(points, settings)):
+        notes.append(text)
+    if kind in MISSION_FILES:
+        count = fence_points(problem)
+        if kind == "plan" and count > MOST_FENCE_POINTS:
+            warnings.append(
+                f"the obstacles take {count} fence points; the vehicle stores about "
+                f"{MOST_FENCE_POINTS} without a card"
+            )
+        remedy = f"heights are negative below it; moved to {SHALLOWEST} m of depth"
+        if (text := height_warning(problem, remedy)) is not None:
+            warnings.append(text)
+        high = sum(p.goal is not None and p.goal >= 0 and p.position[2] > 0.0 for p in points)
+        shallow = sum(p.position[2] > -SHALLOWEST for p in points) - high
+        if shallow:
+            notes.append(
+                f"{counted(shallow, 'waypoint')} shallower than {SHALLOWEST} m moved to that depth"
+            )
+        notes.append("home is assumed to be at the surface above the base; do not set it by hand")
+    return ExportNotes(tuple(warnings), tuple(notes))
+
+
+def bend_note(points: list[Waypoint], settings: Settings) -> str | None:
+    """Return a note where the vehicle holds longer at bends than the settings say; else None.
+
+    Parameters
+    ----------
+    points : list of Waypoint
+        Waypoints that were written.
+    settings : Settings
+        Settings of the file.
+    """
+    seconds = told_apart(points, settings).bend
+    if seconds <= settings.bend:
+        return None
+    return (
+        f"the vehicle holds {seconds} s at bends, because it holds {settings.bend} s at goals: "
+        "this tells goals from bends when the file is imported"
+    )
