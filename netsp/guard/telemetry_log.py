@@ -165,7 +165,8 @@ class _Recording:
             return self.vehicles[system]
         if not self.vehicles and not self.others.total:
             raise InputError(
-                f"{where}: holds no MAVLink message; expected a telemetry log of a ground station"
+                f"{where}: has no positions: no MAVLink message; expected a telemetry log of a "
+                "ground station"
             )
         if not self.vehicles:
             raise InputError(f"{where}: has no positions: no message of an autopilot")
