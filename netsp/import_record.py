@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from collections.abc import Sequence
+from typing import Annotated, Literal, Self, cast
 
 from pydantic import Field, model_validator
 
@@ -55,6 +56,33 @@ class LayerRecord(Model):
                 f"got {named}"
             )
         return self
+
+    def without_goals(self, places: Sequence[str], reason: str) -> LayerRecord:
+        """Return the record with some goals left out for a reason.
+
+        Parameters
+        ----------
+        places : sequence of str
+            Names of their features, by layer and number.
+        reason : str
+            Why they are left out.
+
+        Examples
+        --------
+        >>> layer = LayerRecord(layer="piles", features=2, used={"goal": 2})
+        >>> layer.without_goals(["piles[1]"], "out of reach").used
+        {'goal': 1}
+        """
+        if not places:
+            return self
+        rest = {**self.used, "goal": self.used.get("goal", 0) - len(places)}
+        group = OmittedFeatures(
+            reason=reason, features=len(places), first=tuple(places[:MAX_NAMED])
+        )
+        return LayerRecord(
+            layer=self.layer, features=self.features, left_out=(*self.left_out, group),
+            used=cast("dict[UsedAs, int]", {k: n for k, n in rest.items() if n}),
+        )  # fmt: skip
 
 
 class CropCircle(Model):

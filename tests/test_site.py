@@ -315,6 +315,10 @@ def test_goals_that_only_a_longer_way_round_reaches_are_left_out_too(tmp_path, c
     said = capsys.readouterr().err
     assert "note: goal behind is out of reach: tether_length is 30; expected at least 8" in said
     assert [g.name for g in Problem.load(out).goals] == ["near"]
+    (layer,) = Problem.load(out).site.imported
+    assert layer.used == {"goal": 1, "obstacle": 1, "base": 1}
+    assert [(g.features, g.first) for g in layer.left_out] == [(1, ("features[1]",))]
+    assert "1: out of the tether's reach among the obstacles" in said
 
 
 def ring_about(x, y, r, holes=()):

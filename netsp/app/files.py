@@ -228,7 +228,7 @@ def imported(
 def _site(
     file: Path, notes: list[str], tether_length: float | None, answers: ImportAnswers
 ) -> Problem:
-    from netsp.roadmap.within_reach import unreached_note, within_reach
+    from netsp.roadmap.within_reach import UNREACHED, unreached_note, within_reach
     from netsp.site.options import Looking, SiteOptions
     from netsp.site.projection import Projection
     from netsp.site.read import import_site
@@ -255,6 +255,7 @@ def _site(
         problem, why = within_reach(problem, found.viewpoints)
         if why:
             notes.append(f"{file.name}: {unreached_note(found.problem.goals, problem.goals)}")
+            problem = found.keeping(problem, UNREACHED).problem
     return problem
 
 

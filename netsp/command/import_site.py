@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from netsp.command import messages, told
 from netsp.command.patience import Patience
 from netsp.command.types import check_writable, depth, length, option, positive
-from netsp.errors import InputError
+from netsp.errors import InfeasibleError, InputError
 
 if TYPE_CHECKING:
     import shapely
@@ -165,6 +165,7 @@ def run(args: argparse.Namespace) -> int:
     left_out: tuple[shapely.Geometry, ...] = ()
     viewpoints: frozenset[str] = frozenset()
     floor: SeaFloor | None = None
+    found: ImportedSite | None = None
     with Patience(sys.stderr, f"reading {args.site}"):
         if _is_image(args):
             problem = _of_image(args)
@@ -172,27 +173,36 @@ def run(args: argparse.Namespace) -> int:
             found = _of_map(args)
             problem, left_out, floor = found.problem, found.left_out, found.floor
             viewpoints = found.viewpoints
-            show_table(args.site, found)
     from netsp.site.goal_depths import HEIGHTS_REMEDY, height_warning, surface_warning, with_depth
 
     if args.depth is not None:
         problem = with_depth(problem, args.depth)
-    elif (text := surface_warning(problem)) is not None:
-        messages.warning(text)
     why: list[str] = []
     is_cropped = problem.site is not None and problem.site.cropped is not None
     if args.skip_unreachable or (is_cropped and viewpoints):
-        from netsp.roadmap.within_reach import unreached_note, within_reach
+        from netsp.roadmap.within_reach import UNREACHED, unreached_note, within_reach
 
-        with Patience(sys.stderr, "looking for the goals in reach"):
-            before = problem.goals
-            problem, why = within_reach(problem, None if args.skip_unreachable else viewpoints)
+        try:
+            with Patience(sys.stderr, "looking for the goals in reach"):
+                before = problem.goals
+                problem, why = within_reach(problem, None if args.skip_unreachable else viewpoints)
+        except InfeasibleError:
+            if found is not None:
+                show_table(args.site, found)
+            raise
+        if why and found is not None:
+            found = found.keeping(problem, UNREACHED)
+            problem, left_out = found.problem, found.left_out
         if args.skip_unreachable:
             for line in why:
                 messages.note(f"{line}: left out")
         elif why:
             messages.note(f"{args.site}: {unreached_note(before, problem.goals)}")
+    if found is not None:
+        show_table(args.site, found)
     print(f"{problem.name}: {problem.summary}{_extent(problem)}", file=sys.stderr)
+    if args.depth is None and (text := surface_warning(problem)) is not None:
+        messages.warning(text)
     if (text := height_warning(problem, HEIGHTS_REMEDY)) is not None:
         messages.warning(text)
     if args.output is None:

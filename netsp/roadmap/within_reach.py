@@ -13,6 +13,9 @@ from netsp.roadmap.reach import shortest_tethers, why_unreached
 MAX_EXPLAINED = 5
 """Enclosed goals whose obstacles are named: to find them takes longer than to find the goals."""
 
+UNREACHED = "out of the tether's reach among the obstacles"
+"""Reason to leave a goal out, in the record of an import."""
+
 HAIR = 1e-6
 """Relative; what is so little too far is left to the roadmap to judge."""
 

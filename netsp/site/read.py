@@ -102,6 +102,8 @@ class ImportedSite:
         Names of the goals that stand for obstacles to be looked at.
     floor
         The sea floor, where one was asked for.
+    goal_features
+        Feature of each goal of the problem; None for viewpoints about obstacles.
     """
 
     problem: Problem
@@ -109,6 +111,47 @@ class ImportedSite:
     notes: tuple[str, ...]
     viewpoints: frozenset[str] = frozenset()
     floor: SeaFloor | None = None
+    goal_features: tuple[Feature | None, ...] = ()
+
+    def keeping(self, problem: Problem, reason: str) -> ImportedSite:
+        """Return the import with fewer goals: features without a goal that is kept are left out.
+
+        Parameters
+        ----------
+        problem : Problem
+            The same problem with some of its goals, in their order.
+        reason : str
+            Why the others are left out.
+
+        Returns
+        -------
+        ImportedSite
+            Its record counts these features as left out.
+        """
+        import shapely
+
+        kept, staying, lost = 0, set(), {}
+        shapes: list[shapely.Geometry] = []
+        for goal, feature in zip(self.problem.goals, self.goal_features, strict=True):
+            left = problem.goals[kept] if kept < len(problem.goals) else None
+            if left is not None and (left.name, left.position[:2]) == (
+                goal.name, goal.position[:2],
+            ):  # fmt: skip
+                kept += 1
+                staying.add("" if feature is None else feature.where)
+                continue
+            shapes.append(shapely.Point(goal.position[:2]))
+            if feature is not None:
+                lost[feature.where] = feature.layer
+        assert problem.site is not None
+        layers = tuple(
+            layer.without_goals([w for w in lost if w not in staying and lost[w] == layer.layer],
+                                reason)
+            for layer in problem.site.imported
+        )  # fmt: skip
+        site = problem.site.model_copy(update={"imported": layers})
+        problem = problem.model_copy(update={"site": site})
+        return replace(self, problem=problem, left_out=(*self.left_out, *shapes))
 
 
 def import_site(
@@ -162,7 +205,9 @@ def import_site(
     assert problem.site is not None
     notes = (*found.notes, *site.notes, *problem.site.notes)
     viewpoints = frozenset(site.viewpoints)
-    return ImportedSite(problem, site.left_out(), notes, viewpoints, site.floor)
+    return ImportedSite(
+        problem, site.left_out(), notes, viewpoints, site.floor, tuple(site.goal_features)
+    )
 
 
 def read_site(
@@ -283,6 +328,7 @@ class _Site:
     cropped: CropCircle | None = None
     window: CropWindow | None = None
     viewpoints: list[str] = field(default_factory=list)
+    goal_features: list[Feature | None] = field(default_factory=list)
     floor: SeaFloor | None = None
 
     def __post_init__(self) -> None:
@@ -343,6 +389,7 @@ class _Site:
             goals = self._within_reach(goals, anchor, tether)
         if self.complaints:
             raise self._refused()
+        self.goal_features = [goal.get("source") for goal in goals]
         return self._made(
             {
                 "schema_version": 1, "name": name, "base": list(anchor),
