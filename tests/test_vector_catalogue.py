@@ -593,6 +593,7 @@ INWARDS = [(1, 1), (-1, 1), (-1, -1), (1, -1)]
         (wall("W", SQUARE, INWARDS, [0, 1], 71, 3), 100.0 - 64.0),  # (10, 5) stays free
         (wall("W", SQUARE[:2], [(0, 1)] * 2, [0.5]), 10.5 * 0.5),  # a line, of --line-width
         (insert("W", "B", 20, 0, 41, 2, 42, 2), 20.0),
+        (insert("W", "b", 20, 0), 5.0),  # names of blocks in any case
         (entity("SOLID", "W", 10, 5, 20, 0, 11, 9, 21, 0, 12, 5, 22, 4), 8.0),  # three corners
         (entity("LWPOLYLINE", "W", 90, 2, 10, 5, 20, 0, 40, 1, 41, 2, 10, 9, 20, 0, 40, 2), 12.0),
         (insert("W", "WIDE", 0, 0, 41, 2, 42, 2), 2.0 * 10.0),

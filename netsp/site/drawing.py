@@ -453,16 +453,24 @@ class _Reader:
             yield from self.drawing.block_records[name].all_tags()
             for record in records:
                 if not self.reason(record, self.text(record.get(8, "0"))):
-                    for simple in simple_entities(record):
+                    for simple in self.simple(record):
                         yield from simple.all_tags()
             yield 0, "ENDBLK"
         yield from ((0, "ENDSEC"), (0, "SECTION"), (2, "ENTITIES"))
         for handle, entity in by_handle.items():
-            for record in simple_entities(entity.record):
+            for record in self.simple(entity.record):
                 tags = [(5, handle), *(tag for tag in record.tags if tag[0] != 5)]
                 followers = [f for f in record.followers if f.type != "ATTRIB"]
                 yield from Record(record.type, tags, followers).all_tags()
         yield from ((0, "ENDSEC"), (0, "EOF"))
+
+    def simple(self, record: Record) -> list[Record]:
+        """Return an entity as GDAL reads it; names of blocks in the case of the block itself."""
+        if record.type != "INSERT":
+            return simple_entities(record)
+        name = self.blocks[record.get(2).lower()]
+        tags = [(code, name if code == 2 else value) for code, value in record.tags]
+        return [Record(record.type, tags, record.followers)]
 
     def features(self, entity: _Entity) -> list[Feature]:
         """Return the feature of an entity; of a block with several layers one for each."""
