@@ -11,6 +11,7 @@ import numpy as np
 from netsp import steps
 from netsp.arrays import Floats
 from netsp.pictures import style
+from netsp.pictures.label_placement import LabelPlace, place_labels
 from netsp.problem import Circle, Problem
 from netsp.roadmap.paths import TautPaths
 from netsp.solution import Solution, Status
@@ -20,6 +21,12 @@ if TYPE_CHECKING:
     import shapely
     from matplotlib.axes import Axes
 
+
+MAX_LABELLED = 40
+"""Goals of a picture that bears their names: more names leave no room."""
+
+LABEL_SIZE = 6.0
+"""Size of the font of names, points."""
 
 SMALL = 0.012
 """Radius of the smallest circle that bears its own name, in units of the map."""
@@ -304,30 +311,77 @@ def draw_map(
         ax.plot(path[:, 0], path[:, 1], color=style.PATH, lw=1.8, zorder=3, solid_joinstyle="round")
         _arrows(ax, path, len(solution.tour) + 1)
     for k, goal in enumerate(problem.goals):
-        x, y, z = goal.position
+        x, y = goal.position[:2]
         ax.plot(
             x, y, "o", ms=13 if order else 9, mec=style.PATH, mew=1.4, zorder=5,
             color="white" if order and k not in order else style.GOAL,
         )  # fmt: skip
         visit = str(order.get(k, ""))
         ax.annotate(visit, (x, y), ha="center", va="center", fontsize=7, zorder=6)
-        name = goal.name or "" if order else problem.goal_name(k)
-        note = " ".join(t for t in (name, f"z {z:g}" if z else "") if t)
-        if note and len(problem.goals) <= 40:
-            ax.annotate(
-                note, (x, y), xytext=(8, -10), textcoords="offset points", fontsize=6,
-                color=style.EDGE, zorder=6, path_effects=style.halo(),
-            )  # fmt: skip
     ax.plot(
         *problem.base[:2], marker="*", ms=17, color=style.BASE, mec="white", zorder=7, ls="none",
         label="base",
     )  # fmt: skip
-    ax.set_title(_title(problem, solution), fontsize=10, loc="left")
     ax.set_xlabel(f"x ({problem.units})")
     ax.set_ylabel(f"y ({problem.units})")
     ax.tick_params(labelsize=8)
     _frame(ax, problem, solution)
+    more = ""
+    if len(problem.goals) <= MAX_LABELLED:
+        more = _label_goals(ax, problem, 6.5 if order else 4.5, is_numbered=bool(order))
+    ax.set_title(_title(problem, solution) + more, fontsize=10, loc="left")
     return ax
+
+
+def _label_goals(ax: Axes, problem: Problem, radius: float, *, is_numbered: bool) -> str:
+    """Write the names and heights of goals beside their markers; return what the title says more.
+
+    Where not all labels have room, a height that all goals share stands in the title, and names
+    that would still cover another goal or name are left out.
+
+    Parameters
+    ----------
+    ax : Axes
+        The map, with its limits set.
+    problem : Problem
+        Whose goals they are.
+    radius : float
+        Radius of the markers, points.
+    is_numbered : bool
+        Whether the markers bear numbers, so that goals without a name need none.
+    """
+    low, high = (np.array(limits) for limits in zip(ax.get_xlim(), ax.get_ylim(), strict=True))
+    figure = ax.get_figure(root=True)
+    assert figure is not None
+    paper = 72.0 * np.array(figure.get_size_inches()) * ax.get_position(original=True).size
+    scale = float((paper / (high - low)).min())  # points per unit of the map
+    flat = np.array([goal.position[:2] for goal in problem.goals]) * scale
+    base = np.array([problem.base[:2]]) * scale
+    heights = {goal.position[2] for goal in problem.goals}
+    names = [
+        goal.name or "" if is_numbered else problem.goal_name(k)
+        for k, goal in enumerate(problem.goals)
+    ]
+    notes = [f"z {goal.position[2]:g}" if goal.position[2] else "" for goal in problem.goals]
+    texts = [" ".join(filter(None, both)) for both in zip(names, notes, strict=True)]
+    more = ""
+
+    def places() -> list[LabelPlace | None]:
+        return place_labels(flat, texts, font_size=LABEL_SIZE, marker_radius=radius, taken=base)
+
+    found = places()
+    has_room = all(place or not text for place, text in zip(found, texts, strict=True))
+    if not has_room and len(heights) == 1 and notes[0]:
+        texts, more = names, f"; goals at {notes[0]}"
+        found = places()
+    for goal, text, place in zip(problem.goals, texts, found, strict=True):
+        if place is not None:
+            ax.annotate(
+                text, goal.position[:2], xytext=place.offset, textcoords="offset points",
+                ha=place.align, va="center", fontsize=LABEL_SIZE, color=style.EDGE, zorder=6,
+                path_effects=style.halo(),
+            )  # fmt: skip
+    return more
 
 
 def draw_path(solution: Solution, *, ax: Any = None) -> Any:
@@ -472,7 +526,9 @@ def view(problem: Problem, solution: Solution | None = None) -> tuple[float, flo
     size = max(float((high - low).max()), 1e-9)
     low, high = low - 0.05 * size, high + 0.05 * size
     longest = max(len(g.name or "") for g in problem.goals)
-    if longest and len(problem.goals) <= 40:  # their labels stand to the right of the goals
+    if (
+        longest and len(problem.goals) <= MAX_LABELLED
+    ):  # their labels stand to the right of the goals
         high[0] += min(0.03 + 0.008 * longest, 0.2) * size
     for axis in range(2):
         lack = 0.25 * size - float((high - low)[axis])
