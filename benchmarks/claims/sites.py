@@ -181,6 +181,44 @@ def spellings() -> tuple[str, bool]:
     return f"{wrong} of {tried} wrong", wrong == 0
 
 
+def chart() -> tuple[str, bool]:
+    """Import of the chart of docs/sites.md, and a proven tour of its piers."""
+    from netsp import Status, solve, verify
+    from netsp.roadmap.within_reach import within_reach
+    from netsp.site.options import Looking, SiteOptions
+    from netsp.site.projection import Projection
+    from netsp.site.read import import_site
+    from netsp.site.selection import Selection
+
+    file = DATA / "charts" / "US5MIACB.000"
+    if not file.is_file():
+        return ABSENT, True
+    options = SiteOptions(
+        tether=150.0, radius=1.0, line_width=1.0, floor=True,
+        looking=Looking(1, 3.0, chosen=Selection.parse([("layer", "SLCONS")])),
+    )  # fmt: skip
+    begin = time.process_time()
+    found = import_site(file, Projection(25.77854, -80.18550), options=options)
+    problem, _ = within_reach(found.problem, found.viewpoints)
+    read = time.process_time() - begin
+    assert problem.site is not None
+    layers = problem.site.imported
+    features = sum(layer.features for layer in layers)
+    used = sum(sum(layer.used.values()) for layer in layers)
+    left_out = sum(group.features for layer in layers for group in layer.left_out)
+    begin = time.process_time()
+    tour = solve(problem, time_limit=30.0)
+    took = time.process_time() - begin
+    good = used + left_out == features and read <= 60.0 and len(tour.tour) == len(problem.goals)
+    good &= tour.status is Status.OPTIMAL and bool(verify(problem, tour))
+    return (
+        f"{used} of {features} features used, {left_out} left out; {len(problem.goals)} goals, "
+        f"{len(problem.obstacles)} obstacles, {read:.1f} s; tour {tour.length:.1f} m in "
+        f"{took:.1f} s",
+        good,
+    )  # fmt: skip
+
+
 def claims() -> Iterator[Claim]:
     """All of this file."""
     yield Claim(
@@ -195,3 +233,4 @@ def claims() -> Iterator[Claim]:
     )
     yield Claim("worlds that are off by a tour's margin and do not fit", "none", margined)
     yield Claim("a wind farm of 67 goals, 9 km of tether", "a verified tour in 60 s", farm)
+    yield Claim("a chart imported and its piers toured", "all accounted for, proven; 60 s", chart)
