@@ -13,6 +13,7 @@ from netsp.site.options import Looking, SiteOptions
 from netsp.site.projection import Projection
 from netsp.site.read import import_site, read_map
 from netsp.site.sea_floor import Danger, DepthArea, sea_floor
+from netsp.site.selection import Selection
 from tests.chart_writer import write_cell
 
 pytest.importorskip("pyogrio")
@@ -236,6 +237,27 @@ def test_places_in_water_that_may_be_too_shallow_are_named(tmp_path):
     assert "(weir): lies in DEPARE[0], from 0 m of depth on" in goal
     with pytest.raises(InputError, match="draught: expected a depth of 0 m or more"):
         SiteOptions(draught=-1.0)
+
+
+def test_shallow_water_is_inspected_only_where_its_layer_is_chosen(tmp_path):
+    file = write_cell(tmp_path / "A.000", [pile(-20, 0), water(20, 0, 10, 0.0, 2.0)])
+
+    def layers(*rules):
+        looking = Looking(1, 2.0, chosen=Selection.parse(rules))
+        options = SiteOptions(tether=90.0, radius=1.0, draught=2.0, looking=looking)
+        problem = import_site(file, HERE, options=options).problem
+        return [g.position[0] > 0 for g in problem.goals], len(problem.obstacles)
+
+    assert layers() == ([False], 2)
+    assert layers(("layer", "DEPARE")) == ([True], 2)
+
+
+def test_a_base_in_shallow_water_is_told_once(tmp_path):
+    file = write_cell(tmp_path / "A.000", [water(-300, -300, 600, 0.0, 2.0), pile(0, 20)])
+    options = SiteOptions(tether=90.0, radius=1.0, draught=2.0, looking=Looking(1, 2.0))
+    with pytest.raises(InputError) as caught:
+        import_site(file, HERE, options=options)
+    assert sum("base: lies" in text for text in caught.value.complaints) == 1
 
 
 def test_reach_without_depths_and_beyond_the_chart_is_told(tmp_path):

@@ -24,7 +24,10 @@ from netsp.import_record import KIND_COLUMNS, MAX_NAMED, CropCircle, Site, UsedA
 from netsp.models import explain, shown
 from netsp.problem import Problem
 from netsp.site.chart_classes import (
+    DEPTH_AREAS,
     EQUIPMENT,
+    SOUNDINGS,
+    UNSURVEYED,
     chart_radius,
     chart_width,
     depth_range,
@@ -989,7 +992,8 @@ class _Site:
         found = {
             k
             for k, o in enumerate(obstacles)
-            if any(
+            if (rule.layers or not self._is_shallow(o["feature"]))
+            and any(
                 rule.takes(layer, self._name(o["feature"]) or o["name"])
                 for layer in (o["feature"].layer, *o["feature"].folders)
             )
@@ -1002,6 +1006,10 @@ class _Site:
                 f"there are obstacles of the layers {', '.join(n or '(none)' for n in layers)}"
             )
         return found
+
+    def _is_shallow(self, feature: Feature) -> bool:
+        """Return whether a feature is water that is an obstacle for its depth only."""
+        return self.is_chart and feature.layer.upper() in (*DEPTH_AREAS, UNSURVEYED, SOUNDINGS)
 
     def _free_viewpoints(
         self, goals: list[dict[str, Any]], obstacles: list[dict[str, Any]], anchor: Any,
@@ -1053,6 +1061,8 @@ class _Site:
 
         spot = shapely.Point(anchor[:2])
         for thing in obstacles:
+            if self._is_shallow(thing["feature"]):
+                continue  # named with its depth already
             if _shape(thing).contains(spot):
                 self._complain(
                     f"base: lies inside {self._called(thing['feature'])}; expected a place in the "
