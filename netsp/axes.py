@@ -17,7 +17,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from netsp.arrays import Floats
+from netsp.arrays import Bools, Floats
 from netsp.errors import InputError
 from netsp.fields import LARGEST
 from netsp.files import csv_lines, read_bytes, read_gzip
@@ -123,7 +123,8 @@ _ALIASES: Mapping[Quantity, Mapping[str, float]] = {
     "mode": {"mode": 1.0, "flight mode": 1.0},
     "estimate": {"estimate": 1.0},
     "paid_out": dict.fromkeys(("paid out", "payout", "tether out", "cable out"), 1.0),
-    "classification": dict.fromkeys(("classification", "class"), 1.0),
+    "classification": dict.fromkeys(
+        ("classification", "class", "scalar classification"), 1.0),  # the last is CloudCompare's
     "withheld": {"withheld": 1.0},
 }  # fmt: skip
 """Names of columns in lower case with blanks for underscores, and the factor on their values."""
@@ -147,6 +148,16 @@ _REFERENCES = {
 
 NOISE_CLASSES = {7: "low noise", 18: "high noise"}
 """Classes of points that belong to no surface (ASPRS LAS 1.4 R15, tables 9 and 17)."""
+
+CUSTOMARY_NODATA = (
+    -9999.0, 9999.0, -99999.0, 99999.0, -32768.0, -32767.0, 32767.0, -999999.0, 999999.0,
+)  # fmt: skip
+"""Values that customarily stand for no height. Where a file does not say so, they are taken as such
+if they lie farther from all other values than those lie apart."""
+
+MAX_HEIGHT = 1e9
+"""Largest height in units of a file: heights on earth are below 1.2e7 millimetres. Larger values
+are marks of no height, such as 1e20 and the largest number of a data type."""
 
 SAMPLE_LINES = 1000
 """Lines of a table that decide its separator and its decimal sign; later lines must agree."""
@@ -255,6 +266,96 @@ def _unit_factor(quantity: Quantity, unit: str) -> float | None:
     if quantity.startswith("velocity"):
         return _SPEEDS.get(unit)
     return metres_per_unit(unit)
+
+
+def height_meaning(names: Sequence[str]) -> Column | None:
+    """Return the meaning of a band or variable of heights by the first of its names that says so.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Names, such as a description or a standard name of the CF conventions.
+
+    Returns
+    -------
+    Column or None
+        Its factor is negative for depths; None where no name is that of heights.
+
+    Raises
+    ------
+    InputError
+        Heights in an unknown unit.
+
+    Examples
+    --------
+    >>> height_meaning(["Band 1", "sea_floor_depth_below_geoid"]).factor
+    -1.0
+    """
+    for name in names:
+        bare = _bare(name.lower())
+        for sign, beginnings in _HEIGHT_BEGINNINGS:
+            if bare.startswith(beginnings):
+                return Column("z", sign)
+        meaning = column(name)
+        if meaning is not None and meaning.quantity in ("z", "altitude"):
+            return meaning
+    return None
+
+
+_HEIGHT_BEGINNINGS = (
+    (-1.0, ("sea floor depth", "depth below", "bathymetric depth", "bathymetry depth")),
+    (1.0, ("height above", "surface altitude", "bedrock altitude", "sea floor altitude")),
+)
+"""Signs of heights, by the beginning of the name of a band or of a variable (CF conventions)."""
+
+
+def marks_of_no_height(z: Floats, *more: float) -> list[tuple[float, Bools]]:
+    """Return the values that customarily mark a missing height, and where they stand.
+
+    Parameters
+    ----------
+    z : ndarray
+        Heights in the units of their file; NaN where there is none.
+    *more : float
+        Further values that may mark a missing height, such as the largest of the data type.
+
+    Examples
+    --------
+    >>> marks_of_no_height(np.array([-4.0, -9999.0, -5.0]))
+    [(-9999.0, array([False,  True, False]))]
+    """
+    customary = (*CUSTOMARY_NODATA, *more)
+    suspect = np.isin(z, customary) | (np.abs(z) > MAX_HEIGHT)
+    if not suspect.any():
+        return []
+    others = z[~suspect & ~np.isnan(z)]
+    span = float(np.ptp(others)) if len(others) else 0.0
+    found = []
+    for value in np.unique(z[suspect]):
+        apart = float(np.abs(others - value).min()) if len(others) else math.inf
+        if abs(value) > MAX_HEIGHT or apart > span:
+            found.append((float(value), np.asarray(z == value)))
+    return found
+
+
+def meanings(
+    names: Sequence[str], source: str
+) -> tuple[dict[Quantity, tuple[int, Column]], tuple[str, ...]]:
+    """Return the columns by the quantity that they hold, and the names of the other columns.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Names of the columns in the order of the file.
+    source : str
+        Name of the file, for messages.
+
+    Raises
+    ------
+    InputError
+        Two columns for one quantity, or an unknown unit.
+    """
+    return _meanings(names, source)
 
 
 @dataclass(frozen=True)
@@ -870,15 +971,44 @@ def map_unit(crs: Any) -> float | None:
     Raises
     ------
     InputError
-        Unknown system, or pyproj is not installed.
+        Unknown or geocentric system, or pyproj is not installed.
     """
     system = _system(crs)
     if system.is_geographic:  # in degrees or grads
         return None
+    if system.is_geocentric:
+        raise InputError(
+            "geocentric coordinates, which count from the middle of the earth; expected those of a "
+            "map, such as UTM"
+        )
     for axis in system.axis_info:
         if axis.direction.lower() not in ("up", "down"):
             return float(axis.unit_conversion_factor or 1.0)
     return 1.0
+
+
+def metres_per_unit_code(code: int) -> float | None:
+    """Return the metres in a unit of length by its number in the EPSG registry, None if unknown.
+
+    Parameters
+    ----------
+    code : int
+        Number, as GeoTIFF keys state it: 9001 is the metre.
+
+    Examples
+    --------
+    >>> metres_per_unit_code(9002)
+    0.3048
+    """
+    known = {9001: 1.0, 9002: UNITS["ft"], 9003: UNITS["us-ft"]}
+    if code in known:
+        return known[code]
+    try:
+        from pyproj.database import get_units_map
+    except ImportError:
+        return None
+    units = get_units_map(auth_name="EPSG", category="linear", allow_deprecated=True)
+    return next((float(u.conv_factor) for u in units.values() if u.code == str(code)), None)
 
 
 def _system(crs: Any) -> Any:

@@ -79,8 +79,10 @@ def test_a_cloud_of_binary_records_keeps_its_fields_apart(tmp_path):
         ("a.csv", "x,y,z,depth\n1,2,-3,3\n", "both hold z"),
         ("a.csv", "x,y,z\n1,0000,2,5000,3,2500\n", "decimal commas"),
         ("a.pts", "3\n1 2 3\n4 5 6\n", "states 3 points"),
+        ("a.pcd", "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 1\nDATA zip\n",
+         "ascii, binary or binary_compressed"),
         ("a.pcd", "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 1\nDATA binary_compressed\n",
-         "ascii or binary"),
+         "cut short"),
         ("a.pcd", "FIELDS x y\nDATA ascii\n", "expected x, y and z"),
     ],
 )  # fmt: skip

@@ -12,26 +12,26 @@ import numpy as np
 
 from netsp.arrays import Bools, Floats
 from netsp.axes import (
+    MAP_PAIRS,
     NOISE_CLASSES,
-    UNITS,
+    Column,
     HeightAxis,
     Quantity,
     Table,
     decode_text,
     height_axis,
     map_unit,
+    marks_of_no_height,
+    meanings,
+    metres_per_unit_code,
     read_table,
 )
 from netsp.errors import InputError, counted
 from netsp.files import read_bytes
+from netsp.online.scene.tally import Tally
 
 TEXT_SUFFIXES = (".csv", ".txt", ".xyz", ".asc", ".pts")
 """Extensions of clouds that are tables of text."""
-
-_PCD_TYPES = {("F", 4): "<f4", ("F", 8): "<f8"} | {
-    (kind, size): f"<{letter}{size}" for kind, letter in (("I", "i"), ("U", "u"))
-    for size in (1, 2, 4, 8)
-}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -46,11 +46,97 @@ class PointCloud:
         Metres per unit of x, y and z.
     notes : tuple of str
         Points, columns and classes that were left out, one line each.
+    tally : Tally, optional
+        Number of points of the file, and how many of them were left out and why; None where all
+        are used.
     """
 
     points: Floats = field(repr=False)
     metres: tuple[float, float, float] = (1.0, 1.0, 1.0)
     notes: tuple[str, ...] = ()
+    tally: Tally | None = None
+
+
+class SurfaceFilter:
+    """Selection of the points of a file that lie on surfaces, with the reasons for all others.
+
+    Parameters
+    ----------
+    count : int
+        Number of points of the file.
+
+    Attributes
+    ----------
+    kept : ndarray of bool
+        Points that lie on surfaces.
+    reasons : list of (str, int)
+        Reasons, and how many points were left out for each.
+    """
+
+    def __init__(self, count: int) -> None:
+        self.kept: Bools = np.ones(count, dtype=bool)
+        self.reasons: list[tuple[str, int]] = []
+
+    def leave_out(self, which: Any, reason: str) -> None:
+        """Leave out points that were not left out before.
+
+        Parameters
+        ----------
+        which : ndarray of bool
+            Points.
+        reason : str
+            Reason, which follows "3 points" in a note.
+        """
+        more = np.asarray(which, dtype=bool) & self.kept
+        if more.any():
+            self.kept &= ~more
+            self.reasons.append((reason, int(more.sum())))
+
+    def leave_out_noise(self, classes: Any, withheld: Any) -> None:
+        """Leave out points of noise classes, and those that are marked as withheld.
+
+        Parameters
+        ----------
+        classes : ndarray or None
+            Classes of ASPRS.
+        withheld : ndarray or None
+            Marks.
+        """
+        if classes is not None:
+            for number, name in NOISE_CLASSES.items():
+                self.leave_out(np.asarray(classes) == number, f"of class {number} ({name})")
+        if withheld is not None:
+            self.leave_out(withheld, "marked as withheld")
+
+    def leave_out_unmeasured(self, points: Floats) -> None:
+        """Leave out points that are not finite, and those whose height marks a missing one.
+
+        Parameters
+        ----------
+        points : ndarray, shape (n, 3)
+            All points of the file.
+        """
+        self.leave_out(~np.isfinite(points).all(axis=1), "without coordinates")
+        heights = np.where(self.kept, points[:, 2], np.nan)
+        for value, which in marks_of_no_height(heights):
+            self.leave_out(which, f"of height {value:.6g}, which marks a missing height,")
+
+    def tally(self, before: Sequence[tuple[str, int]] = ()) -> Tally:
+        """Return the numbers of points read and left out.
+
+        Parameters
+        ----------
+        before : sequence of (str, int)
+            Reasons and numbers of points that were left out before.
+        """
+        left_out = (*before, *self.reasons)
+        total = len(self.kept) + sum(count for _, count in before)
+        return Tally("point", total, int(self.kept.sum()), left_out)
+
+    @property
+    def notes(self) -> list[str]:
+        """Return one line for each reason."""
+        return [f"{counted(count, 'point')} {reason} left out" for reason, count in self.reasons]
 
 
 def read_text_cloud(path: str | Path) -> PointCloud:
@@ -88,11 +174,84 @@ def read_text_cloud(path: str | Path) -> PointCloud:
     notes = [f"{counted(gaps, 'row')} without coordinates left out"] if gaps else []
     if table.has_decimal_commas:
         notes.append("numbers are read with decimal commas")
-    kept, left_out = _surface(_classes(table), _withheld(table), len(points))
-    notes += left_out
+    surface = SurfaceFilter(len(points))
+    surface.leave_out_unmeasured(points)
+    surface.leave_out_noise(_classes(table), _withheld(table))
+    notes += surface.notes
     if unused := table.left_out((*used, "classification", "withheld")):
         notes.append(f"unused columns: {', '.join(unused)}")
-    return PointCloud(points[kept], notes=tuple(notes))
+    tally = surface.tally([("without coordinates", gaps)] if gaps else [])
+    return PointCloud(points[surface.kept], notes=tuple(notes), tally=tally)
+
+
+def coordinate_fields(
+    names: Sequence[str], source: str, where: str
+) -> tuple[tuple[int, Column], tuple[int, Column], tuple[int, Column]]:
+    """Return the places and meanings of the fields that hold x, y and z.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Names of the fields, as `netsp.axes.column` takes them.
+    source : str
+        Name of the file, for messages.
+    where : str
+        Term of the format for its fields, for messages.
+
+    Raises
+    ------
+    InputError
+        No fields for x, y and z, or several for one of them.
+    """
+    columns, _ = meanings(names, source)
+    plane = next((p for p in MAP_PAIRS if p[0] in columns and p[1] in columns), None)
+    if plane is None or "z" not in columns:
+        raise InputError(
+            f"{source}: {where}: expected x, y and z, got {' '.join(names)[:80] or 'none'}"
+        )
+    return columns[plane[0]], columns[plane[1]], columns["z"]
+
+
+def cloud_of_fields(
+    names: Sequence[str], values: Floats, source: str, *, where: str = "fields"
+) -> PointCloud:
+    """Return the cloud of records with named fields.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Names of k fields, as `netsp.axes.column` takes them.
+    values : ndarray, shape (n, k)
+        Values of n points. Points that are not finite mark beams without an echo; they are left
+        out.
+    source : str
+        Name of the file, for messages.
+    where : str
+        Term of the format for its fields, for messages.
+
+    Raises
+    ------
+    InputError
+        No fields for x, y and z, or several for one of them.
+    """
+    used = coordinate_fields(names, source, where)
+    columns, _ = meanings(names, source)
+    points = np.column_stack([values[:, k] * column.factor for k, column in used]) + 0.0
+    surface = SurfaceFilter(len(points))
+    surface.leave_out_unmeasured(points)
+    marks = [values[:, columns[q][0]] if q in columns else None for q in _MARKS]
+    surface.leave_out_noise(marks[0], None if marks[1] is None else marks[1] != 0.0)
+    depths = points[surface.kept, 2]
+    if used[2][1].factor < 0.0 and len(depths) and depths.min() >= 0.0 and depths.max() > 0.0:
+        name = names[columns["z"][0]]
+        raise InputError(
+            f"{source}: {where}: {name} holds negative numbers only, and depths count downwards; "
+            "expected positive depths, or the name z for heights"
+        )
+    return PointCloud(points[surface.kept], notes=tuple(surface.notes), tally=surface.tally())
+
+
+_MARKS: tuple[Quantity, Quantity] = ("classification", "withheld")
 
 
 def _without_gaps(table: Table, used: Sequence[Quantity]) -> tuple[Table, int]:
@@ -126,25 +285,6 @@ def _withheld(table: Table) -> Bools | None:
     return np.array([word in ("1", "true", "yes") for word in words])
 
 
-def _surface(classes: Any, withheld: Any, count: int) -> tuple[Bools, list[str]]:
-    """Return which points lie on surfaces, and one line for each kind that does not."""
-    kept, notes = np.ones(count, dtype=bool), []
-    if classes is not None:
-        for number, name in NOISE_CLASSES.items():
-            noise = np.asarray(classes) == number
-            if noise.any():
-                kept &= ~noise
-                notes.append(
-                    f"{counted(int(noise.sum()), 'point')} of class {number} ({name}) left out"
-                )
-    if withheld is not None and np.asarray(withheld).any():
-        more = np.asarray(withheld, dtype=bool) & kept
-        kept &= ~more
-        if more.any():
-            notes.append(f"{counted(int(more.sum()), 'point')} marked as withheld left out")
-    return kept, notes
-
-
 def read_las(path: str | Path) -> PointCloud:
     """Read a LAS or LAZ cloud without noise and withheld points, in the units of its system.
 
@@ -166,22 +306,35 @@ def read_las(path: str | Path) -> PointCloud:
     points = np.array(data.xyz, dtype=float)
     names = set(data.point_format.dimension_names)
     withheld = np.asarray(data.withheld) if "withheld" in names else None
-    kept, notes = _surface(np.asarray(data.classification), withheld, len(points))
+    stated = int(data.header.point_count)
+    if len(points) != stated:
+        raise InputError(f"{path}: cut short; expected {counted(stated, 'point')}")
+    surface = SurfaceFilter(len(points))
+    surface.leave_out_unmeasured(points)
+    surface.leave_out_noise(np.asarray(data.classification), withheld)
+    notes = surface.notes
     system, keys = _system_of(data.header)
-    unit, heights = _KEY_UNITS.get(keys.get(_MAP_UNIT, 0)), HeightAxis()
+    unit, heights = _unit_of_key(keys, _MAP_UNIT, path), HeightAxis()
+    if keys.get(_MODEL, 0) == 3:
+        raise InputError(f"{path}: geocentric coordinates; expected those of a map, such as UTM")
     if system is not None:
-        heights = height_axis(system)
-        unit = map_unit(system) if unit is None else unit
+        try:
+            stated_unit, heights = map_unit(system), height_axis(system)
+        except InputError as error:
+            raise InputError(f"{path}: {error}") from None
+        unit = stated_unit if unit is None else unit
         if unit is None:
             raise InputError(f"{path}: in degrees; expected a cloud in metres, such as UTM")
     elif keys.get(_MODEL, 0) == 2:
         raise InputError(f"{path}: in degrees; expected a cloud in metres, such as UTM")
     elif keys or any(v.record_id == _WKT for v in data.header.vlrs):
-        notes.append("coordinate system unknown: read as metres, z upwards")
+        notes.append(
+            f"coordinate system unknown: {'read as metres, ' if unit is None else ''}z upwards"
+        )
     if not heights.is_stated and 1024 <= keys.get(_VERTICAL, 0) < 32767:
         heights = height_axis(f"EPSG:{keys[_VERTICAL]}")
     unit = 1.0 if unit is None else unit
-    metres = _KEY_UNITS.get(keys.get(_HEIGHT_UNIT, 0))
+    metres = _unit_of_key(keys, _HEIGHT_UNIT, path)
     if metres is None:
         metres = heights.metres if heights.is_stated else unit
     if unit != 1.0 or metres != 1.0:
@@ -189,7 +342,9 @@ def read_las(path: str | Path) -> PointCloud:
     points[:, 2] *= heights.sign
     if heights.sign < 0.0:
         notes.append("heights count downwards: converted to z upwards")
-    return PointCloud(points[kept], (unit, unit, metres), tuple(notes))
+    return PointCloud(
+        points[surface.kept], (unit, unit, metres), tuple(notes), tally=surface.tally()
+    )
 
 
 _WKT, _KEYS = 2112, 34735  # records of LAS with a coordinate system (LAS 1.4 R15, section 3)
@@ -199,8 +354,18 @@ _MODEL, _MAP_UNIT, _VERTICAL, _HEIGHT_UNIT = (
     4096,
     4099,
 )  # keys of GeoTIFF 1.1, section 7
-_KEY_UNITS = {9001: 1.0, 9002: UNITS["ft"], 9003: UNITS["us-ft"]}
-"""Metres per unit, by its number in GeoTIFF keys."""
+USER_DEFINED = 32767  # value of a GeoTIFF key whose meaning stands in other keys
+
+
+def _unit_of_key(keys: dict[int, int], key: int, path: str | Path) -> float | None:
+    """Return the metres in the unit that a GeoTIFF key states; None where it states none."""
+    code = keys.get(key, 0)
+    if code in (0, USER_DEFINED):
+        return None
+    metres = metres_per_unit_code(code)
+    if metres is None:
+        raise InputError(f"{path}: in units EPSG:{code}; expected a known unit of length")
+    return metres
 
 
 def _system_of(header: Any) -> tuple[Any, dict[int, int]]:
@@ -213,72 +378,3 @@ def _system_of(header: Any) -> tuple[Any, dict[int, int]]:
         return header.parse_crs(), keys
     except Exception:  # pyproj is not installed, or the record is not one that it knows
         return None, keys
-
-
-def read_pcd(path: str | Path) -> PointCloud:
-    """Read a cloud of the Point Cloud Library, as text or binary.
-
-    Parameters
-    ----------
-    path : str or Path
-        PCD 0.5 to 0.7 with fields x, y and z. Points that are not finite mark beams without an
-        echo; they are left out.
-
-    Raises
-    ------
-    InputError
-        A head that lacks a field, too few data, or packed data.
-    """
-    data = read_bytes(path)
-    head: dict[str, list[str]] = {}
-    at = 0
-    while "DATA" not in head:
-        end = data.find(b"\n", at)
-        if end < 0 or end > 100_000:
-            raise InputError(f"{path}: expected a PCD file with a line DATA")
-        words = data[at:end].decode("ascii", "replace").split("#")[0].split()
-        if words:
-            head[words[0].upper()] = words[1:]
-        at = end + 1
-    fields = [f.lower() for f in head.get("FIELDS", head.get("COLUMNS", []))]
-    if not {"x", "y", "z"} <= set(fields):
-        raise InputError(f"{path}: FIELDS: expected x, y and z, got {' '.join(fields) or 'none'}")
-    try:
-        sizes = [int(v) for v in head.get("SIZE", ["4"] * len(fields))]
-        kinds = head.get("TYPE", ["F"] * len(fields))
-        counts = [int(v) for v in head.get("COUNT", ["1"] * len(fields))]
-        size = int(head["WIDTH"][0]) * int(head.get("HEIGHT", ["1"])[0])
-        count = int(head.get("POINTS", [str(size)])[0])
-        form = head["DATA"][0].lower()
-        places = np.cumsum([0, *counts])
-        types = [
-            (f"{name}{k}", _PCD_TYPES[kind.upper(), width], (many,))
-            for k, (name, kind, width, many) in enumerate(
-                zip(fields, kinds, sizes, counts, strict=True)
-            )
-        ]
-    except (KeyError, IndexError, ValueError):
-        raise InputError(f"{path}: expected the head of a PCD file (SIZE, TYPE, WIDTH)") from None
-    axes = [fields.index(name) for name in ("x", "y", "z")]
-    if form == "ascii":
-        rows = [line.split() for line in data[at:].decode("ascii", "replace").splitlines()]
-        rows = [row for row in rows if row]
-        points = np.array([[float(row[places[k]]) for k in axes] for row in rows]).reshape(-1, 3)
-    elif form == "binary":
-        kind = np.dtype(types)
-        if len(data) - at < count * kind.itemsize:
-            raise InputError(f"{path}: cut short; expected {counted(count, 'point')}")
-        read = np.frombuffer(data, kind, count, at)
-        points = np.column_stack([read[kind.names[k]][:, 0] for k in axes]).astype(float)  # type: ignore[index]
-    else:
-        raise InputError(f"{path}: DATA: expected ascii or binary, got {form}")
-    if len(points) != count:
-        raise InputError(f"{path}: expected {counted(count, 'point')}, got {len(points)}")
-    notes = []
-    known = np.isfinite(points).all(axis=1)
-    if not known.all():
-        notes.append(f"{counted(int((~known).sum()), 'point')} without coordinates left out")
-    view = [float(v) for v in head.get("VIEWPOINT", [])]
-    if view and view != [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]:
-        notes.append("VIEWPOINT is ignored: points keep their coordinates")
-    return PointCloud(points[known], notes=tuple(notes))

@@ -5,7 +5,7 @@ Validated at the door like a problem; `netsp schema scene` prints the JSON Schem
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self
@@ -21,7 +21,7 @@ from netsp.files import FileModel, read_text
 from netsp.models import Model
 from netsp.online.scene.field import DistanceField
 from netsp.online.scene.grid import VoxelGrid
-from netsp.online.scene.readers import Placement, load_cloud, load_mesh
+from netsp.online.scene.readers import Placement, read_cloud_file, read_mesh_file
 from netsp.online.scene.seams import seam_boxes
 from netsp.online.scene.shapes import (
     Box,
@@ -35,6 +35,7 @@ from netsp.online.scene.shapes import (
     Torus,
 )
 from netsp.online.scene.solids import BOX
+from netsp.online.scene.tally import Tally
 from netsp.problem import Circle, Problem
 
 _KINDS = ("sphere", "capsule", "cylinder", "box", "torus", "post", "prism", "half_space")
@@ -125,7 +126,7 @@ class Floor(Model):
     Attributes
     ----------
     file
-        GeoTIFF or ASC in metres, relative to the scene file.
+        Bathymetry grid, relative to the scene file.
     scale
         Metres per unit of the file.
     voxel
@@ -133,11 +134,15 @@ class Floor(Model):
     origin
         (x, y) on the file's map that is (0, 0) of the scene.
     depths
-        Whether its values count downwards.
+        Whether its values count downwards; None for what its band or column is called.
     """
 
     file: Annotated[
-        str, Field(description="bathymetry grid (GeoTIFF, ASC), relative to the scene file")
+        str,
+        Field(
+            description="bathymetry grid (GeoTIFF, ASC, netCDF, BAG, table of x, y and z), "
+            "relative to the scene file"
+        ),
     ]
     scale: Annotated[Positive, Field(description="factor from the file's units to metres")] = 1.0
     voxel: Annotated[
@@ -147,8 +152,12 @@ class Floor(Model):
         Point2, Field(description="(x, y) of the file's map that is (0, 0) here, its units")
     ] = (0.0, 0.0)
     depths: Annotated[
-        bool, Field(description="whether values are depths, which count downwards")
-    ] = False
+        bool | None,
+        Field(
+            description="whether values are depths, which count downwards; null for what its "
+            "band or column is called, else heights"
+        ),
+    ] = None
 
 
 class Scene(FileModel):
@@ -426,23 +435,25 @@ class Scene(FileModel):
     ) -> tuple[dict[str, tuple[Floats, npt.NDArray[np.int64]]], Floats | None, list[str]]:
         """Read mesh, floor and cloud: triangles by name, points, and notes of what was left out."""
         parts: dict[str, tuple[Floats, npt.NDArray[np.int64]]] = {}
-        points, said = None, []
+        points: Floats | None = None
+        said: list[str] = []
         if self.mesh is not None:
-            vertices, faces, notes = load_mesh(self.mesh.file, self.mesh.placement)
-            parts["mesh"] = vertices, faces
-            said += [f"{self.mesh.file}: {note}" for note in notes]
+            mesh = read_mesh_file(self.mesh.file, self.mesh.placement)
+            parts["mesh"] = mesh.vertices, mesh.faces
+            said += _said(self.mesh.file, mesh.notes, mesh.tally)
         if self.floor is not None:
-            from netsp.online.scene.floor import load_floor
+            from netsp.online.scene.floor import read_floor
 
-            vertices, faces, notes = load_floor(
+            floor = read_floor(
                 self.floor.file, scale=self.floor.scale, origin=self.floor.origin,
                 depths=self.floor.depths,
             )  # fmt: skip
-            parts["floor"] = vertices, faces
-            said += [f"{self.floor.file}: {note}" for note in notes]
+            parts["floor"] = floor.vertices, floor.faces
+            said += _said(self.floor.file, floor.notes, floor.tally)
         if self.cloud is not None:
-            points, notes = load_cloud(self.cloud.file, self.cloud.placement)
-            said += [f"{self.cloud.file}: {note}" for note in notes]
+            cloud = read_cloud_file(self.cloud.file, self.cloud.placement)
+            points = cloud.points
+            said += _said(self.cloud.file, cloud.notes, cloud.tally)
         return parts, points, said
 
     def reading_notes(self) -> list[str]:
@@ -475,6 +486,11 @@ class Scene(FileModel):
         """
         without = self.model_copy(update={"cloud": None})
         return list(without._files()[0].items())
+
+
+def _said(file: str, notes: Sequence[str], tally: Tally) -> list[str]:
+    """Return the notes on a file, and how many of its parts are used where not all are."""
+    return [f"{file}: {note}" for note in (*notes, tally.note) if note]
 
 
 def _thickness(solids: tuple[Solid, ...]) -> list[tuple[str, float]]:
