@@ -251,7 +251,7 @@ def test_cells_of_a_table_are_no_formulas():
     ]  # fmt: skip
 
 
-def test_two_of_one_name_are_refused_on_import(tmp_path, capsys):
+def test_two_of_one_name_are_numbered_and_told_on_import(tmp_path, capsys):
     point = {"type": "Point", "coordinates": [12.7, 55.5]}
     features = [
         {"type": "Feature", "properties": {"kind": "base", "tether_length": 50}, "geometry": point},
@@ -261,8 +261,10 @@ def test_two_of_one_name_are_refused_on_import(tmp_path, capsys):
     ]  # fmt: skip
     file = tmp_path / "site.geojson"
     file.write_text(json.dumps({"type": "FeatureCollection", "features": features}))
-    assert main(["import", str(file), "-o", str(tmp_path / "p.json")]) == 2
-    assert "two goals are named 'A1'" in one_line(capsys)
+    out = tmp_path / "p.json"
+    assert main(["import", str(file), "-o", str(out)]) == 0
+    assert [g.name for g in Problem.load(out).goals] == ["A1", "A1 2"]
+    assert "'A1' is 'A1 2' (features[2])" in capsys.readouterr().err
 
 
 def test_damaged_rows_are_told_and_a_page_escapes_every_field(tmp_path, capsys, monkeypatch):
