@@ -42,6 +42,11 @@ def arguments(p: argparse.ArgumentParser) -> None:
         help="system id of the vehicle; others are not listened to; default 1",
     )  # fmt: skip
     p.add_argument(
+        "--any-vehicle", action="store_true",
+        help="command any vehicle, not only a submarine with ArduPilot; for experts: others take "
+        "the same numbers for other modes",
+    )  # fmt: skip
+    p.add_argument(
         "--frame", metavar="NAME",
         help="local (metres north, east, down of the base) or global; default global where the "
         "problem has an origin",
@@ -189,7 +194,7 @@ def _flown(
 
         done = fly(
             problem, solution, session, options, surprises=surprises, on_step=on_step,
-            should_stop=lambda: clock.stopped,
+            should_stop=lambda: clock.stopped, any_vehicle=args.any_vehicle,
             incoming=(lambda: [e for s in sources for e in s()]) if sources else None,
         )  # fmt: skip
         if done.stopped:

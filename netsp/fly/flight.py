@@ -12,6 +12,7 @@ from netsp.execute.events import Event, Surprises
 from netsp.execute.log import Execution, ExecutionOptions, ExecutionRow
 from netsp.execute.run import StopsFlightError, execute
 from netsp.fly.checks import ready
+from netsp.fly.flight_policy import FlightPolicy
 from netsp.fly.rehearsal import rehearse
 from netsp.fly.vehicle import LinkedVehicle
 from netsp.judge import verify
@@ -40,6 +41,8 @@ def fly(
     incoming: Callable[[], list[Event]] | None = None,
     on_step: Callable[[ExecutionRow], None] | None = None,
     should_stop: Callable[[], bool] = lambda: False,
+    policy: FlightPolicy | None = None,
+    any_vehicle: bool = False,
 ) -> Execution:
     """Carry a tour out with a vehicle.
 
@@ -62,6 +65,10 @@ def fly(
         Called with every row; a KeyboardInterrupt ends the flight.
     should_stop : callable, optional
         Asked while the vehicle is not ready yet; a KeyboardInterrupt is raised then.
+    policy : FlightPolicy, optional
+        Limits of the flight.
+    any_vehicle : bool
+        Command any vehicle; by default only a submarine with ArduPilot.
 
     Returns
     -------
@@ -83,8 +90,8 @@ def fly(
     check_options(options, surprises)
     rehearse()
     start = np.array(problem.base if problem.state is None else problem.state.position)
-    ready(session, start, NEAR_START, should_stop)
-    vehicle = LinkedVehicle(session, options.reach)
+    ready(session, start, NEAR_START, should_stop, any_vehicle=any_vehicle)
+    vehicle = LinkedVehicle(session, options.reach, policy)
     done = execute(
         problem, solution, replace(options, vehicle="linked"), surprises=surprises,
         on_step=on_step, vehicle=vehicle, incoming=incoming,

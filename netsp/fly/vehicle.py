@@ -14,23 +14,11 @@ from netsp.arrays import Floats
 from netsp.execute.run import StopsFlightError
 from netsp.export.write import altitude
 from netsp.fields import Point3
+from netsp.fly.flight_policy import FlightPolicy
 from netsp.guard.fix import Fix
 from netsp.link.dialect import dialect
 from netsp.link.modes import GUIDED, mode_name
 from netsp.link.session import Session
-
-SILENT_S = 3.0
-"""Seconds without a heartbeat after which the link is lost."""
-
-UNPLACED_S = 2.0
-"""Seconds without a position, of ten that come in each, after which there is none."""
-
-OFF_PATH = 1.0
-"""Metres off the line to its target at which a vehicle is not where it was sent; ArduSub keeps
-within 0.2 (0.35 where it brakes into a bend)."""
-
-AGAIN_S = 2.0
-"""Seconds after which a target is sent again."""
 
 POSITION_ONLY = 0x0DF8
 """Type mask: velocities, accelerations, yaw and its rate do not count."""
@@ -48,10 +36,16 @@ class LinkedVehicle:
         With a position.
     reach : float
         A vertex this near is reached, metres.
+    policy : FlightPolicy, optional
+        Limits of the flight; by default those of the class.
     """
 
-    def __init__(self, session: Session, reach: float) -> None:
+    policy = FlightPolicy()
+
+    def __init__(self, session: Session, reach: float, policy: FlightPolicy | None = None) -> None:
         self.session, self.reach = session, reach
+        if policy is not None:
+            self.policy = policy
         self.control_s: list[float] = []
         self._begin = session.now.time
         self._position = self._told()
@@ -165,31 +159,38 @@ class LinkedVehicle:
         wrong = session.broken or _wrong(session.now)
         if wrong is not None:
             raise StopsFlightError(wrong)
-        if session.silent_s > SILENT_S:
+        if session.silent_s > self.policy.max_silence_s:
             raise StopsFlightError(f"the link is lost: no heartbeat for {session.silent_s:.0f} s")
-        if session.unplaced_s > UNPLACED_S:
+        if session.unplaced_s > self.policy.max_position_age_s:
             raise StopsFlightError(
                 f"the link is lost or carries no position: none for {session.unplaced_s:.0f} s"
             )
 
     def _check_path(self) -> None:
-        """That it is where it was sent: carried off, or its estimate set anew, what lies between
-        it and its target is not what was planned."""
+        """Stop a vehicle that is not on the way to its target, because what lies between it and its
+        target is not what was planned.
+
+        The plan and the depth are measured separately: on a sloping leg a vehicle may lag in depth.
+        """
         if self._target is None:
             return
-        a, b = self._from, np.array(self._target)
-        along = b - a
+        a, b, here = self._from, np.array(self._target), self._position
+        along = (b - a)[:2]
         size = float(along @ along)
-        share = 0.0 if size == 0.0 else float(np.clip((self._position - a) @ along / size, 0, 1))
-        off = float(np.linalg.norm((self._position - a - share * along)[:2]))
-        if off > OFF_PATH:
+        share = 0.0 if size == 0.0 else float(np.clip((here - a)[:2] @ along / size, 0.0, 1.0))
+        off = float(np.hypot(*((here - a)[:2] - share * along)))
+        if off > self.policy.max_path_error:
             raise StopsFlightError(f"the vehicle is {off:.1f} m off its path")
+        off = float(max(min(a[2], b[2]) - here[2], here[2] - max(a[2], b[2])))
+        if off > self.policy.max_depth_error:
+            where = "below" if here[2] < b[2] else "above"
+            raise StopsFlightError(f"the vehicle is {off:.1f} m {where} the depth of its path")
 
     def _send(self, place: Floats) -> None:
         x, y, z = (float(v) for v in place)
         target = (x, y, altitude(z))
         now = self.time
-        if target == self._target and now - self._sent < AGAIN_S:
+        if target == self._target and now - self._sent < self.policy.resend_s:
             return
         if target != self._target:
             self.sent.append((now, target))

@@ -24,6 +24,7 @@ from netsp.link.frame import Frame
 from netsp.link.messages import Listener
 from netsp.link.statustext import status_texts
 from netsp.link.udp import UdpLink
+from netsp.link.vehicle_kind import VehicleKind
 
 HEARTBEAT_S = 0.5
 """Seconds between heartbeats: ArduSub disarms when it hears none for about 3."""
@@ -84,6 +85,11 @@ class Session:
     def system(self) -> int | None:
         """System id of the vehicle; None until it was heard."""
         return self._listener.system
+
+    @property
+    def kind(self) -> VehicleKind | None:
+        """Kind of the vehicle; None until it was heard."""
+        return self._listener.kind
 
     @property
     def others(self) -> list[int]:

@@ -1,0 +1,41 @@
+"""Limits of a flight: when it stops, what is sent, and how it ends."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+from netsp.errors import InputError
+
+
+@dataclass(frozen=True)
+class FlightPolicy:
+    """Policy of a flight over MAVLink. All numbers are positive.
+
+    Attributes
+    ----------
+    max_silence_s
+        Longest time without a heartbeat, s of the vehicle; then the link is lost.
+    max_position_age_s
+        Longest time without a position, s of the vehicle, of ten that come in each second.
+    max_path_error
+        Largest distance in the plan from the line to the target, metres. ArduSub keeps within 0.2,
+        and within 0.5 where it brakes into a bend; a larger distance means that the vehicle was
+        carried off, or that its estimate was set anew.
+    max_depth_error
+        Largest distance above or below the depths between which the leg runs, metres. A vehicle
+        that lags in depth on a sloping leg is between them, and is let go on.
+    resend_s
+        Time after which a target is sent again, s.
+    """
+
+    max_silence_s: float = 3.0
+    max_position_age_s: float = 2.0
+    max_path_error: float = 1.0
+    max_depth_error: float = 1.0
+    resend_s: float = 2.0
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if isinstance(value, float | int) and not value > 0.0:
+                raise InputError(f"{field.name}: expected a positive number, got {value!r}")
