@@ -25,8 +25,8 @@ HOME = "55.6,12.95,0,0"
 """Latitude, longitude, altitude and heading of where it starts."""
 
 PARAMETERS = {
-    "SYSID_THISMAV": 1, "FS_GCS_ENABLE": 0, "FS_PILOT_INPUT": 0, "FS_EKF_ACTION": 0,
-    "ARMING_CHECK": 0, "WPNAV_SPEED": 50,
+    "MAV_SYSID": 1, "FS_GCS_ENABLE": 0, "FS_PILOT_INPUT": 0, "FS_EKF_ACTION": 0,
+    "ARMING_SKIPCHK": -1, "WPNAV_SPEED": 50,
 }  # fmt: skip
 
 

@@ -6,10 +6,15 @@ what befalls it (a lost estimate, a push, the pilot's hand) comes in on standard
 
     {"do": "lose_estimate"}, {"do": "restore_estimate"}, {"do": "mode", "mode": 19},
     {"do": "arm"}, {"do": "disarm"}, {"do": "silence", "seconds": 5}, {"do": "jump", "by": [1, 0]},
-    {"do": "push", "by": [1, 0, 0]}, {"do": "place", "at": [0, 0, -1]}, {"do": "quit"}
+    {"do": "gps_jump", "by": [0, 5.6]}, {"do": "push", "by": [1, 0, 0]},
+    {"do": "place", "at": [0, 0, -1]}, {"do": "quit"}
+
+``lose_estimate`` takes the GPS away, ``gps_jump`` moves it, and the filter deals with either as it
+was recorded to do (`Estimate`); ``jump`` moves the estimate itself at once. With ``"silent": true``
+the lost GPS sends no GPS_RAW_INT any more.
 
 All durations are in simulated time, also those of failsafes: at a pace of 20 a ground station has
-to be heard every 150 ms. The parameter FS_GCS_TIMEOUT loosens that, and FS_PILOT_INPUT = 2 makes
+to be heard every 250 ms. The parameter FS_GCS_TIMEOUT loosens that, and FS_PILOT_INPUT = 2 makes
 it want a pilot's input as well. A machine that is too slow for the pace slows the simulation down
 and nothing else.
 
@@ -71,11 +76,37 @@ WANDER_S, WANDER, WANDER_MOST = 4.0, 0.062, 0.125
 CREEP, COAST_S, STOP_S = 0.047, 1.5, 1.0
 """Speed of a vehicle left to itself, seconds to come down to it, seconds to stop when disarmed."""
 
-TIMEOUT = 3.0
-"""Seconds without a heartbeat, a pilot's input or another target with a velocity."""
+GCS_TIMEOUT_S = 5.0
+"""Default of FS_GCS_TIMEOUT: seconds without a heartbeat of the ground station until it disarms."""
 
-MOST_ITEMS, MOST_FENCE_POINTS = 655, 70
+PILOT_TIMEOUT_S = 3.0
+"""Default of FS_PILOT_TIMEOUT: seconds without a pilot's input until it disarms (if enabled)."""
+
+VELOCITY_TIMEOUT_S = 3.0
+"""Seconds after which a target with a velocity is dropped unless it is repeated."""
+
+MAX_MISSION_ITEMS = 655
+"""Items of a mission, home included; a longer one is refused with NO_SPACE."""
+
+FENCE_STORAGE_BYTES = 672
+"""Bytes of ArduPilot's storage for fences (160 + 256 + 256)."""
+
+FENCE_HEADER_BYTES = 5
+"""Bytes of that storage that no fence may use: four at its begin and one at its end."""
+
+CIRCLE_BYTES = 13
+"""Bytes of a circular fence: its type, its centre and its radius."""
+
+POLYGON_BYTES, VERTEX_BYTES = 2, 8
+"""Bytes of a polygonal fence beside its vertices (type and count), and of each vertex."""
+
+DISARMED_BY_COMMAND, DISARMED_BY_GCS_FAILSAFE = 1, 18
+"""Numbers of the methods of disarming in the vehicle's log (ARM.Method)."""
+
 GROUND_STATION = 255
+
+SURFACE_M = 0.0
+"""Height of the water's surface, m: no thruster lifts the vehicle out of the water."""
 
 STABILIZE, ALT_HOLD, AUTO, GUIDED, SURFACE, POSHOLD, MANUAL = 0, 2, 3, 4, 9, 16, 19
 MODES = (STABILIZE, ALT_HOLD, AUTO, GUIDED, SURFACE, POSHOLD, MANUAL)
@@ -104,15 +135,15 @@ FENCE_CIRCLES = (
 )
 FENCE_INCLUSIONS = (FENCE_POLYGONS[0], FENCE_CIRCLES[0])
 
-EKF_LOST = (
+EKF_TIMED_OUT = (
     mavlink.EKF_ATTITUDE
+    | mavlink.EKF_VELOCITY_HORIZ
     | mavlink.EKF_VELOCITY_VERT
     | mavlink.EKF_POS_VERT_ABS
-    | mavlink.EKF_CONST_POS_MODE
 )
+EKF_LOST = EKF_TIMED_OUT | mavlink.EKF_CONST_POS_MODE
 EKF_WELL = (
-    (EKF_LOST & ~mavlink.EKF_CONST_POS_MODE)
-    | mavlink.EKF_VELOCITY_HORIZ
+    EKF_TIMED_OUT
     | mavlink.EKF_POS_HORIZ_REL
     | mavlink.EKF_POS_HORIZ_ABS
     | mavlink.EKF_PRED_POS_HORIZ_REL
@@ -225,28 +256,159 @@ class Wandering:
         return self.value
 
 
-class Estimate:
-    """Where the vehicle believes to be: the truth, noise, a slow drift and jumps.
+@dataclass(frozen=True)
+class FilterParams:
+    """How the filter deals with a GPS that is lost or wrong, from `tests/data/ardusub47`.
 
-    Once lost it stays what it was. Depth comes from pressure and does not drift.
+    Parameters
+    ----------
+    no_fix_s : float
+        Seconds from the loss until GPS_RAW_INT tells of no fix.
+    timeout_s : float
+        Seconds without an accepted position until EKF_STATUS_REPORT says that there is no
+        horizontal position, and until a rejected one is accepted all the same.
+    aiding_s : float
+        Seconds without any until the filter stops aiding: LOCAL_POSITION_NED ends.
+    velocity_error, acceleration_error : float
+        Growth of the error of dead reckoning, m/s and m/s².
+    gate, gate_growth : float
+        A position farther off than this is rejected, m, and what the bound grows by, m/s.
+    absorb_s : float
+        Time constant in which an accepted position moves the estimate, s.
+    glitch_s, glitch_ends_s : float
+        Seconds from the first rejection until EKF_GPS_GLITCHING is set, and from acceptance until
+        it is cleared.
+    """
+
+    no_fix_s: float = 0.4
+    timeout_s: float = 7.2
+    aiding_s: float = 15.2
+    velocity_error: float = 0.025
+    acceleration_error: float = 0.039
+    gate: float = 3.75
+    gate_growth: float = 0.255
+    absorb_s: float = 0.35
+    glitch_s: float = 1.5
+    glitch_ends_s: float = 10.0
+
+
+class Estimate:
+    """Position that the vehicle believes in: the truth, noise, a slow drift and jumps.
+
+    Without a GPS it is dead reckoning, whose error grows, until the filter gives up. A GPS that
+    jumps is rejected for some seconds and then believed. Depth comes from pressure and is not
+    touched by either.
     """
 
     def __init__(self, options: Options, chance: random.Random) -> None:
         n, d = options.noise, options.drift
+        self.params, self.chance = FilterParams(), random.Random(options.seed + 1)
         self.noise = Wandering(chance, (n, n, n), options.smooth)
         self.drift = Wandering(chance, (d, d, 0.0), 60.0)
         self.jumped: Vec = (0.0, 0.0, 0.0)
-        self.ever = self.well = options.estimate
+        self.has_gps = self.has_position = self.ever = options.estimate
         self.point: Vec = (0.0, 0.0, 0.0)
         self.velocity: Vec = (0.0, 0.0, 0.0)
+        self.lost_at: float | None = None if options.estimate else -math.inf
+        self.heading: Vec = (1.0, 0.0, 0.0)
+        self.gps_error: Vec = (0.0, 0.0, 0.0)
+        self.absorbed: Vec = (0.0, 0.0, 0.0)
+        self.rejected_at: float | None = None
+        self.accepted_at: float | None = None
+        self.now = 0.0
 
-    def update(self, body: Body) -> None:
+    @property
+    def lost_s(self) -> float:
+        """Seconds since the GPS was lost; 0 while there is one."""
+        return 0.0 if self.lost_at is None else self.now - self.lost_at
+
+    @property
+    def well(self) -> bool:
+        """Tell whether the filter's flags say that there is a horizontal position."""
+        return self.lost_s < self.params.timeout_s
+
+    @property
+    def has_fix(self) -> bool:
+        return self.lost_s < self.params.no_fix_s
+
+    @property
+    def pending(self) -> Vec:
+        """Return how far off the GPS is from the estimate, noise aside."""
+        return minus(self.gps_error, self.absorbed)
+
+    @property
+    def innovation(self) -> float:
+        """Return the distance of the GPS from the estimate over the bound of acceptance."""
+        return size(self.pending) / self._gate if self.has_gps else 0.0
+
+    @property
+    def _gate(self) -> float:
+        waited = 0.0 if self.rejected_at is None else self.now - self.rejected_at
+        return self.params.gate + self.params.gate_growth * waited
+
+    @property
+    def flags(self) -> int:
+        """Return the flags of EKF_STATUS_REPORT."""
+        if not self.has_position:
+            return EKF_LOST
+        if not self.well:
+            return EKF_TIMED_OUT
+        glitching = self.rejected_at is not None and (
+            self.now - self.rejected_at >= self.params.glitch_s
+        )
+        if self.accepted_at is not None and glitching:
+            glitching = self.now - self.accepted_at < self.params.glitch_ends_s
+        return EKF_WELL | (mavlink.EKF_GPS_GLITCHING if glitching else 0)
+
+    def lose(self) -> None:
+        """Take the GPS away."""
+        if self.lost_at is None:
+            self.lost_at, self.has_gps = self.now, False
+            angle = self.chance.uniform(0.0, 2.0 * math.pi)
+            self.heading = (math.cos(angle), math.sin(angle), 0.0)
+
+    def restore(self) -> None:
+        """Give the GPS back, and believe it at once."""
+        self.lost_at, self.has_gps = None, True
+        self.has_position = self.ever = True
+        self.absorbed, self.rejected_at, self.accepted_at = self.gps_error, None, None
+
+    def move_gps(self, by: Vec) -> None:
+        """Have the GPS tell of other places from now on."""
+        self.gps_error = plus(self.gps_error, by)
+        self.rejected_at = self.accepted_at = None
+
+    def update(self, body: Body, now: float) -> None:
+        """Advance to a time."""
+        self.now = now
         error = plus(plus(self.noise.step(), self.drift.step()), self.jumped)
-        if self.well:
-            self.ever = True
-            self.point, self.velocity = plus(body.point, error), body.velocity
-        else:
+        if self.has_gps:
+            self._absorb()
+        elif self.ever and self.lost_s >= self.params.aiding_s:
+            self.has_position = False
+        if not self.has_position:
             self.velocity = (0.0, 0.0, 0.0)
+            return
+        wrong = self.params.velocity_error + self.params.acceleration_error * self.lost_s
+        far = 0.5 * (self.params.velocity_error + wrong) * self.lost_s
+        error = plus(plus(error, self.absorbed), self.heading, far)
+        self.point = plus(body.point, error)
+        self.velocity = plus(body.velocity, self.heading, 0.0 if self.has_gps else wrong)
+
+    def _absorb(self) -> None:
+        if not any(self.pending):
+            return
+        if self.rejected_at is None and size(self.pending) > self.params.gate:
+            self.rejected_at = self.now
+        if self.rejected_at is not None and self.accepted_at is None:
+            late = self.now - self.rejected_at >= self.params.timeout_s
+            if not late and size(self.pending) > self._gate:
+                return
+            self.accepted_at = self.now
+        step = min(STEP / self.params.absorb_s, 1.0)
+        self.absorbed = plus(self.absorbed, self.pending, step)
+        if size(self.pending) < 1e-3:
+            self.absorbed = self.gps_error
 
 
 class Body:
@@ -335,6 +497,8 @@ class Body:
     def _move(self, velocity: Vec) -> None:
         self.velocity = velocity
         self.point = plus(self.point, velocity, STEP)
+        if self.point[2] > SURFACE_M:
+            self.point = (self.point[0], self.point[1], SURFACE_M)
 
 
 @dataclass(frozen=True)
@@ -395,6 +559,22 @@ class Fence:
         return within
 
 
+def fence_bytes(items: Sequence[Item]) -> int:
+    """Return the bytes of storage that a list of fences takes."""
+    count = FENCE_HEADER_BYTES
+    corners = 0
+    for item in items:
+        if item.command in FENCE_CIRCLES:
+            count += CIRCLE_BYTES
+            continue
+        count += VERTEX_BYTES
+        corners += 1
+        if corners >= item.p1:
+            count += POLYGON_BYTES
+            corners = 0
+    return count
+
+
 # the link
 
 
@@ -435,6 +615,25 @@ class Wire:
             yield from parser.parse_buffer(data) or []
 
 
+class Nowhere:
+    """A link with nobody at the other end, which keeps what is sent."""
+
+    def __init__(self) -> None:
+        self.silent = False
+        self.data = bytearray()
+
+    def write(self, data: bytes) -> None:
+        if not self.silent:
+            self.data += data
+
+    def messages(self) -> list[Any]:
+        """Return the messages that were sent since this was last asked."""
+        parser = mavlink.MAVLink(None)
+        parser.robust_parsing = True
+        data, self.data = bytes(self.data), bytearray()
+        return parser.parse_buffer(data) or []
+
+
 def tell(t: float, **what: object) -> None:
     """A line to the test."""
     sys.stdout.write(json.dumps({"t": round(t, 3), **what}) + "\n")
@@ -457,24 +656,30 @@ class Stream:
 class Vehicle:
     """The autopilot: its state, what it does in a step, and what it answers."""
 
-    def __init__(self, options: Options, wire: Wire) -> None:
-        self.options, self.wire = options, wire
+    def __init__(
+        self, options: Options, wire: Wire | Nowhere, tell: Callable[..., None] = tell
+    ) -> None:
+        self.options, self.wire, self.tell = options, wire, tell
         self.mav: Any = mavlink.MAVLink(wire, srcSystem=options.sysid, srcComponent=1)
         self.chance = random.Random(options.seed)
         self.earth = Earth(*options.origin)
         self.body = Body((options.start[0], options.start[1], options.start[2]), self.chance)
         self.estimate = Estimate(options, self.chance)
-        self.estimate.update(self.body)
-        self.home: Vec | None = self.estimate.point if self.estimate.well else None
         self.steps = 0
+        self.estimate.update(self.body, self.t)
+        self.home: Vec | None = self.estimate.point if self.estimate.well else None
         self.armed, self.mode = False, MANUAL
         self.heard = self.input = self.silent_until = 0.0
         self.params = {
             "WPNAV_SPEED": 100.0 * options.speed,
+            "MAV_SYSID": float(options.sysid),
+            "MAV_GCS_SYSID": float(GROUND_STATION),
+            "ARMING_SKIPCHK": -1.0,
             "FS_GCS_ENABLE": 2.0,
-            "FS_GCS_TIMEOUT": TIMEOUT,
+            "FS_GCS_TIMEOUT": GCS_TIMEOUT_S,
+            "FS_EKF_ACTION": 0.0,
             "FS_PILOT_INPUT": 0.0,
-            "FS_PILOT_TIMEOUT": TIMEOUT,
+            "FS_PILOT_TIMEOUT": PILOT_TIMEOUT_S,
             "FENCE_ENABLE": 0.0,
             **options.params,
         }
@@ -490,7 +695,8 @@ class Vehicle:
         self.upload: Upload | None = None
         self.fence_items: list[Item] = []
         self.fences: list[Fence] = []
-        self.breached = False
+        self.breached = self.gps_silent = False
+        self.gps_place = (0, 0, 0)
         self._make_streams()
         self._make_commands()
 
@@ -503,7 +709,7 @@ class Vehicle:
         return round(self.t * 1000.0)
 
     def event(self, name: str, **what: object) -> None:
-        tell(self.t, event=name, **what)
+        self.tell(self.t, event=name, **what)
 
     def say(self, text: str, severity: int = mavlink.MAV_SEVERITY_WARNING) -> None:
         self.mav.statustext_send(severity, text.encode()[:50])
@@ -518,7 +724,7 @@ class Vehicle:
         if self.mode == AUTO:
             self._fly_mission()
         self._move()
-        self.estimate.update(self.body)
+        self._update_estimate()
         self._watch_fences()
         self._repeat_request()
         for stream in self.streams.values():
@@ -530,7 +736,7 @@ class Vehicle:
 
     def _row(self) -> None:
         goal = self.body.goal if self.target is not None or self.mode == AUTO else None
-        tell(
+        self.tell(
             self.t,
             true=rounded(self.body.point),
             est=rounded(self.estimate.point),
@@ -539,9 +745,23 @@ class Vehicle:
             target=None if goal is None or not self.armed else rounded(goal),
         )
 
+    def _update_estimate(self) -> None:
+        was_well, had_position = self.estimate.well, self.estimate.has_position
+        rejected, accepted = self.estimate.rejected_at, self.estimate.accepted_at
+        self.estimate.update(self.body, self.t)
+        if was_well and not self.estimate.well:
+            self.event("estimate timed out")
+        if had_position and not self.estimate.has_position:
+            self.event("estimate stopped")
+            self.say("EKF3 IMU0 stopped aiding", mavlink.MAV_SEVERITY_CRITICAL)
+        if self.estimate.rejected_at not in (rejected, None):
+            self.event("gps rejected")
+        if self.estimate.accepted_at not in (accepted, None):
+            self.event("gps accepted")
+
     @property
     def steered(self) -> bool:
-        return self.mode in STEERED and self.estimate.well and not self.released
+        return self.mode in STEERED and self.estimate.has_position and not self.released
 
     def _move(self) -> None:
         if not self.armed:
@@ -561,8 +781,8 @@ class Vehicle:
             return
         lost = self.t - self.heard >= self.params["FS_GCS_TIMEOUT"]
         if lost and self.params["FS_GCS_ENABLE"] == 2.0:
-            self.say("MYGCS: 255, heartbeat lost", mavlink.MAV_SEVERITY_CRITICAL)
-            self.disarm("no heartbeat of a ground station")
+            self.say("MYGCS: heartbeat lost", mavlink.MAV_SEVERITY_CRITICAL)
+            self.disarm("no heartbeat of a ground station", DISARMED_BY_GCS_FAILSAFE)
             return
         idle = self.t - self.input >= self.params["FS_PILOT_TIMEOUT"]
         if idle and self.params["FS_PILOT_INPUT"] == 2.0:
@@ -584,13 +804,13 @@ class Vehicle:
         self._send_home()
         self._send_heartbeat()
 
-    def disarm(self, why: str) -> None:
+    def disarm(self, why: str, method: int | None = None) -> None:
         if not self.armed:
             return
         self.armed = False
         self._stand()
         self.tick = self.t + 1.0
-        self.event("disarmed", why=why)
+        self.event("disarmed", why=why, method=method)
         self.say("Disarming motors", mavlink.MAV_SEVERITY_INFO)
         self._send_heartbeat()
 
@@ -636,8 +856,6 @@ class Vehicle:
         why = None
         if m.coordinate_frame != mavlink.MAV_FRAME_LOCAL_NED:
             why = "frame"
-        elif point[2] > 1e-3:
-            why = "above home"
         self._receive(m, point, why)
 
     def _on_set_position_target_global_int(self, m: Any) -> None:
@@ -647,8 +865,6 @@ class Vehicle:
         why = None
         if not relative and m.coordinate_frame not in ABSOLUTE_FRAMES:
             why = "frame"
-        elif m.alt > 1e-3:
-            why = "above home"
         self._receive(m, point, why)
 
     def _receive(self, m: Any, point: Vec, why: str | None) -> None:
@@ -660,8 +876,6 @@ class Vehicle:
             why = "disarmed"
         elif self.mode != GUIDED:
             why = "not in GUIDED"
-        elif why == "above home":
-            self.say("Alt above home must be negative")
         elif not why and self._outside(point):
             why = "outside of the fence"
             self.say("Target outside fence")
@@ -688,7 +902,7 @@ class Vehicle:
             if not again:
                 self.telling = True
                 self.event("under way", at=rounded(target.point))
-        stale = self.t - self.refreshed >= TIMEOUT and not self.coming
+        stale = self.t - self.refreshed >= VELOCITY_TIMEOUT_S and not self.coming
         if self.target is not None and self.target.moving and stale and not self.released:
             self.released = True
             self.body.let_go()
@@ -710,7 +924,7 @@ class Vehicle:
                 self.tick = self.t + 1.0
                 self._reach()
             return
-        if not self.estimate.well or self.t < self.leg_begins:
+        if not self.estimate.has_position or self.t < self.leg_begins:
             return
         while self.current < len(self.items) and self.body.goal is None:
             self._start_item(self.items[self.current])
@@ -781,13 +995,10 @@ class Vehicle:
     # lists: missions and fences
 
     def _on_mission_count(self, m: Any) -> None:
-        most = {
-            mavlink.MAV_MISSION_TYPE_MISSION: MOST_ITEMS,
-            mavlink.MAV_MISSION_TYPE_FENCE: MOST_FENCE_POINTS,
-        }.get(m.mission_type)
-        if most is None:
+        is_mission = m.mission_type == mavlink.MAV_MISSION_TYPE_MISSION
+        if not is_mission and m.mission_type != mavlink.MAV_MISSION_TYPE_FENCE:
             self._acknowledge(m, mavlink.MAV_MISSION_UNSUPPORTED, m.mission_type)
-        elif m.count > most:
+        elif is_mission and m.count > MAX_MISSION_ITEMS:
             self.event("mission refused", items=m.count, why="no space")
             self._acknowledge(m, mavlink.MAV_MISSION_NO_SPACE, m.mission_type)
         else:
@@ -802,6 +1013,11 @@ class Vehicle:
             return
         self.upload = None
         if upload.kind == mavlink.MAV_MISSION_TYPE_FENCE:
+            if fence_bytes(upload.items) > FENCE_STORAGE_BYTES:
+                self.event("mission refused", items=upload.count, why="no space")
+                no_space = mavlink.MAV_MISSION_NO_SPACE
+                self.mav.mission_ack_send(*upload.sender, no_space, upload.kind)
+                return
             self._take_fence(upload.items)
         else:
             self._take_mission(upload.items)
@@ -933,7 +1149,7 @@ class Vehicle:
 
     def _watch_fences(self) -> None:
         """A breach is told, and nothing is done about it."""
-        breached = self.armed and self.estimate.well and self._outside(self.estimate.point)
+        breached = self.armed and self.estimate.has_position and self._outside(self.estimate.point)
         if breached and not self.breached:
             self.say("Fence Breached")
             self.event("fence breached", at=rounded(self.estimate.point))
@@ -985,7 +1201,7 @@ class Vehicle:
 
     def _do_arm(self, p: Sequence[float]) -> int:
         if p[0] == 0.0:
-            self.disarm("command")
+            self.disarm("command", DISARMED_BY_COMMAND)
         elif self.mode in STEERED and not self.estimate.well:
             why, failed = "Arm: Mode requires position", mavlink.MAV_RESULT_FAILED
             return self._refuse(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, why, failed)
@@ -1115,6 +1331,7 @@ class Vehicle:
             mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: Stream(self._send_time, 1.0, rest),
             mavlink.MAVLINK_MSG_ID_SYS_STATUS: Stream(self._send_status, 1.0, status),
             mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: Stream(self._send_mission_current, 1.0, status),
+            mavlink.MAVLINK_MSG_ID_GPS_RAW_INT: Stream(self._send_gps, 1.0, status),
         }
         for stream in self.streams.values():
             stream.interval = stream.default
@@ -1130,8 +1347,8 @@ class Vehicle:
         self.mav.heartbeat_send(kind, autopilot, flags, self.mode, state)
 
     def _send_local(self) -> None:
-        # until there is an origin there is nothing to send
-        if self.estimate.ever:
+        # until there is an origin there is nothing to send, nor without any position
+        if self.estimate.has_position:
             point, velocity = ned(self.estimate.point), ned(self.estimate.velocity)
             self.mav.local_position_ned_send(self.ms, *point, *velocity)
 
@@ -1153,8 +1370,24 @@ class Vehicle:
         self.mav.attitude_send(self.ms, 0.0, 0.0, yaw, 0.0, 0.0, 0.0)
 
     def _send_ekf(self) -> None:
-        flags = EKF_WELL if self.estimate.well else EKF_LOST
-        self.mav.ekf_status_report_send(flags, 0.1, 0.1, 0.05, 0.1, 0.0)
+        innovation = max(0.01, self.estimate.innovation)
+        self.mav.ekf_status_report_send(self.estimate.flags, 0.01, innovation, 0.05, 0.01, 0.0)
+
+    def _send_gps(self) -> None:
+        if self.estimate.lost_s > 0.0 and self.gps_silent:
+            return
+        if self.estimate.has_fix:
+            at = plus(self.body.point, self.estimate.gps_error)
+            self.gps_place = (*self.earth.geographic(at), round(1e3 * at[2]))
+            fix, satellites = mavlink.GPS_FIX_TYPE_RTK_FIXED, 10
+        else:
+            fix, satellites = mavlink.GPS_FIX_TYPE_NO_FIX, 0
+        east, north = self.body.velocity[:2]
+        course = round(math.degrees(math.atan2(east, north)) % 360.0 * 100.0) % 36000
+        self.mav.gps_raw_int_send(
+            self.ms * 1000, fix, *self.gps_place, 121, 200,
+            round(100.0 * math.hypot(east, north)), course, satellites,
+        )  # fmt: skip
 
     def _send_time(self) -> None:
         self.mav.system_time_send(0, self.ms)
@@ -1194,13 +1427,12 @@ class Vehicle:
         if do == "quit":
             return False
         if do == "lose_estimate":
-            self.estimate.well = False
-            self.body.let_go()
+            self.gps_silent = bool(what.get("silent", False))
+            self.estimate.lose()
             self.event("estimate lost")
-            self.say("EKF3 stopped aiding", mavlink.MAV_SEVERITY_CRITICAL)
         elif do == "restore_estimate":
-            self.estimate.well = True
-            self.estimate.update(self.body)
+            self.estimate.restore()
+            self.estimate.update(self.body, self.t)
             self.home = self.home or self.estimate.point
             self.event("estimate restored")
             self.say("EKF3 is using GPS", mavlink.MAV_SEVERITY_INFO)
@@ -1226,6 +1458,9 @@ class Vehicle:
         if do == "jump":
             east, north = what["by"]
             self.estimate.jumped = plus(self.estimate.jumped, (east, north, 0.0))
+        elif do == "gps_jump":
+            east, north = what["by"]
+            self.estimate.move_gps((east, north, 0.0))
         elif do == "push":
             east, north, up = what["by"]
             self.body.point = plus(self.body.point, (east, north, up))
@@ -1234,7 +1469,7 @@ class Vehicle:
             self.body.place((float(east), float(north), float(up)))
         else:
             raise ValueError(f"unknown: {do}")
-        self.estimate.update(self.body)
+        self.estimate.update(self.body, self.t)
         self.event(do, true=rounded(self.body.point), est=rounded(self.estimate.point))
 
 
@@ -1324,6 +1559,88 @@ def main(arguments: Sequence[str]) -> int:
 
 
 # for tests
+
+
+class Simulation:
+    """The vehicle on a clock of its own, without a process or a link: quick and deterministic.
+
+    A ground station is heard at every step while ``beating``.
+    """
+
+    def __init__(self, *, params: dict[str, float] | None = None, **options: Any) -> None:
+        self.rows: list[dict[str, Any]] = []
+        self.events: list[dict[str, Any]] = []
+        self.wire, self.beating = Nowhere(), True
+        given = Options(("", 0), params=params or {}, **options)
+        self.vehicle = Vehicle(given, self.wire, self._tell)
+
+    def _tell(self, t: float, **what: Any) -> None:
+        (self.events if "event" in what else self.rows).append({"t": t, **what})
+
+    @property
+    def now(self) -> float:
+        return self.vehicle.t
+
+    @property
+    def believed(self) -> Vec:
+        """Return where the vehicle believes to be."""
+        return self.vehicle.estimate.point
+
+    def do(self, **command: object) -> None:
+        """Have something befall the vehicle, as `Autopilot.tell` does."""
+        self.vehicle.befall(json.dumps(command).encode())
+
+    def send(self, message: Any) -> None:
+        """Hand the vehicle a message of the ground station."""
+        message.pack(mavlink.MAVLink(None, srcSystem=GROUND_STATION, srcComponent=190))
+        self.vehicle.receive(message)
+
+    def fly(self, mode: int = GUIDED) -> None:
+        """Arm, and enter a mode."""
+        self.vehicle.arm("command")
+        self.vehicle.enter(mode, "command")
+
+    def go(self, point: Vec) -> None:
+        """Send a position target."""
+        frame, rest = mavlink.MAV_FRAME_LOCAL_NED, (0.0,) * 8
+        self.send(
+            mavlink.MAVLink_set_position_target_local_ned_message(
+                0, self.vehicle.options.sysid, 1, frame, 0x0DF8, *ned(point), *rest
+            )
+        )
+
+    def step(self) -> None:
+        if self.beating:
+            self.vehicle.heard = self.vehicle.t
+        self.vehicle.step()
+
+    def advance(self, seconds: float) -> None:
+        """Let time go by."""
+        for _ in range(round(seconds / STEP)):
+            self.step()
+
+    def until(self, condition: Callable[[], Any], seconds: float = 600.0) -> Any:
+        """Let time go by until something comes true."""
+        end = self.now + seconds
+        while not (found := condition()):
+            assert self.now < end, f"waited in vain; events: {self.events[-10:]}"
+            self.step()
+        return found
+
+    def event(self, name: str, since: float = 0.0, seconds: float = 600.0) -> dict[str, Any]:
+        """Let time go by until an event, not before a time."""
+
+        def found() -> dict[str, Any] | None:
+            return next((e for e in self.events if e["event"] == name and e["t"] >= since), None)
+
+        event: dict[str, Any] = self.until(found, seconds)
+        return event
+
+    def truth(self) -> np.ndarray:
+        """Return time, east, north and up of where the vehicle really was, a row each."""
+        import numpy as np
+
+        return np.array([[r["t"], *r["true"]] for r in self.rows]).reshape(-1, 4)
 
 
 class Autopilot:

@@ -435,14 +435,11 @@ def test_targets_are_ignored_when_they_cannot_be_followed(fly: Fly) -> None:
     assert station.mode(GUIDED) == ACCEPTED
     station.go(1.0, 1.0, -1.0)
     assert station.command(ARM, 1) == ACCEPTED
-    station.go(1.0, 2.0, 0.5)
-    assert station.said("Alt above home must be negative")
     station.go(1.0, 3.0, -1.0, 0x0DFF)
     assert station.mode(POSHOLD) == ACCEPTED
     station.go(1.0, 4.0, -1.0)
     why = [e.get("why") for e in station.targets()]
-    assert why == ["disarmed", "above home", "no position", "not in GUIDED"]
-    assert station.targets()[1]["at"] == [1.0, 2.0, 0.5]
+    assert why == ["disarmed", "no position", "not in GUIDED"]
     vehicle.sleep(5.0)
     assert np.abs(vehicle.truth()[:, 1:]).max() < 0.13
     assert vehicle.rows[-1]["target"] is None
@@ -629,12 +626,12 @@ def test_without_heartbeats_it_disarms_and_its_mission_ticks_to_the_end(fly: Fly
     assert vehicle.rows[-1]["mode"] == AUTO
 
 
-def test_a_vehicle_that_hears_of_no_ground_station_disarms_after_three_seconds() -> None:
+def test_a_vehicle_that_hears_of_no_ground_station_disarms_after_five_seconds() -> None:
     with Autopilot(pace=20) as vehicle:
         vehicle.tell(do="arm")
         armed = vehicle.event("armed")["t"]
         disarmed = vehicle.event("disarmed")
-    assert disarmed["t"] - armed == pytest.approx(3.0, abs=0.05)
+    assert disarmed["t"] - armed == pytest.approx(5.0, abs=0.05)
     assert "heartbeat" in disarmed["why"]
 
 
@@ -652,7 +649,7 @@ def test_without_a_pilots_input_it_disarms_if_it_is_set_to(fly: Fly) -> None:
     assert vehicle.rows[-1]["armed"]
 
 
-def test_a_lost_estimate_freezes_the_position_and_leaves_mode_and_arming(fly: Fly) -> None:
+def test_a_lost_estimate_drifts_then_ends_and_leaves_mode_and_arming(fly: Fly) -> None:
     vehicle, station = fly(noise=0.05)
     station.ready()
     station.go(0.0, 30.0, 0.0)
@@ -660,20 +657,18 @@ def test_a_lost_estimate_freezes_the_position_and_leaves_mode_and_arming(fly: Fl
     well = station.next("EKF_STATUS_REPORT").flags
     vehicle.tell(do="lose_estimate")
     t = vehicle.event("estimate lost")["t"]
-    ekf = station.next("EKF_STATUS_REPORT", lambda m: m.flags & mavlink.EKF_CONST_POS_MODE)
+    assert station.next("GPS_RAW_INT", lambda m: m.fix_type < 2).time_usec / 1e6 < t + 1.5
     bits = mavlink.EKF_POS_HORIZ_ABS | mavlink.EKF_POS_HORIZ_REL
-    assert (well & bits, ekf.flags & bits) == (bits, 0)
-    assert not well & mavlink.EKF_CONST_POS_MODE
+    ekf = station.next("EKF_STATUS_REPORT", lambda m: not m.flags & bits)
+    assert well & bits == bits
+    assert not (well | ekf.flags) & mavlink.EKF_CONST_POS_MODE
+    station.next("EKF_STATUS_REPORT", lambda m: m.flags & mavlink.EKF_CONST_POS_MODE)
     begin = len(station.got)
-    vehicle.sleep(10.0)
-    frozen = {(m.x, m.y, m.z) for m in station.all("LOCAL_POSITION_NED", begin)}
-    assert len(frozen) == 1
+    vehicle.sleep(5.0)
+    assert not station.all("LOCAL_POSITION_NED", begin)
     assert len({(m.lat, m.lon) for m in station.all("GLOBAL_POSITION_INT", begin)}) == 1
-    assert len(station.all("LOCAL_POSITION_NED", begin)) > 80
     beat = station.next("HEARTBEAT")
     assert (beat.custom_mode, beat.base_mode & 128) == (GUIDED, 128)
-    rows = between(vehicle.truth(), t, 1e9)
-    assert np.linalg.norm(rows[-1, 1:] - rows[0, 1:]) > 0.5
     assert station.mode(MANUAL) == ACCEPTED
     assert station.mode(GUIDED) == DENIED
     vehicle.tell(do="restore_estimate")
@@ -748,7 +743,7 @@ def test_fences_refuse_targets_in_guided_and_only_report_in_auto(fly: Fly) -> No
     square = [(-5.0, -5.0), (5.0, -5.0), (5.0, 5.0), (-5.0, 5.0)]
     points: list[Item] = [(0, inclusion, 4.0, 0, 0, 0, *lat_lon(e, n), 0.0) for e, n in square]
     points.append((0, circle, 1.0, 0, 0, 0, *lat_lon(0.0, 3.0), 0.0))
-    assert station.upload(points * 15, FENCE) == mavlink.MAV_MISSION_NO_SPACE
+    assert station.upload(points * 15, FENCE) == mavlink.MAV_MISSION_NO_SPACE  # 710 bytes
     assert station.upload(points, FENCE) == mavlink.MAV_MISSION_ACCEPTED
     assert station.command(207, 1) == ACCEPTED
     station.ready()
