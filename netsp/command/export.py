@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from typing import TYPE_CHECKING
 
 from netsp.command import messages, told
 from netsp.command.types import (
@@ -15,6 +16,10 @@ from netsp.command.types import (
     positive,
 )
 from netsp.errors import InputError, counted
+
+if TYPE_CHECKING:
+    from netsp.export.fence import Fence
+    from netsp.problem import Problem
 
 SPEED = 0.5
 """Metres per second, where none is given."""
@@ -32,8 +37,8 @@ def arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument("--problem", metavar="FILE", help="the problem that a solution solves")
     p.add_argument(
         "--format", metavar="NAME",
-        help="plan (QGroundControl), wpl (QGC WPL 110), geojson, kml or csv; default: by the "
-        "extension",
+        help="plan (QGroundControl), wpl (QGC WPL 110), cockpit (Cockpit, .cmp), geojson, kml or "
+        "csv; default: by the extension",
     )  # fmt: skip
     p.add_argument(
         "--origin", metavar="LAT,LON[,HEADING]",
@@ -61,6 +66,11 @@ def arguments(p: argparse.ArgumentParser) -> None:
         help="maximum number of waypoints; default 650",
     )
     p.add_argument(
+        "--fence-bytes", type=positive, default=672, metavar="N",
+        help="storage of the vehicle for its fence, bytes; default 672, as of Pixhawk flight "
+        "controllers without a card",
+    )  # fmt: skip
+    p.add_argument(
         "--margin", default="0.3,0.2", metavar="SLACK[,CLEARANCE]",
         help="warn where less tether is left or an obstacle is closer; default 0.3,0.2",
     )  # fmt: skip
@@ -87,13 +97,14 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(f"--problem: {args.solution} is no mission; expected its problem")
     check_writable(args.output, inputs=(args.solution, args.problem))
     from netsp.export.common_depth import at_depth
+    from netsp.export.fence import MIN_FENCE_BYTES, FencePolicy
     from netsp.export.margins import warnings
     from netsp.export.write import (
-        MOST_FENCE_POINTS,
+        FOR_VEHICLES,
         SHALLOWEST,
         Settings,
         export,
-        fence_points,
+        fence_of_points,
         format_of,
         predicted_s,
     )
@@ -113,13 +124,17 @@ def run(args: argparse.Namespace) -> int:
     elif (text := surface_warning(problem)) is not None:
         messages.warning(text)
     kind = format_of(args.output, args.format)
+    if args.fence_bytes < MIN_FENCE_BYTES:
+        raise InputError(
+            f"--fence-bytes: expected {MIN_FENCE_BYTES} or more, got {args.fence_bytes}"
+        )
     slack, clearance = margins(args.margin)
     projection = None
     if args.origin:
         projection = Projection.parse(args.origin, problem.base[:2], "--origin")
     settings = Settings(
         hold=args.hold, speed=SPEED if args.speed is None else args.speed,
-        max_waypoints=args.max_waypoints,
+        max_waypoints=args.max_waypoints, fence=FencePolicy(max_bytes=args.fence_bytes),
     )  # fmt: skip
     points = export(
         problem, solution, args.output, kind, projection, acceptance=args.acceptance,
@@ -140,12 +155,12 @@ def run(args: argparse.Namespace) -> int:
         })  # fmt: skip
     for line in warnings(problem, solution, points, slack, clearance):
         messages.warning(line)
-    if kind in ("plan", "wpl"):
-        if kind == "plan" and fence_points(problem) > MOST_FENCE_POINTS:
-            messages.warning(
-                f"the obstacles take {fence_points(problem)} fence points; the vehicle stores "
-                f"about {MOST_FENCE_POINTS} without a card"
-            )
+    if kind in FOR_VEHICLES:
+        if kind == "plan":
+            for line in fence_lines(problem, fence_of_points(problem, points, settings)):
+                messages.warning(line)
+        elif problem.obstacles:
+            messages.note("this format has no fence: the obstacles are not in it")
         above = [
             problem.goal_name(p.goal)
             for p in points
@@ -171,6 +186,27 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
+def fence_lines(problem: Problem, fence: Fence) -> list[str]:
+    """Return what of the obstacles the fence of a plan does not hold as it is, one line each."""
+    lines = []
+    if fence.simplified:
+        most = max(z.growth for z in fence.simplified)
+        lines.append(
+            f"{counted(len(fence.simplified), 'obstacle')} simplified in the fence, which reaches "
+            f"up to {most:.2g} {problem.units} beyond them: the vehicle does not store more; "
+            "expected a larger --fence-bytes if yours does"
+        )
+    if fence.left_out:
+        names = [problem.obstacle_name(k) for k in fence.left_out[:3]]
+        more = ", …" if len(fence.left_out) > 3 else ""
+        lines.append(
+            f"{counted(len(fence.left_out), 'obstacle')} left out of the fence "
+            f"({', '.join(names)}{more}), the farthest from the tour: the vehicle does not store "
+            "more; expected a larger --fence-bytes if yours does"
+        )
+    return lines
+
+
 def _mission(args: argparse.Namespace) -> int:
     """Write a planned mission."""
     if args.problem is not None:
@@ -180,7 +216,7 @@ def _mission(args: argparse.Namespace) -> int:
     check_writable(args.output, inputs=(args.solution,))
     from netsp.command.interrupts import until_interrupted
     from netsp.export.mission import export_mission
-    from netsp.export.write import SHALLOWEST, Settings, format_of, predicted_s
+    from netsp.export.write import FOR_VEHICLES, SHALLOWEST, Settings, format_of, predicted_s
     from netsp.online.mission import Mission
     from netsp.site.projection import Projection
 
@@ -224,7 +260,7 @@ def _mission(args: argparse.Namespace) -> int:
             f"the lines between waypoints come within {done.room:.2f} m of a solid, less than the "
             f"margin of {clearance:g}: plan with a larger clearance, or set another margin"
         )
-    if kind in ("plan", "wpl"):
+    if kind in FOR_VEHICLES:
         shallow = sum(p.position[2] > -SHALLOWEST for p in done.points)
         if shallow:
             messages.note(
