@@ -16,10 +16,12 @@ from netsp.command.types import length, natural, seconds
 from netsp.errors import EXIT_DEFECT, EXIT_NOT_ALL, EXIT_NOT_VERIFIED, InputError
 
 if TYPE_CHECKING:
+    from netsp.clock import Clock
     from netsp.execute.events import Event
     from netsp.execute.log import Execution, ExecutionRow
     from netsp.guard.page import Page
     from netsp.link.frame import Frame
+    from netsp.link.session import Session
     from netsp.problem import Problem
     from netsp.solution import Solution
 
@@ -62,6 +64,11 @@ def arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument(
         "--pace", type=length, default=1.0, metavar="F",
         help="seconds of the vehicle for each of ours: 1, but in simulations that run faster",
+    )  # fmt: skip
+    p.add_argument(
+        "--at-end", choices=("hold", "position-hold", "surface", "leave"), default="hold",
+        help="after the flight: hold the place in GUIDED, in POSHOLD, or come to the surface, "
+        "until another ground station is heard or Ctrl-C; or leave the vehicle; default hold",
     )  # fmt: skip
     p.add_argument("--surprise", metavar="FILE", help="surprise file (JSON): events on the way")
     p.add_argument(
@@ -108,21 +115,10 @@ def run(args: argparse.Namespace) -> int:
     if args.dry_run:
         print_targets(problem, solution, frame)
         return 0
-    done = _flown(args, problem, solution, frame, surprises)
-    if args.output is not None:
-        from netsp.execute.write import write_execution
-        from netsp.pictures.execution import save_execution
-
-        write_execution(done, args.output)
-        save_execution(done, Path(args.output) / "run.png")
-    if args.output is None or args.json:
-        told.tell(done.summary)
-    if not args.quiet:
-        from netsp.execute.log import describe_execution
-
-        print(describe_execution(done), file=sys.stderr)
-        if done.stopped or done.interrupted:
-            print(way_home(done), file=sys.stderr)
+    with ExitStack() as stack:
+        done, session, clock = _flown(args, problem, solution, frame, surprises, stack)
+        _tell(args, done)
+        _stand_by(args, session, clock)
     s = done.summary
     if s["defects"]:
         return EXIT_DEFECT
@@ -131,9 +127,46 @@ def run(args: argparse.Namespace) -> int:
     return EXIT_NOT_ALL if s["left_out"] or s["status"] != "done" else 0
 
 
+def _tell(args: argparse.Namespace, done: Execution) -> None:
+    """Write the files of the run, and tell what came of it."""
+    if args.output is not None:
+        from netsp.execute.write import write_execution
+        from netsp.pictures.execution import save_execution
+
+        write_execution(done, args.output)
+        save_execution(done, Path(args.output) / "run.png")
+    if args.output is None or args.json:
+        told.tell(done.summary)
+        sys.stdout.flush()
+    if not args.quiet:
+        from netsp.execute.log import describe_execution
+
+        print(describe_execution(done), file=sys.stderr)
+        if done.stopped or done.interrupted:
+            print(way_home(done), file=sys.stderr)
+
+
+def _stand_by(args: argparse.Namespace, session: Session, clock: Clock) -> None:
+    """Look after the vehicle until somebody else has it, or Ctrl-C: the second one, where the first
+    has ended the flight."""
+    from netsp.fly.standby import stand_by
+
+    has_stopped = clock.stopped
+
+    def say(text: str) -> None:
+        for line in session.texts():
+            print(f"the vehicle says: {line}", file=sys.stderr)
+        print(f"netsp: {text}", file=sys.stderr, flush=True)
+
+    # where the first Ctrl-C has ended the flight, the next one interrupts
+    stand_by(session, args.at_end, say=say, should_stop=lambda: clock.stopped and not has_stopped)
+
+
 def _flown(
-    args: argparse.Namespace, problem: Problem, solution: Solution, frame: Frame, surprises: object
-) -> Execution:
+    args: argparse.Namespace, problem: Problem, solution: Solution, frame: Frame,
+    surprises: object, stack: ExitStack,
+) -> tuple[Execution, Session, Clock]:  # fmt: skip
+    """Fly the tour; the link stays open until the stack is left."""
     from netsp.clock import until_interrupt
     from netsp.command.compiling import compile_messages
     from netsp.command.execute import show_execution
@@ -157,49 +190,48 @@ def _flown(
     assert surprises is None or isinstance(surprises, Surprises)
     address = Address.parse(args.link)
     check_options(options, surprises)
-    with ExitStack() as stack:
-        stack.enter_context(output_folder(args.output))
-        stack.enter_context(nullcontext() if args.quiet else compile_messages(sys.stderr))
-        rehearse()
-        page, sources = None, []
-        if args.events:
-            from netsp.fly.inputs import events_of
+    stack.enter_context(output_folder(args.output))
+    stack.enter_context(nullcontext() if args.quiet else compile_messages(sys.stderr))
+    rehearse()
+    page, sources = None, []
+    if args.events:
+        from netsp.fly.inputs import events_of
 
-            sources.append(events_of(getattr(sys.stdin, "buffer", sys.stdin), complain))
-        if args.page is not None:
-            from netsp.guard.page import Page
+        sources.append(events_of(getattr(sys.stdin, "buffer", sys.stdin), complain))
+    if args.page is not None:
+        from netsp.guard.page import Page
 
-            page = stack.enter_context(Page(problem, args.page, takes_events=True))
-            print(f"the page is {page.address}", file=sys.stderr)
-            sources.append(_from(page, complain))
-        shows = not args.quiet and sys.stderr.isatty()
-        told = show_execution(problem) if shows else None
-        watched = None if page is None else _watched(problem, page, args.speed)
-        # the link last: while it is open, the vehicle counts on our heartbeats
-        session = Session(UdpLink(address), frame, args.system, args.pace)
-        stack.callback(session.close)
-        if not args.quiet:
-            print(f"waiting for system {args.system} on {args.link}", file=sys.stderr)
-        clock = stack.enter_context(until_interrupt(None))
+        page = stack.enter_context(Page(problem, args.page, takes_events=True))
+        print(f"the page is {page.address}", file=sys.stderr)
+        sources.append(_from(page, complain))
+    shows = not args.quiet and sys.stderr.isatty()
+    told = show_execution(problem) if shows else None
+    watched = None if page is None else _watched(problem, page, args.speed)
+    # the link last: while it is open, the vehicle counts on our heartbeats
+    session = Session(UdpLink(address), frame, args.system, args.pace)
+    stack.callback(session.close)
+    if not args.quiet:
+        print(f"waiting for system {args.system} on {args.link}", file=sys.stderr)
+    clock = stack.enter_context(until_interrupt(None))
 
-        def on_step(row: ExecutionRow) -> None:
-            if clock.stopped:
-                raise KeyboardInterrupt
-            for text in session.texts():
-                if not args.quiet:
-                    print(f"\nthe vehicle says: {text}", file=sys.stderr)
-            for call in (told, watched):
-                if call is not None:
-                    call(row)
+    def on_step(row: ExecutionRow) -> None:
+        if clock.stopped:
+            raise KeyboardInterrupt
+        for text in session.texts():
+            if not args.quiet:
+                print(f"\nthe vehicle says: {text}", file=sys.stderr)
+        for call in (told, watched):
+            if call is not None:
+                call(row)
 
-        done = fly(
-            problem, solution, session, options, surprises=surprises, on_step=on_step,
-            should_stop=lambda: clock.stopped, any_vehicle=args.any_vehicle,
-            incoming=(lambda: [e for s in sources for e in s()]) if sources else None,
-        )  # fmt: skip
-        if done.stopped:
-            session.say(f"flight stopped: {done.stopped}", urgent=True)
-        return done
+    done = fly(
+        problem, solution, session, options, surprises=surprises, on_step=on_step,
+        should_stop=lambda: clock.stopped, any_vehicle=args.any_vehicle,
+        incoming=(lambda: [e for s in sources for e in s()]) if sources else None,
+    )  # fmt: skip
+    if done.stopped:
+        session.say(f"flight stopped: {done.stopped}", urgent=True)
+    return done, session, clock
 
 
 def _from(page: Page, complain: Callable[[str], None]) -> Callable[[], list[Event]]:

@@ -17,6 +17,7 @@ from netsp.fly.rehearsal import rehearse
 from netsp.fly.vehicle import LinkedVehicle
 from netsp.judge import verify
 from netsp.link.dialect import dialect
+from netsp.link.modes import ALT_HOLD
 from netsp.link.session import Session
 from netsp.problem import Problem
 from netsp.solution import Solution
@@ -26,9 +27,6 @@ NEAR_START = 2.0
 
 LEAST_REACH = 0.15
 """Metres: targets are a decimetre deep where the tour is at the surface, and it holds to 0.13."""
-
-ALT_HOLD = 2
-"""The mode that a vehicle without an estimate is put in: it keeps its depth and goes nowhere."""
 
 
 def fly(

@@ -26,6 +26,11 @@ class FlightPolicy:
         that lags in depth on a sloping leg is between them, and is let go on.
     resend_s
         Time after which a target is sent again, s.
+    max_answer_s
+        Longest wait for the answer to a question, such as the value of a parameter, s.
+    max_standby_silence_s
+        Time without a heartbeat after which nobody waits for the vehicle any more once the flight
+        has ended, s.
     """
 
     max_silence_s: float = 3.0
@@ -33,6 +38,8 @@ class FlightPolicy:
     max_path_error: float = 1.0
     max_depth_error: float = 1.0
     resend_s: float = 2.0
+    max_answer_s: float = 2.0
+    max_standby_silence_s: float = 60.0
 
     def __post_init__(self) -> None:
         for field in fields(self):

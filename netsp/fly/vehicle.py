@@ -137,6 +137,11 @@ class LinkedVehicle:
         self._position = self._told()
         self._send(self._position)
 
+    def keep(self) -> None:
+        """Send the last target again if the vehicle may not have it."""
+        if self._target is not None:
+            self._send(np.array(self._target))
+
     def stop_at(self, place: Floats) -> None:
         """Where a place differs from what it said, its estimate is off: that is not moved.
 
