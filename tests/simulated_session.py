@@ -41,11 +41,11 @@ class SimulatedSession(Session):
     the vehicle passes their heartbeats on.
     """
 
-    def __init__(self, site: Any, **options: Any) -> None:
-        self.simulation = Simulation(**options)
+    def __init__(self, site: Any, simulation: Simulation | None = None, **options: Any) -> None:
+        self.simulation = simulation or Simulation(**options)
         self.simulation.beating = False
         self.stations: dict[tuple[int, int], float] = {}
-        self._beat_due = 0.0
+        self._beat_due = self.simulation.now
         super().__init__(SimulatedLink(self.simulation), Frame(site, "local"), 1)  # type: ignore[arg-type]
 
     def _start(self) -> None:

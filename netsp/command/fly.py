@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from netsp.clock import Clock
     from netsp.execute.events import Event
     from netsp.execute.log import Execution, ExecutionRow
+    from netsp.fly.resume import BeginsAt
     from netsp.guard.page import Page
     from netsp.link.frame import Frame
     from netsp.link.session import Session
@@ -30,8 +31,22 @@ EXAMPLE = "netsp fly problems/wharf.json tour.json --link udpin:14550 -o run"
 
 def arguments(p: argparse.ArgumentParser) -> None:
     """Of the command line."""
-    p.add_argument("problem", metavar="PROBLEM", help="problem file (JSON)")
-    p.add_argument("solution", metavar="TOUR", help="its solution file (JSON)")
+    p.add_argument("problem", metavar="PROBLEM", nargs="?", help="problem file (JSON)")
+    p.add_argument("solution", metavar="TOUR", nargs="?", help="its solution file (JSON)")
+    p.add_argument(
+        "--resume", metavar="RUN",
+        help="go on with the flight in this folder, from where the vehicle is, in place of PROBLEM "
+        "and TOUR; writes RUN/resumed unless -o says where",
+    )  # fmt: skip
+    p.add_argument(
+        "--class", dest="word", metavar="WORD",
+        help="begin where the vehicle is, with a tether of this class: numbers of obstacles from "
+        "1, negative from right to left, such as --class=-1,2; '' for a straight tether",
+    )  # fmt: skip
+    p.add_argument(
+        "--class-from", metavar="FILE",
+        help="begin where the vehicle is, with the tether in the state file of netsp guard",
+    )  # fmt: skip
     p.add_argument(
         "--link", metavar="ADDRESS",
         help="MAVLink over UDP: udpin:PORT (this machine only), udpin:HOST:PORT, udpout:HOST:PORT",
@@ -96,27 +111,20 @@ def run(args: argparse.Namespace) -> int:
     if args.link is None and not args.dry_run:
         raise InputError("--link: missing; expected the vehicle's address, or --dry-run")
     from netsp.execute.events import Surprises
-    from netsp.judge import verify
     from netsp.link.frame import Frame
-    from netsp.problem import Problem
-    from netsp.solution import Solution
 
-    problem, solution = Problem.load(args.problem), Solution.load(args.solution)
+    problem, solution, begins = _given(args)
     surprises = Surprises.load(args.surprise) if args.surprise else None
     if surprises is not None:
         surprises.check(problem, args.surprise)
     if problem.units != "m":
         raise InputError(f"units: a vehicle goes by metres; expected m, got {problem.units!r}")
-    judged = verify(problem, solution)
-    if not judged:
-        failed = next(c for c in judged.checks if not c.passed)
-        raise InputError(f"{args.solution}: fails its check {failed.name!r}: {failed.detail}")
     frame = Frame(problem, args.frame)
     if args.dry_run:
         print_targets(problem, solution, frame)
         return 0
     with ExitStack() as stack:
-        done, session, clock = _flown(args, problem, solution, frame, surprises, stack)
+        done, session, clock = _flown(args, problem, solution, frame, surprises, begins, stack)
         _tell(args, done)
         _stand_by(args, session, clock)
     s = done.summary
@@ -125,6 +133,58 @@ def run(args: argparse.Namespace) -> int:
     if s["exceedance_s"] > 0.0 or (s["home"] and not s["tether_free"]):
         return EXIT_NOT_VERIFIED
     return EXIT_NOT_ALL if s["left_out"] or s["status"] != "done" else 0
+
+
+def _given(args: argparse.Namespace) -> tuple[Problem, Solution, BeginsAt | None]:
+    """Return problem and tour, and how the flight begins if not at the start of the tour."""
+    from netsp.fly.resume import (
+        from_guard,
+        from_record,
+        from_word,
+        parse_class,
+        read_run,
+        whole_tour,
+    )
+    from netsp.judge import verify
+    from netsp.problem import Problem
+    from netsp.solution import Solution
+
+    if args.word is not None and args.class_from is not None:
+        raise InputError("--class-from: expected either this or --class")
+    word = None if args.word is None else parse_class(args.word)
+    begins_elsewhere = any(x is not None for x in (args.resume, word, args.class_from))
+    if args.dry_run and begins_elsewhere:
+        raise InputError("--dry-run: what is left is planned where the vehicle is; expected a tour")
+    if args.resume is None:
+        if args.problem is None or args.solution is None:
+            raise InputError("PROBLEM, TOUR: missing; expected two files, or --resume RUN")
+        problem, solution = Problem.load(args.problem), Solution.load(args.solution)
+        judged = verify(problem, solution)
+        if not judged:
+            failed = next(c for c in judged.checks if not c.passed)
+            raise InputError(f"{args.solution}: fails its check {failed.name!r}: {failed.detail}")
+        state = None
+    else:
+        if args.problem is not None:
+            raise InputError("--resume: has problem and tour; expected no PROBLEM and TOUR")
+        problem, solution, state = read_run(args.resume)
+        args.output = args.output or _next_folder(args.resume)
+        if Path(args.output).resolve() == Path(args.resume).resolve():
+            raise InputError("-o: is the folder of the flight before; expected another one")
+    if not begins_elsewhere:
+        return problem, solution, None
+    left = state or whole_tour(problem, solution)
+    if word is not None:
+        return problem, solution, from_word(problem, word, left)
+    if args.class_from is not None:
+        return problem, solution, from_guard(problem, args.class_from, left)
+    return problem, solution, from_record(problem, left)
+
+
+def _next_folder(run: str) -> str:
+    """Return a folder for a flight that is resumed, which is not there yet."""
+    names = ("resumed", *(f"resumed-{k}" for k in range(2, 1000)))
+    return str(next(f for name in names if not (f := Path(run) / name).exists()))
 
 
 def _tell(args: argparse.Namespace, done: Execution) -> None:
@@ -164,7 +224,7 @@ def _stand_by(args: argparse.Namespace, session: Session, clock: Clock) -> None:
 
 def _flown(
     args: argparse.Namespace, problem: Problem, solution: Solution, frame: Frame,
-    surprises: object, stack: ExitStack,
+    surprises: object, begins: BeginsAt | None, stack: ExitStack,
 ) -> tuple[Execution, Session, Clock]:  # fmt: skip
     """Fly the tour; the link stays open until the stack is left."""
     from netsp.clock import until_interrupt
@@ -173,6 +233,7 @@ def _flown(
     from netsp.execute.events import Surprises
     from netsp.execute.log import ExecutionOptions
     from netsp.execute.repair import REPLAN_S
+    from netsp.execute.run_record import RunRecord
     from netsp.files import output_folder
     from netsp.fly.flight import check_options, fly
     from netsp.fly.rehearsal import rehearse
@@ -226,7 +287,8 @@ def _flown(
 
     done = fly(
         problem, solution, session, options, surprises=surprises, on_step=on_step,
-        should_stop=lambda: clock.stopped, any_vehicle=args.any_vehicle,
+        should_stop=lambda: clock.stopped, any_vehicle=args.any_vehicle, begins=begins,
+        record=None if args.output is None else RunRecord(args.output, solution),
         incoming=(lambda: [e for s in sources for e in s()]) if sources else None,
     )  # fmt: skip
     if done.stopped:

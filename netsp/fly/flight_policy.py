@@ -26,6 +26,11 @@ class FlightPolicy:
         that lags in depth on a sloping leg is between them, and is let go on.
     resend_s
         Time after which a target is sent again, s.
+    max_unwatched_way
+        Longest straight way from where a vehicle was last to where it is when its flight is
+        resumed, metres: on a longer one it may have gone round an obstacle.
+    min_class_odds
+        How many times as likely as any other the class of a guard's state file must be.
     max_answer_s
         Longest wait for the answer to a question, such as the value of a parameter, s.
     max_standby_silence_s
@@ -38,6 +43,8 @@ class FlightPolicy:
     max_path_error: float = 1.0
     max_depth_error: float = 1.0
     resend_s: float = 2.0
+    max_unwatched_way: float = 10.0
+    min_class_odds: float = 100.0
     max_answer_s: float = 2.0
     max_standby_silence_s: float = 60.0
 
