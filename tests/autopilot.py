@@ -36,7 +36,6 @@ import subprocess
 import sys
 import threading
 import time
-from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -55,26 +54,17 @@ STEP = 0.02
 BURST = 25
 """Steps that are made up for at once; a machine farther behind lets simulated time slip."""
 
-LAG = (0.7, 0.8)
-"""Seconds from a new target to the first movement."""
-
-PAUSE = 0.9
-"""Seconds that a mission stands still at a waypoint."""
-
-RADIUS = 1.0
+RADIUS = 2.0
 """Metres about a waypoint within which it counts as reached (WPNAV_RADIUS)."""
 
-ACCELERATION = 0.185
-"""At 0.5 m/s: a step of 2 m takes 7.4 s with the lag, and 6.7 s without."""
+STRAY_S, STRAY, MAX_STRAY = 4.0, 0.04, 0.08
+"""Noise in the speed of the vehicle: seconds of memory, m/s of spread and at most."""
 
-GAIN = 0.8
-"""Metres per second of correction for a metre off the reference."""
+CREEP = 0.05
+"""Speed at which a vehicle moves whose target with a velocity has timed out, m/s."""
 
-WANDER_S, WANDER, WANDER_MOST = 4.0, 0.062, 0.125
-"""How the vehicle strays off its reference: seconds of memory, metres of spread and at most."""
-
-CREEP, COAST_S, STOP_S = 0.047, 1.5, 1.0
-"""Speed of a vehicle left to itself, seconds to come down to it, seconds to stop when disarmed."""
+SURFACING_SPEED = 0.3
+"""Speed of ascent in the mode SURFACE, m/s."""
 
 GCS_TIMEOUT_S = 5.0
 """Default of FS_GCS_TIMEOUT: seconds without a heartbeat of the ground station until it disarms."""
@@ -230,6 +220,7 @@ class Options:
     drift: float = 0.0
     origin: tuple[float, ...] = (55.5, 12.7)
     start: tuple[float, ...] = (0.0, 0.0, 0.0)
+    current: tuple[float, ...] = (0.0, 0.0)
     sysid: int = 1
     estimate: bool = True
     params: dict[str, float] = field(default_factory=dict)
@@ -411,94 +402,305 @@ class Estimate:
             self.absorbed = self.gps_error
 
 
-class Body:
-    """The vehicle in the water, and the reference that it follows as well as it can.
+@dataclass(frozen=True)
+class MotionParams:
+    """How the vehicle is controlled, and how it answers.
 
-    The reference speeds up and brakes along a straight line to the goal. The vehicle is held to
-    it by its own estimate, and carried off by the water.
+    The controller's numbers are the recorded vehicle's parameters. The answer of the vehicle
+    (`drive`, `drag` and `stray`) is one set for all recordings in `tests/data/ardusub47`.
+
+    Parameters
+    ----------
+    acceleration, acceleration_z : float
+        Bounds in the plan and in depth, m/s² (WPNAV_ACCEL, WPNAV_ACCEL_Z).
+    jerk : float
+        Bound, m/s³ (WPNAV_JERK).
+    bend_s : float
+        Seconds that the jerk itself takes to rise and fall while speed is gained or lost.
+    up, down : float
+        Bounds of the vertical speed, m/s (WPNAV_SPEED_UP, WPNAV_SPEED_DN).
+    gain, gain_z : float
+        Speed of correction for a metre off the reference, 1/s (PSC_POSXY_P, PSC_POSZ_P).
+    slack : float
+        Share of its speed by which the reference may outrun the vehicle before its time slows.
+    push : float
+        Acceleration in the plan over the square of the command, 1/m: thrusters answer with the
+        square. The command is the speed that is missing and its integral, m/s.
+    drive_z : float
+        Acceleration in depth over the command, 1/s.
+    trim, trim_z : float
+        Growth of the integral for each m/s that the speed is off the wanted one, 1/s.
+    drag : float
+        Deceleration over the square of the speed through the water, 1/m: measured where the
+        recorded vehicles were left to themselves.
+    thrust : float
+        Bound on the acceleration by thrust along each axis, m/s².
+    lag_s : float
+        Seconds from a command of thrust to thrust.
     """
 
-    def __init__(self, point: Vec, chance: random.Random) -> None:
-        self.point, self.chance = point, chance
+    acceleration: float = 2.5
+    acceleration_z: float = 1.0
+    jerk: float = 1.0
+    bend_s: float = 0.5
+    up: float = 2.5
+    down: float = 1.5
+    gain: float = 1.0
+    gain_z: float = 3.0
+    slack: float = 0.05
+    push: float = 12.0
+    drive_z: float = 1.8
+    trim: float = 0.05
+    trim_z: float = 0.15
+    drag: float = 3.6
+    thrust: float = 14.0
+    lag_s: float = 0.2
+
+
+class Leg:
+    """A straight line from rest to rest, with limited speed, acceleration and jerk."""
+
+    def __init__(self, origin: Vec, goal: Vec, speed: float, params: MotionParams) -> None:
+        self.origin, self.goal = origin, goal
+        away = minus(goal, origin)
+        self.length = size(away)
+        self.along: Vec = scaled(away, 1.0 / self.length) if self.length > 1e-9 else (1.0, 0.0, 0.0)
+        flat, rise = math.hypot(self.along[0], self.along[1]), self.along[2]
+        vertical = params.up if rise > 0.0 else params.down
+        top = min(speed / max(flat, 1e-9), vertical / max(abs(rise), 1e-9))
+        most = min(
+            params.acceleration / max(flat, 1e-9), params.acceleration_z / max(abs(rise), 1e-9)
+        )
+        self._plan(max(top, 1e-3), most, params)
+
+    def _plan(self, top: float, most: float, params: MotionParams) -> None:
+        """Find the highest speed that the length allows, and the times of its phases."""
+
+        def rise_s(speed: float) -> float:
+            """Return the seconds from rest to a speed."""
+            if speed * params.jerk >= most * most:
+                return speed / most + most / params.jerk + params.bend_s
+            return 2.0 * math.sqrt(speed / params.jerk) + params.bend_s
+
+        if top * rise_s(top) > self.length:
+            low = 0.0
+            for _ in range(30):
+                middle = 0.5 * (low + top)
+                low, top = (low, middle) if middle * rise_s(middle) > self.length else (middle, top)
+        self.top, self.rise_s = top, rise_s(top)
+        self.end_s = self.rise_s + self.length / top
+
+    def _rise(self, t: float) -> tuple[float, float]:
+        """Return distance and speed so many seconds after rest: jerk up, then as much down."""
+        jerk = 4.0 * self.top / self.rise_s**2
+        if t <= 0.5 * self.rise_s:
+            return jerk * t**3 / 6.0, 0.5 * jerk * t * t
+        left = self.rise_s - t
+        return self.top * (0.5 * self.rise_s - left) + jerk * left**3 / 6.0, (
+            self.top - 0.5 * jerk * left * left
+        )
+
+    def at(self, t: float) -> tuple[float, float]:
+        """Return distance and speed at a time."""
+        if t >= self.end_s:
+            return self.length, 0.0
+        if t <= self.rise_s:
+            return self._rise(t)
+        if t >= self.end_s - self.rise_s:
+            distance, speed = self._rise(self.end_s - t)
+            return self.length - distance, speed
+        return 0.5 * self.top * self.rise_s + self.top * (t - self.rise_s), self.top
+
+
+class Body:
+    """The vehicle in the water, and the controller that has it follow a reference.
+
+    The reference runs along a `Leg`; where the vehicle falls behind, the reference's time slows. A
+    goal that is set on the way is planned for anew: from rest, at the point where the vehicle
+    would come to a stop. In depth that point is nearer than in the plan, which is why legs that
+    slope sag when their goal is sent again and again.
+    """
+
+    def __init__(
+        self, point: Vec, chance: random.Random, current: Vec = (0.0, 0.0, 0.0),
+        params: MotionParams | None = None,
+    ) -> None:  # fmt: skip
+        self.point, self.chance, self.current = point, chance, current
+        self.params = params or MotionParams()
         self.velocity: Vec = (0.0, 0.0, 0.0)
         self.yaw, self.bearing = 0.0, 0.0
         self.speed = 0.5
+        self.leg: Leg | None = None
+        self.time, self.rate = 0.0, 1.0
         self.reference, self.pace = point, self.velocity
         self.goal: Vec | None = None
-        self.halt: Vec | None = None
         self.following = False
-        self.creep: Vec | None = None
-        spread = WANDER * GAIN
-        self.wander = Wandering(chance, (spread, spread, 0.4 * spread), WANDER_S)
-
-    @property
-    def acceleration(self) -> float:
-        """Grows with the root of the speed, as if jerk were what is limited."""
-        return ACCELERATION * math.sqrt(max(self.speed, 0.02) / 0.5)
+        self.creeping: Vec | None = None
+        self.trim: Vec = (0.0, 0.0, 0.0)
+        self.command: Vec = (0.0, 0.0, 0.0)
+        self.wander = Wandering(chance, (STRAY, STRAY, 0.6 * STRAY), STRAY_S)
 
     @property
     def arrived(self) -> bool:
-        return self.following and self.goal == self.reference and not any(self.pace)
+        """Tell whether the reference is at the goal."""
+        return (
+            self.following and self.leg is not None and self.goal == self.leg.goal
+            and self.time >= self.leg.end_s
+        )  # fmt: skip
 
     def place(self, point: Vec) -> None:
         self.point, self.velocity = point, (0.0, 0.0, 0.0)
         self.let_go()
 
     def let_go(self) -> None:
-        self.following, self.creep, self.halt = False, None, None
+        """Stop following: the next goal is planned for from where the vehicle is then."""
+        self.following, self.leg, self.creeping = False, None, None
+        self.command = self.trim = (0.0, 0.0, 0.0)
 
-    def follow(self, believed: Vec) -> None:
-        """A step under control; without a goal, to a stop."""
-        if not self.following:
-            self.following, self.creep = True, None
-            self.reference, self.pace = believed, self.velocity
-        if self.goal is not None:
-            self.halt = None
-        elif self.halt is None:
-            self.halt = plus(self.reference, self.pace, 0.5 * size(self.pace) / self.acceleration)
-        self._advance(self.goal or self.halt or self.reference)
-        correction = limited(scaled(minus(self.reference, believed), GAIN), self.speed)
-        stray = limited(self.wander.step(), WANDER_MOST * GAIN)
-        self._move(plus(plus(self.pace, correction), stray))
+    def aim(self, goal: Vec, believed: Vec, moving: Vec) -> None:
+        """Plan for a goal, also when it is the same as before.
+
+        Parameters
+        ----------
+        goal : (e, n, u)
+            Where to go, m.
+        believed, moving : (e, n, u)
+            Position and velocity that the vehicle believes to have, m and m/s.
+        """
+        done = self.following and self.leg is not None and self.time >= self.leg.end_s
+        if done:
+            origin = self.reference
+        else:
+            origin = self._stopping_point(believed, moving)
+            self.trim = self.command  # thrust does not jump
+        self.goal = goal
+        self._begin(Leg(origin, goal, self.speed, self.params))
+
+    def _begin(self, leg: Leg) -> None:
+        self.following = True
+        self.leg, self.time, self.rate = leg, 0.0, 1.0
+        self.reference, self.pace = leg.origin, (0.0, 0.0, 0.0)
+
+    def _stopping_point(self, believed: Vec, moving: Vec) -> Vec:
+        p = self.params
+        flat = math.hypot(moving[0], moving[1])
+        share = stopping_distance(flat, p.gain, p.acceleration) / flat if flat > 1e-6 else 0.0
+        sink = stopping_distance(abs(moving[2]), p.gain_z, p.acceleration_z)
+        return (
+            believed[0] + share * moving[0],
+            believed[1] + share * moving[1],
+            min(believed[2] + math.copysign(sink, moving[2]), SURFACE_M),
+        )
+
+    def follow(self, believed: Vec, moving: Vec) -> None:
+        """Advance by a step under control; without a goal, to a stop."""
+        if self.goal is not None and (self.leg is None or self.leg.goal != self.goal):
+            self.aim(self.goal, believed, moving)
+        elif self.leg is None:
+            stop = self._stopping_point(believed, moving)
+            self._begin(Leg(stop, stop, self.speed, self.params))
+        self._advance(believed, moving)
+        p = self.params
+        off = minus(self.reference, believed)
+        flat = math.hypot(off[0], off[1])
+        share = 0.0
+        if flat > 1e-9:
+            share = min(correction(flat, p.gain, p.acceleration), self.speed) / flat
+        sink = math.copysign(
+            min(correction(abs(off[2]), p.gain_z, p.acceleration_z), p.down), off[2]
+        )
+        stray = limited(self.wander.step(), MAX_STRAY)
+        self._drive((
+            self.pace[0] + share * off[0] + stray[0],
+            self.pace[1] + share * off[1] + stray[1],
+            self.pace[2] + sink + stray[2],
+        ), moving)  # fmt: skip
         turn = (self.bearing - self.yaw + math.pi) % (2.0 * math.pi) - math.pi
         self.yaw += max(-0.6 * STEP, min(0.6 * STEP, turn))
 
-    def _advance(self, goal: Vec) -> None:
-        """Move the reference."""
-        a = self.acceleration
-        away = minus(goal, self.reference)
-        distance, fast = size(away), size(self.pace)
-        if distance <= 2.0 * a * STEP * STEP and fast <= 4.0 * a * STEP:
-            self.reference, self.pace = goal, (0.0, 0.0, 0.0)
+    def _advance(self, believed: Vec, moving: Vec) -> None:
+        """Move the reference, slower where the vehicle lags behind."""
+        leg, p = self.leg, self.params
+        assert leg is not None
+        if self.time >= leg.end_s:
+            self.reference, self.pace = leg.goal, (0.0, 0.0, 0.0)
             return
-        wanted = min(self.speed, math.sqrt(2.0 * a * distance), distance / STEP)
-        change = minus(scaled(away, wanted / max(distance, 1e-9)), self.pace)
-        # braking harder than it speeds up, or it would circle about a goal to its side
-        self.pace = plus(self.pace, limited(change, (1.0 if wanted > fast else 2.0) * a * STEP))
-        self.reference = plus(self.reference, self.pace, STEP)
+        wanted = 1.0
+        speed = size(self.pace)
+        if speed > 0.0:
+            off = minus(self.reference, believed)
+            behind = sum(off[i] * leg.along[i] for i in range(3))
+            made = sum(moving[i] * leg.along[i] for i in range(3))
+            wanted = max(0.0, min(1.0, p.slack + (made - p.gain * behind) / speed))
+        self.rate += (wanted - self.rate) * STEP * p.jerk / p.acceleration
+        self.time += self.rate * STEP
+        distance, speed = leg.at(self.time)
+        self.reference = plus(leg.origin, leg.along, distance)
+        self.pace = scaled(leg.along, speed)
 
-    def coast(self, rise: float = 0.0) -> None:
-        """A step of a vehicle that is armed and left to itself: it comes to creep along."""
-        if self.creep is None:
-            east, north, _ = self.velocity
-            if math.hypot(east, north) < 0.05:
-                angle = self.chance.uniform(0.0, 2.0 * math.pi)
-                east, north = math.cos(angle), math.sin(angle)
-            self.let_go()
-            self.creep = scaled((east, north, 0.0), CREEP / math.hypot(east, north))
-        wanted = (self.creep[0], self.creep[1], rise)
-        self._move(plus(self.velocity, minus(wanted, self.velocity), STEP / COAST_S))
+    def _drive(self, wanted: Vec, moving: Vec) -> None:
+        """Advance the vehicle by a step towards a velocity."""
+        p = self.params
+        missing = minus(wanted, moving)
+        self.trim = (
+            self.trim[0] + STEP * p.trim * missing[0],
+            self.trim[1] + STEP * p.trim * missing[1],
+            self.trim[2] + STEP * p.trim_z * missing[2],
+        )
+        keep = min(STEP / p.lag_s, 1.0)
+        self.command = plus(self.command, minus(plus(missing, self.trim), self.command), keep)
+        east, north, up = self.command
+        flat = math.hypot(east, north)
+        strength = min(p.push * flat, p.thrust / max(flat, 1e-9))
+        lift = max(-p.thrust, min(p.thrust, p.drive_z * up))
+        self._swim((strength * east, strength * north, lift))
 
-    def stop(self) -> None:
-        """A step of a vehicle that is disarmed."""
+    def _swim(self, thrust: Vec) -> None:
+        """Advance by a step under thrust and drag, in the plan and in depth by themselves."""
+        through = minus(self.velocity, self.current)
+        flat = 1.0 + STEP * self.params.drag * math.hypot(through[0], through[1])
+        deep = 1.0 + STEP * self.params.drag * abs(through[2])
+        self._move((
+            self.current[0] + (through[0] + STEP * thrust[0]) / flat,
+            self.current[1] + (through[1] + STEP * thrust[1]) / flat,
+            self.current[2] + (through[2] + STEP * thrust[2]) / deep,
+        ))  # fmt: skip
+
+    def creep(self) -> None:
+        """Advance a vehicle that holds its speed at what it takes for none."""
+        if self.creeping is None:
+            angle = self.chance.uniform(0.0, 2.0 * math.pi)
+            self.creeping = (CREEP * math.cos(angle), CREEP * math.sin(angle), 0.0)
+        self.following, self.leg = False, None
+        self._drive(self.creeping, self.velocity)
+
+    def drift(self, rise: float = 0.0) -> None:
+        """Advance a vehicle that is left to the water, or only rises."""
         self.let_go()
-        self._move(scaled(self.velocity, 1.0 - STEP / STOP_S))
+        lift = self.params.drive_z * (rise - self.velocity[2]) if rise else 0.0
+        self._swim((0.0, 0.0, lift))
 
     def _move(self, velocity: Vec) -> None:
         self.velocity = velocity
         self.point = plus(self.point, velocity, STEP)
         if self.point[2] > SURFACE_M:
             self.point = (self.point[0], self.point[1], SURFACE_M)
+            self.velocity = (velocity[0], velocity[1], min(velocity[2], 0.0))
+
+
+def stopping_distance(speed: float, gain: float, deceleration: float) -> float:
+    """Return the metres in which `correction` comes to a stop from a speed."""
+    if speed < deceleration / gain:
+        return speed / gain
+    return 0.5 * (deceleration / gain**2 + speed * speed / deceleration)
+
+
+def correction(off: float, gain: float, deceleration: float) -> float:
+    """Return the speed of correction for a distance: proportional near, its root farther off."""
+    bend = deceleration / gain**2
+    if off <= bend:
+        return gain * off
+    return math.sqrt(2.0 * deceleration * (off - 0.5 * bend))
 
 
 @dataclass(frozen=True)
@@ -663,7 +865,10 @@ class Vehicle:
         self.mav: Any = mavlink.MAVLink(wire, srcSystem=options.sysid, srcComponent=1)
         self.chance = random.Random(options.seed)
         self.earth = Earth(*options.origin)
-        self.body = Body((options.start[0], options.start[1], options.start[2]), self.chance)
+        east, north, *_ = options.current
+        self.body = Body(
+            (options.start[0], options.start[1], options.start[2]), self.chance, (east, north, 0.0)
+        )
         self.estimate = Estimate(options, self.chance)
         self.steps = 0
         self.estimate.update(self.body, self.t)
@@ -684,7 +889,6 @@ class Vehicle:
             **options.params,
         }
         self._reset_speed()
-        self.coming: deque[tuple[float, Target]] = deque()
         self.target: Target | None = None
         self.refreshed = 0.0
         self.released = self.telling = False
@@ -720,7 +924,7 @@ class Vehicle:
         self.steps += 1
         self.wire.silent = self.t < self.silent_until
         self._watch()
-        self._take_targets()
+        self._drop_stale_target()
         if self.mode == AUTO:
             self._fly_mission()
         self._move()
@@ -765,15 +969,17 @@ class Vehicle:
 
     def _move(self) -> None:
         if not self.armed:
-            self.body.stop()
+            self.body.drift()
         elif self.steered:
-            self.body.follow(self.estimate.point)
+            self.body.follow(self.estimate.point, self.estimate.velocity)
             if self.telling and self.body.arrived and self.mode == GUIDED:
                 self.telling = False
                 self.event("arrived")
+        elif self.mode in STEERED and self.released:
+            self.body.creep()
         else:
             up = self.mode == SURFACE and self.body.point[2] < -0.02
-            self.body.coast(0.3 if up else 0.0)
+            self.body.drift(SURFACING_SPEED if up else 0.0)
 
     def _watch(self) -> None:
         """The failsafes."""
@@ -816,11 +1022,10 @@ class Vehicle:
 
     def _stand(self) -> None:
         """Forget what there was to do."""
-        self.coming.clear()
         self.target, self.released, self.telling = None, False, False
         self.body.goal = None
         self.body.let_go()
-        self.leg_begins, self.held = self.t + PAUSE, None
+        self.leg_begins, self.held = self.t, None
 
     def refusal(self, mode: int) -> str | None:
         """Why a mode is not entered."""
@@ -868,7 +1073,7 @@ class Vehicle:
         self._receive(m, point, why)
 
     def _receive(self, m: Any, point: Vec, why: str | None) -> None:
-        """A target: refused, or to take effect after the lag."""
+        """Take a target, or refuse it."""
         if m.type_mask & POSITION_BITS or not all(map(math.isfinite, point)):
             self.event("target refused", at=None, why="no position")
             return
@@ -884,28 +1089,24 @@ class Vehicle:
             return
         moving = m.type_mask & VELOCITY_BITS == 0
         yaw = None if m.type_mask & YAW_BIT else float(m.yaw)
-        due = self.t + self.chance.uniform(*LAG)
-        if self.coming:
-            due = max(due, self.coming[-1][0])
-        self.coming.append((due, Target(point, yaw, moving)))
+        target = Target(point, yaw, moving)
+        self._follow(target)
         self.refreshed = self.t
         self.event("target", at=rounded(point), velocity=moving)
 
-    def _take_targets(self) -> None:
-        while self.coming and self.t >= self.coming[0][0] - 1e-9:
-            target = self.coming.popleft()[1]
-            again = self.target is not None and target.point == self.target.point
-            self.target = target
-            self.released = False
-            self.body.goal = target.point
-            self._face(target.point, target.yaw)
-            if not again:
-                self.telling = True
-                self.event("under way", at=rounded(target.point))
-        stale = self.t - self.refreshed >= VELOCITY_TIMEOUT_S and not self.coming
+    def _follow(self, target: Target) -> None:
+        """Plan for a target, from anew if it is the same again."""
+        again = self.target is not None and target.point == self.target.point
+        self.target, self.released, self.telling = target, False, True
+        self.body.aim(target.point, self.estimate.point, self.estimate.velocity)
+        self._face(target.point, target.yaw)
+        if not again:
+            self.event("under way", at=rounded(target.point))
+
+    def _drop_stale_target(self) -> None:
+        stale = self.t - self.refreshed >= VELOCITY_TIMEOUT_S
         if self.target is not None and self.target.moving and stale and not self.released:
             self.released = True
-            self.body.let_go()
             self.event("target timed out", at=rounded(self.target.point))
 
     def _face(self, point: Vec, yaw: float | None) -> None:
@@ -930,7 +1131,7 @@ class Vehicle:
             self._start_item(self.items[self.current])
         if self.current < len(self.items) and self._leg_done(self.items[self.current]):
             self.flown = True
-            self.leg_begins, self.held = self.t + PAUSE, None
+            self.leg_begins, self.held = self.t, None
             self.body.goal = None
             self._reach()
 
@@ -1535,6 +1736,7 @@ def options_of(arguments: Sequence[str]) -> Options:
     add("--drift", type=float, default=0.0, help="of the estimate, slow: metres of spread")
     add("--origin", type=numbers(2), default=(55.5, 12.7), metavar="LAT,LON")
     add("--start", type=numbers(3), default=(0.0, 0.0, 0.0), metavar="E,N,U", help="--start=-1,0,0")
+    add("--current", type=numbers(2), default=(0.0, 0.0), metavar="E,N", help="of the water, m/s")
     add("--sysid", type=int, default=1)
     add("--no-estimate", dest="estimate", action="store_false", help="without a position")
     add("--param", dest="params", type=param, action="append", default=[], metavar="NAME=VALUE")
