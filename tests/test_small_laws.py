@@ -599,7 +599,7 @@ class Vehicle:
     """The part of a session that is used before a flight; it answers everything at once."""
 
     system, others, silent_s, unplaced_s, broken = 1, (), 0.0, 0.0, None
-    kind = VehicleKind(12, 3)
+    kind, echo = VehicleKind(12, 3), None
 
     def __init__(self, **told):
         kept = {"position": (0.0, 0.0, -1.0), "estimate": True, "armed": True, "mode": "GUIDED"}

@@ -25,7 +25,18 @@ class FlightPolicy:
         Largest distance above or below the depths between which the leg runs, metres. A vehicle
         that lags in depth on a sloping leg is between them, and is let go on.
     resend_s
-        Time after which a target is sent again, s.
+        Time after which a target is sent again if the vehicle echoes another one, or neither echoes
+        any nor moves towards it, s. A target that is sent again is planned for anew: the vehicle
+        falls behind in depth.
+    max_resends
+        How often a target is sent again to a vehicle that echoes another one.
+    max_echo_error
+        Largest distance between a target and its echo, metres.
+    min_approach
+        Way towards a target after which a vehicle that echoes nothing has it, metres.
+    max_depth_step
+        Largest change of depth up to the next target on a leg that slopes, metres. From target to
+        target a vehicle may lag in depth, at each it is on the leg.
     max_unwatched_way
         Longest straight way from where a vehicle was last to where it is when its flight is
         resumed, metres: on a longer one it may have gone round an obstacle.
@@ -43,6 +54,10 @@ class FlightPolicy:
     max_path_error: float = 1.0
     max_depth_error: float = 1.0
     resend_s: float = 2.0
+    max_resends: int = 3
+    max_echo_error: float = 0.15
+    min_approach: float = 0.2
+    max_depth_step: float = 2.0
     max_unwatched_way: float = 10.0
     min_class_odds: float = 100.0
     max_answer_s: float = 2.0

@@ -1,12 +1,15 @@
 """A vehicle at the other end of a link, as `execute` drives it: position targets, vertex by vertex.
 
 ArduSub in GUIDED holds a position target for good, while one with a velocity times out; so only
-positions are sent, and sent again now and then, for datagrams get lost. It does not go above home
-and has taken an altitude of 0 for "keep the present one" (../export/write.py): targets are at least
-a decimetre deep.
+positions are sent. Datagrams get lost, but a target that is sent again is planned for anew, and the
+vehicle falls behind in depth: it is sent again only if the vehicle says, or shows, that it does not
+have it. ArduSub does not go above home and has taken an altitude of 0 for "keep the present one"
+(../export/write.py): targets are at least a decimetre deep.
 """
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 
@@ -53,6 +56,10 @@ class LinkedVehicle:
         self._sent = -np.inf
         self.sent: list[tuple[float, Point3]] = []
         self._from = self._position
+        self._resends = 0
+        self._vertex: Floats | None = None
+        self._leg: tuple[Floats, Floats] | None = None
+        self._stages: list[Floats] = []
         session.watch(_wrong)
 
     def _told(self) -> Floats:
@@ -117,7 +124,7 @@ class LinkedVehicle:
             while passed < len(path) and self._at(path[passed]):
                 passed += 1
             # the last one is held until it is told to go on
-            self._send(path[min(passed, len(path) - 1)])
+            self._send(self._stage(path[min(passed, len(path) - 1)]))
             if self.time >= until:
                 break
             self.session.sleep(LOOK_S)
@@ -135,11 +142,13 @@ class LinkedVehicle:
         """Stay where it is, if it is still ours."""
         self.check()
         self._position = self._told()
+        self._vertex = self._leg = None
         self._send(self._position)
 
     def keep(self) -> None:
         """Send the last target again if the vehicle may not have it."""
         if self._target is not None:
+            self._position = self._told()
             self._send(np.array(self._target))
 
     def stop_at(self, place: Floats) -> None:
@@ -179,7 +188,8 @@ class LinkedVehicle:
         """
         if self._target is None:
             return
-        a, b, here = self._from, np.array(self._target), self._position
+        a, b = self._leg if self._leg is not None else (self._from, np.array(self._target))
+        here = self._position
         along = (b - a)[:2]
         size = float(along @ along)
         share = 0.0 if size == 0.0 else float(np.clip((here - a)[:2] @ along / size, 0.0, 1.0))
@@ -191,17 +201,61 @@ class LinkedVehicle:
             where = "below" if here[2] < b[2] else "above"
             raise StopsFlightError(f"the vehicle is {off:.1f} m {where} the depth of its path")
 
+    def _stage(self, vertex: Floats) -> Floats:
+        """Return the next target on the way to a vertex: on a leg that slopes, intermediate ones
+        keep the vehicle at the depth of the leg."""
+        if self._vertex is None or not np.array_equal(vertex, self._vertex):
+            self._vertex = vertex.copy()
+            end = np.array([*vertex[:2], altitude(float(vertex[2]))])
+            self._leg = self._position.copy(), end
+            self._stages = self._stages_to(vertex)
+        while len(self._stages) > 1 and self._at(self._stages[0]):
+            self._stages.pop(0)
+        return self._stages[0]
+
+    def _stages_to(self, vertex: Floats) -> list[Floats]:
+        away = vertex - self._position
+        if float(np.hypot(*away[:2])) <= 2.0 * self.reach:
+            return [vertex]  # straight down: nowhere off the leg
+        count = max(1, math.ceil(abs(float(away[2])) / self.policy.max_depth_step))
+        return [self._position + away * (k / count) for k in range(1, count)] + [vertex]
+
     def _send(self, place: Floats) -> None:
         x, y, z = (float(v) for v in place)
         target = (x, y, altitude(z))
         now = self.time
-        if target == self._target and now - self._sent < self.policy.resend_s:
-            return
         if target != self._target:
             self.sent.append((now, target))
-            self._from = self._position
+            self._from, self._resends = self._position, 0
+        elif not self._is_missed(now - self._sent):
+            return
         self._target, self._sent = target, now
         self.session.link.send(target_message(self.session, target))
+
+    def _is_missed(self, waited_s: float) -> bool:
+        """Return whether the vehicle does not have the last target, and should get it again."""
+        if waited_s < self.policy.resend_s:
+            return False
+        assert self._target is not None
+        echo = self.session.echo
+        if echo is not None and echo[1] < waited_s:
+            apart = np.array(echo[0]) - self._target
+            off = float(np.hypot(*apart[:2]))
+            if float(np.linalg.norm(apart)) <= self.policy.max_echo_error:
+                return False
+        else:
+            off = 0.0
+        if off > self.policy.max_echo_error:
+            if self._resends >= self.policy.max_resends:
+                raise StopsFlightError(
+                    f"the vehicle does not take its target: it goes {off:.1f} m beside it"
+                )
+            self._resends += 1
+            return True
+        # no echo, or one that differs in depth, which may be told from another level
+        before = float(np.linalg.norm(self._from - self._target))
+        left = float(np.linalg.norm(self._position - self._target))
+        return left > self.reach and before - left < self.policy.min_approach
 
 
 def _wrong(now: Fix) -> str | None:

@@ -23,6 +23,7 @@ from netsp.link.dialect import dialect
 from netsp.link.frame import Frame
 from netsp.link.messages import Listener
 from netsp.link.statustext import status_texts
+from netsp.link.target_echo import TargetEcho
 from netsp.link.udp import UdpLink
 from netsp.link.vehicle_kind import GROUND_STATION_TYPE, VehicleKind
 
@@ -34,6 +35,9 @@ BACKWARDS_S = 2.0
 
 POSITION_US = 100_000
 """Microseconds between two positions that are asked for."""
+
+ECHO_US = 500_000
+"""Microseconds between two echoes of the target that are asked for."""
 
 
 class Session:
@@ -68,6 +72,8 @@ class Session:
         self._acks: dict[int, int] = {}
         self._parameters: dict[str, float] = {}
         self._station: tuple[int, float] | None = None
+        self._echoes = TargetEcho(frame)
+        self._echo: tuple[Point3, float] | None = None
         self._said = itertools.count()
         self._stop = threading.Event()
         self._threads: list[threading.Thread] = []
@@ -208,8 +214,16 @@ class Session:
             return None
         return station[0]
 
+    @property
+    def echo(self) -> tuple[Point3, float] | None:
+        """Target that the vehicle says it goes to, in the site, and the seconds of the vehicle
+        since it said so; None if it has not."""
+        with self._lock:
+            echo = self._echo
+        return None if echo is None else (echo[0], (self._seconds() - echo[1]) * self.pace)
+
     def ask_for_positions(self) -> None:
-        """Ten a second, whatever the vehicle sends of itself."""
+        """Ask for ten positions a second, and for all else that a flight watches."""
         m = dialect()
         wanted = (
             m.MAVLINK_MSG_ID_GLOBAL_POSITION_INT if self.frame.is_global
@@ -219,6 +233,12 @@ class Session:
         self.command(
             m.MAV_CMD_SET_MESSAGE_INTERVAL, m.MAVLINK_MSG_ID_EKF_STATUS_REPORT, 2 * POSITION_US
         )
+        for echo in (
+            m.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT, m.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED
+        ):  # fmt: skip
+            self.command(m.MAV_CMD_SET_MESSAGE_INTERVAL, echo, ECHO_US)
+        # echoes are in degrees; positions may be in metres from where the estimate began
+        self.command(m.MAV_CMD_REQUEST_MESSAGE, m.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN)
 
     def say(self, text: str, urgent: bool = False) -> None:
         """Words for whoever looks at the ground station."""
@@ -254,6 +274,9 @@ class Session:
                 self._acks[int(message.command)] = int(message.result)
             elif kind == "PARAM_VALUE":
                 self._parameters[str(message.param_id)] = float(message.param_value)
+            echo = self._echoes.understand(message)
+            if echo is not None:
+                self._echo = echo, self._seconds()
             if fix is None:
                 return
             kept = {
