@@ -113,6 +113,16 @@ def test_it_disarms_as_long_after_the_ground_station_fell_silent(flight: str) ->
     assert heard[-2:] == recorded
 
 
+def test_its_target_is_told_when_it_is_asked_for() -> None:
+    for echo in (True, False):
+        vehicle = under_way(echo=echo)
+        vehicle.send(mavlink.MAVLink_command_long_message(1, 1, 511, 0, 85, 2e5, *[0.0] * 5))
+        vehicle.wire.messages()
+        vehicle.advance(1.0)
+        told = [m for m in vehicle.wire.messages() if m.get_type() == "POSITION_TARGET_LOCAL_NED"]
+        assert {(m.x, m.y, m.z) for m in told} == ({(60.0, 0.0, 1.0)} if echo else set())
+
+
 def test_targets_above_home_draw_no_refusal_and_do_not_lift_it_out_of_the_water() -> None:
     vehicle = Simulation(start=(0.0, 0.0, -1.0))
     vehicle.fly()
