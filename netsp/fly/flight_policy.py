@@ -33,7 +33,8 @@ class FlightPolicy:
     max_echo_error
         Largest distance between a target and its echo, metres.
     min_approach
-        Way towards a target after which a vehicle that echoes nothing has it, metres.
+        Way towards a target that a vehicle which echoes nothing makes in `resend_s` if it has it,
+        metres.
     max_depth_step
         Largest change of depth up to the next target on a leg that slopes, metres. From target to
         target a vehicle may lag in depth, at each it is on the leg.
@@ -56,7 +57,7 @@ class FlightPolicy:
     resend_s: float = 2.0
     max_resends: int = 3
     max_echo_error: float = 0.15
-    min_approach: float = 0.2
+    min_approach: float = 0.1
     max_depth_step: float = 2.0
     max_unwatched_way: float = 10.0
     min_class_odds: float = 100.0

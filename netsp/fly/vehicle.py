@@ -57,6 +57,7 @@ class LinkedVehicle:
         self.sent: list[tuple[float, Point3]] = []
         self._from = self._position
         self._resends = 0
+        self._mark = 0.0, math.inf
         self._vertex: Floats | None = None
         self._leg: tuple[Floats, Floats] | None = None
         self._stages: list[Floats] = []
@@ -230,6 +231,7 @@ class LinkedVehicle:
         elif not self._is_missed(now - self._sent):
             return
         self._target, self._sent = target, now
+        self._mark = now, self._left()
         self.session.link.send(target_message(self.session, target))
 
     def _is_missed(self, waited_s: float) -> bool:
@@ -253,9 +255,15 @@ class LinkedVehicle:
             self._resends += 1
             return True
         # no echo, or one that differs in depth, which may be told from another level
-        before = float(np.linalg.norm(self._from - self._target))
-        left = float(np.linalg.norm(self._position - self._target))
+        if self.time - self._mark[0] < self.policy.resend_s:
+            return False
+        before, left = self._mark[1], self._left()
+        self._mark = self.time, left
         return left > self.reach and before - left < self.policy.min_approach
+
+    def _left(self) -> float:
+        """Return the distance to the target, metres."""
+        return float(np.linalg.norm(self._position - np.array(self._target)))
 
 
 def _wrong(now: Fix) -> str | None:
