@@ -33,13 +33,14 @@ PARAMETERS = {
 class ArduSub:
     """The process, for a test; the ground station listens on `port`."""
 
-    def __init__(self, pace: float = 1.0) -> None:
+    def __init__(self, pace: float = 1.0, parameters: dict[str, float] | None = None) -> None:
         self.port, self.pace = free_port(), pace
+        self.parameters = {**PARAMETERS, **(parameters or {})}
         self._folder = tempfile.TemporaryDirectory()
 
     def __enter__(self) -> ArduSub:
         defaults = Path(self._folder.name) / "defaults.parm"
-        defaults.write_text("".join(f"{k} {v}\n" for k, v in PARAMETERS.items()))
+        defaults.write_text("".join(f"{k} {v}\n" for k, v in self.parameters.items()))
         self.process = subprocess.Popen(
             [BINARY, "-S", "-w", "--model", "vectored", "--speedup", str(self.pace), "-I", "0",
              "--home", HOME, "--defaults", str(defaults),

@@ -406,9 +406,29 @@ def test_a_current_costs_little_room_and_takes_a_disarmed_vehicle_along() -> Non
         vehicle, _ = flown(path, current=current)
         rows = vehicle.truth()
         off.append(np.percentile(np.abs(rows[rows[:, 2] > 3.0, 1]), 90))
-    assert off[0] < 0.12
-    assert off[1] < 0.25
+    assert off[0] < 0.1
+    assert off[1] < 0.3  # it begins at rest in the current
     vehicle.vehicle.disarm("test")
     begin = vehicle.truth()[-1, 1]
     vehicle.advance(10.0)
     assert vehicle.truth()[-1, 1] - begin == pytest.approx(8.0, rel=0.15)
+
+
+def test_it_keeps_to_its_path_as_recorded_and_little_less_in_a_current() -> None:
+    """In 0.8 m/s the real one lost 0.15 m of room to its path, in still water 0.10 m."""
+    path = np.array(targets("fly-wharf"))[:, :2]
+    a, along = path[:-1], np.diff(path, axis=0)
+
+    def off(rows: np.ndarray) -> float:
+        """Return the distance from the path that is exceeded a tenth of the time, m."""
+        found = []
+        for place in rows[::4, 1:3]:
+            share = ((place - a) * along).sum(1) / np.maximum((along * along).sum(1), 1e-12)
+            nearest = a + np.clip(share, 0.0, 1.0)[:, None] * along
+            found.append(np.hypot(*(place - nearest).T).min())
+        return float(np.percentile(found, 90))
+
+    rows, _, truth, _ = tour("fly-wharf")
+    assert off(truth) == pytest.approx(off(rows), abs=0.05)
+    vehicle, _ = flown(targets("fly-wharf"), current=(0.0, 0.8))
+    assert off(vehicle.truth()) == pytest.approx(off(rows) + 0.05, abs=0.1)
