@@ -17,7 +17,7 @@ import json
 import random
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -109,6 +109,9 @@ class Vehicle:
 
     @property
     def now(self) -> float:
+        """Seconds of the vehicle's clock, also while it is not heard."""
+        if isinstance(self.session, SimulatedSession):
+            return float(self.session.simulation.now)
         return float(self.session.now.time)
 
     @property
@@ -272,26 +275,36 @@ def predicted_s(problem: Problem, solution: Solution, speed: float) -> float:
 
 
 def tours(rows: Rows, pace: float, names: list[str], few: bool) -> None:
-    problems = [Problem.load(ROOT / "problems" / f"{name}.json") for name in names]
-    problems += worlds(1 if few else N_WORLDS)
+    groups = {name: [Problem.load(ROOT / "problems" / f"{name}.json")] for name in names}
+    n_worlds = 1 if few else N_WORLDS
+    groups[f"{n_worlds} random worlds"] = worlds(n_worlds)
     currents = (0.0,) if BINARY else (0.0, 0.8) if few else CURRENTS
-    head("vehicle", "problem", "m/s", "current m/s", "goals", "words as planned",
-         "home, tether free", "true tether of the limit", "room m, clearance", "seconds, of length "
-         "/ speed", name="fly-tours")  # fmt: skip
-    for problem in problems:
-        speeds = SPEEDS[:1] if few else SPEEDS[1:] if problem.name in KILOMETRES else SPEEDS
+    head("vehicle", "problem", "m/s", "flights", "home, tether free", "goals", "words as planned",
+         "longest true tether of the limit", "least room m, clearance",
+         "seconds over length / speed, median / worst", name="fly-tours")  # fmt: skip
+    for name, problems in groups.items():
+        speeds = SPEEDS[:1] if few else SPEEDS[1:] if name in KILOMETRES else SPEEDS
         for speed in speeds:
-            for current in currents:
-                # the row's function is called at once
-                r = rows.of(
+            found = [
+                rows.of(
                     lambda p=problem, v=speed, c=current: fly_tour(p, pace, v, c),  # type: ignore[misc]
                     tour=problem.name, speed=speed, current=current,
-                )  # fmt: skip
-                row("ArduSub" if BINARY else "fake", problem.name, speed, current, r["goals"],
-                    r["words"], r["home"], f"{r['tether']:.3f}",
-                    f"{r['room']:.2f}, {problem.clearance:g}",
-                    f"{r['seconds']:.0f}, {r['seconds'] / r['predicted']:.2f}")  # fmt: skip
+                )
+                for problem in problems for current in currents
+            ]  # fmt: skip
+            share = [r["seconds"] / r["predicted"] for r in found if r["home"] == "yes"]
+            row("ArduSub" if BINARY else "fake", name, speed, len(found), len(share),
+                of_all(r["goals"] for r in found), of_all(r["words"] for r in found),
+                f"{max(r['tether'] for r in found):.3f}",
+                f"{min(r['room'] for r in found):.2f}, {problems[0].clearance:g}",
+                f"{np.median(share):.2f} / {max(share):.2f}" if share else "")  # fmt: skip
     print()
+
+
+def of_all(counts: Iterable[str]) -> str:
+    """Return the sum of counts such as "5 of 6"."""
+    pairs = [tuple(map(int, text.split(" of "))) for text in counts]
+    return f"{sum(p[0] for p in pairs)} of {sum(p[1] for p in pairs)}"
 
 
 def in_the_way(
@@ -434,7 +447,7 @@ def median(values: list[float]) -> str:
     return f"{np.median(values):.1f} / {max(values):.1f}" if values else ""
 
 
-def least(values: Iterator[float | None]) -> str:
+def least(values: Iterable[float | None]) -> str:
     found = [v for v in values if v is not None]
     return f"{min(found):.2f}" if found else ""
 
