@@ -42,6 +42,7 @@ from netsp.link.address import Address
 from netsp.link.dialect import dialect, parser
 from netsp.link.frame import Frame
 from netsp.link.messages import Listener
+from netsp.link.modes import mode_name
 from netsp.link.session import Session
 from netsp.link.udp import UdpLink, messages_in
 from netsp.online.scene.scene import scene_of
@@ -117,6 +118,14 @@ class Vehicle:
     @property
     def truth(self) -> np.ndarray:
         return np.array(self.session.truth)
+
+    @property
+    def state(self) -> tuple[bool | None, str | None]:
+        """Return whether it is armed, and its mode: what is true, not what was heard."""
+        if isinstance(self.session, SimulatedSession):
+            true = self.session.simulation.vehicle
+            return true.armed, mode_name(true.mode)
+        return self.session.now.armed, self.session.now.mode
 
 
 @contextmanager
@@ -486,7 +495,7 @@ def fly_failure(
             done, why = resume(v, run, options)
         end = v.now
         stand_by_for(v, BEYOND_S)
-        rows, armed, mode = v.truth, v.session.now.armed, v.session.now.mode
+        rows, (armed, mode) = v.truth, v.state
     late = rows[rows[:, 0] > end]
     early = rows[(rows[:, 0] >= begin) & (rows[:, 0] <= end)]
     home = done is not None and done.summary["home"] and done.summary["tether_free"]

@@ -6,7 +6,7 @@ than the recorded time for the tour of the wharf, 1 % more for that of the pool,
 the mission in space, whose single legs differ by up to 15 %. Its speeds are within 0.04 m/s, and
 its distance from the path within 0.05 m. Legs sag in depth within 0.1 m of the recording; on 30 m
 out and 11 m down by 1.8 m against 2.0 m with repeated targets, and not at all without, where the
-real one sagged by 0.5 m. At a right angle it overshoots by 0.5 to 0.6 m against 0.48 m. The drift
+real one sagged by 0.5 m. At a right angle it overshoots by 0.50 to 0.63 m against 0.48 m. The drift
 of a lost estimate (within 25 %) and the gate of a GPS that jumps come from one flight each. Above
 0.5 m/s nothing was recorded.
 

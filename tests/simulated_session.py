@@ -26,7 +26,7 @@ class SimulatedLink:
     def send(self, message: Any) -> bool:
         message.pack(parser(*self.ids))
         self.sent.append((self.simulation.now, message))
-        if not self.is_cut:
+        if not self.is_cut and not self.simulation.wire.silent:
             self.simulation.vehicle.receive(message)
         return True
 

@@ -52,7 +52,7 @@ ENDS = {
     "done": None,
     "Ctrl-C": stop,
     "pushed": lambda s: s.simulation.do(do="push", by=[-1.5, -2.5, 0]),
-    "link lost for a while": lambda s: s.simulation.do(do="silence", seconds=4.5),
+    "link lost for a while": lambda s: s.simulation.do(do="silence", seconds=4.0),
 }
 
 
