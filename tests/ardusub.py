@@ -25,21 +25,22 @@ HOME = "55.6,12.95,0,0"
 """Latitude, longitude, altitude and heading of where it starts."""
 
 PARAMETERS = {
-    "SYSID_THISMAV": 1, "FS_GCS_ENABLE": 0, "FS_PILOT_INPUT": 0, "FS_EKF_ACTION": 0,
-    "ARMING_CHECK": 0, "WPNAV_SPEED": 50,
+    "MAV_SYSID": 1, "FS_GCS_ENABLE": 0, "FS_PILOT_INPUT": 0, "FS_EKF_ACTION": 0,
+    "ARMING_SKIPCHK": -1, "WPNAV_SPEED": 50,
 }  # fmt: skip
 
 
 class ArduSub:
     """The process, for a test; the ground station listens on `port`."""
 
-    def __init__(self, pace: float = 1.0) -> None:
+    def __init__(self, pace: float = 1.0, parameters: dict[str, float] | None = None) -> None:
         self.port, self.pace = free_port(), pace
+        self.parameters = {**PARAMETERS, **(parameters or {})}
         self._folder = tempfile.TemporaryDirectory()
 
     def __enter__(self) -> ArduSub:
         defaults = Path(self._folder.name) / "defaults.parm"
-        defaults.write_text("".join(f"{k} {v}\n" for k, v in PARAMETERS.items()))
+        defaults.write_text("".join(f"{k} {v}\n" for k, v in self.parameters.items()))
         self.process = subprocess.Popen(
             [BINARY, "-S", "-w", "--model", "vectored", "--speedup", str(self.pace), "-I", "0",
              "--home", HOME, "--defaults", str(defaults),

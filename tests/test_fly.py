@@ -11,7 +11,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import netsp.fly.vehicle as linked
 from netsp import Circle, Problem, solve
 from netsp.command.main import main
 from netsp.errors import InputError
@@ -19,9 +18,11 @@ from netsp.execute.events import Surprises
 from netsp.execute.log import ExecutionOptions
 from netsp.fly.checks import ready
 from netsp.fly.flight import fly
+from netsp.fly.flight_policy import FlightPolicy
 from netsp.fly.inputs import event_of
 from netsp.fly.rehearsal import rehearse
 from netsp.fly.stopped import RefusedError
+from netsp.fly.vehicle import LinkedVehicle
 from netsp.guard.fix import Fix
 from netsp.link.address import Address
 from netsp.link.dialect import dialect, parser
@@ -29,6 +30,7 @@ from netsp.link.frame import Frame
 from netsp.link.messages import Listener
 from netsp.link.session import Session
 from netsp.link.udp import UdpLink, messages_in
+from netsp.link.vehicle_kind import VehicleKind
 from tests.ardusub import BINARY, REASON, ArduSub
 from tests.autopilot import Autopilot
 
@@ -50,8 +52,8 @@ def tour():
 def patience(monkeypatch):
     """At `PACE` two seconds of the vehicle are a quarter of one of ours, for which a busy machine
     holds either end up: only what is about lost links takes that for one."""
-    monkeypatch.setattr(linked, "SILENT_S", 60.0)
-    monkeypatch.setattr(linked, "UNPLACED_S", 60.0)
+    patient = FlightPolicy(max_silence_s=60.0, max_position_age_s=60.0)
+    monkeypatch.setattr(LinkedVehicle, "policy", patient)
 
 
 class Flown:
@@ -153,7 +155,7 @@ def test_an_armed_vehicle_is_not_refused_before_it_has_said_whether_it_is():
     said = iter([placed] * 5)
 
     class Heard:
-        silent_s = 0.0
+        silent_s, kind = 0.0, VehicleKind(12, 3)
         now = property(lambda self: next(said, replace(placed, armed=True, mode="GUIDED")))
 
         def ask_for_positions(self):
@@ -243,6 +245,27 @@ def test_events_that_come_in_are_asked_first():
     for line in ("[]", "{", '{"appear": 3}', '{"tether_length": -1}', "{}"):
         with pytest.raises(InputError, match="event"):
             event_of(line)
+
+
+@pytest.mark.parametrize("sent", [b"", b'{"cancel_goal": 1}\nrubbish\n{"cancel'])
+def test_a_command_that_waits_for_events_ends_with_its_own_exit_code(sent):
+    """Standard input stays open, as that of a shell does."""
+    program = (
+        "import sys, time\n"
+        "from netsp.fly.inputs import events_of\n"
+        "events, found = events_of(sys.stdin.buffer, print), []\n"
+        "time.sleep(0.2)  # so that it waits for a line when the program ends\n"
+        "while len(found) < int(sys.argv[1]):\n"
+        "    found += events()\n"
+        "sys.exit(3)\n"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", program, str(sent.count(b"cancel_goal"))],
+        stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
+    ) as command:  # fmt: skip
+        command.stdin.write(sent)
+        command.stdin.flush()
+        assert command.wait(60.0) == 3, command.stderr.read()
 
 
 def test_nobody_else_is_listened_to():
@@ -404,7 +427,8 @@ def test_disarming_that_nobody_looked_at_in_time_is_not_forgotten(tour):
 
 
 def test_a_vehicle_that_tells_no_positions_any_more_is_stopped(tour, monkeypatch):
-    monkeypatch.setattr(linked, "UNPLACED_S", 2.0)
+    patient = FlightPolicy(max_silence_s=60.0, max_position_age_s=2.0)
+    monkeypatch.setattr(LinkedVehicle, "policy", patient)
 
     def deaf():
         flown.session._listener._local_position_ned = lambda message: None

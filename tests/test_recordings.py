@@ -279,6 +279,54 @@ def m():
     return dialect()
 
 
+def tried(monkeypatch, m):
+    """The number of bytes that the parser of messages was given, in a list."""
+    total = [0]
+    decode, parse = m.MAVLink.decode, m.MAVLink.parse_char
+
+    def counted(read):
+        def wrapped(self, data):
+            total[0] += len(data)
+            return read(self, data)
+
+        return wrapped
+
+    monkeypatch.setattr(m.MAVLink, "decode", counted(decode))
+    monkeypatch.setattr(m.MAVLink, "parse_char", counted(parse))
+    return total
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [
+        (np.random.default_rng(5).bytes(40_000), "no telemetry log"),
+        (b"Notes of a dive, in words. " * 1500, "no telemetry log"),
+        (b"\xa3\x95" + np.random.default_rng(6).bytes(40_000), "end in .bin"),
+        (b"\x1f\x8b" + np.random.default_rng(7).bytes(40_000), "gunzip"),
+    ],
+    ids=["noise", "words", "vehicle's log", "gzip"],
+)
+def test_a_file_that_is_no_telemetry_log_is_refused_in_one_look(
+    tmp_path, m, monkeypatch, content, says
+):
+    (tmp_path / "wrong.tlog").write_bytes(content)
+    total = tried(monkeypatch, m)
+    with pytest.raises(InputError, match=says):
+        list(read_fixes(tmp_path / "wrong.tlog", Frame(SITE)))
+    assert total[0] < 2 * len(content)
+
+
+def test_a_damaged_telemetry_log_loses_only_the_messages_that_are_damaged(tmp_path, m):
+    file = tlog(tmp_path / "a.tlog", *vehicle(m))
+    data = bytearray(file.read_bytes())
+    whole = len(list(read_fixes(file, Frame(SITE))))
+    marker = data.index(m.PROTOCOL_MARKER_V2, 300)
+    data[marker + 11] ^= 0xFF  # a payload whose checksum is none any more
+    data[8:8] = b"\xfd\xfe\x01rest of a message"
+    file.write_bytes(data[:-3])
+    assert whole - len(list(read_fixes(file, Frame(SITE)))) in (1, 2, 3)
+
+
 FIX, NO_FIX = (580000100, 55000100), (0, 0)
 
 

@@ -62,6 +62,7 @@ from netsp.guard.reasons import (
 from netsp.guard.site import Loop
 from netsp.guard.track import Track
 from netsp.hsignature.words import concatenate, cyclically_reduced, entangled, invert, reduce
+from netsp.link.vehicle_kind import VehicleKind
 from netsp.lower_bound import LowerBound, Scope
 from netsp.site.contract import kind_of, words_of
 from netsp.site.feature import Feature
@@ -598,6 +599,7 @@ class Vehicle:
     """The part of a session that is used before a flight; it answers everything at once."""
 
     system, others, silent_s, unplaced_s, broken = 1, (), 0.0, 0.0, None
+    kind, echo = VehicleKind(12, 3), None
 
     def __init__(self, **told):
         kept = {"position": (0.0, 0.0, -1.0), "estimate": True, "armed": True, "mode": "GUIDED"}

@@ -29,8 +29,8 @@ MAPS = (
 """Sites in one file; shapefiles come in several, and images with a YAML beside them."""
 
 EXPORTS = {
-    "plan": "mission.plan", "wpl": "mission.waypoints", "geojson": "tour.geojson",
-    "kml": "tour.kml", "csv": "tour.csv",
+    "plan": "mission.plan", "wpl": "mission.waypoints", "cockpit": "mission.cmp",
+    "geojson": "tour.geojson", "kml": "tour.kml", "csv": "tour.csv",
 }  # fmt: skip
 """What a tour can be written as, and the name that it is offered under."""
 

@@ -32,8 +32,8 @@ def arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument("--problem", metavar="FILE", help="the problem that a solution solves")
     p.add_argument(
         "--format", metavar="NAME",
-        help="plan (QGroundControl), wpl (QGC WPL 110), geojson, kml, kmz or csv; default: by "
-        "the extension",
+        help="plan (QGroundControl), wpl (QGC WPL 110), cockpit (Cockpit, .cmp), geojson, kml, kmz "
+        "or csv; default: by the extension",
     )  # fmt: skip
     p.add_argument(
         "--origin", metavar="LAT,LON[,HEADING]",
@@ -60,6 +60,11 @@ def arguments(p: argparse.ArgumentParser) -> None:
         metavar="N",
         help="maximum number of waypoints; default 650",
     )
+    p.add_argument(
+        "--fence-bytes", type=positive, default=672, metavar="N",
+        help="storage of the vehicle for its fence, bytes; default 672, as of Pixhawk flight "
+        "controllers without a card",
+    )  # fmt: skip
     p.add_argument(
         "--margin", default="0.3,0.2", metavar="SLACK[,CLEARANCE]",
         help="warn where less tether is left or an obstacle is closer; default 0.3,0.2",
@@ -88,6 +93,7 @@ def run(args: argparse.Namespace) -> int:
     check_writable(args.output, inputs=(args.solution, args.problem))
     from netsp.export.common_depth import at_depth
     from netsp.export.export_notes import export_notes
+    from netsp.export.fence import MIN_FENCE_BYTES, FencePolicy
     from netsp.export.margins import warnings
     from netsp.export.write import Settings, export, format_of, predicted_s
     from netsp.judge import verify
@@ -106,13 +112,17 @@ def run(args: argparse.Namespace) -> int:
     elif (text := surface_warning(problem)) is not None:
         messages.warning(text)
     kind = format_of(args.output, args.format)
+    if args.fence_bytes < MIN_FENCE_BYTES:
+        raise InputError(
+            f"--fence-bytes: expected {MIN_FENCE_BYTES} or more, got {args.fence_bytes}"
+        )
     slack, clearance = margins(args.margin)
     projection = None
     if args.origin:
         projection = Projection.parse(args.origin, problem.base[:2], "--origin")
     settings = Settings(
         hold=args.hold, speed=SPEED if args.speed is None else args.speed,
-        max_waypoints=args.max_waypoints,
+        max_waypoints=args.max_waypoints, fence=FencePolicy(max_bytes=args.fence_bytes),
     )  # fmt: skip
     points = export(
         problem, solution, args.output, kind, projection, acceptance=args.acceptance,
@@ -151,7 +161,7 @@ def _mission(args: argparse.Namespace) -> int:
     from netsp.command.interrupts import until_interrupted
     from netsp.export.export_notes import bend_note
     from netsp.export.mission import export_mission
-    from netsp.export.write import SHALLOWEST, Settings, format_of, predicted_s
+    from netsp.export.write import FOR_VEHICLES, SHALLOWEST, Settings, format_of, predicted_s
     from netsp.online.mission import Mission
     from netsp.site.projection import Projection
 
@@ -195,7 +205,7 @@ def _mission(args: argparse.Namespace) -> int:
             f"the lines between waypoints come within {done.room:.2f} m of a solid, less than the "
             f"margin of {clearance:g}: plan with a larger clearance, or set another margin"
         )
-    if kind in ("plan", "wpl"):
+    if kind in FOR_VEHICLES:
         shallow = sum(p.position[2] > -SHALLOWEST for p in done.points)
         if shallow:
             messages.note(

@@ -16,10 +16,13 @@ from netsp.command.types import length, natural, seconds
 from netsp.errors import EXIT_DEFECT, EXIT_NOT_ALL, EXIT_NOT_VERIFIED, InputError
 
 if TYPE_CHECKING:
+    from netsp.clock import Clock
     from netsp.execute.events import Event
     from netsp.execute.log import Execution, ExecutionRow
+    from netsp.fly.resume import BeginsAt
     from netsp.guard.page import Page
     from netsp.link.frame import Frame
+    from netsp.link.session import Session
     from netsp.problem import Problem
     from netsp.solution import Solution
 
@@ -28,8 +31,22 @@ EXAMPLE = "netsp fly problems/wharf.json tour.json --link udpin:14550 -o run"
 
 def arguments(p: argparse.ArgumentParser) -> None:
     """Of the command line."""
-    p.add_argument("problem", metavar="PROBLEM", help="problem file (JSON)")
-    p.add_argument("solution", metavar="TOUR", help="its solution file (JSON)")
+    p.add_argument("problem", metavar="PROBLEM", nargs="?", help="problem file (JSON)")
+    p.add_argument("solution", metavar="TOUR", nargs="?", help="its solution file (JSON)")
+    p.add_argument(
+        "--resume", metavar="RUN",
+        help="go on with the flight in this folder, from where the vehicle is, in place of PROBLEM "
+        "and TOUR; writes RUN/resumed unless -o says where",
+    )  # fmt: skip
+    p.add_argument(
+        "--class", dest="word", metavar="WORD",
+        help="begin where the vehicle is, with a tether of this class: numbers of obstacles from "
+        "1, negative from right to left, such as --class=-1,2; '' for a straight tether",
+    )  # fmt: skip
+    p.add_argument(
+        "--class-from", metavar="FILE",
+        help="begin where the vehicle is, with the tether in the state file of netsp guard",
+    )  # fmt: skip
     p.add_argument(
         "--link", metavar="ADDRESS",
         help="MAVLink over UDP: udpin:PORT (this machine only), udpin:HOST:PORT, udpout:HOST:PORT",
@@ -40,6 +57,11 @@ def arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument(
         "--system", type=natural, default=1, metavar="N",
         help="system id of the vehicle; others are not listened to; default 1",
+    )  # fmt: skip
+    p.add_argument(
+        "--any-vehicle", action="store_true",
+        help="command any vehicle, not only a submarine with ArduPilot; for experts: others take "
+        "the same numbers for other modes",
     )  # fmt: skip
     p.add_argument(
         "--frame", metavar="NAME",
@@ -57,6 +79,11 @@ def arguments(p: argparse.ArgumentParser) -> None:
     p.add_argument(
         "--pace", type=length, default=1.0, metavar="F",
         help="seconds of the vehicle for each of ours: 1, but in simulations that run faster",
+    )  # fmt: skip
+    p.add_argument(
+        "--at-end", choices=("hold", "position-hold", "surface", "leave"), default="hold",
+        help="after the flight: hold the place in GUIDED, in POSHOLD, or come to the surface, "
+        "until another ground station is heard or Ctrl-C; or leave the vehicle; default hold",
     )  # fmt: skip
     p.add_argument("--surprise", metavar="FILE", help="surprise file (JSON): events on the way")
     p.add_argument(
@@ -84,40 +111,22 @@ def run(args: argparse.Namespace) -> int:
     if args.link is None and not args.dry_run:
         raise InputError("--link: missing; expected the vehicle's address, or --dry-run")
     from netsp.execute.events import Surprises
-    from netsp.judge import verify
     from netsp.link.frame import Frame
-    from netsp.problem import Problem
-    from netsp.solution import Solution
 
-    problem, solution = Problem.load(args.problem), Solution.load(args.solution)
+    problem, solution, begins = _given(args)
     surprises = Surprises.load(args.surprise) if args.surprise else None
     if surprises is not None:
         surprises.check(problem, args.surprise)
     if problem.units != "m":
         raise InputError(f"units: a vehicle goes by metres; expected m, got {problem.units!r}")
-    judged = verify(problem, solution)
-    if not judged:
-        failed = next(c for c in judged.checks if not c.passed)
-        raise InputError(f"{args.solution}: fails its check {failed.name!r}: {failed.detail}")
     frame = Frame(problem, args.frame)
     if args.dry_run:
         print_targets(problem, solution, frame)
         return 0
-    done = _flown(args, problem, solution, frame, surprises)
-    if args.output is not None:
-        from netsp.execute.write import write_execution
-        from netsp.pictures.execution import save_execution
-
-        write_execution(done, args.output)
-        save_execution(done, Path(args.output) / "run.png")
-    if args.output is None or args.json:
-        told.tell(done.summary)
-    if not args.quiet:
-        from netsp.execute.log import describe_execution
-
-        print(describe_execution(done), file=sys.stderr)
-        if done.stopped or done.interrupted:
-            print(way_home(done), file=sys.stderr)
+    with ExitStack() as stack:
+        done, session, clock = _flown(args, problem, solution, frame, surprises, begins, stack)
+        _tell(args, done)
+        _stand_by(args, session, clock)
     s = done.summary
     if s["defects"]:
         return EXIT_DEFECT
@@ -126,15 +135,105 @@ def run(args: argparse.Namespace) -> int:
     return EXIT_NOT_ALL if s["left_out"] or s["status"] != "done" else 0
 
 
+def _given(args: argparse.Namespace) -> tuple[Problem, Solution, BeginsAt | None]:
+    """Return problem and tour, and how the flight begins if not at the start of the tour."""
+    from netsp.fly.resume import (
+        from_guard,
+        from_record,
+        from_word,
+        parse_class,
+        read_run,
+        whole_tour,
+    )
+    from netsp.judge import verify
+    from netsp.problem import Problem
+    from netsp.solution import Solution
+
+    if args.word is not None and args.class_from is not None:
+        raise InputError("--class-from: expected either this or --class")
+    word = None if args.word is None else parse_class(args.word)
+    begins_elsewhere = any(x is not None for x in (args.resume, word, args.class_from))
+    if args.dry_run and begins_elsewhere:
+        raise InputError("--dry-run: what is left is planned where the vehicle is; expected a tour")
+    if args.resume is None:
+        if args.problem is None or args.solution is None:
+            raise InputError("PROBLEM, TOUR: missing; expected two files, or --resume RUN")
+        problem, solution = Problem.load(args.problem), Solution.load(args.solution)
+        judged = verify(problem, solution)
+        if not judged:
+            failed = next(c for c in judged.checks if not c.passed)
+            raise InputError(f"{args.solution}: fails its check {failed.name!r}: {failed.detail}")
+        state = None
+    else:
+        if args.problem is not None:
+            raise InputError("--resume: has problem and tour; expected no PROBLEM and TOUR")
+        problem, solution, state = read_run(args.resume)
+        args.output = args.output or _next_folder(args.resume)
+        if Path(args.output).resolve() == Path(args.resume).resolve():
+            raise InputError("-o: is the folder of the flight before; expected another one")
+    if not begins_elsewhere:
+        return problem, solution, None
+    left = state or whole_tour(problem, solution)
+    if word is not None:
+        return problem, solution, from_word(problem, word, left)
+    if args.class_from is not None:
+        return problem, solution, from_guard(problem, args.class_from, left)
+    return problem, solution, from_record(problem, left)
+
+
+def _next_folder(run: str) -> str:
+    """Return a folder for a flight that is resumed, which is not there yet."""
+    names = ("resumed", *(f"resumed-{k}" for k in range(2, 1000)))
+    return str(next(f for name in names if not (f := Path(run) / name).exists()))
+
+
+def _tell(args: argparse.Namespace, done: Execution) -> None:
+    """Write the files of the run, and tell what came of it."""
+    if args.output is not None:
+        from netsp.execute.write import write_execution
+        from netsp.pictures.execution import save_execution
+
+        write_execution(done, args.output)
+        save_execution(done, Path(args.output) / "run.png")
+    if args.output is None or args.json:
+        told.tell(done.summary)
+        sys.stdout.flush()
+    if not args.quiet:
+        from netsp.execute.log import describe_execution
+
+        print(describe_execution(done), file=sys.stderr)
+        if done.stopped or done.interrupted:
+            print(way_home(done), file=sys.stderr)
+
+
+def _stand_by(args: argparse.Namespace, session: Session, clock: Clock) -> None:
+    """Look after the vehicle until somebody else has it, or Ctrl-C: the second one, where the first
+    has ended the flight."""
+    from netsp.fly.standby import stand_by
+
+    has_stopped = clock.stopped
+
+    def say(text: str) -> None:
+        for line in session.texts():
+            print(f"the vehicle says: {line}", file=sys.stderr)
+        print(f"netsp: {text}", file=sys.stderr, flush=True)
+
+    # where the first Ctrl-C has ended the flight, the next one interrupts
+    stand_by(session, args.at_end, say=say, should_stop=lambda: clock.stopped and not has_stopped)
+
+
 def _flown(
-    args: argparse.Namespace, problem: Problem, solution: Solution, frame: Frame, surprises: object
-) -> Execution:
+    args: argparse.Namespace, problem: Problem, solution: Solution, frame: Frame,
+    surprises: object, begins: BeginsAt | None, stack: ExitStack,
+) -> tuple[Execution, Session, Clock]:  # fmt: skip
+    """Fly the tour; the link stays open until the stack is left."""
     from netsp.clock import until_interrupt
     from netsp.command.compiling import compile_messages
     from netsp.command.execute import show_execution
     from netsp.execute.events import Surprises
     from netsp.execute.log import ExecutionOptions
     from netsp.execute.repair import REPLAN_S
+    from netsp.execute.run_record import RunRecord
     from netsp.files import output_folder
     from netsp.fly.flight import check_options, fly
     from netsp.fly.rehearsal import rehearse
@@ -152,49 +251,49 @@ def _flown(
     assert surprises is None or isinstance(surprises, Surprises)
     address = Address.parse(args.link)
     check_options(options, surprises)
-    with ExitStack() as stack:
-        stack.enter_context(output_folder(args.output))
-        stack.enter_context(nullcontext() if args.quiet else compile_messages(sys.stderr))
-        rehearse()
-        page, sources = None, []
-        if args.events:
-            from netsp.fly.inputs import events_of
+    stack.enter_context(output_folder(args.output))
+    stack.enter_context(nullcontext() if args.quiet else compile_messages(sys.stderr))
+    rehearse()
+    page, sources = None, []
+    if args.events:
+        from netsp.fly.inputs import events_of
 
-            sources.append(events_of(getattr(sys.stdin, "buffer", sys.stdin), complain))
-        if args.page is not None:
-            from netsp.guard.page import Page
+        sources.append(events_of(getattr(sys.stdin, "buffer", sys.stdin), complain))
+    if args.page is not None:
+        from netsp.guard.page import Page
 
-            page = stack.enter_context(Page(problem, args.page, takes_events=True))
-            print(f"the page is {page.address}", file=sys.stderr)
-            sources.append(_from(page, complain))
-        shows = not args.quiet and sys.stderr.isatty()
-        told = show_execution(problem) if shows else None
-        watched = None if page is None else _watched(problem, page, args.speed)
-        # the link last: while it is open, the vehicle counts on our heartbeats
-        session = Session(UdpLink(address), frame, args.system, args.pace)
-        stack.callback(session.close)
-        if not args.quiet:
-            print(f"waiting for system {args.system} on {args.link}", file=sys.stderr)
-        clock = stack.enter_context(until_interrupt(None))
+        page = stack.enter_context(Page(problem, args.page, takes_events=True))
+        print(f"the page is {page.address}", file=sys.stderr)
+        sources.append(_from(page, complain))
+    shows = not args.quiet and sys.stderr.isatty()
+    told = show_execution(problem) if shows else None
+    watched = None if page is None else _watched(problem, page, args.speed)
+    # the link last: while it is open, the vehicle counts on our heartbeats
+    session = Session(UdpLink(address), frame, args.system, args.pace)
+    stack.callback(session.close)
+    if not args.quiet:
+        print(f"waiting for system {args.system} on {args.link}", file=sys.stderr)
+    clock = stack.enter_context(until_interrupt(None))
 
-        def on_step(row: ExecutionRow) -> None:
-            if clock.stopped:
-                raise KeyboardInterrupt
-            for text in session.texts():
-                if not args.quiet:
-                    print(f"\nthe vehicle says: {text}", file=sys.stderr)
-            for call in (told, watched):
-                if call is not None:
-                    call(row)
+    def on_step(row: ExecutionRow) -> None:
+        if clock.stopped:
+            raise KeyboardInterrupt
+        for text in session.texts():
+            if not args.quiet:
+                print(f"\nthe vehicle says: {text}", file=sys.stderr)
+        for call in (told, watched):
+            if call is not None:
+                call(row)
 
-        done = fly(
-            problem, solution, session, options, surprises=surprises, on_step=on_step,
-            should_stop=lambda: clock.stopped,
-            incoming=(lambda: [e for s in sources for e in s()]) if sources else None,
-        )  # fmt: skip
-        if done.stopped:
-            session.say(f"flight stopped: {done.stopped}", urgent=True)
-        return done
+    done = fly(
+        problem, solution, session, options, surprises=surprises, on_step=on_step,
+        should_stop=lambda: clock.stopped, any_vehicle=args.any_vehicle, begins=begins,
+        record=None if args.output is None else RunRecord(args.output, solution),
+        incoming=(lambda: [e for s in sources for e in s()]) if sources else None,
+    )  # fmt: skip
+    if done.stopped:
+        session.say(f"flight stopped: {done.stopped}", urgent=True)
+    return done, session, clock
 
 
 def _from(page: Page, complain: Callable[[str], None]) -> Callable[[], list[Event]]:

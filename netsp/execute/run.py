@@ -16,6 +16,7 @@ from netsp.execute.log import Arrival, Entry, Execution, ExecutionOptions, Execu
 from netsp.execute.plan import HOME, Leg, legs_of
 from netsp.execute.ready import make_ready
 from netsp.execute.repair import Repair, broken, reachable, repair
+from netsp.execute.run_record import Begun, LeftOut, RunRecord, RunState
 from netsp.fields import LARGEST, checked_argument, checked_instance
 from netsp.geometry import polylines
 from netsp.hsignature import signature
@@ -76,16 +77,20 @@ class _Run:
 
     def __init__(
         self, problem: Problem, solution: Solution, options: ExecutionOptions,
-        live: LiveVehicle | None = None,
+        live: LiveVehicle | None = None, begun: Begun | None = None,
     ) -> None:  # fmt: skip
         self.out = Execution(problem, solution, options)
         self.problem, self.options = problem, options
-        self.legs: list[Leg] = legs_of(problem, solution)
+        self.legs: list[Leg] = [] if begun is not None else legs_of(problem, solution)
         self.start = np.array(problem.base if problem.state is None else problem.state.position)
         self.delta = options.delta or suggested_delta(problem)
         self.now = 0.0
         self._enter(problem)
-        if problem.state is None:
+        if begun is not None:
+            self.start = begun.tether[-1]
+            anchor = self.model.start(begun.tether[0], begun.tether[0])
+            self.tether = self.model.refine(self.model.drive(anchor, begun.tether[1:])[0])
+        elif problem.state is None:
             self.tether = self.model.start(problem.base, problem.base)
         else:
             self.tether = self.model.lay(np.array(solution.start_tether))
@@ -98,7 +103,7 @@ class _Run:
         self.mode, self.fresh, self.leg_s = "tour", True, 0.0
         self.shorten = False
         self.unreachable: set[int] = set()
-        self.path = self.legs[0].path
+        self.path = self.legs[0].path if self.legs else np.array([self.vehicle.position])
 
     def _enter(self, problem: Problem) -> None:
         """The scene of a problem."""
@@ -106,6 +111,21 @@ class _Run:
         self.out.maps.append((round(self.now, 6), problem))
         self.scene: DistanceField = scene_of(problem).field()
         self.model = GeodesicTether(self.scene, self.delta)
+
+    def resume(self, begun: Begun) -> None:
+        """Plan what is left of a run from where the robot is."""
+        self.out.left_out |= begun.left_out
+        self.out.cancelled |= dict.fromkeys(begun.cancelled, 0.0)
+        self._mend(begun.why, list(begun.left), "resumed")
+
+    @property
+    def state(self) -> RunState:
+        """State that the run can be resumed from."""
+        return RunState(
+            time=max(self.now, 0.0), tether=tuple(map(tuple, self.tether.nodes.tolist())),
+            left=tuple(self.left), cancelled=tuple(sorted(self.out.cancelled)),
+            left_out=tuple(LeftOut(goal=g, reason=why) for g, why in self.out.left_out.items()),
+        )  # fmt: skip
 
     # a step
 
@@ -354,6 +374,8 @@ def execute(
     on_step: Callable[[ExecutionRow], None] | None = None,
     vehicle: LiveVehicle | None = None,
     incoming: Callable[[], list[Event]] | None = None,
+    record: RunRecord | None = None,
+    begun: Begun | None = None,
 ) -> Execution:
     """Carry out a solution in the scene of its problem.
 
@@ -376,6 +398,10 @@ def execute(
         One that is not simulated; `StopsFlightError` of it ends the run as well.
     incoming : callable, optional
         Asked at every step for events that have come since.
+    record : RunRecord, optional
+        Takes every row, and the state, as the run goes on.
+    begun : Begun, optional
+        Beginning elsewhere than at the start of the solution: what is left is planned from there.
 
     Returns
     -------
@@ -406,8 +432,8 @@ def execute(
         raise InputError(f"seed: expected a whole number from 0 on, got {options.seed!r}")
     if solution.status is Status.INVALID or solution.length is None:
         raise InputError(f"solution: has status {solution.status.value}; expected a tour that fits")
-    judged = verify(problem, solution)
-    if not judged:
+    judged = verify(problem, solution) if begun is None else None
+    if judged is not None and not judged:
         failed = next(c for c in judged.checks if not c.passed)
         raise InputError(f"solution: fails its check {failed.name!r}: {failed.detail}")
     surprises.check(problem)
@@ -420,29 +446,38 @@ def execute(
             f"delta: expected at most {coarsest:.4g}, or the tether would slip through the "
             f"thinnest obstacle, got {options.delta!r}"
         )
-    if (surprises.events or incoming is not None) and options.repair:
+    if (surprises.events or incoming is not None or begun is not None) and options.repair:
         make_ready()
     begin = time.perf_counter()
-    run = _Run(problem, solution, options, vehicle)
+    run = _Run(problem, solution, options, vehicle, begun)
+
+    def note() -> ExecutionRow:
+        row = run.note()
+        if record is not None:
+            record.take(row, run.problem, lambda: run.state)
+        return row
+
     coming = sorted(surprises.events, key=lambda e: e.time)
     try:
+        if begun is not None:
+            run.resume(begun)
         while run.legs:
             while coming and coming[0].time <= run.now:
                 run.happen(coming.pop(0))
             for event in incoming() if incoming is not None else ():
                 run.asked(event)
-            row = run.note()
+            row = note()
             if on_step is not None:
                 on_step(row)
             run.go()
-        run.note()
+        note()
         for event in coming:
             run.too_late(event)
     except KeyboardInterrupt:
         run.out.interrupted = True
     except StopsFlightError as stop:
         run.out.stopped = stop.reason
-        run.note()
+        note()
     run.out.tethers.append((round(run.now, 6), run.tether.nodes.copy()))
     # a corner may have held it back for the few rounds of an update
     run.out.free = tether_is_free(run.model.refine(run.tether), run.delta)

@@ -5,20 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from netsp.errors import counted
+from netsp.export.fence import Fence
 from netsp.export.waypoints import Waypoint
 from netsp.export.write import (
-    MOST_FENCE_POINTS,
+    FOR_VEHICLES,
     SHALLOWEST,
     Settings,
-    fence_points,
+    fence_of_points,
     not_written,
     told_apart,
 )
 from netsp.problem import Problem
 from netsp.site.goal_depths import height_warning
-
-MISSION_FILES = ("plan", "wpl")
-"""Formats that a vehicle flies."""
 
 
 @dataclass(frozen=True)
@@ -56,15 +54,11 @@ def export_notes(
     warnings, notes = [], []
     if kind != "csv" and (text := not_written(problem, kind)):
         notes.append(text)
-    if kind in MISSION_FILES and (text := bend_note(points, settings)):
+    if kind in FOR_VEHICLES and (text := bend_note(points, settings)):
         notes.append(text)
-    if kind in MISSION_FILES:
-        count = fence_points(problem)
-        if kind == "plan" and count > MOST_FENCE_POINTS:
-            warnings.append(
-                f"the obstacles take {count} fence points; the vehicle stores about "
-                f"{MOST_FENCE_POINTS} without a card"
-            )
+    if kind in FOR_VEHICLES:
+        if kind == "plan":
+            warnings += _fence_warnings(problem, fence_of_points(problem, points, settings))
         remedy = f"heights are negative below it; moved to {SHALLOWEST} m of depth"
         if (text := height_warning(problem, remedy)) is not None:
             warnings.append(text)
@@ -95,3 +89,24 @@ def bend_note(points: list[Waypoint], settings: Settings) -> str | None:
         f"the vehicle holds {seconds} s at bends, because it holds {settings.bend} s at goals: "
         "this tells goals from bends when the file is imported"
     )
+
+
+def _fence_warnings(problem: Problem, fence: Fence) -> list[str]:
+    """Return what of the obstacles the fence of a plan does not hold as it is, one line each."""
+    lines = []
+    if fence.simplified:
+        most = max(z.growth for z in fence.simplified)
+        lines.append(
+            f"{counted(len(fence.simplified), 'obstacle')} simplified in the fence, which reaches "
+            f"up to {most:.2g} {problem.units} beyond them: the vehicle does not store more; "
+            "expected a larger --fence-bytes if yours does"
+        )
+    if fence.left_out:
+        names = [problem.obstacle_name(k) for k in fence.left_out[:3]]
+        more = ", …" if len(fence.left_out) > 3 else ""
+        lines.append(
+            f"{counted(len(fence.left_out), 'obstacle')} left out of the fence "
+            f"({', '.join(names)}{more}), the farthest from the tour: the vehicle does not store "
+            "more; expected a larger --fence-bytes if yours does"
+        )
+    return lines

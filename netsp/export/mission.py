@@ -19,7 +19,14 @@ from netsp.arrays import Floats
 from netsp.errors import InputError
 from netsp.execute.plan import HOME
 from netsp.export.waypoints import STRAIGHT, Waypoint, turn
-from netsp.export.write import FORMATS, Settings, check_settings, told_apart, write_page
+from netsp.export.write import (
+    FOR_VEHICLES,
+    FORMATS,
+    Settings,
+    check_settings,
+    told_apart,
+    write_page,
+)
 from netsp.fields import Point3, checked_argument
 from netsp.geometry import polylines
 from netsp.online.mission import Mission
@@ -99,13 +106,13 @@ def export_mission(
     if projection is None and kind != "csv":
         raise InputError(f"origin: format {kind!r} needs latitude and longitude of the start")
     points = _waypoints(mission, projection)
-    if len(points) > settings.max_waypoints and kind in ("plan", "wpl"):
+    if len(points) > settings.max_waypoints and kind in FOR_VEHICLES:
         raise InputError(
             f"mission: needs {len(points)} waypoints, and the vehicle takes "
             f"{settings.max_waypoints}; raise that number if yours takes more"
         )
     high = max(p.position[2] for p in points)
-    if high > surface and kind in ("plan", "wpl"):
+    if high > surface and kind in FOR_VEHICLES:
         raise InputError(
             f"surface: {surface:g} is below the tour, which rises to z {high:.4g}; expected the z "
             "of the water's surface"

@@ -1,4 +1,5 @@
-"""Mission files: QGroundControl plans and waypoint lists for ArduSub, GeoJSON, KML and CSV.
+"""Mission files: QGroundControl plans, waypoint lists and Cockpit missions for ArduSub, GeoJSON,
+KML and CSV.
 
 Formats: QGroundControl's plan files and MAVLink's mission items; RFC 7946 for GeoJSON, which has no
 circle, so that obstacles are points with `radius_m`. ArduSub: depth is a negative altitude relative
@@ -14,9 +15,10 @@ from __future__ import annotations
 import csv
 import io
 import json
+import math
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +26,8 @@ import numpy as np
 
 from netsp.errors import InputError
 from netsp.execute.plan import HOME
+from netsp.export.cockpit_mission import cockpit_mission
+from netsp.export.fence import Fence, FencePolicy, fence_of
 from netsp.export.kml import kml_of, kmz_of
 from netsp.export.waypoints import Waypoint, waypoints_of
 from netsp.fields import checked_argument, checked_instance
@@ -43,9 +47,6 @@ MOST_ITEMS = 650
 
 FASTEST = 20.0
 """Metres per second that no underwater vehicle reaches."""
-
-MOST_FENCE_POINTS = 70
-"""Fence points that ArduSub stores without a card, about."""
 
 NAV_WAYPOINT, CHANGE_SPEED, RELATIVE_ALTITUDE, MISSION_FRAME = 16, 178, 3, 2
 GROUND_SPEED, KEEP_THROTTLE = 1, -1
@@ -72,12 +73,15 @@ class Settings:
         m/s; None leaves it to the vehicle.
     max_waypoints
         Waypoints.
+    fence
+        Policy of what the fence of a plan may take.
     """
 
     hold: int | None = None
     bend: int = 1
     speed: float | None = 0.5
     max_waypoints: int = MOST_ITEMS
+    fence: FencePolicy = field(default_factory=FencePolicy)
 
 
 def export(
@@ -136,7 +140,7 @@ def export(
         )
     points = [start_of(problem, solution), *waypoints_of(problem, solution, acceptance)]
     settings = told_apart(points, settings)
-    if len(points) > settings.max_waypoints and kind in ("plan", "wpl"):
+    if len(points) > settings.max_waypoints and kind in FOR_VEHICLES:
         raise InputError(
             f"solution: needs {len(points)} waypoints, and the vehicle takes "
             f"{settings.max_waypoints}; raise that number if yours takes more"
@@ -220,9 +224,9 @@ def predicted_s(points: list[Waypoint], settings: Settings) -> float | None:
     return float(moving.sum()) + sum(_hold(p, settings) for p in points)
 
 
-def fence_points(problem: Problem) -> int:
-    """How many fence points the obstacles take: a circle one, a polygon its corners."""
-    return sum(1 if isinstance(o, Circle) else len(o.polygon) for o in problem.obstacles)
+def fence_of_points(problem: Problem, points: list[Waypoint], settings: Settings) -> Fence:
+    """Return the fence that a plan of these waypoints has."""
+    return fence_of(problem, [p.position[:2] for p in points], settings.fence)
 
 
 def not_written(problem: Problem, kind: str) -> str | None:
@@ -236,7 +240,7 @@ def not_written(problem: Problem, kind: str) -> str | None:
         One of `FORMATS`.
     """
     lost = []
-    if kind == "wpl":
+    if kind in ("wpl", "cockpit"):
         lost += ["the tether's length", "the clearance"]
         lost += ["obstacles"] if problem.obstacles else []
         lost += ["names of goals"] if any(g.name is not None for g in problem.goals) else []
@@ -306,10 +310,13 @@ def _plan(
         item["doJumpId"] = k + 1
     circles: list[Any] = []
     polygons: list[Any] = []
-    for o in problem.obstacles:
+    fence = fence_of_points(problem, points, settings)
+    for zone in fence.zones:
+        o = zone.shape
         if isinstance(o, Circle):
             ((lat, lon),) = projection.to_earth([o.center])
-            centre = {"center": [_degrees(lat), _degrees(lon)], "radius": round(o.radius, 3)}
+            radius = math.ceil(1000.0 * o.radius - 1e-3) / 1000.0  # no smaller than the obstacle
+            centre = {"center": [_degrees(lat), _degrees(lon)], "radius": radius}
             circles.append({"version": 1, "inclusion": False, "circle": centre})
         else:
             corners = [[_degrees(a), _degrees(b)] for a, b in projection.to_earth(o.polygon)]
@@ -319,6 +326,10 @@ def _plan(
         "netsp": {
             "tether_length": problem.tether_length, "clearance": problem.clearance,
             "heading": projection.heading,
+            "fence": {
+                "simplified": [problem.obstacle_name(z.obstacle) for z in fence.simplified],
+                "left_out": [problem.obstacle_name(k) for k in fence.left_out],
+            },
         },
         "geoFence": {"version": 2, "circles": circles, "polygons": polygons},
         "rallyPoints": {"version": 2, "points": []},
@@ -362,6 +373,15 @@ def _wpl(
             rows.append([2, 0, MISSION_FRAME, CHANGE_SPEED, GROUND_SPEED, settings.speed,
                          KEEP_THROTTLE, 0, 0, 0, 0, 1])  # fmt: skip
     return "QGC WPL 110\n" + "".join("\t".join(map(_cell, r)) + "\n" for r in rows)
+
+
+def _cockpit(
+    problem: Problem, points: list[Waypoint], projection: Projection | None, settings: Settings
+) -> str:
+    assert projection is not None
+    holds = [_hold(p, settings) for p in points]
+    depths = [altitude(p.position[2]) for p in points]
+    return cockpit_mission(problem.name, points, holds, depths, projection, settings.speed)
 
 
 def _cell(value: Any) -> str:
@@ -459,18 +479,22 @@ def _kml(
 FORMATS: dict[str, Callable[[Problem, list[Waypoint], Projection | None, Settings], str]] = {
     "plan": _plan,
     "wpl": _wpl,
+    "cockpit": _cockpit,
     "geojson": _geojson,
     "kml": _kml,
     "csv": _csv,
     "kmz": _kml,  # packed by `write_page`
 }
 
-__all__ = ["FORMATS", "Settings", "altitude", "export"]
+FOR_VEHICLES = ("plan", "wpl", "cockpit")
+"""Formats that are uploaded to a vehicle, with its limits and depths."""
+
+__all__ = ["FORMATS", "FOR_VEHICLES", "Settings", "altitude", "export"]
 
 
 EXTENSIONS = {
-    ".plan": "plan", ".waypoints": "wpl", ".txt": "wpl", ".geojson": "geojson", ".json": "geojson",
-    ".kml": "kml", ".kmz": "kmz", ".csv": "csv",
+    ".plan": "plan", ".waypoints": "wpl", ".txt": "wpl", ".cmp": "cockpit", ".geojson": "geojson",
+    ".json": "geojson", ".kml": "kml", ".kmz": "kmz", ".csv": "csv",
 }  # fmt: skip
 """Which format a file's name asks for."""
 

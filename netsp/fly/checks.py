@@ -19,8 +19,9 @@ LOOK_S = 0.1
 
 
 def ready(
-    session: Session, start: Floats, near: float, should_stop: Callable[[], bool] = lambda: False
-) -> None:
+    session: Session, start: Floats, near: float, should_stop: Callable[[], bool] = lambda: False,
+    *, any_vehicle: bool = False,
+) -> None:  # fmt: skip
     """Have a vehicle ready to be told where to go, or refuse.
 
     Parameters
@@ -33,12 +34,15 @@ def ready(
         Metres from there at most.
     should_stop : callable, optional
         Asked while it waits; a KeyboardInterrupt is raised then.
+    any_vehicle : bool
+        Command any vehicle; by default only a submarine with ArduPilot, because others take the
+        same numbers for other modes and targets.
 
     Raises
     ------
     RefusedError
-        It does not speak, has no position estimate, is away from the start or disarmed, or does
-        not take the mode GUIDED.
+        It does not speak, is no submarine with ArduPilot, has no position estimate, is away from
+        the start or disarmed, or does not take the mode GUIDED.
     """
 
     def until(holds: Callable[[], bool]) -> bool:
@@ -51,6 +55,12 @@ def ready(
                 f"{session.system} for {WAIT_S:g} s: is that its id?"
             )
         raise RefusedError(f"no vehicle has been heard for {WAIT_S:g} s: is the link right?")
+    kind = session.kind
+    if not (any_vehicle or (kind is not None and kind.is_ardusub)):
+        raise RefusedError(
+            f"system {session.system} is no submarine with ArduPilot: it says that it is a "
+            f"{kind}; choose another with --system, or command it anyway with --any-vehicle"
+        )
     session.ask_for_positions()
     m = dialect()
 

@@ -11,11 +11,15 @@ from netsp.errors import InputError
 from netsp.execute.events import Event, Surprises
 from netsp.execute.log import Execution, ExecutionOptions, ExecutionRow
 from netsp.execute.run import StopsFlightError, execute
+from netsp.execute.run_record import RunRecord
 from netsp.fly.checks import ready
+from netsp.fly.flight_policy import FlightPolicy
 from netsp.fly.rehearsal import rehearse
+from netsp.fly.resume import BeginsAt
 from netsp.fly.vehicle import LinkedVehicle
 from netsp.judge import verify
 from netsp.link.dialect import dialect
+from netsp.link.modes import ALT_HOLD
 from netsp.link.session import Session
 from netsp.problem import Problem
 from netsp.solution import Solution
@@ -25,9 +29,6 @@ NEAR_START = 2.0
 
 LEAST_REACH = 0.15
 """Metres: targets are a decimetre deep where the tour is at the surface, and it holds to 0.13."""
-
-ALT_HOLD = 2
-"""The mode that a vehicle without an estimate is put in: it keeps its depth and goes nowhere."""
 
 
 def fly(
@@ -40,6 +41,10 @@ def fly(
     incoming: Callable[[], list[Event]] | None = None,
     on_step: Callable[[ExecutionRow], None] | None = None,
     should_stop: Callable[[], bool] = lambda: False,
+    policy: FlightPolicy | None = None,
+    any_vehicle: bool = False,
+    record: RunRecord | None = None,
+    begins: BeginsAt | None = None,
 ) -> Execution:
     """Carry a tour out with a vehicle.
 
@@ -62,6 +67,15 @@ def fly(
         Called with every row; a KeyboardInterrupt ends the flight.
     should_stop : callable, optional
         Asked while the vehicle is not ready yet; a KeyboardInterrupt is raised then.
+    policy : FlightPolicy, optional
+        Limits of the flight.
+    any_vehicle : bool
+        Command any vehicle; by default only a submarine with ArduPilot.
+    record : RunRecord, optional
+        Takes every row, and the state, as the flight goes on.
+    begins : callable, optional
+        Says how the tether lies, and what is left, where the vehicle is; by default the flight
+        begins at the start of the tour.
 
     Returns
     -------
@@ -76,18 +90,20 @@ def fly(
         As of `netsp.fly.checks.ready`.
     """
     options = options or ExecutionOptions(reach=0.3)
-    judged = verify(problem, solution)
-    if not judged:
+    judged = verify(problem, solution) if begins is None else None
+    if judged is not None and not judged:
         failed = next(c for c in judged.checks if not c.passed)
         raise InputError(f"solution: fails its check {failed.name!r}: {failed.detail}")
     check_options(options, surprises)
     rehearse()
     start = np.array(problem.base if problem.state is None else problem.state.position)
-    ready(session, start, NEAR_START, should_stop)
-    vehicle = LinkedVehicle(session, options.reach)
+    near = NEAR_START if begins is None else np.inf
+    ready(session, start, near, should_stop, any_vehicle=any_vehicle)
+    begun = begins and begins(np.array(session.now.position))
+    vehicle = LinkedVehicle(session, options.reach, policy)
     done = execute(
         problem, solution, replace(options, vehicle="linked"), surprises=surprises,
-        on_step=on_step, vehicle=vehicle, incoming=incoming,
+        on_step=on_step, vehicle=vehicle, incoming=incoming, record=record, begun=begun,
     )  # fmt: skip
     if done.stopped or done.interrupted:
         _leave(session, vehicle)

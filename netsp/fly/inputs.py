@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import queue
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import BinaryIO, TextIO
 
 from pydantic import ValidationError
@@ -13,14 +14,20 @@ from netsp.errors import InputError
 from netsp.execute.events import Event
 from netsp.models import explain, parse_json_object
 
-MOST_LINE = 100_000
-"""Characters of a line."""
+MAX_LINE = 100_000
+"""Longest line of events, characters or bytes; a longer one is taken in pieces and refused."""
+
+MAX_READ = 65_536
+"""Most bytes taken from a stream at once."""
 
 
 def events_of(
     stream: TextIO | BinaryIO, complain: Callable[[str], None]
 ) -> Callable[[], list[Event]]:
-    """Events from a stream, which a thread of its own reads.
+    """Read events from a stream in a thread of its own.
+
+    A stream with a file descriptor is read past Python's buffers: a thread that waits for a line
+    holds the lock of the buffer, and Python aborts at its exit if it cannot have that lock.
 
     Parameters
     ----------
@@ -38,7 +45,7 @@ def events_of(
     waiting: queue.Queue[Event] = queue.Queue()
 
     def read() -> None:
-        while line := stream.readline(MOST_LINE):
+        for line in _lines_of(stream):
             if not line.strip():
                 continue
             try:
@@ -58,8 +65,31 @@ def events_of(
     return since
 
 
+def _lines_of(stream: TextIO | BinaryIO) -> Iterator[str | bytes]:
+    """Yield the lines of a stream as they come, until it ends."""
+    try:
+        number = stream.fileno()
+    except (OSError, AttributeError):  # held in memory: nobody waits for it
+        while line := stream.readline(MAX_LINE):
+            yield line
+        return
+    rest = b""
+    while True:
+        try:
+            data = os.read(number, MAX_READ)
+        except OSError:  # closed while it waited
+            data = b""
+        *lines, rest = (rest + data).split(b"\n")
+        yield from lines
+        if not data or len(rest) > MAX_LINE:
+            yield rest
+            rest = b""
+        if not data:
+            return
+
+
 def event_of(line: str) -> Event:
-    """An event from a line of JSON; InputError for what is none."""
+    """Return the event in a line of JSON; InputError for what is none."""
     data = parse_json_object(line, "event")
     try:
         return Event.model_validate({"time": 0.0, **data})

@@ -1,12 +1,15 @@
 """A vehicle at the other end of a link, as `execute` drives it: position targets, vertex by vertex.
 
 ArduSub in GUIDED holds a position target for good, while one with a velocity times out; so only
-positions are sent, and sent again now and then, for datagrams get lost. It does not go above home
-and has taken an altitude of 0 for "keep the present one" (../export/write.py): targets are at least
-a decimetre deep.
+positions are sent. Datagrams get lost, but a target that is sent again is planned for anew, and the
+vehicle falls behind in depth: it is sent again only if the vehicle says, or shows, that it does not
+have it. ArduSub does not go above home and has taken an altitude of 0 for "keep the present one"
+(../export/write.py): targets are at least a decimetre deep.
 """
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 
@@ -14,23 +17,11 @@ from netsp.arrays import Floats
 from netsp.execute.run import StopsFlightError
 from netsp.export.write import altitude
 from netsp.fields import Point3
+from netsp.fly.flight_policy import FlightPolicy
 from netsp.guard.fix import Fix
 from netsp.link.dialect import dialect
 from netsp.link.modes import GUIDED, mode_name
 from netsp.link.session import Session
-
-SILENT_S = 3.0
-"""Seconds without a heartbeat after which the link is lost."""
-
-UNPLACED_S = 2.0
-"""Seconds without a position, of ten that come in each, after which there is none."""
-
-OFF_PATH = 1.0
-"""Metres off the line to its target at which a vehicle is not where it was sent; ArduSub keeps
-within 0.2 (0.35 where it brakes into a bend)."""
-
-AGAIN_S = 2.0
-"""Seconds after which a target is sent again."""
 
 POSITION_ONLY = 0x0DF8
 """Type mask: velocities, accelerations, yaw and its rate do not count."""
@@ -48,10 +39,16 @@ class LinkedVehicle:
         With a position.
     reach : float
         A vertex this near is reached, metres.
+    policy : FlightPolicy, optional
+        Limits of the flight; by default those of the class.
     """
 
-    def __init__(self, session: Session, reach: float) -> None:
+    policy = FlightPolicy()
+
+    def __init__(self, session: Session, reach: float, policy: FlightPolicy | None = None) -> None:
         self.session, self.reach = session, reach
+        if policy is not None:
+            self.policy = policy
         self.control_s: list[float] = []
         self._begin = session.now.time
         self._position = self._told()
@@ -59,6 +56,11 @@ class LinkedVehicle:
         self._sent = -np.inf
         self.sent: list[tuple[float, Point3]] = []
         self._from = self._position
+        self._resends = 0
+        self._mark = 0.0, math.inf
+        self._vertex: Floats | None = None
+        self._leg: tuple[Floats, Floats] | None = None
+        self._stages: list[Floats] = []
         session.watch(_wrong)
 
     def _told(self) -> Floats:
@@ -123,7 +125,7 @@ class LinkedVehicle:
             while passed < len(path) and self._at(path[passed]):
                 passed += 1
             # the last one is held until it is told to go on
-            self._send(path[min(passed, len(path) - 1)])
+            self._send(self._stage(path[min(passed, len(path) - 1)]))
             if self.time >= until:
                 break
             self.session.sleep(LOOK_S)
@@ -141,7 +143,14 @@ class LinkedVehicle:
         """Stay where it is, if it is still ours."""
         self.check()
         self._position = self._told()
+        self._vertex = self._leg = None
         self._send(self._position)
+
+    def keep(self) -> None:
+        """Send the last target again if the vehicle may not have it."""
+        if self._target is not None:
+            self._position = self._told()
+            self._send(np.array(self._target))
 
     def stop_at(self, place: Floats) -> None:
         """Where a place differs from what it said, its estimate is off: that is not moved.
@@ -165,37 +174,96 @@ class LinkedVehicle:
         wrong = session.broken or _wrong(session.now)
         if wrong is not None:
             raise StopsFlightError(wrong)
-        if session.silent_s > SILENT_S:
+        if session.silent_s > self.policy.max_silence_s:
             raise StopsFlightError(f"the link is lost: no heartbeat for {session.silent_s:.0f} s")
-        if session.unplaced_s > UNPLACED_S:
+        if session.unplaced_s > self.policy.max_position_age_s:
             raise StopsFlightError(
                 f"the link is lost or carries no position: none for {session.unplaced_s:.0f} s"
             )
 
     def _check_path(self) -> None:
-        """That it is where it was sent: carried off, or its estimate set anew, what lies between
-        it and its target is not what was planned."""
+        """Stop a vehicle that is not on the way to its target, because what lies between it and its
+        target is not what was planned.
+
+        The plan and the depth are measured separately: on a sloping leg a vehicle may lag in depth.
+        """
         if self._target is None:
             return
-        a, b = self._from, np.array(self._target)
-        along = b - a
+        a, b = self._leg if self._leg is not None else (self._from, np.array(self._target))
+        here = self._position
+        along = (b - a)[:2]
         size = float(along @ along)
-        share = 0.0 if size == 0.0 else float(np.clip((self._position - a) @ along / size, 0, 1))
-        off = float(np.linalg.norm((self._position - a - share * along)[:2]))
-        if off > OFF_PATH:
+        share = 0.0 if size == 0.0 else float(np.clip((here - a)[:2] @ along / size, 0.0, 1.0))
+        off = float(np.hypot(*((here - a)[:2] - share * along)))
+        if off > self.policy.max_path_error:
             raise StopsFlightError(f"the vehicle is {off:.1f} m off its path")
+        off = float(max(min(a[2], b[2]) - here[2], here[2] - max(a[2], b[2])))
+        if off > self.policy.max_depth_error:
+            where = "below" if here[2] < b[2] else "above"
+            raise StopsFlightError(f"the vehicle is {off:.1f} m {where} the depth of its path")
+
+    def _stage(self, vertex: Floats) -> Floats:
+        """Return the next target on the way to a vertex: on a leg that slopes, intermediate ones
+        keep the vehicle at the depth of the leg."""
+        if self._vertex is None or not np.array_equal(vertex, self._vertex):
+            self._vertex = vertex.copy()
+            end = np.array([*vertex[:2], altitude(float(vertex[2]))])
+            self._leg = self._position.copy(), end
+            self._stages = self._stages_to(vertex)
+        while len(self._stages) > 1 and self._at(self._stages[0]):
+            self._stages.pop(0)
+        return self._stages[0]
+
+    def _stages_to(self, vertex: Floats) -> list[Floats]:
+        away = vertex - self._position
+        if float(np.hypot(*away[:2])) <= 2.0 * self.reach:
+            return [vertex]  # straight down: nowhere off the leg
+        count = max(1, math.ceil(abs(float(away[2])) / self.policy.max_depth_step))
+        return [self._position + away * (k / count) for k in range(1, count)] + [vertex]
 
     def _send(self, place: Floats) -> None:
         x, y, z = (float(v) for v in place)
         target = (x, y, altitude(z))
         now = self.time
-        if target == self._target and now - self._sent < AGAIN_S:
-            return
         if target != self._target:
             self.sent.append((now, target))
-            self._from = self._position
+            self._from, self._resends = self._position, 0
+        elif not self._is_missed(now - self._sent):
+            return
         self._target, self._sent = target, now
+        self._mark = now, self._left()
         self.session.link.send(target_message(self.session, target))
+
+    def _is_missed(self, waited_s: float) -> bool:
+        """Return whether the vehicle does not have the last target, and should get it again."""
+        if waited_s < self.policy.resend_s:
+            return False
+        assert self._target is not None
+        echo = self.session.echo
+        if echo is not None and echo[1] < waited_s:
+            apart = np.array(echo[0]) - self._target
+            off = float(np.hypot(*apart[:2]))
+            if float(np.linalg.norm(apart)) <= self.policy.max_echo_error:
+                return False
+        else:
+            off = 0.0
+        if off > self.policy.max_echo_error:
+            if self._resends >= self.policy.max_resends:
+                raise StopsFlightError(
+                    f"the vehicle does not take its target: it goes {off:.1f} m beside it"
+                )
+            self._resends += 1
+            return True
+        # no echo, or one that differs in depth, which may be told from another level
+        if self.time - self._mark[0] < self.policy.resend_s:
+            return False
+        before, left = self._mark[1], self._left()
+        self._mark = self.time, left
+        return left > self.reach and before - left < self.policy.min_approach
+
+    def _left(self) -> float:
+        """Return the distance to the target, metres."""
+        return float(np.linalg.norm(self._position - np.array(self._target)))
 
 
 def _wrong(now: Fix) -> str | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import struct
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
@@ -16,11 +17,20 @@ from netsp.link.dialect import dialect, parser
 from netsp.link.frame import Frame
 from netsp.link.messages import AUTOPILOT, POSITIONS, Listener
 
-MAX_PACKET_BYTES = 300
-"""Maximum length of a MAVLink message, bytes."""
-
-STAMP_BYTES = 8
+TIME_BYTES = 8
 """Length of the time before each message, bytes."""
+
+MAX_STEP_US = 86_400_000_000
+"""Longest time between two messages in a row, microseconds: with it, messages of other dialects are
+told from chance."""
+
+CHECKSUM_BYTES = 2
+"""Length of the checksum after each message, bytes."""
+
+_VERSION_1, _VERSION_2, _SIGNED = 0xFE, 0xFD, 1
+"""First bytes of MAVLink's messages, and the flag of a message with a signature."""
+
+_MARKER = re.compile(b"[\xfd\xfe]")
 
 
 def read_tlog(
@@ -51,11 +61,14 @@ def read_tlog(
     Raises
     ------
     InputError
-        Several vehicles tell positions and `system` is None; no message is of `system`.
+        The file is no telemetry log; several vehicles tell positions and `system` is None; no
+        message is of `system`.
     """
     where = f"--replay: {file}"
     data = read_bytes(file)
     heard = _Recording.heard(data, frame)
+    if not heard.vehicles and not heard.others.total:
+        raise InputError(f"{where}: {_no_log(data)}")
     vehicle = heard.vehicle(system, where)
     if not vehicle.has_positions and frame.is_global and not frame.is_asked_for:
         other = _Recording.heard(data, frame.local())
@@ -88,23 +101,57 @@ def messages_of(data: bytes) -> Iterator[Any]:
     MAVLink_message
         One after the other.
     """
-    error = dialect().MAVError
+    reads, error = parser(), dialect().MAVError
     at = 0
-    while at + STAMP_BYTES < len(data):
-        reads = parser()
-        message = None
-        for k in range(at + STAMP_BYTES, min(len(data), at + STAMP_BYTES + MAX_PACKET_BYTES)):
-            try:
-                message = reads.parse_char(data[k : k + 1])
-            except (error, struct.error, ValueError):
-                break
-            if message is not None:
-                break
-        if message is None or message.get_type() == "BAD_DATA":
-            at += 1  # damaged: look for the next message
+    while (begin := _next_marker(data, at + TIME_BYTES)) >= 0:
+        at = begin + 1 - TIME_BYTES  # where to go on when this is no message
+        end = begin + _length(data, begin)
+        if end > len(data) or (data[begin] == _VERSION_2 and data[begin + 2] & ~_SIGNED):
             continue
-        at = k + 1
+        try:
+            message = reads.decode(bytearray(data[begin:end]))
+        except (error, struct.error, ValueError):
+            continue
+        # the checksum of a message of another dialect cannot be checked: the times beside it can
+        if message.get_type().startswith("UNKNOWN") and not _is_between_times(data, begin, end):
+            continue
+        at = end
         yield message
+
+
+def _next_marker(data: bytes, begin: int) -> int:
+    """Return where the next byte is that begins messages; -1 where there is none."""
+    found = _MARKER.search(data, begin)
+    return -1 if found is None else found.start()
+
+
+def _length(data: bytes, begin: int) -> int:
+    """Return the length in bytes of the message that begins at a marker, by its header."""
+    header, signature = (6, 0) if data[begin] == _VERSION_1 else (10, 0)
+    if begin + header > len(data):
+        return header
+    if data[begin] == _VERSION_2 and data[begin + 2] & _SIGNED:
+        signature = 13
+    return header + data[begin + 1] + CHECKSUM_BYTES + signature
+
+
+def _is_between_times(data: bytes, begin: int, end: int) -> bool:
+    """Return whether the times before and after some bytes are of one log, or the log ends here."""
+    following = end + TIME_BYTES
+    if following >= len(data):
+        return True
+    before, after = (int.from_bytes(data[k - TIME_BYTES : k], "big") for k in (begin, following))
+    return data[following] in (_VERSION_1, _VERSION_2) and abs(after - before) < MAX_STEP_US
+
+
+def _no_log(data: bytes) -> str:
+    """Return why a file without a single message has no positions, and what it may be instead."""
+    instead = "expected the .tlog of a ground station"
+    if data.startswith(b"\xa3\x95"):
+        instead = "it begins as a log of a vehicle does: expected its name to end in .bin"
+    elif data.startswith(b"\x1f\x8b"):
+        instead = "it is compressed: unpack it with gunzip"
+    return f"has no positions: no telemetry log, for no MAVLink message is in it; {instead}"
 
 
 @dataclass
@@ -144,7 +191,7 @@ class _Recording:
         self = cls()
         self.foreign_bytes = len(data)
         for message in messages_of(data):
-            self.foreign_bytes -= STAMP_BYTES + len(message.get_msgbuf())
+            self.foreign_bytes -= TIME_BYTES + len(message.get_msgbuf())
             system = message.get_srcSystem()
             if message.get_srcComponent() != AUTOPILOT:
                 kind = f"{message.get_type()} of component {message.get_srcComponent()}"

@@ -11,6 +11,7 @@ from netsp.fields import Point3
 from netsp.guard.fix import Fix
 from netsp.link.frame import Frame
 from netsp.link.modes import mode_name
+from netsp.link.vehicle_kind import VehicleKind
 
 AUTOPILOT = 1
 """Component id of the flight controller."""
@@ -54,6 +55,8 @@ class Listener:
         How many messages came from others.
     others : set of int
         System ids of the other vehicles among them.
+    kind : VehicleKind or None
+        Kind of the vehicle by its last heartbeat; None before the first.
     left_out : str
         Why the last message that was not understood says nothing that counts; empty for one that is
         kept until the vehicle tells its time.
@@ -65,6 +68,7 @@ class Listener:
         self.heard = False
         self.strangers = 0
         self.others: set[int] = set()
+        self.kind: VehicleKind | None = None
         self.left_out = ""
         self._early: Fix | None = None
 
@@ -133,6 +137,7 @@ class Listener:
 
     def _heartbeat(self, m: Any) -> Fix:
         assert self.time is not None
+        self.kind = VehicleKind(int(m.type), int(m.autopilot))
         return Fix(
             self.time, armed=bool(m.base_mode & ARMED), mode=mode_name(int(m.custom_mode))
         )  # fmt: skip

@@ -8,7 +8,7 @@ MODES = {
 }  # fmt: skip
 """As ArduSub numbers them in the custom mode of its heartbeat."""
 
-GUIDED = 4
+ALT_HOLD, GUIDED, SURFACE, POSHOLD = 2, 4, 9, 16
 
 
 def mode_name(number: int) -> str:

@@ -23,16 +23,21 @@ from netsp.link.dialect import dialect
 from netsp.link.frame import Frame
 from netsp.link.messages import Listener
 from netsp.link.statustext import status_texts
+from netsp.link.target_echo import TargetEcho
 from netsp.link.udp import UdpLink
+from netsp.link.vehicle_kind import GROUND_STATION_TYPE, VehicleKind
 
 HEARTBEAT_S = 0.5
-"""Seconds between heartbeats: ArduSub disarms when it hears none for about 3."""
+"""Seconds between heartbeats: ArduSub disarms when it hears none for 5."""
 
 BACKWARDS_S = 2.0
 """Seconds by which the vehicle's clock may go back when messages overtake one another."""
 
 POSITION_US = 100_000
 """Microseconds between two positions that are asked for."""
+
+ECHO_US = 500_000
+"""Microseconds between two echoes of the target that are asked for."""
 
 
 class Session:
@@ -65,13 +70,25 @@ class Session:
         self._places: deque[tuple[float, Point3]] = deque(maxlen=2000)
         self._texts: deque[str] = deque(maxlen=200)
         self._acks: dict[int, int] = {}
+        self._parameters: dict[str, float] = {}
+        self._station: tuple[int, float] | None = None
+        self._echoes = TargetEcho(frame)
+        self._echo: tuple[Point3, float] | None = None
         self._said = itertools.count()
         self._stop = threading.Event()
-        self._threads = [
-            threading.Thread(target=work, daemon=True) for work in (self._read, self._beat)
-        ]
-        for thread in self._threads:
+        self._threads: list[threading.Thread] = []
+        self._start()
+
+    def _start(self) -> None:
+        """Start the threads that read and send heartbeats."""
+        for work in (self._read, self._beat):
+            thread = threading.Thread(target=work, daemon=True)
+            self._threads.append(thread)
             thread.start()
+
+    def _seconds(self) -> float:
+        """Return the seconds of a clock of ours that is never set."""
+        return time.monotonic()
 
     def close(self) -> None:
         """End both threads, and close the socket."""
@@ -84,6 +101,11 @@ class Session:
     def system(self) -> int | None:
         """System id of the vehicle; None until it was heard."""
         return self._listener.system
+
+    @property
+    def kind(self) -> VehicleKind | None:
+        """Kind of the vehicle; None until it was heard."""
+        return self._listener.kind
 
     @property
     def others(self) -> list[int]:
@@ -101,14 +123,14 @@ class Session:
         """Seconds of the vehicle since its last heartbeat; infinite before the first."""
         with self._lock:
             heard = self._heard
-        return float("inf") if heard is None else (time.monotonic() - heard) * self.pace
+        return float("inf") if heard is None else (self._seconds() - heard) * self.pace
 
     @property
     def unplaced_s(self) -> float:
         """Seconds of the vehicle since its last position came; infinite before the first."""
         with self._lock:
             placed = self._placed
-        return float("inf") if placed is None else (time.monotonic() - placed) * self.pace
+        return float("inf") if placed is None else (self._seconds() - placed) * self.pace
 
     def watch(self, holds: Callable[[Fix], str | None]) -> None:
         """From now on, ask of all that the vehicle says whether something holds, so that nothing is
@@ -161,8 +183,47 @@ class Session:
         message = dialect().MAVLink_command_long_message(self.system, 1, number, 0, *values)
         return self.link.send(message)
 
+    def ask_parameter(self, name: str) -> None:
+        """Ask for the value of a parameter of the vehicle.
+
+        Parameters
+        ----------
+        name : str
+            Its name, 16 letters at most.
+        """
+        if self.system is not None:
+            m = dialect()
+            self.link.send(m.MAVLink_param_request_read_message(self.system, 1, name.encode(), -1))
+
+    def parameter(self, name: str) -> float | None:
+        """Return the value of a parameter; None if the vehicle has not told it."""
+        with self._lock:
+            return self._parameters.get(name)
+
+    def ground_station(self, within_s: float) -> int | None:
+        """Return the system id of another ground station that was heard lately; None without one.
+
+        Parameters
+        ----------
+        within_s : float
+            Seconds of the vehicle since its last heartbeat, at most.
+        """
+        with self._lock:
+            station = self._station
+        if station is None or (self._seconds() - station[1]) * self.pace > within_s:
+            return None
+        return station[0]
+
+    @property
+    def echo(self) -> tuple[Point3, float] | None:
+        """Target that the vehicle says it goes to, in the site, and the seconds of the vehicle
+        since it said so; None if it has not."""
+        with self._lock:
+            echo = self._echo
+        return None if echo is None else (echo[0], (self._seconds() - echo[1]) * self.pace)
+
     def ask_for_positions(self) -> None:
-        """Ten a second, whatever the vehicle sends of itself."""
+        """Ask for ten positions a second, and for all else that a flight watches."""
         m = dialect()
         wanted = (
             m.MAVLINK_MSG_ID_GLOBAL_POSITION_INT if self.frame.is_global
@@ -172,6 +233,12 @@ class Session:
         self.command(
             m.MAV_CMD_SET_MESSAGE_INTERVAL, m.MAVLINK_MSG_ID_EKF_STATUS_REPORT, 2 * POSITION_US
         )
+        for echo in (
+            m.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT, m.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED
+        ):  # fmt: skip
+            self.command(m.MAV_CMD_SET_MESSAGE_INTERVAL, echo, ECHO_US)
+        # echoes are in degrees; positions may be in metres from where the estimate began
+        self.command(m.MAV_CMD_REQUEST_MESSAGE, m.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN)
 
     def say(self, text: str, urgent: bool = False) -> None:
         """Words for whoever looks at the ground station."""
@@ -189,6 +256,7 @@ class Session:
         known = self._listener.system
         if known is not None and self.link.peer is not None and peer != self.link.peer:
             return
+        self._note_station(message)
         fix = self._listener.understand(message)
         if self._listener.system is None or message.get_srcSystem() != self._listener.system:
             return
@@ -199,11 +267,16 @@ class Session:
         kind = message.get_type()
         with self._lock:
             if kind == "HEARTBEAT":
-                self._heard = time.monotonic()
+                self._heard = self._seconds()
             elif kind == "STATUSTEXT":
                 self._texts.append(str(message.text))
             elif kind == "COMMAND_ACK":
                 self._acks[int(message.command)] = int(message.result)
+            elif kind == "PARAM_VALUE":
+                self._parameters[str(message.param_id)] = float(message.param_value)
+            echo = self._echoes.understand(message)
+            if echo is not None:
+                self._echo = echo, self._seconds()
             if fix is None:
                 return
             kept = {
@@ -212,17 +285,35 @@ class Session:
             }  # fmt: skip
             before, self._now = self._now.time, replace(fix, **kept)
             if fix.position is not None:
-                self._placed = time.monotonic()
+                self._placed = self._seconds()
                 self._places.append((fix.time, fix.position))
             if self._holds is not None and self._broken is None:
                 self._broken = self._holds(self._now)
                 if self._now.time < before - BACKWARDS_S:
                     self._broken = "the vehicle has started anew"
 
+    def _note_station(self, message: Any) -> None:
+        """Note the heartbeat of another ground station, which the vehicle or a router passes on."""
+        if message.get_type() != "HEARTBEAT" or int(message.type) != GROUND_STATION_TYPE:
+            return
+        system = int(message.get_srcSystem())
+        if (system, message.get_srcComponent()) == self.link.ids or self.link.peer is None:
+            return
+        with self._lock:
+            before = self._station
+            # the one that the vehicle counts on goes before others
+            is_ours = before is not None and before[0] == self.link.ids[0]
+            if system == self.link.ids[0] or not is_ours:
+                self._station = system, self._seconds()
+
     def _beat(self) -> None:
-        m = dialect()
-        beat = m.MAVLink_heartbeat_message(
-            m.MAV_TYPE_GCS, m.MAV_AUTOPILOT_INVALID, 0, 0, m.MAV_STATE_ACTIVE, 3
-        )
         while not self._stop.wait(HEARTBEAT_S / self.pace):
-            self.link.send(beat)
+            self._send_heartbeat()
+
+    def _send_heartbeat(self) -> None:
+        m = dialect()
+        self.link.send(
+            m.MAVLink_heartbeat_message(
+                m.MAV_TYPE_GCS, m.MAV_AUTOPILOT_INVALID, 0, 0, m.MAV_STATE_ACTIVE, 3
+            )
+        )

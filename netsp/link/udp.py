@@ -60,6 +60,7 @@ class UdpLink:
     def __init__(
         self, address: Address, system: int = GROUND_STATION, component: int = ONBOARD_COMPUTER
     ) -> None:
+        self.ids = system, component
         self._pack = parser(system, component)
         self._lock = threading.Lock()
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)

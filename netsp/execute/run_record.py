@@ -1,0 +1,153 @@
+"""Record of a run that is written while it goes on, so that it outlives the process.
+
+The log gets its rows as they come, and the state that a run can be resumed from is replaced after
+every second.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+from pydantic import ConfigDict, Field
+
+from netsp.arrays import Floats
+from netsp.errors import InputError
+from netsp.execute.log import ExecutionRow
+from netsp.fields import NonNegative, Point3
+from netsp.files import FileModel, make_folder, write_text
+from netsp.models import Model
+from netsp.problem import Problem
+from netsp.solution import Solution
+
+LOG, STATE, PROBLEM, SOLUTION = "log.csv", "state.json", "problem.json", "solution.json"
+"""Files of a run that are written while it goes on."""
+
+PERIOD_S = 1.0
+"""Seconds of the run between two states."""
+
+
+class LeftOut(Model):
+    """A goal that was left out."""
+
+    goal: Annotated[int, Field(description="its number, from 0", ge=0)]
+    reason: Annotated[str, Field(description="why")]
+
+
+class RunState(FileModel):
+    """The state file of a run: all that it takes to go on."""
+
+    file_kind: ClassVar[str] = "run state"
+
+    model_config = ConfigDict(title="netsp run state")
+
+    schema_version: Annotated[Literal[1], Field(description="of the file format")] = 1
+    time: Annotated[NonNegative, Field(description="seconds after the start of the run")]
+    tether: Annotated[
+        tuple[Point3, ...],
+        Field(
+            description="(x, y, z) along the taut tether, from the base to the robot, in the "
+            "problem's units",
+            min_length=2, max_length=100_000,
+        ),
+    ]  # fmt: skip
+    left: Annotated[
+        tuple[int, ...], Field(description="goals still to be visited, in the planned order")
+    ]
+    left_out: Annotated[tuple[LeftOut, ...], Field(description="goals that were left out")] = ()
+    cancelled: Annotated[tuple[int, ...], Field(description="goals that were cancelled")] = ()
+
+    def check(self, problem: Problem, source: str) -> None:
+        """Refuse the state of another problem.
+
+        Parameters
+        ----------
+        problem : Problem
+            Problem that the run was of.
+        source : str
+            Name of the state in messages.
+
+        Raises
+        ------
+        InputError
+            A goal that the problem does not have, or a tether that begins elsewhere.
+        """
+        for goal in (*self.left, *self.cancelled, *(g.goal for g in self.left_out)):
+            if not 0 <= goal < len(problem.goals):
+                raise InputError(
+                    f"{source}: left: expected goals below {len(problem.goals)}, got {goal}"
+                )
+        away = float(np.linalg.norm(np.array(self.tether[0]) - np.array(problem.base)))
+        if away > 1e-6 * problem.scale:
+            raise InputError(f"{source}: tether: expected to begin at the base of the problem")
+
+
+@dataclass(frozen=True)
+class Begun:
+    """Beginning of a run elsewhere than at the start of its plan.
+
+    Attributes
+    ----------
+    tether
+        (k, 3) the tether from the base to the robot, in its class.
+    left
+        Goals still to be visited, in their order.
+    why
+        Reason for a new plan, for the log.
+    left_out
+        Goals that were left out before, with the reason.
+    cancelled
+        Goals that were cancelled before.
+    """
+
+    tether: Floats
+    left: list[int]
+    why: str
+    left_out: dict[int, str] = field(default_factory=dict)
+    cancelled: tuple[int, ...] = ()
+
+
+class RunRecord:
+    """Writes log and state of a run into a folder while it goes on.
+
+    Parameters
+    ----------
+    folder : str or Path
+        The folder; a log that is there is replaced at the first row.
+    solution : Solution
+        The plan at the start.
+    """
+
+    def __init__(self, folder: str | Path, solution: Solution) -> None:
+        self.folder, self.solution = Path(folder), solution
+        self._problem: Problem | None = None
+        self._due = -np.inf
+
+    def take(self, row: ExecutionRow, problem: Problem, state: Callable[[], RunState]) -> None:
+        """Write a row, and the state if a second has gone by since the last one.
+
+        Parameters
+        ----------
+        row : ExecutionRow
+            The row.
+        problem : Problem
+            The problem as it is now.
+        state : callable
+            Returns the state now.
+        """
+        cells = [round(v, 6) if isinstance(v, float) else v for v in asdict(row).values()]
+        if self._problem is None:
+            write_text(make_folder(self.folder) / LOG, ",".join(asdict(row)) + "\n")
+            write_text(self.folder / SOLUTION, self.solution.to_json())
+        with (self.folder / LOG).open("a") as log_file:
+            log_file.write(",".join(map(str, cells)) + "\n")
+        changed = problem is not self._problem
+        if changed:
+            write_text(self.folder / PROBLEM, problem.to_json())
+            self._problem = problem
+        if changed or row.time >= self._due:
+            self._due = row.time + PERIOD_S
+            write_text(self.folder / STATE, state().to_json())

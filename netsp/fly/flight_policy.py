@@ -1,0 +1,71 @@
+"""Limits of a flight: when it stops, what is sent, and how it ends."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+from netsp.errors import InputError
+
+
+@dataclass(frozen=True)
+class FlightPolicy:
+    """Policy of a flight over MAVLink. All numbers are positive.
+
+    Attributes
+    ----------
+    max_silence_s
+        Longest time without a heartbeat, s of the vehicle; then the link is lost.
+    max_position_age_s
+        Longest time without a position, s of the vehicle, of ten that come in each second.
+    max_path_error
+        Largest distance in the plan from the line to the target, metres. ArduSub keeps within 0.2,
+        and within 0.5 where it brakes into a bend; a larger distance means that the vehicle was
+        carried off, or that its estimate was set anew.
+    max_depth_error
+        Largest distance above or below the depths between which the leg runs, metres. A vehicle
+        that lags in depth on a sloping leg is between them, and is let go on.
+    resend_s
+        Time after which a target is sent again if the vehicle echoes another one, or neither echoes
+        any nor moves towards it, s. A target that is sent again is planned for anew: the vehicle
+        falls behind in depth.
+    max_resends
+        How often a target is sent again to a vehicle that echoes another one.
+    max_echo_error
+        Largest distance between a target and its echo, metres.
+    min_approach
+        Way towards a target that a vehicle which echoes nothing makes in `resend_s` if it has it,
+        metres.
+    max_depth_step
+        Largest change of depth up to the next target on a leg that slopes, metres. From target to
+        target a vehicle may lag in depth, at each it is on the leg.
+    max_unwatched_way
+        Longest straight way from where a vehicle was last to where it is when its flight is
+        resumed, metres: on a longer one it may have gone round an obstacle.
+    min_class_odds
+        How many times as likely as any other the class of a guard's state file must be.
+    max_answer_s
+        Longest wait for the answer to a question, such as the value of a parameter, s.
+    max_standby_silence_s
+        Time without a heartbeat after which nobody waits for the vehicle any more once the flight
+        has ended, s.
+    """
+
+    max_silence_s: float = 3.0
+    max_position_age_s: float = 2.0
+    max_path_error: float = 1.0
+    max_depth_error: float = 1.0
+    resend_s: float = 2.0
+    max_resends: int = 3
+    max_echo_error: float = 0.15
+    min_approach: float = 0.1
+    max_depth_step: float = 2.0
+    max_unwatched_way: float = 10.0
+    min_class_odds: float = 100.0
+    max_answer_s: float = 2.0
+    max_standby_silence_s: float = 60.0
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if isinstance(value, float | int) and not value > 0.0:
+                raise InputError(f"{field.name}: expected a positive number, got {value!r}")

@@ -1,0 +1,202 @@
+"""Standing by after a flight: a vehicle is not left alone until somebody else has it.
+
+ArduSub disarms, or does what its parameter FS_GCS_ENABLE says, a few seconds after it has heard
+the last heartbeat of a ground station, and drifts. So heartbeats go on after the flight, and the
+vehicle is held where it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Literal, get_args
+
+import numpy as np
+
+from netsp.execute.run import StopsFlightError
+from netsp.fly.flight_policy import FlightPolicy
+from netsp.fly.vehicle import LinkedVehicle
+from netsp.link.dialect import GROUND_STATION, dialect
+from netsp.link.modes import ALT_HOLD, GUIDED, POSHOLD, SURFACE, mode_name
+from netsp.link.session import Session
+
+Ending = Literal["hold", "position-hold", "surface", "leave"]
+"""What a vehicle does after a flight: hold its place in GUIDED or in POSHOLD, come to the surface,
+or stay as it is with no heartbeats from us."""
+
+ENDINGS: tuple[Ending, ...] = get_args(Ending)
+
+ASKED = {"position-hold": POSHOLD, "surface": SURFACE}
+"""Mode that an ending asks for."""
+
+FAILSAFE, FAILSAFE_TIME = "FS_GCS_ENABLE", "FS_GCS_TIMEOUT"
+"""Parameters: what the vehicle does without a ground station, and after how many seconds."""
+
+FAILSAFE_S = 5.0
+"""Seconds that ArduSub waits where FS_GCS_TIMEOUT is not known."""
+
+CONSEQUENCES = {
+    2: "disarms and drifts",
+    3: "holds its depth (ALT_HOLD) and drifts",
+    4: "comes to the surface",
+}
+"""What the vehicle does without a ground station, by FS_GCS_ENABLE; nothing at 0 and 1."""
+
+LOOK_S = 0.1
+"""Seconds between two looks at what came."""
+
+
+def stand_by(
+    session: Session,
+    ending: Ending = "hold",
+    *,
+    say: Callable[[str], None] = lambda text: None,
+    should_stop: Callable[[], bool] = lambda: False,
+    policy: FlightPolicy | None = None,
+) -> str:
+    """Keep a vehicle where it is, and its link alive, until somebody else has it.
+
+    Parameters
+    ----------
+    session : Session
+        The vehicle, after a flight.
+    ending : {"hold", "position-hold", "surface", "leave"}
+        What it is to do.
+    say : callable, optional
+        Called with what happens now, and what will happen.
+    should_stop : callable, optional
+        Asked all the time; ends it, as does a KeyboardInterrupt.
+    policy : FlightPolicy, optional
+        Limits.
+
+    Returns
+    -------
+    str
+        Why it ended.
+    """
+    if ending == "leave":
+        return "as asked for"
+    if session.now.position is None:
+        return "the vehicle was never there"
+    try:
+        return _Standby(session, ending, say, policy).run(should_stop)
+    except KeyboardInterrupt:
+        return "Ctrl-C"
+
+
+class _Standby:
+    """A vehicle that is looked after.
+
+    Attributes
+    ----------
+    is_held
+        Whether it was told where to stay since the link was there last.
+    is_unaided
+        Whether it was put into ALT_HOLD because it has no estimate.
+    ask_again
+        Time by the vehicle's clock at which the mode is asked for again.
+    strangers
+        Ground stations that were heard, but that the vehicle does not count on.
+    """
+
+    def __init__(
+        self, session: Session, ending: Ending, say: Callable[[str], None],
+        policy: FlightPolicy | None,
+    ) -> None:  # fmt: skip
+        self.session, self.ending, self.say = session, ending, say
+        self.vehicle = LinkedVehicle(session, 1.0, policy)
+        self.policy = self.vehicle.policy
+        self.is_held = self.is_unaided = False
+        self.ask_again = -np.inf
+        self.strangers: set[int] = set()
+
+    def run(self, should_stop: Callable[[], bool]) -> str:
+        """Look after it until one of the reasons to end; return the reason."""
+        session = self.session
+        for name in (FAILSAFE, FAILSAFE_TIME):
+            session.ask_parameter(name)
+        self._hold()
+        waited, told = 0.0, False
+        while True:
+            if should_stop():
+                return "Ctrl-C"
+            if session.now.armed is False:
+                return self._ended("the vehicle is disarmed: nothing is left to hold")
+            station = session.ground_station(self.policy.max_silence_s)
+            if station == GROUND_STATION:
+                return self._ended(f"a ground station (system {station}) has taken over")
+            if station is not None and station not in self.strangers:
+                self.strangers.add(station)
+                self.say(
+                    f"ground station {station} is heard, but the vehicle counts on system "
+                    f"{GROUND_STATION}: netsp goes on"
+                )
+            if session.silent_s > self.policy.max_standby_silence_s:
+                return self._ended(f"the vehicle was not heard for {session.silent_s:.0f} s")
+            if not self.is_settled and waited < self.policy.max_answer_s:
+                pass
+            elif self.needs_nobody:
+                return self._ended("the vehicle stays so without a ground station (FS_GCS_ENABLE)")
+            elif not told:
+                told = True
+                self.say(self._outlook())
+            self._hold()
+            session.sleep(LOOK_S)
+            waited += LOOK_S
+
+    @property
+    def is_settled(self) -> bool:
+        """Return whether the vehicle has told what it does without a ground station, and has the
+        mode that it is to have."""
+        asked = ASKED.get(self.ending)
+        is_so = asked is None or self.session.now.mode == mode_name(asked)
+        return is_so and self.session.parameter(FAILSAFE) is not None
+
+    @property
+    def needs_nobody(self) -> bool:
+        """Return whether the vehicle has said that it does nothing without a ground station."""
+        enabled = self.session.parameter(FAILSAFE)
+        return enabled is not None and round(enabled) not in CONSEQUENCES
+
+    def _hold(self) -> None:
+        """Have the vehicle do what it is to do, if it is ours: not while a pilot has it, and not
+        without an estimate."""
+        session, mode = self.session, self.session.now.mode
+        try:
+            self.vehicle.check()
+        except StopsFlightError:
+            if session.now.estimate is False and mode == mode_name(GUIDED) and not self.is_unaided:
+                self.is_unaided = True
+                session.command(dialect().MAV_CMD_DO_SET_MODE, 1, ALT_HOLD)
+            if session.silent_s > self.policy.max_silence_s:
+                self.is_held = False  # it may have gone on meanwhile
+            return
+        if not self.is_held:
+            self.is_held = True
+            self.vehicle.hold()
+        else:
+            self.vehicle.keep()
+        if self.ending in ASKED and session.now.time >= self.ask_again:
+            self.ask_again = session.now.time + self.policy.max_answer_s
+            session.command(dialect().MAV_CMD_DO_SET_MODE, 1, ASKED[self.ending])
+
+    def _outlook(self) -> str:
+        """Tell what the vehicle does now, and what it will do."""
+        session, mode = self.session, self.session.now.mode
+        doing = {
+            "GUIDED": "the vehicle holds its place",
+            "POSHOLD": "the vehicle holds its place in POSHOLD",
+            "SURFACE": "the vehicle comes to the surface",
+        }.get(mode or "", f"the vehicle is in {mode}, and netsp does not steer it")
+        enabled = session.parameter(FAILSAFE)
+        consequence = CONSEQUENCES.get(2 if enabled is None else round(enabled), "stays as it is")
+        after = session.parameter(FAILSAFE_TIME)
+        seconds = FAILSAFE_S if after is None or not np.isfinite(after) else after
+        return (
+            f"{doing}; netsp keeps its link alive until a ground station (system "
+            f"{GROUND_STATION}) is heard. Ctrl-C ends that: the vehicle then {consequence} after "
+            f"{seconds:g} s"
+        )
+
+    def _ended(self, why: str) -> str:
+        self.say(why)
+        return why
