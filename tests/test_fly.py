@@ -52,7 +52,7 @@ def tour():
 def patience(monkeypatch):
     """At `PACE` two seconds of the vehicle are a quarter of one of ours, for which a busy machine
     holds either end up: only what is about lost links takes that for one."""
-    patient = FlightPolicy(max_silence_s=60.0, max_position_age_s=60.0)
+    patient = FlightPolicy(max_silence_s=60.0, max_position_age_s=60.0, max_gps_age_s=60.0)
     monkeypatch.setattr(LinkedVehicle, "policy", patient)
 
 

@@ -45,6 +45,9 @@ class Scripted:
     def watch(self, holds):
         self.holds = holds
 
+    def source_lost(self, *_):
+        pass
+
     def ask_for_positions(self):
         self.asked.append("positions")
 

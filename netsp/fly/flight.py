@@ -16,10 +16,10 @@ from netsp.fly.checks import ready
 from netsp.fly.flight_policy import FlightPolicy
 from netsp.fly.rehearsal import rehearse
 from netsp.fly.resume import BeginsAt
-from netsp.fly.vehicle import LinkedVehicle
+from netsp.fly.vehicle import LOOK_S, LinkedVehicle
 from netsp.judge import verify
 from netsp.link.dialect import dialect
-from netsp.link.modes import ALT_HOLD
+from netsp.link.modes import ALT_HOLD, GUIDED, mode_name
 from netsp.link.session import Session
 from netsp.problem import Problem
 from netsp.solution import Solution
@@ -136,7 +136,19 @@ def _leave(session: Session, vehicle: LinkedVehicle) -> None:
     try:
         vehicle.check()
     except StopsFlightError:
-        if session.now.estimate is False and session.now.mode == "GUIDED":
+        if session.now.mode != mode_name(GUIDED) or session.now.armed is not True:
+            return
+        if session.now.estimate is not False and vehicle.source_lost is not None:
+            # stop by the estimate while it is good for that, then do without it
+            vehicle.halt()
+            until = vehicle.time + vehicle.policy.max_unaided_hold_s
+            while vehicle.time < until and session.silent_s <= vehicle.policy.max_silence_s:
+                session.sleep(LOOK_S)
+            if vehicle.source_lost is None:
+                return
+        elif session.now.estimate is not False:
+            return
+        if session.now.mode == mode_name(GUIDED):
             session.command(dialect().MAV_CMD_DO_SET_MODE, 1, ALT_HOLD)
         return
     vehicle.hold()

@@ -17,6 +17,14 @@ class FlightPolicy:
         Longest time without a heartbeat, s of the vehicle; then the link is lost.
     max_position_age_s
         Longest time without a position, s of the vehicle, of ten that come in each second.
+    min_source_loss_s
+        Time for which a source of the position estimate (GPS, DVL, innovations of the filter) must
+        be bad until the flight is stopped, s. The estimate drifts meanwhile.
+    max_gps_age_s
+        Longest time without a message of a GPS, s; three of its usual intervals if they are longer.
+    max_unaided_hold_s
+        Time for which a vehicle without a source holds its place by its estimate, s, before it is
+        put into ALT_HOLD: long enough to stop, and short of where the estimate leads it away.
     max_path_error
         Largest distance in the plan from the line to the target, metres. ArduSub keeps within 0.2,
         and within 0.5 where it brakes into a bend; a larger distance means that the vehicle was
@@ -52,6 +60,9 @@ class FlightPolicy:
 
     max_silence_s: float = 3.0
     max_position_age_s: float = 2.0
+    min_source_loss_s: float = 0.6
+    max_gps_age_s: float = 1.2
+    max_unaided_hold_s: float = 2.0
     max_path_error: float = 1.0
     max_depth_error: float = 1.0
     resend_s: float = 2.0

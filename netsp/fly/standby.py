@@ -92,6 +92,8 @@ class _Standby:
         Whether it was told where to stay since the link was there last.
     is_unaided
         Whether it was put into ALT_HOLD because it has no estimate.
+    unaided_since
+        Time by the vehicle's clock since which it has no source of its estimate.
     ask_again
         Time by the vehicle's clock at which the mode is asked for again.
     strangers
@@ -107,6 +109,7 @@ class _Standby:
         self.policy = self.vehicle.policy
         self.is_held = self.is_unaided = False
         self.ask_again = -np.inf
+        self.unaided_since: float | None = None
         self.strangers: set[int] = set()
 
     def run(self, should_stop: Callable[[], bool]) -> str:
@@ -160,13 +163,11 @@ class _Standby:
     def _hold(self) -> None:
         """Have the vehicle do what it is to do, if it is ours: not while a pilot has it, and not
         without an estimate."""
-        session, mode = self.session, self.session.now.mode
+        session = self.session
         try:
             self.vehicle.check()
         except StopsFlightError:
-            if session.now.estimate is False and mode == mode_name(GUIDED) and not self.is_unaided:
-                self.is_unaided = True
-                session.command(dialect().MAV_CMD_DO_SET_MODE, 1, ALT_HOLD)
+            self._do_without_estimate()
             if session.silent_s > self.policy.max_silence_s:
                 self.is_held = False  # it may have gone on meanwhile
             return
@@ -178,6 +179,22 @@ class _Standby:
         if self.ending in ASKED and session.now.time >= self.ask_again:
             self.ask_again = session.now.time + self.policy.max_answer_s
             session.command(dialect().MAV_CMD_DO_SET_MODE, 1, ASKED[self.ending])
+
+    def _do_without_estimate(self) -> None:
+        """Put a vehicle whose estimate is lost, or drifts for some seconds, into ALT_HOLD."""
+        now, lost = self.session.now, self.vehicle.source_lost
+        if now.estimate is not False and lost is None:
+            self.unaided_since = None
+            return
+        if now.mode not in (mode_name(GUIDED), mode_name(POSHOLD)):
+            return
+        if self.unaided_since is None:
+            self.unaided_since = now.time
+        wait = 0.0 if now.estimate is False else self.policy.max_unaided_hold_s
+        if now.time - self.unaided_since >= wait and not self.is_unaided:
+            self.is_unaided = True
+            self.say(f"the position estimate is of no use ({lost or 'lost'}): ALT_HOLD")
+            self.session.command(dialect().MAV_CMD_DO_SET_MODE, 1, ALT_HOLD)
 
     def _outlook(self) -> str:
         """Tell what the vehicle does now, and what it will do."""

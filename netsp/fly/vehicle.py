@@ -142,6 +142,10 @@ class LinkedVehicle:
     def hold(self) -> None:
         """Stay where it is, if it is still ours."""
         self.check()
+        self.halt()
+
+    def halt(self) -> None:
+        """Stay where it is, whatever its estimate is worth."""
         self._position = self._told()
         self._vertex = self._leg = None
         self._send(self._position)
@@ -180,6 +184,16 @@ class LinkedVehicle:
             raise StopsFlightError(
                 f"the link is lost or carries no position: none for {session.unplaced_s:.0f} s"
             )
+
+        source = self.source_lost
+        if source is not None:
+            raise StopsFlightError(f"the position estimate drifts: {source}")
+
+    @property
+    def source_lost(self) -> str | None:
+        """What is wrong with the sources of the position estimate; None if nothing is."""
+        policy = self.policy
+        return self.session.source_lost(policy.min_source_loss_s, policy.max_gps_age_s)
 
     def _check_path(self) -> None:
         """Stop a vehicle that is not on the way to its target, because what lies between it and its

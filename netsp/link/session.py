@@ -22,6 +22,7 @@ from netsp.guard.fix import Fix
 from netsp.link.dialect import dialect
 from netsp.link.frame import Frame
 from netsp.link.messages import Listener
+from netsp.link.position_source import PositionSources
 from netsp.link.statustext import status_texts
 from netsp.link.target_echo import TargetEcho
 from netsp.link.udp import UdpLink
@@ -73,6 +74,7 @@ class Session:
         self._parameters: dict[str, float] = {}
         self._station: tuple[int, float] | None = None
         self._echoes = TargetEcho(frame)
+        self._sources = PositionSources()
         self._echo: tuple[Point3, float] | None = None
         self._said = itertools.count()
         self._stop = threading.Event()
@@ -214,6 +216,18 @@ class Session:
             return None
         return station[0]
 
+    def source_lost(self, confirm_s: float, max_age_s: float) -> str | None:
+        """Return what is wrong with the sources of the position estimate; None if nothing is.
+
+        Parameters
+        ----------
+        confirm_s, max_age_s : float
+            As of `netsp.link.position_source.PositionSources.lost`.
+        """
+        with self._lock:
+            time = self._listener.time
+            return None if time is None else self._sources.lost(time, confirm_s, max_age_s)
+
     @property
     def echo(self) -> tuple[Point3, float] | None:
         """Target that the vehicle says it goes to, in the site, and the seconds of the vehicle
@@ -233,6 +247,11 @@ class Session:
         self.command(
             m.MAV_CMD_SET_MESSAGE_INTERVAL, m.MAVLINK_MSG_ID_EKF_STATUS_REPORT, 2 * POSITION_US
         )
+        for source, period in (
+            (m.MAVLINK_MSG_ID_GPS_RAW_INT, 2 * POSITION_US),
+            (m.MAVLINK_MSG_ID_SYS_STATUS, 5 * POSITION_US),
+        ):  # fmt: skip
+            self.command(m.MAV_CMD_SET_MESSAGE_INTERVAL, source, period)
         for echo in (
             m.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT, m.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED
         ):  # fmt: skip
@@ -274,6 +293,8 @@ class Session:
                 self._acks[int(message.command)] = int(message.result)
             elif kind == "PARAM_VALUE":
                 self._parameters[str(message.param_id)] = float(message.param_value)
+            if self._listener.time is not None:
+                self._sources.take(message, self._listener.time)
             echo = self._echoes.understand(message)
             if echo is not None:
                 self._echo = echo, self._seconds()
