@@ -32,7 +32,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
         help="problem file or mission file (JSON); one of a planned mission also tells whether the "
         "tether is as planned",
     )
-    source = p.add_argument_group("where it listens; nothing is ever told to the vehicle to do")
+    source = p.add_argument_group("where it listens; the vehicle is never told to go anywhere")
     source.add_argument(
         "--link", metavar="ADDRESS",
         help="MAVLink over UDP: udpin:PORT (this machine only), udpin:HOST:PORT, udpout:HOST:PORT",
@@ -71,6 +71,10 @@ def arguments(p: argparse.ArgumentParser) -> None:
         help="send tether, slack and alarms to the link (NAMED_VALUE_FLOAT, STATUSTEXT)",
     )  # fmt: skip
     p.add_argument(
+        "--ask-rates", action="store_true",
+        help="ask the vehicle to tell its position ten times a second (SET_MESSAGE_INTERVAL)",
+    )  # fmt: skip
+    p.add_argument(
         "--page", nargs="?", type=natural, const=PORT, metavar="PORT",
         help=f"serve a page on this machine; default port {PORT}",
     )  # fmt: skip
@@ -85,8 +89,8 @@ def run(args: argparse.Namespace) -> int:
     """Watch until the recording or the operator ends it, and return the exit code."""
     if (args.link is None) == (args.replay is None):
         raise InputError("--link, --replay: expected one of them")
-    if args.replay is not None and (args.publish or args.state):
-        raise InputError("--publish, --state: are for links; a recording is over")
+    if args.replay is not None and (args.publish or args.state or args.ask_rates):
+        raise InputError("--publish, --state, --ask-rates: are for links; a recording is over")
     output = None if args.output == "-" else args.output
     check_writable(output, args.state, inputs=(args.site, args.replay))
     from netsp.command.compiling import compile_messages
@@ -142,7 +146,7 @@ def run(args: argparse.Namespace) -> int:
                 watch(
                     guard, frame, args.link, take, system=args.system, state=args.state,
                     publish=args.publish, corrections=None if page is None else page.corrections,
-                    say=None if args.quiet else told.say,
+                    say=None if args.quiet else told.say, ask_rates=args.ask_rates,
                 )  # fmt: skip
         except KeyboardInterrupt:
             told.say("stopped")

@@ -23,7 +23,7 @@ class Alarm:
     Parameters
     ----------
     kind : str
-        What it is about: estimate, class, slack, short, loop-ahead, loop.
+        What it is about: estimate, position, class, slack, short, loop-ahead, loop.
     level : Level
         How urgent.
     text : str

@@ -78,6 +78,7 @@ class Belief:
         self.drift = max(drift, 1e-6)
         self.reach = REACH * self.drift
         spacing = self.reach / RINGS
+        self._noise_left = noise
         self.noise = math.hypot(max(noise, 1e-2), GRID * spacing)
         self.offsets, self._beside = _hexagonal(RINGS, spacing)
         prior = np.exp(-0.5 * (self.offsets**2).sum(1) / self.drift**2)
@@ -111,6 +112,26 @@ class Belief:
         self._likely = {w: math.exp(least - cost) * self._prior for w, cost in words.items()}
         self._spread = False
         self._trim()
+
+    def with_drift(self, drift: float, place: Floats) -> Belief:
+        """Return a belief in the same classes, of a position with another drift.
+
+        Parameters
+        ----------
+        drift : float
+            Standard deviation of how far the estimate is off from now on, metres.
+        place : ndarray, shape (2,) or (3,)
+            The estimate, metres.
+
+        Returns
+        -------
+        Belief
+            What was known of the offset is forgotten.
+        """
+        other = Belief(self.letters, drift, self._noise_left)
+        self._gather(place)
+        other.begin({h.word: -math.log(h.likely) for h in self.classes() if h.likely > 0.0})
+        return other
 
     def drop(self, words: set[Word]) -> None:
         """Some classes are none, for another reason than where the robot is.

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import contextlib
 import io
+import math
 import os
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +18,7 @@ from netsp.guard.message_tally import MessageTally
 from netsp.link.frame import Frame
 from netsp.link.messages import CONSTANT, HORIZONTAL, NO_GPS_FIX, NO_NUMBERS
 from netsp.link.modes import mode_name
+from netsp.link.position_aiding import PositionAiding
 from netsp.models import shown
 
 MAX_SECONDS = 1e9
@@ -170,7 +173,7 @@ def _fixes_of_log(
         filters = next((f for f in FILTERS if f"{f}1" in logged or f"{f}4" in logged), FILTERS[0])
     places, status = f"{filters}1", f"{filters}4"
     cores = {int(getattr(m, "C", 0)) for m in messages if m.get_type() == places}
-    primary, found = 0, []
+    primary, found, aiding = 0, [], PositionAiding()
     for m in messages:
         kind, time = m.get_type(), float(m.TimeUS) * 1e-6
         if not abs(time) < MAX_SECONDS:
@@ -182,6 +185,10 @@ def _fixes_of_log(
             tally.leave_out(kind, "of a filter that the vehicle does not go by")
             continue
         fix = _fix_of_message(m, kind, time, frame, source, places, status)
+        if kind == status and isinstance(fix, Fix):
+            aiding.take_innovation(float(getattr(m, "SP", math.nan)))
+            aiding.take_gps_checks(int(getattr(m, "GPS", 0)))
+            fix = replace(fix, aiding_fault=aiding.fault(time))
         if isinstance(fix, str):
             tally.leave_out(kind, fix)
         else:

@@ -29,6 +29,8 @@ class Fix:
         Length of tether that the winch has let out.
     velocity : (x, y, z), optional
         As estimated with the position, m/s.
+    aiding_fault : str, optional
+        Why no fixes of GPS or another system correct the position; empty while they do.
     """
 
     time: float
@@ -39,3 +41,4 @@ class Fix:
     estimate: bool | None = None
     paid_out: float | None = None
     velocity: Point3 | None = None
+    aiding_fault: str | None = None

@@ -6,7 +6,7 @@ fix → track (noise, gaps, jumps) → belief (classes) → taut tethers → ahe
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -17,13 +17,14 @@ from netsp.guard import reasons
 from netsp.guard.ahead import Ahead, Look
 from netsp.guard.alarms import Alarm, Alarms
 from netsp.guard.belief import Belief
+from netsp.guard.dead_reckoning import DeadReckoning
 from netsp.guard.fix import Fix
 from netsp.guard.gaps import after_gap
 from netsp.guard.report import ClassNow, Report
 from netsp.guard.site import Loop, Site
 from netsp.guard.sites import site_of
 from netsp.guard.tethers import Strand, Strands
-from netsp.guard.track import GAP, Motion, Track
+from netsp.guard.track import GAP, JUMPED, Motion, Track
 from netsp.hsignature import Word
 from netsp.online.mission import Mission
 from netsp.online.tether import Tether
@@ -54,11 +55,14 @@ class GuardOptions:
         Standard deviation of how far estimates are off for minutes, metres.
     speed : float
         Fastest speed, m/s.
+    dead_reckoning : DeadReckoning
+        How the drift grows while no fixes correct the position.
     """
 
     noise: float = 0.3
     drift: float = 0.5
     speed: float = 0.5
+    dead_reckoning: DeadReckoning = field(default_factory=DeadReckoning)
 
 
 class Guard:
@@ -103,6 +107,9 @@ class Guard:
         self.strands = Strands(self.site)
         self.alarms = Alarms()
         self._vouched: bool | None = None
+        self._uncorrected_since: float | None = None
+        self._corrected_at: float | None = None
+        self._jumped_m: float | None = None
         self._last = Fix(0.0)
         self._seen, self._looked = -np.inf, -np.inf
         self._heard_since: float | None = None
@@ -210,8 +217,12 @@ class Guard:
             armed=self._last.armed if fix.armed is None else fix.armed,
             mode=self._last.mode if fix.mode is None else fix.mode,
             paid_out=self._last.paid_out if fix.paid_out is None else fix.paid_out,
+            aiding_fault=(
+                self._last.aiding_fault if fix.aiding_fault is None else fix.aiding_fault
+            ),
         )
         self._seen = max(self._seen, fix.time)
+        self._note_aiding()
         if self._heard_since is None:
             self._heard_since = fix.time
         if fix.estimate is not None:
@@ -228,10 +239,39 @@ class Guard:
                 self._moved(motion)
         return self._told(self._last)
 
+    def _note_aiding(self) -> None:
+        """Note since when no fixes correct the position, or since when they do again."""
+        now = self._seen
+        if self._last.aiding_fault:
+            self._corrected_at = None
+            if self._uncorrected_since is None:
+                self._uncorrected_since = now
+        elif self._uncorrected_since is not None:
+            if self._corrected_at is None:
+                self._corrected_at = now
+            if now - self._corrected_at > self.options.dead_reckoning.settle_s:
+                self._uncorrected_since = self._corrected_at = self._jumped_m = None
+
+    @property
+    def drift(self) -> float:
+        """Standard deviation of how far the position is off by now, metres."""
+        o, since = self.options, self._uncorrected_since
+        if since is None:
+            return o.drift
+        until = self._seen if self._corrected_at is None else self._corrected_at
+        return o.drift + o.dead_reckoning.error(until - since)
+
+    def _fit_drift(self, place: Floats) -> None:
+        """Have the belief know how far the position may be off by now."""
+        drift, known = self.drift, self.belief.drift
+        least = 1.0 if self._uncorrected_since is None else self.options.dead_reckoning.growth
+        if drift > least * known or (self._uncorrected_since is None and drift < 0.999 * known):
+            self.belief = self.belief.with_drift(drift, place)
+
     def _beyond(self, place: Point3) -> bool:
         """Whether a place is farther from the base than twice the tether."""
         far = float(np.linalg.norm(np.array(place) - self.site.anchor))
-        return not far <= 2.0 * self.site.tether_length + 4.0 * self.options.drift
+        return not far <= 2.0 * self.site.tether_length + 4.0 * self.drift
 
     def wait(self, now: float) -> Report:
         """Nothing has come for a while.
@@ -270,23 +310,30 @@ class Guard:
         self.alarms = Alarms()
         self._seen = self._looked = -np.inf
         self._heard_since = fix.time
+        self._uncorrected_since = self._corrected_at = self._jumped_m = None
         self.track.lose(fix.time if self.track.time is None else self.track.time)
         self._vouched = None
         return self.take(fix)
 
     def _moved(self, motion: Motion) -> None:
         o = self.options
-        reach = 2.0 * (o.drift + LEFT_OF_NOISE * o.noise)
         first = self._motion is None
+        if not first:
+            self._fit_drift(motion.before if self._previous is None else self._previous.after)
+        reach = 2.0 * (max(self.drift, self.belief.drift) + LEFT_OF_NOISE * o.noise)
         self._motion = motion
         if first:
             self._begin(motion, reach)
         elif motion.lost_s:
+            lost_s = motion.lost_s
+            if self._uncorrected_since is not None:  # where it has been since then is a guess
+                lost_s = max(lost_s, motion.time - self._uncorrected_since)
+                if motion.reason == JUMPED:
+                    self._jumped_m = float(np.linalg.norm(motion.after - motion.before))
             words = {h.word: -float(np.log(h.likely)) for h in self.belief.classes()}
             self.belief.begin(
-                after_gap(self.site, words, motion.before, motion.after, motion.lost_s,
-                          o.speed, reach)
-            )  # fmt: skip
+                after_gap(self.site, words, motion.before, motion.after, lost_s, o.speed, reach)
+            )
         else:
             before = motion.before if self._previous is None else self._previous.after
             dt = motion.time - (self._previous.time if self._previous else motion.time)
@@ -356,7 +403,7 @@ class Guard:
             loops=tuple(tuple(map(names, loop.around)) for loop in loops),
             alarms=tuple(sorted(self.alarms.on.values(), key=lambda a: -a.level)),
             raised=tuple(raised), paid_out=fix.paid_out,
-            as_planned=self._as_planned(strands),
+            as_planned=self._as_planned(strands), drift=self.drift,
         )  # fmt: skip
         return self.report
 
@@ -374,7 +421,7 @@ class Guard:
             )  # fmt: skip
             return [reasons.estimate_lost(silent, why)]
         if not classes:
-            return []
+            return self._uncorrected()
         robot, site = strands[0].tether.robot, self.site
         share, found = wound
         loops = next((loops for loops in found if loops), [])
@@ -384,6 +431,7 @@ class Guard:
         on_plan = self._on_plan
         ahead = self._ahead
         return [
+            *self._uncorrected(),
             *reasons.in_doubt(classes),
             *reasons.otherwise(as_planned, classes[0]),
             *reasons.little_left(site, classes[0]),
@@ -394,6 +442,15 @@ class Guard:
             ),
             *reasons.looped(site, loops, robot, share, on_plan),
         ]  # fmt: skip
+
+    def _uncorrected(self) -> list[Alarm]:
+        """Return the alarm that no fixes correct the position, if so."""
+        since, why = self._uncorrected_since, self._last.aiding_fault
+        if self._jumped_m is not None:
+            return [reasons.set_anew(self._jumped_m, self.site.units)]
+        if since is None or not why:
+            return []
+        return [reasons.uncorrected(self._seen - since, why, self.drift, self.site.units)]
 
     def _never_placed(self) -> list[Alarm]:
         """Return the alarm that nothing was ever claimed; silence counts after `GAP` seconds."""
@@ -412,8 +469,8 @@ class Guard:
     def _as_planned(self, strands: Sequence[Strand]) -> bool | None:
         if not strands:
             return None
-        o, now = self.options, strands[0]
-        off = o.drift + LEFT_OF_NOISE * o.noise
+        now = strands[0]
+        off = self.drift + LEFT_OF_NOISE * self.options.noise
         return self.site.as_planned(now.tether.robot, now.word, off)
 
     def _look(

@@ -13,6 +13,7 @@ from netsp.guard.alarms import Level
 from netsp.guard.fix import Fix
 from netsp.guard.guard import Guard
 from netsp.guard.memory import restore, save
+from netsp.guard.message_rates import MessageRates
 from netsp.guard.plane import PlaneSite
 from netsp.guard.rehearsal import rehearse
 from netsp.guard.report import Report
@@ -24,6 +25,7 @@ from netsp.link.frame import Frame
 from netsp.link.messages import AUTOPILOT, NO_GPS_FIX, POSITIONS, Listener
 from netsp.link.statustext import status_texts
 from netsp.link.udp import UdpLink
+from netsp.link.vehicle_kind import other_vehicle
 
 SAVE_S = 1.0
 """Seconds between two times that the class is written down."""
@@ -43,6 +45,7 @@ def watch(
     system: int | None = None, state: str | None = None, publish: bool = False,
     corrections: queue.Queue[tuple[str, str]] | None = None,
     say: Callable[[str], None] | None = None, until: Callable[[], bool] | None = None,
+    ask_rates: bool = False,
 ) -> None:  # fmt: skip
     """Watch a vehicle.
 
@@ -68,6 +71,9 @@ def watch(
         Called with a line of text now and then.
     until : callable, optional
         Asked whether to end.
+    ask_rates : bool
+        True to ask the vehicle to tell more often what the guard needs; nothing else is ever asked
+        of it.
 
     Raises
     ------
@@ -93,7 +99,7 @@ def watch(
     listener, stream = Listener(frame, system), Stream(guard, on_note=tell)
     heard = saved = sent = told = time.monotonic()
     others: set[int] = set()
-    hints = _Hints()
+    hints, rates = _Hints(), MessageRates(frame, ask_rates)
     numbers = itertools.count()
     try:
         tell(f"listening on {address}")
@@ -109,10 +115,15 @@ def watch(
                 fix = listener.understand(message)
                 for line in hints.about(message, fix, listener):
                     tell(line)
+                if listener.system is not None and message.get_srcSystem() == listener.system:
+                    for line in _rate_lines(rates, message, fix):
+                        tell(line)
                 if fix is None or message.get_srcSystem() != listener.system:
                     continue
                 heard = now
                 link.answer(peer)
+                for request in rates.requests(message.get_srcSystem(), fix.time):
+                    link.send(request)
                 report = stream.take(fix)
                 if report is not None:
                     told = now
@@ -141,15 +152,31 @@ def watch(
             save(guard, state)
 
 
+def _rate_lines(rates: MessageRates, message: Any, fix: Fix | None) -> Iterator[str]:
+    """Yield what a message of the vehicle tells of the rates of its messages."""
+    if message.get_type() == "COMMAND_ACK":
+        yield from rates.take_ack(int(message.command), int(message.result))
+    elif fix is not None and fix.position is not None:
+        yield from rates.take(fix.time)
+
+
 class _Hints:
-    """Hints at options that help while no position is understood; each is given once."""
+    """Hints at options that help while no position is understood, and a warning of vehicles whose
+    words may be misread; each is given once."""
 
     def __init__(self) -> None:
         self._has_position = False
+        self._is_kind_told = False
         self._told: set[str] = set()
 
     def about(self, message: Any, fix: Fix | None, listener: Listener) -> Iterator[str]:
-        """Yield the hint for a position message that is not understood."""
+        """Yield the hint for a position message that is not understood, and the warning of a
+        vehicle that is no submarine of ArduPilot's."""
+        kind = listener.kind
+        if kind is not None and not self._is_kind_told:
+            self._is_kind_told = True
+            if not kind.is_ardusub:
+                yield other_vehicle(kind)
         self._has_position = self._has_position or (fix is not None and fix.position is not None)
         if self._has_position or fix is not None or message.get_type() not in POSITIONS:
             return

@@ -85,6 +85,25 @@ def never_claimed(why: str, seconds: float) -> Alarm:
     return Alarm("estimate", Level.ALARM, text, is_immediate=True)
 
 
+def uncorrected(seconds: float, why: str, error: float, units: str) -> Alarm:
+    """Return the alarm that no fixes correct the position."""
+    lasted = f", for {seconds:.0f} s" if seconds >= 1.0 else ""
+    text = (
+        f"{why}{lasted}: the position may be off by {error:.1f} {units} and more; stop "
+        "and hold until fixes come, or go back along the tether"
+    )
+    return Alarm("position", Level.WARNING, text, is_immediate=True)
+
+
+def set_anew(far: float, units: str) -> Alarm:
+    """Return the alarm that the position jumped when fixes were taken again."""
+    text = (
+        f"the position was set anew, {far:.1f} {units} from where it was: it was off, or the fixes "
+        "are; say on which side of obstacles the tether passes, or go back along it"
+    )
+    return Alarm("position", Level.WARNING, text, is_immediate=True)
+
+
 def in_doubt(classes: Sequence[ClassNow]) -> list[Alarm]:
     """The class is one of several."""
     if len(classes) < 2 or classes[1].likely < DOUBT:

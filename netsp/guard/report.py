@@ -92,6 +92,9 @@ class Report:
     as_planned : bool or None
         Whether the likeliest class is the one that the tour means it to be in; None where the robot
         is at none of its stops, or there is no tour.
+    drift : float or None
+        Standard deviation of how far the position is off, metres: as given, and more while no fixes
+        correct it.
     """
 
     time: float
@@ -111,6 +114,7 @@ class Report:
     raised: tuple[Alarm, ...]
     paid_out: float | None = None
     as_planned: bool | None = None
+    drift: float | None = None
 
     def as_row(self) -> dict[str, Any]:
         """For JSON lines and the page; no number is infinite or not one."""
@@ -130,6 +134,7 @@ class Report:
             "loop_s": brief(self.loop_s), "loop_around": list(self.loop_around),
             "short_s": brief(self.short_s), "loops": [list(names) for names in self.loops],
             "paid_out": brief(self.paid_out), "as_planned": self.as_planned,
+            "drift": brief(self.drift),
             "alarms": [
                 {"kind": a.kind, "level": a.level.name.lower(), "text": a.text}
                 for a in self.alarms

@@ -16,6 +16,7 @@ from netsp.guard.message_tally import MessageTally
 from netsp.link.dialect import dialect, parser
 from netsp.link.frame import Frame
 from netsp.link.messages import AUTOPILOT, POSITIONS, Listener
+from netsp.link.vehicle_kind import other_vehicle
 
 TIME_BYTES = 8
 """Length of the time before each message, bytes."""
@@ -83,6 +84,9 @@ def read_tlog(
     heard.count(vehicle, tally)
     if heard.foreign_bytes > 0:
         on_note(f"{where}: {heard.foreign_bytes:,} bytes left out: they belong to no message")
+    kind = vehicle.listener.kind
+    if kind is not None and not kind.is_ardusub:
+        on_note(f"{where}: {other_vehicle(kind)}")
     if not vehicle.has_positions:
         raise InputError(f"{where}: has no positions{_help(heard, vehicle, frame)}")
     return vehicle.fixes

@@ -29,6 +29,9 @@ FROZEN = 3.0
 MOVING = 0.1
 """Share of the speed: slower than that a robot is at rest."""
 
+JUMPED = "the position jumped"
+"""Reason of a motion that no robot can have made."""
+
 RESTART_S = 10.0
 """Seconds that a vehicle takes to start anew, at least."""
 
@@ -206,7 +209,7 @@ class Track:
         elif dt > GAP:
             lost_s, reason = dt, "no position came"
         elif far > most:
-            lost_s, reason = dt, "the position jumped"
+            lost_s, reason = dt, JUMPED
         if lost_s:
             self.begin(fix.time, position)
             return Motion(fix.time, before, position, np.zeros(3), 0.0, lost_s, reason)

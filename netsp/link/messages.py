@@ -11,6 +11,7 @@ from netsp.fields import Point3
 from netsp.guard.fix import Fix
 from netsp.link.frame import Frame
 from netsp.link.modes import mode_name
+from netsp.link.position_aiding import PositionAiding
 from netsp.link.vehicle_kind import VehicleKind
 
 AUTOPILOT = 1
@@ -55,6 +56,8 @@ class Listener:
         How many messages came from others.
     others : set of int
         System ids of the other vehicles among them.
+    aiding : PositionAiding
+        What corrects the vehicle's position.
     kind : VehicleKind or None
         Kind of the vehicle by its last heartbeat; None before the first.
     left_out : str
@@ -70,6 +73,7 @@ class Listener:
         self.others: set[int] = set()
         self.kind: VehicleKind | None = None
         self.left_out = ""
+        self.aiding = PositionAiding()
         self._early: Fix | None = None
 
     def understand(self, message: Any) -> Fix | None:
@@ -106,7 +110,10 @@ class Listener:
             return self._none("says nothing that the guard uses")
         if self.time is None:
             return self._keep(read, message)
+        self.aiding.take(message, self.time)
         fix = read(message)
+        if fix is not None:
+            fix = replace(fix, aiding_fault=self.aiding.fault(self.time))
         if fix is None or self._early is None:
             return fix
         early, self._early = self._early, None
@@ -129,6 +136,7 @@ class Listener:
             "LOCAL_POSITION_NED": self._local_position_ned,
             "GLOBAL_POSITION_INT": self._global_position_int,
             "EKF_STATUS_REPORT": self._ekf_status_report, "WINCH_STATUS": self._winch_status,
+            "GPS_RAW_INT": self._aiding_only, "SYS_STATUS": self._aiding_only,
         }  # fmt: skip
 
     def _none(self, why: str) -> Fix | None:
@@ -184,6 +192,11 @@ class Listener:
         flags = int(m.flags)
         good = bool(flags & HORIZONTAL) and not flags & (CONSTANT | UNINITIALIZED)
         return Fix(self.time, estimate=good)
+
+    def _aiding_only(self, m: Any) -> Fix:
+        del m  # what it says of the position's aiding is added to every fix
+        assert self.time is not None
+        return Fix(self.time)
 
     def _winch_status(self, m: Any) -> Fix | None:
         assert self.time is not None

@@ -41,6 +41,25 @@ class VehicleKind:
         return f"{vehicle} with autopilot {_name(names, 'MAV_AUTOPILOT', self.autopilot)}"
 
 
+def other_vehicle(kind: VehicleKind) -> str:
+    """Return the warning of a vehicle that a guard does not know.
+
+    Parameters
+    ----------
+    kind : VehicleKind
+        Kind of the vehicle.
+
+    Returns
+    -------
+    str
+        One line.
+    """
+    return (
+        f"warning: the vehicle is a {kind}, expected a submarine with ArduPilot: its modes, and "
+        "when its position is lost, may be misread"
+    )
+
+
 def _name(names: Any, kind: str, number: int) -> str:
     """Return the name of a number of an enumeration in small letters; the number if it has none."""
     entry = names[kind].get(number)

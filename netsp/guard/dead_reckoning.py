@@ -1,0 +1,72 @@
+"""How far off a position is that no fixes correct.
+
+A filter without fixes integrates the errors of its accelerometers and of its model of the vehicle,
+so that its error grows with the square of the time. ArduSub 4.7 with the GPS switched off was off
+by 0.25 m after 3 s, 0.54 m after 5 s, 0.99 m after 7.1 s and 3.6 m after 13 s: half of 0.04 m/s² by
+the time squared.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from netsp.errors import InputError
+
+
+@dataclass(frozen=True)
+class DeadReckoning:
+    """Growth of a position's error while nothing corrects it.
+
+    Attributes
+    ----------
+    acceleration
+        Twice the error by the square of the time, m/s²; from flights with a GPS switched off. 0 or
+        more.
+    notice_s
+        Time from the loss until it is noticed, s: the error has grown for that long. 0 or more.
+    max_error
+        Error at which growth ends, m: nobody knows the class any more. Positive.
+    settle_s
+        Time for which the error counts after fixes are taken again, s: the filter sets its estimate
+        anew meanwhile. 0 or more.
+    growth
+        Factor by which the error grows before the classes are sought anew. More than 1.
+    """
+
+    acceleration: float = 0.04
+    notice_s: float = 2.0
+    max_error: float = 10.0
+    settle_s: float = 2.0
+    growth: float = 1.1
+
+    def __post_init__(self) -> None:
+        for name, is_good, expected in (
+            ("acceleration", self.acceleration >= 0.0, "0 or more"),
+            ("notice_s", self.notice_s >= 0.0, "0 or more"),
+            ("max_error", self.max_error > 0.0, "more than 0"),
+            ("settle_s", self.settle_s >= 0.0, "0 or more"),
+            ("growth", self.growth > 1.0, "more than 1"),
+        ):
+            if not is_good:
+                raise InputError(f"{name}: expected {expected}, got {getattr(self, name)!r}")
+
+    def error(self, seconds: float) -> float:
+        """Return the error that has been added since the loss was noticed.
+
+        Parameters
+        ----------
+        seconds : float
+            Seconds since then.
+
+        Returns
+        -------
+        float
+            Metres.
+
+        Examples
+        --------
+        >>> [round(DeadReckoning().error(t), 2) for t in (0, 3, 5, 11)]
+        [0.08, 0.5, 0.98, 3.38]
+        """
+        lasted = self.notice_s + max(seconds, 0.0)
+        return min(0.5 * self.acceleration * lasted**2, self.max_error)
