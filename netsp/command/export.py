@@ -6,6 +6,7 @@ import argparse
 import sys
 
 from netsp.command import messages, told
+from netsp.command.clearance_flags import clearance_flags, warn_of_clearance
 from netsp.command.types import (
     check_writable,
     depth,
@@ -69,6 +70,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
         "--margin", default="0.3,0.2", metavar="SLACK[,CLEARANCE]",
         help="warn where less tether is left or an obstacle is closer; default 0.3,0.2",
     )  # fmt: skip
+    clearance_flags(p)
     p.add_argument(
         "--depth", type=depth, metavar="D",
         help="depth of all goals of a solution (m), instead of their own",
@@ -95,7 +97,7 @@ def run(args: argparse.Namespace) -> int:
     from netsp.export.export_notes import export_notes
     from netsp.export.fence import MIN_FENCE_BYTES, FencePolicy
     from netsp.export.margins import warnings
-    from netsp.export.write import Settings, export, format_of, predicted_s
+    from netsp.export.write import FOR_VEHICLES, Settings, export, format_of, predicted_s
     from netsp.judge import verify
     from netsp.problem import Problem
     from netsp.site.goal_depths import surface_warning
@@ -143,6 +145,11 @@ def run(args: argparse.Namespace) -> int:
         })  # fmt: skip
     for line in warnings(problem, solution, points, slack, clearance):
         messages.warning(line)
+    if kind in FOR_VEHICLES:
+        warn_of_clearance(
+            args.position_error, args.current, problem.clearance, problem.units,
+            bool(problem.obstacles),
+        )  # fmt: skip
     said = export_notes(problem, points, kind, settings)
     for line in said.warnings:
         messages.warning(line)
@@ -206,6 +213,7 @@ def _mission(args: argparse.Namespace) -> int:
             f"margin of {clearance:g}: plan with a larger clearance, or set another margin"
         )
     if kind in FOR_VEHICLES:
+        warn_of_clearance(args.position_error, args.current, mission.clearance, "m", True)
         shallow = sum(p.position[2] > -SHALLOWEST for p in done.points)
         if shallow:
             messages.note(

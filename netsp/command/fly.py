@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from netsp.command import told
+from netsp.command.clearance_flags import clearance_flags, warn_of_clearance
 from netsp.command.guard import PORT
 from netsp.command.types import length, natural, seconds
 from netsp.errors import EXIT_DEFECT, EXIT_NOT_ALL, EXIT_NOT_VERIFIED, InputError
@@ -100,6 +101,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     p.add_argument("--seed", type=natural, default=0, metavar="N", help="of solvers; default 0")
     p.add_argument("-o", "--output", metavar="RUN", help="folder for logs, summary and run.png")
+    clearance_flags(p)
     p.add_argument("--quiet", action="store_true", help="no progress, no summary")
     told.json_flag(p)
 
@@ -120,6 +122,11 @@ def run(args: argparse.Namespace) -> int:
     if problem.units != "m":
         raise InputError(f"units: a vehicle goes by metres; expected m, got {problem.units!r}")
     frame = Frame(problem, args.frame)
+    if not args.quiet:
+        warn_of_clearance(
+            args.position_error, args.current, problem.clearance, problem.units,
+            bool(problem.obstacles),
+        )  # fmt: skip
     if args.dry_run:
         print_targets(problem, solution, frame)
         return 0

@@ -8,6 +8,7 @@ import sys
 from typing import TYPE_CHECKING
 
 from netsp.command import messages, told
+from netsp.command.clearance_flags import clearance_flags, warn_of_clearance
 from netsp.command.types import (
     check_writable,
     choices,
@@ -79,6 +80,7 @@ def for_all(p: argparse.ArgumentParser) -> None:
         help="write the solution (the planned mission) to this file (default: stdout)",
     )  # fmt: skip
     p.add_argument("--plot", metavar="FILE", help="draw the solution (png, svg or pdf)")
+    clearance_flags(p)
     p.add_argument("--quiet", action="store_true", help="no progress, no summary")
     told.json_flag(p)
 
@@ -143,7 +145,8 @@ def run_mission(args: argparse.Namespace) -> int:
     return solve_mission.solve(
         args.problem, solver=args.solver, params=_params(args), time_limit=args.time_limit,
         iteration_limit=args.iteration_limit, seed=args.seed, output=args.output, plot=args.plot,
-        quiet=args.quiet, as_json=args.json,
+        quiet=args.quiet, as_json=args.json, position_error=args.position_error,
+        current=args.current,
     )  # fmt: skip
 
 
@@ -235,6 +238,11 @@ def run(args: argparse.Namespace) -> int:
         table.end()
         text = summary(problem, solution, args.output, args.plot, args.plot_trace)
         print(text, file=sys.stderr)
+        if solution.tour:
+            warn_of_clearance(
+                args.position_error, args.current, problem.clearance + args.margin, problem.units,
+                bool(problem.obstacles),
+            )  # fmt: skip
     if args.json:
         told.tell(told.of_solution(problem, solution))
     return _EXIT.get(solution.status.value, 0)

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from netsp.command import told
+from netsp.command.clearance_flags import warn_of_clearance
 from netsp.command.types import check_writable
 from netsp.errors import EXIT_NOT_ALL, InputError, counted
 
@@ -59,7 +60,7 @@ def check_flags(args: argparse.Namespace, parser_defaults: dict[str, Any]) -> No
 def solve(
     file: str, *, solver: str, params: dict[str, str], time_limit: float | None,
     iteration_limit: int | None, seed: int, output: str | None, plot: str | None, quiet: bool,
-    as_json: bool = False,
+    as_json: bool = False, position_error: float = 0.0, current: float = 0.0,
 ) -> int:  # fmt: skip
     """Plan the mission, write it, and return the exit code."""
     check_writable(output, plot, inputs=(file,))
@@ -119,6 +120,7 @@ def solve(
             summary(mission, found, time.monotonic() - begin, output, plot, scene.units),
             file=sys.stderr,
         )
+        warn_of_clearance(position_error, current, mission.clearance, scene.units, True)
     if as_json:
         told.tell(told.of_mission(mission, found, scene.units))
     return EXIT_NOT_ALL if found.left_out else 0
