@@ -20,7 +20,7 @@ MAX_PACKET_BYTES = 300
 """Maximum length of a MAVLink message, bytes."""
 
 STAMP_BYTES = 8
-"""Length of the time before each message, bytes."""
+"""Length of the time stamp before each message, bytes."""
 
 
 def read_tlog(
