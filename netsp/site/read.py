@@ -117,7 +117,7 @@ class ImportedSite:
     goal_features: tuple[Feature | None, ...] = ()
 
     def keeping(self, problem: Problem, reason: str) -> ImportedSite:
-        """Return the import with fewer goals: features without a goal that is kept are left out.
+        """Return the import with fewer goals; features without a remaining goal count as left out.
 
         Parameters
         ----------
@@ -308,8 +308,8 @@ centimetre are written with seven decimals of a degree."""
 SKIP_OPTION = "; leave out what is out of reach with --skip-unreachable"
 
 MIN_SHARE = 5e-4
-"""Share of the tether's reach from which on a note says what is not known there: 0.05 %, the least
-that two digits show as more than a rounding of areas."""
+"""Smallest share of the tether's reach without chart or depth that a note reports: 0.05 %, because
+smaller shares may be rounding of areas."""
 
 MOST_OF_A_KIND = 5
 """Goals out of reach that are told one by one."""
@@ -494,7 +494,7 @@ class _Site:
     def _check_depth(
         self, shallow: list[Feature], places: Mapping[str, Any], draught: float
     ) -> None:
-        """Complain of places that the robot needs in water that may be too shallow."""
+        """Report a base or goals that lie in water that may be too shallow."""
         import shapely
 
         areas = [self._plane(feature.shape) for feature in shallow]
@@ -623,7 +623,7 @@ class _Site:
             if depth < 0.0:
                 self._complain(
                     f"{self._called(feature)}: depth: counts downwards; expected 0 or more, got "
-                    f"{depth:g} m; if it is a height, give the point itself the height"
+                    f"{depth:g} m; if it is a height, give it as the z of the point"
                 )
             return 0.0 - depth
         at = point if point is not None else feature.shape
@@ -1008,7 +1008,7 @@ class _Site:
         return found
 
     def _is_shallow(self, feature: Feature) -> bool:
-        """Return whether a feature is water that is an obstacle for its depth only."""
+        """Return whether a feature is water that is an obstacle only because of its depth."""
         return self.is_chart and feature.layer.upper() in (*DEPTH_AREAS, UNSURVEYED, SOUNDINGS)
 
     def _free_viewpoints(
