@@ -12,6 +12,7 @@ from netsp.command.main import main
 from netsp.errors import InputError
 from netsp.online.scene.readers import Placement, load_cloud, load_mesh
 from netsp.problem import Problem
+from netsp.site import read_site
 from netsp.site.goal_depths import surface_warning, with_depth
 from netsp.site.path_file import read_paths
 from netsp.site.projection import Projection
@@ -456,3 +457,21 @@ def test_every_point_of_a_cloud_is_used_or_counted_in_a_note(tmp_path, kind):
     left_out = sum(int(note.split()[0]) for note in notes if note.endswith("left out"))
     assert left_out > 0
     assert len(used) + left_out == 60
+
+
+def test_heights_and_sizes_that_are_not_read_are_named(tmp_path):
+    def point(x, **properties):
+        geometry = {"type": "Point", "coordinates": [5.5 + x, 58.0]}
+        return {"type": "Feature", "properties": properties, "geometry": geometry}
+
+    goals = [
+        point(2e-4, kind="goal", elevation=-5), point(3e-4, kind="goal", depth=2),
+        point(1e-4, kind="obstacle", radius_ft=10), point(0.0, kind="base"),
+    ]  # fmt: skip
+    file = tmp_path / "site.geojson"
+    file.write_text(json.dumps({"type": "FeatureCollection", "features": goals}))
+    notes: list[str] = []
+    read_site(file, tether=60.0, radius=0.5, on_note=notes.append)
+    assert [note for note in notes if "'elevation' is not read" in note]
+    assert [note for note in notes if "'radius_ft' is not read" in note]
+    assert len(notes) == 2

@@ -634,6 +634,11 @@ class _Site:
             )
             return 0.0
         if at.geom_type != "Point" or not at.has_z or at.z != at.z:
+            self._note_unread(
+                feature,
+                [name for name in feature.properties if _is_height(str(name))],
+                "expected a depth (downwards), or the height as z of the point",
+            )
             return 0.0
         return float(at.z) * (1.0 if self.map.geographic else self._unit)
 
@@ -909,8 +914,23 @@ class _Site:
         radius = self._number(feature, "radius")
         if radius is not None:
             return radius * (1.0 if metres else self._unit)
+        self._note_unread(
+            feature,
+            [n for n in feature.properties if str(n).lower().startswith(("radius", "diameter"))],
+            "expected radius_m, in metres",
+        )
         own = chart_radius(feature) if self.is_chart else None
         return own if own is not None else self.said.radius
+
+    def _note_unread(self, feature: Feature, names: list[Any], expected: str) -> None:
+        """Note once a layer that properties which look like a height or a size are not read."""
+        for name in names:
+            if self.is_chart or feature.properties[name] is None:
+                continue
+            layer = f"layer {feature.layer!r}: " if feature.layer else ""
+            note = f"{layer}property {str(name)!r} is not read: {expected}"
+            if note not in self.notes:
+                self.notes.append(note)
 
     def _complain_of_points(self, features: list[Feature]) -> None:
         """Complain of points without a radius, a line for each layer."""
@@ -1278,6 +1298,15 @@ def _distance(places: np.ndarray, obstacles: list[dict[str, Any]]) -> np.ndarray
 def _first_of(places: list[str]) -> str:
     """Return the first of some places and how many more there are."""
     return places[0] + (f" and {len(places) - 1} more" if len(places) > 1 else "")
+
+
+def _is_height(name: str) -> bool:
+    """Return whether the name of a property means a height."""
+    try:
+        meaning = column(name)
+    except InputError:
+        return False
+    return meaning is not None and meaning.quantity == "z"
 
 
 def _number_parts(things: list[dict[str, Any]]) -> None:
