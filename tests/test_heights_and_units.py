@@ -475,3 +475,25 @@ def test_heights_and_sizes_that_are_not_read_are_named(tmp_path):
     assert [note for note in notes if "'elevation' is not read" in note]
     assert [note for note in notes if "'radius_ft' is not read" in note]
     assert len(notes) == 2
+
+
+def test_a_depth_and_another_height_of_one_point_are_told_apart(tmp_path):
+    def goal(x, z, depth):
+        geometry = {"type": "Point", "coordinates": [5.5 + x, 58.0, z]}
+        return {
+            "type": "Feature", "geometry": geometry,
+            "properties": {"kind": "goal", "name": f"G{depth}", "depth": depth},
+        }  # fmt: skip
+
+    base = {
+        "type": "Feature", "properties": {"kind": "base"},
+        "geometry": {"type": "Point", "coordinates": [5.5, 58.0]},
+    }  # fmt: skip
+    file = tmp_path / "site.geojson"
+    features = [goal(1e-4, -7.0, 2.0), goal(2e-4, -3.0, 3.0), goal(3e-4, 0.0, 4.0), base]
+    file.write_text(json.dumps({"type": "FeatureCollection", "features": features}))
+    notes: list[str] = []
+    problem = read_site(file, tether=60.0, on_note=notes.append)
+    assert [g.position[2] for g in problem.goals] == [-2.0, -3.0, -4.0]
+    (note,) = notes
+    assert "(G2.0): its depth of 2 m is taken, and its height of -7 m is not" in note

@@ -307,6 +307,10 @@ centimetre are written with seven decimals of a degree."""
 
 SKIP_OPTION = "; leave out what is out of reach with --skip-unreachable"
 
+MAX_HEIGHT_GAP = 0.005
+"""Largest distance in metres between a depth and the height of the same point that needs no note:
+files round heights to a centimetre."""
+
 MIN_SHARE = 5e-4
 """Smallest share of the tether's reach without chart or depth that a note reports: 0.05 %, because
 smaller shares may be rounding of areas."""
@@ -619,14 +623,15 @@ class _Site:
         """Return z in metres: of a depth, else of the point itself, whose height on the earth is
         in metres by its format."""
         depth = self._depth(feature)
+        at = point if point is not None else feature.shape
         if depth is not None:
             if depth < 0.0:
                 self._complain(
                     f"{self._called(feature)}: depth: counts downwards; expected 0 or more, got "
                     f"{depth:g} m; if it is a height, give it as the z of the point"
                 )
+            self._note_other_height(feature, at, depth)
             return 0.0 - depth
-        at = point if point is not None else feature.shape
         if feature.is_above_floor:
             self._complain(
                 f"{self._called(feature)}: its height counts from the sea floor, which the map "
@@ -921,6 +926,18 @@ class _Site:
         )
         own = chart_radius(feature) if self.is_chart else None
         return own if own is not None else self.said.radius
+
+    def _note_other_height(self, feature: Feature, at: Any, depth: float) -> None:
+        """Note that the depth of a feature is taken, where its point has another height."""
+        if self.is_chart or at.geom_type != "Point" or not at.has_z:
+            return
+        z = float(at.z) * (1.0 if self.map.geographic else self._unit)
+        # files write 0 where they have no height
+        if z and abs(z + depth) > MAX_HEIGHT_GAP:
+            self.notes.append(
+                f"{self._called(feature)}: its depth of {depth:g} m is taken, and its height of "
+                f"{z:g} m is not"
+            )
 
     def _note_unread(self, feature: Feature, names: list[Any], expected: str) -> None:
         """Note once a layer that properties which look like a height or a size are not read."""
