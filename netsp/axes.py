@@ -152,12 +152,12 @@ NOISE_CLASSES = {7: "low noise", 18: "high noise"}
 CUSTOMARY_NODATA = (
     -9999.0, 9999.0, -99999.0, 99999.0, -32768.0, -32767.0, 32767.0, -999999.0, 999999.0,
 )  # fmt: skip
-"""Values that customarily stand for no height. Where a file does not say so, they are taken as such
-if they lie farther from all other values than those lie apart."""
+"""Values that usually mark a missing height. If a file does not declare them as nodata, they count
+as missing only where their distance from all other values exceeds the range of those values."""
 
 MAX_HEIGHT = 1e9
-"""Largest height in units of a file: heights on earth are below 1.2e7 millimetres. Larger values
-are marks of no height, such as 1e20 and the largest number of a data type."""
+"""Largest height, in units of the file: heights on earth are below 1.2e7 mm. Larger values, such as
+1e20 or the largest number of a data type, mark a missing height."""
 
 SAMPLE_LINES = 1000
 """Lines of a table that decide its separator and its decimal sign; later lines must agree."""
@@ -269,7 +269,7 @@ def _unit_factor(quantity: Quantity, unit: str) -> float | None:
 
 
 def height_meaning(names: Sequence[str]) -> Column | None:
-    """Return the meaning of a band or variable of heights by the first of its names that says so.
+    """Return the meaning of a band or variable, from the first of its names that means heights.
 
     Parameters
     ----------
@@ -279,7 +279,7 @@ def height_meaning(names: Sequence[str]) -> Column | None:
     Returns
     -------
     Column or None
-        Its factor is negative for depths; None where no name is that of heights.
+        Meaning, with a negative factor for depths; None if no name means heights or depths.
 
     Raises
     ------
@@ -306,11 +306,11 @@ _HEIGHT_BEGINNINGS = (
     (-1.0, ("sea floor depth", "depth below", "bathymetric depth", "bathymetry depth")),
     (1.0, ("height above", "surface altitude", "bedrock altitude", "sea floor altitude")),
 )
-"""Signs of heights, by the beginning of the name of a band or of a variable (CF conventions)."""
+"""Sign of the values, and beginnings of names of bands or variables with it (CF conventions)."""
 
 
 def marks_of_no_height(z: Floats, *more: float) -> list[tuple[float, Bools]]:
-    """Return the values that customarily mark a missing height, and where they stand.
+    """Return the values that mark a missing height, each with a mask of where it occurs.
 
     Parameters
     ----------
@@ -341,7 +341,7 @@ def marks_of_no_height(z: Floats, *more: float) -> list[tuple[float, Bools]]:
 def meanings(
     names: Sequence[str], source: str
 ) -> tuple[dict[Quantity, tuple[int, Column]], tuple[str, ...]]:
-    """Return the columns by the quantity that they hold, and the names of the other columns.
+    """Return the position and meaning of each known column by its quantity, and the other names.
 
     Parameters
     ----------
@@ -556,7 +556,7 @@ class Table:
         return (*known, *self.unused)
 
     def notes(self, quantities: Sequence[Quantity]) -> list[str]:
-        """Return what a reader of the table has to tell: decimal commas, and unused columns.
+        """Return notes on how the table was read: decimal commas, and unused columns.
 
         Parameters
         ----------
@@ -961,7 +961,7 @@ def height_axis(crs: Any) -> HeightAxis:
 
 
 def map_unit(crs: Any) -> float | None:
-    """Return the metres per unit of a coordinate system's map; None where it is in angles.
+    """Return the metres per unit of a coordinate system's map; None if it is in angles.
 
     Parameters
     ----------
@@ -978,8 +978,8 @@ def map_unit(crs: Any) -> float | None:
         return None
     if system.is_geocentric:
         raise InputError(
-            "geocentric coordinates, which count from the middle of the earth; expected those of a "
-            "map, such as UTM"
+            "geocentric coordinates (from the centre of the earth); expected map coordinates, such "
+            "as UTM"
         )
     for axis in system.axis_info:
         if axis.direction.lower() not in ("up", "down"):
@@ -988,12 +988,12 @@ def map_unit(crs: Any) -> float | None:
 
 
 def metres_per_unit_code(code: int) -> float | None:
-    """Return the metres in a unit of length by its number in the EPSG registry, None if unknown.
+    """Return the metres in a unit of length, given its EPSG code; None if the code is unknown.
 
     Parameters
     ----------
     code : int
-        Number, as GeoTIFF keys state it: 9001 is the metre.
+        EPSG code of the unit, as in GeoTIFF keys: 9001 is the metre.
 
     Examples
     --------

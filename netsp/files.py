@@ -118,7 +118,7 @@ def read_gzip(path: str | Path, most: int = MOST_BYTES) -> bytes:
 
 
 def write_text(path: str | Path, text: str) -> None:
-    """Write a text in UTF-8 to a file as `write_bytes` does.
+    """Write a text to a file in UTF-8, replacing the file as `write_bytes` does.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ def write_text(path: str | Path, text: str) -> None:
 
 
 def write_bytes(path: str | Path, data: bytes) -> None:
-    """Write a file by renaming a finished one into place, so that it is never half there.
+    """Write a file by renaming a finished one into place, so that it is never half written.
 
     Parameters
     ----------

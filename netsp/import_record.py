@@ -58,7 +58,7 @@ class LayerRecord(Model):
         return self
 
     def without_goals(self, places: Sequence[str], reason: str) -> LayerRecord:
-        """Return the record with some goals left out for a reason.
+        """Return the record with some goals counted as left out.
 
         Parameters
         ----------

@@ -150,7 +150,7 @@ def test_files_that_are_no_single_cell_are_told_in_one_line(tmp_path):
     (tmp_path / "B.000").write_text("no chart")
     with pytest.raises(InputError, match="not a chart of S-57"):
         read_map(tmp_path / "B.000")
-    with pytest.raises(InputError, match="in degrees always"):
+    with pytest.raises(InputError, match="always in degrees"):
         read_map(cell, "EPSG:32632")
     shutil.copy(cell, tmp_path / "renamed.dat")
     assert read_map(tmp_path / "renamed.dat").is_chart

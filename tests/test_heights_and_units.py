@@ -12,6 +12,7 @@ from netsp.command.main import main
 from netsp.errors import InputError
 from netsp.online.scene.readers import Placement, load_cloud, load_mesh
 from netsp.problem import Problem
+from netsp.site import read_site
 from netsp.site.goal_depths import surface_warning, with_depth
 from netsp.site.path_file import read_paths
 from netsp.site.projection import Projection
@@ -456,3 +457,43 @@ def test_every_point_of_a_cloud_is_used_or_counted_in_a_note(tmp_path, kind):
     left_out = sum(int(note.split()[0]) for note in notes if note.endswith("left out"))
     assert left_out > 0
     assert len(used) + left_out == 60
+
+
+def test_heights_and_sizes_that_are_not_read_are_named(tmp_path):
+    def point(x, **properties):
+        geometry = {"type": "Point", "coordinates": [5.5 + x, 58.0]}
+        return {"type": "Feature", "properties": properties, "geometry": geometry}
+
+    goals = [
+        point(2e-4, kind="goal", elevation=-5), point(3e-4, kind="goal", depth=2),
+        point(1e-4, kind="obstacle", radius_ft=10), point(0.0, kind="base"),
+    ]  # fmt: skip
+    file = tmp_path / "site.geojson"
+    file.write_text(json.dumps({"type": "FeatureCollection", "features": goals}))
+    notes: list[str] = []
+    read_site(file, tether=60.0, radius=0.5, on_note=notes.append)
+    assert [note for note in notes if "'elevation' is not read" in note]
+    assert [note for note in notes if "'radius_ft' is not read" in note]
+    assert len(notes) == 2
+
+
+def test_a_depth_and_another_height_of_one_point_are_told_apart(tmp_path):
+    def goal(x, z, depth):
+        geometry = {"type": "Point", "coordinates": [5.5 + x, 58.0, z]}
+        return {
+            "type": "Feature", "geometry": geometry,
+            "properties": {"kind": "goal", "name": f"G{depth}", "depth": depth},
+        }  # fmt: skip
+
+    base = {
+        "type": "Feature", "properties": {"kind": "base"},
+        "geometry": {"type": "Point", "coordinates": [5.5, 58.0]},
+    }  # fmt: skip
+    file = tmp_path / "site.geojson"
+    features = [goal(1e-4, -7.0, 2.0), goal(2e-4, -3.0, 3.0), goal(3e-4, 0.0, 4.0), base]
+    file.write_text(json.dumps({"type": "FeatureCollection", "features": features}))
+    notes: list[str] = []
+    problem = read_site(file, tether=60.0, on_note=notes.append)
+    assert [g.position[2] for g in problem.goals] == [-2.0, -3.0, -4.0]
+    (note,) = notes
+    assert "(G2.0): its depth of 2 m is taken, and its height of -7 m is not" in note

@@ -179,7 +179,7 @@ def test_tables_of_loggers_tell_the_track_and_what_was_assumed(tmp_path, name):
     ("text", "site", "says"),
     [
         (table("time,x,y,z", "{ms},{x},{y},{z}"), SITE, "1000 s between positions"),
-        ("t,x,y,z\n45615.29,0,0,-1\n45615.290001,1,0,-1\n", SITE, "move at 1e+06 m/s"),
+        ("t,x,y,z\n45615.29,0,0,-1\n45615.290001,1,0,-1\n", SITE, "moves at 1e+06 m/s"),
         (table("t,x,y,z", "{t},45{t}000.5,63{t}0000,{z}"), SITE, "3 of 3 positions are farther"),
         ("t,lat,lon,z\n0,5.5,58,-1\n1,5.5,58,-1\n", ON_EARTH, "check the frame"),
         ("t,x,y,z\n5,0,0,-1\n3,1,0,-1\n5,0,0,-1\n6,0,0,-1\n7,0,0,-1\n", SITE, "go back at 1 place"),

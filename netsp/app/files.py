@@ -260,12 +260,12 @@ def _site(
 
 
 def import_warnings(problem: Problem) -> list[str]:
-    """Return what may be wrong with the problem of a map, one line each; nothing of other problems.
+    """Return warnings about a problem that was imported from a map, one line each.
 
     Parameters
     ----------
     problem : Problem
-        Problem that was imported, perhaps edited since.
+        Problem, perhaps edited since its import; a problem from no map has no warnings.
     """
     if problem.site is None:
         return []
@@ -295,7 +295,7 @@ def exported(problem: Problem, solution: Solution, kind: str) -> tuple[str, str,
     text : str
         What `netsp export` writes.
     notes : list of str
-        What `netsp export` says of it.
+        Notes and warnings of `netsp export`, one line each.
 
     Raises
     ------
@@ -311,7 +311,7 @@ def exported(problem: Problem, solution: Solution, kind: str) -> tuple[str, str,
         raise InputError(f"export: expected one of {', '.join(EXPORTS)}, got {kind!r}")
     if problem.origin is None and kind != "csv":
         raise InputError(
-            "origin: the place of the base on the earth is not known; give its latitude and "
+            "origin: netsp does not know where the base is on the earth; enter its latitude and "
             "longitude in the panel"
         )
     with tempfile.TemporaryDirectory(prefix="netsp-") as folder:
@@ -328,7 +328,7 @@ def exported(problem: Problem, solution: Solution, kind: str) -> tuple[str, str,
 
 
 def is_map(content: bytes) -> bool:
-    """Tell whether a JSON file is a map, as GeoJSON or a plan of QGroundControl, and no problem.
+    """Return whether a JSON file is a map (GeoJSON or a QGroundControl plan) instead of a problem.
 
     Parameters
     ----------

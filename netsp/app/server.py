@@ -76,7 +76,7 @@ class Session:
     shown : Shown, optional
         Something that is only looked at: nothing is edited or solved then.
     notes : sequence of str
-        What was assumed, changed or left out when the document was imported from a map.
+        Notes of the import, if the document comes from a map: assumptions, changes, omissions.
     """
 
     def __init__(
@@ -200,19 +200,19 @@ class Session:
         return None
 
     def take_in(self, data: Mapping[str, Any], notes: Sequence[str]) -> list[str]:
-        """Make a version of an imported file.
+        """Replace the document by an imported problem, as a new version.
 
         Parameters
         ----------
         data : mapping
-            Problem as a problem file has it.
+            Problem, in the format of problem files.
         notes : sequence of str
-            What was assumed, changed or left out; shown while this problem is on the map.
+            Notes of the import; shown while this problem is on the map.
 
         Returns
         -------
         list of str
-            What may be wrong with the problem.
+            Warnings about the problem, one line each.
         """
         self._notes[_source(data)] = list(notes)
         self.do({"edit": {"replace": data}})
@@ -590,7 +590,7 @@ def _download(session: Session, name: str) -> Any:
 
 
 def _source(data: Mapping[str, Any]) -> str:
-    """Return what tells the import of a document from other imports: its record, as text."""
+    """Return the import record of a document as text, which identifies the import."""
     site = data.get("site")
     own = {k: v for k, v in site.items() if k != "edited"} if isinstance(site, dict) else None
     return json.dumps(own, sort_keys=True)

@@ -27,7 +27,7 @@ EMPTY: dict[str, Any] = {
 LISTS = ("goals", "obstacles")
 
 MAPPED = ("base", "bounds", *LISTS)
-"""Fields that an import takes from a map: a change of them is noted in `site`."""
+"""Fields that an import takes from a map; editing one sets `site.edited`."""
 
 MOST_VERSIONS = 10_000
 """Versions that can be gone back to; each shares with the one before what did not change."""

@@ -45,7 +45,7 @@ def arguments(p: argparse.ArgumentParser) -> None:
 
 
 def _document(name: str | None) -> tuple[Document, list[str]]:
-    """Return what is on the map at first, a problem or that of a map, and notes on the import."""
+    """Return the document to open (a problem, or an import of a map) and notes on the import."""
     from pathlib import Path
 
     from netsp.app.files import import_warnings, is_map, without_options
@@ -62,8 +62,8 @@ def _document(name: str | None) -> tuple[Document, list[str]]:
     target = path.with_suffix(".json")
     if target == path:
         raise InputError(
-            f"{name}: is a map, and its problem would be saved over it; expected the map under "
-            "another ending, as .geojson or .plan"
+            f"{name}: is a map, and saving its problem would overwrite it; give the map another "
+            "extension, such as .geojson or .plan"
         )
     found = import_site(name)
     record = found.problem.site

@@ -288,14 +288,14 @@ def _of_image(args: argparse.Namespace) -> Problem:
 
 
 def show_table(site: str, found: ImportedSite) -> None:
-    """Print what became of the features of each layer, and what was assumed.
+    """Print a table of how the features of each layer were used, and the notes of the import.
 
     Parameters
     ----------
     site : str
         Name of the map.
     found : ImportedSite
-        What the import made of it.
+        Result of the import.
     """
     from netsp.command.text_table import print_table
 

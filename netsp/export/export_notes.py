@@ -1,4 +1,4 @@
-"""Notes on a mission file: what is moved, what is not written, what is assumed."""
+"""Notes and warnings on an exported file: points moved, things not written, assumptions."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ class ExportNotes:
     Attributes
     ----------
     warnings
-        What may go wrong, one line each.
+        Possible problems in use, one line each.
     notes
-        What was changed, assumed or not written, one line each.
+        Changes, assumptions and omissions, one line each.
     """
 
     warnings: tuple[str, ...]
@@ -38,7 +38,7 @@ class ExportNotes:
 def export_notes(
     problem: Problem, points: list[Waypoint], kind: str, settings: Settings
 ) -> ExportNotes:
-    """Return what there is to say of a file with a tour.
+    """Return the notes and warnings on an exported tour.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def export_notes(
 
 
 def bend_note(points: list[Waypoint], settings: Settings) -> str | None:
-    """Return a note where the vehicle holds longer at bends than the settings say; else None.
+    """Return a note if the vehicle holds longer at bends than the settings say; None otherwise.
 
     Parameters
     ----------
@@ -86,8 +86,8 @@ def bend_note(points: list[Waypoint], settings: Settings) -> str | None:
     if seconds <= settings.bend:
         return None
     return (
-        f"the vehicle holds {seconds} s at bends, because it holds {settings.bend} s at goals: "
-        "this tells goals from bends when the file is imported"
+        f"the vehicle holds {seconds} s at bends instead of {settings.bend} s, because it holds "
+        f"{settings.bend} s at a goal: netsp import tells goals from bends by these times"
     )
 
 

@@ -67,8 +67,8 @@ class Settings:
     hold
         Whole seconds at goals.
     bend
-        Whole seconds at bends, at the start and at the end, at least 1; longer where a goal holds
-        as long (`told_apart`).
+        Whole seconds at bends, at the start and at the end, at least 1; longer if the vehicle holds
+        that long at a goal (`told_apart`).
     speed
         m/s; None leaves it to the vehicle.
     max_waypoints
@@ -159,12 +159,12 @@ def write_page(file: str | Path, kind: str, text: str) -> None:
     kind : str
         One of `FORMATS`.
     text : str
-        Text that the format gives.
+        Contents in that format.
 
     Raises
     ------
     InputError
-        It cannot be written.
+        The file cannot be written.
     """
     if kind == "kmz":
         write_bytes(file, kmz_of(text))
@@ -230,7 +230,7 @@ def fence_of_points(problem: Problem, points: list[Waypoint], settings: Settings
 
 
 def not_written(problem: Problem, kind: str) -> str | None:
-    """Return what of a problem a format has no place for; None if it holds all of it.
+    """Return a note on the parts of a problem that a format cannot store; None if it stores all.
 
     Parameters
     ----------
@@ -257,17 +257,17 @@ def altitude(z: float) -> float:
 
 
 def told_apart(points: Sequence[Waypoint], settings: Settings) -> Settings:
-    """Return settings with a hold at bends that no goal has.
+    """Return the settings with a hold at bends that differs from the hold at every goal.
 
-    Mission files say of a waypoint only how long the vehicle holds there: this tells goals from
-    bends when a file is imported, also after a ground station saved it.
+    An import tells goals from bends by these times, because a ground station keeps no other mark of
+    a waypoint when it saves the file.
 
     Parameters
     ----------
     points : sequence of Waypoint
         Waypoints that are written.
     settings : Settings
-        Settings of the file; their hold at bends is the least.
+        Settings of the file; their hold at bends is the minimum.
     """
     holds = {_hold(p, settings) for p in points if p.goal not in (None, HOME)}
     free = (s for s in range(settings.bend, settings.bend + len(holds) + 1) if s not in holds)

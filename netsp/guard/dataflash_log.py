@@ -34,7 +34,7 @@ MESSAGE_MARK = b"\xa3\x95"
 """First bytes of each message of a log."""
 
 SEARCHED_BYTES = 65_536
-"""Bytes at the beginning of a log in which a first message is sought; damage may come before it."""
+"""Bytes at the beginning of a log that must hold a message; damaged bytes may precede it."""
 
 KINDS = ("XKF1", "XKF4", "NKF1", "NKF4", "POS", "ARM", "MODE", "WINC")
 """Messages that are read."""
@@ -107,7 +107,7 @@ def read_bin(
 
 
 def _check_begin(file: Path, where: str) -> None:
-    """Refuse a file whose beginning holds no message of ArduPilot, as of a renamed file."""
+    """Refuse a file without an ArduPilot message near its beginning, such as a renamed file."""
     with open(file, "rb") as stream:
         begin = stream.read(SEARCHED_BYTES)
     if MESSAGE_MARK not in begin:

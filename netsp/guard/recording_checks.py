@@ -1,7 +1,7 @@
-"""Checks of a recording that was read: what is unlikely of a tethered robot is told.
+"""Plausibility checks of a recording: distances, speeds and times that no tethered robot has.
 
-A wrong unit, a swapped column or a frame of another place gives numbers that can be read. They show
-in distances beyond the tether, in speeds, and in times between positions.
+A wrong unit, swapped columns or a wrong frame still give numbers that can be read. They show up as
+positions beyond the tether's reach, high speeds, or long times between positions.
 """
 
 from __future__ import annotations
@@ -21,24 +21,24 @@ from netsp.problem import Problem
 
 @dataclass(frozen=True)
 class RecordingPolicy:
-    """Policy that tells unlikely recordings.
+    """Limits that decide whether a recording is implausible or out of order.
 
     Attributes
     ----------
     max_speed
-        Largest median speed between positions, m/s; no tethered robot is faster. Positive.
+        Largest plausible median speed between positions, m/s, positive. Tethered robots are slower.
     max_far_share
-        Largest share of positions that are farther from the base than the tether reaches; 0 to 1.
+        Largest plausible share of positions beyond the tether's reach, 0 to 1.
     max_back_share
-        Largest share of rows of a table whose time is before that of the row before: more rows are
-        in another order, and are sorted. A clock that is set goes back once. 0 to 1.
+        Share of rows with an earlier time than the previous row from which on a table is sorted, 0
+        to 1. A clock that is set goes back only once.
     min_back_count
-        Least number of such rows from which on a table is sorted; 1 or more.
+        Least number of such rows for a table to be sorted, 1 or more.
     max_height
-        Largest height above the water that a column of depths may state, m, 0 or more: with larger
-        heights alone the column holds heights.
+        Largest height above the water in a column of depths, m, 0 or more. If a value is higher,
+        the reader checks whether the column holds heights instead.
     no_places
-        Coordinates that loggers write where there is none, both of them in one row.
+        Values that loggers write for a missing position, as both coordinates of a row.
     """
 
     max_speed: float = 20.0
@@ -61,19 +61,19 @@ class RecordingPolicy:
 
 
 def in_order_of_time(fixes: list[Fix], policy: RecordingPolicy) -> list[Fix]:
-    """Return the rows of a table in the order of their times, where they stand in another order.
+    """Return the rows of a table sorted by time, if the table is not in order of time.
 
     Parameters
     ----------
     fixes : list of Fix
-        In the order of the file.
+        Rows in the order of the file.
     policy : RecordingPolicy
-        Decides whether rows are out of order, or a clock was set.
+        Limits that tell rows out of order from a clock that was set.
 
     Returns
     -------
     list of Fix
-        The same list where the rows are in order but for a clock that was set.
+        The same list object if there is nothing to sort.
     """
     back = int((np.diff([fix.time for fix in fixes]) < 0.0).sum())
     if back < max(policy.min_back_count, policy.max_back_share * (len(fixes) - 1)):
@@ -84,7 +84,7 @@ def in_order_of_time(fixes: list[Fix], policy: RecordingPolicy) -> list[Fix]:
 def doubts(
     fixes: Sequence[Fix], site: Problem | Mission, policy: RecordingPolicy | None = None
 ) -> list[str]:
-    """Return what is unlikely of a recording, one line each.
+    """Return notes on what is implausible in a recording, one line each.
 
     Parameters
     ----------
@@ -93,12 +93,12 @@ def doubts(
     site : Problem or Mission
         Site of the recording.
     policy : RecordingPolicy, optional
-        Limits.
+        Limits; None takes the defaults.
 
     Returns
     -------
     list of str
-        Empty for a likely recording.
+        Notes; empty for a plausible recording.
     """
     policy = policy or RecordingPolicy()
     places = np.array([fix.position for fix in fixes], dtype=float).reshape(-1, 3)
@@ -119,8 +119,8 @@ def doubts(
     if len(back):
         out.append(
             f"the times go back at {counted(len(back), 'place')}, first from "
-            f"{times[back[0]]:.10g} to {times[back[0] + 1]:.10g} s: a message that came late is "
-            "left out, a clock that was set or a restart goes on"
+            f"{times[back[0]]:.10g} to {times[back[0] + 1]:.10g} s: late messages are left "
+            "out; after a restart or a clock that was set, the track goes on"
         )
     moved = np.linalg.norm(np.diff(places, axis=0), axis=1)
     is_on = steps > 0.0
@@ -130,12 +130,12 @@ def doubts(
     speed = float(np.median(moved[is_on] / steps[is_on]))
     if speed > policy.max_speed:
         out.append(
-            f"the positions move at {speed:.4g} {units}/s; check the unit of the times and of the "
-            "lengths"
+            f"the robot moves at {speed:.4g} {units}/s between positions; check the units of times "
+            "and lengths"
         )
     elif period > GAP:
         out.append(
-            f"{period:.4g} s between positions: times are taken as seconds, and more than "
-            f"{GAP:g} s without a position are a gap; name the column time_ms for milliseconds"
+            f"{period:.4g} s between positions: the times are taken as seconds, and more than "
+            f"{GAP:g} s without a position is a gap; for milliseconds, name the column time_ms"
         )
     return out

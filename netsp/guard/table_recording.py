@@ -58,7 +58,7 @@ def read_recording(
     Raises
     ------
     InputError
-        No such table, a value that is none, or a column of depths that holds heights.
+        The table is missing, a value is invalid, or a column of depths holds heights.
     """
     policy = RecordingPolicy()
     found: list[Fix] = []
@@ -78,7 +78,7 @@ def read_recording(
         raise InputError(f"--replay: {error}") from None
     ordered = in_order_of_time(found, policy)
     if ordered is not found:
-        on_note(f"--replay: {file}: the rows are not in the order of their times: sorted")
+        on_note(f"--replay: {file}: the rows are not in order of time; they were sorted")
     yield from ordered
 
 
@@ -123,7 +123,7 @@ class _Rows:
             self.table.check_depths(np.array(z))
 
     def _check_heading(self) -> None:
-        """Tell of headings that may be radians."""
+        """Add a note if the headings may be in radians."""
         if "heading" not in self.table or self.table.columns["heading"][1].unit:
             return
         values = [self._number(k, "heading") for k in range(len(self.table.rows))]
@@ -131,8 +131,8 @@ class _Rows:
         if len(turns) > 1 and max(turns) <= 2.0 * math.pi:
             title = self.table.title("heading")
             self._note(
-                f"column {title} is taken as degrees, and holds {max(turns):.3g} at most; name it "
-                f"{title}_rad if these are radians"
+                f"column {title} is taken as degrees, but no value exceeds {max(turns):.3g}; "
+                f"if these are radians, name it {title}_rad"
             )
 
     def _note(self, text: str) -> None:
@@ -142,7 +142,7 @@ class _Rows:
         return f"{self.where}: line {self.table.lines[k]}"
 
     def fix(self, k: int) -> Fix | str:
-        """Return what row k says, or the reason to leave it out."""
+        """Return the fix in row k, or the reason to leave the row out."""
         a, b = (self._number(k, q) for q in self.plan)
         z = 0.0 if self.up is None else self._number(k, self.up)
         place = None

@@ -18,8 +18,8 @@ from netsp.link.frame import Frame
 from netsp.link.messages import AUTOPILOT, POSITIONS, Listener
 from netsp.link.vehicle_kind import other_vehicle
 
-TIME_BYTES = 8
-"""Length of the time before each message, bytes."""
+STAMP_BYTES = 8
+"""Length of the time stamp before each message, bytes."""
 
 MAX_STEP_US = 86_400_000_000
 """Longest time between two messages in a row, microseconds: with it, messages of other dialects are
@@ -107,8 +107,8 @@ def messages_of(data: bytes) -> Iterator[Any]:
     """
     reads, error = parser(), dialect().MAVError
     at = 0
-    while (begin := _next_marker(data, at + TIME_BYTES)) >= 0:
-        at = begin + 1 - TIME_BYTES  # where to go on when this is no message
+    while (begin := _next_marker(data, at + STAMP_BYTES)) >= 0:
+        at = begin + 1 - STAMP_BYTES  # where to go on when this is no message
         end = begin + _length(data, begin)
         if end > len(data) or (data[begin] == _VERSION_2 and data[begin + 2] & ~_SIGNED):
             continue
@@ -141,10 +141,10 @@ def _length(data: bytes, begin: int) -> int:
 
 def _is_between_times(data: bytes, begin: int, end: int) -> bool:
     """Return whether the times before and after some bytes are of one log, or the log ends here."""
-    following = end + TIME_BYTES
+    following = end + STAMP_BYTES
     if following >= len(data):
         return True
-    before, after = (int.from_bytes(data[k - TIME_BYTES : k], "big") for k in (begin, following))
+    before, after = (int.from_bytes(data[k - STAMP_BYTES : k], "big") for k in (begin, following))
     return data[following] in (_VERSION_1, _VERSION_2) and abs(after - before) < MAX_STEP_US
 
 
@@ -195,7 +195,7 @@ class _Recording:
         self = cls()
         self.foreign_bytes = len(data)
         for message in messages_of(data):
-            self.foreign_bytes -= TIME_BYTES + len(message.get_msgbuf())
+            self.foreign_bytes -= STAMP_BYTES + len(message.get_msgbuf())
             system = message.get_srcSystem()
             if message.get_srcComponent() != AUTOPILOT:
                 kind = f"{message.get_type()} of component {message.get_srcComponent()}"

@@ -1,4 +1,4 @@
-"""Placement of labels beside markers, so that neither labels nor markers are covered."""
+"""Placement of labels beside markers, without overlaps."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class LabelPlace:
     offset
         From the middle of the marker to the label's end or middle, points.
     align
-        Part of the label that is there.
+        Part of the label that lies at the offset.
     """
 
     offset: tuple[float, float]
@@ -52,7 +52,7 @@ def place_labels(
     places: Floats, texts: Sequence[str], *, font_size: float, marker_radius: float,
     taken: Floats | None = None,
 ) -> list[LabelPlace | None]:  # fmt: skip
-    """Return where each label goes, None where it would cover something.
+    """Return the place of each label; None if it would cover a marker or another label.
 
     Labels are placed one after the other beside their markers, on the first side that is free.
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 MAX_LABELLED = 40
-"""Goals of a picture that bears their names: more names leave no room."""
+"""Largest number of goals whose names are drawn; more names have no room."""
 
 LABEL_SIZE = 6.0
 """Size of the font of names, points."""
@@ -334,17 +334,17 @@ def draw_map(
 
 
 def _label_goals(ax: Axes, problem: Problem, radius: float, *, is_numbered: bool) -> str:
-    """Write the names and heights of goals beside their markers; return what the title says more.
+    """Write the names and heights of goals beside their markers; return an addition to the title.
 
-    Where not all labels have room, a height that all goals share stands in the title, and names
-    that would still cover another goal or name are left out.
+    If the labels lack room, a height that all goals share moves to the title. Names that would
+    still cover another goal or name are left out.
 
     Parameters
     ----------
     ax : Axes
         The map, with its limits set.
     problem : Problem
-        Whose goals they are.
+        Problem with these goals.
     radius : float
         Radius of the markers, points.
     is_numbered : bool

@@ -70,12 +70,12 @@ def shoal_soundings(
     draught : float
         Depth that is needed, metres.
     shallow : sequence of Feature
-        Areas that are obstacles for their depth; soundings within them need no obstacle.
+        Areas that are obstacles already; soundings within them are skipped.
 
     Returns
     -------
     list of Feature
-        Those of class SOUNDG with such a sounding, each with these points only.
+        Features of class SOUNDG, reduced to their shoal soundings.
     """
     import shapely
 
@@ -119,7 +119,7 @@ def uncharted_share(
 def depthless_share(
     features: Sequence[Feature], plane: Callable[[shapely.Geometry], Any], window: CropWindow
 ) -> float:
-    """Return the share of a window that is neither land nor an area of known or unknown depth.
+    """Return the share of a window without land, depth area, dredged or unsurveyed area.
 
     Parameters
     ----------

@@ -131,8 +131,8 @@ def read_chart(file: str | Path, crs: str | None, units: str | None) -> Map:
     crs : str, optional
         Refused, since charts are in degrees.
     units : str, optional
-        Unit of depths that the user says, and of lengths if the chart names no known one; None
-        takes those of the chart.
+        Unit of depths from the user, also for lengths if the chart's unit is unknown; None takes
+        the chart's units.
 
     Returns
     -------
@@ -148,7 +148,7 @@ def read_chart(file: str | Path, crs: str | None, units: str | None) -> Map:
     check_file(file)
     cell = _identity(file)
     if crs is not None:
-        raise InputError(f"--crs: {file} is in degrees always; expected no system")
+        raise InputError(f"--crs: {file} is always in degrees; leave the option out")
     updates, notes = _updates(Path(file), cell)
     with tempfile.TemporaryDirectory() as folder, gdal_options(GDAL_OPTIONS):
         plain = Path(folder) / f"cell{CELL}"
@@ -171,7 +171,7 @@ def read_chart(file: str | Path, crs: str | None, units: str | None) -> Map:
     if _code(head.get("DSPM_HDAT")) not in (WGS_84, None):
         notes.append(
             f"horizontal datum {head['DSPM_HDAT']} of S-57 is taken as WGS 84; places may be off "
-            "by some hundred metres against a satellite receiver"
+            "by some hundred metres from those of a satellite receiver"
         )
     features = tuple(_in_metres(feature, UNITS[depth], UNITS[length]) for feature in found.features)
     return replace(found, features=features, notes=(*notes, *found.notes), is_chart=True)
@@ -196,7 +196,7 @@ def _in_metres(feature: Feature, depth: float, length: float) -> Feature:
     return replace(feature, properties=properties, shape=shape)
 
 
-# What may be said of the file before it is read
+# Checks before the file is read
 
 
 def _refuse_containers(path: Path) -> None:
@@ -246,7 +246,7 @@ def _is_exchange_file(head: bytes) -> bool:
 
 
 def _identity(file: str | Path) -> CellIdentity:
-    """Return what a file of a chart says that it is, from its first record (field DSID).
+    """Return the identity of a chart file, from its first record (field DSID).
 
     Raises
     ------
@@ -304,7 +304,7 @@ def _updates(file: Path, cell: CellIdentity) -> tuple[list[Path], list[str]]:
     for number, path in sorted(beside.items()):
         own = _update_edition(path)
         if number <= cell.update:
-            continue  # the cell was issued anew and holds it
+            continue  # a reissued cell already contains this update
         if own is None:
             reason = "not an update of S-57"
         elif own != cell.edition:
@@ -370,7 +370,7 @@ def _units(
     length = known(HEIGHT_UNITS, "DSPM_HUNI", "hunits", "lengths")
     if wrong:
         plain = [f"{file}: {text}" for text in wrong]
-        option = "; say the right one with --units"
+        option = "; give the right one with --units"
         raise UnansweredError([text + option for text in plain], plain)
     return depth, length
 

@@ -76,7 +76,7 @@ PICTURES = {
 """Types of entities that show or cover a picture."""
 
 NO_SHAPES = {"VIEWPORT", "LIGHT", "CAMERA", "SUN", "GEOPOSITIONMARKER", "SEQEND", "VERTEX"}
-"""Types of entities that help to show or to place a drawing."""
+"""Types of entities for display or placement, without a shape of the site."""
 
 SOLIDS = {
     "3DSOLID", "REGION", "BODY", "SURFACE", "EXTRUDEDSURFACE", "LOFTEDSURFACE", "NURBSURFACE",
@@ -155,10 +155,10 @@ def read_dxf(
 
 
 def _unit(file: str | Path, drawing: Drawing, asked: str | None) -> tuple[float | None, str]:
-    """Return the metres per unit that the header states, and what is to be said of it.
+    """Return the metres per unit that the header states, and a note on the unit.
 
-    A drawing that could state a unit and states none is asked about. Releases before 2000 could
-    not: their lengths are metres, as in other planes.
+    If the header could state a unit but states none, the user must give it. Releases before 2000
+    could not state one: their lengths are taken as metres.
     """
     text = drawing.header.get("$INSUNITS", "")
     try:
@@ -419,7 +419,7 @@ class _Reader:
             return read_layer(self.file, plain, "entities", self.notes)
 
     def damaged(self, entities: list[tuple[str, _Entity]], error: InputError) -> str:
-        """Return the message for a drawing that GDAL does not read: the entity that stops it."""
+        """Return the message on the entity that makes GDAL fail, found by bisection."""
 
         def is_read(some: list[tuple[str, _Entity]]) -> bool:
             try:
@@ -693,7 +693,7 @@ CHANGING_WIDTH = "a width that changes: taken as the largest"
 WIDTH_OF_BLOCK = "lines in its block are as wide as the widest polyline there"
 
 NO_LOSS = re.compile(r"GDAL: (Block .* does not exist|Non closed ring detected)")
-"""Warnings of GDAL that tell nothing new: of a block without records, and of each 3DFACE."""
+"""Warnings of GDAL without a loss: a block without records, and each 3DFACE."""
 
 UNICODE = re.compile(r"\\U\+([0-9A-Fa-f]{4})")
 """A character as drawings escape it."""

@@ -117,7 +117,7 @@ class ImportedSite:
     goal_features: tuple[Feature | None, ...] = ()
 
     def keeping(self, problem: Problem, reason: str) -> ImportedSite:
-        """Return the import with fewer goals: features without a goal that is kept are left out.
+        """Return the import with fewer goals; features without a remaining goal count as left out.
 
         Parameters
         ----------
@@ -307,9 +307,13 @@ centimetre are written with seven decimals of a degree."""
 
 SKIP_OPTION = "; leave out what is out of reach with --skip-unreachable"
 
+MAX_HEIGHT_GAP = 0.005
+"""Largest distance in metres between a depth and the height of the same point that needs no note:
+files round heights to a centimetre."""
+
 MIN_SHARE = 5e-4
-"""Share of the tether's reach from which on a note says what is not known there: 0.05 %, the least
-that two digits show as more than a rounding of areas."""
+"""Smallest share of the tether's reach without chart or depth that a note reports: 0.05 %, because
+smaller shares may be rounding of areas."""
 
 MOST_OF_A_KIND = 5
 """Goals out of reach that are told one by one."""
@@ -494,7 +498,7 @@ class _Site:
     def _check_depth(
         self, shallow: list[Feature], places: Mapping[str, Any], draught: float
     ) -> None:
-        """Complain of places that the robot needs in water that may be too shallow."""
+        """Report a base or goals that lie in water that may be too shallow."""
         import shapely
 
         areas = [self._plane(feature.shape) for feature in shallow]
@@ -619,14 +623,15 @@ class _Site:
         """Return z in metres: of a depth, else of the point itself, whose height on the earth is
         in metres by its format."""
         depth = self._depth(feature)
+        at = point if point is not None else feature.shape
         if depth is not None:
             if depth < 0.0:
                 self._complain(
                     f"{self._called(feature)}: depth: counts downwards; expected 0 or more, got "
-                    f"{depth:g} m; if it is a height, give the point itself the height"
+                    f"{depth:g} m; if it is a height, give it as the z of the point"
                 )
+            self._note_other_height(feature, at, depth)
             return 0.0 - depth
-        at = point if point is not None else feature.shape
         if feature.is_above_floor:
             self._complain(
                 f"{self._called(feature)}: its height counts from the sea floor, which the map "
@@ -634,6 +639,11 @@ class _Site:
             )
             return 0.0
         if at.geom_type != "Point" or not at.has_z or at.z != at.z:
+            self._note_unread(
+                feature,
+                [name for name in feature.properties if _is_height(str(name))],
+                "expected a depth (downwards), or the height as z of the point",
+            )
             return 0.0
         return float(at.z) * (1.0 if self.map.geographic else self._unit)
 
@@ -909,8 +919,35 @@ class _Site:
         radius = self._number(feature, "radius")
         if radius is not None:
             return radius * (1.0 if metres else self._unit)
+        self._note_unread(
+            feature,
+            [n for n in feature.properties if str(n).lower().startswith(("radius", "diameter"))],
+            "expected radius_m, in metres",
+        )
         own = chart_radius(feature) if self.is_chart else None
         return own if own is not None else self.said.radius
+
+    def _note_other_height(self, feature: Feature, at: Any, depth: float) -> None:
+        """Note that the depth of a feature is taken, where its point has another height."""
+        if self.is_chart or at.geom_type != "Point" or not at.has_z:
+            return
+        z = float(at.z) * (1.0 if self.map.geographic else self._unit)
+        # files write 0 where they have no height
+        if z and abs(z + depth) > MAX_HEIGHT_GAP:
+            self.notes.append(
+                f"{self._called(feature)}: its depth of {depth:g} m is taken, and its height of "
+                f"{z:g} m is not"
+            )
+
+    def _note_unread(self, feature: Feature, names: list[Any], expected: str) -> None:
+        """Note once a layer that properties which look like a height or a size are not read."""
+        for name in names:
+            if self.is_chart or feature.properties[name] is None:
+                continue
+            layer = f"layer {feature.layer!r}: " if feature.layer else ""
+            note = f"{layer}property {str(name)!r} is not read: {expected}"
+            if note not in self.notes:
+                self.notes.append(note)
 
     def _complain_of_points(self, features: list[Feature]) -> None:
         """Complain of points without a radius, a line for each layer."""
@@ -1008,7 +1045,7 @@ class _Site:
         return found
 
     def _is_shallow(self, feature: Feature) -> bool:
-        """Return whether a feature is water that is an obstacle for its depth only."""
+        """Return whether a feature is water that is an obstacle only because of its depth."""
         return self.is_chart and feature.layer.upper() in (*DEPTH_AREAS, UNSURVEYED, SOUNDINGS)
 
     def _free_viewpoints(
@@ -1278,6 +1315,15 @@ def _distance(places: np.ndarray, obstacles: list[dict[str, Any]]) -> np.ndarray
 def _first_of(places: list[str]) -> str:
     """Return the first of some places and how many more there are."""
     return places[0] + (f" and {len(places) - 1} more" if len(places) > 1 else "")
+
+
+def _is_height(name: str) -> bool:
+    """Return whether the name of a property means a height."""
+    try:
+        meaning = column(name)
+    except InputError:
+        return False
+    return meaning is not None and meaning.quantity == "z"
 
 
 def _number_parts(things: list[dict[str, Any]]) -> None:

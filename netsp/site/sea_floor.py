@@ -211,7 +211,7 @@ def _is_shoal(soundings: Floats, areas: Sequence[DepthArea]) -> np.ndarray:
 
 
 def _cap(depth: Floats, soundings: Floats, corner: tuple[float, float], cell: float) -> None:
-    """Keep the floor above soundings: each caps the four middles of cells about it."""
+    """Keep the floor above soundings: each limits the depth of the four cells about it."""
     rows, columns = depth.shape
     left, low = (np.floor((soundings[:, k] - corner[k]) / cell - 0.5).astype(int) for k in (0, 1))
     for row, column in ((low, left), (low, left + 1), (low + 1, left), (low + 1, left + 1)):
@@ -253,7 +253,7 @@ def _covered(shape: shapely.Geometry, x: Floats, y: Floats) -> np.ndarray:
 def _interpolated(
     contours: Floats, soundings: Floats, is_shoal: np.ndarray, x: Floats, y: Floats
 ) -> tuple[Floats, np.ndarray]:
-    """Return depths linear between points, NaN beyond them, and which depend on a shoal."""
+    """Return depths interpolated linearly (NaN outside), and a mask of those that use a shoal."""
     from scipy.interpolate import LinearNDInterpolator
     from scipy.spatial import Delaunay, QhullError
 

@@ -64,7 +64,7 @@ def from_table(
         row = int(np.flatnonzero(places[:, 2] > 0.0)[0])
         raise InputError(
             f"{file}: row {row + 1}: {shown(table.title(up))} counts downwards; expected 0 or "
-            f"more, got {-places[row, 2]:g} m; heights belong into a column z"
+            f"more, got {-places[row, 2]:g} m; put heights into a column z"
         )
     if is_global and projection is not None:
         wrong = np.flatnonzero((np.abs(places[:, :2]) > [90.0, 180.0]).any(axis=1))

@@ -34,11 +34,11 @@ DATES = (
     (re.compile(r"(\d{4})[/.](\d{1,2})[/.](\d{1,2})"), (1, 2, 3)),
 )
 """Dates besides ISO 8601, with the places of year, month and day. A date such as 11/12/2026 is
-refused: nobody knows which number is the month."""
+refused, because the order of day and month is ambiguous."""
 
 
 class TimeStamps:
-    """Reader of the times of a table, which are all of one kind.
+    """Reader of the times of a table, which must all be of one kind.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ class TimeStamps:
         return value
 
     def _clock_seconds(self, clock: re.Match[str]) -> float:
-        """Return the seconds of a clock time; a clock that falls by half a day passed midnight."""
+        """Return the seconds of a clock time; a fall of over half a day means midnight."""
         hours, minutes, rest = clock.groups()
         value = 3600.0 * int(hours) + 60.0 * int(minutes) + float(rest.replace(",", "."))
         if value < self._last - 0.5 * DAY_S:

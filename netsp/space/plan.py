@@ -640,7 +640,7 @@ def _best_driven(
             return with_status(result, driven, ROUNDING), driven
         joined = board.forbid(driven.fault)
         if clock.up and not (joined and board.leads_to(tour)):
-            return None  # no time to solve again, and this tour cannot be driven any more
+            return None  # no time is left, and this tour can no longer be driven
         warm = None  # it may go along that leg
         again += 1
         if not clock.up:

@@ -79,10 +79,10 @@ class MissionPolicy:
         Share of the time until home that a flight by going straight on must save to replace a tour
         with a bound. Stopping within reach of the start saves less than the default.
     first_tour_s : float
-        CPU seconds, at least 0, until which the first tour is worked on even if the limit is
-        shorter: the one in the order of the file or, where that is no tour, another. A smaller
-        number leaves more missions without any tour when the limit is short; with a larger one,
-        very large missions end later.
+        CPU seconds, at least 0, up to which netsp works on the first tour, even if the time limit
+        is shorter: the tour in the order of the file or, if that cannot be driven, another. A
+        smaller number leaves more missions without any tour when the limit is short; with a larger
+        one, very large missions end later.
     potential : PotentialParams
         Effort of the bound on each leg.
     """

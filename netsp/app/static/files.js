@@ -88,7 +88,7 @@ export function files(page, link, say) {
     a.click();
     setTimeout(() => URL.revokeObjectURL(a.href), 10000);
     const notes = decodeURIComponent(answer.headers.get("x-notes") ?? "").split("\n").filter(Boolean);
-    say([`${a.download} is downloaded`, ...notes].join("; "));
+    say([`Downloaded ${a.download}`, ...notes].join("; "));
   }
 
   page.download = fetched;

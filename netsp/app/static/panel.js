@@ -108,7 +108,7 @@ function drawn(page) {
   return [element("h2", "Path by hand"), ...hint, table, element("div", back, " ", none, " ", save)];
 }
 
-/** What an import made of every feature of a map, and what it assumed.
+/** Build the section on an imported map: a table of its layers, the notes, and a field for depths.
  * @param {any} page @param {(path: any[], value: any) => void} set */
 function imported(page, set) {
   const site = page.data.site, goals = page.data.goals ?? [];
@@ -116,7 +116,7 @@ function imported(page, set) {
   const notes = (page.notes ?? []).map((/** @type {string} */ text) => element("li", text));
   const list = element("ul", ...notes);
   list.className = "notes";
-  const edited = site.edited ? [element("p", "Edited after the import; the table shows the import.")] : [];
+  const edited = site.edited ? [element("p", "The map was edited after the import; the table shows it as imported.")] : [];
   const depths = new Set(goals.map((/** @type {any} */ g) => 0 - (placeOf(g)[2] ?? 0)));
   const sink = (/** @type {string} */ v) => set(["goals"], goals.map((/** @type {any} */ g) => {
     const at = [placeOf(g)[0], placeOf(g)[1], 0 - Number(v)];

@@ -1,4 +1,4 @@
-"""A sea floor from a bathymetry grid: GeoTIFF, ASC, tables, and whatever else rasterio reads."""
+"""A sea floor from a bathymetry grid: GeoTIFF, ASC, tables and other formats of rasterio."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def load_floor(
         What becomes (0, 0), in units of the map.
     depths : bool, optional
         Whether values count downwards, where the grid's vertical system does not say so. None:
-        what the name of its band or column says, else upwards.
+        decided by the name of the band or column, else upwards.
 
     Returns
     -------
@@ -149,7 +149,7 @@ def read_floor(
     if by_name and grid.z.max() <= 0.0:
         by_name = False
         notes.append(
-            "called a depth, but no value is above 0: taken as heights; set depths to true if "
+            "named a depth, but no value is above 0: taken as heights; set depths to true if the "
             "values count downwards"
         )
     sign = -1.0 if depths or grid.counts_down or by_name else 1.0
@@ -256,7 +256,7 @@ def _read(path: str | Path) -> _Grid:
         metres = horizontal
     if t.is_identity:
         raise InputError(
-            f"{path}: the grid has no place on the map; expected one with a geotransform "
+            f"{path}: the grid has no place on the map; add a geotransform "
             "(gdal_translate -a_ullr west north east south)"
         )
     if max(abs(t.b), abs(t.d)) > MAX_TURN * max(abs(t.a), abs(t.e)):
@@ -294,7 +294,7 @@ MAX_TURN = 1e-9  # share of a cell by which rows may lean, from rounding of the 
 
 @contextmanager
 def _opened(rasterio: Any, path: str | Path) -> Iterator[Any]:
-    """Open a grid: without a byte order mark, and of several variables the one of heights."""
+    """Open a grid, skipping a byte order mark; of several variables, open the one of heights."""
     with Path(path).open("rb") as file:
         has_mark = file.read(3) == b"\xef\xbb\xbf"
     if has_mark:
@@ -310,15 +310,15 @@ def _opened(rasterio: Any, path: str | Path) -> Iterator[Any]:
     chosen = [sub for sub, name in names.items() if height_meaning([name]) is not None]
     if len(chosen) != 1:
         raise InputError(
-            f"{path}: several grids ({', '.join(names.values())[:80]}); expected one, called "
-            "elevation, height or depth"
+            f"{path}: several grids ({', '.join(names.values())[:80]}); expected exactly one "
+            "named elevation, height or depth"
         )
     with rasterio.open(chosen[0]) as grid:
         yield grid
 
 
 def _chosen_band(grid: Any, path: str | Path) -> tuple[_Band, list[_Band]]:
-    """Return the band of heights and the others: the first whose name says so, else the first."""
+    """Return the first band whose name means heights, else the first band, and all others."""
     bands = []
     for number in range(1, grid.count + 1):
         tags = grid.tags(number)
@@ -337,7 +337,7 @@ def _chosen_band(grid: Any, path: str | Path) -> tuple[_Band, list[_Band]]:
 
 
 def _extremes(kind: np.dtype[Any]) -> tuple[float, ...]:
-    """Return the values of a type of whole numbers that often mark a missing height."""
+    """Return the extreme values of an integer type, which often mark a missing height."""
     if kind.kind not in "iu":
         return ()
     ends = np.iinfo(kind)
@@ -357,7 +357,7 @@ def _unit_of_band(unit: str | None, path: str | Path) -> float | None:
 def _without_gaps(
     z: Floats, path: str | Path, notes: list[str], extremes: tuple[float, ...] = ()
 ) -> tuple[Floats, int]:
-    """Return the values with gaps filled from the nearest cell, and how many gaps there are."""
+    """Return the values with gaps filled from the nearest cell, and the number of gaps."""
     for value, cells in marks_of_no_height(z, *extremes):
         z[cells] = np.nan
         notes.append(
@@ -411,7 +411,7 @@ MAX_SHIFT = 0.02  # share of a step by which coordinates of a table may lie off 
 
 
 def _steps(values: Floats, path: str | Path) -> tuple[Floats, npt.NDArray[np.int64]]:
-    """Return the equal steps along an axis, and the step of each value."""
+    """Return the equally spaced coordinates along an axis, and the index of each value."""
     known, places = np.unique(values, return_inverse=True)
     if len(known) < 2:
         raise InputError(f"{path}: expected at least 2 x 2 cells")
@@ -422,8 +422,8 @@ def _steps(values: Floats, path: str | Path) -> tuple[Floats, npt.NDArray[np.int
         np.abs(known - known[0] - step * numbers).max() > MAX_SHIFT * step
     ):
         raise InputError(
-            f"{path}: its points lie on no grid of equal steps; expected a grid, or the file as "
-            "the cloud of a scene"
+            f"{path}: its points lie on no grid of equal steps; give a regular grid, or use the "
+            "file as the cloud of a scene"
         )
     steps = known[0] + step * np.arange(numbers[-1] + 1.0)
     return steps, numbers[places.ravel()].astype(np.int64)

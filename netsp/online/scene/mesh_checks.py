@@ -1,4 +1,4 @@
-"""Contents of mesh files that their readers pass over: what is left out, and what is refused."""
+"""Checks of mesh files for contents that the mesh readers would silently ignore."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _FAN = 6
 
 
 def gltf_parts(path: str | Path) -> tuple[int, list[tuple[str, int]]]:
-    """Count the parts of a glTF file that are read, and those that are left out and why.
+    """Count the parts of a glTF file that are read, and those left out, by reason.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def gltf_parts(path: str | Path) -> tuple[int, list[tuple[str, int]]]:
     Raises
     ------
     InputError
-        Vertices that only an extension, a skeleton or a morph would place.
+        Vertices depend on an extension, a skeleton or a morph target.
     """
     page = _gltf_page(path)
     required = [str(e) for e in page.get("extensionsRequired", [])]
@@ -74,7 +74,7 @@ def _gltf_page(path: str | Path) -> dict[str, Any]:
     data = read_bytes(path)
     if data[:4] == b"glTF":
         if len(data) < 20 or len(data) < struct.unpack_from("<I", data, 8)[0]:
-            raise InputError(f"{path}: cut short; expected as many bytes as its head states")
+            raise InputError(f"{path}: cut short; its header states more bytes")
         size = struct.unpack_from("<I", data, 12)[0]
         data = data[20 : 20 + size]
     try:
@@ -106,7 +106,7 @@ def _mesh_of(node: dict[str, Any], page: dict[str, Any]) -> dict[str, Any]:
 def _node_parts(
     node: dict[str, Any], page: dict[str, Any], reasons: Counter[str], path: str | Path
 ) -> int:
-    """Count a node's parts of triangles, and add to the reasons for the others."""
+    """Return the number of triangle parts of a node, and count the other parts by reason."""
     mesh = _mesh_of(node, page)
     used = 0
     if "EXT_mesh_gpu_instancing" in node.get("extensions", {}):
@@ -141,7 +141,7 @@ def _node_parts(
 
 
 def collada_parts(path: str | Path) -> list[tuple[str, int]]:
-    """Count the parts of a COLLADA file that are left out, and why.
+    """Count the parts of a COLLADA file that are left out, by reason.
 
     Parameters
     ----------
@@ -241,10 +241,10 @@ def _with_positive_indices(data: bytes) -> list[bytes]:
 
 
 def binary_stl(path: str | Path) -> Floats | None:
-    """Return the triangles (n, 3, 3) of a binary STL file; None for text.
+    """Return the triangles (n, 3, 3) of a binary STL file; None for a text file.
 
-    The head of a binary file may begin with "solid" as text does: the number of triangles after the
-    head decides, and bytes after the last triangle are no triangles.
+    The header of a binary file may begin with "solid", as text does, so the size that follows from
+    the stated number of triangles decides. Bytes after the last triangle are ignored.
 
     Parameters
     ----------

@@ -22,7 +22,7 @@ _TYPES = {("F", 4): "<f4", ("F", 8): "<f8"} | {
 PADDING = "_"
 """Name of fields that hold nothing. Packed data do not contain them."""
 
-HEAD_BYTES = 100_000  # largest head of a file: the line DATA must begin before
+HEAD_BYTES = 100_000  # largest header; the line DATA must end within these bytes
 
 MAX_UNPACKED = 4 * MOST_BYTES  # bytes of packed data when they are unpacked
 
@@ -57,7 +57,7 @@ def read_pcd(path: str | Path) -> PointCloud:
     Raises
     ------
     InputError
-        A damaged head, a field that is missing, or too few or damaged data.
+        The header is damaged, a field is missing, or data are missing or damaged.
     """
     data = read_bytes(path)
     head = _head(data, path)
@@ -78,8 +78,8 @@ def read_pcd(path: str | Path) -> PointCloud:
         return cloud
     place = ", ".join(f"{v:g}" for v in head.view[:3])
     note = (
-        f"VIEWPOINT: the sensor stood at ({place}); points keep the coordinates of the file, "
-        "origin and rotate of the cloud in the scene move them"
+        f"VIEWPOINT: the sensor stood at ({place}), which is ignored: points keep the coordinates "
+        "of the file; to move the cloud, set its origin and rotate in the scene"
     )
     return replace(cloud, notes=(*cloud.notes, note))
 
@@ -192,7 +192,7 @@ def _from_columns(data: bytes, head: _Head, single: list[int], path: str | Path)
 def unpack_lzf(packed: bytes, size: int) -> bytes:
     """Unpack data in Marc Lehmann's LZF format.
 
-    A control byte below 32 precedes that many bytes plus one. Any other begins a reference: its
+    A control byte n below 32 is followed by n + 1 literal bytes. Any other begins a reference: its
     upper three bits are the length less two (seven: the next byte is added), its lower five bits
     and the following byte are the distance back less one.
 

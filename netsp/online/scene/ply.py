@@ -27,7 +27,7 @@ _ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 _CORNERS = ("vertex_indices", "vertex_index")
 """Names of the property of a face that lists its corners."""
 
-HEAD_BYTES = 100_000  # largest head of a file
+HEAD_BYTES = 100_000  # largest header
 
 
 @dataclass(frozen=True)
@@ -66,8 +66,8 @@ class PlyFile:
 
 @dataclass(frozen=True)
 class _Element:
-    """Element of the head: its name, number, and properties as (name, type, type of its length);
-    the last is empty where the property is no list."""
+    """Element of the header: name, count, and properties as (name, type, type of the length);
+    the last is empty unless the property is a list."""
 
     name: str
     count: int
@@ -85,7 +85,7 @@ def read_ply(path: str | Path) -> PlyFile:
     Raises
     ------
     InputError
-        A damaged head, fewer data than the head states, or a face without one of its vertices.
+        The header is damaged, data are missing, or a face refers to a missing vertex.
     """
     data = read_bytes(path)
     elements, order, at = _head(data, path)

@@ -58,7 +58,7 @@ class PointCloud:
 
 
 class SurfaceFilter:
-    """Selection of the points of a file that lie on surfaces, with the reasons for all others.
+    """Selection of the points of a file that lie on surfaces; counts the others by reason.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ class SurfaceFilter:
             self.leave_out(withheld, "marked as withheld")
 
     def leave_out_unmeasured(self, points: Floats) -> None:
-        """Leave out points that are not finite, and those whose height marks a missing one.
+        """Leave out points that are not finite, or whose height is a nodata value.
 
         Parameters
         ----------

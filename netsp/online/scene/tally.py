@@ -1,4 +1,4 @@
-"""Numbers of points, cells and faces of a file: read, used, and left out for which reason."""
+"""Numbers of points, cells or faces of a file that are used, and left out by reason."""
 
 from __future__ import annotations
 
