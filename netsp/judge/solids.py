@@ -14,7 +14,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
-from scipy.spatial import cKDTree
 
 from netsp.arrays import Floats, Ints
 from netsp.geometry.polygons import counterclockwise
@@ -94,6 +93,8 @@ def inset(problem: Problem, obstacle: Circle | Polygon, place: float, origin: Fl
 
 def _nearest(v: Floats, ring: Floats) -> Ints:
     """Return for each point of a ring the nearest of some corners, the first of two as near."""
+    from scipy.spatial import cKDTree
+
     away, index = cKDTree(v).query(ring, k=2)
     index = np.where((away[:, 0] == away[:, 1])[:, None], np.sort(index, axis=1), index)
     return np.asarray(index[:, 0], dtype=np.int64)

@@ -13,8 +13,6 @@ Handles are sought as in Padberg & Hong (1980): components of what is fractional
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from netsp.arrays import Bools, Floats, Ints
 from netsp.mip.cuts import Cut
@@ -36,6 +34,9 @@ def shrunk(legs: Ints, y: Floats, cluster: Ints) -> Floats:
 
 def handles(between: Floats, least: int) -> list[Bools]:
     """Components of what is fractional between so many clusters or more, at several levels."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
     out: dict[bytes, Bools] = {}
     for level in LEVELS:
         part = coo_array((between > level) & (between < 1.0 - level))

@@ -28,7 +28,6 @@ from netsp.errors import LimitReachedError, interrupted
 from netsp.lower_bound import OPTIMALITY_TOLERANCE
 from netsp.mip.cuts import Cut
 from netsp.mip.deadlegs import DeadLegs
-from netsp.mip.highs import HighsRelaxation
 from netsp.mip.overcells import Cells, OverCells
 from netsp.mip.root import Root, tour_legs
 from netsp.mip.splits import Splits
@@ -138,6 +137,8 @@ class _Level:
         self, tower: Tower, obstacles: tuple[int, ...], tour: Stops,
         length: float, clock: Clock, limits: Limits, before: _Level | None,
     ) -> None:  # fmt: skip
+        from netsp.mip.highs import HighsRelaxation  # loads HiGHS
+
         self.over = False
         self.cells = tower.cells(obstacles)
         costs = self.costs = tower.costs(self.cells)

@@ -16,7 +16,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.sparse.csgraph import minimum_spanning_tree
 
 from netsp.arrays import Floats, Ints
 from netsp.clock import Clock
@@ -209,6 +208,8 @@ def best_tree(lengths: Floats, up: Callable[[], bool]) -> float:
 def _tree(lengths: Floats, prices: Floats) -> tuple[float, Floats]:
     """Length of the least 1-tree at some prices, less what these come to, and (n,) how many legs
     more than two each place has."""
+    from scipy.sparse.csgraph import minimum_spanning_tree
+
     priced = lengths + prices[:, None] + prices[None, :]
     two = np.partition(priced[0, 1:], 1)[:2]
     at = np.argpartition(priced[0, 1:], 1)[:2] + 1

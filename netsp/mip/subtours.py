@@ -11,8 +11,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from netsp.arrays import Bools, Floats, Ints
 from netsp.hsignature import Word
@@ -29,6 +27,9 @@ MOST_CUTS = 60
 
 def components(x: Floats, legs: Ints, y: Floats) -> tuple[int, Ints]:
     """Connected components of the support (vertices with x > 0); label -1 elsewhere."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
     on = y > 1e-9
     n = len(x)
     u, v = legs[on].T

@@ -7,7 +7,6 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import binom
 
 from netsp.arrays import Floats
 from netsp.compare.rows import FAILED, TrialRow
@@ -92,6 +91,8 @@ def summary(values: Sequence[float]) -> Summary | None:
         return None
     x = np.sort(np.asarray(values, dtype=float))
     n = len(x)
+    from scipy.stats import binom
+
     k = int(binom.ppf(0.5 * (1.0 - CONFIDENCE), n, 0.5))
     k = max(0, min(k - 1, (n - 1) // 2)) if k > 0 else 0
     return Summary(float(np.median(x)), float(x[k]), float(x[n - 1 - k]), float(x.mean()), n)

@@ -7,8 +7,6 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import dijkstra
 
 from netsp.arrays import Floats, Ints
 from netsp.clock import Clock
@@ -71,6 +69,8 @@ class ContactGraph:
     def __init__(
         self, outline: Outline, tangents: TangentGraph | None = None, clock: Clock | None = None
     ) -> None:
+        from scipy.sparse import csr_array
+
         self.outline = outline
         if tangents is None:
             tangents = build_tangents(outline, np.inf, clock)
@@ -114,6 +114,8 @@ class ContactGraph:
 
     def lengths(self, sources: Sequence[int] | None = None) -> Floats:
         """(sources, points) shortest lengths between the outline's points (default from all)."""
+        from scipy.sparse.csgraph import dijkstra
+
         rows = np.arange(self.points) if sources is None else np.asarray(sources)
         found = dijkstra(self._graph, directed=False, indices=rows)
         return np.asarray(found[:, : self.points])
@@ -141,6 +143,8 @@ class ContactGraph:
 
     def rest(self, goal: int) -> Rest:
         """What is left to a point from the base and from the end of every tangent."""
+        from scipy.sparse.csgraph import dijkstra
+
         found = dijkstra(self._graph, directed=False, indices=goal)
         ends = np.where(
             self.tangents.target >= 2 * len(self.tangents.arcs),
@@ -152,6 +156,8 @@ class ContactGraph:
 
     def tree(self, source: int, limit: float = np.inf) -> tuple[Floats, Ints]:
         """Length to every node and the node before it; inf for those beyond a limit."""
+        from scipy.sparse.csgraph import dijkstra
+
         d, before = dijkstra(
             self._graph, directed=False, indices=source, return_predecessors=True, limit=limit
         )
@@ -224,6 +230,8 @@ class MilestoneGraph:
     """Shortest paths over the straight edges of a roadmap."""
 
     def __init__(self, places: Floats, edges: Ints) -> None:
+        from scipy.sparse import csr_array
+
         self.places = places
         cost = np.hypot(*(places[edges[:, 0]] - places[edges[:, 1]]).T)
         self._graph = csr_array(
@@ -233,6 +241,8 @@ class MilestoneGraph:
 
     def tree(self, source: int) -> tuple[Floats, Ints]:
         """Length to every node and the node before it."""
+        from scipy.sparse.csgraph import dijkstra
+
         d, before = dijkstra(self._graph, directed=False, indices=source, return_predecessors=True)
         return d, before.astype(np.int64)
 

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import connected_components
 
 from netsp.arrays import Bools, Floats, Ints
 from netsp.clock import Clock
@@ -79,6 +77,9 @@ def checked_costs(
     base
         Whether vertex 0 must be alone in cluster 0.
     """
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import connected_components
+
     try:
         c = np.array(costs, dtype=float)
         numbers = np.array(clusters, dtype=float)
