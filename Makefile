@@ -1,4 +1,5 @@
-# Two commands on a fresh machine: `make demo` and `make test`. Each sets up .venv by itself.
+# Two commands on a fresh machine: `make demo` and `make test`. Each sets up .venv by itself: the
+# demo installs what planning needs, the tests add the rest to the same environment.
 VENV   ?= .venv
 PYTHON ?= python3
 BIN     = $(VENV)/bin
@@ -9,13 +10,18 @@ TESTERS = $(shell $(PYTHON) -c 'import os; print((os.cpu_count() or 1) + 1)')
 .PHONY: demo test accept docs wheel wheel-installed pythons tables lint bench js clean
 .DELETE_ON_ERROR:
 
-$(VENV)/.installed: pyproject.toml
+$(VENV)/.core: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e .
+	touch $@
+
+# compiled ahead: the tests run in several processes, and each would compile what it meets
+$(VENV)/.installed: $(VENV)/.core
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[dev]'
 	$(BIN)/netsp warm-up --quiet
 	touch $@
 
-demo: $(VENV)/.installed
+demo: $(VENV)/.core
 	mkdir -p $(DEMO)
 	$(BIN)/netsp solve problems/wharf.json -o $(DEMO)/wharf-solution.json --plot $(DEMO)/wharf.png
 	$(BIN)/netsp verify problems/wharf.json $(DEMO)/wharf-solution.json
@@ -46,7 +52,7 @@ wheel: wheel-installed
 	cd build/wheel && env/bin/netsp solve ../../problems/pool.json -o tour.json --plot tour.png --quiet
 	cd build/wheel && env/bin/netsp verify ../../problems/pool.json tour.json --quiet
 
-wheel-installed: $(VENV)/.installed
+wheel-installed: $(VENV)/.core
 	rm -rf build/wheel && mkdir -p build/wheel
 	$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps -w build/wheel .
 	$(PYTHON) -m venv build/wheel/env
